@@ -1,0 +1,54 @@
+# make test   set up .venv, then check style, types, floors and run all tests, those of plugins/ included
+# make demo   set up .venv, then identify a law from a few noisy creep curves and leave a plot in demo/
+#
+# TORCH chooses another build of torch: make test TORCH='torch==2.13.0' on a machine with a GPU.
+
+SHELL := /bin/bash -euo pipefail
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := test
+.PHONY: test demo clean
+
+PYTHONS := python3.11 python3.12 python3.13
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/pyproject.toml))
+
+TORCH_CPU := torch==2.13.0+cpu
+TORCH_ANY := torch==2.13.0
+CPU_WHEELS := https://download.pytorch.org/whl/cpu
+
+# Two threads of torch on one busy core are far slower than one; pytest runs two workers instead.
+export OMP_NUM_THREADS := 1
+
+test: .venv/.ok
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
+	@for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q); done
+	$(BIN)/pytest -q -n 2
+
+demo: .venv/.ok
+	$(BIN)/creepkit demo --to demo
+
+.venv/.ok: pyproject.toml $(PLUGINS:%=%/pyproject.toml)
+	@echo "set-up 1/4: virtual environment .venv"
+	@for python in $(PYTHONS); do \
+	    if $$python -c 'import ensurepip, venv' >/dev/null 2>&1; then $$python -m venv .venv; exit 0; fi; \
+	done; echo "none of $(PYTHONS) can make a virtual environment; install one of them, with its venv module" >&2; exit 1
+	@echo "set-up 2/4: torch"
+ifdef TORCH
+	@$(PIP) $(TORCH)
+else
+	@$(PIP) '$(TORCH_CPU)' 2>/dev/null \
+	    || $(PIP) --retries 1 --timeout 20 --extra-index-url $(CPU_WHEELS) '$(TORCH_CPU)' 2>/dev/null \
+	    || $(PIP) '$(TORCH_ANY)'
+endif
+	@echo "set-up 3/4: creepkit and what it needs"
+	@$(PIP) --editable '.[dev]'
+	@echo "set-up 4/4: plugins"
+	@for plugin in $(PLUGINS); do $(PIP) --no-build-isolation --editable $$plugin; done
+	@touch $@
+
+clean:
+	rm -rf .venv demo

@@ -1,0 +1,83 @@
+"""creepkit: a creep law is written once, as symbols; kernels, simulation, identification and exports follow from it.
+
+Names load their modules when they are first used, so `import creepkit` itself is quick.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from creepkit import errors as errors
+    from creepkit.kernels import lower as lower
+    from creepkit.language import CreepLaw as CreepLaw
+    from creepkit.language import Elastic as Elastic
+    from creepkit.language import Param as Param
+    from creepkit.language import State as State
+    from creepkit.language import activated as activated
+    from creepkit.language import arrhenius as arrhenius
+    from creepkit.language import exponential as exponential
+    from creepkit.language import inverse as inverse
+    from creepkit.language import linear as linear
+    from creepkit.language import wachtman as wachtman
+    from creepkit.records import History as History
+    from creepkit.records import Nuisance as Nuisance
+    from creepkit.records import PressureJump as PressureJump
+    from creepkit.records import Program as Program
+    from creepkit.records import StressSteps as StressSteps
+    from creepkit.records import constant_stress as constant_stress
+    from creepkit.study import export as export
+    from creepkit.study import identify as identify
+    from creepkit.study import law as law
+    from creepkit.study import laws as laws
+    from creepkit.study import load as load
+    from creepkit.study import rank as rank
+    from creepkit.study import read_histories as read_histories
+    from creepkit.study import simulate as simulate
+    from creepkit.study import specimen as specimen
+    from creepkit.study import specimens as specimens
+
+    __version__: str
+
+_HOMES = {
+    "creepkit.kernels": "lower",
+    "creepkit.language": "CreepLaw Elastic Param State activated arrhenius exponential inverse linear wachtman",
+    "creepkit.records": "History Nuisance PressureJump Program StressSteps constant_stress",
+    "creepkit.study": "export identify law laws load rank read_histories simulate specimen specimens",
+}
+_PUBLIC = {name: home for home, names in _HOMES.items() for name in names.split()}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PUBLIC:
+        value = getattr(import_module(_PUBLIC[name]), name)
+    elif name == "errors":
+        return import_module("creepkit.errors")
+    elif name == "__version__":
+        value = import_module("importlib.metadata").version("creepkit")
+    else:
+        raise AttributeError(f"module 'creepkit' has no attribute '{name}'")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_PUBLIC, "errors", "__version__"})
+
+
+class _Door(ModuleType):
+    """The package as a module on which a public name stays what it is.
+
+    Importing the package creepkit.export (or laws, specimens, inverse) would put that module in the place of the verb
+    of the same name, or not, depending on who imports first.
+    """
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name in _PUBLIC and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Door

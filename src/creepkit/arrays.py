@@ -1,0 +1,22 @@
+"""Aliases for arrays, used in signatures; shapes and units stand in the docstrings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats: TypeAlias = NDArray[np.float64]
+Ints: TypeAlias = NDArray[np.int64]
+Bools: TypeAlias = NDArray[np.bool_]
+
+__all__ = ["ArrayLike", "Bools", "Floats", "Ints", "frozen"]
+
+
+def frozen(values: ArrayLike | Sequence[Any], dtype: type = np.float64) -> NDArray[Any]:
+    """Return a read-only contiguous copy of `values`."""
+    array: NDArray[Any] = np.array(values, dtype=dtype, order="C")
+    array.flags.writeable = False
+    return array

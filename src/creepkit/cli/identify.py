@@ -1,0 +1,136 @@
+"""`creepkit identify`: from a folder of creep curves to a named law with intervals and a plot."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from creepkit.cli.printing import print_json, print_table
+from creepkit.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection import Ranking
+    from creepkit.language import CreepLaw
+    from creepkit.records import History
+
+
+def command(
+    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Measured files, folders or patterns.")],
+    law: Annotated[list[str], typer.Option("--law", metavar="NAME", help="A law to fit; may be given several times.")],
+    to: Annotated[Path, typer.Option(help="Folder for results; made if needed.")] = Path("identified"),
+    reader: Annotated[str | None, typer.Option(help="Reader to use; by default the one that accepts the file.")] = None,
+    temperature: Annotated[
+        str, typer.Option(help="auto: an Arrhenius factor when the tests span several temperatures; or none.")
+    ] = "auto",
+    up_to: Annotated[float | None, typer.Option(help="Use frames up to this strain only, such as 0.05.")] = None,
+    starts: Annotated[int, typer.Option(min=1, help="Starts of the search.")] = 8,
+    seed: Annotated[int, typer.Option(help="Seed of the search.")] = 0,
+    loss: Annotated[str, typer.Option(help="linear, soft_l1, huber, cauchy or arctan.")] = "linear",
+    as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
+) -> None:
+    """Fit each named law to all curves at once, rank the laws, write JSON, plots, LaTeX and Python."""
+    from creepkit import study
+    from creepkit.errors import FitError
+
+    if temperature not in ("auto", "none"):
+        raise FitError(f"--temperature {temperature} is not known; allowed are auto and none")
+    if up_to is not None and not up_to > 0:
+        raise FitError(f"--up-to {up_to:g} is not a strain above zero; write 0.05 for 5 %")
+    named = [study.law(name) for name in dict.fromkeys(law)]
+    histories = study.read_histories(files, reader)
+    if up_to is not None:
+        histories = [h.up_to("strain", up_to) for h in histories]
+    if temperature == "auto":
+        from creepkit.inverse.warmth import with_arrhenius
+
+        named = [with_arrhenius(one, histories) for one in named]
+    ranking = _ranked(named, histories, starts, seed, loss)
+    written = _write(ranking, to)
+    if as_json:
+        print_json(_answer(ranking, written))
+    else:
+        _tell(ranking, written, histories)
+
+
+def _ranked(laws: Sequence[CreepLaw], histories: list[History], starts: int, seed: int, loss: str) -> Ranking:
+    from creepkit import study
+    from creepkit.inverse.selection import rank
+
+    fits = []
+    with Progress() as progress:
+        for one in laws:
+
+            def tick(task: str, done: int, total: int, name: str = one.name) -> None:
+                progress.tick(f"{name}, {task}", done, total)
+
+            fits.append(study.identify(one, histories, starts=starts, seed=seed, loss=loss, progress=tick))
+    return rank(fits)
+
+
+def _write(ranking: Ranking, folder: Path) -> list[Path]:
+    """Write every law's JSON and plot, and the best law as LaTeX and Python; returns the paths."""
+    from creepkit import study
+
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for ranked in ranking.laws:
+        name = folder / slug(ranked.fit.law.name)
+        written.append(ranked.fit.save(name.with_suffix(".json")))
+        ranked.fit.plot(name.with_suffix(".png"))
+        written.append(name.with_suffix(".png"))
+    best = ranking.best
+    for language, suffix in (("latex", ".tex"), ("python", ".py")):
+        path = folder / f"{slug(best.law.name)}{suffix}"
+        study.export(best, language, to=path)
+        written.append(path)
+    return written
+
+
+def slug(name: str) -> str:
+    """A law's name as a file name."""
+    return re.sub(r"[^A-Za-z0-9.=-]+", "-", name).strip("-") or "law"
+
+
+def _tell(ranking: Ranking, written: list[Path], histories: list[History]) -> None:
+    rows = [
+        (
+            ranked.fit.law.name,
+            str(len(ranked.fit.law.params)),
+            f"{ranked.fit.rms:.3f}",
+            f"{100 * ranked.fit.scatter.rate:.0f} %",
+            f"{100 * ranked.fit.scatter.drift:.0f} %",
+            f"{ranked.excess:.1f}",
+            f"{ranked.weight:.3f}",
+        )
+        for ranked in ranking.laws
+    ]
+    columns = ("law", "parameters", "rms ln strain", "test to test", "not followed", "BIC - best", "weight")
+    print_table(f"{len(histories)} tests", columns, rows)
+    typer.echo(f"{ranking.verdict}\n\n{ranking.best}\n")
+    for path in written:
+        typer.echo(f"wrote {path}")
+
+
+def _answer(ranking: Ranking, written: list[Path]) -> dict[str, Any]:
+    return {
+        "verdict": ranking.verdict,
+        "laws": [{**_summary(r.fit), "bic_excess": r.excess, "weight": r.weight} for r in ranking.laws],
+        "files": [str(path) for path in written],
+    }
+
+
+def _summary(fit: Identification) -> dict[str, Any]:
+    return {
+        "law": fit.law.name,
+        "rms_ln_strain": fit.rms,
+        "parameters": {e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
+                       for e in fit.estimates},
+        "scatter": fit.scatter.to_dict(),
+        "notes": list(fit.notes),
+    }  # fmt: skip

@@ -1,0 +1,59 @@
+"""`creepkit laws`: the laws that are known, or one of them in full."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from creepkit.cli.printing import print_json, print_table
+
+if TYPE_CHECKING:
+    from creepkit.language import CreepLaw
+    from creepkit.registry import Registered
+
+
+def command(
+    name: Annotated[str | None, typer.Argument(help="Show this law in full.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """List the laws that are known, or show one in full."""
+    from creepkit import registry
+
+    known = registry.default().laws()
+    if name is not None:
+        law = registry.default().law(name)
+        _show_one(law, known[name], as_json)
+    elif as_json:
+        print_json([_record(found) for found in known.values()])
+    else:
+        rows = [(law.name, law.title, " ".join(law.names)) for law in (found.value for found in known.values())]
+        print_table(f"{len(rows)} laws", ("name", "title", "parameters"), rows)
+
+
+def _show_one(law: CreepLaw, found: Registered[CreepLaw], as_json: bool) -> None:
+    if as_json:
+        print_json(_record(found))
+    else:
+        typer.echo(f"{law}\n  from {found.provenance}\n  LaTeX: {law.latex()}")
+
+
+def _record(found: Registered[CreepLaw]) -> dict[str, Any]:
+    """Return all that a law says, as JSON types; the text of a term is for reading, never to be parsed."""
+    law = found.value
+    table = law.table.items()
+    return {
+        "name": law.name,
+        "title": law.title,
+        "provenance": str(found.provenance),
+        "fingerprint": law.fingerprint,
+        "terms": {label: str(term) for label, term in law.terms.items()},
+        "parameters": {
+            name: {"meaning": p.meaning, "unit": p.unit, "bounds": p.bounds, "scale": p.scale, "off": p.off}
+            for name, p in table
+        },
+        "states": {symbol.name: {"rate": str(s.rate), "initial": s.initial} for symbol, s in law.states.items()},
+        "constraints": [str(relation) for relation in law.constraints],
+        "references": list(law.references),
+        "latex": law.latex(),
+    }

@@ -1,0 +1,46 @@
+"""`creepkit plugins`: what is loaded, where it came from, and what is wrong with it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from creepkit.cli.printing import print_json, print_table
+
+if TYPE_CHECKING:
+    from creepkit.registry import Plugin
+
+
+def command(as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False) -> None:
+    """List the plugins, what they offer and what is wrong."""
+    from creepkit import registry
+
+    plugins, clashes = registry.default().plugins(), registry.default().clashes()
+    if as_json:
+        print_json({"plugins": [_record(plugin) for plugin in plugins], "clashes": clashes})
+        return
+    rows = [(p.provenance.name, p.provenance.origin, _offers(p), _status(p)) for p in plugins]
+    print_table(f"{len(rows)} plugins", ("plugin", "from", "offers", "status"), rows)
+    for sentence in (*(plugin.problem for plugin in plugins if plugin.problem), *clashes):
+        typer.echo(sentence)
+
+
+def _record(plugin: Plugin) -> dict[str, Any]:
+    return {
+        "name": plugin.provenance.name,
+        "from": plugin.provenance.origin,
+        "status": _status(plugin),
+        "problem": plugin.problem,
+        "offers": {word: list(things) for word, things in plugin.offers.items()},
+        "commands": plugin.commands,
+    }
+
+
+def _offers(plugin: Plugin) -> str:
+    told = [f"{word} {name}" for word, things in plugin.offers.items() for name in things]
+    return ", ".join(told + ["commands"] * plugin.commands)
+
+
+def _status(plugin: Plugin) -> str:
+    return "broken" if plugin.problem else "ok"

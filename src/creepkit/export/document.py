@@ -1,0 +1,74 @@
+"""JSON: the law as trees, its values and notes; the one export that creepkit reads back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from creepkit.errors import ExportError
+from creepkit.language.law import CreepLaw
+from creepkit.language.symbols import GAS_CONSTANT
+from creepkit.language.tree import law_from_json, law_to_json
+
+FORMAT = "creepkit-valued-law"
+VERSION = 1
+_KEYS = {"format", "version", "units", "gas_constant", "law", "values", "notes"}
+
+
+@dataclass(frozen=True)
+class JsonExporter:
+    """The law, its values and notes as JSON; `read_valued_law` reads it."""
+
+    name: str = "json"
+    title: str = "JSON that creepkit reads back"
+    suffix: str = ".json"
+
+    def text(self, law: CreepLaw, values: Mapping[str, float], notes: Sequence[str] = ()) -> str:
+        """Return the document as text, indented."""
+        document = {
+            "format": FORMAT,
+            "version": VERSION,
+            "units": {"stress": "MPa", "time": "s", "temperature": "K", "energy": "J/mol"},
+            "gas_constant": GAS_CONSTANT,
+            "law": law_to_json(law),
+            "values": law.values(values),
+            "notes": list(notes),
+        }
+        return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+@dataclass(frozen=True)
+class ValuedLaw:
+    """A law with its values, {parameter: number in its unit}, and notes."""
+
+    law: CreepLaw
+    values: Mapping[str, float]
+    notes: tuple[str, ...]
+
+
+def read_valued_law(text: str, source: str = "exported law") -> ValuedLaw:
+    """Return what JsonExporter wrote; ExportError or LawError, naming `source`, when it is anything else."""
+    data = _parsed(text, source)
+    if not isinstance(data, dict) or data.get("format") != FORMAT or data.get("version") != VERSION:
+        raise ExportError(f"{source}: this is not a law that creepkit exported (format '{FORMAT}', version {VERSION})")
+    if set(data) != _KEYS:
+        odd = ", ".join(sorted(set(data) ^ _KEYS))
+        raise ExportError(f"{source}: the entries {odd} are missing or unknown; allowed are {', '.join(sorted(_KEYS))}")
+    values, notes = data["values"], data["notes"]
+    if not isinstance(values, dict) or any(type(v) not in (int, float) for v in values.values()):
+        raise ExportError(f"{source}: 'values' must be numbers by the names of parameters")
+    if not isinstance(notes, list) or any(type(note) is not str for note in notes):
+        raise ExportError(f"{source}: 'notes' must be a list of texts")
+    law = law_from_json(data["law"], source)
+    return ValuedLaw(law, law.values(values), tuple(notes))
+
+
+def _parsed(text: str, source: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ExportError(f"{source}, line {error.lineno}: not JSON: {error.msg}") from None
+    except (ValueError, RecursionError):
+        raise ExportError(f"{source}: not a law: it holds an integer too long or lists nested too deep") from None

@@ -1,0 +1,49 @@
+"""The hooks: everything a plugin can add, one typed function and one sentence each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import pluggy
+
+if TYPE_CHECKING:
+    import typer
+
+    from creepkit.language.law import CreepLaw
+    from creepkit.language.thermal import Factor, TemperatureForm
+    from creepkit.records import Exporter, Reader, Specimen
+
+PROJECT = "creepkit"
+hookspec = pluggy.HookspecMarker(PROJECT)
+hookimpl = pluggy.HookimplMarker(PROJECT)
+
+
+@hookspec
+def creepkit_laws() -> Sequence[CreepLaw]:  # type: ignore[empty-body]
+    """Return creep laws; each name must be new."""
+
+
+@hookspec
+def creepkit_specimens() -> Sequence[Specimen]:  # type: ignore[empty-body]
+    """Return specimens: what is loaded, and which outputs are observed."""
+
+
+@hookspec
+def creepkit_readers() -> Sequence[Reader]:  # type: ignore[empty-body]
+    """Return readers that turn measured files into histories."""
+
+
+@hookspec
+def creepkit_exporters() -> Sequence[Exporter]:  # type: ignore[empty-body]
+    """Return exporters that write a law and its values as text."""
+
+
+@hookspec
+def creepkit_temperature_forms() -> Mapping[str, Any]:  # type: ignore[empty-body]
+    """Return {name: function of T_ref} giving temperature forms or factors."""
+
+
+@hookspec
+def creepkit_commands(app: typer.Typer) -> None:
+    """Add commands to the command line."""

@@ -1,0 +1,207 @@
+"""Integration of many candidates over many tests, in one call of compiled code."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from creepkit.arrays import Floats, Ints, frozen
+from creepkit.errors import SolveError
+from creepkit.integration.point import (
+    DIVERGED,
+    REACHED_END,
+    SINGULAR,
+    STATE_LIMIT,
+    STEP_TOO_SMALL,
+    STRAIN_LIMIT,
+    TOO_MANY_STEPS,
+    Kernel,
+    Settings,
+    integrate_point,
+)
+from creepkit.integration.segments import segments_of
+from creepkit.integration.stage import UNIAXIAL, Axes
+from creepkit.integration.step import Drive, room
+from creepkit.integration.tableau import SDIRK4, Tableau
+from creepkit.kernels.interface import CompiledLaw
+from creepkit.records import Program, Status
+
+REASONS = {
+    REACHED_END: "",
+    STRAIN_LIMIT: "creep strain reached the strain limit",
+    STATE_LIMIT: "an internal variable reached its limit",
+    DIVERGED: "the creep rate diverged",
+    STEP_TOO_SMALL: "the time step became too small",
+    TOO_MANY_STEPS: "the cap on steps was reached",
+    SINGULAR: "the sensitivities are singular",
+}
+"""What each ending means, in words."""
+
+_STATUS = np.full(len(REASONS), int(Status.NOT_CONVERGED))
+_STATUS[REACHED_END] = Status.COMPLETE
+_STATUS[[STRAIN_LIMIT, STATE_LIMIT, DIVERGED]] = Status.BURST
+
+
+@dataclass(frozen=True, eq=False)
+class PointTest:
+    """What a material point goes through: sigma = (driving - stiffness p) exp(p) under load, else without exp(p).
+
+    driving : MPa; stress, nominal stress under constant load, or E times the total strain in relaxation.
+    temperature : K. times : (times,) s, non-decreasing. stiffness : MPa; 0 unless the strain is prescribed.
+    """
+
+    driving: Program
+    temperature: Program
+    times: Floats
+    stiffness: float = 0.0
+    constant_load: bool = False
+
+    def __post_init__(self) -> None:
+        times = frozen(np.atleast_1d(self.times))
+        if not np.isfinite(times).all() or (np.diff(times) < 0).any() or (times < 0).any():
+            raise SolveError("output times must be finite, at or after 0 s, and must not decrease")
+        if self.stiffness < 0 or (self.stiffness > 0 and self.constant_load):
+            raise SolveError("stiffness must not be negative, and goes with prescribed strain, not with constant load")
+        object.__setattr__(self, "times", times)
+
+
+@dataclass(frozen=True, eq=False)
+class Integration:
+    """Strain of candidates x tests; the tests lie one behind another along the last axis of `strain`.
+
+    strain : (candidates, frames), NaN after an end; starts : (tests + 1,) where each test's frames begin.
+    jacobian : (candidates, frames, P) or None, derivatives to the internal parameters.
+    endings : (candidates, tests) codes, see REASONS; end_times : s; steps : (candidates, tests, 2) accepted, rejected.
+    """
+
+    strain: Floats
+    starts: Ints
+    jacobian: Floats | None
+    endings: Ints
+    end_times: Floats
+    steps: Ints
+
+    @property
+    def status(self) -> Ints:
+        """Status of each row, (candidates, tests)."""
+        return np.asarray(_STATUS[self.endings])
+
+    def of(self, test: int) -> Floats:
+        """Strain of one test, (candidates, times)."""
+        return np.asarray(self.strain[:, self.starts[test] : self.starts[test + 1]])
+
+
+def integrate(
+    law: CompiledLaw,
+    theta: Floats,
+    tests: Sequence[PointTest],
+    *,
+    settings: Settings | None = None,
+    jacobian: bool = False,
+    axes: Axes = UNIAXIAL,
+    tableau: Tableau = SDIRK4,
+) -> Integration:
+    """Integrate every candidate, theta (candidates, P) in internal form, over every test."""
+    theta = np.array(theta, dtype=float, order="C", ndmin=2)
+    candidates, parameters = theta.shape
+    segments = [segments_of(t.driving, t.temperature, float(t.times[-1]) if t.times.size else 0.0) for t in tests]
+    starts = np.concatenate([[0], np.cumsum([t.times.size for t in tests], dtype=np.int64)])
+    cuts = np.concatenate([[0], np.cumsum([s.shape[0] for s in segments], dtype=np.int64)])
+    frames, rows = int(starts[-1]), candidates if jacobian else 0
+    strain = np.full((candidates, frames), np.nan)
+    changes = np.full((rows, frames, parameters), np.nan)
+    endings = np.zeros((candidates, len(tests)), dtype=np.int64)
+    end_times = np.zeros((candidates, len(tests)))
+    steps = np.zeros((candidates, len(tests), 2), dtype=np.int64)
+    drives = np.array([[t.stiffness, float(t.constant_load)] for t in tests]).reshape(-1, 2)
+    beta, beta_slopes = leading_exponents(law, theta, jacobian)
+    integrate_batch(
+        law.update,
+        law.sensitivity,
+        theta,
+        beta,
+        beta_slopes,
+        np.array(law.initial),
+        np.array(law.limits),
+        drives,
+        axes,
+        np.concatenate([*segments, np.zeros((0, 6))]),
+        cuts,
+        np.concatenate([*(t.times for t in tests), np.zeros(0)]),
+        starts,
+        settings or Settings(),
+        tableau,
+        strain,
+        changes,
+        endings,
+        end_times,
+        steps,
+    )
+    return Integration(strain, starts, changes if jacobian else None, endings, end_times, steps)
+
+
+def leading_exponents(law: CompiledLaw, theta: Floats, slopes: bool) -> tuple[Floats, Floats]:
+    """The leading exponent of time (candidates,), and its derivatives (candidates, P), zero unless asked for."""
+    beta = np.array(law.leading(theta), dtype=float).reshape(theta.shape[0])
+    change = np.zeros(theta.shape)
+    if slopes:
+        step = 1e-6
+        for p in range(theta.shape[1]):
+            up, down = theta.copy(), theta.copy()
+            up[:, p] += step
+            down[:, p] -= step
+            change[:, p] = (np.asarray(law.leading(up)) - np.asarray(law.leading(down))) / (2 * step)
+    return beta, change
+
+
+@njit(cache=True)
+def integrate_batch(
+    update: Any,
+    sensitivity: Any,
+    theta: Floats,
+    beta: Floats,
+    beta_slopes: Floats,
+    initial: Floats,
+    limits: Floats,
+    drives: Floats,
+    axes: Axes,
+    segments: Floats,
+    cuts: Ints,
+    times: Floats,
+    starts: Ints,
+    settings: Settings,
+    tableau: Tableau,
+    strain: Floats,
+    jacobian: Floats,
+    endings: Ints,
+    end_times: Floats,
+    steps: Ints,
+) -> None:
+    """Integrate candidates x tests without returning to Python; arrays as in Integration, tests laid end to end."""
+    work = room(initial.size, theta.shape[1], tableau.c.size)
+    nothing = np.zeros((0, theta.shape[1]))
+    for c in range(theta.shape[0]):
+        kernel = Kernel(theta[c], beta[c], beta_slopes[c], initial, limits)
+        for k in range(drives.shape[0]):
+            drive = Drive(drives[k, 0], drives[k, 1], axes)
+            first, last = starts[k], starts[k + 1]
+            changes = jacobian[c, first:last] if jacobian.shape[0] > 0 else nothing
+            ending = integrate_point(
+                update,
+                sensitivity,
+                kernel,
+                drive,
+                segments[cuts[k] : cuts[k + 1]],
+                times[first:last],
+                settings,
+                tableau,
+                work,
+                strain[c, first:last],
+                changes,
+            )
+            endings[c, k], end_times[c, k] = ending.code, ending.time
+            steps[c, k, 0], steps[c, k, 1] = ending.steps, ending.rejected

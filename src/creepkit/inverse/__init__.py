@@ -1,0 +1,1 @@
+"""From histories to a law with intervals: coordinates, objective, search, scatter, uncertainty, ranking."""

@@ -1,0 +1,104 @@
+"""Well-conditioned coordinates: the log rate of each term at a reference point instead of its coefficient.
+
+A and n are correlated to -0.99999 in raw form; ln of the term's rate at the middle of the measured stresses, and n,
+are nearly independent. With theta the internal parameters, u equals theta but for each term's coefficient ln A_i,
+which becomes u_i = ln f_i(reference; theta). The map is linear in ln A_i, so it inverts at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.kernels import Kernel, lower
+from creepkit.language import CreepLaw
+from creepkit.records import History
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The point at which term rates are stated: stress MPa, strain, time s, temperature K."""
+
+    stress: float
+    strain: float
+    time: float
+    temperature: float
+
+    @classmethod
+    def of(cls, histories: Sequence[History], output: str = "strain") -> Reference:
+        """The middle of what was measured: geometric means of stress and time, of half the end strain; median T."""
+        stresses = [float(np.exp(np.mean(np.log(np.maximum(h.loading.program().values, 1e-6))))) for h in histories]
+        times = [float(h.times[h.used][-1]) for h in histories]
+        strains = [max(float(np.max(h.outputs[output][h.used])), 1e-7) for h in histories]
+        warmth = [float(np.mean(h.temperature_program().values)) for h in histories]
+        middle = [float(np.exp(np.mean(np.log(v)))) for v in (stresses, strains, times)]
+        return cls(middle[0], 0.5 * middle[1], 0.5 * middle[2], float(np.median(warmth)))
+
+
+class Coordinates:
+    """The map between internal parameters theta and conditioned coordinates u, both (..., parameters)."""
+
+    def __init__(self, law: CreepLaw, reference: Reference) -> None:
+        self.law, self.reference = law, reference
+        self.names = law.names
+        self._terms: list[tuple[int, list[int], Kernel]] = []
+        for label in law.terms:
+            single = law.only(label)
+            k = _coefficient(law, single)
+            if k is not None:
+                self._terms.append((k, [law.names.index(n) for n in single.names], lower(single, "numpy")))
+
+    @property
+    def rates(self) -> tuple[int, ...]:
+        """Positions of the coordinates that are log rates of terms."""
+        return tuple(k for k, _, _ in self._terms)
+
+    def theta(self, u: Floats) -> Floats:
+        """Internal parameters of conditioned coordinates."""
+        theta = np.array(u, float)
+        for k, positions, kernel in self._terms:
+            part = np.array(u, float)
+            part[..., k] = 0.0
+            theta[..., k] = u[..., k] - self._log_rate(kernel, part[..., positions])
+        return theta
+
+    def u(self, theta: Floats) -> Floats:
+        """Conditioned coordinates of internal parameters."""
+        u = np.array(theta, float)
+        for k, positions, kernel in self._terms:
+            u[..., k] = self._log_rate(kernel, theta[..., positions])
+        return u
+
+    def jacobian(self, u: Floats) -> Floats:
+        """d theta / d u at one u, (parameters, parameters)."""
+        theta = self.theta(u)
+        matrix = np.eye(theta.size)
+        for k, positions, kernel in self._terms:
+            found = kernel.internal_derivatives(*self._point(kernel.law), *theta[positions])
+            for name, position in zip(kernel.law.names, positions, strict=True):
+                if position != k:
+                    matrix[k, position] = -float(found.params[name]) / float(found.rate)
+        return matrix
+
+    def _point(self, law: CreepLaw) -> list[float]:
+        r = self.reference
+        return [r.stress, r.strain, r.time, r.temperature, r.stress, r.stress / 3, *(z.initial for z in law.states.values())]
+
+    def _log_rate(self, kernel: Kernel, theta: Floats) -> Floats:
+        return np.asarray(kernel.internal_log_rate(*self._point(kernel.law), *np.moveaxis(theta, -1, 0)), float)
+
+
+def _coefficient(law: CreepLaw, single: CreepLaw) -> int | None:
+    """Position of the one log-scale parameter that multiplies this term and no other, if there is one."""
+    from creepkit.kernels.logform import log_form
+
+    (own,) = log_form(single).coefficients
+    names = [single.names[k] for k in own]
+    shared = [
+        sum(symbol in term.free_symbols for term in law.terms.values()) for symbol in (law.symbol(n) for n in names)
+    ]
+    alone = [n for n, count in zip(names, shared, strict=True) if count == 1]
+    return law.names.index(alone[0]) if alone else None

@@ -1,0 +1,132 @@
+"""How residuals of creep tests scatter: four sources with a standard deviation each, found from the data.
+
+Residuals on the log scale are not independent: one test creeps twice as fast as its twin and stays so, a model that
+bends wrongly is wrong for decades of time on end. The covariance of one test's residuals is
+
+    C = noise^2 S S + offset^2 s s' + rate^2 d d' + drift^2 exp(-|ln t - ln t'| / reach)
+
+with s = dg/dy (S its diagonal): `noise` of each frame (in the output's unit), `offset` of the whole curve (loading
+strain, same unit), `rate` scatter between tests (d = derivative to ln of a factor on the creep rate: heat-to-heat
+scatter) and `drift`, an Ornstein-Uhlenbeck process in ln t for what the law cannot follow, which makes error bars
+honest under autocorrelation. Sizes are those of largest marginal likelihood (a first-order mixed-effects model,
+Pinheiro & Bates (2000), Mixed-Effects Models in S and S-PLUS, ch. 7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from creepkit.arrays import Floats
+from creepkit.inverse.objective import Residuals
+from creepkit.records import Nuisance
+
+_JITTER = 1e-10
+SOURCES = ("noise", "offset", "rate", "drift", "reach")
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Standard deviations of the sources of scatter.
+
+    noise, offset : in the output's unit; rate, drift : in ln strain rate and ln strain; reach : in ln t.
+    """
+
+    noise: float
+    offset: float = 0.0
+    rate: float = 0.0
+    drift: float = 0.0
+    reach: float = 1.0
+
+    def to_dict(self) -> dict[str, float]:
+        """Plain numbers by name."""
+        return {k: float(v) for k, v in asdict(self).items()}
+
+
+def covariance(residuals: Residuals, log_times: Floats, scatter: Scatter) -> Floats:
+    """(tests, frames, frames); absent frames have unit variance and no company."""
+    s, present = residuals.slopes, residuals.present
+    d = np.zeros_like(s) if residuals.rate_effect is None else residuals.rate_effect
+    lag = np.abs(log_times[:, :, None] - log_times[:, None, :])
+    c = scatter.drift**2 * np.exp(-lag / scatter.reach)
+    c += scatter.offset**2 * s[:, :, None] * s[:, None, :] + scatter.rate**2 * d[:, :, None] * d[:, None, :]
+    k = np.arange(s.shape[1])
+    c[:, k, k] += (scatter.noise * s) ** 2 + _JITTER
+    both = present[:, :, None] & present[:, None, :]
+    c = np.where(both, c, 0.0)
+    c[:, k, k] = np.where(present, c[:, k, k], 1.0)
+    return np.asarray(c)
+
+
+def whitener(residuals: Residuals, log_times: Floats, scatter: Scatter) -> Floats:
+    """Lower Cholesky factors L of the covariance, (tests, frames, frames); L^-1 r is white."""
+    return np.asarray(np.linalg.cholesky(covariance(residuals, log_times, scatter)))
+
+
+def log_likelihood(residuals: Residuals, log_times: Floats, scatter: Scatter) -> float:
+    """Gaussian log-likelihood of the residuals given the scatter."""
+    factor = whitener(residuals, log_times, scatter)
+    white = np.linalg.solve(factor, residuals.values[..., None])[..., 0]
+    k = np.arange(factor.shape[1])
+    log_det = 2.0 * np.log(factor[:, k, k]).sum()
+    count = int(residuals.present.sum())
+    return float(-0.5 * ((white**2).sum() + log_det + count * np.log(2 * np.pi)))
+
+
+def expected_effects(residuals: Residuals, log_times: Floats, scatter: Scatter) -> tuple[Floats, Floats]:
+    """Best linear prediction of each test's own offset and ln rate factor, (tests,) each; 0 where unknown."""
+    c = covariance(residuals, log_times, scatter)
+    weighted = np.linalg.solve(c, -residuals.values[..., None])[..., 0]
+    effect = np.zeros_like(residuals.slopes) if residuals.rate_effect is None else residuals.rate_effect
+    offset = scatter.offset**2 * (residuals.slopes * weighted).sum(axis=1)
+    return offset, scatter.rate**2 * (effect * weighted).sum(axis=1)
+
+
+def effective_size(residuals: Residuals, log_times: Floats, scatter: Scatter) -> float:
+    """Number of independent observations that carry the same information on a common mean as all frames together."""
+    c = covariance(residuals, log_times, replace(scatter, offset=0.0))
+    k = np.arange(c.shape[1])
+    sd = np.sqrt(c[:, k, k])
+    correlation = c / (sd[:, :, None] * sd[:, None, :])
+    ones = residuals.present.astype(float)
+    weights = np.linalg.solve(correlation, ones[..., None])[..., 0]
+    return float(np.clip((ones * weights).sum(), len(ones), ones.sum()))
+
+
+def first_guess(noise: float, histories: int, nuisances: Sequence[Nuisance]) -> Scatter:
+    """Scatter assumed before anything was fitted: broad, so that no curve dominates."""
+    return fitted_only(Scatter(max(noise, 1e-7), 3 * max(noise, 1e-7), 0.5, 0.2, 2.0), histories, nuisances)
+
+
+def fitted_only(scatter: Scatter, histories: int, nuisances: Sequence[Nuisance]) -> Scatter:
+    """Switch off the sources that are not among the nuisances, and fix those whose prior is given."""
+    sizes = {"offset": 0.0, "rate": 0.0}
+    for nuisance in nuisances:
+        if nuisance.kind == "rate" and histories < 3:
+            continue
+        if nuisance.kind in sizes:
+            sizes[nuisance.kind] = nuisance.sd if nuisance.sd is not None else getattr(scatter, nuisance.kind)
+    return replace(scatter, **sizes)
+
+
+def estimated(residuals: Residuals, log_times: Floats, start: Scatter, nuisances: Sequence[Nuisance]) -> Scatter:
+    """The scatter of largest likelihood, beginning from `start`; sources at zero or with a given prior stay."""
+    given = {n.kind for n in nuisances if n.sd is not None}
+    free = [name for name in SOURCES if getattr(start, name) > 0 and name not in given]
+    typical = float(np.median(1.0 / np.maximum(residuals.slopes[residuals.present], 1e-12)))
+    low = {"noise": 1e-5 * typical, "offset": 1e-5 * typical, "rate": 1e-3, "drift": 1e-4, "reach": 0.05}
+    high = {"noise": typical, "offset": typical, "rate": 5.0, "drift": 5.0, "reach": 20.0}
+
+    def scatter_at(x: Floats) -> Scatter:
+        return replace(start, **{n: float(v) for n, v in zip(free, np.exp(x), strict=True)})
+
+    def cost(x: Floats) -> float:
+        return -log_likelihood(residuals, log_times, scatter_at(x))
+
+    bounds = [(np.log(low[n]), np.log(max(high[n], 2 * low[n]))) for n in free]
+    x0 = np.array([np.clip(np.log(getattr(start, n)), *b) for n, b in zip(free, bounds, strict=True)])
+    found = minimize(cost, x0, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "ftol": 1e-7})
+    return scatter_at(found.x)

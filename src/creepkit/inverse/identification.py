@@ -1,0 +1,168 @@
+"""Identification: the law of a set of tests, its values with intervals, how tests scatter, and how well it fits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.inverse.coordinates import Coordinates, Reference
+from creepkit.inverse.covariance import Scatter
+from creepkit.inverse.uncertainty import Z95, Estimate, band
+from creepkit.language import CreepLaw
+from creepkit.records import History, Prediction, Predictor
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class TestMisfit:
+    """One test in the fit.
+
+    rms, bias : root mean square and mean of ln(predicted / measured) over its fitted frames.
+    offset : estimated loading strain that the law does not explain, in the output's unit.
+    rate_factor : estimated factor of this test's creep rate on the law's (heat-to-heat scatter).
+    """
+
+    __test__ = False  # not a test case, whatever its name says to pytest
+
+    name: str
+    condition: str
+    frames: int
+    rms: float
+    bias: float
+    offset: float = 0.0
+    rate_factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a run can be repeated from."""
+
+    starts: int = 8
+    draws: int = 64
+    frames: int = 40
+    seed: int = 0
+    loss: str = "linear"
+    limits: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """The answer of identify().
+
+    estimates : one Estimate for each parameter, in the law's order.
+    u, covariance : conditioned coordinates at the optimum and their posterior covariance (see inverse.coordinates).
+    scatter : standard deviations of the sources of scatter, found from the data.
+    rms : root mean square of ln(predicted / measured) over the fitted frames of all tests.
+    ranges : {"stress", "temperature", "strain", "time": (low, high)} that the fitted frames cover; MPa, K, s.
+    bic, log_likelihood, size : -2 ln L + K ln(size), with size the number of effectively independent frames.
+    """
+
+    law: CreepLaw
+    estimates: tuple[Estimate, ...]
+    u: Floats
+    covariance: Floats
+    reference: Reference
+    scatter: Scatter
+    rms: float
+    log_likelihood: float
+    size: float
+    misfits: tuple[TestMisfit, ...]
+    ranges: Mapping[str, tuple[float, float]]
+    settings: Settings
+    provenance: Mapping[str, Any]
+    converged: bool = True
+    notes: tuple[str, ...] = ()
+    histories: tuple[History, ...] = ()
+    using: Predictor | None = None
+
+    @property
+    def values(self) -> dict[str, float]:
+        """{parameter: value} in the author's units."""
+        return {e.name: e.value for e in self.estimates}
+
+    @property
+    def bic(self) -> float:
+        """Bayesian information criterion; the scatter sizes count for every law alike and are left out."""
+        return -2.0 * self.log_likelihood + len(self.law.params) * float(np.log(self.size))
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """The map between conditioned coordinates and parameters."""
+        return Coordinates(self.law, self.reference)
+
+    def rate(
+        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        time: ArrayLike | None = None,
+    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+        """Creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape.
+
+        stress MPa, temperature K; strain and time default to those of the reference point.
+        """
+        middle, sd = band(self._log_rates(stress, temperature, strain, time), self.u, self.covariance)
+        return np.exp(middle), np.exp(middle - Z95 * sd), np.exp(middle + Z95 * sd)
+
+    def local_exponent(
+        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        time: ArrayLike | None = None,
+    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+        """Local stress exponent d ln rate / d ln stress with its 95 % interval."""
+        stress = np.asarray(stress, float)
+        up, down = (self._log_rates(stress * f, temperature, strain, time) for f in (1.0005, 1 / 1.0005))
+        middle, sd = band(lambda u: (up(u) - down(u)) / (2 * np.log(1.0005)), self.u, self.covariance)
+        return middle, middle - Z95 * sd, middle + Z95 * sd
+
+    def predict(self, histories: list[History] | None = None, using: Predictor | None = None) -> Prediction:
+        """Predict histories (by default those that were fitted) at the identified values."""
+        predictor = using or self.using
+        if predictor is None:
+            from creepkit.errors import FitError
+
+            raise FitError("this identification was loaded from a file: give using=, the specimen it was made with")
+        return predictor.predict(self.law, self.values, list(histories or self.histories))
+
+    def on(self, histories: Sequence[History], using: Predictor) -> Identification:
+        """The same answer with histories and specimen attached, as after load(), for plots and predictions."""
+        return replace(self, histories=tuple(histories), using=using)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the identification as JSON (to a temporary name, then renamed)."""
+        from creepkit.inverse.files import save
+
+        return save(self, Path(path))
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Measured against identified, and residuals; written to `path` when given."""
+        from creepkit.inverse.plotting import figure_of
+
+        return figure_of(self, path)
+
+    def __str__(self) -> str:
+        from creepkit.inverse.printing import text_of
+
+        return text_of(self)
+
+    def _log_rates(
+        self, stress: ArrayLike, temperature: ArrayLike | None, strain: ArrayLike | None, time: ArrayLike | None
+    ) -> Any:
+        from creepkit.kernels import lower
+
+        kernel, coordinates, r = lower(self.law, "numpy"), self.coordinates, self.reference
+        point = [
+            np.asarray(default if given is None else given, float)
+            for given, default in ((stress, r.stress), (strain, r.strain), (time, r.time), (temperature, r.temperature))
+        ]
+        point += [point[0], point[0] / 3]
+        inner = [z.initial for z in self.law.states.values()]
+
+        def log_rate(u: Floats) -> Floats:
+            out = kernel.internal_log_rate(*point, *inner, *coordinates.theta(u))
+            return np.asarray(out + np.zeros(np.broadcast_shapes(*(p.shape for p in point))), float)
+
+        return log_rate

@@ -1,0 +1,64 @@
+"""Ranking of identified laws by BIC, with weights: a set of laws, "decisive" only above 0.95."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from creepkit.errors import FitError
+from creepkit.inverse.identification import Identification
+
+DECISIVE = 0.95
+CREDIBLE = 0.05
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One law in a ranking: BIC less the best, and its share of belief."""
+
+    fit: Identification
+    excess: float
+    weight: float
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Identified laws, best first."""
+
+    laws: tuple[Ranked, ...]
+
+    @property
+    def best(self) -> Identification:
+        """The law of lowest BIC."""
+        return self.laws[0].fit
+
+    @property
+    def remaining(self) -> tuple[Ranked, ...]:
+        """The laws that the tests cannot rule out: weight above 5 %."""
+        return tuple(r for r in self.laws if r.weight > CREDIBLE)
+
+    @property
+    def verdict(self) -> str:
+        """One sentence: which law, or which laws these tests cannot tell apart."""
+        names = [r.fit.law.name for r in self.remaining]
+        if self.laws[0].weight > DECISIVE:
+            return f"decisive: {names[0]}" if len(self.laws) > 1 else f"only {names[0]} was fitted"
+        return f"not decisive: these tests cannot tell apart {' and '.join(names)}"
+
+
+def rank(fits: Sequence[Identification]) -> Ranking:
+    """Rank identifications made from the same histories."""
+    if not fits:
+        raise FitError("there are no identifications to rank")
+    tests = {tuple(m.name for m in fit.misfits) for fit in fits}
+    if len(tests) > 1:
+        raise FitError("the identifications were made from different histories and cannot be ranked")
+    size = float(np.median([fit.size for fit in fits]))
+    score = np.array([-2 * fit.log_likelihood + len(fit.law.params) * np.log(size) for fit in fits])
+    excess = score - score.min()
+    weight = np.exp(-0.5 * excess)
+    weight /= weight.sum()
+    order = np.argsort(excess)
+    return Ranking(tuple(Ranked(fits[k], float(excess[k]), float(weight[k])) for k in order))

@@ -1,0 +1,89 @@
+"""The compiled interface of a law: what `integration` and `fem` see of it (no sympy here).
+
+An entry is a C function ``int64 entry(int64 rows, double *x, double *theta, double *out)``; all arrays are
+row-major and contiguous, one row a material point. With S states and P parameters:
+
+x : (rows, 6 + S) stress MPa, strain, time s, temperature K, largest principal stress MPa, mean stress MPa, states.
+theta : (P,) internal parameters, the natural logarithm where the scale is log; -inf there switches the term off
+    (the mask for {0}).
+out : one row a point,
+    rate        (1 + S)                     rate 1/s, then each state's rate;
+    update      (1 + S) (1 + 6 + S)         [ln rate, state rates], then their derivatives with respect to x, row by row;
+    sensitivity (1 + S) (1 + 6 + S + P)     [rate, state rates], then derivatives to x, then derivatives to theta.
+The returned flags add up: 1 a rate is not finite, 2 a derivative is not finite.
+
+`update` speaks of ln rate because Newton's method is nearly linear in it and nothing overflows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.extending import intrinsic
+
+from creepkit.arrays import Floats
+
+POINT_SIZE = 6
+STRESS, STRAIN, TIME, TEMPERATURE, PRINCIPAL, MEAN = range(POINT_SIZE)
+
+_DOUBLES: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
+SIGNATURE = types.int64(types.int64, _DOUBLES, _DOUBLES, _DOUBLES)
+ENTRY = types.FunctionType(SIGNATURE)
+"""The numba type of an entry: a function compiled once for it accepts any law."""
+
+RATE_NOT_FINITE = 1
+DERIVATIVE_NOT_FINITE = 2
+
+
+def _pointer(typingctx: Any, array: Any) -> Any:
+    signature = _DOUBLES(array)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        data = context.make_array(sig.args[0])(context, builder, args[0]).data
+        return builder.bitcast(data, context.get_value_type(_DOUBLES))
+
+    return signature, codegen
+
+
+pointer: Any = intrinsic(_pointer)
+"""Inside compiled code: the C pointer to the first number of a contiguous float64 array."""
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledLaw:
+    """A law as compiled entries.
+
+    rate, update, sensitivity : entries, to be passed to numba functions declared with ENTRY; each has `.address`.
+    initial : (S,) states at time zero; limits : (S,) values at which the point has failed (inf: none).
+    log_scale : (P,) which internal parameters are logarithms.
+    leading : function of theta (..., P) giving the exponent beta of time in strain ~ t^beta as t -> 0+ from a
+        virgin state at constant stress, (...,).
+    """
+
+    rate: Any
+    update: Any
+    sensitivity: Any
+    names: tuple[str, ...]
+    log_scale: np.ndarray[Any, np.dtype[np.bool_]]
+    initial: Floats
+    limits: Floats
+    leading: Callable[[Floats], Floats]
+    source: str
+    fingerprint: str
+
+    @property
+    def states(self) -> int:
+        """Number of internal variables, S."""
+        return int(self.initial.size)
+
+    def internal(self, values: Mapping[str, Any]) -> Floats:
+        """Return theta, (candidates, P), from author's values {name: number or (candidates,)}."""
+        columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[name], float)) for name in self.names))
+        theta = np.stack(columns, axis=-1) if columns else np.zeros((1, 0))
+        with np.errstate(divide="ignore"):
+            theta[:, self.log_scale] = np.log(theta[:, self.log_scale])
+        return np.ascontiguousarray(theta)

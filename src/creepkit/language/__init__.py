@@ -1,0 +1,52 @@
+"""The language in which creep laws are written: all that a law plugin imports."""
+
+from creepkit.hookspecs import hookimpl
+from creepkit.language.elastic import Elastic
+from creepkit.language.law import CreepLaw
+from creepkit.language.params import Param, State
+from creepkit.language.symbols import (
+    GAS_CONSTANT,
+    mean_stress,
+    parameters,
+    principal_stress,
+    states,
+    strain,
+    stress,
+    temperature,
+    time,
+)
+from creepkit.language.thermal import (
+    Factor,
+    TemperatureForm,
+    activated,
+    arrhenius,
+    exponential,
+    inverse,
+    linear,
+    wachtman,
+)
+
+__all__ = [
+    "GAS_CONSTANT",
+    "CreepLaw",
+    "Elastic",
+    "Factor",
+    "Param",
+    "State",
+    "TemperatureForm",
+    "activated",
+    "arrhenius",
+    "exponential",
+    "hookimpl",
+    "inverse",
+    "linear",
+    "mean_stress",
+    "parameters",
+    "principal_stress",
+    "states",
+    "strain",
+    "stress",
+    "temperature",
+    "time",
+    "wachtman",
+]

@@ -1,0 +1,41 @@
+"""Elastic data as a record of its own: Young's modulus and Poisson's ratio, constant or functions of temperature."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy
+
+from creepkit.errors import LawError
+from creepkit.language.symbols import temperature
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """Isotropic linear elasticity; E in MPa, a number or an expression of `temperature` such as wachtman(...)."""
+
+    E: float | sympy.Expr
+    nu: float | sympy.Expr = 0.3
+
+    def __post_init__(self) -> None:
+        for name in ("E", "nu"):
+            value = getattr(self, name)
+            if isinstance(value, sympy.Expr):
+                stray = value.free_symbols - {temperature}
+                if stray:
+                    found = ", ".join(sorted(map(str, stray)))
+                    raise LawError(f"Elastic: {name} may depend on temperature alone, found {found}")
+                if value.free_symbols:
+                    continue
+            object.__setattr__(self, name, float(value))
+        if isinstance(self.E, float) and not 0 < self.E < 1e8:
+            raise LawError(f"Elastic: E = {self.E:g} MPa is not a modulus; write it in MPa, such as 150e3")
+        if isinstance(self.nu, float) and not -1 < self.nu < 0.5:
+            raise LawError(f"Elastic: nu = {self.nu:g} is outside (-1, 0.5)")
+
+    def at(self, T: float) -> Elastic:
+        """The same record with numbers, at temperature `T` in K."""
+        E, nu = (
+            float(v.subs(temperature, T)) if isinstance(v, sympy.Expr) else float(v) for v in (self.E, self.nu)
+        )
+        return Elastic(E, nu)

@@ -1,0 +1,238 @@
+"""Expressions as JSON trees and back; nothing is ever evaluated from text.
+
+A tree is a symbol ("stress"), an integer (2) or a list whose first entry is a head: ["mul", "A", ["pow", "stress",
+"n"]]. Other numbers are ["rational", 1, 3] and ["float", 0.1]; a Float of other than double precision is ["float",
+mantissa, exponent, bits]. Rebuilt expressions equal the original exactly, since sympy is told not to rearrange them.
+"""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import mpmath
+import sympy
+from sympy.logic.boolalg import Boolean
+
+from creepkit.errors import LawError, nearest
+from creepkit.language.precise import value_of
+
+DEPTH_LIMIT, SIZE_LIMIT = 60, 5000
+"""Levels and nodes of the largest expression that is written or read."""
+EXPONENT_LIMIT = 1000
+"""Largest numeric exponent."""
+_DIGITS, _BITS = 300, 1024
+_MANY = SIZE_LIMIT
+
+
+@dataclass(frozen=True)
+class _Head:
+    """What a head builds: a sympy type, how many arguments it takes, of which kind, and what kind it is."""
+
+    type: Any
+    least: int = 1
+    most: int = 1
+    takes: type = sympy.Expr
+    gives: type = sympy.Expr
+
+
+_HEADS = {
+    "add": _Head(sympy.Add, 2, _MANY),
+    "mul": _Head(sympy.Mul, 2, _MANY),
+    "pow": _Head(sympy.Pow, 2, 2),
+    **{f.__name__: _Head(f) for f in (sympy.exp, sympy.log, sympy.sinh, sympy.cosh, sympy.tanh, sympy.asinh)},
+    "abs": _Head(sympy.Abs),
+    "sign": _Head(sympy.sign),
+    "max": _Head(sympy.Max, 2, _MANY),
+    "min": _Head(sympy.Min, 2, _MANY),
+    "heaviside": _Head(sympy.Heaviside, 2, 2),
+    "ge": _Head(sympy.GreaterThan, 2, 2, gives=Boolean),
+    "gt": _Head(sympy.StrictGreaterThan, 2, 2, gives=Boolean),
+    "le": _Head(sympy.LessThan, 2, 2, gives=Boolean),
+    "lt": _Head(sympy.StrictLessThan, 2, 2, gives=Boolean),
+    "and": _Head(sympy.And, 2, _MANY, Boolean, Boolean),
+    "or": _Head(sympy.Or, 2, _MANY, Boolean, Boolean),
+}
+_NAMES = {head.type: name for name, head in _HEADS.items()}
+_CONSTANTS = {"pi": sympy.pi, "e": sympy.E, "true": sympy.true, "false": sympy.false}
+_WORDS = (*_HEADS, *_CONSTANTS, "rational", "float", "piecewise")
+
+
+# ---- writing -------------------------------------------------------------------------------------------------------
+
+
+def to_tree(expression: sympy.Basic) -> Any:
+    """Return the tree of an expression or condition; LawError when it holds what the language does not know."""
+    return _Writer().tree(expression, 0)
+
+
+class _Writer:
+    def __init__(self) -> None:
+        self.size = 0
+
+    def tree(self, expression: sympy.Basic, depth: int) -> Any:
+        self.size += 1
+        _check_size(self.size, depth)
+        if isinstance(expression, sympy.Symbol):
+            return _name_of(expression)
+        if isinstance(expression, sympy.Float):
+            return _float_tree(expression)
+        if isinstance(expression, sympy.Integer):
+            return _small(int(expression))
+        if isinstance(expression, sympy.Rational):
+            return ["rational", _small(int(expression.p)), _small(int(expression.q))]
+        for word, constant in _CONSTANTS.items():
+            if expression is constant:
+                return [word]
+        if isinstance(expression, sympy.Piecewise):
+            pairs = [[self.tree(part, depth + 1) for part in pair.args] for pair in expression.args]
+            return ["piecewise", *pairs]
+        name = _NAMES.get(expression.func)
+        if name is None:
+            raise LawError(f"'{expression}' cannot be written to a file; known are the heads {', '.join(_WORDS)}")
+        return [name, *(self.tree(argument, depth + 1) for argument in expression.args)]
+
+
+def _name_of(symbol: sympy.Symbol) -> str:
+    if symbol != sympy.Symbol(symbol.name, real=True):
+        raise LawError(f"the symbol '{symbol}' carries assumptions; make symbols with parameters(\"{symbol}\")")
+    return str(symbol.name)
+
+
+def _float_tree(number: sympy.Float) -> list[Any]:
+    bits = int(number._prec)
+    if bits == 53 and sympy.Float(float(number))._mpf_ == number._mpf_:
+        return ["float", float(number)]
+    sign, mantissa, exponent, _ = number._mpf_
+    return ["float", int(-mantissa if sign else mantissa), int(exponent), bits]
+
+
+# ---- reading -------------------------------------------------------------------------------------------------------
+
+
+def from_tree(tree: Any, symbols: Mapping[str, sympy.Symbol]) -> sympy.Expr:
+    """Return the expression of a tree whose names are all in `symbols`; LawError for anything else."""
+    return _Reader(symbols).read(tree, sympy.Expr)
+
+
+def condition_from_tree(tree: Any, symbols: Mapping[str, sympy.Symbol]) -> Boolean:
+    """Return the relation of a tree, such as ["ge", "n", 0]; LawError for anything else."""
+    return _Reader(symbols).read(tree, Boolean)
+
+
+class _Reader:
+    def __init__(self, symbols: Mapping[str, sympy.Symbol]) -> None:
+        self.symbols = symbols
+        self.size = 0
+
+    def read(self, tree: Any, kind: type) -> Any:
+        return self.node(tree, kind, 0)
+
+    def node(self, tree: Any, kind: type, depth: int) -> Any:
+        self.size += 1
+        _check_size(self.size, depth)
+        found = self.atom(tree) if not isinstance(tree, list) else self.branch(tree, depth)
+        if not isinstance(found, kind) or (kind is Boolean and isinstance(found, sympy.Symbol)):
+            wanted = "a number" if kind is sympy.Expr else "a condition"
+            raise LawError(f"the expression holds {_shown(tree)} where {wanted} is needed")
+        return found
+
+    def atom(self, tree: Any) -> sympy.Basic:
+        if type(tree) is int:
+            return sympy.Integer(_small(tree))
+        if not isinstance(tree, str):
+            raise LawError(f"the expression holds {_shown(tree)}; allowed are names, integers and lists with a head")
+        if tree not in self.symbols:
+            raise LawError(f"the expression mentions {_shown(tree)}, not declared: {nearest(tree, self.symbols)}")
+        return self.symbols[tree]
+
+    def branch(self, tree: list[Any], depth: int) -> sympy.Basic:
+        if not tree or not isinstance(tree[0], str) or tree[0] not in _WORDS:
+            raise LawError(f"the expression holds {_shown(tree)}, which has no known head: {', '.join(_WORDS)}")
+        name, *arguments = tree
+        if name in _CONSTANTS and not arguments:
+            return _CONSTANTS[name]
+        if name == "float":
+            return _float_from(arguments)
+        if name == "rational":
+            return _rational_from(arguments)
+        if name == "piecewise":
+            return sympy.Piecewise(*(self.pair(a, depth + 1) for a in arguments), evaluate=False)
+        head = _HEADS.get(name)
+        if head is None or not head.least <= len(arguments) <= head.most:
+            raise LawError(f"the expression holds {_shown(tree)}: '{name}' does not take {len(arguments)} argument(s)")
+        parts = [self.node(argument, head.takes, depth + 1) for argument in arguments]
+        built = head.type(*parts, evaluate=False)
+        _check_numbers(built, tree)
+        return built
+
+    def pair(self, tree: Any, depth: int) -> tuple[sympy.Expr, Boolean]:
+        if not isinstance(tree, list) or len(tree) != 2:
+            raise LawError(f"a branch of 'piecewise' is {_shown(tree)}; write [expression, condition]")
+        return self.node(tree[0], sympy.Expr, depth), self.node(tree[1], Boolean, depth)
+
+
+def _float_from(arguments: list[Any]) -> sympy.Float:
+    match arguments:
+        case [float() | int() as number] if type(number) is not bool and abs(number) < 1.8e308:
+            return sympy.Float(float(number))
+        case [int() as mantissa, int() as exponent, int() as bits] if 1 < bits <= _BITS and abs(exponent) <= 2 * _BITS:
+            _small(mantissa)
+            sign, size = int(mantissa < 0), abs(mantissa)
+            return sympy.Float((sign, size, exponent, size.bit_length()), precision=bits)
+    raise LawError(f"{_shown(['float', *arguments])} is not a finite number in the form [\"float\", 0.1]")
+
+
+def _rational_from(arguments: list[Any]) -> sympy.Rational:
+    if [type(a) for a in arguments] != [int, int] or arguments[1] < 1:
+        raise LawError(f"{_shown(['rational', *arguments])} is not a fraction in the form [\"rational\", 1, 3]")
+    return sympy.Rational(*map(_small, arguments))
+
+
+# ---- limits --------------------------------------------------------------------------------------------------------
+
+
+def _check_numbers(built: sympy.Basic, tree: list[Any]) -> None:
+    """Refuse numbers that sympy could not evaluate later, such as 9**9**9**9 and x**(10**99)."""
+    if isinstance(built, sympy.Pow) and not built.exp.free_symbols and not _size(built.exp) <= EXPONENT_LIMIT:
+        raise LawError(f"{_shown(tree)} has an exponent outside -{EXPONENT_LIMIT} to {EXPONENT_LIMIT}")
+    if isinstance(built, sympy.Expr) and not built.free_symbols:
+        size = _size(built)
+        if not (size == 0 or 1e-308 < size < 1e308):
+            raise LawError(f"{_shown(tree)} is not a finite number between 1e-308 and 1e308 in size")
+
+
+def _size(number: sympy.Basic) -> Any:
+    """Absolute value of an expression without symbols; infinite when it has none that can be computed."""
+    try:
+        with mpmath.workdps(20):
+            return abs(value_of(number, {}))
+    except ArithmeticError:
+        return mpmath.inf
+
+
+def _check_size(size: int, depth: int) -> None:
+    if depth > DEPTH_LIMIT or size > SIZE_LIMIT:
+        raise LawError(f"an expression is too large: at most {DEPTH_LIMIT} levels and {SIZE_LIMIT} nodes are allowed")
+
+
+def _small(number: int) -> int:
+    if abs(number) >= 10**_DIGITS:
+        raise LawError(f"an expression holds an integer of more than {_DIGITS} digits")
+    return number
+
+
+class _Brief(reprlib.Repr):
+    """A short view of any JSON, however deep or long."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel, self.maxlist, self.maxdict, self.maxstring, self.maxother = 2, 4, 2, 30, 30
+
+    def repr_int(self, x: int, level: int) -> str:
+        return str(x) if abs(x) < 10**20 else "a very long integer"
+
+
+_shown = _Brief().repr

@@ -1,0 +1,109 @@
+"""Laws as text and LaTeX."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import sympy
+from sympy.printing.latex import LatexPrinter
+
+from creepkit.language.symbols import GAS_CONSTANT, LATEX, temperature
+
+if TYPE_CHECKING:
+    from creepkit.language.law import CreepLaw
+
+_SPECIAL = {"n_inf": r"n_\infty"}
+
+
+# ---- LaTeX ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Activation:
+    """exp[-(Q/R)(1/T - 1/T_ref)] recognised in an expression: Q in J/mol, T_ref in K."""
+
+    Q: sympy.Expr
+    T_ref: float
+
+
+def activation_of(exponent: sympy.Expr) -> Activation | None:
+    """Read an exponent of the form (Q/R)(1/T_ref - 1/T); None when it is another function of temperature."""
+    per_T = sympy.Symbol("per_T", positive=True)
+    line = sympy.expand(exponent.xreplace({temperature: 1 / per_T})).as_poly(per_T)
+    if line is None or line.degree() != 1:
+        return None
+    slope, start = line.coeff_monomial(per_T), line.coeff_monomial(1)
+    T_ref = -slope / start if start != 0 else sympy.S.Zero
+    if not (T_ref.is_Number and T_ref > 0):
+        return None
+    number, rest = (-slope * GAS_CONSTANT).as_coeff_Mul()
+    return Activation(_tidy(number) * rest, float(_tidy(T_ref)))
+
+
+def _tidy(number: sympy.Expr) -> sympy.Expr:
+    """The number without the last digits, which products of R and T_ref have rounded."""
+    rounded = float(f"{float(number):.12g}")
+    return sympy.Integer(int(rounded)) if rounded.is_integer() else sympy.Float(rounded)
+
+
+class LawPrinter(LatexPrinter):  # type: ignore[misc]
+    """Print exponentials of reciprocal temperature as Arrhenius factors, everything else as sympy does."""
+
+    def __init__(self, law: CreepLaw) -> None:
+        names = {s: _SPECIAL[s.name] for s in law.params if s.name in _SPECIAL}
+        super().__init__({"symbol_names": {**LATEX, **names}, "mul_symbol": None})
+
+    def _print_exp(self, e: Any, exp: Any = None) -> str:
+        parts = {part: activation_of(part) for part in sympy.Add.make_args(e.args[0])}
+        if not any(parts.values()):
+            return str(self._print_ExpBase(e, exp=exp))
+        text = "".join(self._factor(found) for found in parts.values() if found)
+        rest = sympy.Add(*(part for part, found in parts.items() if not found))
+        if rest != 0:
+            text += rf" \exp\!\left[{self._print(rest)}\right]"
+        return text if exp is None else rf"\left({text}\right)^{{{exp}}}"
+
+    def _factor(self, found: Activation) -> str:
+        falls = found.Q.could_extract_minus_sign()
+        sign, energy = ("", -found.Q) if falls else ("-", found.Q)
+        return (
+            rf"\exp\!\left[{sign}\frac{{{self._print(energy)}}}{{R}}"
+            rf"\left(\frac{{1}}{{T}} - \frac{{1}}{{{found.T_ref:g}\,\mathrm{{K}}}}\right)\right]"
+        )
+
+
+def latex_of(law: CreepLaw) -> str:
+    r"""Return ``\dot{\varepsilon}_{cr} = ...`` with one summand a term; states follow as further equations."""
+    return r",\quad ".join(f"{left} = {' + '.join(right)}" for left, right in equations_of(law, LawPrinter(law)))
+
+
+def equations_of(law: CreepLaw, printer: LawPrinter) -> list[tuple[str, list[str]]]:
+    """Return (left side, summands) of the rate of strain, then of each internal variable."""
+    states = [(rf"\dot{{{printer.doprint(s)}}}", [printer.doprint(state.rate)]) for s, state in law.states.items()]
+    return [(r"\dot{\varepsilon}_{cr}", [printer.doprint(term) for term in law.terms.values()]), *states]
+
+
+# ---- plain text ----------------------------------------------------------------------------------------------------
+
+
+def text_of(law: CreepLaw) -> str:
+    """Return the law as a small table for a terminal."""
+    lines = [f"{law.name}: {law.title}" if law.title else law.name]
+    lead = "rate ="
+    for label, term in law.terms.items():
+        lines.append(f"  {lead:6} {sympy.sstr(term)}    [{label}]")
+        lead = "     +"
+    for symbol, state in law.states.items():
+        lines.append(f"  d{symbol}/dt = {sympy.sstr(state.rate)}, from {state.initial:g}")
+    for name, param in law.table.items():
+        low, high = param.bounds
+        off = "" if param.off is None or low <= param.off <= high else f" or {param.off:g}"
+        unit = "" if param.unit == "1" else f" {param.unit}"
+        scale = ", log scale" if param.scale == "log" else ""
+        lines.append(f"  {name:8} {param.meaning}: {low:g} to {high:g}{off}{unit}{scale}")
+    for relation in law.constraints:
+        lines.append(f"  with {sympy.sstr(relation)}")
+    for reference in law.references:
+        lines.append(f"  see {reference}")
+    return "\n".join(lines)

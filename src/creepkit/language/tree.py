@@ -1,0 +1,183 @@
+"""Laws as JSON and back: a file is checked against models, rebuilt node by node, and its fingerprint compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, Literal, TypeVar
+
+import sympy
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from creepkit.errors import LawError
+from creepkit.language.law import CreepLaw
+from creepkit.language.nodes import condition_from_tree, from_tree, to_tree
+from creepkit.language.params import Param, Scale, State
+from creepkit.language.symbols import POINT
+
+__all__ = ["FORMAT", "VERSION", "condition_from_tree", "from_tree", "law_from_json", "law_to_json", "to_tree"]
+
+FORMAT = "creepkit-law"
+VERSION = 1
+
+T = TypeVar("T")
+Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+# ---- what a file may hold ------------------------------------------------------------------------------------------
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class TermJson(_Strict):
+    """One named term; `expression` is a tree."""
+
+    name: str
+    expression: Any
+
+
+class ParamJson(_Strict):
+    """One parameter of the table."""
+
+    name: str
+    meaning: str
+    unit: str
+    bounds: Annotated[list[Number], Field(min_length=2, max_length=2)]
+    scale: Scale
+    off: Number | None
+
+
+class StateJson(_Strict):
+    """One internal variable; `rate` is a tree."""
+
+    name: str
+    meaning: str
+    unit: str
+    initial: Number
+    rate: Any
+    limit: Number | None
+
+
+class LawJson(_Strict):
+    """A whole law."""
+
+    format: Literal["creepkit-law"]
+    version: Literal[1]
+    name: str
+    title: str
+    fingerprint: str
+    terms: list[TermJson]
+    params: list[ParamJson]
+    states: list[StateJson]
+    constraints: list[Any]
+    references: list[str]
+
+
+# ---- writing -------------------------------------------------------------------------------------------------------
+
+
+def law_to_json(law: CreepLaw) -> dict[str, Any]:
+    """Return the law as a dictionary for json.dumps; `law_from_json` gives back an equal law."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": law.name,
+        "title": law.title,
+        "fingerprint": law.fingerprint,
+        "terms": [{"name": label, "expression": to_tree(term)} for label, term in law.terms.items()],
+        "params": [_param_to_json(name, param) for name, param in law.table.items()],
+        "states": [_state_to_json(symbol.name, state) for symbol, state in law.states.items()],
+        "constraints": [to_tree(relation) for relation in law.constraints],
+        "references": list(law.references),
+    }
+
+
+def _param_to_json(name: str, param: Param) -> dict[str, Any]:
+    return {
+        "name": name,
+        "meaning": param.meaning,
+        "unit": param.unit,
+        "bounds": list(param.bounds),
+        "scale": param.scale,
+        "off": param.off,
+    }
+
+
+def _state_to_json(name: str, state: State) -> dict[str, Any]:
+    return {
+        "name": name,
+        "meaning": state.meaning,
+        "unit": state.unit,
+        "initial": state.initial,
+        "rate": to_tree(state.rate),
+        "limit": state.limit,
+    }
+
+
+# ---- reading -------------------------------------------------------------------------------------------------------
+
+
+def law_from_json(data: Any, source: str = "law file") -> CreepLaw:
+    """Return the law that `law_to_json` wrote; LawError, naming `source`, when the data are anything else."""
+    try:
+        model = LawJson.model_validate(data)
+    except ValidationError as error:
+        raise LawError(f"{source}: {_sentence(error)}") from None
+    try:
+        law = _law_of(model)
+    except LawError as error:
+        raise LawError(f"{source}: {error}") from None
+    if law.fingerprint != model.fingerprint:
+        raise LawError(
+            f"{source}: the equations of law '{law.name}' have fingerprint {law.fingerprint} but the file says "
+            f"'{model.fingerprint:.40}'; it was changed after it was written, write it again from the law"
+        )
+    return law
+
+
+def _law_of(model: LawJson) -> CreepLaw:
+    names = [param.name for param in model.params] + [state.name for state in model.states]
+    _check_once(names, "parameter or state")
+    _check_once([term.name for term in model.terms], "term")
+    symbols = {symbol.name: symbol for symbol in (*POINT, *(sympy.Symbol(name, real=True) for name in names))}
+    return CreepLaw(
+        name=model.name,
+        title=model.title,
+        terms={t.name: _placed(f"term '{t.name}'", from_tree, t.expression, symbols) for t in model.terms},
+        params={symbols[p.name]: _param_of(p) for p in model.params},
+        states={symbols[s.name]: _state_of(s, symbols) for s in model.states},
+        constraints=tuple(_placed("a constraint", condition_from_tree, c, symbols) for c in model.constraints),
+        references=tuple(model.references),
+    )
+
+
+def _param_of(entry: ParamJson) -> Param:
+    low, high = entry.bounds
+    return Param(entry.meaning, (low, high), entry.unit, entry.scale, entry.off)
+
+
+def _state_of(entry: StateJson, symbols: Mapping[str, sympy.Symbol]) -> State:
+    rate = _placed(f"rate of state '{entry.name}'", from_tree, entry.rate, symbols)
+    return State(entry.initial, rate, entry.meaning, entry.unit, entry.limit)
+
+
+def _placed(place: str, read: Callable[[Any, Mapping[str, sympy.Symbol]], T], tree: Any, symbols: Any) -> T:
+    try:
+        return read(tree, symbols)
+    except LawError as error:
+        raise LawError(f"{place}: {error}") from None
+
+
+def _check_once(names: Sequence[str], what: str) -> None:
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise LawError(f"the {what} name '{twice[0]}' is used twice")
+
+
+def _sentence(error: ValidationError) -> str:
+    """The first thing that is wrong, as one sentence with its place."""
+    first = error.errors(include_url=False, include_input=False)[0]
+    place = ".".join(str(part) for part in first["loc"]) or "the whole"
+    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+    return f"{place}: {first['msg'][:1].lower()}{first['msg'][1:]}{more}; this is not a law that creepkit wrote"

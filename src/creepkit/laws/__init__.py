@@ -1,0 +1,1 @@
+"""The built-in laws, one a file; each imports the language only, as an outside plugin does."""

@@ -1,0 +1,1 @@
+"""Measured files to histories: small declared readers, units converted at the edge, every error with its line."""

@@ -1,0 +1,98 @@
+"""Files, folders and patterns to histories, whichever reader understands them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from glob import glob
+from pathlib import Path
+
+from creepkit.errors import HistoryError, nearest
+from creepkit.readers.history_csv import CSV
+from creepkit.records import History, Reader
+
+Paths = str | Path | Iterable[str | Path]
+
+
+def read_histories(paths: Paths, readers: Sequence[Reader], reader: str | None = None) -> list[History]:
+    """Read the histories in files, folders and glob patterns, in the order given and sorted within each.
+
+    reader : the name of the reader to use; None asks each of `readers` which files it accepts. The general `csv`
+    accepts every CSV file, and so gets only those that no other reader wants. A folder is read as a whole when a
+    reader accepts it, else file by file. What is reached twice is kept once; tests of one name get the name of their
+    folder in front.
+    """
+    if reader is not None:
+        readers = [_named(reader, readers)]
+    read: dict[tuple[str, str], tuple[Path, History]] = {}
+    for path in _expanded(paths):
+        for source in _sources(path, readers):
+            for history in _reader_of(source, readers).read(source):
+                read.setdefault((history.source or str(source), history.name), (source, history))
+    return _distinguished(list(read.values()))
+
+
+def _named(name: str, readers: Sequence[Reader]) -> Reader:
+    known = {reader.name: reader for reader in readers}
+    if name not in known:
+        raise HistoryError(f"no reader is called '{name}'; {nearest(name, known)}")
+    return known[name]
+
+
+def _expanded(paths: Paths) -> list[Path]:
+    """The paths that exist, with `~` and patterns expanded, each once."""
+    given = [paths] if isinstance(paths, (str, Path)) else list(paths)
+    if not given:
+        raise HistoryError("no file, folder or pattern was given to read histories from")
+    found: dict[Path, None] = {}
+    for item in given:
+        path = Path(item).expanduser()
+        matches = [path] if path.exists() else [Path(match) for match in sorted(glob(str(path)))]
+        if not matches:
+            raise HistoryError(f"{path}: no such file or folder, and no file matches it as a pattern")
+        found.update(dict.fromkeys(matches))
+    return list(found)
+
+
+def _sources(path: Path, readers: Sequence[Reader]) -> list[Path]:
+    """What to read for a path: itself, or the files in a folder that no reader accepts as a whole."""
+    if path.is_file() or any(reader.accepts(path) for reader in readers):
+        return [path]
+    files = [file for file in sorted(path.iterdir()) if file.is_file() and any(r.accepts(file) for r in readers)]
+    return files or [path]
+
+
+def _reader_of(path: Path, readers: Sequence[Reader]) -> Reader:
+    """The one reader for a path; a reader without rivals is not asked."""
+    if len(readers) == 1:
+        return readers[0]
+    willing = [reader for reader in readers if reader.accepts(path)]
+    if len(willing) > 1:
+        willing = [reader for reader in willing if reader is not CSV]
+    if not willing:
+        known = "; ".join(f"{reader.name}: {reader.title}" for reader in readers)
+        raise HistoryError(f"{path}: no reader understands it; known are {known or 'none'}")
+    if len(willing) > 1:
+        names = " and ".join(f"'{reader.name}'" for reader in willing)
+        raise HistoryError(f"{path}: the readers {names} both accept it; say which one with reader=")
+    return willing[0]
+
+
+def _distinguished(read: Sequence[tuple[Path, History]]) -> list[History]:
+    """The histories with names of their own: the folder's name in front where a name comes twice."""
+    counts = Counter(history.name for _, history in read)
+    histories = [
+        history.replace(name=f"{_folder(path)}/{history.name}") if counts[history.name] > 1 else history
+        for path, history in read
+    ]
+    seen: dict[str, str] = {}
+    for history in histories:
+        if history.name in seen:
+            both = f"{seen[history.name]} and {history.source}"
+            raise HistoryError(f"two tests are called '{history.name}', in {both}; rename one of them")
+        seen[history.name] = history.source
+    return histories
+
+
+def _folder(path: Path) -> str:
+    return (path if path.is_dir() else path.absolute().parent).name

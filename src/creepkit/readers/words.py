@@ -1,0 +1,83 @@
+"""The words that measured files may use, and how a laboratory's own words map to them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from creepkit.readers.units import (
+    FLAG,
+    LENGTH,
+    MODULUS,
+    NUMBER,
+    POISSON,
+    STRAIN,
+    STRESS,
+    TEMPERATURE,
+    TIME,
+    Kind,
+)
+
+OUTPUTS: Mapping[str, Mapping[str, Kind]] = {
+    "uniaxial": {"strain": STRAIN},
+    "bulge": {"amplitude": LENGTH, "width": LENGTH, "shape": NUMBER},
+}
+"""What each specimen's outputs are called, and of which kind they are."""
+
+IMPOSED: Mapping[str, Kind] = {"stress": STRESS, "pressure": STRESS, "temperature": TEMPERATURE}
+"""What may be imposed on a specimen: a number, `_steps`, a `_program`, or a column."""
+
+CONDITIONS: Mapping[str, Kind] = {
+    **IMPOSED,
+    **{f"{quantity}_{k}": STRESS for quantity in ("stress", "pressure") for k in (1, 2)},
+    **dict.fromkeys(("jump_time", "end_time", "ramp"), TIME),
+    "modulus": MODULUS,
+    "poisson": POISSON,
+}
+"""Numbers that stand once for a whole test."""
+
+TEXTS = frozenset(
+    [f"{quantity}_{form}" for quantity in IMPOSED for form in ("steps", "program")]
+    + ["name", "alloy", "specimen", "operator", "control", "strain_measure", "includes_elastic"]
+)
+"""Words that stand once for a whole test; every other key becomes a label."""
+
+SPECIMEN_NAME = re.compile(r"[a-z][a-z0-9_-]*")
+"""What the name of a specimen looks like; any other text after `specimen` is a label."""
+
+CREEP_MACHINE: Mapping[str, str] = {"control": "load", "strain_measure": "engineering", "includes_elastic": "no"}
+"""What a creep machine with a dead load and an extensometer records, unless the file says otherwise."""
+
+
+@dataclass(frozen=True)
+class Words:
+    """How a laboratory names things.
+
+    rename : {its name: ours}, for columns and conditions alike, such as {"youngs_MPa": "modulus_MPa"}.
+    assumed : {text: value} for what its files leave unsaid; recorded in the label "assumed".
+    averaged : {label: columns} whose mean over the whole test is kept as a label, such as thermocouples.
+    outputs : {specimen: {output: kind}}.
+    """
+
+    rename: Mapping[str, str] = field(default_factory=dict)
+    assumed: Mapping[str, str] = field(default_factory=lambda: CREEP_MACHINE)
+    averaged: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    outputs: Mapping[str, Mapping[str, Kind]] = field(default_factory=lambda: OUTPUTS)
+
+    @property
+    def conditions(self) -> dict[str, Kind]:
+        """The kinds of all numbers that stand once for a test."""
+        return {**CONDITIONS, **self._spreads()}
+
+    @property
+    def columns(self) -> dict[str, Kind]:
+        """The kinds of all columns of frames."""
+        return {"time": TIME, **self.observed(), **self._spreads(), **IMPOSED, "used": FLAG}
+
+    def observed(self) -> dict[str, Kind]:
+        """The outputs of all specimens."""
+        return {name: kind for outputs in self.outputs.values() for name, kind in outputs.items()}
+
+    def _spreads(self) -> dict[str, Kind]:
+        return {f"{name}_sd": kind.spread() for name, kind in self.observed().items()}

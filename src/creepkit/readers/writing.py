@@ -1,0 +1,149 @@
+"""Histories to CSV files that the reader `csv` reads back to the last digit."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import HistoryError
+from creepkit.readers.units import LENGTH, Kind
+from creepkit.readers.words import SPECIMEN_NAME, Words
+from creepkit.records import History, PressureJump, Program, RecordedLoading, StressSteps
+
+
+def write_history(history: History, path: str | Path) -> Path:
+    """Write a history as CSV, in s, MPa, mm, K, and return the path; nothing is half-written.
+
+    All is kept but `source`, which is the file from then on. A loading without words of its own is written as its
+    program, and elastic data that depend on temperature as their values at the temperature of the test.
+    """
+    text = history_text(history)
+    path = Path(path)
+    try:
+        with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
+            whole = Path(folder) / path.name
+            whole.write_text(text, encoding="utf-8", newline="\n")
+            whole.replace(path)
+    except OSError as error:
+        raise HistoryError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
+    return path
+
+
+def history_text(history: History) -> str:
+    """The text of the CSV file of a history; HistoryError when it could not be read back."""
+    if history.times.size < 2:
+        raise HistoryError(f"history '{history.name}' has one frame; at least two can be written and read back")
+    columns = dict(_columns(history, Words().observed()))
+    for name, values in columns.items():
+        if not np.isfinite(values).all():
+            raise HistoryError(f"history '{history.name}': '{name}' holds a number that is not finite; drop that frame")
+    lines = [f"# {key}: {_line(history, text)}" for key, text in _head(history)]
+    lines.append(",".join(columns))
+    lines += [",".join(map(_digits, row)) for row in zip(*columns.values(), strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def _head(history: History) -> Iterator[tuple[str, str]]:
+    """Key and text of every line of the head."""
+    yield "name", history.name
+    if not SPECIMEN_NAME.fullmatch(history.specimen):
+        raise HistoryError(f"history '{history.name}': specimen '{history.specimen}' is not a name in small letters")
+    yield "specimen", history.specimen
+    if history.alloy:
+        yield "alloy", history.alloy
+    yield from _loading(history)
+    yield from _temperature(history)
+    yield from _elastic(history)
+    yield "strain_measure", history.strain_measure
+    yield "includes_elastic", "yes" if history.includes_elastic else "no"
+    if history.operator:
+        yield "operator", history.operator
+    for key, value in history.geometry.items():
+        # A bare number is read as it stands, but a name that ends in a unit would lose it.
+        unit = "_mm" if key.rpartition("_")[2] in LENGTH.units else ""
+        yield f"geometry {_key(history, key)}{unit}", _digits(value)
+    for key, text in history.labels.items():
+        yield f"label {_key(history, key)}", text
+
+
+def _loading(history: History) -> Iterator[tuple[str, str]]:
+    loading = history.loading
+    if isinstance(loading, PressureJump):
+        yield "pressure_1_MPa", _digits(loading.P1)
+        yield "pressure_2_MPa", _digits(loading.P2)
+        yield "jump_time_s", _digits(loading.Tj)
+        yield "ramp_s", _digits(loading.ramp)
+    elif isinstance(loading, StressSteps) and len(loading.steps) == 1:
+        yield "stress_MPa", _digits(loading.steps[0][1])
+    elif isinstance(loading, StressSteps):
+        yield "stress_steps", _pairs(loading.steps, "MPa")
+    else:
+        yield f"{loading.quantity}_program", _program(loading.program(), "MPa")
+    if loading.quantity == "stress":
+        yield "control", loading.control if isinstance(loading, (StressSteps, RecordedLoading)) else "load"
+
+
+def _temperature(history: History) -> Iterator[tuple[str, str]]:
+    if isinstance(history.temperature, Program):
+        yield "temperature_program", _program(history.temperature, "K")
+    else:
+        yield "temperature_K", _digits(history.temperature)
+
+
+def _elastic(history: History) -> Iterator[tuple[str, str]]:
+    if history.elastic is None:
+        return
+    elastic = history.elastic
+    if not (isinstance(elastic.E, float) and isinstance(elastic.nu, float)):
+        if isinstance(history.temperature, Program):
+            raise HistoryError(
+                f"history '{history.name}': elastic data that change with the temperature during a test cannot be "
+                "written; replace them by elastic.at(T)"
+            )
+        elastic = elastic.at(history.temperature)
+    yield "modulus_MPa", _digits(float(elastic.E))
+    yield "poisson", _digits(float(elastic.nu))
+
+
+def _columns(history: History, kinds: Mapping[str, Kind]) -> Iterator[tuple[str, Floats]]:
+    yield "time_s", history.times
+    spreads = {f"{name}_sd": values for name, values in history.standard_deviation.items()}
+    for name, values in {**history.outputs, **spreads}.items():
+        kind = kinds.get(name.removesuffix("_sd"))
+        if kind is None:
+            raise HistoryError(f"history '{history.name}': no unit is known for '{name}'; known: {', '.join(kinds)}")
+        unit = next(iter(kind.units))
+        yield f"{name}_{unit}" if unit else name, values
+    used = np.asarray(history.used)
+    if not used.all():
+        yield "used", used.astype(float)
+
+
+def _digits(number: float) -> str:
+    """The shortest text that reads back as the same number."""
+    return repr(float(number))
+
+
+def _program(program: Program, unit: str) -> str:
+    return _pairs(zip(program.times, program.values, strict=True), unit)
+
+
+def _pairs(pairs: Iterator[tuple[float, float]] | tuple[tuple[float, float], ...], unit: str) -> str:
+    return "; ".join(f"{_digits(time)} s {_digits(value)} {unit}" for time, value in pairs)
+
+
+def _line(history: History, text: str) -> str:
+    """Refuse what would not survive as part of one line."""
+    if text != text.strip() or not text.isprintable():
+        raise HistoryError(f"history '{history.name}': {text!r} cannot be written in one line; use plain words there")
+    return text
+
+
+def _key(history: History, key: str) -> str:
+    if ":" in key or not key:
+        raise HistoryError(f"history '{history.name}': {key!r} cannot name a line; use words without a colon")
+    return _line(history, key)

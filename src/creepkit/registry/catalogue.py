@@ -1,0 +1,215 @@
+"""The registry: every law, specimen, reader, exporter and temperature form that plugins offer, with its provenance.
+
+Built-ins and outsiders come through the same entry-point group; files come from CREEPKIT_PLUGINS and `load_file`.
+All are imported at the first question. A plugin that cannot be used is kept with the reason and the others stand;
+only `load_file`, where somebody asked for that very plugin, raises.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import pluggy
+
+from creepkit import hookspecs
+from creepkit.errors import PluginError, nearest
+from creepkit.registry import kinds, sources
+from creepkit.registry.kinds import Kind
+from creepkit.registry.sources import Provenance
+
+if TYPE_CHECKING:
+    import typer
+
+    from creepkit.language.law import CreepLaw
+    from creepkit.records import Exporter, Reader, Specimen
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Registered(Generic[T]):
+    """Something a plugin offers, and the plugin it came from."""
+
+    value: T
+    provenance: Provenance
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """One plugin: where it came from, and what it offers or why it cannot be used.
+
+    offers : {kind: {name: thing}} with the kinds "law", "specimen", "reader", "exporter", "temperature form".
+    commands : whether it adds commands to the command line.
+    problem : one sentence when the plugin is broken, else empty.
+    """
+
+    provenance: Provenance
+    offers: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    commands: bool = False
+    problem: str = ""
+
+
+class Registry:
+    """A plugin manager that knows where everything came from; it loads what is installed at the first question."""
+
+    def __init__(self) -> None:
+        self._manager = pluggy.PluginManager(hookspecs.PROJECT)
+        self._manager.add_hookspecs(hookspecs)
+        self._plugins: dict[Provenance, Plugin] = {}
+        self._complete = False
+
+    # ---- what there is ---------------------------------------------------------------------------------------------
+
+    def plugins(self) -> tuple[Plugin, ...]:
+        """Return every plugin, the broken ones included, in the order of loading."""
+        self._load_all()
+        return tuple(self._plugins.values())
+
+    def clashes(self) -> tuple[str, ...]:
+        """Return one sentence for each name that two plugins offer."""
+        return tuple(clash for kind in kinds.KINDS for clash in _merged(kind, self.plugins())[1])
+
+    def laws(self) -> dict[str, Registered[CreepLaw]]:
+        """Return {name: registered law}."""
+        return self._all(kinds.LAW)
+
+    def specimens(self) -> dict[str, Registered[Specimen]]:
+        """Return {name: registered specimen}."""
+        return self._all(kinds.SPECIMEN)
+
+    def readers(self) -> dict[str, Registered[Reader]]:
+        """Return {name: registered reader}."""
+        return self._all(kinds.READER)
+
+    def exporters(self) -> dict[str, Registered[Exporter]]:
+        """Return {name: registered exporter}."""
+        return self._all(kinds.EXPORTER)
+
+    def temperature_forms(self) -> dict[str, Registered[Callable[..., Any]]]:
+        """Return {name: registered function of T_ref that gives a form or a factor}."""
+        return self._all(kinds.FORM)
+
+    def law(self, name: str) -> CreepLaw:
+        """Return the law called `name`; LawError with the nearest name when there is none."""
+        law: CreepLaw = self._one(kinds.LAW, name)
+        return law
+
+    def specimen(self, name: str) -> Specimen:
+        """Return the specimen called `name`; SolveError with the nearest name when there is none."""
+        specimen: Specimen = self._one(kinds.SPECIMEN, name)
+        return specimen
+
+    def reader(self, name: str) -> Reader:
+        """Return the reader called `name`; HistoryError with the nearest name when there is none."""
+        reader: Reader = self._one(kinds.READER, name)
+        return reader
+
+    def exporter(self, name: str) -> Exporter:
+        """Return the exporter called `name`; ExportError with the nearest name when there is none."""
+        exporter: Exporter = self._one(kinds.EXPORTER, name)
+        return exporter
+
+    def temperature_form(self, name: str) -> Callable[..., Any]:
+        """Return the function of T_ref called `name`; LawError with the nearest name when there is none."""
+        form: Callable[..., Any] = self._one(kinds.FORM, name)
+        return form
+
+    def _all(self, kind: Kind) -> dict[str, Registered[Any]]:
+        found, clashes = _merged(kind, self.plugins())
+        if clashes:
+            raise PluginError(clashes[0])
+        return found
+
+    def _one(self, kind: Kind, name: str) -> Any:
+        known = self._all(kind)
+        if name in known:
+            return known[name].value
+        broken = sum(bool(plugin.problem) for plugin in self.plugins())
+        hint = f"; {broken} plugin(s) could not be loaded, see 'creepkit plugins'" if broken else ""
+        raise kind.error(f"there is no {kind.word} '{name}': {nearest(name, known)}{hint}")
+
+    # ---- where it comes from ---------------------------------------------------------------------------------------
+
+    def load_file(self, path: str | Path) -> Plugin:
+        """Load one plugin file; PluginError, and nothing registered, when it cannot be used."""
+        path = Path(path)
+        provenance = sources.of_file(path)
+        known = self._plugins.get(provenance)
+        if known is None or known.problem:
+            self._plugins[provenance] = self._entered(provenance, sources.import_file(provenance, path))
+        return self._plugins[provenance]
+
+    def add_commands(self, app: typer.Typer) -> None:
+        """Let every plugin add its commands to the command line; one that raises is broken from then on."""
+        by_name = {str(plugin.provenance): plugin for plugin in self.plugins()}
+        for implementation in self._manager.hook.creepkit_commands.get_hookimpls():
+            plugin = by_name[implementation.plugin_name]
+            try:
+                kinds.called(implementation, app=app)
+            except PluginError as error:
+                self._plugins[plugin.provenance] = replace(plugin, problem=str(error))
+
+    def _load_all(self) -> None:
+        """Load what is installed and what the environment names, once."""
+        if self._complete:
+            return
+        self._complete = True
+        for provenance, entry in sources.installed():
+            self._keep(provenance, partial(sources.import_entry, provenance, entry))
+        for path in sources.named_in_environment():
+            provenance = sources.of_file(path)
+            self._keep(provenance, partial(sources.import_file, provenance, path))
+
+    def _keep(self, provenance: Provenance, imported: Callable[[], object]) -> None:
+        """Enter a plugin, or else the reason why it cannot be used."""
+        if provenance in self._plugins:
+            return
+        try:
+            self._plugins[provenance] = self._entered(provenance, imported())
+        except PluginError as error:
+            self._plugins[provenance] = Plugin(provenance, problem=str(error))
+
+    def _entered(self, provenance: Provenance, module: object) -> Plugin:
+        """Enter a plugin whole or not at all: its hooks must exist and return what they promise."""
+        if twin := self._manager.get_name(module):
+            raise PluginError(f"{provenance} is the same module as {twin}; drop one of the two entry points")
+        try:
+            self._register(provenance, module)
+            hooks = kinds.implementations(self._manager, module, provenance)
+            offers = {k.word: kinds.offered(k, hooks[k.hook]) for k in kinds.KINDS if k.hook in hooks}
+        except PluginError:
+            if self._manager.is_registered(module):
+                self._manager.unregister(module)
+            raise
+        return Plugin(provenance, offers, commands=kinds.COMMANDS in hooks)
+
+    def _register(self, provenance: Provenance, module: object) -> None:
+        try:
+            self._manager.register(module, str(provenance))
+        except pluggy.PluginValidationError as error:
+            told = " ".join(str(error).split())
+            raise PluginError(f"{provenance} does not fit the hooks of creepkit: {told}") from error
+
+
+@cache
+def default() -> Registry:
+    """The registry that the verbs share: made at its first use, from what is installed and the environment names."""
+    return Registry()
+
+
+def _merged(kind: Kind, plugins: Iterable[Plugin]) -> tuple[dict[str, Registered[Any]], list[str]]:
+    """Return {name: registered} over plugins, and one sentence for each name that is offered twice."""
+    found: dict[str, Registered[Any]] = {}
+    clashes = []
+    for plugin in plugins:
+        for name, value in plugin.offers.get(kind.word, {}).items():
+            if name in found:
+                culprits = f"{found[name].provenance} and by {plugin.provenance}"
+                clashes.append(f"the {kind.word} '{name}' is offered twice, by {culprits}; rename one or uninstall it")
+            else:
+                found[name] = Registered(value, plugin.provenance)
+    return found, clashes

@@ -1,0 +1,278 @@
+"""The algebra of laws: results are ordinary laws whose rates are what pencil and paper give."""
+
+import math
+
+import pytest
+import sympy
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from creepkit.errors import LawError
+from creepkit.language import (
+    GAS_CONSTANT,
+    CreepLaw,
+    Param,
+    State,
+    activated,
+    arrhenius,
+    exponential,
+    inverse,
+    linear,
+    parameters,
+    states,
+    strain,
+    stress,
+    temperature,
+    time,
+)
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
+from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.laws.time_hardening import TIME_HARDENING
+
+POINT = {stress: 120.0, strain: 0.013, time: 3.6e4, temperature: 1123.15}
+
+
+def rate(law, point=POINT, **values):
+    """The rate of a law at a point, 1/s, from its expression."""
+    numbers = {symbol: values[symbol.name] for symbol in law.params}
+    return float(law.rate.subs({**point, **numbers}))
+
+
+# ---- addition ------------------------------------------------------------------------------------------------------
+
+
+def test_the_combined_law_is_equation_2_of_the_paper():
+    assert COMBINED.names == ("A_1", "n_1", "B", "A_2", "n_2", "m_1", "A_3", "n_3", "m_2")
+    values = dict(A_1=1e-9, n_1=2, B=80, A_2=2e-17, n_2=4, m_1=-0.3, A_3=3e-15, n_3=3, m_2=-0.4)
+    expected = (
+        1e-9 * math.sinh(120 / 80) ** 2 + 2e-17 * 120**4 * 0.013**-0.3 + 3e-15 * 120**3 * 3.6e4**-0.4
+    )
+    assert rate(COMBINED, **values) == pytest.approx(expected, rel=1e-13)
+
+
+def test_three_laws_have_the_same_names_in_both_associations():
+    left = (NORTON + STRAIN_HARDENING) + TIME_HARDENING
+    right = NORTON + (STRAIN_HARDENING + TIME_HARDENING)
+    assert left == right
+    assert left.fingerprint == right.fingerprint
+
+
+def _letters(names):
+    symbols = parameters(" ".join(names))
+    exponent = Param("exponent", bounds=(1, 8))
+    term = sympy.Mul(*(stress**s for s in symbols))
+    return CreepLaw("trial", {"power law": term}, dict.fromkeys(symbols, exponent))
+
+
+NAMES = st.lists(st.sampled_from(["A", "A_1", "A_2", "A_3", "n", "n_0", "n_inf", "n_2"]), min_size=1, unique=True)
+
+
+@given(NAMES, NAMES, NAMES)
+@settings(max_examples=60, deadline=None)
+def test_addition_is_associative_whatever_the_names(a, b, c):
+    a, b, c = _letters(a), _letters(b), _letters(c)
+    left, right = (a + b) + c, a + (b + c)
+    assert left.names == right.names
+    assert list(left.terms.items()) == list(right.terms.items())
+
+
+def test_names_that_do_not_collide_stay():
+    total = DRIFTING_EXPONENT + NORTON
+    assert total.names == ("A_1", "n_0", "n_inf", "C", "tau_d", "tau_r", "m", "A_2", "n")
+
+
+def test_a_law_added_to_itself_doubles_the_rate():
+    twice = NORTON + NORTON
+    assert list(twice.terms) == ["power law 1", "power law 2"]
+    assert rate(twice, A_1=1e-16, n_1=5, A_2=1e-16, n_2=5) == pytest.approx(2e-16 * 120**5, rel=1e-14)
+
+
+def test_addition_renames_internal_variables_and_what_mentions_them():
+    A, n = parameters("A n")
+    (omega,) = states("omega")
+    table = {A: NORTON.table["A"], n: NORTON.table["n"]}
+    damage = CreepLaw(
+        "damage",
+        {"creep": A * (stress / (1 - omega)) ** n},
+        table,
+        states={omega: State(0.1, A * stress, limit=1.0)},
+        constraints=(n >= 0,),
+    )
+    twice = damage + damage
+    assert [s.name for s in twice.states] == ["omega_1", "omega_2"]
+    (first, second) = twice.states.values()
+    assert str(first.rate) == "A_1*stress"
+    assert str(second.rate) == "A_2*stress"
+    assert [str(c) for c in twice.constraints] == ["n_1 >= 0", "n_2 >= 0"]
+
+
+def test_only_laws_can_be_added():
+    with pytest.raises(TypeError):
+        NORTON + 1
+
+
+# ---- taking away ---------------------------------------------------------------------------------------------------
+
+
+def test_only_and_without_are_two_ways_of_saying_the_same():
+    kept = COMBINED.only("strain hardening", "time hardening")
+    dropped = COMBINED.without("hyperbolic sine")
+    assert kept == dropped
+    assert kept.names == ("A_2", "n_2", "m_1", "A_3", "n_3", "m_2")
+
+
+def test_the_nearest_term_is_suggested():
+    with pytest.raises(LawError, match="no term 'time-hardening': did you mean 'time hardening'"):
+        COMBINED.without("time-hardening")
+    with pytest.raises(LawError, match="no term would be left"):
+        NORTON.without("power law")
+
+
+def test_fixing_m_at_zero_makes_strain_hardening_a_power_law():
+    reduced = STRAIN_HARDENING.fix(m=0)
+    assert reduced.names == ("A", "n")
+    assert dict(reduced.params) == {s: STRAIN_HARDENING.params[s] for s in reduced.params}
+    assert list(reduced.terms.values()) == list(NORTON.terms.values())
+
+
+def test_fixing_a_rate_coefficient_at_zero_drops_its_term_and_parameters():
+    reduced = COMBINED.fix(A_2=0)
+    assert list(reduced.terms) == ["hyperbolic sine", "time hardening"]
+    assert reduced.names == ("A_1", "n_1", "B", "A_3", "n_3", "m_2")
+
+
+def test_fixing_the_exponent_of_sinh_at_zero_drops_the_breakdown_stress():
+    assert HYPERBOLIC_SINE.fix(n=0).names == ("A",)
+
+
+def test_fixing_a_number_gives_its_rate():
+    fixed = COMBINED.fix(n_1=2.5, B=80, A_3=0)
+    expected = 1e-9 * math.sinh(1.5) ** 2.5 + 1e-17 * 120**4 * 0.013**-0.3
+    assert rate(fixed, A_1=1e-9, A_2=1e-17, n_2=4, m_1=-0.3) == pytest.approx(expected, rel=1e-13)
+
+
+def test_fixing_nothing_gives_the_same_law():
+    assert NORTON.fix() == NORTON
+    assert NORTON.with_temperature() == NORTON
+
+
+@pytest.mark.parametrize(
+    ("fixed", "message"),
+    [
+        ({"A": 0}, "no term is left"),
+        ({"n": 9}, r"cannot fix n = 9; allowed are 1 to 8 or 0 \(off\)"),
+        ({"n": float("nan")}, "cannot fix n = nan"),
+        ({"n": "five"}, "parameter 'n': 'five' is not a number"),
+        ({"k": 1}, "has no parameter 'k'"),
+    ],
+)
+def test_what_cannot_be_fixed(fixed, message):
+    with pytest.raises(LawError, match=message):
+        NORTON.fix(**fixed)
+
+
+def test_fixing_what_a_constraint_mentions_fixes_it_there_too():
+    fixed = DRIFTING_EXPONENT.fix(n_0=4, n_inf=4, C=0)
+    assert fixed.names == ("A", "m")
+    assert fixed.constraints == ()
+
+
+def test_an_internal_variable_that_nothing_needs_goes():
+    A, B = parameters("A B")
+    (omega,) = states("omega")
+    coefficient = NORTON.table["A"]
+    law = CreepLaw(
+        "two", {"a": A * stress, "b": B * (1 + omega)}, {A: coefficient, B: coefficient}, states={omega: State(0, B)}
+    )
+    assert not law.without("b").states
+    assert law.without("a").states == law.states
+
+
+# ---- temperature ---------------------------------------------------------------------------------------------------
+
+
+def test_arrhenius_is_one_at_its_reference_and_falls_as_boltzmann_says():
+    law = NORTON.times(arrhenius(T_ref=1073.15))
+    values = dict(A=1e-16, n=5.0, Q=4e5)
+    at_reference = rate(law, {**POINT, temperature: 1073.15}, **values)
+    assert at_reference == pytest.approx(1e-16 * 120**5, rel=1e-14)
+    expected = math.exp(-4e5 / 8.314462618 * (1 / 1123.15 - 1 / 1073.15))
+    assert rate(law, **values) / at_reference == pytest.approx(expected, rel=1e-12)
+    assert GAS_CONSTANT == 8.314462618
+
+
+def test_the_law_at_its_reference_temperature_no_longer_has_an_activation_energy():
+    assert NORTON.times(arrhenius(T_ref=1100)).at(1100).names == ("A", "n")
+
+
+def test_at_gives_the_rate_at_that_temperature():
+    law = COMBINED.times(arrhenius()).with_temperature(n_1=linear())
+    values = {**law.center(), "A_1": 1e-9, "n_1_T": -0.01}
+    cold = law.at(1123.15)
+    assert not cold.uses(temperature)
+    assert rate(cold, **{name: values[name] for name in cold.names}) == pytest.approx(rate(law, **values), rel=1e-12)
+
+
+@pytest.mark.parametrize("T", [0, -5, 2e4, float("nan"), "hot"])
+def test_at_takes_kelvin(T):
+    with pytest.raises(LawError, match="temperature"):
+        NORTON.times(arrhenius()).at(T)
+
+
+def test_a_second_factor_gets_a_parameter_of_its_own():
+    law = NORTON.times(arrhenius()).times(arrhenius())
+    assert law.names == ("A", "n", "Q", "Q_2")
+
+
+FORMS = {
+    "linear": (linear(1000.0), "n", "n_T", lambda p, q: p + q * (1123.15 - 1000)),
+    "inverse": (inverse(1000.0), "n", "n_I", lambda p, q: p + q * (1000 / 1123.15 - 1)),
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_forms_of_an_exponent(name):
+    form, param, slope, closed = FORMS[name]
+    law = NORTON.with_temperature(**{param: form})
+    assert law.names == ("A", "n", slope)
+    exponent = closed(5.0, 0.004)
+    assert rate(law, A=1e-16, n=5.0, **{slope: 0.004}) == pytest.approx(1e-16 * 120**exponent, rel=1e-12)
+    reference = rate(law, {**POINT, temperature: 1000.0}, A=1e-16, n=5.0, **{slope: 0.004})
+    assert reference == pytest.approx(1e-16 * 120**5, rel=1e-13)
+
+
+def test_forms_of_a_positive_parameter():
+    law = HYPERBOLIC_SINE.with_temperature(B=activated(1000.0), A=exponential(1000.0))
+    assert law.names == ("A", "A_T", "n", "B", "Q_B")
+    B = 80 * math.exp(-2e4 / 8.314462618 * (1 / 1123.15 - 1 / 1000))
+    expected = 1e-9 * math.exp(0.01 * 123.15) * math.sinh(120 / B) ** 2
+    assert rate(law, A=1e-9, A_T=0.01, n=2, B=80, Q_B=2e4) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_constraint_follows_its_parameter_into_temperature():
+    law = DRIFTING_EXPONENT.with_temperature(n_inf=linear(1000.0))
+    drift = {s for relation in law.constraints for s in relation.free_symbols}
+    assert {"n_inf", "n_inf_T", "temperature"} <= {s.name for s in drift}
+    values = {**law.center(), "n_0": 1.0, "n_inf": 1.0, "C": 0.0, "n_inf_T": -0.03}
+    late = {**POINT, time: 1e6, **{s: values[s.name] for s in law.params}}
+    assert any(relation.subs(late) == sympy.false for relation in law.constraints)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: NORTON.with_temperature(A=linear()), "has a log scale: use exponential"),
+        (lambda: NORTON.with_temperature(A=inverse()), "has a log scale: use activated"),
+        (lambda: NORTON.with_temperature(n="linear"), "n needs a form such as linear"),
+        (lambda: NORTON.with_temperature(n=linear()).with_temperature(n=linear()), "depends on temperature twice"),
+        (lambda: NORTON.with_temperature(q=linear()), "has no parameter 'q'"),
+        (lambda: NORTON.times(linear()), r"times\(\) takes a factor"),
+        (lambda: arrhenius(T_ref=-3), "T_ref = -3 is not a temperature in K"),
+    ],
+)
+def test_wrong_forms_are_explained(wrong, message):
+    with pytest.raises(LawError, match=message):
+        wrong()

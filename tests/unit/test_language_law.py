@@ -1,0 +1,255 @@
+"""The language says in one sentence what is wrong with a law, and laws behave as values."""
+
+import copy
+import pickle
+
+import pytest
+import sympy
+
+from creepkit.errors import LawError
+from creepkit.language import CreepLaw, Elastic, Param, State, parameters, states, strain, stress, temperature, time
+from creepkit.language import arrhenius, wachtman
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
+from creepkit.laws.norton import NORTON
+
+A, n, B = parameters("A n B")
+RATE = Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0)
+EXPONENT = Param("stress exponent", bounds=(1, 8))
+(omega,) = states("omega")
+
+
+def law(**changes):
+    given = {"name": "trial", "terms": {"power law": A * stress**n}, "params": {A: RATE, n: EXPONENT}}
+    return CreepLaw(**{**given, **changes})
+
+
+BAD_LAWS = {
+    "no name": ({"name": " "}, "a law needs a name"),
+    "name of two lines": ({"name": "a\nimport os"}, "must be one line of words"),
+    "label with quotes": ({"terms": {'"""': A * stress**n}}, "must be one line of words without quotes"),
+    "title of two lines": ({"title": "a\nb"}, "title or reference"),
+    "no terms": ({"terms": {}}, "has no terms"),
+    "terms not named": ({"terms": A * stress**n}, "has no terms"),
+    "text": ({"terms": {"power law": "A*stress**n"}}, "text is never evaluated"),
+    "a condition as a term": ({"terms": {"power law": sympy.Gt(A * stress, n)}}, "not finite and real"),
+    "unknown symbol": ({"terms": {"power law": A * stress**n * B}}, "unknown symbol B in a rate; declared are A, mean"),
+    "foreign stress": ({"terms": {"power law": A * sympy.Symbol("stress") ** n}}, "import it from creepkit.language"),
+    "positive symbol": (
+        {"terms": {"x": sympy.Symbol("A", positive=True) * stress**n}, "params": {A: RATE, n: EXPONENT}},
+        "'A' is not a plain real one",
+    ),
+    "unused": ({"params": {A: RATE, n: EXPONENT, B: EXPONENT}}, "parameter B is declared but not used"),
+    "keyed by text": ({"params": {"A": RATE, "n": EXPONENT}}, "must be keyed by symbols, found 'A'"),
+    "not a Param": ({"params": {A: (1, 2), n: EXPONENT}}, r"parameter 'A': found tuple, write Param\(...\)"),
+    "reserved name": (
+        {"terms": {"x": A * sympy.Symbol("time", real=True)}, "params": {A: RATE, time: EXPONENT}},
+        "'time' is a word of the language",
+    ),
+    "name used twice": (
+        {"params": {A: RATE, n: EXPONENT}, "states": {n: State(0, A)}},
+        "the name 'n' is used twice",
+    ),
+    "not an identifier": (
+        {"terms": {"x": sympy.Symbol("2x", real=True) * stress}, "params": {sympy.Symbol("2x", real=True): EXPONENT}},
+        "'2x' is not a plain name",
+    ),
+    "not finite": ({"terms": {"x": A * stress**n + sympy.zoo}}, "not finite and real"),
+    "not real": ({"terms": {"x": sympy.I * A * stress**n}}, "not finite and real"),
+    "stray constraint": ({"constraints": (B >= 0,)}, "a constraint mentions unknown symbol B"),
+    "no constraint": ({"constraints": (n,)}, "constraint n is not a relation"),
+    "constraint that cannot hold": ({"constraints": (sympy.false,)}, "constraint False is not a relation"),
+    "state not a State": ({"states": {omega: A}}, "states must be written as"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_LAWS)
+def test_a_bad_law_is_explained_in_one_sentence(case):
+    changes, message = BAD_LAWS[case]
+    with pytest.raises(LawError, match=message) as error:
+        law(**changes)
+    assert "\n" not in str(error.value)
+
+
+BAD_PARAMS = {
+    "reversed bounds": ({"bounds": (8, 1)}, r"bounds are reversed or empty, \(8, 1\)"),
+    "empty bounds": ({"bounds": (1, 1)}, "reversed or empty"),
+    "one bound": ({"bounds": (1,)}, r"write two numbers \(low, high\)"),
+    "bounds in words": ({"bounds": "wide"}, "write two numbers"),
+    "infinite bounds": ({"bounds": (0, float("inf"))}, "must be finite"),
+    "log of zero": ({"bounds": (0, 1), "scale": "log", "unit": "1/s"}, "a log scale needs bounds above zero"),
+    "missing unit": ({"scale": "log"}, 'missing unit; write unit="1/s"'),
+    "unknown scale": ({"scale": "logarithmic"}, "allowed are 'linear' and 'log'"),
+    "no meaning": ({"meaning": " "}, "empty meaning"),
+    "meaning of two lines": ({"meaning": "a\nb"}, "one line of text"),
+    "off not finite": ({"off": float("nan")}, "off = nan must be a finite number"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_PARAMS)
+def test_a_bad_param_is_explained(case):
+    changes, message = BAD_PARAMS[case]
+    with pytest.raises(LawError, match=message):
+        Param(**{"meaning": "stress exponent", "bounds": (1, 8), **changes})
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"initial": float("nan")}, "initial = nan must be a finite number"),
+        ({"limit": float("inf")}, "limit = inf must be a finite number"),
+        ({"rate": "A*stress"}, "not a sympy expression"),
+    ],
+)
+def test_a_bad_state_is_explained(changes, message):
+    with pytest.raises(LawError, match=message):
+        State(**{"initial": 0.0, "rate": A, **changes})
+
+
+def test_param_knows_its_middle_its_internal_form_and_what_it_admits():
+    assert RATE.center == pytest.approx(10**-22.5)
+    assert EXPONENT.center == 4.5
+    assert RATE.to_internal(0.0) == -float("inf")
+    assert RATE.from_internal(RATE.to_internal(1e-12)) == pytest.approx(1e-12, rel=1e-13)
+    assert RATE.admits(0.0)
+    assert RATE.admits(1e-40)
+    assert not RATE.admits(1e-4)
+    assert not EXPONENT.admits(0.0)
+    assert not EXPONENT.admits(float("nan"))
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"A": 1e-12}, "needs a value for n"),
+        ({"A": 1e-12, "n": 5, "q": 1}, "has no parameter 'q'"),
+        ({"A": 1e-12, "n": "five"}, "parameter 'n': 'five' is not a number"),
+        ({"A": 1e-12, "n": None}, "parameter 'n': None is not a number"),
+        ({"A": 1e-12, "n": float("inf")}, "inf is not a finite number"),
+        ({"A": -1e-12, "n": 5}, "is negative; it must be positive"),
+    ],
+)
+def test_values_are_checked(values, message):
+    with pytest.raises(LawError, match=message):
+        NORTON.values(values)
+
+
+def test_values_come_back_complete_and_in_the_law_s_order():
+    assert list(NORTON.values({"n": 5, "A": 0}).items()) == [("A", 0.0), ("n", 5.0)]
+
+
+def test_the_nearest_parameter_is_suggested():
+    with pytest.raises(LawError, match="did you mean 'tau_r'"):
+        DRIFTING_EXPONENT.symbol("tau_R")
+
+
+@pytest.mark.parametrize("built", [NORTON, COMBINED, DRIFTING_EXPONENT, COMBINED.times(arrhenius())], ids=str)
+def test_laws_survive_pickle_and_copies(built):
+    for other in (pickle.loads(pickle.dumps(built)), copy.deepcopy(built), built.rename(built.name)):
+        assert other == built
+        assert hash(other) == hash(built)
+        assert other.fingerprint == built.fingerprint
+        assert other.names == built.names
+
+
+def test_laws_cannot_be_changed():
+    with pytest.raises(AttributeError):
+        NORTON.name = "other"
+    with pytest.raises(TypeError):
+        NORTON.terms["more"] = stress
+
+
+def test_parameters_keep_the_author_s_order():
+    p, q, a = parameters("p q a")
+    table = {q: EXPONENT, a: RATE, p: EXPONENT}
+    assert law(terms={"x": a * stress**p * strain**q}, params=table).names == ("q", "a", "p")
+
+
+# ---- fingerprint ---------------------------------------------------------------------------------------------------
+
+
+def test_titles_bounds_and_references_do_not_enter_the_fingerprint():
+    wide = Param("another meaning", bounds=(0.5, 20))
+    other = law(name="other", title="Other", references=("Somebody (1950)",), params={A: RATE, n: wide})
+    assert other.fingerprint == law().fingerprint
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        law(terms={"power law": A * stress ** (n + 1)}),
+        law(terms={"another name": A * stress**n}),
+        law(params={A: Param("rate coefficient", bounds=(1e-40, 1e-5)), n: EXPONENT}),
+        law(terms={"power law": A * stress**B}, params={A: RATE, B: EXPONENT}),
+        law(terms={"power law": A * (1 + omega) * stress**n}, states={omega: State(0, A * stress)}),
+    ],
+)
+def test_mathematics_enters_the_fingerprint(changed):
+    assert changed.fingerprint != law().fingerprint
+
+
+def test_the_fingerprint_of_a_power_tower_is_found_in_no_time():
+    tower = law(terms={"x": A * time ** (time ** (time**n))})
+    assert tower.fingerprint.count("-") == 1
+
+
+def test_a_parameter_may_be_called_as_a_function_is():
+    exp, lambda_ = parameters("exp lambda")
+    odd = law(terms={"x": exp * sympy.exp(stress / lambda_)}, params={exp: RATE, lambda_: EXPONENT})
+    assert odd.fingerprint == pickle.loads(pickle.dumps(odd)).fingerprint
+
+
+# ---- print ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_law_prints_its_terms_and_table():
+    text = str(COMBINED)
+    assert "A_1*sinh(stress/B)**n_1    [hyperbolic sine]" in text
+    assert "+ A_3*stress**n_3*time**m_2    [time hardening]" in text
+    assert "m_2      time exponent: -0.95 to 0" in text
+    assert "A_1      rate coefficient: 1e-40 to 1e-05 or 0 1/s, log scale" in text
+    assert repr(NORTON) == "<CreepLaw norton: 1 term(s), parameters A, n>"
+
+
+def test_latex_of_a_power_law():
+    assert NORTON.latex() == r"\dot{\varepsilon}_{cr} = A \sigma_e^{n}"
+
+
+def test_latex_shows_arrhenius_as_people_write_it():
+    expected = r"A \sigma_e^{n} \exp\!\left[-\frac{Q}{R}\left(\frac{1}{T} - \frac{1}{1073.15\,\mathrm{K}}\right)\right]"
+    assert NORTON.times(arrhenius(T_ref=1073.15)).latex() == r"\dot{\varepsilon}_{cr} = " + expected
+
+
+def test_latex_of_a_given_activation_energy():
+    assert r"-\frac{412000}{R}" in NORTON.times(arrhenius(T_ref=1100, Q=412e3)).latex()
+
+
+def test_latex_of_internal_variables():
+    damage = law(terms={"x": A * (stress / (1 - omega)) ** n}, states={omega: State(0, A * stress**n, limit=1.0)})
+    assert r",\quad \dot{\omega} = A \sigma_e^{n}" in damage.latex()
+    assert "domega/dt = A*stress**n, from 0" in str(damage)
+
+
+# ---- elastic -------------------------------------------------------------------------------------------------------
+
+
+def test_wachtman_modulus():
+    """E = E0 - b T exp(-T0/T), Wachtman et al. (1961): at T = T0 the exponential is 1/e."""
+    assert Elastic(E=wachtman(2e5, 40.0, 500.0)).at(500.0).E == pytest.approx(2e5 - 40 * 500 / 2.718281828459045)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ({"E": 0}, "E = 0 MPa is not a modulus"),
+        ({"E": 2e5, "nu": 0.5}, r"nu = 0.5 is outside \(-1, 0.5\)"),
+        ({"E": 2e5 * stress}, "may depend on temperature alone, found stress"),
+    ],
+)
+def test_bad_elastic_data(data, message):
+    with pytest.raises(LawError, match=message):
+        Elastic(**data)
+
+
+def test_elastic_numbers_may_depend_on_temperature():
+    assert Elastic(E=2e5 - 50 * temperature, nu=0.3).at(1000.0) == Elastic(150e3, 0.3)

@@ -1,0 +1,155 @@
+"""Every way in which a file can be wrong is told in one sentence, with the file and the line."""
+
+from pathlib import Path
+
+import pytest
+
+from creepkit.errors import HistoryError
+from creepkit.readers.history_csv import CSV
+
+HEAD = "# temperature_C: 850\n# stress_MPa: 60\n"
+BODY = "time_s,strain\n0,0\n10,0.1\n"
+
+CASES = {
+    "empty": ("", "x.csv: the file is empty; write a line of columns such as time_s,strain, then rows"),
+    "blank": ("\n \n", "x.csv: the file is empty"),
+    "header only": (HEAD, "x.csv: the file holds a header but no table"),
+    "no rows": (HEAD + "time_s,strain\n", "x.csv:3: no rows below the line of columns"),
+    "one point": (HEAD + "time_s,strain\n0,0\n", "x.csv:4: only one frame in time; at least two are needed"),
+    "one time": (HEAD + "time_s,strain\n1,0\n1,1\n", "x.csv:4: only one frame in time"),
+    "no time": (HEAD + "strain\n0\n1\n", "x.csv:3: missing column: no time among strain; name one time_s, time_min"),
+    "no output": (HEAD + "time_s,temperature_C\n0,850\n1,850\n", "x.csv:3: missing column: the columns hold no output"),
+    "two specimens": (HEAD + "time_s,strain,shape\n0,0,2\n1,0,2\n", "x.csv:3: .* outputs of uniaxial and bulge, those"),
+    "other specimen": (HEAD + "# specimen: bulge\n" + BODY, "x.csv:4: .* outputs of uniaxial, those of bulge are"),
+    "unknown column": (
+        HEAD + "time_s,strian\n0,0\n1,0\n",
+        "x.csv:3: column 'strian' is not understood; did you mean 'strain'",
+    ),
+    "unknown unit of a column": (
+        HEAD + "time_yr,strain\n0,0\n1,0\n",
+        "x.csv:3: the unit 'yr' of 'time_yr' is not understood; allowed: time_s, time_min, time_h, time_d",
+    ),
+    "unknown unit of a strain": (
+        HEAD + "time_s,strain_ppm\n0,0\n1,0\n",
+        "x.csv:3: the unit 'ppm' of 'strain_ppm' is not understood; allowed: strain, strain_pct, strain_percent",
+    ),
+    "no unit": (HEAD + "time,strain\n0,0\n1,0\n", "x.csv:3: 'time' has no unit; allowed: time_s, time_min"),
+    "unknown unit of a key": (
+        "# temperature_F: 1600\n# stress_MPa: 60\n" + BODY,
+        "x.csv:1: the unit 'F' of 'temperature_F' is not understood; allowed: temperature_K, temperature_C",
+    ),
+    "key without unit": (
+        "# temperature: 850\n" + BODY,
+        "x.csv:1: 'temperature' has no unit; allowed: temperature_K, temperature_C",
+    ),
+    "falling time": (
+        HEAD + "time_s,strain\n0,0\n10,0.1\n9,0.2\n",
+        "x.csv:6: time falls from 10 s to 9 s; it must never decrease",
+    ),
+    "negative time": (HEAD + "time_s,strain\n-1,0\n1,0\n", "x.csv:4: 'time_s' is -1; a time must lie from 0 to 1e"),
+    "nan": (HEAD + "time_s,strain\n0,0\n1,nan\n", "x.csv:5: 'strain' is 'nan'; write a finite number"),
+    "infinite": (HEAD + "time_s,strain\n0,0\n1,1e999\n", "x.csv:5: 'strain' is inf; a strain must lie from"),
+    "not a number": (HEAD + "time_s,strain\n0,0\n1,a lot\n", "x.csv:5: 'strain' is 'a lot'; write a finite number"),
+    "grouped digits": (HEAD + "time_s,strain\n0,0\n1_000,0\n", "x.csv:5: 'time_s' is '1_000'; write a finite number"),
+    "empty cell": (HEAD + "time_s,strain\n0,0\n1,\n", "x.csv:5: 'strain' is empty; write a finite number"),
+    "too few cells": (HEAD + "time_s,strain\n0,0\n\n1\n", "x.csv:6: 1 cells for 2 columns; write one cell a column"),
+    "too many cells": (HEAD + "time_s,strain\n0,0,0\n", "x.csv:4: 3 cells for 2 columns"),
+    "stray quote": (HEAD + 'time_s,strain\n0,"0\n1,0\n', "x.csv:4: not a line of a CSV table .*; look for stray"),
+    "column twice": (HEAD + "time_s,strain,strain\n0,0,0\n", "x.csv:3: the column 'strain' stands there twice"),
+    "quantity twice": (HEAD + "time_s,time_h,strain\n0,0,0\n", "x.csv:3: two columns hold the time; keep one"),
+    "nameless column": (HEAD + "time_s,,strain\n0,0,0\n", "x.csv:3: a column has no name"),
+    "no loading": (
+        "# temperature_C: 850\n# stres_MPa: 60\n" + BODY,
+        r"x.csv: no loading \(neither stress nor pressure\) \(keys not understood: stres_MPa\); write stress_MPa",
+    ),
+    "no temperature": ("# stress_MPa: 60\n" + BODY, "x.csv: no temperature; write temperature_C or temperature_K"),
+    "negative stress": (
+        "# temperature_C: 850\n# stress_MPa: -60\n" + BODY,
+        "x.csv:2: 'stress_MPa' is -60; a stress must lie from 0 to 100000 MPa",
+    ),
+    "below absolute zero": (
+        "# temperature_C: -300\n# stress_MPa: 60\n" + BODY,
+        "x.csv:1: 'temperature_C' is -300; a temperature must lie above 0 and below 10000 K",
+    ),
+    "modulus of zero": (HEAD + "# modulus_GPa: 0\n" + BODY, "x.csv:3: 'modulus_GPa' is 0; a modulus must lie above 0"),
+    "key twice": (
+        HEAD + "# stress_MPa: 61\n" + BODY,
+        "x.csv:3: 'stress_MPa' was already given in line 2; keep one of them",
+    ),
+    "quantity in two units": (
+        HEAD + "# temperature_K: 1123.15\n" + BODY,
+        r"x.csv:3: 'temperature' is given twice \(perhaps in two units\)",
+    ),
+    "two ways of stress": (
+        HEAD + "# stress_steps: 0 s 60 MPa\n" + BODY,
+        "x.csv: the stress is given 2 times over, as a number, stress_steps, stress_program or a column; keep one",
+    ),
+    "column against key": (
+        HEAD + "time_s,strain,stress_MPa\n0,0,60\n1,0,61\n",
+        "x.csv:5: the column holds 61 where 'stress_MPa' .*x.csv:2.* says 60; keep the column or the number, or rename",
+    ),
+    "stress and pressure": (
+        HEAD + "# pressure_MPa: 8\n" + BODY,
+        "x.csv:3: 'pressure_MPa' has no meaning beside the other conditions",
+    ),
+    "pressure column beside stress": (
+        HEAD + "time_s,strain,pressure_MPa\n0,0,8\n1,0,8\n",
+        "x.csv:3: a column of pressure has no meaning beside strain, stress, temperature",
+    ),
+    "half a jump": (
+        "# temperature_C: 850\n# pressure_1_MPa: 8\n# pressure_2_MPa: 8\n" + BODY,
+        "x.csv:2: 'pressure_1_MPa' needs jump_time beside it .*, which is missing",
+    ),
+    "jump in the ramp": (
+        "# temperature_C: 850\n# pressure_1_MPa: 8\n# pressure_2_MPa: 8\n# jump_time_s: 1\n" + BODY,
+        "x.csv:2: a pressure jump needs .* Tj after the first ramp",
+    ),
+    "jump beside a stress": (HEAD + "# jump_time_h: 3\n" + BODY, "x.csv:3: 'jump_time_h' has no meaning beside"),
+    "steps that cannot be read": (
+        "# temperature_C: 850\n# stress_steps: 0 s 60 MPa, 5 s 70 MPa\n" + BODY,
+        "x.csv:2: stress_steps holds '0 s 60 MPa, 5 s 70 MPa'; write time and value with units, such as 0 s 100 MPa",
+    ),
+    "steps from later on": (
+        "# temperature_C: 850\n# stress_steps: 5 s 60 MPa\n" + BODY,
+        "x.csv:2: the times of stress_steps are 5 s; they must start at 0 and never decrease",
+    ),
+    "steps at one time": (
+        "# temperature_C: 850\n# stress_steps: 0 s 60 MPa; 0 s 61 MPa\n" + BODY,
+        "x.csv:2: stress steps must start at time 0 and follow one another",
+    ),
+    "unit within steps": (
+        "# temperature_C: 850\n# stress_steps: 0 s 60 N\n" + BODY,
+        "x.csv:2: the unit 'N' of 'stress_steps' is not understood; allowed: MPa, kPa",
+    ),
+    "control": (HEAD + "# control: force\n" + BODY, "x.csv:3: control is 'force'; allowed: load, stress"),
+    "strain measure": (HEAD + "# strain_measure: true\n" + BODY, "x.csv:3: strain_measure is 'true'; allowed: eng"),
+    "end before the start": (HEAD + "# end_time_s: 1\ntime_s,strain\n2,0\n3,0\n", "x.csv:3: every frame lies after"),
+    "no scatter at all": (HEAD + "# strain_sd: 0\n" + BODY, "x.csv:3: 'strain_sd' is 0; a standard deviation of a"),
+    "scatter twice": (
+        HEAD + "# strain_sd: 1\ntime_s,strain,strain_sd\n0,0,1\n1,0,1\n",
+        "x.csv:3: 'strain_sd' is also a column of the frames",
+    ),
+    "flag of two": (HEAD + "time_s,strain,used\n0,0,1\n1,0,2\n", "x.csv:5: 'used' is 2; a flag must lie from 0 to 1"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_message(case: str, tmp_path: Path):
+    text, message = CASES[case]
+    path = tmp_path / "x.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(HistoryError, match=message) as caught:
+        CSV.read(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_bytes_that_are_no_text(tmp_path: Path):
+    path = tmp_path / "x.csv"
+    path.write_bytes(b"# alloy: a\n# heat: \xb0\n")
+    with pytest.raises(HistoryError, match=r"x.csv:2: byte 0xb0 is not text in UTF-8; save the table as CSV in UTF-8"):
+        CSV.read(path)
+
+
+def test_file_that_is_not_there(tmp_path: Path):
+    with pytest.raises(HistoryError, match=r"x.csv: cannot be read \(No such file or directory\)"):
+        CSV.read(tmp_path / "x.csv")

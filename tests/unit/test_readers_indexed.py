@@ -1,0 +1,136 @@
+"""Folders with an index: frames of all tests in one file, or one file a test."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from creepkit.errors import HistoryError
+from creepkit.readers.indexed import INDEXED_FILES, INDEXED_TABLE, IndexedFolder
+from creepkit.readers.words import Words
+
+INDEX = "key,temperature_C,stress_MPa,youngs_MPa,state\na/1,900,25,149000,Ruptured\na/2,950,20,144000,\n"
+CURVES = (
+    "key,temperature_C,stress_MPa,time_s,strain\na/1,900,25,0,0\na/2,950,20,0,0\na/1,900,25,10,0.1\na/2,950,20,9,0.2\n"
+)
+
+
+def folder(tmp_path: Path, files: dict[str, str]) -> Path:
+    made = tmp_path / "alloy9"
+    made.mkdir()
+    for name, text in files.items():
+        (made / name).write_text(text, encoding="utf-8")
+    return made
+
+
+def files(index: str = "", frames: str = "") -> dict[str, str]:
+    index = index or "test,temperature_C,stress_MPa,rupture_h\nB,980,230,78.7\nA,980,140,Not applicable\n"
+    frames = frames or "time_h,creep_extension_pct,T_top_C,T_mid_C,T_bot_C\n0,0,980,981,982\n2,0.5,980,981,988\n"
+    return {"index.csv": index, "A_creep.csv": frames, "B_creep.csv": frames}
+
+
+def test_one_table_for_all_tests(tmp_path):
+    first, second = INDEXED_TABLE.read(folder(tmp_path, {"index.csv": INDEX, "curves.csv": CURVES}))
+    assert (first.name, second.name) == ("a/1", "a/2")
+    assert first.outputs["strain"].tolist() == [0.0, 0.1]
+    assert second.times.tolist() == [0.0, 9.0]
+    assert first.elastic.E == 149000.0
+    assert first.temperature == 1173.15
+    assert (first.labels["state"], "state" in second.labels) == ("Ruptured", False)
+    assert first.alloy == "alloy9"
+    assert first.source.endswith("curves.csv (a/1)")
+
+
+def test_one_file_a_test_in_the_order_of_the_index(tmp_path):
+    made = folder(tmp_path, files())
+    first, second = INDEXED_FILES.read(made)
+    assert (first.name, second.name) == ("B", "A")
+    np.testing.assert_allclose(first.times, [0, 7200])
+    np.testing.assert_allclose(first.outputs["strain"], [0, 0.005])
+    assert first.loading.steps == ((0.0, 230.0),)
+    assert first.temperature == pytest.approx(1253.15)
+    assert first.labels["measured_temperature_C"] == "982.00"  # (980 + 981 + 982 + 980 + 981 + 988) / 6
+    assert (first.labels["rupture_h"], second.labels["rupture_h"]) == ("78.7", "Not applicable")
+    assert first.source == str(made / "B_creep.csv")
+
+
+def test_any_file_of_the_folder_leads_to_it(tmp_path):
+    made = folder(tmp_path, files())
+    assert all(INDEXED_FILES.accepts(made / name) for name in ("", "index.csv", "A_creep.csv"))
+    assert [history.name for history in INDEXED_FILES.read(made / "index.csv")] == ["B", "A"]
+    assert [history.name for history in INDEXED_FILES.read(made / "A_creep.csv")] == ["A"]
+    assert not INDEXED_TABLE.accepts(made)
+    (made / "notes.csv").write_text("x\n1\n")
+    assert not INDEXED_FILES.accepts(made / "notes.csv")
+
+
+def test_alloy_from_the_index(tmp_path):
+    index = "test,temperature_C,stress_MPa,alloy\nA,980,230,CMSX-6\nB,980,140,CMSX-6\n"
+    assert {history.alloy for history in INDEXED_FILES.read(folder(tmp_path, files(index)))} == {"CMSX-6"}
+
+
+def test_another_laboratory_is_a_declaration(tmp_path):
+    layout = IndexedFolder(
+        name="lab",
+        title="our laboratory",
+        key="Probe",
+        frames="{key}.csv",
+        index="Liste.csv",
+        words=Words(rename={"T_C": "temperature_C", "Spannung_MPa": "stress_MPa", "Dehnung_pct": "strain_pct"}),
+    )
+    made = folder(
+        tmp_path, {"Liste.csv": "Probe,T_C,Spannung_MPa\nx,600,90\n", "x.csv": "time_h,Dehnung_pct\n0,0\n1,2\n"}
+    )
+    assert layout.accepts(made)
+    (history,) = layout.read(made)
+    assert (history.name, history.condition) == ("x", "600 C, 90 MPa")
+    np.testing.assert_allclose(history.outputs["strain"], [0, 0.02])
+
+
+BAD = {
+    "test twice": (INDEX + "a/1,900,25,149000,\n", CURVES, "index.csv:4: test 'a/1' already stands in line 2"),
+    "test without a name": (INDEX + ",900,25,149000,\n", CURVES, "index.csv:4: the key is empty or not printable"),
+    "test without frames": (INDEX + "a/3,900,25,149000,\n", CURVES, "index.csv:4: test 'a/3' has no frames in .*"),
+    "frames without test": (INDEX, CURVES + "b,900,25,0,0\n", "curves.csv:6: test 'b' is not in .*index.csv; add it"),
+    "no stress": (INDEX.replace("stress_MPa", "sigma"), CURVES.replace("stress_MPa", "strain_sd"), "index.csv:2: no l"),
+    "column against index": (
+        INDEX,
+        CURVES.replace("a/1,900,25,10", "a/1,901,25,10"),
+        r"curves.csv:4: the column holds 1174.15 where 'temperature_C' \(.*index.csv:2\) says 1173.15",
+    ),
+    "falling time": (INDEX, CURVES + "a/1,900,25,9,0.2\n", "curves.csv:6: time falls from 10 s to 9 s"),
+    "empty index": ("", CURVES, "index.csv: the file is empty"),
+    "no key": (INDEX.replace("key", "test"), CURVES, "index.csv:1: missing column 'key'; found: test, temperature_C"),
+    "negative stress": (INDEX.replace(",20,", ",-20,"), CURVES, "index.csv:3: 'stress_MPa' is -20; a stress must lie"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_message_of_a_bad_table(case, tmp_path):
+    index, curves, message = BAD[case]
+    made = folder(tmp_path, {"index.csv": index, "curves.csv": curves})
+    with pytest.raises(HistoryError, match=message):
+        INDEXED_TABLE.read(made)
+
+
+def test_message_for_missing_and_extra_files(tmp_path):
+    made = folder(tmp_path, files())
+    (made / "B_creep.csv").rename(made / "C_creep.csv")
+    with pytest.raises(HistoryError, match=r"C_creep.csv: no test in .*index.csv has these frames"):
+        INDEXED_FILES.read(made)
+    (made / "C_creep.csv").unlink()
+    with pytest.raises(HistoryError, match=r"index.csv:2: test 'B' has no file B_creep.csv"):
+        INDEXED_FILES.read(made)
+
+
+def test_key_cannot_lead_out_of_the_folder(tmp_path):
+    (tmp_path / "A_creep.csv").write_text("secret")
+    index = "test,temperature_C,stress_MPa\nA,980,230\nB,980,140\n../A,980,1\n"
+    with pytest.raises(HistoryError, match=r"index.csv:4: test '../A' has no file"):
+        INDEXED_FILES.read(folder(tmp_path, files(index)))
+
+
+def test_missing_thermocouple(tmp_path):
+    frames = "time_h,creep_extension_pct,T_top_C,T_mid_C\n0,0,980,981\n2,0.5,980,981\n"
+    with pytest.raises(HistoryError, match=r"B_creep.csv:1: missing column 'T_bot_C'; found: time_h, creep_ext"):
+        INDEXED_FILES.read(folder(tmp_path, files(frames=frames)))

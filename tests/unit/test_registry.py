@@ -1,0 +1,307 @@
+"""Plugins as pip, the environment and --plugin bring them: good ones, clashing ones and broken ones."""
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from creepkit.errors import ExportError, HistoryError, LawError, PluginError, SolveError
+from creepkit.language import CreepLaw, Factor, arrhenius
+from creepkit.registry import Plugin, Registry
+
+LAW = """
+from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress
+
+A, n = parameters("A n")
+LAW = CreepLaw(
+    name="{name}",
+    title="A law of an outsider",
+    terms={{"power law": A * stress**n}},
+    params={{
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log"),
+        n: Param("stress exponent", bounds=(1, 8)),
+    }},
+)
+
+
+@hookimpl
+def creepkit_laws():
+    return [LAW]
+"""
+
+Write = Callable[[str, str], Path]
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
+    """Leave a distribution with one module and one entry point on the path, as pip would."""
+    modules = []
+
+    def write(name: str, source: str) -> Path:
+        site, module = tmp_path / name, name.replace("-", "_")
+        info = site / f"{module}-1.2.dist-info"
+        info.mkdir(parents=True)
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.2\n")
+        (info / "entry_points.txt").write_text(f"[creepkit]\nmine = {module}\n")
+        file = site / f"{module}.py"
+        file.write_text(source)
+        monkeypatch.syspath_prepend(site)
+        modules.append(module)
+        return file
+
+    yield write
+    for module in modules:
+        sys.modules.pop(module, None)
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Write a plugin file."""
+
+    def write(name: str, source: str) -> Path:
+        file = tmp_path / f"{name}.py"
+        file.write_text(source)
+        return file
+
+    return write
+
+
+def of(registry: Registry, origin: str) -> Plugin:
+    return next(plugin for plugin in registry.plugins() if plugin.provenance.origin.startswith(origin))
+
+
+# ---- what creepkit brings itself -----------------------------------------------------------------------------------
+
+
+def test_every_built_in_plugin_loads() -> None:
+    own = [plugin for plugin in Registry().plugins() if plugin.provenance.origin.startswith("creepkit ")]
+
+    assert len(own) >= 10
+    assert [plugin.problem for plugin in own if plugin.problem] == []
+    assert [plugin.provenance.name for plugin in own if not any(plugin.offers.values())] == []
+
+
+def test_the_six_laws_of_the_paper_are_there() -> None:
+    laws = Registry().laws()
+
+    published = {"norton", "strain-hardening", "time-hardening", "hyperbolic-sine", "drifting-exponent", "combined"}
+    assert published <= set(laws)
+    assert all(isinstance(found.value, CreepLaw) and found.value.name == name for name, found in laws.items())
+    assert str(laws["norton"].provenance).startswith("plugin 'norton' (creepkit ")
+
+
+def test_a_temperature_form_is_found_by_name() -> None:
+    factor = Registry().temperature_form("arrhenius")(T_ref=1000.0)
+
+    assert isinstance(factor, Factor)
+    assert factor == arrhenius(T_ref=1000.0)
+
+
+def test_an_unknown_name_is_an_error_of_its_kind_with_the_nearest_name() -> None:
+    registry = Registry()
+
+    with pytest.raises(LawError, match=r"there is no law 'nortn': did you mean 'norton'\?"):
+        registry.law("nortn")
+    with pytest.raises(SolveError, match=r"there is no specimen 'uniaxal': did you mean 'uniaxial'\?"):
+        registry.specimen("uniaxal")
+    with pytest.raises(LawError, match=r"there is no temperature form 'linaer': did you mean 'linear'\?"):
+        registry.temperature_form("linaer")
+    with pytest.raises(HistoryError, match="there is no reader 'no-such': known: "):
+        registry.reader("no-such")
+    with pytest.raises(ExportError, match="there is no exporter 'no-such': known: "):
+        registry.exporter("no-such")
+
+
+# ---- where plugins come from ---------------------------------------------------------------------------------------
+
+
+def test_an_installed_plugin_is_found_with_its_distribution(install: Write) -> None:
+    install("outsider-pack", LAW.format(name="outsider"))
+
+    found = Registry().laws()["outsider"]
+
+    assert found.value.names == ("A", "n")
+    assert str(found.provenance) == "plugin 'mine' (outsider-pack 1.2)"
+
+
+def test_files_in_the_environment_are_loaded(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = [write("one", LAW.format(name="one")), write("two", LAW.format(name="two"))]
+    monkeypatch.setenv("CREEPKIT_PLUGINS", os.pathsep.join(map(str, files)))
+
+    laws = Registry().laws()
+
+    assert laws["one"].provenance.origin == str(files[0].resolve())
+    assert laws["two"].provenance.name == "two"
+
+
+def test_a_file_is_loaded_once_however_it_is_named(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = write("once", LAW.format(name="once"))
+    monkeypatch.setenv("CREEPKIT_PLUGINS", os.pathsep.join([str(file), str(file.parent / "." / file.name)]))
+    registry = Registry()
+
+    registry.load_file(file)
+
+    assert "once" in registry.laws()
+    assert sum(plugin.provenance.name == "once" for plugin in registry.plugins()) == 1
+
+
+def test_an_edited_file_is_read_anew_and_leaves_no_bytecode(write: Write) -> None:
+    file = write("edited", LAW.format(name="before"))
+    Registry().load_file(file)
+    file.write_text(LAW.format(name="behind"))
+
+    assert list(Registry().load_file(file).offers["law"]) == ["behind"]
+    assert not (file.parent / "__pycache__").exists()
+
+
+def test_asking_for_the_registry_imports_no_plugin(install: Write) -> None:
+    install("lazy-pack", LAW.format(name="lazy"))
+
+    registry = Registry()
+
+    assert "lazy_pack" not in sys.modules
+    assert "lazy" in registry.laws()
+    assert "lazy_pack" in sys.modules
+
+
+# ---- what can be wrong ---------------------------------------------------------------------------------------------
+
+
+def test_two_plugins_with_one_name_are_both_named(install: Write, write: Write) -> None:
+    install("first-pack", LAW.format(name="same"))
+    file = write("second", LAW.format(name="same"))
+    registry = Registry()
+    registry.load_file(file)
+
+    with pytest.raises(PluginError) as caught:
+        registry.laws()
+
+    told = str(caught.value)
+    assert "the law 'same' is offered twice" in told
+    assert "plugin 'mine' (first-pack 1.2)" in told
+    assert f"plugin 'second' ({file.resolve()})" in told
+    assert registry.clashes() == (told,)
+
+
+def test_one_plugin_with_a_name_twice_is_broken(write: Write) -> None:
+    file = write("double", LAW.format(name="double").replace("[LAW]", "[LAW, LAW]"))
+
+    with pytest.raises(PluginError, match="offers the law 'double' twice"):
+        Registry().load_file(file)
+
+
+WRONG = {
+    "raises on import": ("import creepkit\n\n1 / 0\n", "ZeroDivisionError: division by zero", "line 3"),
+    "exits on import": ("import sys\nsys.exit('bye')\n", "SystemExit: bye", "line 2"),
+    "syntax error": ("A = 1\nB = (\n", "SyntaxError: '(' was never closed", "line 2"),
+    "missing module": ("import no_such_module_of_mine\n", "No module named 'no_such_module_of_mine'", "line 1"),
+    "law not well formed": (
+        LAW.format(name="bad").replace("bounds=(1, 8)", "bounds=(8, 1)"),
+        "bounds are reversed",
+        "line 11",
+    ),
+    "misspelt hook": (
+        LAW.format(name="bad").replace("creepkit_laws", "creepkit_law"),
+        "unknown hook 'creepkit_law': did you mean 'creepkit_laws'?",
+        "",
+    ),
+    "hook without decorator": (LAW.format(name="bad").replace("@hookimpl", ""), "'creepkit_laws' without @", ""),
+    "no hook at all": ("A = 1\n", "offers nothing", ""),
+    "hook with a wrong argument": (
+        LAW.format(name="bad").replace("creepkit_laws()", "creepkit_laws(registry)"),
+        "does not fit the hooks of creepkit",
+        "",
+    ),
+    "hook that raises": (LAW.format(name="bad").replace("[LAW]", "[LAW][3]"), "raised IndexError", "line 18"),
+    "hook that forgot to return": (LAW.format(name="bad").replace("return [LAW]", "[LAW]"), "found NoneType None", ""),
+    "a law for a list": (LAW.format(name="bad").replace("[LAW]", "LAW"), "must return a list of CreepLaw", ""),
+    "text for a law": (LAW.format(name="bad").replace("[LAW]", "['A*stress**n']"), "found str 'A*stress**n' in it", ""),
+    "class for a law": (LAW.format(name="bad").replace("[LAW]", "[CreepLaw]"), "found the class CreepLaw in it", ""),
+    "numbers for specimens": (
+        "from creepkit.language import hookimpl\n\n@hookimpl\ndef creepkit_specimens():\n    return [1.5]\n",
+        "must return a list of Specimen records, found float 1.5 in it",
+        "",
+    ),
+    "text for temperature forms": (
+        "from creepkit.language import hookimpl\n@hookimpl\ndef creepkit_temperature_forms(): return {'x': '1/T'}\n",
+        "found str '1/T' for 'x'",
+        "",
+    ),
+}
+
+
+@pytest.mark.parametrize(("source", "told", "line"), WRONG.values(), ids=WRONG.keys())
+def test_a_wrong_file_is_one_sentence_when_asked_for(write: Write, source: str, told: str, line: str) -> None:
+    file = write("wrong", source)
+    registry = Registry()
+
+    with pytest.raises(PluginError) as caught:
+        registry.load_file(file)
+
+    sentence = str(caught.value)
+    assert told in sentence
+    assert str(file) in sentence
+    assert line in sentence
+    assert "\n" not in sentence
+    assert all(plugin.provenance.name != "wrong" for plugin in registry.plugins())
+
+
+@pytest.mark.parametrize(("source", "told", "line"), WRONG.values(), ids=WRONG.keys())
+def test_a_wrong_installed_plugin_leaves_the_others_standing(install: Write, source: str, told: str, line: str) -> None:
+    install("wrong-pack", source)
+    install("right-pack", LAW.format(name="right"))
+    registry = Registry()
+
+    assert {"norton", "right"} <= set(registry.laws())
+    problem = of(registry, "wrong-pack 1.2").problem
+    assert told in problem
+    assert line in problem
+    assert "wrong-pack 1.2" in problem
+
+
+def test_an_unknown_law_reminds_of_broken_plugins(install: Write) -> None:
+    install("wrong-pack", "1 / 0\n")
+
+    with pytest.raises(LawError, match=r"\d plugin\(s\) could not be loaded, see 'creepkit plugins'"):
+        Registry().law("mine")
+
+
+def test_a_missing_file_is_an_error_when_asked_for_and_a_note_in_the_environment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    missing = tmp_path / "nowhere.py"
+    monkeypatch.setenv("CREEPKIT_PLUGINS", str(missing))
+    registry = Registry()
+
+    assert of(registry, str(missing)).problem.startswith(f"plugin file {missing} does not exist; name a Python file")
+    with pytest.raises(PluginError, match="does not exist"):
+        registry.load_file(missing)
+
+
+def test_a_file_that_was_mended_loads(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = write("mended", "1 / 0\n")
+    monkeypatch.setenv("CREEPKIT_PLUGINS", str(file))
+    registry = Registry()
+    assert of(registry, str(file)).problem
+
+    file.write_text(LAW.format(name="mended"))
+    registry.load_file(file)
+
+    assert registry.law("mended").title == "A law of an outsider"
+
+
+def test_one_module_under_two_entry_points_is_told(install: Write) -> None:
+    file = install("twin-pack", LAW.format(name="twin"))
+    (file.parent / "twin_pack-1.2.dist-info" / "entry_points.txt").write_text(
+        "[creepkit]\nfirst = twin_pack\nsecond = twin_pack\n"
+    )
+    registry = Registry()
+
+    assert "twin" in registry.laws()
+    problems = [p.problem for p in registry.plugins() if p.provenance.name == "second"]
+    assert problems == [
+        "plugin 'second' (twin-pack 1.2) is the same module as plugin 'first' (twin-pack 1.2); "
+        "drop one of the two entry points"
+    ]

@@ -1,0 +1,163 @@
+"""The verbs, with plugins and predictors made for the occasion."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import ExportError, HistoryError, LawError, SolveError
+from creepkit.records import History, Prediction, Status
+from creepkit.registry import default
+
+READERS = """
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from creepkit.language import hookimpl
+from creepkit.records import History, constant_stress
+
+
+@dataclass(frozen=True)
+class OneNumber:
+    name: str
+    suffix: str
+    title: str = "A file with one strain in it"
+
+    def accepts(self, path):
+        return path.suffix == self.suffix
+
+    def read(self, path):
+        strain = np.array([float(path.read_text())])
+        return [History(path.stem, np.ones(1), {{"strain": strain}}, constant_stress(10.0), 1000.0, source=self.name)]
+
+
+@hookimpl
+def creepkit_readers():
+    return [OneNumber("first", ".one"), OneNumber("second", "{suffix}")]
+"""
+
+
+class Steady:
+    """Closed form of steady creep, A s^n t, that ends as it is told to."""
+
+    name = "steady"
+
+    def __init__(self, status: Status = Status.COMPLETE, end: float = np.inf) -> None:
+        self.status, self.end = status, end
+
+    def predict(
+        self, law: ck.CreepLaw, values: Mapping[str, float], histories: Sequence[History], *, jacobian: bool = False
+    ) -> Prediction:
+        times = histories[0].times
+        stress = histories[0].loading.program().at(times)
+        strain = np.where(times <= self.end, values["A"] * stress ** values["n"] * times, np.nan)
+        return Prediction(
+            values=strain[None, None, :, None],
+            outputs=("strain",),
+            lengths=np.array([times.size]),
+            status=np.array([[self.status]]),
+            end_times=np.array([[min(self.end, times[-1])]]),
+        )
+
+
+@pytest.fixture
+def _own_registry() -> Iterator[None]:
+    default.cache_clear()
+    yield
+    default.cache_clear()
+
+
+def simulate(using: Steady, times: Sequence[float] = (1.0, 2.0, 4.0)) -> History:
+    values = {"A": 1e-10, "n": 3.0}
+    return ck.simulate(ck.law("norton"), using, values, loading=ck.constant_stress(100.0), times=times)
+
+
+def test_a_law_is_found_by_name() -> None:
+    assert ck.law("norton").names == ("A", "n")
+    assert ck.laws()["norton"] == ck.law("norton")
+    with pytest.raises(LawError, match="did you mean 'combined'"):
+        ck.law("combind")
+
+
+def test_text_is_never_evaluated_as_a_law() -> None:
+    with pytest.raises(LawError, match="there is no law"):
+        ck.law("A*stress**n")
+
+
+def test_a_simulation_is_a_history_of_what_a_perfect_test_would_measure() -> None:
+    run = simulate(Steady())
+
+    np.testing.assert_allclose(run.outputs["strain"], [1e-4, 2e-4, 4e-4], rtol=1e-12)
+    assert run.condition.endswith("100 MPa")
+
+
+def test_a_simulation_that_bursts_ends_there() -> None:
+    run = simulate(Steady(Status.BURST, end=3.0))
+
+    assert run.times.tolist() == [1.0, 2.0]
+    with pytest.raises(SolveError, match=r"burst at 0.5 s, before the first time asked for"):
+        simulate(Steady(Status.BURST, end=0.5))
+
+
+def test_a_simulation_that_fails_says_so() -> None:
+    with pytest.raises(SolveError, match=r"law 'norton' stopped at 3 s: not converged"):
+        simulate(Steady(Status.NOT_CONVERGED, end=3.0))
+
+
+def test_a_law_that_needs_a_temperature_asks_for_it() -> None:
+    law = ck.law("norton").times(ck.arrhenius(T_ref=1000.0))
+
+    with pytest.raises(SolveError, match="depends on temperature: give temperature= in K"):
+        ck.simulate(law, Steady(), {"A": 1e-10, "n": 3, "Q": 3e5}, loading=ck.constant_stress(100.0), times=[1.0])
+
+
+@pytest.mark.usefixtures("_own_registry")
+def test_histories_are_read_by_name_by_pattern_and_by_folder(tmp_path: Path) -> None:
+    plugin = tmp_path / "readers.py"
+    plugin.write_text(READERS.format(suffix=".two"))
+    default().load_file(plugin)
+    for name, strain in [("b.one", 0.2), ("a.one", 0.1), ("c.two", 0.3)]:
+        (tmp_path / name).write_text(str(strain))
+
+    assert [h.name for h in ck.read_histories(str(tmp_path / "*.one"))] == ["a", "b"]
+    read = ck.read_histories([tmp_path / "c.two", tmp_path / "b.one"])
+    assert [(h.name, h.outputs["strain"][0], h.source) for h in read] == [("c", 0.3, "second"), ("b", 0.2, "first")]
+    assert ck.read_histories(tmp_path / "c.two", reader="first")[0].source == "first"
+
+
+@pytest.mark.usefixtures("_own_registry")
+def test_what_cannot_be_read_is_one_sentence(tmp_path: Path) -> None:
+    plugin = tmp_path / "readers.py"
+    plugin.write_text(READERS.format(suffix=".one"))
+    default().load_file(plugin)
+    (tmp_path / "a.one").write_text("0.1")
+    (tmp_path / "a.odd").write_text("0.1")
+
+    with pytest.raises(HistoryError, match=r"nothing\.csv: the file does not exist"):
+        ck.read_histories(tmp_path / "nothing.csv")
+    with pytest.raises(HistoryError, match=r"\*\.csv: no file matches this pattern"):
+        ck.read_histories(str(tmp_path / "*.csv"))
+    with pytest.raises(HistoryError, match=r"a\.odd: no reader understands this file; readers: "):
+        ck.read_histories(tmp_path / "a.odd")
+    with pytest.raises(HistoryError, match=r"several readers accept this file \(first, second\); choose one"):
+        ck.read_histories(tmp_path / "a.one")
+    with pytest.raises(HistoryError, match="no measured files were named"):
+        ck.read_histories([])
+    with pytest.raises(HistoryError, match="there is no reader 'frist': did you mean 'first'"):
+        ck.read_histories(tmp_path / "a.one", reader="frist")
+
+
+def test_export_writes_the_text_it_returns(tmp_path: Path) -> None:
+    law, values = ck.law("norton"), {"A": 1.2e-16, "n": 5.2}
+
+    text = ck.export(law, "latex", values, to=tmp_path / "law.tex")
+
+    assert (tmp_path / "law.tex").read_text() == text
+    assert [path.name for path in tmp_path.iterdir()] == ["law.tex"]
+    with pytest.raises(ExportError, match="there is no exporter 'latx': did you mean 'latex'"):
+        ck.export(law, "latx", values)
+    with pytest.raises(LawError, match="needs a value for n"):
+        ck.export(law, "latex", {"A": 1e-16})

@@ -1,0 +1,227 @@
+"""Laws and expressions go to JSON and come back equal, bit for bit; anything else is one LawError."""
+
+import copy
+import json
+
+import pytest
+import sympy
+
+from creepkit.errors import LawError
+from creepkit.language import (
+    CreepLaw,
+    Param,
+    State,
+    activated,
+    arrhenius,
+    exponential,
+    inverse,
+    linear,
+    parameters,
+    states,
+    strain,
+    stress,
+    temperature,
+    time,
+)
+from creepkit.language.nodes import DEPTH_LIMIT
+from creepkit.language.tree import condition_from_tree, from_tree, law_from_json, law_to_json, to_tree
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
+from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.laws.time_hardening import TIME_HARDENING
+
+A, n = parameters("A n")
+(omega,) = states("omega")
+SYMBOLS = {s.name: s for s in (A, n, stress, strain, time, temperature, omega)}
+
+DAMAGE = CreepLaw(
+    name="damage",
+    title="Power law with damage",
+    terms={"creep": A * (stress / (1 - omega)) ** n, "threshold": A * sympy.Max(stress - 10, 0)},
+    params={A: Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", 0.0), n: Param("exponent", (1, 8))},
+    states={omega: State(0.0, A * stress**n, meaning="damage", limit=0.99)},
+    constraints=(n >= 1, omega < 1),
+)
+LAWS = [
+    NORTON,
+    STRAIN_HARDENING,
+    TIME_HARDENING,
+    HYPERBOLIC_SINE,
+    DRIFTING_EXPONENT,
+    COMBINED,
+    DAMAGE,
+    NORTON + HYPERBOLIC_SINE,
+    DAMAGE + DAMAGE,
+    COMBINED.times(arrhenius()),
+    COMBINED.times(arrhenius(T_ref=1234.567, Q=4.1e5)),
+    NORTON.with_temperature(n=linear()),
+    NORTON.with_temperature(A=exponential(), n=inverse(1001.1)),
+    HYPERBOLIC_SINE.with_temperature(B=activated()).times(arrhenius()),
+    DRIFTING_EXPONENT.with_temperature(n_0=linear()),
+    STRAIN_HARDENING.fix(m=0),
+    COMBINED.fix(n_1=2.7, B=81.3),
+    COMBINED.times(arrhenius()).at(1100.1),
+    COMBINED.only("hyperbolic sine"),
+    COMBINED.without("time hardening"),
+]
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_a_law_comes_back_equal_with_the_same_fingerprint(law):
+    rebuilt = law_from_json(json.loads(json.dumps(law_to_json(law))))
+    assert rebuilt == law
+    assert rebuilt.fingerprint == law.fingerprint
+    assert rebuilt.names == law.names
+    assert list(rebuilt.terms) == list(law.terms)
+
+
+EXPRESSIONS = [
+    sympy.Integer(-3),
+    sympy.Rational(1, 3) * stress,
+    sympy.Float(0.1) + stress,
+    sympy.Float("0.1", 40) * stress,
+    sympy.Float(2.5e-310) + stress,
+    sympy.Float(1073.15) ** n,
+    sympy.pi * stress + sympy.E,
+    sympy.sqrt(2) * sympy.sqrt(stress),
+    sympy.exp(-time / n) * sympy.log(stress),
+    sympy.sinh(stress) + sympy.cosh(stress) + sympy.tanh(stress) + sympy.asinh(stress),
+    sympy.Max(stress - n, 0) + sympy.Min(stress, n, 3),
+    sympy.Heaviside(stress - n) + sympy.Heaviside(stress - n, 1),
+    sympy.Abs(stress) * sympy.sign(time - 1),
+    sympy.Piecewise((stress**n, stress > 1), (n, sympy.And(stress > 0, time < 1)), (stress, True)),
+    sympy.Piecewise((1, sympy.Or(stress > 1, time <= 2)), (0, True)),
+]
+
+
+@pytest.mark.parametrize("expression", EXPRESSIONS, ids=str)
+def test_an_expression_comes_back_equal(expression):
+    rebuilt = from_tree(json.loads(json.dumps(to_tree(expression))), SYMBOLS)
+    assert rebuilt == expression
+    assert sympy.srepr(rebuilt) == sympy.srepr(expression)
+
+
+@pytest.mark.parametrize("value", [0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -1073.15, 2.0**-1074 * 3, 0.0])
+def test_a_float_comes_back_bit_for_bit(value):
+    rebuilt = from_tree(json.loads(json.dumps(to_tree(sympy.Float(value) + stress))), SYMBOLS)
+    assert float(rebuilt.subs(stress, 0)).hex() == value.hex()
+
+
+def test_a_tree_is_readable():
+    assert to_tree(A * stress**n) == ["mul", "A", ["pow", "stress", "n"]]
+
+
+def test_a_condition_comes_back_equal():
+    assert condition_from_tree(to_tree(n >= 0), SYMBOLS) == (n >= 0)
+
+
+nested = "stress"
+for _ in range(DEPTH_LIMIT + 1):
+    nested = ["exp", nested]
+bottomless = []
+for _ in range(100_000):
+    bottomless = ["exp", bottomless]
+
+BAD_TREES = {
+    "unknown head": (["eval", "stress"], "no known head"),
+    "text of Python": ("__import__('os')", "not declared"),
+    "undeclared": (["mul", "A", "B"], "mentions 'B', not declared"),
+    "no head": ([], "no known head"),
+    "head that is a list": ([["mul"], "A"], "no known head"),
+    "null": (None, "holds None; allowed are names"),
+    "true": (True, "holds True"),
+    "bare float": (1.5, "holds 1.5; allowed are names, integers"),
+    "object": ({"mul": 1}, "allowed are names"),
+    "too few": (["pow", "stress"], "'pow' does not take 1 argument"),
+    "too many": (["exp", "stress", "n"], "'exp' does not take 2 argument"),
+    "condition for a number": (["exp", ["ge", "n", 0]], "where a number is needed"),
+    "number for a condition": (["piecewise", ["n", "n"]], "where a condition is needed"),
+    "branch": (["piecewise", "n"], r"write \[expression, condition\]"),
+    "not finite": (["float", float("nan")], "not a finite number"),
+    "infinite": (["float", float("inf")], "not a finite number"),
+    "float in words": (["float", "0x1p3"], "not a finite number"),
+    "float of huge exponent": (["float", 1, 10**9, 53], "not a finite number"),
+    "no fraction": (["rational", 1, 0], "not a fraction"),
+    "giant integer": (10**5000, "integer of more than 300 digits"),
+    "tower": (["pow", 9, ["pow", 9, ["pow", 9, 9]]], "not a finite number between"),
+    "giant exponent": (["pow", "stress", 10**12], "exponent outside -1000 to 1000"),
+    "giant exponential": (["exp", ["exp", ["exp", 9]]], "not a finite number between"),
+    "one over zero": (["pow", 0, -1], "not a finite number between"),
+    "logarithm of zero": (["log", 0], "not a finite number between"),
+    "too deep": (nested, "at most 60 levels"),
+    "bottomless": (bottomless, "at most 60 levels"),
+    "too long": (["add", *["stress"] * 6000], "5000 nodes|does not take"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_TREES)
+def test_a_bad_tree_is_one_sentence(case):
+    tree, message = BAD_TREES[case]
+    with pytest.raises(LawError, match=message) as error:
+        from_tree(tree, SYMBOLS)
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 400
+
+
+@pytest.mark.parametrize(
+    ("expression", "message"),
+    [
+        (sympy.gamma(stress), "cannot be written to a file"),
+        (sympy.Symbol("A", positive=True) * stress, "carries assumptions"),
+        (sympy.zoo, "cannot be written"),
+        (sympy.Add(*(stress**k for k in range(3000))), "too large"),
+    ],
+    ids=["gamma", "assumptions", "infinity", "large"],
+)
+def test_what_cannot_be_written(expression, message):
+    with pytest.raises(LawError, match=message):
+        to_tree(expression)
+
+
+def _changed(*path, to):
+    data = copy.deepcopy(law_to_json(DAMAGE))
+    place = data
+    for key in path[:-1]:
+        place = place[key]
+    if to is KeyError:
+        del place[path[-1]]
+    else:
+        place[path[-1]] = to
+    return data
+
+
+BAD_FILES = {
+    "not an object": ([], "the whole: "),
+    "missing": (_changed("terms", to=KeyError), "terms: field required"),
+    "extra": (_changed("script", to="import os"), "script: extra inputs are not permitted"),
+    "another format": (_changed("format", to="other"), "format: "),
+    "a later version": (_changed("version", to=2), "version: "),
+    "number as text": (_changed("params", 1, "bounds", to=["1", 8]), r"params.1.bounds.0: "),
+    "three bounds": (_changed("params", 1, "bounds", to=[1, 2, 3]), "params.1.bounds: "),
+    "infinite bound": (_changed("params", 1, "bounds", to=[1, float("inf")]), "params.1.bounds.1: "),
+    "reversed bounds": (_changed("params", 1, "bounds", to=[8, 1]), "bounds are reversed"),
+    "unknown scale": (_changed("params", 1, "scale", to="cubic"), "params.1.scale: "),
+    "same name": (_changed("params", 1, "name", to="A"), "parameter or state name 'A' is used twice"),
+    "same term": (_changed("terms", 1, "name", to="creep"), "term name 'creep' is used twice"),
+    "no term": (_changed("terms", to=[]), "has no terms"),
+    "undeclared": (_changed("terms", 0, "expression", to=["mul", "A", "q"]), "term 'creep': the expression mentions 'q'"),
+    "bad state": (_changed("states", 0, "rate", to=["boom"]), "rate of state 'omega': "),
+    "bad constraint": (_changed("constraints", 0, to=["add", "n", 1]), "a constraint: "),
+    "another exponent": (
+        _changed("terms", 1, "expression", to=["mul", "A", "stress", "n"]),
+        "changed after it was written",
+    ),
+    "another fingerprint": (_changed("fingerprint", to="0" * 500), "but the file says '0{40}'"),
+    "reserved name": (_changed("params", 1, "name", to="stress"), "is a word of the language"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_FILES)
+def test_a_bad_law_file_is_one_sentence_that_names_the_file(case):
+    data, message = BAD_FILES[case]
+    with pytest.raises(LawError, match=message) as error:
+        law_from_json(data, "laws/mine.json")
+    assert str(error.value).startswith("laws/mine.json: ")
+    assert "\n" not in str(error.value)
