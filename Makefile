@@ -3,14 +3,15 @@
 #
 # TORCH chooses another build of torch: make test TORCH='torch==2.13.0' on a machine with a GPU.
 
-SHELL := /bin/bash -euo pipefail
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := test
 .PHONY: test demo clean
 
 PYTHONS := python3.11 python3.12 python3.13
 BIN := .venv/bin
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+PIP := $(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check
 PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/pyproject.toml))
 
 TORCH_CPU := torch==2.13.0+cpu

@@ -192,7 +192,7 @@ class History:
     strain_measure: Literal["logarithmic", "engineering"] = "logarithmic"
     includes_elastic: bool = False
     standard_deviation: Mapping[str, Floats] = field(default_factory=dict)
-    used: Bools = EVERY_FRAME
+    used: Bools = field(default_factory=lambda: EVERY_FRAME)
     geometry: Mapping[str, float] = field(default_factory=dict)
     operator: str = ""
     alloy: str = ""

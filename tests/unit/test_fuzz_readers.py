@@ -11,11 +11,11 @@ from creepkit.errors import HistoryError
 from creepkit.readers.history_csv import CSV
 from creepkit.readers.indexed import INDEXED_FILES, INDEXED_TABLE
 from creepkit.readers.writing import write_history
-from creepkit.records import History, PressureJump, Program, StressSteps, constant_stress
+from creepkit.records import History, PressureJump, Program, Reader, StressSteps, constant_stress
 
 # The one folder of a test function serves all its examples, each of which writes its files anew.
 bounded = settings(
-    max_examples=150,
+    max_examples=120,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
@@ -23,7 +23,8 @@ bounded = settings(
 
 GOOD = (
     "# alloy: x\n# temperature_C: 850\n# stress_steps: 0 s 60 MPa; 1 h 70 MPa\n# modulus_GPa: 150\n# strain_sd: 1e-5\n"
-    "# end_time_h: 2\n# geometry gauge_mm: 25\n# label heat: X7\ntime_s,strain,used\n0,0,1\n10,0.1,1\n10,0.2,0\n20,0.3,1\n"
+    "# end_time_h: 2\n# geometry gauge_mm: 25\n# label heat: X7\n"
+    "time_s,strain,used\n0,0,1\n10,0.1,1\n10,0.2,0\n20,0.3,1\n"
 )
 BULGE = (
     "# temperature_K: 1000\n# pressure_1_MPa: 8\n# pressure_2_MPa: 9\n# jump_time_h: 3\n# ramp_s: 5\n"
@@ -31,21 +32,46 @@ BULGE = (
 )
 PIECES = [
     *("temperature_K", "stress_MPa", "stress_1_MPa", "pressure_program", "time_h", "strain_pct", "amplitude_mm", "_sd"),
-    *("nan", "inf", "1e308", "1e29", "-1", "0", "-0.0", "1e-320", "٣", "", " ", ",", "#", "# ", ":", ";", '"', "\n", "\r"),
+    *(
+        "nan",
+        "inf",
+        "1e308",
+        "1e29",
+        "-1",
+        "0",
+        "-0.0",
+        "1e-320",
+        "٣",
+        "",
+        " ",
+        ",",
+        "#",
+        "# ",
+        ":",
+        ";",
+        '"',
+        "\n",
+        "\r",
+    ),
     *("\x00", "\x0c", "\u2028", "\ufeff", "label ", "geometry ", "specimen: bulge", "0 s 1 MPa", "used", "yes", "true"),
 ]
+
+
+def attempt(reader: Reader, path: Path) -> tuple[list[History], str]:
+    """The histories, or what the reader complains of; any other exception is a failure."""
+    try:
+        return reader.read(path), ""
+    except HistoryError as error:
+        return [], str(error)
 
 
 def read_or_refuse(text: str | bytes, path: Path) -> None:
     path.write_bytes(text if isinstance(text, bytes) else text.encode("utf-8", errors="surrogatepass"))
     assert CSV.accepts(path)
-    try:
-        histories = CSV.read(path)
-    except HistoryError as error:
-        assert str(path) in str(error)
-        assert "\n" not in str(error)
-    else:
-        assert all(isinstance(history, History) and history.times.size > 1 for history in histories)
+    histories, complaint = attempt(CSV, path)
+    assert all(isinstance(history, History) and history.times.size > 1 for history in histories)
+    assert bool(histories) != (str(path) in complaint)
+    assert "\n" not in complaint
 
 
 @bounded
@@ -85,10 +111,8 @@ def test_index_with_pieces_cut_out_and_put_in(tmp_path, reader, data):
     index = index[:start] + data.draw(st.sampled_from(PIECES) | st.text(max_size=5)) + index[end:]
     (tmp_path / "index.csv").write_bytes(index.encode("utf-8", errors="surrogatepass"))
     reader.accepts(tmp_path)
-    try:
-        assert [history.times.size for history in reader.read(tmp_path)] == [2]
-    except HistoryError as error:
-        assert str(tmp_path) in str(error)
+    histories, complaint = attempt(reader, tmp_path)
+    assert [history.times.size for history in histories] == [2] or str(tmp_path) in complaint
 
 
 values = st.floats(-1e20, 1e20)

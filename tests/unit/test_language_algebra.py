@@ -180,6 +180,13 @@ def test_fixing_what_a_constraint_mentions_fixes_it_there_too():
     assert fixed.constraints == ()
 
 
+def test_values_that_break_a_constraint_are_refused():
+    law = NORTON.with_temperature(n=linear(1000.0)).fix(n=1, n_T=-0.03)
+    assert law.at(1010.0).names == ("A",)
+    with pytest.raises(LawError, match=r"its constraint .* >= 0 cannot hold for .*@1300K"):
+        law.at(1300.0)
+
+
 def test_an_internal_variable_that_nothing_needs_goes():
     A, B = parameters("A B")
     (omega,) = states("omega")

@@ -7,8 +7,20 @@ import pytest
 import sympy
 
 from creepkit.errors import LawError
-from creepkit.language import CreepLaw, Elastic, Param, State, parameters, states, strain, stress, temperature, time
-from creepkit.language import arrhenius, wachtman
+from creepkit.language import (
+    CreepLaw,
+    Elastic,
+    Param,
+    State,
+    arrhenius,
+    parameters,
+    states,
+    strain,
+    stress,
+    temperature,
+    time,
+    wachtman,
+)
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
@@ -26,8 +38,8 @@ def law(**changes):
 
 BAD_LAWS = {
     "no name": ({"name": " "}, "a law needs a name"),
-    "name of two lines": ({"name": "a\nimport os"}, "must be one line of words"),
-    "label with quotes": ({"terms": {'"""': A * stress**n}}, "must be one line of words without quotes"),
+    "name of two lines": ({"name": "a\nimport os"}, "cannot name a law or term: write one line"),
+    "label with quotes": ({"terms": {'"""': A * stress**n}}, "without quotes or backslashes"),
     "title of two lines": ({"title": "a\nb"}, "title or reference"),
     "no terms": ({"terms": {}}, "has no terms"),
     "terms not named": ({"terms": A * stress**n}, "has no terms"),
@@ -222,6 +234,12 @@ def test_latex_shows_arrhenius_as_people_write_it():
 
 def test_latex_of_a_given_activation_energy():
     assert r"-\frac{412000}{R}" in NORTON.times(arrhenius(T_ref=1100, Q=412e3)).latex()
+
+
+def test_latex_of_a_power_of_branches():
+    switch = sympy.Piecewise((stress, stress > 1), (0, True))
+    power = sympy.Mul(A, sympy.Pow(switch, n, evaluate=False), evaluate=False)
+    assert r"\end{cases}\right)^{n}" in law(terms={"x": power}).latex()
 
 
 def test_latex_of_internal_variables():

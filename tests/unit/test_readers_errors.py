@@ -52,8 +52,11 @@ CASES = {
     "not a number": (HEAD + "time_s,strain\n0,0\n1,a lot\n", "x.csv:5: 'strain' is 'a lot'; write a finite number"),
     "grouped digits": (HEAD + "time_s,strain\n0,0\n1_000,0\n", "x.csv:5: 'time_s' is '1_000'; write a finite number"),
     "empty cell": (HEAD + "time_s,strain\n0,0\n1,\n", "x.csv:5: 'strain' is empty; write a finite number"),
-    "too few cells": (HEAD + "time_s,strain\n0,0\n\n1\n", "x.csv:6: 1 cells for 2 columns; write one cell a column"),
-    "too many cells": (HEAD + "time_s,strain\n0,0,0\n", "x.csv:4: 3 cells for 2 columns"),
+    "too few cells": (
+        HEAD + "time_s,strain\n0,0\n\n1\n",
+        "x.csv:6: number of cells 1, of columns 2; write one cell a column",
+    ),
+    "too many cells": (HEAD + "time_s,strain\n0,0,0\n", "x.csv:4: number of cells 3, of columns 2"),
     "stray quote": (HEAD + 'time_s,strain\n0,"0\n1,0\n', "x.csv:4: not a line of a CSV table .*; look for stray"),
     "column twice": (HEAD + "time_s,strain,strain\n0,0,0\n", "x.csv:3: the column 'strain' stands there twice"),
     "quantity twice": (HEAD + "time_s,time_h,strain\n0,0,0\n", "x.csv:3: two columns hold the time; keep one"),

@@ -45,9 +45,8 @@ def test_alloy_617_spot_values(alloy617):
 
 
 def test_alloy_617_readings_of_one_time_are_merged(alloy617):
-    merged = {name: history.labels["merged_frames"] for name, history in alloy617.items() if history.labels.get("merged_frames")}
-    assert len(merged) == 10
-    assert set(merged.values()) == {"1"}
+    merged = [history.labels.get("merged_frames") for history in alloy617.values()]
+    assert Counter(merged) == {None: 84, "1": 10}
     ruptured = alloy617["inl_2/AirBase_750_118_a"]  # at 12040600 s: 0.21372, then 0.22174
     assert ruptured.times[-1] == 12040600.0
     assert ruptured.outputs["strain"][-1] == pytest.approx(0.21773, abs=1e-12)
@@ -55,11 +54,13 @@ def test_alloy_617_readings_of_one_time_are_merged(alloy617):
     assert repeated.outputs["strain"][-1] == pytest.approx(0.34191, abs=1e-12)
 
 
-def test_alloy_617_holds_two_tests_twice(alloy617):
-    assert duplicates(list(alloy617.values())) == [
-        ("kaeri_2/AirBase_900_25_a", "kaeri_3/AirBase_900_25_a"),
-        ("kaeri_2/AirBase_900_50_a", "kaeri_3/AirBase_900_50_a"),
-    ]
+def test_alloy_617_holds_four_tests_twice(alloy617):
+    found = duplicates(list(alloy617.values()))
+    assert found == [(f"kaeri_2/AirBase_900_{s}_a", f"kaeri_3/AirBase_900_{s}_a") for s in (25, 40, 45, 50)]
+    for one, two in (map(alloy617.get, pair) for pair in found):  # they agree all along, though thinned differently
+        times = np.linspace(0.2, 0.9, 8) * one.times[-1]
+        strains = [np.interp(times, test.times, test.outputs["strain"]) for test in (one, two)]
+        np.testing.assert_allclose(*strains, rtol=0.01)
 
 
 def test_cmsx_6():
@@ -83,7 +84,7 @@ def test_inconel_625_bulges():
     assert all(isinstance(history.loading, PressureJump) for history in tests.values())
     first, jumped = tests["test_01"], tests["test_11"]
     assert first.loading == PressureJump(8.0, 8.0, 10800.0)
-    assert jumped.loading == PressureJump(8.0, 10.0, pytest.approx(14580.0))
+    assert (jumped.loading.P1, jumped.loading.P2, jumped.loading.Tj) == pytest.approx((8.0, 10.0, 14580.0))
     assert first.temperature == pytest.approx(988.91)
     assert first.elastic.E == pytest.approx(108425.0)
     assert [first.outputs[name][0] for name in ("amplitude", "width", "shape")] == [0.069047753, 3.6917447, 1.98580857]

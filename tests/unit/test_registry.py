@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+import typer
 
 from creepkit.errors import ExportError, HistoryError, LawError, PluginError, SolveError
 from creepkit.language import CreepLaw, Factor, arrhenius
@@ -305,3 +306,17 @@ def test_one_module_under_two_entry_points_is_told(install: Write) -> None:
         "plugin 'second' (twin-pack 1.2) is the same module as plugin 'first' (twin-pack 1.2); "
         "drop one of the two entry points"
     ]
+
+
+def test_a_plugin_whose_commands_fail_is_told_and_the_others_add_theirs(write: Write) -> None:
+    head = "from creepkit.language import hookimpl\n\n@hookimpl\ndef creepkit_commands(app):\n"
+    registry, app = Registry(), typer.Typer()
+    registry.load_file(write("failing", head + "    app.no_such_method()\n"))
+    registry.load_file(write("working", head + "    app.command('work')(lambda: None)\n"))
+
+    registry.add_commands(app)
+
+    assert [command.name for command in app.registered_commands] == ["work"]
+    problems = {p.provenance.name: p.problem for p in registry.plugins()}
+    assert "creepkit_commands raised AttributeError" in problems["failing"]
+    assert problems["working"] == ""

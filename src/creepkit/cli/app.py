@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from creepkit.cli import check, identify, laws, new_law, plugins, simulate
+from creepkit.cli import check, demo, identify, laws, new_law, plugins, simulate
 from creepkit.errors import CreepkitError, PluginError
 
 
@@ -59,6 +59,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "new-law": new_law.command,
     "simulate": simulate.command,
     "identify": identify.command,
+    "demo": demo.command,
 }
 
 for name, command in COMMANDS.items():

@@ -34,7 +34,10 @@ def command(
     loss: Annotated[str, typer.Option(help="linear, soft_l1, huber, cauchy or arctan.")] = "linear",
     as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
 ) -> None:
-    """Fit each named law to all curves at once, rank the laws, write JSON, plots, LaTeX and Python."""
+    """Fit laws to creep curves and rank them.
+
+    Every law is fitted to all curves at once; JSON and plots of each, LaTeX and Python of the best, go to a folder.
+    """
     from creepkit import study
     from creepkit.errors import FitError
 
@@ -50,15 +53,16 @@ def command(
         from creepkit.inverse.warmth import with_arrhenius
 
         named = [with_arrhenius(one, histories) for one in named]
-    ranking = _ranked(named, histories, starts, seed, loss)
-    written = _write(ranking, to)
+    ranking = ranked(named, histories, starts, seed, loss)
+    written = write(ranking, to)
     if as_json:
         print_json(_answer(ranking, written))
     else:
-        _tell(ranking, written, histories)
+        tell(ranking, written, histories)
 
 
-def _ranked(laws: Sequence[CreepLaw], histories: list[History], starts: int, seed: int, loss: str) -> Ranking:
+def ranked(laws: Sequence[CreepLaw], histories: list[History], starts: int, seed: int, loss: str) -> Ranking:
+    """Fit each law, showing progress, and rank them."""
     from creepkit import study
     from creepkit.inverse.selection import rank
 
@@ -73,17 +77,17 @@ def _ranked(laws: Sequence[CreepLaw], histories: list[History], starts: int, see
     return rank(fits)
 
 
-def _write(ranking: Ranking, folder: Path) -> list[Path]:
+def write(ranking: Ranking, folder: Path) -> list[Path]:
     """Write every law's JSON and plot, and the best law as LaTeX and Python; returns the paths."""
     from creepkit import study
 
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for ranked in ranking.laws:
-        name = folder / slug(ranked.fit.law.name)
-        written.append(ranked.fit.save(name.with_suffix(".json")))
-        ranked.fit.plot(name.with_suffix(".png"))
-        written.append(name.with_suffix(".png"))
+    for entry in ranking.laws:
+        name = slug(entry.fit.law.name)
+        written.append(entry.fit.save(folder / f"{name}.json"))
+        entry.fit.plot(folder / f"{name}.png")
+        written.append(folder / f"{name}.png")
     best = ranking.best
     for language, suffix in (("latex", ".tex"), ("python", ".py")):
         path = folder / f"{slug(best.law.name)}{suffix}"
@@ -97,18 +101,19 @@ def slug(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9.=-]+", "-", name).strip("-") or "law"
 
 
-def _tell(ranking: Ranking, written: list[Path], histories: list[History]) -> None:
+def tell(ranking: Ranking, written: list[Path], histories: list[History]) -> None:
+    """Print the table of laws, the verdict, the best law and what was written."""
     rows = [
         (
-            ranked.fit.law.name,
-            str(len(ranked.fit.law.params)),
-            f"{ranked.fit.rms:.3f}",
-            f"{100 * ranked.fit.scatter.rate:.0f} %",
-            f"{100 * ranked.fit.scatter.drift:.0f} %",
-            f"{ranked.excess:.1f}",
-            f"{ranked.weight:.3f}",
+            entry.fit.law.name,
+            str(len(entry.fit.law.params)),
+            f"{entry.fit.rms:.3f}",
+            f"{100 * entry.fit.scatter.rate:.0f} %",
+            f"{100 * entry.fit.scatter.drift:.0f} %",
+            f"{entry.excess:.1f}",
+            f"{entry.weight:.3f}",
         )
-        for ranked in ranking.laws
+        for entry in ranking.laws
     ]
     columns = ("law", "parameters", "rms ln strain", "test to test", "not followed", "BIC - best", "weight")
     print_table(f"{len(histories)} tests", columns, rows)

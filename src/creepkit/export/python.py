@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import ast
-import inspect
+import keyword
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib import resources
 from typing import Any
 
 import sympy
 
 from creepkit.errors import ExportError, LawError
-from creepkit.export import scalar
 from creepkit.kernels.logform import FLOOR, LogForm, log_form
-from creepkit.kernels.printing import KernelPrinter
+from creepkit.kernels.printing import FUNCTIONS, KernelPrinter
+from creepkit.kernels.stable_functions import Floored
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import POINT
+from creepkit.language.symbols import POINT, temperature
 
-_SCALAR = [name for name, thing in vars(scalar).items() if inspect.isfunction(thing)]
 _MEANINGS = {
     "stress": "von Mises stress, MPa",
     "strain": "accumulated equivalent creep strain, logarithmic",
@@ -43,7 +44,7 @@ class PythonExporter:
         try:
             code = _Functions(law, values).text()
         except LawError as error:
-            raise ExportError(f"law '{law.name}' cannot be written as Python: {error}") from None
+            raise ExportError(f"cannot be written as Python: {error}") from None
         code = _with_helpers(code)
         head = _comments([*_description(law, values, code), *(f"Note: {note}" for note in notes)])
         return "\n".join(['"""A creep law with its values, exported by creepkit."""', "", *head, "", code]) + "\n"
@@ -85,13 +86,19 @@ def _printable(text: str) -> str:
 class _Printer(KernelPrinter):
     """Kernel text for one number at a time: branches are taken lazily, maxima are Python's."""
 
-    reserved_words = (*KernelPrinter.reserved_words, *_SCALAR, "inf", "max", "min", "abs", "float", "copysign")
+    reserved_words = (*keyword.kwlist, *FUNCTIONS, "inf", "max", "min")
 
     def _print_Max(self, e: Any) -> str:
         return f"max({', '.join(self._print(a) for a in e.args)})"
 
     def _print_Min(self, e: Any) -> str:
         return f"min({', '.join(self._print(a) for a in e.args)})"
+
+    def _print_And(self, e: Any) -> str:
+        return f"({' and '.join(self._print(a) for a in e.args)})"
+
+    def _print_Or(self, e: Any) -> str:
+        return f"({' or '.join(self._print(a) for a in e.args)})"
 
     def _print_Piecewise(self, e: Any) -> str:
         branches = [f"{self._print(branch)} if {self._print(condition)} else " for branch, condition in e.args[:-1]]
@@ -104,7 +111,7 @@ class _Functions:
     def __init__(self, law: CreepLaw, values: Mapping[str, float]) -> None:
         self.law, self.values = law, values
         self.form: LogForm = log_form(law)
-        self.logs = {theta: s for s, theta in zip(law.params, self.form.theta, strict=True) if theta != s}
+        self.logs = {theta: symbol for symbol, theta in self.form.logs.items()}
         self.printer = _Printer({"standard": "python3"})
 
     def text(self) -> str:
@@ -140,8 +147,8 @@ class _Functions:
     def _function(self, name: str, title: str, result: list[str], expressions: Sequence[sympy.Expr]) -> str:
         read = set().union(*(e.free_symbols for e in expressions))
         logs = [
-            f"    {self.printer.doprint(theta)} = log_or_off({self.printer.doprint(symbol)})"
-            for theta, symbol in self.logs.items()
+            f"    {self.printer.doprint(theta)} = log({name}) if {name} != 0.0 else -inf"
+            for theta, name in ((theta, self.printer.doprint(symbol)) for theta, symbol in self.logs.items())
             if theta in read
         ]
         head = [f"def {name}(", *self._signature(), "):", f'    """{title}', "", *self._arguments(), '    """']
@@ -167,7 +174,7 @@ class _Functions:
 
 
 def _author_form(expression: sympy.Expr, logs: Mapping[sympy.Symbol, sympy.Symbol]) -> sympy.Expr:
-    """Write exp(ln_B) as B again: shorter, and free of the rounding of a logarithm."""
+    """Write exp(ln_B) as B again, free of the rounding of a logarithm, and temperature without a floor."""
 
     def factored(e: sympy.Expr) -> sympy.Expr:
         summands = sympy.Add.make_args(e.args[0])
@@ -175,7 +182,8 @@ def _author_form(expression: sympy.Expr, logs: Mapping[sympy.Symbol, sympy.Symbo
         rest = sympy.Add(*(a for a in summands if a not in found))
         return sympy.Mul(*found.values(), sympy.exp(rest))
 
-    return expression.replace(lambda e: isinstance(e, sympy.exp), factored)
+    plain = expression.xreplace({Floored(temperature, sympy.Float(FLOOR)): temperature})
+    return plain.replace(lambda e: isinstance(e, sympy.exp), factored)
 
 
 # ---- imports and helpers -------------------------------------------------------------------------------------------
@@ -183,15 +191,39 @@ def _author_form(expression: sympy.Expr, logs: Mapping[sympy.Symbol, sympy.Symbo
 
 def _with_helpers(code: str) -> str:
     """Put the imports and the functions that the code calls before it."""
-    called = _names(code)
-    helpers = [inspect.getsource(getattr(scalar, name)).rstrip() for name in _SCALAR if name in called]
-    body = "\n\n\n".join([*helpers, code])
+    helpers = _helpers()
+    needed = _names(code)
+    for name in reversed(helpers):
+        if name in needed:
+            needed |= _names(helpers[name])
+    body = "\n\n\n".join([*(text for name, text in helpers.items() if name in needed), code])
     imported = sorted(name for name in _names(body) if hasattr(math, name))
     return f"from math import {', '.join(imported)}\n\n\n{body}"
 
 
+@cache
+def _helpers() -> dict[str, str]:
+    """{name: text} of the functions for one number that compiled kernels call, in their order."""
+    source = resources.files("creepkit.kernels").joinpath("numba_functions.py").read_text(encoding="utf-8")
+    found: dict[str, str] = {}
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.FunctionDef):
+            node.decorator_list, node.returns = [], None
+            for argument in node.args.args:
+                argument.annotation = None
+            found[node.name] = ast.unparse(node)
+        elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            found[node.targets[0].id] = ast.unparse(node)
+    return found
+
+
 def _names(code: str) -> set[str]:
-    """Every name that the code reads without defining it as an argument."""
-    nodes = list(ast.walk(ast.parse(code)))
-    arguments = {node.arg for node in nodes if isinstance(node, ast.arg)}
-    return {node.id for node in nodes if isinstance(node, ast.Name)} - arguments
+    """Every name that top-level functions and statements read from outside themselves."""
+    return set().union(*(_read(node) for node in ast.parse(code).body))
+
+
+def _read(node: ast.stmt) -> set[str]:
+    inner = list(ast.walk(node))
+    own = {n.arg for n in inner if isinstance(n, ast.arg)}
+    own |= {n.id for n in inner if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    return {n.id for n in inner if isinstance(n, ast.Name)} - own

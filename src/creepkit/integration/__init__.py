@@ -1,8 +1,22 @@
-"""The implicit adaptive integration of creep at a material point, compiled once for any law."""
+"""The implicit adaptive integration of creep at a material point, compiled once for any law.
+
+Names load when first used: numba is heavy.
+"""
 
 from __future__ import annotations
 
-from creepkit.integration.batch import Integration, PointTest, integrate
-from creepkit.integration.point import Settings
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["Integration", "PointTest", "Settings", "integrate"]
+if TYPE_CHECKING:
+    from creepkit.integration.batch import REASONS, Integration, PointTest, integrate
+    from creepkit.integration.point import Settings
+
+__all__ = ["REASONS", "Integration", "PointTest", "Settings", "integrate"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'creepkit.integration' has no attribute '{name}'")
+    from creepkit.integration import batch
+
+    return getattr(batch, name)

@@ -118,13 +118,11 @@ def integrate(
     end_times = np.zeros((candidates, len(tests)))
     steps = np.zeros((candidates, len(tests), 2), dtype=np.int64)
     drives = np.array([[t.stiffness, float(t.constant_load)] for t in tests]).reshape(-1, 2)
-    beta, beta_slopes = leading_exponents(law, theta, jacobian)
     integrate_batch(
         law.update,
         law.sensitivity,
         theta,
-        beta,
-        beta_slopes,
+        np.array(law.leading(theta), dtype=float).reshape(candidates),
         np.array(law.initial),
         np.array(law.limits),
         drives,
@@ -144,27 +142,12 @@ def integrate(
     return Integration(strain, starts, changes if jacobian else None, endings, end_times, steps)
 
 
-def leading_exponents(law: CompiledLaw, theta: Floats, slopes: bool) -> tuple[Floats, Floats]:
-    """The leading exponent of time (candidates,), and its derivatives (candidates, P), zero unless asked for."""
-    beta = np.array(law.leading(theta), dtype=float).reshape(theta.shape[0])
-    change = np.zeros(theta.shape)
-    if slopes:
-        step = 1e-6
-        for p in range(theta.shape[1]):
-            up, down = theta.copy(), theta.copy()
-            up[:, p] += step
-            down[:, p] -= step
-            change[:, p] = (np.asarray(law.leading(up)) - np.asarray(law.leading(down))) / (2 * step)
-    return beta, change
-
-
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def integrate_batch(
     update: Any,
     sensitivity: Any,
     theta: Floats,
     beta: Floats,
-    beta_slopes: Floats,
     initial: Floats,
     limits: Floats,
     drives: Floats,
@@ -185,7 +168,7 @@ def integrate_batch(
     work = room(initial.size, theta.shape[1], tableau.c.size)
     nothing = np.zeros((0, theta.shape[1]))
     for c in range(theta.shape[0]):
-        kernel = Kernel(theta[c], beta[c], beta_slopes[c], initial, limits)
+        kernel = Kernel(theta[c], beta[c], initial, limits)
         for k in range(drives.shape[0]):
             drive = Drive(drives[k, 0], drives[k, 1], axes)
             first, last = starts[k], starts[k + 1]

@@ -43,7 +43,7 @@ class Moment(NamedTuple):
     log_pace: float
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def moment(clock: Clock, s: float) -> Moment:
     """Time and pace at position `s` > 0."""
     if clock.tau == 0.0:
@@ -57,7 +57,7 @@ def moment(clock: Clock, s: float) -> Moment:
     return Moment(clock.start + elapsed, log(clock.tau * reach / clock.beta) + power - grown)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def position(clock: Clock, time: float) -> float:
     """Position of a time in the segment."""
     elapsed = time - clock.start
@@ -69,7 +69,7 @@ def position(clock: Clock, time: float) -> float:
     return expm1(clock.beta * log1p(elapsed / clock.tau)) / reach
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def velocity(clock: Clock, s: float) -> tuple[Moment, Moment]:
     """Derivatives of `moment` with respect to beta and to tau at a fixed position."""
     beta, tau, length = clock.beta, clock.tau, clock.length
@@ -91,7 +91,7 @@ def velocity(clock: Clock, s: float) -> tuple[Moment, Moment]:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _through(
     tau: float, beta: float, s: float, reach: float, inner: float, power: float, change: float
 ) -> Moment:
@@ -100,19 +100,19 @@ def _through(
     return Moment(tau * exp(power) * rise, rise + change / reach - s * change / inner)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def plain(start: float, length: float) -> Clock:
     """Plain time: s proportional to it."""
     return Clock(start, length, 1.0, length)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def virgin(start: float, length: float, beta: float) -> Clock:
     """The clock of a segment that begins without creep strain; `beta` is the leading exponent of time."""
     return Clock(start, length, min(max(beta, SMALLEST_BETA), 1.0), 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def shifted(start: float, length: float, bend: float, bend_rate: float) -> Clock:
     """The clock of a segment that begins after some creep.
 

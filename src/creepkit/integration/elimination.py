@@ -7,7 +7,7 @@ from numba import njit
 from creepkit.arrays import Floats
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def eliminate(matrix: Floats, right: Floats) -> bool:
     """Solve ``matrix x = right`` in place, x left in `right`; False when the matrix is singular.
 
@@ -28,16 +28,23 @@ def eliminate(matrix: Floats, right: Floats) -> bool:
         for i in range(k + 1, size):
             factor = matrix[i, k] / pivot
             if factor != 0.0:
-                matrix[i, k:] -= factor * matrix[k, k:]
-                right[i] -= factor * right[k]
+                _subtract(matrix, i, factor, k)
+                _subtract(right, i, factor, k)
     for k in range(size - 1, -1, -1):
         for i in range(k + 1, size):
-            right[k] -= matrix[k, i] * right[i]
-        right[k] /= matrix[k, k]
+            _subtract(right, k, matrix[k, i], i)
+        for j in range(right.shape[1]):
+            right[k, j] /= matrix[k, k]
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _subtract(rows: Floats, i: int, factor: float, k: int) -> None:
+    for j in range(rows.shape[1]):
+        rows[i, j] -= factor * rows[k, j]
+
+
+@njit(cache=True, error_model="numpy")
 def _swap(rows: Floats, i: int, k: int) -> None:
     for j in range(rows.shape[1]):
         rows[i, j], rows[k, j] = rows[k, j], rows[i, j]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp, isfinite
+from math import exp, isfinite, log
 from typing import Any
 
 from numba import njit
@@ -20,7 +20,7 @@ _VIRGIN = 1e-25
 _NUDGE = 1e-6
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def choose_clock(
     update: Any, theta: Floats, beta: float, drive: Drive, segment: Segment, value: Floats, work: Room
 ) -> tuple[Clock, float]:
@@ -34,31 +34,32 @@ def choose_clock(
     if not stress > 0.0:
         return plain(segment.start, length), 0.0
     row[TIME], row[TEMPERATURE] = segment.start, segment.temperature
-    row[POINT_SIZE:] = value[1:]
+    for v in range(1, size):
+        row[POINT_SIZE + v - 1] = value[v]
     place(row, drive.axes, stress, strain)
     update(1, pointer(row), pointer(theta), pointer(out))
     rate = exp(min(out[0], 600.0))
     if not isfinite(rate) or rate <= 0.0:
         return plain(segment.start, length), 0.0
-    bend, bend_rate = _bends(drive, segment, stress, rate, out[size:], row, out[1:size])
+    bend, bend_rate = _bends(drive, segment, stress, rate, row, out, size)
     return shifted(segment.start, length, bend, bend_rate), rate
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _bends(
-    drive: Drive, segment: Segment, stress: float, rate: float, gradient: Floats, row: Floats, state_rates: Floats
+    drive: Drive, segment: Segment, stress: float, rate: float, row: Floats, out: Floats, size: int
 ) -> tuple[float, float]:
     """r in p'' = r p' and its rate, if ln f kept its logarithmic slopes to time, strain and stress."""
-    by_stress = along_stress(gradient, drive.axes)
+    by_stress = along_stress(out, size, drive.axes)
     strain, time = row[STRAIN], row[TIME]
-    aging = gradient[TIME]
-    hardening = rate * gradient[STRAIN] if strain > 0.0 else 0.0
+    aging = out[size + TIME]
+    hardening = rate * out[size + STRAIN] if strain > 0.0 else 0.0
     thinning = rate * drive.load * stress * by_stress
     relaxing = -rate * drive.stiffness * by_stress
     driven = by_stress * stress_rate(segment) * exp(drive.load * strain)
-    driven += gradient[TEMPERATURE] * temperature_rate(segment)
-    for i in range(state_rates.size):
-        driven += gradient[POINT_SIZE + i] * state_rates[i]
+    driven += out[size + TEMPERATURE] * temperature_rate(segment)
+    for v in range(1, size):
+        driven += out[size + POINT_SIZE + v - 1] * out[v]
     bend = aging + hardening + thinning + relaxing + driven
     bend_rate = thinning * bend + relaxing * (bend + drive.stiffness * rate / stress)
     if time > 0.0:
@@ -68,37 +69,61 @@ def _bends(
     return bend, bend_rate
 
 
-@njit(cache=True)
-def move_clock(
-    update: Any,
-    theta: Floats,
-    beta: float,
-    beta_slope: Floats,
-    drive: Drive,
-    segment: Segment,
-    clock: Clock,
-    work: Room,
-) -> None:
-    """Write into the room how the clock moves with each parameter, (2, P).
+@njit(cache=True, error_model="numpy")
+def local_exponent(
+    update: Any, theta: Floats, beta: float, drive: Drive, segment: Segment, time: float, work: Room
+) -> float:
+    """Exponent of time of the curve p ~ t^b that a virgin state follows about `time`, s."""
+    row, out = work.row, work.out
+    elapsed = time - segment.start
+    row[TIME] = time
+    row[TEMPERATURE] = segment.temperature + temperature_rate(segment) * elapsed
+    for v in range(1, work.value.size):
+        row[POINT_SIZE + v - 1] = work.value[v]
+    stress = segment.stress + stress_rate(segment) * elapsed
+    log_strain, exponent = -7.0, beta
+    for _ in range(30):
+        place(row, drive.axes, stress, exp(log_strain))
+        update(1, pointer(row), pointer(theta), pointer(out))
+        softening = 1.0 - out[work.value.size + STRAIN] * row[STRAIN]
+        exponent = (1.0 + elapsed * out[work.value.size + TIME]) / softening
+        step = (log(elapsed / beta) + out[0] - log_strain) / softening
+        if not isfinite(step) or abs(step) < 1e-10:
+            break
+        log_strain = min(max(log_strain + step, -65.0), 0.0)
+    return exponent
 
-    Any motion gives right sensitivities, since they are exact for a moving clock; this one, by differences, keeps
-    them as smooth in s as the strain itself.
+
+@njit(cache=True, error_model="numpy")
+def move_clock(
+    update: Any, theta: Floats, beta: float, drive: Drive, segment: Segment, clock: Clock, first: float, work: Room
+) -> None:
+    """Write into the room how the clock moves with each parameter, (2, P); `first` is the first output time, s.
+
+    Any motion gives right sensitivities, since they are exact for a moving clock. This one, by differences, keeps
+    them as smooth in s as the strain itself: it follows the exponent that prevails when the first output is due.
     """
-    work.clock_change[:] = 0.0
-    if clock.tau == 0.0:
-        if SMALLEST_BETA < beta < 1.0:
-            work.clock_change[0] = beta_slope
+    for p in range(theta.size):
+        work.clock_change[0, p] = work.clock_change[1, p] = 0.0
+    from_virgin = clock.tau == 0.0
+    if from_virgin and not SMALLEST_BETA < beta < 1.0:
         return
+    here = local_exponent(update, theta, beta, drive, segment, first, work) if from_virgin else 0.0
     nudged, value = theta.copy(), work.value.copy()
     for p in range(theta.size):
         step = _NUDGE * max(1.0, abs(theta[p])) if isfinite(theta[p]) else 0.0
         if step == 0.0:
             continue
         nudged[p] = theta[p] + step
-        for v in range(value.size):
-            value[v] = work.value[v] + step * work.change[v, p]
-        moved, _ = choose_clock(update, nudged, beta, drive, segment, value, work)
+        if from_virgin:
+            there = local_exponent(update, nudged, beta, drive, segment, first, work)
+            change = (there - here) / step
+            work.clock_change[0, p] = change if isfinite(change) else 0.0
+        else:
+            for v in range(value.size):
+                value[v] = work.value[v] + step * work.change[v, p]
+            moved, _ = choose_clock(update, nudged, beta, drive, segment, value, work)
+            if moved.tau > 0.0 and moved.beta != 1.0 and clock.beta != 1.0:
+                work.clock_change[0, p] = (moved.beta - clock.beta) / step
+                work.clock_change[1, p] = (moved.tau - clock.tau) / step
         nudged[p] = theta[p]
-        if moved.tau > 0.0 and moved.beta != 1.0 and clock.beta != 1.0:
-            work.clock_change[0, p] = (moved.beta - clock.beta) / step
-            work.clock_change[1, p] = (moved.tau - clock.tau) / step

@@ -20,7 +20,7 @@ BY_TRIAL, BY_STRAIN, BY_TIME, BY_TEMPERATURE, BY_LOG_WEIGHT, BY_PRINCIPAL, BY_ME
 """Columns of a response; those of the S initial states z0 and of the P parameters follow."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def gradient_of_update(out: Floats, problem: Problem, increment: float, gradient: Floats) -> None:
     """Derivatives of [w f, w g] with respect to a kernel's row, (1 + S, 6 + S), from the output of `update`."""
     size, width = gradient.shape
@@ -31,7 +31,7 @@ def gradient_of_update(out: Floats, problem: Problem, increment: float, gradient
             gradient[i, j] = factor * slope if factor != 0.0 else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def gradient_of_sensitivity(full: Floats, problem: Problem, increment: float, gradient: Floats) -> None:
     """The same from the output of `sensitivity`."""
     size, width = gradient.shape
@@ -42,7 +42,7 @@ def gradient_of_sensitivity(full: Floats, problem: Problem, increment: float, gr
             gradient[i, j] = factor * slope if factor != 0.0 else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def respond(
     axes: Axes,
     problem: Problem,
@@ -63,9 +63,11 @@ def respond(
     growth = exp(problem.load * increment)
     by_increment = problem.load * stress - problem.stiffness * growth
     for i in range(size):
-        by_stress = along_stress(gradient[i], axes)
+        by_stress = along_stress(gradient[i], 0, axes)
         matrix[i, 0] = -gradient[i, STRAIN] - by_stress * by_increment
-        matrix[i, 1:] = -gradient[i, POINT_SIZE:]
+        for j in range(1, size):
+            matrix[i, j] = -gradient[i, POINT_SIZE + j - 1]
+            response[i, INPUTS + j - 1] = 1.0 if i == j else 0.0
         matrix[i, i] += 1.0
         response[i, BY_TRIAL] = by_stress * growth
         response[i, BY_STRAIN] = gradient[i, STRAIN]
@@ -74,7 +76,4 @@ def respond(
         response[i, BY_LOG_WEIGHT] = increment if i == 0 else problem.weight * state_rates[i - 1]
         response[i, BY_PRINCIPAL] = gradient[i, PRINCIPAL]
         response[i, BY_MEAN] = gradient[i, MEAN]
-        response[i, INPUTS : INPUTS + size - 1] = 0.0
-        if i > 0:
-            response[i, INPUTS + i - 1] = 1.0
     return eliminate(matrix, response)

@@ -24,19 +24,19 @@ class Segment(NamedTuple):
     end_temperature: float
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def segment_of(row: Floats) -> Segment:
     """A segment from its row of six numbers."""
     return Segment(row[0], row[1], row[2], row[3], row[4], row[5])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def stress_rate(segment: Segment) -> float:
     """Slope of the driving stress, MPa/s."""
     return (segment.end_stress - segment.stress) / (segment.end - segment.start)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def temperature_rate(segment: Segment) -> float:
     """Slope of the temperature, K/s."""
     return (segment.end_temperature - segment.temperature) / (segment.end - segment.start)

@@ -7,7 +7,7 @@ Unknown are the creep increment D and the states z at the end of the stage:
 
 with w the weight of the stage (gamma h dt/ds), p0 and z0 the history so far, trial the stress if nothing crept, and
 k = 3G in a finite element, E in relaxation, 0 under prescribed stress. load = 1 is uniaxial tension under constant
-load, whose true stress grows as exp(strain) because creep keeps the volume; else load = 0.
+load, whose true stress grows as exp(strain) because creep keeps the volume; else load = 0. Not both are above zero.
 
 The unknown is x = ln[D / (1 - k D/trial)]: ln D while little has crept, and minus ln sigma when creep takes all of
 the trial stress. Since kernels give ln f, the equation is nearly linear in x at both ends, for any rate.
@@ -59,7 +59,7 @@ class Problem(NamedTuple):
 
 
 class Unfolded(NamedTuple):
-    """An iterate x in plain terms: increment, stress in MPa, and their derivatives d(ln D)/dx and d(ln sigma)/dx."""
+    """An iterate x in plain terms: D, ln D, stress in MPa, and d(ln D)/dx, d(ln sigma)/dx."""
 
     increment: float
     log_increment: float
@@ -68,19 +68,19 @@ class Unfolded(NamedTuple):
     stress_slope: float
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def unfold(problem: Problem, x: float) -> Unfolded:
     """Turn the unknown x into increment and stress."""
     amount = exp(min(x, 700.0))
-    ratio = problem.stiffness * amount / problem.trial if problem.stiffness > 0.0 else 0.0
-    elastic = 1.0 / (1.0 + ratio)
-    increment = amount * elastic
-    stress = problem.trial * elastic * exp(problem.load * min(increment, 700.0))
-    stress_slope = (elastic - 1.0) + problem.load * increment * elastic
-    return Unfolded(increment, x - log1p(ratio), stress, elastic, stress_slope)
+    if problem.stiffness > 0.0:
+        ratio = problem.stiffness * amount / problem.trial
+        elastic = 1.0 / (1.0 + ratio)
+        return Unfolded(amount * elastic, x - log1p(ratio), problem.trial * elastic, elastic, elastic - 1.0)
+    stress = problem.trial * exp(problem.load * min(amount, 700.0)) if problem.load > 0.0 else problem.trial
+    return Unfolded(amount, x, stress, 1.0, problem.load * amount)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def fold(problem: Problem, increment: float) -> float:
     """The unknown x of a guessed increment, kept off the ends of its range."""
     guess = max(increment, 1e-300)
@@ -90,7 +90,7 @@ def fold(problem: Problem, increment: float) -> float:
     return log(guess) - log1p(-share) if share < 0.999 else log(999.0 * problem.trial / problem.stiffness)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def place(row: Floats, axes: Axes, stress: float, strain: float) -> None:
     """Write stress and strain into a kernel's row; time, temperature and states are there already."""
     row[STRESS] = stress
@@ -99,15 +99,17 @@ def place(row: Floats, axes: Axes, stress: float, strain: float) -> None:
     row[MEAN] = axes.mean + axes.mean_slope * stress
 
 
-@njit(cache=True)
-def along_stress(gradient: Floats, axes: Axes) -> float:
-    """Derivative to the equivalent stress, principal and mean stress following it."""
-    return (
-        gradient[STRESS] + axes.principal_slope * gradient[PRINCIPAL] + axes.mean_slope * gradient[MEAN]
+@njit(cache=True, error_model="numpy")
+def along_stress(slopes: Floats, start: int, axes: Axes) -> float:
+    """Derivative to the equivalent stress, principal and mean stress following it; a gradient begins at `start`."""
+    return float(
+        slopes[start + STRESS]
+        + axes.principal_slope * slopes[start + PRINCIPAL]
+        + axes.mean_slope * slopes[start + MEAN]
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def solve(
     update: Any,
     theta: Floats,
@@ -135,7 +137,7 @@ def solve(
     return _solve_scalar(update, theta, axes, problem, row, out, guess, tolerance)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _solve_scalar(
     update: Any,
     theta: Floats,
@@ -148,6 +150,7 @@ def _solve_scalar(
 ) -> tuple[float, int]:
     """Newton's method in x, bracketed: it cannot fail where the rate falls with strain and rises with stress."""
     x, low, high, before = fold(problem, guess), -inf, inf, inf
+    log_weight = log(problem.weight)
     for _ in range(_ITERATIONS):
         now = unfold(problem, x)
         place(row, axes, now.stress, problem.strain + now.increment)
@@ -155,10 +158,10 @@ def _solve_scalar(
         if out[0] < _NO_RATE:
             place(row, axes, problem.trial, problem.strain)
             return 0.0, SOLVED
-        residual = now.log_increment - log(problem.weight) - out[0]
+        residual = now.log_increment - log_weight - out[0]
         if not isfinite(residual):
             return 0.0, NOT_FINITE
-        slope = _slope(now, out[1:], axes)
+        slope = _slope(now, out, axes)
         if residual > 0.0:
             high = x
         else:
@@ -177,14 +180,15 @@ def _solve_scalar(
     return 0.0, TOO_MANY
 
 
-@njit(cache=True)
-def _slope(now: Unfolded, gradient: Floats, axes: Axes) -> float:
+@njit(cache=True, error_model="numpy")
+def _slope(now: Unfolded, out: Floats, axes: Axes) -> float:
     """d(ln D - ln w - ln f)/dx; between 1 and the stress exponent for a hardening law under prescribed strain."""
-    by_strain = now.increment * now.increment_slope * gradient[STRAIN]
-    return now.increment_slope - by_strain - now.stress * now.stress_slope * along_stress(gradient, axes)
+    by_strain = now.increment * now.increment_slope * out[1 + STRAIN]
+    by_stress = now.stress * now.stress_slope * along_stress(out, 1, axes)
+    return float(now.increment_slope - by_strain - by_stress)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _cautious(x: float, step: float, low: float, high: float) -> float:
     """Bisect a closed bracket; in an open one Newton's step is kept, but not beyond 60 in ln D."""
     if isfinite(low) and isfinite(high):
@@ -192,7 +196,7 @@ def _cautious(x: float, step: float, low: float, high: float) -> float:
     return min(max(step, -60.0), 60.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _solve_coupled(
     update: Any,
     theta: Floats,
@@ -218,18 +222,19 @@ def _solve_coupled(
         creeps = creeps and not out[0] < _NO_RATE
         if not _finite(out, size, creeps):
             halvings += 1
-            if halvings > _HALVINGS or (last == 0.0).all():
+            if halvings > _HALVINGS:
                 return 0.0, NOT_FINITE
-            last *= 0.5
-            x -= last[0]
-            row[POINT_SIZE:] -= last[1:]
+            x = _correct(x, row, last, -0.5)
+            for i in range(size):
+                last[i] *= 0.5
             continue
         _newton_system(axes, problem, states, row, out, now, creeps, matrix, step)
         if not eliminate(matrix, step):
             return 0.0, NO_SOLUTION
-        last[:] = step[:, 0] * min(1.0, _LONGEST_CORRECTION / max(abs(step[0, 0]), 1e-300))
-        x += last[0]
-        row[POINT_SIZE:] += last[1:]
+        damping = min(1.0, _LONGEST_CORRECTION / max(abs(step[0, 0]), 1e-300))
+        for i in range(size):
+            last[i] = damping * step[i, 0]
+        x = _correct(x, row, last, 1.0)
         halvings = 0
         if _small(last, row, tolerance):
             now = unfold(problem, x) if creeps else now
@@ -238,17 +243,24 @@ def _solve_coupled(
     return 0.0, TOO_MANY
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _correct(x: float, row: Floats, step: Floats, factor: float) -> float:
+    """Add a multiple of a step to the states in `row`; return the new x."""
+    for i in range(1, step.size):
+        row[POINT_SIZE + i - 1] += factor * step[i]
+    return float(x + factor * step[0])
+
+
+@njit(cache=True, error_model="numpy")
 def _finite(out: Floats, size: int, creeps: bool) -> bool:
     """Whether what Newton's method needs of the entry's output is finite."""
-    start = 0 if creeps else 1
-    for i in range(start, size):
-        if not isfinite(out[i]):
-            return False
-    return True
+    total = 0.0
+    for i in range(0 if creeps else 1, size):
+        total += out[i]
+    return isfinite(total)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _small(step: Floats, row: Floats, tolerance: float) -> bool:
     if abs(step[0]) > tolerance:
         return False
@@ -259,7 +271,7 @@ def _small(step: Floats, row: Floats, tolerance: float) -> bool:
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _newton_system(
     axes: Axes,
     problem: Problem,
@@ -274,22 +286,15 @@ def _newton_system(
     """Jacobian and minus the residual of [ln D - ln w - ln f, z - z0 - w g] in (x, z)."""
     size = matrix.shape[0]
     width = POINT_SIZE + size - 1
-    matrix[:] = 0.0
     for i in range(size):
-        gradient = out[size + i * width : size + (i + 1) * width]
-        factor = 1.0 if i == 0 else problem.weight
-        if creeps:
-            matrix[i, 0] = -factor * (
-                now.increment * now.increment_slope * gradient[STRAIN]
-                + now.stress * now.stress_slope * along_stress(gradient, axes)
-            )
-            matrix[i, 1:] = -factor * gradient[POINT_SIZE:]
-        elif i > 0:
-            matrix[i, 1:] = -factor * gradient[POINT_SIZE:]
-        matrix[i, i] += now.increment_slope if i == 0 else 1.0
+        start = size + i * width
+        factor = problem.weight if i > 0 else 1.0 if creeps else 0.0
+        by_strain = now.increment * now.increment_slope * out[start + STRAIN]
+        by_stress = now.stress * now.stress_slope * along_stress(out, start, axes)
+        matrix[i, 0] = -factor * (by_strain + by_stress) if creeps else 0.0
+        for j in range(1, size):
+            matrix[i, j] = -factor * out[start + POINT_SIZE + j - 1] if factor > 0.0 else 0.0
+        matrix[i, i] += 1.0 if i > 0 or not creeps else now.increment_slope
         if i > 0:
             right[i, 0] = states[i - 1] + problem.weight * out[i] - row[POINT_SIZE + i - 1]
-    if creeps:
-        right[0, 0] = log(problem.weight) + out[0] - now.log_increment
-    else:
-        matrix[0, 0], right[0, 0] = 1.0, 0.0
+    right[0, 0] = log(problem.weight) + out[0] - now.log_increment if creeps else 0.0

@@ -28,7 +28,7 @@ from creepkit.integration.response import (
 from creepkit.integration.segments import Segment, stress_rate, temperature_rate
 from creepkit.integration.stage import NO_SOLUTION, SOLVED, Axes, Problem, place, solve
 from creepkit.integration.tableau import Tableau
-from creepkit.kernels.interface import POINT_SIZE, STRESS, TEMPERATURE, TIME, pointer
+from creepkit.kernels.interface import POINT_SIZE, TEMPERATURE, TIME, pointer
 
 
 class Drive(NamedTuple):
@@ -65,7 +65,7 @@ class Room(NamedTuple):
     clock_change: Floats
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def room(states: int, parameters: int, stages: int) -> Room:
     """Allocate the working arrays."""
     size, width = 1 + states, POINT_SIZE + states
@@ -88,7 +88,7 @@ def room(states: int, parameters: int, stages: int) -> Room:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _set_stage(
     drive: Drive, segment: Segment, clock: Clock, tableau: Tableau, work: Room, s: float, h: float, i: int
 ) -> Problem:
@@ -96,9 +96,11 @@ def _set_stage(
 
     Where strain starts as a high power of s, weights below zero can make its history negative: laws never see that.
     """
-    work.base[:] = work.value
-    for j in range(i):
-        work.base[:] += h * tableau.a[i, j] * work.slopes[j]
+    for v in range(work.base.size):
+        total = 0.0
+        for j in range(i):
+            total += tableau.a[i, j] * work.slopes[j, v]
+        work.base[v] = work.value[v] + h * total
     now = moment(clock, s + tableau.c[i] * h)
     elapsed = now.time - segment.start
     work.row[TIME] = now.time
@@ -109,7 +111,7 @@ def _set_stage(
     return Problem(trial, drive.stiffness, drive.load, tableau.a[i, i] * h * exp(now.log_pace), strain)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance(
     update: Any,
     theta: Floats,
@@ -127,7 +129,8 @@ def advance(
     for i in range(tableau.c.size):
         problem = _set_stage(drive, segment, clock, tableau, work, s, h, i)
         share = tableau.a[i, i] * h
-        work.row[POINT_SIZE:] = work.base[1:] + (share * work.slopes[i - 1, 1:] if i > 0 else 0.0 * work.base[1:])
+        for v in range(1, work.base.size):
+            work.row[POINT_SIZE + v - 1] = work.base[v] + (share * work.slopes[i - 1, v] if i > 0 else 0.0)
         guess = share * (work.slopes[i - 1, 0] if i > 0 else slope)
         increment, flag = solve(
             update, theta, drive.axes, problem, work.base[1:], work.row, work.out, guess, tolerance
@@ -135,13 +138,14 @@ def advance(
         if flag != SOLVED:
             return flag
         work.slopes[i, 0] = increment / share
-        work.slopes[i, 1:] = (work.row[POINT_SIZE:] - work.base[1:]) / share
-    work.new_value[0] = work.base[0] + increment
-    work.new_value[1:] = work.row[POINT_SIZE:]
+        work.new_value[0] = work.base[0] + increment
+        for v in range(1, work.base.size):
+            work.new_value[v] = work.row[POINT_SIZE + v - 1]
+            work.slopes[i, v] = (work.new_value[v] - work.base[v]) / share
     return SOLVED
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def differentiate(
     sensitivity: Any,
     theta: Floats,
@@ -159,7 +163,8 @@ def differentiate(
         problem = _set_stage(drive, segment, clock, tableau, work, s, h, i)
         share = tableau.a[i, i] * h
         increment = share * work.slopes[i, 0]
-        work.row[POINT_SIZE:] = work.base[1:] + share * work.slopes[i, 1:]
+        for v in range(1, size):
+            work.row[POINT_SIZE + v - 1] = work.base[v] + share * work.slopes[i, v]
         growth = exp(drive.load * increment)
         stress = (problem.trial - problem.stiffness * increment) * growth
         place(work.row, drive.axes, stress, problem.strain + increment)
@@ -183,7 +188,7 @@ def differentiate(
     return SOLVED
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _stage_change(
     drive: Drive,
     segment: Segment,
@@ -197,9 +202,12 @@ def _stage_change(
 ) -> None:
     """Chain the response of stage `i` to the changes of its history and of its clock."""
     size, parameters = work.change.shape
-    work.base_change[:] = work.change
-    for j in range(i):
-        work.base_change[:] += h * tableau.a[i, j] * work.slope_changes[j]
+    for v in range(size):
+        for p in range(parameters):
+            total = 0.0
+            for j in range(i):
+                total += tableau.a[i, j] * work.slope_changes[j, v, p]
+            work.base_change[v, p] = work.change[v, p] + h * total
     by_beta, by_tau = velocity(clock, s + tableau.c[i] * h)
     strain = problem.strain
     trial_by_strain = drive.load * problem.trial - drive.stiffness * exp(drive.load * strain)
@@ -223,7 +231,7 @@ def _stage_change(
             work.slope_changes[i, v, p] = total / share
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def error_of(tableau: Tableau, work: Room, h: float, v: int) -> float:
     """Estimated local error of unknown `v`."""
     total = 0.0
@@ -232,7 +240,7 @@ def error_of(tableau: Tableau, work: Room, h: float, v: int) -> float:
     return abs(h * total)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def dense_weight(tableau: Tableau, i: int, x: float) -> float:
     """Weight of stage `i` up to the share `x` of the step."""
     total = 0.0
@@ -241,7 +249,7 @@ def dense_weight(tableau: Tableau, i: int, x: float) -> float:
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def dense_slope(tableau: Tableau, i: int, x: float) -> float:
     """Derivative of `dense_weight` to x."""
     total = 0.0
@@ -250,7 +258,7 @@ def dense_slope(tableau: Tableau, i: int, x: float) -> float:
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def dense_value(tableau: Tableau, work: Room, h: float, x: float, v: int) -> float:
     """Unknown `v` at the share `x` of the step."""
     total = 0.0
@@ -259,16 +267,19 @@ def dense_value(tableau: Tableau, work: Room, h: float, x: float, v: int) -> flo
     return float(work.value[v] + h * total)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def dense_change(
     clock: Clock, tableau: Tableau, work: Room, s: float, h: float, x: float, v: int, change: Floats
 ) -> None:
     """Derivatives of unknown `v` at a fixed time with respect to the parameters, into `change` (P,)."""
-    change[:] = work.change[v]
     slope = 0.0
+    for p in range(change.size):
+        change[p] = work.change[v, p]
     for i in range(tableau.c.size):
-        change[:] += h * dense_weight(tableau, i, x) * work.slope_changes[i, v]
+        weight = h * dense_weight(tableau, i, x)
         slope += dense_slope(tableau, i, x) * work.slopes[i, v]
+        for p in range(change.size):
+            change[p] += weight * work.slope_changes[i, v, p]
     place_now = s + x * h
     by_beta, by_tau = velocity(clock, place_now)
     pace = exp(moment(clock, place_now).log_pace)

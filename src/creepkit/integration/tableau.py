@@ -38,9 +38,9 @@ class Tableau(NamedTuple):
         return float(self.a[0, 0])
 
     @property
-    def weights(self) -> Floats:
-        """Weights of the stages over the whole step."""
-        return self.a[-1]
+    def stages(self) -> int:
+        """Number of stages."""
+        return int(self.c.size)
 
 
 def _tableau(

@@ -1,15 +1,18 @@
-"""How residuals of creep tests scatter: four sources with a standard deviation each, found from the data.
+"""How residuals of creep tests scatter: sources with a standard deviation each, found from the data.
 
 Residuals on the log scale are not independent: one test creeps twice as fast as its twin and stays so, a model that
 bends wrongly is wrong for decades of time on end. The covariance of one test's residuals is
 
-    C = noise^2 S S + offset^2 s s' + rate^2 d d' + drift^2 exp(-|ln t - ln t'| / reach)
+    C = noise^2 S S + misfit^2 I + offset^2 s s' + rate^2 d d' + drift^2 exp(-|ln t - ln t'| / reach)
 
-with s = dg/dy (S its diagonal): `noise` of each frame (in the output's unit), `offset` of the whole curve (loading
-strain, same unit), `rate` scatter between tests (d = derivative to ln of a factor on the creep rate: heat-to-heat
-scatter) and `drift`, an Ornstein-Uhlenbeck process in ln t for what the law cannot follow, which makes error bars
-honest under autocorrelation. Sizes are those of largest marginal likelihood (a first-order mixed-effects model,
-Pinheiro & Bates (2000), Mixed-Effects Models in S and S-PLUS, ch. 7).
+with s = dg/dy (S its diagonal): `noise` of each frame (in the output's unit), `misfit` of each frame on the log scale,
+`offset` of the whole curve (loading strain), `rate` scatter between tests (d = derivative to ln of a factor on the
+creep rate: heat-to-heat scatter) and `drift`, an Ornstein-Uhlenbeck process in ln t for what the law cannot follow.
+
+Values are estimated with `working` scatter alone (noise, misfit, offset): every frame pulls with the same weight, so
+that a law which cannot bend as the data do still runs through the middle of them. Their intervals use the whole
+covariance. Sizes are those of largest marginal likelihood (a first-order mixed-effects model, Pinheiro & Bates
+(2000), Mixed-Effects Models in S and S-PLUS, ch. 7).
 """
 
 from __future__ import annotations
@@ -24,18 +27,21 @@ from creepkit.arrays import Floats
 from creepkit.inverse.objective import Residuals
 from creepkit.records import Nuisance
 
+LONGEST = 3.0
+"""Longest reach of the drift in ln t, a factor 20 in time: what lasts longer is scatter of the rate."""
 _JITTER = 1e-10
-SOURCES = ("noise", "offset", "rate", "drift", "reach")
+SOURCES = ("noise", "misfit", "offset", "rate", "drift", "reach")
 
 
 @dataclass(frozen=True)
 class Scatter:
     """Standard deviations of the sources of scatter.
 
-    noise, offset : in the output's unit; rate, drift : in ln strain rate and ln strain; reach : in ln t.
+    noise, offset : in the output's unit; misfit, rate, drift : in ln strain or ln rate; reach : in ln t.
     """
 
     noise: float
+    misfit: float = 0.0
     offset: float = 0.0
     rate: float = 0.0
     drift: float = 0.0
@@ -54,7 +60,7 @@ def covariance(residuals: Residuals, log_times: Floats, scatter: Scatter) -> Flo
     c = scatter.drift**2 * np.exp(-lag / scatter.reach)
     c += scatter.offset**2 * s[:, :, None] * s[:, None, :] + scatter.rate**2 * d[:, :, None] * d[:, None, :]
     k = np.arange(s.shape[1])
-    c[:, k, k] += (scatter.noise * s) ** 2 + _JITTER
+    c[:, k, k] = c[:, k, k] * (1 + 1e-9) + (scatter.noise * s) ** 2 + scatter.misfit**2 + _JITTER
     both = present[:, :, None] & present[:, None, :]
     c = np.where(both, c, 0.0)
     c[:, k, k] = np.where(present, c[:, k, k], 1.0)
@@ -96,20 +102,21 @@ def effective_size(residuals: Residuals, log_times: Floats, scatter: Scatter) ->
     return float(np.clip((ones * weights).sum(), len(ones), ones.sum()))
 
 
-def first_guess(noise: float, histories: int, nuisances: Sequence[Nuisance]) -> Scatter:
-    """Scatter assumed before anything was fitted: broad, so that no curve dominates."""
-    return fitted_only(Scatter(max(noise, 1e-7), 3 * max(noise, 1e-7), 0.5, 0.2, 2.0), histories, nuisances)
+def working_guess(noise: float, floor: float, nuisances: Sequence[Nuisance]) -> Scatter:
+    """Working scatter assumed before anything was fitted: frames wrong by a third, offsets of the scale's floor."""
+    return Scatter(noise=max(noise, 1e-3 * floor), misfit=0.3, offset=_size(nuisances, "offset", floor))
 
 
-def fitted_only(scatter: Scatter, histories: int, nuisances: Sequence[Nuisance]) -> Scatter:
-    """Switch off the sources that are not among the nuisances, and fix those whose prior is given."""
-    sizes = {"offset": 0.0, "rate": 0.0}
-    for nuisance in nuisances:
-        if nuisance.kind == "rate" and histories < 3:
-            continue
-        if nuisance.kind in sizes:
-            sizes[nuisance.kind] = nuisance.sd if nuisance.sd is not None else getattr(scatter, nuisance.kind)
-    return replace(scatter, **sizes)
+def full_guess(working: Scatter, tests: int, nuisances: Sequence[Nuisance]) -> Scatter:
+    """Where the estimate of the whole scatter begins; scatter between tests needs three of them to be seen."""
+    rate = _size(nuisances, "rate", 0.3) if tests >= 3 else 0.0
+    return replace(working, misfit=0.3 * working.misfit, rate=rate, drift=0.5 * working.misfit, reach=1.0)
+
+
+def _size(nuisances: Sequence[Nuisance], kind: str, default: float) -> float:
+    """Zero unless the nuisance is there; its prior if it has one."""
+    sizes = [default if n.sd is None else n.sd for n in nuisances if n.kind == kind]
+    return sizes[0] if sizes else 0.0
 
 
 def estimated(residuals: Residuals, log_times: Floats, start: Scatter, nuisances: Sequence[Nuisance]) -> Scatter:
@@ -117,8 +124,8 @@ def estimated(residuals: Residuals, log_times: Floats, start: Scatter, nuisances
     given = {n.kind for n in nuisances if n.sd is not None}
     free = [name for name in SOURCES if getattr(start, name) > 0 and name not in given]
     typical = float(np.median(1.0 / np.maximum(residuals.slopes[residuals.present], 1e-12)))
-    low = {"noise": 1e-5 * typical, "offset": 1e-5 * typical, "rate": 1e-3, "drift": 1e-4, "reach": 0.05}
-    high = {"noise": typical, "offset": typical, "rate": 5.0, "drift": 5.0, "reach": 20.0}
+    low = {"noise": 1e-5 * typical, "offset": 1e-5 * typical, "reach": 0.05}
+    high = {"noise": typical, "offset": typical, "reach": LONGEST}
 
     def scatter_at(x: Floats) -> Scatter:
         return replace(start, **{n: float(v) for n, v in zip(free, np.exp(x), strict=True)})
@@ -126,7 +133,7 @@ def estimated(residuals: Residuals, log_times: Floats, start: Scatter, nuisances
     def cost(x: Floats) -> float:
         return -log_likelihood(residuals, log_times, scatter_at(x))
 
-    bounds = [(np.log(low[n]), np.log(max(high[n], 2 * low[n]))) for n in free]
+    bounds = [(np.log(low.get(n, 1e-4)), np.log(high.get(n, 5.0))) for n in free]
     x0 = np.array([np.clip(np.log(getattr(start, n)), *b) for n, b in zip(free, bounds, strict=True)])
     found = minimize(cost, x0, method="L-BFGS-B", bounds=bounds, options={"maxiter": 60, "ftol": 1e-7})
     return scatter_at(found.x)

@@ -45,6 +45,7 @@ class _Reference(_Strict):
 
 class _Scatter(_Strict):
     noise: float = Field(ge=0)
+    misfit: float = Field(ge=0)
     offset: float = Field(ge=0)
     rate: float = Field(ge=0)
     drift: float = Field(ge=0)

@@ -12,7 +12,7 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.inverse.coordinates import Coordinates, Reference
 from creepkit.inverse.covariance import Scatter
-from creepkit.inverse.uncertainty import Z95, Estimate, band
+from creepkit.inverse.uncertainty import Estimate, band, quantile
 from creepkit.language import CreepLaw
 from creepkit.records import History, Prediction, Predictor
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 class TestMisfit:
     """One test in the fit.
 
-    rms, bias : root mean square and mean of ln(predicted / measured) over its fitted frames.
+    rms, bias : root mean square and mean of ln((predicted + offset) / measured) over its fitted frames.
     offset : estimated loading strain that the law does not explain, in the output's unit.
     rate_factor : estimated factor of this test's creep rate on the law's (heat-to-heat scatter).
     """
@@ -59,9 +59,11 @@ class Identification:
     estimates : one Estimate for each parameter, in the law's order.
     u, covariance : conditioned coordinates at the optimum and their posterior covariance (see inverse.coordinates).
     scatter : standard deviations of the sources of scatter, found from the data.
-    rms : root mean square of ln(predicted / measured) over the fitted frames of all tests.
+    rms : root mean square of ln((predicted + offset) / measured) over the fitted frames of all tests; each test has
+        its own offset (loading strain), none its own rate.
     ranges : {"stress", "temperature", "strain", "time": (low, high)} that the fitted frames cover; MPa, K, s.
-    bic, log_likelihood, size : -2 ln L + K ln(size), with size the number of effectively independent frames.
+    log_likelihood : of the fitted frames as if they were independent (working scatter).
+    size : number of effectively independent frames (about one a test when tests differ from one another).
     """
 
     law: CreepLaw
@@ -89,8 +91,8 @@ class Identification:
 
     @property
     def bic(self) -> float:
-        """Bayesian information criterion; the scatter sizes count for every law alike and are left out."""
-        return -2.0 * self.log_likelihood + len(self.law.params) * float(np.log(self.size))
+        """Bayesian information criterion with as many observations as there are independent frames."""
+        return information_criterion(self, self.size)
 
     @property
     def coordinates(self) -> Coordinates:
@@ -106,7 +108,8 @@ class Identification:
         stress MPa, temperature K; strain and time default to those of the reference point.
         """
         middle, sd = band(self._log_rates(stress, temperature, strain, time), self.u, self.covariance)
-        return np.exp(middle), np.exp(middle - Z95 * sd), np.exp(middle + Z95 * sd)
+        half = self._quantile * sd
+        return np.exp(middle), np.exp(middle - half), np.exp(middle + half)
 
     def local_exponent(
         self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
@@ -116,7 +119,8 @@ class Identification:
         stress = np.asarray(stress, float)
         up, down = (self._log_rates(stress * f, temperature, strain, time) for f in (1.0005, 1 / 1.0005))
         middle, sd = band(lambda u: (up(u) - down(u)) / (2 * np.log(1.0005)), self.u, self.covariance)
-        return middle, middle - Z95 * sd, middle + Z95 * sd
+        half = self._quantile * sd
+        return middle, middle - half, middle + half
 
     def predict(self, histories: list[History] | None = None, using: Predictor | None = None) -> Prediction:
         """Predict histories (by default those that were fitted) at the identified values."""
@@ -148,6 +152,10 @@ class Identification:
 
         return text_of(self)
 
+    @property
+    def _quantile(self) -> float:
+        return quantile(self.size, len(self.law.params))
+
     def _log_rates(
         self, stress: ArrayLike, temperature: ArrayLike | None, strain: ArrayLike | None, time: ArrayLike | None
     ) -> Any:
@@ -166,3 +174,9 @@ class Identification:
             return np.asarray(out + np.zeros(np.broadcast_shapes(*(p.shape for p in point))), float)
 
         return log_rate
+
+
+def information_criterion(fit: Identification, size: float) -> float:
+    """-2 ln L x size / frames + K ln(size): frames that move together count as one."""
+    frames = sum(m.frames for m in fit.misfits)
+    return -2.0 * fit.log_likelihood * min(size / max(frames, 1), 1.0) + len(fit.law.params) * float(np.log(size))

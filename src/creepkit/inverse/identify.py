@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from importlib.metadata import version
 
 import numpy as np
 
@@ -16,20 +17,31 @@ from creepkit.inverse.covariance import (
     effective_size,
     estimated,
     expected_effects,
-    first_guess,
+    full_guess,
     log_likelihood,
     whitener,
+    working_guess,
 )
 from creepkit.inverse.frames import thinned
 from creepkit.inverse.identification import Identification, Settings, TestMisfit
 from creepkit.inverse.objective import Objective, Residuals
 from creepkit.inverse.scales import frame_noise, log_scale_for
-from creepkit.inverse.search import Box, Minimum, Progress, measured_log_rate, multistart, refine
-from creepkit.inverse.uncertainty import estimates, laplace
+from creepkit.inverse.search import (
+    Box,
+    Minimum,
+    Progress,
+    from_single_terms,
+    measured_log_rate,
+    multistart,
+    refine,
+)
+from creepkit.inverse.uncertainty import estimates, laplace, quantile
 from creepkit.language import CreepLaw, temperature
 from creepkit.records import History, Nuisance, Predictor
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
+PUSH = 0.05
+"""How far, in ln, data may push a coefficient beyond its bounds against the fence before that is an error."""
 NUISANCES = (Nuisance("offset"), Nuisance("rate"))
 """Unless told otherwise: a loading-strain offset for each curve, and test-to-test scatter of the rate, both estimated."""
 
@@ -60,30 +72,30 @@ def identify(
     box = Box.of(law, coordinates, measured_log_rate(objective))
     log_times = np.log(objective.times)
     noise = float(np.median([frame_noise(h, "strain") for h in histories]))
-    scatter = first_guess(noise, len(thin), nuisances)
+    working = working_guess(noise, objective.scale.floor, nuisances)
     if start is None:
-        factor = whitener(objective.before_fit(), log_times, scatter)
-        minima = multistart(
-            objective, box, factor, starts=settings.starts, draws=settings.draws, seed=settings.seed,
-            loss=settings.loss if settings.loss != "linear" else "soft_l1", progress=progress,
-        )  # fmt: skip
-        u = minima[0].u
+        candidates = _searched(objective, box, whitener(objective.before_fit(), log_times, working), settings, progress)
     else:
-        u = box.clip(np.asarray(start, float))
-    best, residuals, scatter = _alternate(objective, box, log_times, u, scatter, nuisances, settings, progress)
-    factor = whitener(residuals, log_times, scatter)
-    covariance = laplace(residuals, factor, box)
+        candidates = [box.clip(np.asarray(start, float))]
+    ends = [_alternate(objective, box, log_times, u, working, nuisances, settings, progress) for u in candidates]
+    best, residuals, working = max(ends, key=lambda end: log_likelihood(end[1], log_times, end[2]))
+    _check_bounds(law, coordinates, best.u)
+    scatter = estimated(residuals, log_times, full_guess(working, len(thin), nuisances), nuisances)
+    size = effective_size(residuals, log_times, scatter)
+    factor, whole = whitener(residuals, log_times, working), whitener(residuals, log_times, scatter)
+    covariance = laplace(residuals, factor, whole, box, size)
+    misfits = tuple(_misfits(objective, residuals, expected_effects(residuals, log_times, scatter)))
     return Identification(
         law=law,
-        estimates=estimates(law, coordinates, best.u, covariance),
+        estimates=estimates(law, coordinates, best.u, covariance, quantile(size, len(law.params))),
         u=best.u,
         covariance=covariance,
         reference=reference,
         scatter=scatter,
-        rms=_rms(objective, residuals),
-        log_likelihood=log_likelihood(residuals, log_times, scatter),
-        size=effective_size(residuals, log_times, scatter),
-        misfits=tuple(_misfits(objective, residuals, expected_effects(residuals, log_times, scatter))),
+        rms=_pooled(misfits),
+        log_likelihood=log_likelihood(residuals, log_times, working),
+        size=size,
+        misfits=misfits,
         ranges=_ranges(thin),
         settings=settings,
         provenance=_provenance(law, objective),
@@ -94,25 +106,50 @@ def identify(
     )
 
 
+def _searched(
+    objective: Objective, box: Box, factor: Floats, settings: Settings, progress: Progress | None
+) -> list[Floats]:
+    """Global search with a covariance that is broad and fixed, and a loss that no single curve can capture.
+
+    The few best minima that differ; their likelihoods decide, since the covariance is not yet known here.
+    """
+    loss = "soft_l1" if settings.loss == "linear" else settings.loss
+    few = max(2, settings.starts // 3)
+    singles = from_single_terms(objective, box, factor, starts=few, draws=settings.draws // 2, seed=settings.seed, loss=loss)
+    minima = multistart(
+        objective, box, factor, starts=settings.starts, draws=settings.draws, seed=settings.seed, loss=loss,
+        progress=progress, extra=singles,
+    )  # fmt: skip
+    return _distinct(minima, box)
+
+
+def _distinct(minima: Sequence[Minimum], box: Box, most: int = 3, near: float = 0.02) -> list[Floats]:
+    """The best minima, at most three, that differ by more than 2 % of the box in some coordinate."""
+    kept: list[Floats] = []
+    for minimum in minima:
+        if all((np.abs(minimum.u - u) > near * box.width).any() for u in kept):
+            kept.append(minimum.u)
+    return kept[:most]
+
+
 def _alternate(
-    objective: Objective, box: Box, log_times: Floats, u: Floats, scatter: Scatter, nuisances: Sequence[Nuisance],
-    settings: Settings, progress: Progress | None, rounds: int = 6,
+    objective: Objective, box: Box, log_times: Floats, u: Floats, working: Scatter, nuisances: Sequence[Nuisance],
+    settings: Settings, progress: Progress | None, rounds: int = 8,
 ) -> tuple[Minimum, Residuals, Scatter]:  # fmt: skip
-    """Scatter given the law, law given the scatter, until the likelihood no longer grows."""
+    """Working scatter given the law, law given the scatter, until the likelihood no longer grows."""
     residuals = objective.at(u)
     best, likelihood = Minimum(u, np.inf, False, 0), -np.inf
     for k in range(rounds):
-        scatter = estimated(residuals, log_times, scatter, nuisances)
-        factor = whitener(residuals, log_times, scatter)
-        best = refine(objective, box, factor, best.u, loss=settings.loss)
+        working = estimated(residuals, log_times, working, nuisances)
+        best = refine(objective, box, whitener(residuals, log_times, working), best.u, loss=settings.loss)
         residuals = objective.at(best.u)
-        now = log_likelihood(residuals, log_times, scatter)
+        now = log_likelihood(residuals, log_times, working)
         if progress is not None:
             progress("round", k + 1, rounds)
-        if abs(now - likelihood) < 0.05:
+        if abs(now - likelihood) < 0.01:
             break
         likelihood = now
-    return best, residuals, scatter
+    return best, residuals, working
 
 
 def refit(fit: Identification, histories: Sequence[History]) -> Identification:
@@ -126,23 +163,28 @@ def refit(fit: Identification, histories: Sequence[History]) -> Identification:
 def _misfits(objective: Objective, residuals: Residuals, effects: tuple[Floats, Floats]) -> list[TestMisfit]:
     found = []
     offset, log_factor = effects
+    ratios = _log_ratios(objective, residuals, offset)
     for k, history in enumerate(objective.histories):
-        r = _log_ratios(objective, residuals)[k]
-        r = r[np.isfinite(r)]
+        r = ratios[k][np.isfinite(ratios[k])]
         rms, bias = (float(np.sqrt(np.mean(r**2))), float(np.mean(r))) if r.size else (np.nan, np.nan)
         own = float(offset[k]), float(np.exp(log_factor[k]))
         found.append(TestMisfit(history.name, history.condition, int(r.size), rms, bias, *own))
     return found
 
 
-def _log_ratios(objective: Objective, residuals: Residuals) -> Floats:
-    """Compared difference where the measured strain is above the floor of the scale, NaN elsewhere."""
-    above = objective.present & (objective.measured > 2 * objective.scale.floor)
-    return np.where(above, residuals.values, np.nan)
+def _log_ratios(objective: Objective, residuals: Residuals, offset: Floats) -> Floats:
+    """ln(predicted + the test's offset) - ln(measured) where the measured strain is above the scale's floor, else NaN."""
+    scale = objective.scale
+    predicted = scale.backward(residuals.values + objective.compared)
+    above = objective.present & (objective.measured > 2 * scale.floor)
+    return np.where(above, scale.forward(predicted + offset[:, None]) - objective.compared, np.nan)
 
 
-def _rms(objective: Objective, residuals: Residuals) -> float:
-    return float(np.sqrt(np.nanmean(_log_ratios(objective, residuals) ** 2)))
+def _pooled(misfits: Sequence[TestMisfit]) -> float:
+    """Root mean square over the frames of all tests."""
+    frames = np.array([m.frames for m in misfits], float)
+    squares = np.array([m.rms**2 if m.frames else 0.0 for m in misfits])
+    return float(np.sqrt((frames * squares).sum() / frames.sum()))
 
 
 def _ranges(histories: Sequence[History]) -> dict[str, tuple[float, float]]:
@@ -157,10 +199,8 @@ def _ranges(histories: Sequence[History]) -> dict[str, tuple[float, float]]:
 
 
 def _provenance(law: CreepLaw, objective: Objective) -> dict[str, object]:
-    import creepkit
-
     return {
-        "creepkit": creepkit.__version__,
+        "creepkit": version("creepkit"),
         "law": law.name,
         "fingerprint": law.fingerprint,
         "specimen": getattr(objective.using, "name", type(objective.using).__name__),
@@ -180,6 +220,20 @@ def _notes(law: CreepLaw, objective: Objective, best: Minimum) -> tuple[str, ...
     if len(stresses) == 1:
         notes.append("all tests have one stress: the stress dependence is not determined by them")
     return tuple(notes)
+
+
+def _check_bounds(law: CreepLaw, coordinates: Coordinates, u: Floats) -> None:
+    """A coefficient that the data push through its bounds is an error: the answer would be the bound's, not theirs."""
+    theta = coordinates.theta(u)
+    for k in coordinates.rates:
+        name, param = law.names[k], law.table[law.names[k]]
+        low, high = (param.to_internal(b) for b in param.bounds)
+        if not low - PUSH <= theta[k] <= high + PUSH:
+            found = param.from_internal(float(theta[k]))
+            raise FitError(
+                f"law '{law.name}': the bounds exclude the data, which push {name} to {found:.3g} {param.unit} and it may "
+                f"lie from {param.bounds[0]:g} to {param.bounds[1]:g}; widen its bounds or choose another law"
+            )
 
 
 def _check(law: CreepLaw, histories: Sequence[History], settings: Settings) -> None:

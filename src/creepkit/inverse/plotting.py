@@ -34,7 +34,8 @@ def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
     colours = _colours(fit.histories)
     found = fit.predict()
     for k, history in enumerate(fit.histories):
-        _draw_test(curves, residuals, history, found.of(k)[:, 0], colours[k], named=len(fit.histories) <= CROWDED)
+        offset = fit.misfits[k].offset
+        _draw_test(curves, residuals, history, found.of(k)[:, 0], offset, colours[k], named=len(fit.histories) <= CROWDED)
     _draw_rates(rates, fit)
     _finish(figure, (curves, residuals, rates), fit)
     if path is not None:
@@ -42,10 +43,12 @@ def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
     return figure
 
 
-def _draw_test(curves: Axes, residuals: Axes, history: History, predicted: Any, colour: Any, *, named: bool) -> None:
+def _draw_test(
+    curves: Axes, residuals: Axes, history: History, predicted: Any, offset: float, colour: Any, *, named: bool
+) -> None:
     hours = history.times / 3600.0
-    measured, used = history.outputs["strain"], history.used & (history.times > 0)
-    label = f"{history.name}: {history.condition}" if named else None
+    measured, used = history.outputs["strain"] - offset, history.used & (history.times > 0)
+    label = history.condition if named else None
     curves.plot(hours[used], 100 * measured[used], ".", ms=3, color=colour, alpha=0.55, label=label)
     curves.plot(hours[used], 100 * predicted[used], "-", lw=1.2, color=colour)
     good = used & (measured > 0) & (predicted > 0)
@@ -82,13 +85,13 @@ def _finish(figure: Figure, panels: tuple[Axes, Axes, Axes], fit: Identification
     smallest = min(float(np.min(h.outputs["strain"][h.used], initial=1.0, where=h.outputs["strain"][h.used] > 0))
                    for h in fit.histories)  # fmt: skip
     top = max(float(np.max(h.outputs["strain"][h.used])) for h in fit.histories)
-    curves.set_ylim(100 * max(smallest / 1.5, top * 1e-4), 200 * top)
+    curves.set_ylim(100 * max(smallest / 1.5, top * 1e-3), 200 * top)
     residuals.axhline(0, color="black", lw=0.8)
     residuals.set_ylim(-_reach(fit), _reach(fit))
-    curves.set_title("measured (dots) and identified (lines)", fontsize=10)
-    residuals.set_title(f"rms of ln strain {fit.rms:.3g}", fontsize=10)
+    curves.set_title("measured less loading strain (dots), identified (lines)", fontsize=10)
+    residuals.set_title(f"rms of ln strain {fit.rms:.3g}, loading strains taken off", fontsize=10)
     if len(fit.histories) <= CROWDED:
-        curves.legend(fontsize=7, loc="upper left")
+        curves.legend(fontsize=7, loc="lower right")
     figure.suptitle(f"{fit.law.title or fit.law.name}   ({len(fit.histories)} tests)", fontsize=11)
 
 

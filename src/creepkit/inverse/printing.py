@@ -30,8 +30,8 @@ def text_of(fit: Identification) -> str:
     lines += [
         "",
         f"  {len(fit.misfits)} tests, {frames} frames: rms of ln strain {fit.rms:.3g}, BIC {fit.bic:.1f}",
-        f"  scatter: rate between tests {100 * s.rate:.0f} %, loading strain {s.offset:.2g}, frame noise {s.noise:.2g}, "
-        f"what the law cannot follow {100 * s.drift:.0f} % over {s.reach:.2g} in ln t",
+        f"  scatter (one sd): rate between tests {100 * s.rate:.0f} %, loading strain {s.offset:.2g}, "
+        f"frame noise {s.noise:.2g}, what the law cannot follow {100 * s.drift:.1f} % of strain",
     ]
     lines += [f"  note: {note}" for note in fit.notes]
     return "\n".join(lines)

@@ -21,6 +21,10 @@ class LogScale:
         """The compared quantity."""
         return np.arcsinh(y / (2.0 * self.floor))
 
+    def backward(self, g: Floats) -> Floats:
+        """The output whose compared quantity is g."""
+        return 2.0 * self.floor * np.sinh(g)
+
     def slope(self, y: Floats) -> Floats:
         """dg/dy; 1/y well above the floor."""
         return 1.0 / np.hypot(y, 2.0 * self.floor)

@@ -6,7 +6,7 @@ finds the best misfit at a hundredth of the cost of a swarm.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,16 +96,42 @@ class Fences:
 
 def multistart(
     objective: Objective, box: Box, factor: Floats, *, starts: int, draws: int, seed: int,
-    loss: str, progress: Progress | None = None,
+    loss: str, progress: Progress | None = None, extra: Sequence[Floats] = (),
 ) -> list[Minimum]:  # fmt: skip
-    """Minima from the screened best of `draws` Sobol points and the centre of the bounds, best first."""
-    seeds = _screened(objective, box, starts=starts, draws=draws, seed=seed)
+    """Minima from the screened best of `draws` Sobol points, the centre of the bounds and `extra`, best first."""
+    seeds = [*extra, *_screened(objective, box, starts=starts, draws=draws, seed=seed)]
     found = []
     for k, u in enumerate(seeds):
         found.append(refine(objective, box, factor, u, loss=loss))
         if progress is not None:
             progress("start", k + 1, len(seeds))
     return sorted(found, key=lambda minimum: minimum.cost)
+
+
+def from_single_terms(
+    objective: Objective, box: Box, factor: Floats, *, starts: int, draws: int, seed: int, loss: str
+) -> list[Floats]:
+    """For a sum of terms, one start for each: its optimum as a law of its own, the other terms at a 20th of its rate.
+
+    A sum is never worse than its terms, but a search from the whole box rarely finds that.
+    """
+    law, found = objective.law, []
+    if len(law.terms) < 2:
+        return []
+    for label in law.terms:
+        single = law.only(label)
+        coordinates = Coordinates(single, objective.coordinates.reference)
+        part = Objective(single, objective.histories, objective.using, coordinates, objective.scale, objective.output)
+        own = [law.names.index(name) for name in single.names]
+        inner = Box(box.low[own], box.high[own])
+        minimum = multistart(part, inner, factor, starts=starts, draws=draws, seed=seed, loss=loss)[0]
+        u = 0.5 * (box.low + box.high)
+        u[own] = minimum.u
+        rates = list(objective.coordinates.rates)
+        level = max((u[k] for k in rates if k in own), default=float(u[rates[0]]))
+        u[[k for k in rates if k not in own]] = level - np.log(20.0)
+        found.append(box.clip(u))
+    return found
 
 
 def refine(

@@ -1,4 +1,7 @@
-"""Ranking of identified laws by BIC, with weights: a set of laws, "decisive" only above 0.95."""
+"""Ranking of identified laws by BIC, with weights: a set of laws, "decisive" only above 0.95.
+
+All laws are judged by the same number of independent frames, the median of what their residuals say.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creepkit.errors import FitError
-from creepkit.inverse.identification import Identification
+from creepkit.inverse.identification import Identification, information_criterion
 
 DECISIVE = 0.95
 CREDIBLE = 0.05
@@ -56,7 +59,7 @@ def rank(fits: Sequence[Identification]) -> Ranking:
     if len(tests) > 1:
         raise FitError("the identifications were made from different histories and cannot be ranked")
     size = float(np.median([fit.size for fit in fits]))
-    score = np.array([-2 * fit.log_likelihood + len(fit.law.params) * np.log(size) for fit in fits])
+    score = np.array([information_criterion(fit, size) for fit in fits])
     excess = score - score.min()
     weight = np.exp(-0.5 * excess)
     weight /= weight.sum()

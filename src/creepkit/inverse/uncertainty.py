@@ -1,7 +1,10 @@
-"""Intervals: Laplace's approximation with the covariance of residuals, and what the data leave undetermined.
+"""Intervals: Laplace's approximation with correlated residuals, and what the data leave undetermined.
 
-The curvature of the log-likelihood, with autocorrelated residuals whitened by their covariance, plus a weak
-Gaussian prior of the variance of each parameter's bounds; intervals are 95 %.
+Values minimise r' W r with the working covariance W^-1; residuals really have the covariance C. With J = dr/du the
+covariance of the values is (J'WJ)^-1 J'W C W J (J'WJ)^-1, the sandwich, joined with a weak Gaussian prior of the
+variance of each parameter's bounds. Intervals are 95 %. Sizes of scatter come from the same data: with N effectively
+independent frames (about one a test when tests differ) and K parameters the covariance is scaled by N/(N - K) and
+quantiles are Student's with N - K degrees of freedom.
 """
 
 from __future__ import annotations
@@ -10,14 +13,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
 from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.objective import Residuals
 from creepkit.inverse.search import Box
 from creepkit.language import CreepLaw
-
-Z95 = 1.959963984540054
 
 
 @dataclass(frozen=True)
@@ -35,32 +37,48 @@ class Estimate:
     verdict: str
 
 
-def laplace(residuals: Residuals, factor: Floats, box: Box) -> Floats:
-    """Posterior covariance of u, (parameters, parameters)."""
+def quantile(size: float, count: int) -> float:
+    """Half width of a 95 % interval in standard deviations, for `size` independent frames and `count` parameters."""
+    return float(student.ppf(0.975, max(size - count, 1.0)))
+
+
+def laplace(residuals: Residuals, working: Floats, whole: Floats, box: Box, size: float) -> Floats:
+    """Posterior covariance of u, (parameters, parameters).
+
+    working, whole : (tests, frames, frames) Cholesky factors of the working and of the whole covariance.
+    """
     assert residuals.jacobian is not None
-    white = np.linalg.solve(factor, residuals.jacobian)[residuals.present]
-    information = white.T @ white + np.diag(12.0 / box.width**2)
-    return np.asarray(np.linalg.inv(information))
+    count = box.width.size
+    white = np.linalg.solve(working, residuals.jacobian)
+    weighted = np.linalg.solve(np.swapaxes(working, 1, 2), white)
+    root = np.swapaxes(whole, 1, 2) @ weighted
+    bread = np.einsum("tfp,tfq->pq", white, white) + 1e-12 * np.diag(1.0 / box.width**2)
+    meat = np.einsum("tfp,tfq->pq", root, root) * max(size, 1.0) / max(size - count, 1.0)
+    scale = np.sqrt(np.diag(bread))
+    inner = np.linalg.pinv(bread / np.outer(scale, scale), hermitian=True, rcond=1e-13) / np.outer(scale, scale)
+    free = inner @ meat @ inner
+    prior = np.diag(box.width**2 / 12.0)
+    return np.asarray(prior - prior @ np.linalg.solve(prior + free, prior))
 
 
-def estimates(law: CreepLaw, coordinates: Coordinates, u: Floats, covariance: Floats) -> tuple[Estimate, ...]:
-    """Intervals of the author's parameters."""
+def estimates(law: CreepLaw, coordinates: Coordinates, u: Floats, covariance: Floats, wide: float) -> tuple[Estimate, ...]:
+    """Intervals of the author's parameters, `wide` standard deviations to each side."""
     theta = coordinates.theta(u)
     to_theta = coordinates.jacobian(u)
     sd = np.sqrt(np.diag(to_theta @ covariance @ to_theta.T))
     found = []
     for (name, param), value, spread in zip(law.table.items(), theta, sd, strict=True):
         low, high = (param.to_internal(b) for b in param.bounds)
-        a, b = max(value - Z95 * spread, low), min(value + Z95 * spread, high)
+        a, b = max(value - wide * spread, low), min(value + wide * spread, high)
         a, b = min(a, value), max(b, value)
         middle, bottom, top = (param.from_internal(float(v)) for v in (value, a, b))
-        verdict = _verdict(float(value), float(spread), low, high)
+        verdict = _verdict(float(value), float(wide * spread), low, high)
         found.append(Estimate(name, middle, bottom, top, param.unit, verdict))
     return tuple(found)
 
 
-def _verdict(value: float, sd: float, low: float, high: float) -> str:
-    if 2 * Z95 * sd >= 0.8 * (high - low):
+def _verdict(value: float, half: float, low: float, high: float) -> str:
+    if 2 * half >= 0.8 * (high - low):
         return "not determined"
     if min(value - low, high - value) <= 1e-4 * (high - low):
         return "at its bound"

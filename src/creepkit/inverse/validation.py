@@ -6,7 +6,7 @@ times fall (Holdsworth et al. (2008), Int. J. Pressure Vessels and Piping 85, 80
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
+from creepkit.inverse.search import Progress
 from creepkit.language import CreepLaw
 from creepkit.records import EVERY_FRAME, History, Prediction, Predictor, Status
 
@@ -62,11 +63,23 @@ def measured_time(history: History, level: float, output: str = "strain") -> flo
     return float(t[k - 1] + (level - y[k - 1]) / (y[k] - y[k - 1]) * (t[k] - t[k - 1]))
 
 
+def loading_strains(histories: Sequence[History], output: str = "strain") -> list[float]:
+    """Strain of the first frame after time zero: what was there before creep, as the instrument saw it."""
+    return [float(h.outputs[output][np.flatnonzero(h.times > 0)[0]]) for h in histories]
+
+
 def times_to_strain(
-    law: CreepLaw, values: dict[str, float], histories: Sequence[History], using: Predictor, level: float
-) -> TimeComparison:
-    """Compare the times to `level` of every history that reached it; predictions carry no offset of the test."""
-    reached = [(h, t) for h in histories if (t := measured_time(h, level)) is not None]
+    law: CreepLaw, values: Mapping[str, float], histories: Sequence[History], using: Predictor, level: float,
+    offsets: Sequence[float] | None = None,
+) -> TimeComparison:  # fmt: skip
+    """Compare the times to `level` of creep strain of every history that reached it.
+
+    offsets : loading strain of each history, taken off what was measured; predictions carry none.
+    """
+    own = [0.0] * len(histories) if offsets is None else offsets
+    reached = [
+        (h, t) for h, o in zip(histories, own, strict=True) if (t := measured_time(h, level + o)) is not None
+    ]
     grids = [t * np.geomspace(1e-4, 1e4, 400) for _, t in reached]
     probes = [
         replace(h, times=grid, outputs={"strain": np.zeros(grid.size)}, used=EVERY_FRAME, standard_deviation={})
@@ -78,20 +91,25 @@ def times_to_strain(
 
 
 def leave_one_condition_out(
-    fit: Identification, histories: Sequence[History], level: float, full: Sequence[History] | None = None
-) -> tuple[TimeComparison, list[Identification]]:
-    """Predict each condition (temperature and stress) from a fit to all the others; times to `level`.
+    fit: Identification, histories: Sequence[History], level: float, full: Sequence[History] | None = None,
+    progress: Progress | None = None,
+) -> tuple[TimeComparison, list[Identification]]:  # fmt: skip
+    """Predict each condition (temperature and stress) from a fit to all the others; times to `level` of creep strain.
 
     histories : what the fits see; full : the same tests with all frames, to read measured times from.
     """
     assert fit.using is not None
     everything = {h.name: h for h in (full or histories)}
-    parts, fits = [], []
-    for held, rest in _folds(histories):
+    parts: list[TimeComparison] = []
+    fits: list[Identification] = []
+    folds = list(_folds(histories))
+    for held, rest in folds:
         partial = refit(fit, rest)
         fits.append(partial)
         tests = [everything[h.name] for h in held]
-        parts.append(times_to_strain(partial.law, partial.values, tests, fit.using, level))
+        parts.append(times_to_strain(partial.law, partial.values, tests, fit.using, level, loading_strains(tests)))
+        if progress is not None:
+            progress("condition", len(fits), len(folds))
     names = tuple(n for p in parts for n in p.names)
     joined = [np.concatenate([getattr(p, f) for p in parts]) for f in ("measured", "predicted")]
     return TimeComparison(level, names, *joined), fits

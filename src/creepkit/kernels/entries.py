@@ -1,14 +1,27 @@
-"""The entries of a kernel as symbols: which numbers each of rate, update and sensitivity puts out."""
+"""The entries of a kernel as symbols: which numbers each of rate, update and sensitivity puts out.
+
+Steps carry the author's words where there are any: `ln_stress`, `B = exp(ln_B)`, `strain_hardening` for the term of
+that name; what else is common to several results is called x0, x1 ...
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy
 
-from creepkit.kernels.logform import TINY, Floored, LogFloor, LogForm, log_form
+from creepkit.kernels.exponentials import paired_everywhere
+from creepkit.kernels.logform import FLOOR, LogForm, log_form
+from creepkit.kernels.naming import Names
+from creepkit.kernels.stable_functions import Floored, LogFloor
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT
+
+NOTHING = sympy.Float(-1e30)
+"""ln of the rate of a law whose terms are all off: finite, in single precision too."""
+
+Steps = Mapping[sympy.Symbol, sympy.Expr]
 
 
 @dataclass(frozen=True)
@@ -16,80 +29,134 @@ class Entry:
     """One function to be printed.
 
     inputs : every symbol it may read, the point, the states, then theta.
-    steps : common subexpressions, in order.
+    constants : named subexpressions of theta alone, each after those it needs.
+    steps : named subexpressions of the point too, likewise.
     outputs : expressions in the order of the compiled interface.
     """
 
     name: str
     inputs: tuple[sympy.Symbol, ...]
+    constants: tuple[tuple[sympy.Symbol, sympy.Expr], ...]
     steps: tuple[tuple[sympy.Symbol, sympy.Expr], ...]
     outputs: tuple[sympy.Expr, ...]
 
     @property
     def read(self) -> set[sympy.Symbol]:
         """The inputs that matter."""
-        expressions = [*self.outputs, *(e for _, e in self.steps)]
+        expressions = [*self.outputs, *(e for _, e in (*self.constants, *self.steps))]
         return set().union(*(e.free_symbols for e in expressions)) & set(self.inputs)
 
 
 @dataclass(frozen=True)
 class Lowered:
-    """A law as entries, ready for a printer."""
+    """A law as entries, ready for a printer; `form` is in the author's symbols, entries are in printable ones."""
 
     law: CreepLaw
     form: LogForm
+    names: Names
     rate: Entry
     log_rate: Entry
     update: Entry
     sensitivity: Entry
 
 
-def entries(law: CreepLaw) -> Lowered:
-    """Lower a law to its entries; the layout of `update` and `sensitivity` is that of kernels.interface."""
-    form = log_form(law)
+def entries(law: CreepLaw, pairing: bool = False) -> Lowered:
+    """Lower a law to its entries; the layout of `update` and `sensitivity` is that of kernels.interface.
+
+    pairing : as in `log_form`; slopes are paired in any case.
+    """
+    form = log_form(law, pairing)
+    names = Names(law, form)
     point = (*POINT, *law.states)
-    rate = sympy.Add(*(sympy.exp(term) for term in form.terms))
-    log_rate, weights = _log_sum(form.terms)
-    slopes = [[sympy.diff(term, v) for v in (*point, *form.theta)] for term in form.terms]
+    size, variables = len(point), (*point, *form.theta)
+    slopes = [[paired_everywhere(sympy.diff(term, v)) for v in variables] for term in form.terms]
+    inner = [[paired_everywhere(sympy.diff(rate, v)) for v in variables] for rate in form.state_rates]
 
-    def along(factors: tuple[sympy.Expr, ...], start: int, stop: int) -> list[sympy.Expr]:
+    def along(weights: Sequence[sympy.Expr], start: int, stop: int) -> list[sympy.Expr]:
         columns = range(start, stop)
-        return [sympy.Add(*(f * s[k] for f, s in zip(factors, slopes, strict=True))) for k in columns]
+        first = [sympy.Add(*(w * row[k] for w, row in zip(weights, slopes, strict=True))) for k in columns]
+        return [*first, *(row[k] for row in inner for k in columns)]
 
-    size, whole = len(point), len(point) + len(form.theta)
-    exponentials = tuple(sympy.exp(term) for term in form.terms)
-    inner = [[sympy.diff(g, v) for v in (*point, *form.theta)] for g in form.state_rates]
-    to_point = [d for row in inner for d in row[:size]]
-    to_theta = [d for row in inner for d in row[size:]]
-    values = form.state_rates
+    terms = {symbol: sympy.exp(ln) for symbol, ln in zip(names.terms, form.terms, strict=True)}
+    rates = [sympy.Add(*terms), *form.state_rates]
+    log_rate, weights, shares = _log_sum(names, form.terms)
+    log_rates = [log_rate, *form.state_rates]
+    to_point, to_theta = along(list(terms), 0, size), along(list(terms), size, len(variables))
     return Lowered(
         law,
         form,
-        _entry("rate", point, form, [rate, *values]),
-        _entry("log_rate", point, form, [log_rate, *values]),
-        _entry("update", point, form, [log_rate, *values, *along(weights, 0, size), *to_point]),
-        _entry(
-            "sensitivity",
-            point,
-            form,
-            [rate, *values, *along(exponentials, 0, size), *to_point, *along(exponentials, size, whole), *to_theta],
-        ),
+        names,
+        rate=_entry("rate", names, terms, rates),
+        log_rate=_entry("log_rate", names, shares, log_rates),
+        update=_entry("update", names, shares, [*log_rates, *along(weights, 0, size)]),
+        sensitivity=_entry("sensitivity", names, terms, [*rates, *to_point, *to_theta]),
     )
 
 
-def _log_sum(terms: tuple[sympy.Expr, ...]) -> tuple[sympy.Expr, tuple[sympy.Expr, ...]]:
-    """ln of the sum of exponentials, and each term's share; finite even when every term is off."""
-    if len(terms) == 1:
-        return terms[0], (sympy.S.One,)
-    largest = sympy.Max(*terms, sympy.Float(-1e300), evaluate=False)
-    scaled = [sympy.exp(sympy.Add(term, -largest, evaluate=False)) for term in terms]
-    total = sympy.Add(*scaled)
-    shares = tuple(s / Floored(total, sympy.Float(TINY)) for s in scaled)
-    return largest + LogFloor(total, sympy.Float(TINY)), shares
+def _log_sum(names: Names, logs: Sequence[sympy.Expr]) -> tuple[sympy.Expr, list[sympy.Expr], Steps]:
+    """ln of the sum of exponentials, each term's weight in it, and the steps there; finite when every term is off."""
+    if len(logs) == 1:
+        return sympy.Max(logs[0], NOTHING, evaluate=False), [sympy.S.One], {}
+    ln_terms = dict(zip(names.logs_of_terms, logs, strict=True))
+    largest, total = names.word("largest"), names.word("total")
+    shares = {share: sympy.exp(ln - largest) for share, ln in zip(names.shares, ln_terms, strict=True)}
+    steps = {**ln_terms, largest: sympy.Max(*ln_terms, NOTHING, evaluate=False), **shares, total: sympy.Add(*shares)}
+    floor = sympy.Float(FLOOR)
+    return largest + LogFloor(total, floor), [share / Floored(total, floor) for share in shares], steps
 
 
-def _entry(name: str, point: tuple[sympy.Symbol, ...], form: LogForm, outputs: list[sympy.Expr]) -> Entry:
-    inputs = (*point, *form.theta)
-    fresh = sympy.numbered_symbols("x", exclude=inputs, real=True)
-    steps, results = sympy.cse(outputs, symbols=fresh, order="none")
-    return Entry(name, inputs, tuple(steps), tuple(results))
+def _entry(name: str, names: Names, steps: Steps, outputs: Sequence[sympy.Expr]) -> Entry:
+    """Name what has a name, what depends on theta alone and what is common; keep the steps that the outputs need."""
+    given = [names.renamed(e) for e in (*steps.values(), *outputs)]
+    temporaries = names.temporaries()
+    constants = {e: next(temporaries) for e in _costly_constants(given, names.constants)}
+    given = [e.xreplace(constants) for e in given]
+    meanings = names.definitions([*given, *constants]) | {symbol: e for e, symbol in constants.items()}
+    common, found = sympy.cse([*meanings.values(), *given], symbols=temporaries, order="none")
+    every = dict(common) | dict(zip((*meanings, *steps), found, strict=False))
+    results = found[len(found) - len(outputs) :]
+    ordered = _ordered(every, results)
+    constant = _constant(every, ordered, names.constants)
+    return Entry(
+        name,
+        names.inputs,
+        constants=tuple((s, every[s]) for s in ordered if s in constant),
+        steps=tuple((s, every[s]) for s in ordered if s not in constant),
+        outputs=tuple(results),
+    )
+
+
+def _costly_constants(expressions: Sequence[sympy.Expr], theta: set[sympy.Symbol]) -> list[sympy.Expr]:
+    """The largest subexpressions of theta alone that call a function, so that they are taken out of loops."""
+    found: dict[sympy.Expr, None] = {}
+    for expression in expressions:
+        nodes = sympy.preorder_traversal(expression)
+        for node in nodes:
+            if isinstance(node, sympy.Expr) and node.free_symbols <= theta and node.has(sympy.Function):
+                found[node] = None
+                nodes.skip()
+    return list(found)
+
+
+def _ordered(steps: Steps, wanted: Sequence[sympy.Expr]) -> list[sympy.Symbol]:
+    """The steps that are wanted, each after those it needs."""
+    position = {symbol: k for k, symbol in enumerate(steps)}
+    ordered: dict[sympy.Symbol, None] = {}
+
+    def visit(expression: sympy.Expr) -> None:
+        for symbol in sorted(expression.free_symbols & position.keys() - ordered.keys(), key=position.__getitem__):
+            visit(steps[symbol])
+            ordered[symbol] = None
+
+    for expression in wanted:
+        visit(expression)
+    return list(ordered)
+
+
+def _constant(steps: Steps, ordered: Sequence[sympy.Symbol], known: set[sympy.Symbol]) -> set[sympy.Symbol]:
+    """The steps that can be taken before the point is known."""
+    constant: set[sympy.Symbol] = set()
+    for symbol in ordered:
+        if steps[symbol].free_symbols <= known | constant:
+            constant.add(symbol)
+    return constant

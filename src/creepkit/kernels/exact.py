@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import mpmath
@@ -18,30 +18,64 @@ class Exact:
     def __init__(self, law: CreepLaw, digits: int = 50) -> None:
         self.law, self.digits = law, digits
         self.variables = (*POINT, *law.states, *law.params)
-        expressions = [law.rate, *(state.rate for state in law.states.values())]
-        columns = [[e, *(sympy.diff(e, v) for v in self.variables)] for e in expressions]
-        self._rate = sympy.lambdify(self.variables, [row[0] for row in columns], "mpmath")
-        self._all = sympy.lambdify(self.variables, columns, "mpmath")
+        logarithmic = {symbol for symbol, param in law.params.items() if param.scale == "log"}
+        self._logarithmic = [v in logarithmic for v in self.variables]
+        self._parts = [*law.terms.values(), *(state.rate for state in law.states.values())]
+        slopes = [[_slope(part, v) for v in self.variables] for part in self._parts]
+        self._values = self._compiled(self._parts)
+        self._columns = self._compiled([[row[k] for row in slopes] for k in range(len(self.variables))])
 
-    def rates(self, point: Sequence[float], theta: Sequence[float]) -> list[Any]:
-        """Rate and state rates at a point (six variables, then states) with internal parameters theta."""
+    def terms(self, point: Sequence[float], theta: Sequence[float]) -> list[Any]:
+        """Each term at a point (six variables, then states) with internal parameters theta."""
         with mpmath.workdps(self.digits):
-            return [mpmath.mpmathify(v) for v in self._rate(*self._numbers(point, theta))]
+            plain = [self._plain(k, v) for k, v in enumerate(_numbers(point, theta))]
+            return self._at(plain)[: len(self.law.terms)]
 
     def rows(self, point: Sequence[float], theta: Sequence[float]) -> list[list[Any]]:
         """For the rate and each state rate: value, derivatives to the point and states, then to theta."""
         with mpmath.workdps(self.digits):
-            numbers = self._numbers(point, theta)
-            scale = [mpmath.mpf(1)] * (len(self.variables) - len(theta))
-            scale += [
-                value if p.scale == "log" else mpmath.mpf(1)
-                for p, value in zip(self.law.params.values(), numbers[len(scale) :], strict=True)
-            ]
-            return [[mpmath.mpmathify(row[0]), *(d * s for d, s in zip(row[1:], scale, strict=True))] for row in self._all(*numbers)]
+            plain = [self._plain(k, v) for k, v in enumerate(_numbers(point, theta))]
+            try:
+                columns = self._columns(*plain)
+            except (ZeroDivisionError, ValueError):  # slopes such as n x^n/x at x = 0
+                return self.differences(point, theta)
+            scaled = [[d * v if log else d for d in c] for c, v, log in zip(columns, plain, self._logarithmic, strict=True)]
+            return self._rows([self._at(plain), *scaled])
 
-    def _numbers(self, point: Sequence[float], theta: Sequence[float]) -> list[Any]:
-        params = [
-            mpmath.exp(mpmath.mpf(float(v))) if p.scale == "log" else mpmath.mpf(float(v))
-            for p, v in zip(self.law.params.values(), theta, strict=True)
-        ]
-        return [*(mpmath.mpf(float(v)) for v in point), *params]
+    def differences(self, point: Sequence[float], theta: Sequence[float]) -> list[list[Any]]:
+        """The same with central differences, in four times the digits, for derivatives."""
+        with mpmath.workdps(4 * self.digits):
+            numbers = _numbers(point, theta)
+            plain = [self._plain(k, v) for k, v in enumerate(numbers)]
+            return self._rows([self._at(plain), *(self._difference(numbers[k], plain, k) for k in range(len(plain)))])
+
+    def _difference(self, number: Any, plain: list[Any], k: int) -> list[Any]:
+        step = mpmath.mpf(10) ** -(self.digits + 10) * (abs(number) or 1)
+        high, low = (self._at([*plain[:k], self._plain(k, number + s), *plain[k + 1 :]]) for s in (step, -step))
+        return [(a - b) / (2 * step) for a, b in zip(high, low, strict=True)]
+
+    def _rows(self, columns: Sequence[Sequence[Any]]) -> list[list[Any]]:
+        """Columns of parts (terms, then state rates) as rows of the rate and the state rates."""
+        split = len(self.law.terms)
+        added = [[mpmath.fsum(parts[:split]), *parts[split:]] for parts in columns]
+        return [[mpmath.mpmathify(v) for v in row] for row in zip(*added, strict=True)]
+
+    def _compiled(self, expressions: Sequence[Any]) -> Callable[..., Any]:
+        function: Callable[..., Any] = sympy.lambdify(self.variables, expressions, "mpmath", cse=True, dummify=True)
+        return function
+
+    def _plain(self, k: int, number: Any) -> Any:
+        """The author's value of an internal variable."""
+        return mpmath.exp(number) if self._logarithmic[k] else number
+
+    def _at(self, plain: list[Any]) -> list[Any]:
+        return [mpmath.mpmathify(v) for v in self._values(*plain)]
+
+
+def _slope(part: sympy.Expr, variable: sympy.Symbol) -> sympy.Expr:
+    """The derivative away from jumps."""
+    return sympy.diff(part, variable).replace(sympy.DiracDelta, lambda *_: sympy.S.Zero)
+
+
+def _numbers(point: Sequence[float], theta: Sequence[float]) -> list[Any]:
+    return [mpmath.mpf(float(v)) for v in (*point, *theta)]

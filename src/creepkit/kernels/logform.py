@@ -7,14 +7,27 @@ that are bases of powers are floored (FLOOR below), never parameters.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass
-from typing import Any
 
 import sympy
 
+from creepkit.errors import LawError
+from creepkit.kernels.exponentials import paired
+from creepkit.kernels.stable_functions import (
+    Coth,
+    ExpDifference,
+    Expm1,
+    Floored,
+    Log1p,
+    LogCosh,
+    LogFloor,
+    LogRise,
+    LogSinh,
+    LogTanh,
+    Tanh,
+)
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import POINT
+from creepkit.language.symbols import POINT, temperature
 
 FLOOR = 1e-30
 """Stress, strain, time and states below this act as this when they are bases of powers; slopes are those there."""
@@ -22,65 +35,18 @@ FLOOR = 1e-30
 TINY = 1e-300
 """Composite bases, such as Max(stress - threshold, 0), are floored here: zero to any power above 1.04 is zero."""
 
+KNOWN = (
+    *(sympy.exp, sympy.log, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth, sympy.asinh),
+    *(sympy.sin, sympy.cos, sympy.atan, sympy.erf),
+    *(sympy.Abs, sympy.sign, sympy.Heaviside, sympy.Max, sympy.Min, sympy.Piecewise),
+)
+"""The functions that a law may call."""
 
-class LogFloor(sympy.Function):  # type: ignore[misc]
-    """ln(max(x, floor)), with slope 1/max(x, floor) on both sides."""
-
-    nargs = 2
-
-    def fdiff(self, argindex: int = 1) -> sympy.Expr:
-        """Slope, one-sided at and below the floor."""
-        return 1 / Floored(*self.args) if argindex == 1 else sympy.S.Zero
-
-
-class Floored(sympy.Function):  # type: ignore[misc]
-    """max(x, floor), with slope 1 on both sides."""
-
-    nargs = 2
-
-    def fdiff(self, argindex: int = 1) -> sympy.Expr:
-        """Slope 1: the floor is not felt."""
-        return sympy.S.One if argindex == 1 else sympy.S.Zero
-
-
-class LogSinh(sympy.Function):  # type: ignore[misc]
-    """ln sinh(x) for x > 0, without overflow or cancellation."""
-
-    nargs = 1
-
-    def fdiff(self, argindex: int = 1) -> sympy.Expr:
-        """Slope."""
-        return Coth(self.args[0])
-
-
-class Coth(sympy.Function):  # type: ignore[misc]
-    """coth(x) for x > 0."""
-
-    nargs = 1
-
-    def fdiff(self, argindex: int = 1) -> sympy.Expr:
-        """Slope."""
-        return 1 - Coth(self.args[0]) ** 2
-
-
-class Expm1(sympy.Function):  # type: ignore[misc]
-    """exp(x) - 1 without cancellation."""
-
-    nargs = 1
-
-    def fdiff(self, argindex: int = 1) -> sympy.Expr:
-        """Slope."""
-        return sympy.exp(self.args[0])
-
-
-class ExpDifference(sympy.Function):  # type: ignore[misc]
-    """exp(a) - exp(b) without cancellation."""
-
-    nargs = 2
-
-    def fdiff(self, argindex: int = 1) -> sympy.Expr:
-        """Slope."""
-        return sympy.exp(self.args[0]) if argindex == 1 else -sympy.exp(self.args[1])
+_ALGEBRA = (sympy.Add, sympy.Mul, sympy.Pow, sympy.functions.elementary.piecewise.ExprCondPair)
+_CONDITIONS = (
+    *(sympy.GreaterThan, sympy.StrictGreaterThan, sympy.LessThan, sympy.StrictLessThan, sympy.And, sympy.Or),
+    *(type(sympy.true), type(sympy.false)),
+)
 
 
 @dataclass(frozen=True)
@@ -90,105 +56,195 @@ class LogForm:
     terms : ln of each term, in the law's order.
     state_rates : the rate of each internal variable, linear.
     theta : internal parameters, one symbol each in the law's order (`ln_A` for A of log scale, else itself).
+    logs : {parameter of log scale: its internal symbol}.
     coefficients : for each term, the positions in theta that multiply it: -inf there switches the term off.
     """
 
     terms: tuple[sympy.Expr, ...]
     state_rates: tuple[sympy.Expr, ...]
     theta: tuple[sympy.Symbol, ...]
+    logs: dict[sympy.Symbol, sympy.Symbol]
     coefficients: tuple[tuple[int, ...], ...]
 
 
-def log_form(law: CreepLaw) -> LogForm:
-    """Lower a law; raises nothing for a valid law."""
-    pass_ = _Pass(law)
-    terms = tuple(pass_.log_of(term) for term in law.terms.values())
-    coefficients = tuple(
-        tuple(k for k, t in enumerate(pass_.theta) if t in pass_.logs.values() and sympy.diff(term, t) == 1)
-        for term in terms
+def log_form(law: CreepLaw, pairing: bool = False) -> LogForm:
+    """Lower a law; LawError, naming the term, where it holds what no kernel can evaluate.
+
+    pairing : pair differences of exponentials inside exponents too. Values do not need it; it is for a target that
+        differentiates what it is given, and so would meet such differences in gradients.
+    """
+    logs = _logarithms(law)
+    bases = {*POINT, *law.states}
+    lowering, inner = _Lowering(logs, bases, pairing), _Lowering(logs, bases, pairing=True)
+    rates = {f"rate of '{symbol}'": state.rate for symbol, state in law.states.items()}
+    for place, expression in ({f"term '{k}'": v for k, v in law.terms.items()} | rates).items():
+        _check(expression, f"law '{law.name}', {place}")
+    terms = []
+    for label, term in law.terms.items():
+        try:
+            terms.append(lowering.log_of(term))
+        except LawError as error:
+            raise LawError(f"law '{law.name}', term '{label}': {error}") from None
+    positions = {symbol: k for k, symbol in enumerate(law.params) if symbol in logs}
+    coefficients = [sorted(positions[s] for s in _coefficients(t) if s in logs) for t in law.terms.values()]
+    return LogForm(
+        terms=tuple(terms),
+        state_rates=tuple(inner.linear(state.rate) for state in law.states.values()),
+        theta=tuple(logs.get(s, s) for s in law.params),
+        logs=logs,
+        coefficients=tuple(map(tuple, coefficients)),
     )
-    rates = tuple(pass_.linear(state.rate) for state in law.states.values())
-    return LogForm(terms, rates, pass_.theta, coefficients)
 
 
-class _Pass:
-    """One walk over a law's expressions; keeps which symbols are logarithms."""
+def _logarithms(law: CreepLaw) -> dict[sympy.Symbol, sympy.Symbol]:
+    """A symbol for the logarithm of each parameter of log scale, of a name that is still free."""
+    taken, logs = {*law.names, *(s.name for s in law.states)}, {}
+    for symbol, param in law.params.items():
+        if param.scale == "log":
+            name = f"ln_{symbol.name}"
+            while name in taken:
+                name += "_"
+            taken.add(name)
+            logs[symbol] = sympy.Symbol(name, real=True)
+    return logs
 
-    def __init__(self, law: CreepLaw) -> None:
-        log_scaled = [s for s, p in law.params.items() if p.scale == "log"]
-        self.logs = {s: sympy.Symbol(f"ln_{s.name}", real=True) for s in log_scaled}
-        self.theta = tuple(self.logs.get(s, s) for s in law.params)
-        self.bases = {*POINT, *law.states}
+
+def _check(expression: sympy.Expr, where: str) -> None:
+    """Refuse what has no kernel, and branches that leave a gap."""
+    for node in sympy.preorder_traversal(expression):
+        if not (node.is_Atom or isinstance(node, (*KNOWN, *_ALGEBRA, *_CONDITIONS))):
+            allowed = ", ".join(sorted(f.__name__ for f in KNOWN))
+            raise LawError(f"{where}: the function {node.func.__name__} in {node} has no kernel; allowed are {allowed}")
+        if isinstance(node, sympy.Piecewise) and node.args[-1].cond != sympy.true:
+            raise LawError(f"{where}: the last branch of {node} must hold in all remaining cases: write (..., True)")
+
+
+def _coefficients(term: sympy.Expr) -> set[sympy.Symbol]:
+    """The symbols whose zero makes the whole term zero."""
+    if term.is_Symbol:
+        return {term}
+    if term.is_Mul:
+        return set().union(*map(_coefficients, term.args))
+    if term.is_Pow and term.exp.is_positive:
+        return _coefficients(term.base)
+    if isinstance(term, sympy.Piecewise):
+        branches = [_coefficients(branch) for branch, _ in term.args if branch != 0]
+        return set.intersection(*branches) if branches else set()
+    return set()
+
+
+class _Lowering:
+    """One walk over a law's expressions. logs : {parameter: its logarithm}; bases : what FLOOR applies to."""
+
+    def __init__(self, logs: dict[sympy.Symbol, sympy.Symbol], bases: set[sympy.Symbol], pairing: bool) -> None:
+        self.logs, self.bases, self.pairing = logs, bases, pairing
+
+    # ---- logarithms ------------------------------------------------------------------------------------------------
 
     def log_of(self, e: sympy.Expr) -> sympy.Expr:
         """Return ln(e) for e > 0."""
-        if e.is_Number:
-            return sympy.Float(sympy.log(e).evalf(30), 17) if e > 0 else sympy.Float(-690.0)
+        if not e.free_symbols:
+            return _log_of_number(e)
         if e in self.logs:
             return self.logs[e]
         if e.is_Mul:
-            return sympy.Add(*(self.log_of(factor) for factor in _positive_factors(e)))
+            return self._log_of_product(e)
         if e.is_Pow:
-            return self.linear(e.exp) * self.log_of(e.base)
+            base = sympy.Abs(e.base) if e.exp.is_even and e.base.is_Add else e.base
+            return self.linear(e.exp) * self.log_of(base)
+        if e.is_Add:
+            return self._log_of_sum(e)
+        if isinstance(e, sympy.Piecewise):
+            return sympy.Piecewise(*((self.log_of(branch), self.linear(condition)) for branch, condition in e.args))
         if isinstance(e, sympy.exp):
             return self.linear(e.args[0])
-        if isinstance(e, sympy.sinh):
-            return LogSinh(self.linear(e.args[0]))
+        if e.func in _LOGARITHMS:
+            return _LOGARITHMS[e.func](self.linear(e.args[0]))
         return LogFloor(self.linear(e), sympy.Float(FLOOR if e in self.bases else TINY))
 
-    def linear(self, e: sympy.Expr) -> sympy.Expr:
-        """Return e itself in internal parameters, with powers as exp(k ln x) and differences of exponentials paired."""
+    def _log_of_product(self, e: sympy.Mul) -> sympy.Expr:
+        """Return the sum of logarithms; a negative number is moved into a factor: -3 (a - b) is 3 (b - a)."""
+        number, rest = e.as_coeff_Mul()
+        factors = list(sympy.Mul.make_args(rest))
+        if number > 0:
+            return sympy.Add(*(self.log_of(f) for f in (number, *factors)))
+        turned = next((f for f in factors if f.is_Add), None) or next((f for f in factors if self._may_be_negative(f)), None)
+        if turned is None:
+            raise LawError(f"{e} is negative, and a rate is not; write recovery as a factor or an internal variable")
+        factors.remove(turned)
+        if turned.is_Add:
+            last = self.log_of(sympy.Add(*(-a for a in turned.args)))
+        else:
+            last = LogFloor(-self.linear(turned), sympy.Float(TINY))
+        return sympy.Add(*(self.log_of(f) for f in (-number, *factors)), last)
+
+    def _may_be_negative(self, factor: sympy.Expr) -> bool:
+        positive = (sympy.exp, sympy.sinh, sympy.cosh, sympy.Abs)
+        return not (factor.is_Pow or isinstance(factor, positive) or factor in self.logs or factor in self.bases)
+
+    def _log_of_sum(self, e: sympy.Expr) -> sympy.Expr:
+        """Differences of exponentials keep their digits and do not overflow, cosh(x) - 1 among them."""
+        if len(e.args) == 2 and e.args[0] == -1 and isinstance(e.args[1], sympy.cosh):
+            return _log_of_number(sympy.Integer(2)) + 2 * LogSinh(self.linear(e.args[1].args[0]) / 2)
+        total = paired(self.linear(e))
+        number, factors = total.as_coeff_mul()
+        found = [f for f in factors if isinstance(f, (Expm1, ExpDifference))]
+        others = [f for f in factors if f not in found]
+        if len(found) != 1 or not all(isinstance(f, sympy.exp) for f in others):
+            return LogFloor(total, sympy.Float(TINY))
+        a, b = (*found[0].args, sympy.S.Zero)[:2]
+        high, low = (a, b) if number > 0 else (b, a)
+        return sympy.Add(_log_of_number(abs(number)), *(f.args[0] for f in others), high, LogRise(high - low))
+
+    # ---- values ----------------------------------------------------------------------------------------------------
+
+    def linear(self, e: sympy.Basic) -> sympy.Basic:
+        """Return e in internal parameters, with powers as exp(k ln x)."""
         if e in self.logs:
             return sympy.exp(self.logs[e])
         if not e.args:
             return e
-        if e.is_Pow and not e.exp.is_Integer:
+        if e.is_Pow:
+            return self._power(e)
+        if isinstance(e, sympy.log):
+            return self._logarithm(e.args[0])
+        if isinstance(e, sympy.Abs) and e.args[0] in self.bases:
+            return e.args[0]
+        arguments = [self.linear(argument) for argument in e.args]
+        rewrite = _REWRITES.get(e.func)
+        if rewrite:
+            return rewrite(*arguments)
+        rebuilt = e.func(*arguments)
+        return paired(rebuilt) if self.pairing and rebuilt.is_Add else rebuilt
+
+    def _power(self, e: sympy.Pow) -> sympy.Expr:
+        if not e.exp.is_Integer:
             return sympy.exp(self.linear(e.exp) * self.log_of(e.base))
-        rebuilt = e.func(*(self.linear(argument) for argument in e.args))
-        return paired_exponentials(rebuilt) if rebuilt.is_Add else rebuilt
+        base = self.linear(e.base)
+        may_be_zero = e.base in self.bases and e.base != temperature
+        return Floored(base, sympy.Float(FLOOR)) ** e.exp if e.exp < 0 and may_be_zero else base**e.exp
+
+    def _logarithm(self, e: sympy.Expr) -> sympy.Expr:
+        return Log1p(self.linear(e - 1)) if e.is_Add and sympy.S.One in e.args else self.log_of(e)
 
 
-def paired_exponentials(total: sympy.Expr) -> sympy.Expr:
-    """Rewrite c exp(a) - c exp(b) as c ExpDifference(a, b), and c exp(a) - c as c Expm1(a), wherever they occur."""
-    if not total.has(sympy.exp):
-        return total
-    groups: dict[sympy.Expr, list[tuple[sympy.Expr, sympy.Expr]]] = defaultdict(list)
-    for summand in sympy.Add.make_args(sympy.expand_mul(total)):
-        number, rest = summand.as_coeff_Mul()
-        exponents = [f.args[0] for f in sympy.Mul.make_args(rest) if isinstance(f, sympy.exp)]
-        others = [f for f in sympy.Mul.make_args(rest) if not isinstance(f, sympy.exp)]
-        groups[sympy.Mul(*others)].append((number, sympy.Add(*exponents)))
-    if not any(_cancels(group) for group in groups.values()):
-        return total
-    parts = []
-    for other, group in groups.items():
-        if _cancels(group):
-            (number, a), (_, b) = group
-            parts.append(number * other * _difference(a, b))
-        else:
-            parts += [number * other * sympy.exp(a) for number, a in group]
-    return sympy.Add(*parts)
+_REWRITES = {
+    sympy.tanh: Tanh,
+    sympy.coth: Coth,
+    sympy.Abs: lambda x: sympy.Piecewise((x, x >= 0), (-x, True)),
+    sympy.sign: lambda x: sympy.Piecewise((1, x > 0), (-1, x < 0), (0, True)),
+    sympy.Heaviside: lambda x, half: sympy.Piecewise((1, x > 0), (0, x < 0), (half, True)),
+}
+"""Functions whose derivatives in sympy are distributions, or lose digits."""
 
 
-def _cancels(group: list[tuple[sympy.Expr, sympy.Expr]]) -> bool:
-    return len(group) == 2 and group[0][0] + group[1][0] == 0
+_LOGARITHMS = {sympy.sinh: LogSinh, sympy.cosh: LogCosh, sympy.tanh: LogTanh}
 
 
-def _difference(a: sympy.Expr, b: sympy.Expr) -> sympy.Expr:
-    if b == 0:
-        return Expm1(a)
-    if a == 0:
-        return -Expm1(b)
-    return ExpDifference(a, b)
-
-
-def _positive_factors(product: sympy.Mul) -> list[Any]:
-    """The factors of a positive product, with a negative number moved into a sum: -3 (a - b) is 3 (b - a)."""
-    number, rest = product.as_coeff_Mul()
-    factors = list(sympy.Mul.make_args(rest))
-    if number < 0:
-        sums = [k for k, f in enumerate(factors) if f.is_Add]
-        if sums:
-            factors[sums[0]] = sympy.Add(*(-a for a in factors[sums[0]].args))
-            number = -number
-    return factors if number == 1 else [number, *factors]
+def _log_of_number(e: sympy.Expr) -> sympy.Expr:
+    value = e.evalf(30)
+    if value < 0:
+        raise LawError(f"the factor {e} is negative, and a rate is not; write recovery as a factor or an internal variable")
+    if value == 1:
+        return sympy.S.Zero
+    return sympy.Float(sympy.log(value) if value > 0 else sympy.log(sympy.Float(TINY)), 17)

@@ -6,6 +6,8 @@ import linecache
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import import_module
+from itertools import islice
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -13,6 +15,7 @@ import numpy as np
 
 from creepkit.errors import LawError, nearest
 from creepkit.kernels.entries import Lowered, entries
+from creepkit.kernels.printing import array_function, described
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT
 
@@ -61,27 +64,30 @@ class Kernel:
     Each method takes `values`, {parameter: number or array} in the author's units (0 switches a rate coefficient
     off), and the point by keyword: stress and mean_stress, principal_stress in MPa, strain, time in s, temperature
     in K, and states by name. Strain and time default to 0 (floored at 1e-30 where they are bases of powers).
+
+    Methods that begin with `internal` take the six variables of the point, the states, then the internal parameters
+    (logarithms where the scale is log), by position, and check nothing.
     """
 
-    def __init__(self, lowered: Lowered, target: str, functions: ModuleType) -> None:
-        from creepkit.kernels.printing import array_function
-
+    def __init__(self, lowered: Lowered, target: Target, functions: ModuleType) -> None:
         law = lowered.law
         parts = (lowered.rate, lowered.log_rate, lowered.sensitivity)
         self.law, self.target = law, target
-        self.source = f'"""Kernel of {law.name!r} for {target}; generated."""\n\n' + "\n\n".join(map(array_function, parts))
+        self.source = "\n".join([*described(law), "\n", *map(array_function, parts)])
         name = f"<creepkit kernel {law.fingerprint} {target}>"
         linecache.cache[name] = (len(self.source), None, self.source.splitlines(True), name)
-        self._namespace: dict[str, Any] = {k: getattr(functions, k) for k in functions.__all__}
-        exec(compile(self.source, name, "exec"), self._namespace)
+        self._functions: dict[str, Any] = {name: getattr(functions, name) for name in functions.__all__}
+        exec(compile(self.source, name, "exec"), self._functions)
+        self._alike = functions.alike
         self._states = [s.name for s in law.states]
+        self._variables = [*(s.name for s in POINT), *self._states]
 
     def rate(self, values: Mapping[str, Any], **point: Any) -> Any:
         """Rate of equivalent creep strain, 1/s; inf or 0 where it is beyond float64 (log_rate is finite there)."""
         return self._call("rate", self._arguments(values, point))[0]
 
     def log_rate(self, values: Mapping[str, Any], **point: Any) -> Any:
-        """Natural logarithm of the rate; finite where the rate itself over- or underflows."""
+        """Natural logarithm of the rate; finite where the rate itself over- or underflows, -1e30 where it is off."""
         return self._call("log_rate", self._arguments(values, point))[0]
 
     def state_rates(self, values: Mapping[str, Any], **point: Any) -> dict[str, Any]:
@@ -94,66 +100,58 @@ class Kernel:
         return self.internal_derivatives(*self._arguments(values, point))
 
     def internal_rate(self, *arguments: Any) -> Any:
-        """The rate from the six variables of the point, the states, then internal parameters, positionally."""
+        """The rate."""
         return self._call("rate", arguments)[0]
 
     def internal_rates(self, *arguments: Any) -> Any:
-        """The rate and every state rate, a tuple, from internal parameters, positionally."""
+        """The rate and every state rate, a tuple."""
         return self._call("rate", arguments)
 
     def internal_log_rate(self, *arguments: Any) -> Any:
-        """The log rate from the six variables of the point, the states, then internal parameters, positionally."""
+        """The logarithm of the rate."""
         return self._call("log_rate", arguments)[0]
 
     def internal_derivatives(self, *arguments: Any) -> Derivatives:
-        """Derivatives from the six variables of the point, the states, then internal parameters, positionally."""
-        out = self._call("sensitivity", arguments)
-        states, names = self._states, self.law.names
-        point = [*(s.name for s in POINT), *states]
-        rows, start = 1 + len(states), 1 + len(states)
-        table = [out[start + k * len(point) : start + (k + 1) * len(point)] for k in range(rows)]
-        start += rows * len(point)
-        theta = [out[start + k * len(names) : start + (k + 1) * len(names)] for k in range(rows)]
-        inner = {
-            state: dict(zip((*point, *names), (*table[k], *theta[k]), strict=True))
-            for k, state in enumerate(states, start=1)
-        }
-        return Derivatives(
-            out[0], dict(zip(point, table[0], strict=True)), dict(zip(names, theta[0], strict=True)), inner
-        )
+        """The rate and its derivatives."""
+        rows, size, names = 1 + len(self._states), len(self._variables), self.law.names
+        out = iter(self._call("sensitivity", arguments))
+        values = list(islice(out, rows))
+        point = [dict(zip(self._variables, islice(out, size), strict=True)) for _ in range(rows)]
+        theta = [dict(zip(names, islice(out, len(names)), strict=True)) for _ in range(rows)]
+        inner = [a | b for a, b in zip(point, theta, strict=True)]
+        return Derivatives(values[0], point[0], theta[0], dict(zip(self._states, inner[1:], strict=True)))
 
     def _call(self, entry: str, arguments: Sequence[Any]) -> Any:
         with np.errstate(over="ignore", under="ignore", divide="ignore"):
-            return self._namespace[entry](*arguments)
+            return self._alike(self._functions[entry](*arguments), arguments)
 
     def _arguments(self, values: Mapping[str, Any], point: Mapping[str, Any]) -> Sequence[Any]:
-        known = [*(s.name for s in POINT), *self._states]
         for name in point:
-            if name not in known:
-                raise LawError(f"law '{self.law.name}' has no variable '{name}': {nearest(name, known)}")
+            if name not in self._variables:
+                raise LawError(f"law '{self.law.name}' has no variable '{name}': {nearest(name, self._variables)}")
         if "stress" not in point:
             raise LawError(f"law '{self.law.name}' needs a stress, in MPa")
         if self.law.uses(POINT[3]) and "temperature" not in point:
             raise LawError(f"law '{self.law.name}' depends on temperature: give temperature in K")
-        stress = point["stress"]
-        defaults = {"principal_stress": stress, "mean_stress": stress / 3.0, "temperature": 1.0}
+        given = {name: self._number(value) for name, value in point.items()}
+        defaults = {"principal_stress": given["stress"], "mean_stress": given["stress"] / 3.0, "temperature": 1.0}
         defaults |= {s.name: z.initial for s, z in self.law.states.items()}
-        variables = [point.get(name, defaults.get(name, 0.0)) for name in known]
-        return [*variables, *self._theta(values)]
+        return [*(given.get(n, defaults.get(n, 0.0)) for n in self._variables), *self._theta(values)]
 
     def _theta(self, values: Mapping[str, Any]) -> list[Any]:
+        for name in values:
+            self.law.symbol(name)
         missing = [name for name in self.law.names if name not in values]
         if missing:
             raise LawError(f"law '{self.law.name}' needs a value for {', '.join(missing)}")
-        log = self._namespace["log"]
-        with np.errstate(divide="ignore"):
-            return [log(values[n]) if p.scale == "log" else values[n] for n, p in self.law.table.items()]
+        log = self._functions["log_or_off"]
+        numbers = {n: self._number(values[n]) for n in self.law.names}
+        return [log(numbers[n]) if p.scale == "log" else numbers[n] for n, p in self.law.table.items()]
+
+    def _number(self, value: Any) -> Any:
+        return value if self.target == "torch" or isinstance(value, float) else np.asarray(value)
 
 
 @lru_cache(maxsize=256)
-def _kernel(law: CreepLaw, target: str) -> Kernel:
-    if target == "torch":
-        from creepkit.kernels import torch_functions as functions
-    else:
-        from creepkit.kernels import numpy_functions as functions  # type: ignore[no-redef]
-    return Kernel(entries(law), target, functions)
+def _kernel(law: CreepLaw, target: Target) -> Kernel:
+    return Kernel(entries(law, pairing=target == "torch"), target, import_module(f"creepkit.kernels.{target}_functions"))

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from math import cos, cosh, erf, exp, expm1, log, sin, sinh, sqrt, tanh
-from math import atan as atan
+from math import asinh, atan, cos, cosh, erf, exp, expm1, log, log1p, sin, sinh, sqrt, tanh
 from typing import Any
 
 from numba import njit
 
 __all__ = [
-    "absolute", "atan", "choose", "cos", "cosh", "coth", "erf", "exp", "exp_difference", "expm1", "floored", "heaviside",
-    "larger", "log", "log_floor", "log_sinh", "power", "sin", "sinh", "smaller", "sqrt", "tanh",
+    "asinh", "atan", "both", "choose", "cos", "cosh", "coth", "either", "erf", "exp", "exp_difference", "expm1",
+    "floored", "heaviside", "larger", "log", "log1p", "log_cosh", "log_floor", "log_rise", "log_sinh", "log_tanh",
+    "power", "sin", "sinh", "smaller", "sqrt", "square", "tanh",
 ]  # fmt: skip
 
 _inlined = njit(cache=True, error_model="numpy", inline="always")
-
-
-@_inlined
-def absolute(x: Any) -> Any:
-    """|x|."""
-    return abs(x)
+_LN2 = log(2.0)
 
 
 @_inlined
@@ -29,9 +24,27 @@ def power(x: Any, y: Any) -> Any:
 
 
 @_inlined
+def square(x: Any) -> Any:
+    """Return x times x."""
+    return x * x
+
+
+@_inlined
 def choose(condition: Any, a: Any, b: Any) -> Any:
     """Return a where the condition holds, else b."""
     return a if condition else b
+
+
+@_inlined
+def both(a: Any, b: Any) -> Any:
+    """Whether both conditions hold."""
+    return a and b
+
+
+@_inlined
+def either(a: Any, b: Any) -> Any:
+    """Whether one of the conditions holds."""
+    return a or b
 
 
 @_inlined
@@ -69,6 +82,28 @@ def log_sinh(x: Any) -> Any:
     """Return ln sinh(x), x > 0."""
     y = x if x > 1e-30 else 1e-30
     return y + log(-0.5 * expm1(-2.0 * y))
+
+
+@_inlined
+def log_cosh(x: Any) -> Any:
+    """Return ln cosh(x)."""
+    y = abs(x)
+    return y + log1p(exp(-2.0 * y)) - _LN2
+
+
+@_inlined
+def log_rise(x: Any) -> Any:
+    """ln(1 - exp(-x)), x > 0."""
+    y = x if x > 1e-30 else 1e-30
+    return log1p(-exp(-y)) if y > _LN2 else log(-expm1(-y))
+
+
+@_inlined
+def log_tanh(x: Any) -> Any:
+    """Return ln tanh(x), x > 0."""
+    y = x if x > 1e-30 else 1e-30
+    tail = exp(-2.0 * y)
+    return (log1p(-tail) if 2.0 * y > _LN2 else log(-expm1(-2.0 * y))) - log1p(tail)
 
 
 @_inlined

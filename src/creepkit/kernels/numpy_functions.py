@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy import cos, cosh, exp, expm1, log, sin, sinh, sqrt, tanh
+from numpy import cos, cosh, exp, expm1, log, log1p, sin, sinh, sqrt, square, tanh
 
 __all__ = [
-    "absolute", "atan", "choose", "cos", "cosh", "coth", "erf", "exp", "exp_difference", "expm1", "floored", "heaviside",
-    "larger", "log", "log_floor", "log_sinh", "power", "sin", "sinh", "smaller", "sqrt", "tanh",
+    "asinh", "atan", "both", "choose", "cos", "cosh", "coth", "either", "erf", "exp", "exp_difference", "expm1",
+    "floored", "heaviside", "larger", "log", "log1p", "log_cosh", "log_floor", "log_or_off", "log_rise", "log_sinh",
+    "log_tanh", "power", "sin", "sinh", "smaller", "sqrt", "square", "tanh",
 ]  # fmt: skip
 
-absolute, atan, choose, larger, power, smaller = np.absolute, np.arctan, np.where, np.maximum, np.power, np.minimum
+asinh, atan, choose, power = np.arcsinh, np.arctan, np.where, np.power
+both, either, larger, smaller = np.logical_and, np.logical_or, np.maximum, np.minimum
+_LN2 = float(np.log(2.0))
+
+
+def alike(outputs: Sequence[Any], inputs: Sequence[Any]) -> list[Any]:
+    """Give every output the shape of all inputs together (zeros are printed as plain numbers)."""
+    shape = np.broadcast_shapes(*(np.shape(x) for x in inputs))
+    return [y if np.shape(y) == shape else np.broadcast_to(y, shape) for y in outputs]
+
+
+def log_or_off(x: Any) -> Any:
+    """Natural logarithm; minus infinity at 0, which switches a rate coefficient off."""
+    with np.errstate(divide="ignore"):
+        return np.log(x)
 
 
 def erf(x: Any) -> Any:
@@ -28,19 +44,38 @@ def heaviside(x: Any) -> Any:
 
 
 def floored(x: Any, floor: float) -> Any:
-    """max(x, floor)."""
+    """max(x, floor), and no less than the smallest normal number of single precision where x has it."""
+    if floor < 1e-37 and getattr(x, "dtype", None) == np.float32:
+        floor = 1e-37
     return np.maximum(x, floor)
 
 
 def log_floor(x: Any, floor: float) -> Any:
     """ln max(x, floor)."""
-    return np.log(np.maximum(x, floor))
+    return np.log(floored(x, floor))
 
 
 def log_sinh(x: Any) -> Any:
     """Return ln sinh(x), x > 0."""
     x = np.maximum(x, 1e-30)
     return x + np.log(-0.5 * np.expm1(-2.0 * x))
+
+
+def log_cosh(x: Any) -> Any:
+    """Return ln cosh(x)."""
+    x = np.absolute(x)
+    return x + np.log1p(np.exp(-2.0 * x)) - _LN2
+
+
+def log_rise(x: Any) -> Any:
+    """ln(1 - exp(-x)), x > 0."""
+    x = np.maximum(x, 1e-30)
+    return np.where(x > _LN2, np.log1p(-np.exp(-np.maximum(x, _LN2))), np.log(-np.expm1(-np.minimum(x, _LN2))))
+
+
+def log_tanh(x: Any) -> Any:
+    """Return ln tanh(x), x > 0."""
+    return log_rise(2.0 * x) - np.log1p(np.exp(-2.0 * x))
 
 
 def coth(x: Any) -> Any:
@@ -50,5 +85,5 @@ def coth(x: Any) -> Any:
 
 def exp_difference(a: Any, b: Any) -> Any:
     """exp(a) - exp(b) without cancellation."""
-    high = np.maximum(a, b)
-    return np.copysign(np.exp(high) * -np.expm1(np.minimum(a, b) - high), np.subtract(a, b))
+    high, low = np.maximum(a, b), np.minimum(a, b)
+    return np.copysign(np.exp(high) * np.expm1(low - high), np.subtract(a, b))

@@ -6,34 +6,46 @@ numpy_functions, torch_functions and numba_functions.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import sympy
+from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.pycode import PythonCodePrinter
 
 from creepkit.errors import LawError
-from creepkit.kernels.entries import Entry
+
+if TYPE_CHECKING:
+    from creepkit.kernels.entries import Entry
+    from creepkit.language.law import CreepLaw
 
 NAMES = {
     "exp": "exp",
     "log": "log",
     "sinh": "sinh",
     "cosh": "cosh",
+    "asinh": "asinh",
     "tanh": "tanh",
     "sin": "sin",
     "cos": "cos",
     "atan": "atan",
     "erf": "erf",
-    "Abs": "absolute",
     "LogFloor": "log_floor",
     "Floored": "floored",
+    "Log1p": "log1p",
     "LogSinh": "log_sinh",
+    "LogCosh": "log_cosh",
+    "LogTanh": "log_tanh",
+    "LogRise": "log_rise",
+    "Tanh": "tanh",
     "Coth": "coth",
     "Expm1": "expm1",
     "ExpDifference": "exp_difference",
     "Heaviside": "heaviside",
 }
-FUNCTIONS = (*sorted(set(NAMES.values())), "choose", "larger", "power", "smaller", "sqrt")
+"""{sympy class: function of every target}; Heaviside comes from the slopes of Max and Min."""
+
+FUNCTIONS = (*sorted({*NAMES.values()}), "both", "choose", "either", "larger", "power", "smaller", "sqrt", "square")
 
 
 class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
@@ -48,14 +60,14 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
         arguments = e.args[:1] if name == "heaviside" else e.args
         return f"{name}({', '.join(self._print(a) for a in arguments)})"
 
-    _print_exp = _print_log = _print_sinh = _print_cosh = _print_tanh = _print_Abs = _print_Function
+    _print_exp = _print_log = _print_sinh = _print_cosh = _print_tanh = _print_asinh = _print_Function
     _print_sin = _print_cos = _print_atan = _print_erf = _print_Heaviside = _print_Function
 
     def _print_Float(self, e: Any) -> str:
         return repr(float(e))
 
     def _print_Integer(self, e: Any) -> str:
-        return f"{int(e)}.0"
+        return repr(float(e))
 
     def _print_Rational(self, e: Any) -> str:
         return repr(float(e))
@@ -66,14 +78,17 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
     _print_Pi = _print_Exp1 = _print_NumberSymbol
 
     def _print_Pow(self, e: Any, rational: bool = False, **_: Any) -> str:
-        base = self._print(e.base)
+        base, tight = self._print(e.base), self.parenthesize(e.base, PRECEDENCE["Pow"])
         if e.exp == sympy.S.Half:
             return f"sqrt({base})"
         if e.exp == -1:
-            return f"1.0/{self.parenthesize(e.base, sympy.printing.precedence.PRECEDENCE['Pow'])}"
-        if e.exp.is_Integer and 2 <= abs(int(e.exp)) <= 4:
-            product = "*".join([self.parenthesize(e.base, sympy.printing.precedence.PRECEDENCE["Pow"])] * abs(int(e.exp)))
-            return f"({product})" if e.exp > 0 else f"1.0/({product})"
+            return f"1.0/{tight}"
+        if e.base.is_Symbol and e.exp in (2, 3, 4):
+            return f"({'*'.join([tight] * int(e.exp))})"
+        if e.exp == 2:
+            return f"square({base})"
+        if e.exp.is_Integer and e.exp < -1:
+            return f"1.0/{self._print(1 / e)}"
         return f"power({base}, {self._print(e.exp)})"
 
     def _print_Max(self, e: Any) -> str:
@@ -81,6 +96,12 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
 
     def _print_Min(self, e: Any) -> str:
         return self._nested("smaller", list(e.args))
+
+    def _print_And(self, e: Any) -> str:
+        return self._nested("both", list(e.args))
+
+    def _print_Or(self, e: Any) -> str:
+        return self._nested("either", list(e.args))
 
     def _nested(self, name: str, arguments: list[Any]) -> str:
         text = self._print(arguments[0])
@@ -98,24 +119,26 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
 _PRINTER = KernelPrinter({"standard": "python3"})
 
 
-def name_of(symbol: sympy.Symbol) -> str:
-    """The symbol's name in printed text (words of Python and of the target get a tail)."""
-    return str(_PRINTER.doprint(symbol))
+def text_of(expression: sympy.Basic) -> str:
+    """An expression as text."""
+    return str(_PRINTER.doprint(expression))
 
 
-def body(entry: Entry, indent: str) -> list[str]:
-    """The assignments of an entry's steps as lines of text."""
-    return [f"{indent}{symbol} = {_PRINTER.doprint(expression)}" for symbol, expression in entry.steps]
-
-
-def results(entry: Entry) -> list[str]:
-    """The entry's outputs as texts."""
-    return [str(_PRINTER.doprint(expression)) for expression in entry.outputs]
+def assignments(steps: Iterable[tuple[sympy.Symbol, sympy.Expr]], indent: str) -> list[str]:
+    """Steps as lines of text."""
+    return [f"{indent}{symbol} = {text_of(expression)}" for symbol, expression in steps]
 
 
 def array_function(entry: Entry) -> str:
     """An entry as a function of arrays or tensors that returns a tuple."""
-    arguments = ", ".join(name_of(s) for s in entry.inputs)
-    lines = [f"def {entry.name}({arguments}):", *body(entry, "    ")]
-    outputs = "".join(f"        {text},\n" for text in results(entry))
+    arguments = ", ".join(s.name for s in entry.inputs)
+    lines = [f"def {entry.name}({arguments}):", *assignments((*entry.constants, *entry.steps), "    ")]
+    outputs = "".join(f"        {text_of(output)},\n" for output in entry.outputs)
     return "\n".join(lines) + f"\n    return (\n{outputs}    )\n"
+
+
+def described(law: CreepLaw) -> list[str]:
+    """The terms and state rates of a law as comments; nothing in a label can end one."""
+    lines = [f"{label}: {term}" for label, term in law.terms.items()]
+    lines += [f"d{symbol}/dt: {state.rate}" for symbol, state in law.states.items()]
+    return [f"# {''.join(c if c.isprintable() else ' ' for c in line)}" for line in lines]

@@ -149,7 +149,10 @@ def _substituted(law: CreepLaw, swap: Mapping[sympy.Symbol, sympy.Expr], name: s
     if not terms:
         raise LawError(f"law '{law.name}': no term is left after setting {', '.join(map(str, swap))}")
     states = {s: replace(z, rate=z.rate.subs(swap)) for s, z in law.states.items()}
-    constraints = (c.subs(swap) for c in law.constraints)
+    constraints = [c.subs(swap) for c in law.constraints]
+    for relation, now in zip(law.constraints, constraints, strict=True):
+        if now == sympy.false:
+            raise LawError(f"law '{law.name}': its constraint {relation} cannot hold for '{name}'")
     return _pruned(law, terms, states, [c for c in constraints if c is not sympy.true], name, title)
 
 

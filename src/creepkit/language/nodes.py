@@ -42,9 +42,9 @@ _HEADS = {
     "add": _Head(sympy.Add, 2, _MANY),
     "mul": _Head(sympy.Mul, 2, _MANY),
     "pow": _Head(sympy.Pow, 2, 2),
-    **{f.__name__: _Head(f) for f in (sympy.exp, sympy.log, sympy.sinh, sympy.cosh, sympy.tanh, sympy.asinh)},
+    **{f.__name__: _Head(f) for f in (sympy.exp, sympy.log, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth)},
+    **{f.__name__: _Head(f) for f in (sympy.asinh, sympy.sin, sympy.cos, sympy.atan, sympy.erf, sympy.sign)},
     "abs": _Head(sympy.Abs),
-    "sign": _Head(sympy.sign),
     "max": _Head(sympy.Max, 2, _MANY),
     "min": _Head(sympy.Min, 2, _MANY),
     "heaviside": _Head(sympy.Heaviside, 2, 2),
@@ -171,18 +171,27 @@ class _Reader:
     def pair(self, tree: Any, depth: int) -> tuple[sympy.Expr, Boolean]:
         if not isinstance(tree, list) or len(tree) != 2:
             raise LawError(f"a branch of 'piecewise' is {_shown(tree)}; write [expression, condition]")
-        return self.node(tree[0], sympy.Expr, depth), self.node(tree[1], Boolean, depth)
+        value, condition = self.node(tree[0], sympy.Expr, depth), self.node(tree[1], Boolean, depth)
+        if condition.has(sympy.Piecewise):
+            raise LawError(f"the condition {_shown(tree[1])} of 'piecewise' holds another 'piecewise'")
+        return value, condition
 
 
 def _float_from(arguments: list[Any]) -> sympy.Float:
     match arguments:
         case [float() | int() as number] if type(number) is not bool and abs(number) < 1.8e308:
             return sympy.Float(float(number))
-        case [int() as mantissa, int() as exponent, int() as bits] if 1 < bits <= _BITS and abs(exponent) <= 2 * _BITS:
-            _small(mantissa)
+        case [int() as mantissa, int() as exponent, int() as bits] if _is_normal(mantissa, exponent, bits):
             sign, size = int(mantissa < 0), abs(mantissa)
-            return sympy.Float((sign, size, exponent, size.bit_length()), precision=bits)
+            return sympy.Float((sign, size, exponent, size.bit_length()) if size else 0, precision=bits)
     raise LawError(f"{_shown(['float', *arguments])} is not a finite number in the form [\"float\", 0.1]")
+
+
+def _is_normal(mantissa: int, exponent: int, bits: int) -> bool:
+    """Whether mantissa 2^exponent is written as sympy writes it: an odd mantissa of at most `bits` bits, or 0 2^0."""
+    if mantissa == 0:
+        return exponent == 0 and 1 < bits <= _BITS
+    return mantissa % 2 == 1 and mantissa.bit_length() <= bits <= _BITS and abs(exponent) <= 2 * _BITS
 
 
 def _rational_from(arguments: list[Any]) -> sympy.Rational:
@@ -201,16 +210,17 @@ def _check_numbers(built: sympy.Basic, tree: list[Any]) -> None:
     if isinstance(built, sympy.Expr) and not built.free_symbols:
         size = _size(built)
         if not (size == 0 or 1e-308 < size < 1e308):
-            raise LawError(f"{_shown(tree)} is not a finite number between 1e-308 and 1e308 in size")
+            raise LawError(f"{_shown(tree)} is not a real number between 1e-308 and 1e308 in size")
 
 
 def _size(number: sympy.Basic) -> Any:
-    """Absolute value of an expression without symbols; infinite when it has none that can be computed."""
+    """Absolute value of an expression without symbols; infinite when it is not real or cannot be computed."""
     try:
         with mpmath.workdps(20):
-            return abs(value_of(number, {}))
+            value = value_of(number, {})
     except ArithmeticError:
         return mpmath.inf
+    return mpmath.inf if isinstance(value, mpmath.mpc) else abs(value)
 
 
 def _check_size(size: int, depth: int) -> None:

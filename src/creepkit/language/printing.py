@@ -64,6 +64,10 @@ class LawPrinter(LatexPrinter):  # type: ignore[misc]
             text += rf" \exp\!\left[{self._print(rest)}\right]"
         return text if exp is None else rf"\left({text}\right)^{{{exp}}}"
 
+    def _print_Piecewise(self, expr: Any, exp: Any = None) -> str:
+        text = str(super()._print_Piecewise(expr))
+        return text if exp is None else rf"\left({text}\right)^{{{exp}}}"
+
     def _factor(self, found: Activation) -> str:
         falls = found.Q.could_extract_minus_sign()
         sign, energy = ("", -found.Q) if falls else ("-", found.Q)

@@ -11,12 +11,12 @@ from creepkit.records import History, Program
 
 
 def duplicates(
-    histories: Sequence[History], *, time_rounding: float = 1e-6, output_rounding: float = 1e-4
+    histories: Sequence[History], *, time_rounding: float = 1e-5, output_rounding: float = 1e-4
 ) -> list[tuple[str, str]]:
     """Return the names of every two histories that are one test: same condition, same end.
 
-    The end is the last frame: its time and each output must agree to the relative roundings. Records of one test may
-    differ elsewhere, since sources thin and trim them in their own ways.
+    The end is the last frame: its time and each output must agree to the relative roundings (two times of six digits
+    may differ by 1e-5). Records of one test may differ elsewhere, since sources thin them in their own ways.
     """
     pairs = combinations(histories, 2)
     return [(a.name, b.name) for a, b in pairs if _same_test(a, b, time_rounding, output_rounding)]

@@ -85,7 +85,7 @@ def read_table(path: Path) -> Table:
     rows = tuple(Row(number, _cells(path, number, line)) for number, line in body)
     for row in rows:
         if len(row.cells) != len(columns):
-            found = f"{len(row.cells)} cells for {len(columns)} columns"
+            found = f"number of cells {len(row.cells)}, of columns {len(columns)}"
             raise HistoryError(f"{path}:{row.line}: {found}; write one cell a column, separated by commas")
     if not rows:
         raise HistoryError(f"{path}:{start + 1}: no rows below the line of columns; a table needs at least one")

@@ -1,0 +1,123 @@
+"""Generated modules on disk: compiled once, found again by later processes, loaded only when intact.
+
+Each module has a folder of its own, named after the hash of all that it was made from, with the source, numba's
+machine code and a seal: the SHA-256 of every file. A folder is built under a temporary name and renamed into place
+whole, so that processes may build the same module at once. What its seal does not match is built anew.
+
+Machine code from the cache is executed: keep the folder writable for yourself alone, as it is by default.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+SOURCE, SEAL = "law.py", "SHA256SUMS"
+
+_loaded: dict[str, ModuleType] = {}
+
+
+def load(key: str, text: Callable[[], str]) -> ModuleType:
+    """Return the module of `key`: from memory, from disk, or made from text() now."""
+    if key not in _loaded:
+        folder = _shelf() / f"law_{key}"
+        if intact(folder):
+            _loaded[key] = _executed(key, folder / SOURCE)
+        else:
+            _loaded[key] = _built(key, folder, text())
+    return _loaded[key]
+
+
+def cache_folder() -> Path:
+    """Where generated kernels are kept: CREEPKIT_CACHE, else `creepkit` in the user's cache folder."""
+    chosen = os.environ.get("CREEPKIT_CACHE")
+    base = Path(chosen) if chosen else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "creepkit"
+    return base / "kernels"
+
+
+def intact(folder: Path) -> bool:
+    """Whether a folder holds the files its seal names, unchanged, and no others."""
+    try:
+        return (folder / SEAL).read_text(encoding="utf-8") == _sums(folder)
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+# ---- folders -------------------------------------------------------------------------------------------------------
+
+
+def _shelf() -> Path:
+    """The cache folder where it can be written; else a private one for this process, with what is cached copied."""
+    folder = cache_folder()
+    return folder if _writable(folder) else _private_copy(folder)
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+@cache
+def _private_copy(folder: Path) -> Path:
+    private = Path(tempfile.mkdtemp(prefix="creepkit-"))
+    atexit.register(shutil.rmtree, private, ignore_errors=True)
+    for cached in folder.glob("law_*") if folder.is_dir() else ():
+        if intact(cached):
+            shutil.copytree(cached, private / cached.name)
+    return private
+
+
+# ---- making and loading --------------------------------------------------------------------------------------------
+
+
+def _built(key: str, folder: Path, text: str) -> ModuleType:
+    """Write, compile and seal a module in a temporary folder, then put the folder into its place."""
+    temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f"new_{folder.name}_"))
+    try:
+        (temporary / SOURCE).write_text(text, encoding="utf-8", newline="\n")
+        module = _executed(key, temporary / SOURCE)
+        (temporary / SEAL).write_text(_sums(temporary), encoding="utf-8", newline="\n")
+        _put(temporary, folder)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return module
+
+
+def _put(temporary: Path, folder: Path) -> None:
+    """Rename the new folder into place; an intact one that is there already stays, a damaged one goes."""
+    if folder.exists() and not intact(folder):
+        damaged = tempfile.mkdtemp(dir=folder.parent, prefix="damaged_")
+        os.replace(folder, Path(damaged) / folder.name)
+        shutil.rmtree(damaged, ignore_errors=True)
+    try:
+        os.rename(temporary, folder)
+    except OSError:
+        if not folder.exists():
+            raise
+
+
+def _executed(key: str, path: Path) -> ModuleType:
+    text = path.read_text(encoding="utf-8")
+    module = ModuleType(f"creepkit_kernel_{key}")
+    module.__file__, module.__dict__["SOURCE"] = str(path), text
+    sys.modules[module.__name__] = module  # numba finds the functions of cached machine code through their module
+    exec(compile(text, str(path), "exec"), module.__dict__)
+    return module
+
+
+def _sums(folder: Path) -> str:
+    """One line a file: its SHA-256 and its path."""
+    files = sorted(p for p in folder.rglob("*") if p.is_file() and p != folder / SEAL)
+    return "".join(f"{hashlib.sha256(p.read_bytes()).hexdigest()}  {p.relative_to(folder).as_posix()}\n" for p in files)

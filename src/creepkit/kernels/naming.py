@@ -1,0 +1,80 @@
+"""The names in printed kernels: the author's words, made fit to print and unique."""
+
+from __future__ import annotations
+
+import keyword
+import re
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping
+
+import sympy
+
+from creepkit.kernels.logform import FLOOR, LogForm
+from creepkit.kernels.printing import FUNCTIONS
+from creepkit.kernels.stable_functions import LogFloor
+from creepkit.language.law import CreepLaw
+from creepkit.language.symbols import POINT
+
+_TAKEN = (
+    *keyword.kwlist,
+    *FUNCTIONS,
+    *("rate", "log_rate", "update", "sensitivity", "exponents", "COEFFICIENTS", "SIGNATURE", "cfunc"),
+    *("rows", "row", "x", "theta", "out", "flags", "range"),
+)
+_NUMBERED = re.compile(r"[xy]\d+")
+
+
+class Names:
+    """Printable symbols of one law.
+
+    inputs : the point, the states and theta, in order.
+    theta : the last of them. constants : theta, and the parameters of log scale themselves.
+    terms, logs_of_terms, shares : one symbol a term, for its rate, the logarithm of it and its share in the largest.
+    """
+
+    def __init__(self, law: CreepLaw, form: LogForm) -> None:
+        self._used: set[str] = set(_TAKEN)
+        originals = (*POINT, *law.states, *form.theta)
+        self._printed = {s: self.word(s.name) for s in originals}
+        self.inputs = tuple(self._printed.values())
+        self.theta = self.inputs[len(POINT) + len(law.states) :]
+        self._plain = {self._printed[ln]: self.word(symbol.name) for symbol, ln in form.logs.items()}
+        self.constants = {*self.theta, *self._plain.values()}
+        bases = [self._printed[s] for s in (*POINT, *law.states)]
+        self._logs = {LogFloor(s, sympy.Float(FLOOR)): self.word(f"ln_{s.name}") for s in bases}
+        self.terms = tuple(self.word(label) for label in law.terms)
+        self.logs_of_terms = tuple(self.word(f"ln_{label}") for label in law.terms)
+        self.shares = tuple(self.word(f"share_of_{label}") for label in law.terms)
+
+    def word(self, text: str) -> sympy.Symbol:
+        """A new symbol, named after `text` as far as a name can be."""
+        name = re.sub(r"\W+", "_", unicodedata.normalize("NFKC", text)).strip("_") or "unnamed"
+        if not name.isidentifier() or _NUMBERED.fullmatch(name):
+            name = f"{name}_" if name.isidentifier() else f"_{name}"
+        while name in self._used:
+            name += "_"
+        self._used.add(name)
+        return sympy.Symbol(name, real=True)
+
+    def renamed(self, expression: sympy.Expr) -> sympy.Expr:
+        """Write an expression in printable symbols, with ln_stress for ln(stress) and 1/B for exp(-ln_B)."""
+        printed = expression.xreplace(self._printed).xreplace(self._logs)
+        return printed.replace(self._is_plain, self._as_plain)
+
+    def definitions(self, expressions: Iterable[sympy.Expr]) -> dict[sympy.Symbol, sympy.Expr]:
+        """What the symbols stand for that `renamed` has put in."""
+        meanings = {symbol: e for e, symbol in self._logs.items()}
+        meanings |= {symbol: sympy.exp(ln) for ln, symbol in self._plain.items()}
+        used = set().union(*(e.free_symbols for e in expressions))
+        return {symbol: e for symbol, e in meanings.items() if symbol in used}
+
+    def temporaries(self) -> Iterator[sympy.Symbol]:
+        """x0, x1, ..., which no other name looks like."""
+        return iter(sympy.numbered_symbols("x", real=True))
+
+    def _is_plain(self, e: sympy.Expr) -> bool:
+        return isinstance(e, sympy.exp) and e.args[0].as_coeff_Mul()[1] in self._plain
+
+    def _as_plain(self, e: sympy.Expr) -> sympy.Expr:
+        number, ln = e.args[0].as_coeff_Mul()
+        return self._plain[ln] ** number

@@ -1,0 +1,219 @@
+"""The promises that every law makes, one function each: it yields what it found at the samples."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator
+
+import mpmath
+import numpy as np
+import sympy
+
+from creepkit.arrays import Bools, Floats
+from creepkit.errors import LawError
+from creepkit.kernels.calling import call
+from creepkit.kernels.exact import Exact
+from creepkit.kernels.lowering import Kernel, lower
+from creepkit.language.law import CreepLaw
+from creepkit.language.symbols import POINT, strain, time
+from creepkit.testing.parity import DERIVATIVE_TOLERANCE, NO_RATE, VALUE_TOLERANCE, Truth, worst
+from creepkit.testing.report import Check
+from creepkit.testing.sampling import Samples, constraints_hold
+from creepkit.testing.tables import TABLES
+
+_STRESSES = [0, 4, 5]
+_OFF = -1e29
+"""ln rates below this mean that no term is left."""
+
+
+# ---- what the author wrote -----------------------------------------------------------------------------------------
+
+
+def table(law: CreepLaw, _: Samples) -> Iterator[Check]:
+    """Declared equals used; title, references and units are there."""
+    rates = (*law.terms.values(), *(state.rate for state in law.states.values()))
+    used = set().union(*(rate.free_symbols for rate in rates))
+    stray = sorted(s.name for s in (used - {*POINT}) ^ {*law.params, *law.states})
+    yield Check("declared equals used", not stray, ", ".join(stray) or f"{len(law.params)} parameters")
+    missing = [what for what, there in (("title", law.title.strip()), ("references", law.references)) if not there]
+    missing += [f"unit of {name}" for name, param in law.table.items() if not param.unit]
+    yield Check("title, references, units", not missing, f"missing {', '.join(missing)}" if missing else "present")
+
+
+def printing(law: CreepLaw, _: Samples) -> Iterator[Check]:
+    """LaTeX and source print, and the law survives pickling."""
+    text, source = law.latex(), lower(law, "numpy").source
+    balanced = text.count("{") == text.count("}") and text.count(r"\left") == text.count(r"\right")
+    yield Check("LaTeX and source print", balanced and "def rate" in source, f"{len(text)} and {len(source)} characters")
+    again = pickle.loads(pickle.dumps(law))
+    yield Check("pickle and equality", again == law and again.fingerprint == law.fingerprint, law.fingerprint)
+
+
+def signs(law: CreepLaw, drawn: Samples) -> Iterator[Check]:
+    """No term is negative: each is judged by the author's own expression."""
+    exact = Exact(law)
+    for point, theta in zip(drawn.points, drawn.theta, strict=True):
+        for label, value in zip(law.terms, exact.terms(point, theta), strict=True):
+            if not (mpmath.im(value) == 0 and value >= 0):
+                detail = f"term '{label}' is {mpmath.nstr(value, 4)} 1/s at {_place(law, point)}; say where it holds in constraints"
+                yield Check("no term is negative", False, detail)
+                return
+    yield Check("no term is negative", True, f"{len(drawn)} points")
+
+
+# ---- what kernels make of it ---------------------------------------------------------------------------------------
+
+
+def finite(law: CreepLaw, drawn: Samples) -> Iterator[Check]:
+    """The log rate and its derivatives are finite, at zero strain, time and stress too."""
+    kernel, compiled = lower(law, "numpy"), lower(law, "numba")
+    yield _verdict("ln rate is finite", law, drawn, _log_rate(kernel, drawn) > _OFF)
+    zeros = ({"strain": 0.0}, {"time": 0.0}, {"stress": 0.0, "principal_stress": 0.0, "mean_stress": 0.0})
+    for columns in (*zeros, zeros[0] | zeros[1] | zeros[2]):
+        at_zero = drawn.at(**columns)
+        flags = [call(compiled, "update", p[None], t)[1] for p, t in zip(at_zero.points, at_zero.theta, strict=True)]
+        good = (_log_rate(kernel, at_zero) > _OFF) & (np.array(flags) == 0)
+        words = " and ".join(name for name in columns if "_" not in name)
+        yield _verdict(f"ln rate and its derivatives are finite at zero {words}", law, at_zero, good)
+
+
+def monotone(law: CreepLaw, drawn: Samples) -> Iterator[Check]:
+    """A higher stress of the same direction never lowers the rate."""
+    kernel, points = lower(law, "numpy"), drawn.points.copy()
+    points[:, _STRESSES] *= 1.01
+    raised = Samples(points, drawn.theta)
+    before, after = _log_rate(kernel, drawn), _log_rate(kernel, raised)
+    rises = after - before >= -1e-9 * np.maximum(1.0, np.abs(before))
+    yield _verdict("rate never falls with stress", law, drawn, rises | ~constraints_hold(law, points, drawn.theta))
+
+
+def parity(law: CreepLaw, drawn: Samples) -> Iterator[Check]:
+    """Every target agrees with 50-digit arithmetic."""
+    truth = Truth(Exact(law), drawn)
+    for target, evaluate in TABLES.items():
+        with np.errstate(all="ignore"):
+            values, derivatives = worst(truth, evaluate(law, drawn), forgive=True)
+        for what, found, limit in (
+            ("value", values, VALUE_TOLERANCE),
+            ("derivatives", derivatives, DERIVATIVE_TOLERANCE),
+        ):
+            where = "" if found.size <= limit else f", {truth.at(found)}"
+            yield Check(f"{target} {what} against 50 digits", found.size <= limit, f"{found.size:.1e}{where}")
+
+
+def gradients(law: CreepLaw, drawn: Samples) -> Iterator[Check]:
+    """Torch gradients of the log rate equal the derivatives by symbols, and are finite at zero strain and time."""
+    kernel = lower(law, "torch")
+    gaps = [_gradient_gap(kernel, law, drawn), _gradient_gap(kernel, law, drawn.at(strain=0.0, time=0.0))]
+    for where, gap in zip(("", " at zero strain and time"), gaps, strict=True):
+        name = f"torch gradients{where}"
+        yield Check(name, gap <= DERIVATIVE_TOLERANCE, f"{gap:.1e}" if np.isfinite(gap) else "NaN or inf")
+
+
+def switches(law: CreepLaw, drawn: Samples) -> Iterator[Check]:
+    """A parameter that is off does what fixing it at its off value does; with every term off the rate is 0."""
+    off = {name: param.off for name, param in law.table.items() if param.off is not None}
+    gaps = {name: _switch_gap(law, drawn, name, value) for name, value in off.items()}
+    told = ", ".join(f"{name} {gap:.1e}" for name, gap in gaps.items())
+    yield Check("off equals fix", all(gap <= 1e-11 for gap in gaps.values()), told or "no switches")
+    columns = [k for k, p in enumerate(law.params.values()) if p.scale == "log" and p.off == 0]
+    coefficients = {k for own in _coefficients(law) for k in own[:1]}
+    if coefficients <= {*columns} and all(_coefficients(law)):
+        theta = drawn.theta.copy()
+        theta[:, sorted(coefficients)] = -np.inf
+        yield Check("every term off", *_all_off(law, Samples(drawn.points, theta)))
+
+
+def leading(law: CreepLaw, drawn: Samples) -> Iterator[Check]:
+    """The exponents of time at the start, against d ln f / d ln t and d ln f / d ln strain at t = 1e-12 s."""
+    few = Samples(drawn.points[:16].copy(), drawn.theta[:16])
+    few.points[:, 1:3] = 1e-40, 1e-12
+    beta = lower(law, "numba").leading(few.theta, few.points)
+    truth = [_leading_exponent(Exact(law), p, t) for p, t in zip(few.points, few.theta, strict=True)]
+    gap = float(np.max(np.abs(beta - truth), initial=0.0))
+    yield Check("leading exponent of time", gap <= 1e-6, f"{gap:.1e}")
+
+
+# ---- mechanisms ----------------------------------------------------------------------------------------------------
+
+
+def _verdict(name: str, law: CreepLaw, drawn: Samples, good: Bools) -> Check:
+    if good.all():
+        return Check(name, True, f"{good.size} points")
+    first = int(np.flatnonzero(~good)[0])
+    return Check(name, False, f"not at {int((~good).sum())} of {good.size} points, such as {_place(law, drawn.points[first])}")
+
+
+def _place(law: CreepLaw, point: Floats) -> str:
+    pairs = zip((*POINT, *law.states), point, strict=True)
+    return ", ".join(f"{s.name} {value:.4g}" for s, value in pairs if law.uses(s))
+
+
+def _log_rate(kernel: Kernel, drawn: Samples) -> Floats:
+    with np.errstate(all="ignore"):
+        return np.asarray(kernel.internal_log_rate(*drawn.arguments()), float)
+
+
+def _gradient_gap(kernel: Kernel, law: CreepLaw, drawn: Samples) -> float:
+    """Largest relative difference of torch's gradient of ln rate from d(rate)/rate; inf where either is not finite."""
+    import torch
+
+    inputs = [torch.tensor(column, requires_grad=True) for column in drawn.arguments()]
+    grown = torch.autograd.grad(kernel.internal_log_rate(*inputs).sum(), inputs, allow_unused=True)
+    found = np.stack([np.zeros(len(drawn)) if g is None else g.numpy() for g in grown], axis=1)
+    compiled, width = lower(law, "numba"), drawn.points.shape[1]
+    rows = [call(compiled, "update", p[None], t)[0][0] for p, t in zip(drawn.points, drawn.theta, strict=True)]
+    expected = np.array(rows)[:, 1 + compiled.states :][:, :width]
+    if not np.isfinite(found).all():
+        return np.inf
+    gap = np.abs(found[:, :width] - expected)
+    return float(np.max(gap / np.maximum(np.abs(expected), 1e-300), where=gap > 0, initial=0.0))
+
+
+def _switch_gap(law: CreepLaw, drawn: Samples, name: str, value: float) -> float:
+    inner = [s.name for s in (*POINT, *law.states)]
+    point = dict(zip(inner, drawn.points.T, strict=True))
+    pairs = zip(law.table.items(), drawn.theta.T, strict=True)
+    values = {n: np.exp(t) if p.scale == "log" else t for (n, p), t in pairs}
+    off = lower(law, "numpy").rate({**values, name: value}, **point)
+    try:
+        fixed = law.fix(**{name: value})
+    except LawError:  # no term is left
+        return float(np.max(np.abs(off))) / NO_RATE
+    kept = {s.name for s in (*POINT, *fixed.states)}
+    expected = lower(fixed, "numpy").rate({n: values[n] for n in fixed.names}, **{n: v for n, v in point.items() if n in kept})
+    both = np.isfinite(off) & np.isfinite(expected)
+    gap = np.abs(off[both] - expected[both]) / np.maximum(np.abs(expected[both]), NO_RATE)
+    return float(gap.max(initial=0.0))
+
+
+def _coefficients(law: CreepLaw) -> tuple[tuple[int, ...], ...]:
+    from creepkit.kernels.logform import log_form
+
+    return log_form(law).coefficients
+
+
+def _all_off(law: CreepLaw, drawn: Samples) -> tuple[bool, str]:
+    """Rate 0 and a finite update, in every target."""
+    for target, evaluate in TABLES.items():
+        found = evaluate(law, drawn)
+        if not ((found.rows[:, 0, 0] < NO_RATE).all() and np.isfinite(found.rows).all() and np.isfinite(found.logs).all()):
+            return False, f"the {target} kernel leaves a rate, or a number that is not finite"
+    compiled = lower(law, "numba")
+    flags = [call(compiled, "update", p[None], t)[1] for p, t in zip(drawn.points, drawn.theta, strict=True)]
+    return not any(flags), "rate 0, update finite" if not any(flags) else "the update entry is not finite"
+
+
+def _leading_exponent(exact: Exact, point: Floats, theta: Floats) -> float:
+    """Smallest (1 + a)/(1 - b) of the terms, from differences of their logarithms."""
+    columns = [exact.variables.index(v) for v in (time, strain)]
+    slopes = []
+    with mpmath.workdps(exact.digits):
+        for column in columns:
+            up, down = point.copy(), point.copy()
+            up[column], down[column] = up[column] * (1 + 2.0**-12), down[column] * (1 - 2.0**-12)
+            pairs = zip(exact.terms(up, theta), exact.terms(down, theta), strict=True)
+            width = mpmath.log(mpmath.mpf(up[column]) / mpmath.mpf(down[column]))
+            slopes.append([mpmath.log(a / b) / width if a > 0 and b > 0 else None for a, b in pairs])
+        found = [(1 + a) / (1 - b) for a, b in zip(*slopes, strict=True) if a is not None and b is not None and b < 1]
+    return float(min(found, default=sympy.S.One))

@@ -1,0 +1,111 @@
+"""Every sensible law of the catalogue on measured creep curves: the table of the README.
+
+    python tests/benchmarks/measured_creep.py [--data FOLDER] [--sets alloy617 ...] [--laws norton ...] [--quick] [--plots FOLDER]
+
+Alloy 617 (750 to 1000 C) and CMSX-6 (980 C) up to 5 % strain; engineering strain under constant load is compared with
+true stress and logarithmic strain inside. Columns: parameters; rms of ln strain (each test's own loading strain taken
+off); Z = 10^(2.5 s) of the time to 1 % creep strain, fitted and leave-one-condition-out (the first frame counts as
+loading strain); scatter of the rate between tests; BIC less the best; CPU seconds of the identification.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import creepkit as ck
+from creepkit.inverse.selection import rank
+from creepkit.inverse.validation import leave_one_condition_out, loading_strains, times_to_strain
+from creepkit.inverse.warmth import reference_temperature, several_temperatures
+
+LIMIT, LEVEL = 0.05, 0.01
+
+
+def catalogue(histories):
+    """{name: law}: each law alone, with temperature where the tests call for it, and what grows from them."""
+    plain = {name: ck.law(name) for name in (
+        "norton", "hyperbolic-sine", "strain-hardening", "time-hardening", "logarithmic", "drifting-exponent", "combined",
+    )}  # fmt: skip
+    plain["norton + strain-hardening"] = ck.law("norton") + ck.law("strain-hardening")
+    if not several_temperatures(histories):
+        return plain
+    T = reference_temperature(histories)
+    warm = {f"{name} x arrhenius": law.times(ck.arrhenius(T_ref=T)) for name, law in plain.items()}
+    warm["norton x arrhenius, n(T)"] = warm["norton x arrhenius"].with_temperature(n=ck.linear(T_ref=T))
+    warm["strain-hardening x arrhenius, n(T)"] = warm["strain-hardening x arrhenius"].with_temperature(n=ck.linear(T_ref=T))
+    warm["logarithmic x arrhenius, n(T)"] = warm["logarithmic x arrhenius"].with_temperature(n=ck.linear(T_ref=T))
+    warm["hyperbolic-sine x arrhenius, B(T)"] = warm["hyperbolic-sine x arrhenius"].with_temperature(B=ck.activated(T_ref=T))
+    own = [ck.law(name).times(ck.arrhenius(T_ref=T)) for name in ("norton", "strain-hardening")]
+    warm["norton + strain-hardening, own Q"] = own[0] + own[1]
+    return warm
+
+
+def sets(folder):
+    """{name: histories with all frames}."""
+    alloy = ck.read_histories(folder / "alloy617")
+    return {
+        "alloy617": alloy,
+        "alloy617-base": [h for h in alloy if h.labels.get("product") == "Base"],
+        "cmsx6": ck.read_histories(folder / "cmsx6"),
+    }
+
+
+def usable(histories):
+    """Frames up to the strain limit; a curve that has none after time zero is left out, and said."""
+    cut = [h.up_to("strain", LIMIT) for h in histories]
+    for h in cut:
+        if (h.used & (h.times > 0)).sum() < 2:
+            print(f"left out: {h.name}, which begins above {100 * LIMIT:g} % strain")
+    return [h for h in cut if (h.used & (h.times > 0)).sum() >= 2]
+
+
+def row(name, fit, histories, cpu, quick):
+    """One line of the table, without BIC."""
+    fitted = times_to_strain(fit.law, fit.values, histories, fit.using, LEVEL, loading_strains(histories))
+    held = "" if quick else f"{leave_one_condition_out(fit, histories, LEVEL)[0].z_factor:.2f}"
+    ends = [e.name for e in fit.estimates if e.verdict != "determined"]
+    return [name, str(len(fit.law.params)), f"{fit.rms:.3f}", f"{fitted.z_factor:.2f}", held, f"{100 * fit.scatter.rate:.0f} %",
+            "", f"{cpu:.1f}", ", ".join(ends) or "all"]  # fmt: skip
+
+
+def main():
+    """Print one table a set, rows by BIC."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, default=Path("../shared/data/uniaxial"))
+    parser.add_argument("--sets", nargs="*")
+    parser.add_argument("--laws", nargs="*")
+    parser.add_argument("--quick", action="store_true", help="no leave-one-condition-out")
+    parser.add_argument("--plots", type=Path)
+    given = parser.parse_args()
+    for title, histories in sets(given.data).items():
+        if given.sets and title not in given.sets:
+            continue
+        print(f"\n### {title}", flush=True)
+        tests = usable(histories)
+        fits, rows = [], []
+        for name, law in catalogue(tests).items():
+            if given.laws and name not in given.laws:
+                continue
+            before = time.process_time()
+            try:
+                fit = ck.identify(law, tests)
+            except ck.errors.FitError as error:
+                print(f"no fit: {error}", flush=True)
+                continue
+            rows.append(row(name, fit, tests, time.process_time() - before, given.quick))
+            fits.append(fit)
+            print("done:", " | ".join(rows[-1]), flush=True)
+            if given.plots:
+                given.plots.mkdir(parents=True, exist_ok=True)
+                fit.plot(given.plots / f"{title}_{name.replace(' ', '_')}.png")
+        print(f"\n{len(tests)} tests, {sum(m.frames for m in fits[0].misfits)} frames\n")
+        print("| law | parameters | rms ln strain | Z fitted | Z held out | rate between tests | BIC - best | CPU s | not determined |")
+        print("|-|-|-|-|-|-|-|-|-|")
+        for entry in rank(fits).laws:
+            line = rows[fits.index(entry.fit)]
+            line[6] = f"{entry.excess:.0f}"
+            line[8] = "none" if line[8] == "all" else line[8]
+            print("| " + " | ".join(line) + " |")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,210 @@
+"""Exporters: the JSON document comes back, LaTeX holds together, and files are written whole or not at all."""
+
+import json
+import math
+import re
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from creepkit.errors import CreepkitError, ExportError, LawError
+from creepkit.export import export_text, write_text
+from creepkit.export.builtin import creepkit_exporters
+from creepkit.export.document import JsonExporter, read_valued_law
+from creepkit.export.latex import LatexExporter, number
+from creepkit.language import CreepLaw, Param, State, activated, arrhenius, linear, parameters, states, stress
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
+from creepkit.laws.norton import NORTON
+from creepkit.records import Exporter
+
+A, n, k_max = parameters("A n k_max")
+(omega,) = states("omega")
+DAMAGE = CreepLaw(
+    name="damage",
+    title="Power law with damage",
+    terms={"creep": A * (stress / (1 - omega)) ** n},
+    params={A: Param("rate coefficient & more", (1e-40, 1e-5), "1/s", "log", 0.0), n: Param("50 % exponent_x", (1, 8))},
+    states={omega: State(0.05, A * stress**n, meaning="damage", limit=0.99)},
+)
+LAWS = [
+    NORTON,
+    COMBINED,
+    DRIFTING_EXPONENT,
+    DAMAGE,
+    COMBINED.times(arrhenius()),
+    NORTON.with_temperature(n=linear(), A=activated(1100.0)).times(arrhenius()),
+    NORTON.times(arrhenius(Q=4e5)),
+]
+NOTES = ("intervals: n = 4.5 +- 0.1 (95 %)", "valid from 700 to 900 C\nand 20 to 200 MPa")
+
+
+def test_the_built_in_exporters_keep_the_protocol():
+    exporters = creepkit_exporters()
+    assert [(e.name, e.suffix) for e in exporters] == [("latex", ".tex"), ("python", ".py"), ("json", ".json")]
+    assert all(isinstance(e.title, str) and e.title for e in exporters)
+    assert isinstance(exporters, list)
+    chosen: Exporter = exporters[0]
+    assert export_text(NORTON, {"A": 1e-16, "n": 5}, chosen).startswith("% Norton")
+
+
+@pytest.mark.parametrize("exporter", creepkit_exporters(), ids=lambda e: e.name)
+def test_values_are_checked(exporter):
+    with pytest.raises(LawError, match="needs a value for n"):
+        export_text(NORTON, {"A": 1e-16}, exporter)
+    with pytest.raises(LawError, match="'five' is not a number"):
+        exporter.text(NORTON, {"A": 1e-16, "n": "five"}, ())
+
+
+@pytest.mark.parametrize("exporter", creepkit_exporters(), ids=lambda e: e.name)
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_every_exporter_writes_every_law_with_its_notes(law, exporter):
+    text = export_text(law, law.center(), exporter, NOTES)
+    assert text.endswith("\n")
+    assert "valid from 700 to 900 C" in text
+
+
+# ---- JSON ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_json_comes_back_equal(law):
+    values = {name: value * 1.0000000000000002 for name, value in law.center().items()}
+    back = read_valued_law(export_text(law, values, JsonExporter(), NOTES))
+    assert back.law == law
+    assert dict(back.values) == values
+    assert back.notes == NOTES
+
+
+def test_json_states_units_and_the_gas_constant():
+    document = json.loads(export_text(NORTON, {"A": 1e-16, "n": 5}, JsonExporter()))
+    assert document["gas_constant"] == 8.314462618
+    assert document["units"]["stress"] == "MPa"
+
+
+def _json(**changes):
+    document = json.loads(export_text(NORTON, {"A": 1e-16, "n": 5}, JsonExporter()))
+    return json.dumps({**document, **changes})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "mine.json, line 1: not JSON"),
+        ("", "mine.json, line 1: not JSON"),
+        ("[" * 100_000, "nested too deep"),
+        ('{"format": ' + "9" * 5000 + "}", "integer too long"),
+        ("[]", "not a law that creepkit exported"),
+        (_json(version=2), "not a law that creepkit exported"),
+        (_json(script="import os"), "the entries script are missing or unknown"),
+        (_json(values=[1]), "'values' must be numbers"),
+        (_json(values={"A": True, "n": 1}), "'values' must be numbers"),
+        (_json(values={"A": 1e-16}), "needs a value for n"),
+        (_json(values={"A": 1e-16, "n": float("inf")}), "not a finite number"),
+        (_json(notes="text"), "'notes' must be a list"),
+        (_json(law={}), "mine.json: format: field required"),
+    ],
+)
+def test_a_bad_document_is_one_sentence(text, message):
+    with pytest.raises(CreepkitError, match=message) as error:
+        read_valued_law(text, "mine.json")
+    assert "\n" not in str(error.value)
+
+
+@given(st.text() | st.recursive(st.none() | st.integers() | st.floats() | st.text(), st.lists).map(json.dumps))
+@settings(max_examples=100, deadline=None)
+def test_any_text_is_a_document_or_an_error(text):
+    with pytest.raises(CreepkitError):
+        read_valued_law(text)
+
+
+# ---- LaTeX ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_latex_is_balanced_and_holds_every_parameter(law):
+    text = export_text(law, law.center(), LatexExporter(), NOTES)
+    code = "\n".join(line for line in text.splitlines() if not line.startswith("%"))
+    plain = re.sub(r"\\[{}$%&]", "", code)
+    depth = 0
+    for c in plain:
+        depth += (c == "{") - (c == "}")
+        assert depth >= 0
+    assert depth == 0
+    assert plain.count("$") % 2 == 0
+    assert code.count(r"\left") == code.count(r"\right")
+    assert re.findall(r"\\begin\{(.*?)\}", code) == re.findall(r"\\end\{(.*?)\}", code)
+    rows = re.findall(r"^  \$(.+?)\$ & (.+?) & \$(.+?)\$ & (.*?) \\\\$", code, flags=re.M)
+    assert len(rows) == len(law.params) + len(law.states)
+    for value, (_, _, shown, _) in zip(law.center().values(), rows, strict=False):
+        mantissa, _, exponent = shown.partition(r" \times 10^{")
+        assert float(mantissa) * 10.0 ** int(exponent.rstrip("}") or 0) == pytest.approx(value, rel=1e-5)
+
+
+def test_latex_escapes_text():
+    text = export_text(DAMAGE, {"A": 1e-16, "n": 5}, LatexExporter())
+    assert r"& rate coefficient \& more &" in text
+    assert r"50 \% exponent\_x" in text
+    assert r"$\omega(0)$ & damage & $0.05$" in text
+
+
+def test_both_forms_of_arrhenius_are_printed():
+    """A_inf = A exp(Q/(R T_ref)); with the paper's 8.31 it would differ by 2.4 %."""
+    text = export_text(NORTON.times(arrhenius(1073.15)), {"A": 1e-8, "n": 5, "Q": 4e5}, LatexExporter())
+    factor = r"\exp\!\left[-\frac{Q}{R}\left(\frac{1}{T} - \frac{1}{1073.15\,\mathrm{K}}\right)\right]"
+    assert rf"A \sigma_e^{{n}} {factor}" in text
+    assert r"A_{\infty} \sigma_e^{n} \exp\!\left[-\frac{Q}{R T}\right]" in text
+    shown = re.search(r"= ([\d.]+) \\times 10\^\{(.+?)\} \\; \\mathrm\{s\}\^\{-1\}", text)
+    expected = 1e-8 * math.exp(4e5 / (8.314462618 * 1073.15))
+    assert float(shown[1]) * 10 ** int(shown[2]) == pytest.approx(expected, rel=1e-5)
+    assert "R = 8.314462618 J/(mol K)" in text
+
+
+def test_an_infinite_temperature_coefficient_beyond_double_range_is_printed():
+    """Q = 900 kJ/mol about 120 K: A_inf = 1e-5 exp(902.05), which is e^890.5 = 10^386.7."""
+    text = export_text(NORTON.times(arrhenius(120.0)), {"A": 1e-5, "n": 5, "Q": 9e5}, LatexExporter())
+    exponent = math.floor((math.log(1e-5) + 9e5 / (8.314462618 * 120)) / math.log(10))
+    assert exponent > 308
+    assert rf"\times 10^{{{exponent}}}" in text
+
+
+def test_a_law_without_temperature_has_one_form():
+    assert r"\infty" not in export_text(COMBINED, COMBINED.center(), LatexExporter())
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(4.5, "4.5"), (8.0, "8"), (0.0, "0"), (-0.475, "-0.475"), (1e-23, r"1 \times 10^{-23}"), (475000.0, "475000")],
+)
+def test_numbers_in_latex(value, shown):
+    assert number(value) == shown
+
+
+# ---- files ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_file_is_written_whole(tmp_path):
+    path = write_text(NORTON, {"A": 1e-16, "n": 5}, JsonExporter(), tmp_path / "norton.json", NOTES)
+    assert read_valued_law(path.read_text(encoding="utf-8")).law == NORTON
+    assert [p.name for p in tmp_path.iterdir()] == ["norton.json"]
+
+
+def test_a_refused_export_leaves_the_old_file(tmp_path):
+    path = tmp_path / "norton.json"
+    path.write_text("old")
+    with pytest.raises(LawError):
+        write_text(NORTON, {"A": 1e-16}, JsonExporter(), path)
+    assert path.read_text() == "old"
+
+
+def test_a_folder_that_does_not_exist_is_named(tmp_path):
+    with pytest.raises(ExportError, match="cannot be written to .*missing.*No such file"):
+        write_text(NORTON, {"A": 1e-16, "n": 5}, JsonExporter(), tmp_path / "missing" / "norton.json")
+
+
+def test_a_failed_replacement_leaves_nothing_behind(tmp_path):
+    (tmp_path / "norton.json").mkdir()
+    with pytest.raises(ExportError, match="cannot be written"):
+        write_text(NORTON, {"A": 1e-16, "n": 5}, JsonExporter(), tmp_path / "norton.json")
+    assert [p.name for p in tmp_path.iterdir()] == ["norton.json"]
