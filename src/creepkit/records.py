@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 from itertools import pairwise
 from pathlib import Path
@@ -231,8 +231,14 @@ class History:
         freeze(self, "labels", MappingProxyType(dict(self.labels)))
 
     def replace(self, **changes: Any) -> History:
-        """The same history with some fields changed."""
+        """The same history with some fields changed; new times are all used unless `used` is given too."""
+        if "times" in changes:
+            changes = {"used": EVERY_FRAME, **changes}
         return replace(self, **changes)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        state = {f.name: getattr(self, f.name) for f in fields(self)}
+        return _history, ({k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()},)
 
     def up_to(self, output: str, limit: float) -> History:
         """Mark unused every frame from the first used one whose `output` exceeds `limit` on."""
@@ -255,6 +261,10 @@ class History:
         T = self.temperature_program().values - ZERO_CELSIUS
         warm = f"{T[0]:.0f}" if np.ptp(T) < 0.5 else f"{T[0]:.0f} to {T[-1]:.0f}"
         return f"{warm} C, {driven} MPa"
+
+
+def _history(state: dict[str, Any]) -> History:
+    return History(**state)
 
 
 # ---- what a model says ---------------------------------------------------------------------------------------------

@@ -85,7 +85,9 @@ def torch_runs(law: CreepLaw, points: Any, values: dict[str, float]) -> list[tup
     return array_runs(law, "torch", torch, [torch.tensor(column.copy()) for column in points.T], tensors)
 
 
-def array_runs(law: CreepLaw, target: Any, module: Any, point: list[Any], values: dict[str, Any]) -> list[tuple[Run, Run]]:
+def array_runs(
+    law: CreepLaw, target: Any, module: Any, point: list[Any], values: dict[str, Any]
+) -> list[tuple[Run, Run]]:
     """Hand and kernel for arrays or tensors; kernels get logarithms, as they do in a fit."""
     rate, derivatives = LAWS[law.name](module)
     kernel, given = creepkit.lower(law, target), list(values.values())
@@ -102,11 +104,14 @@ def numba_runs(law: CreepLaw, points: Any, values: dict[str, float]) -> list[tup
     compiled = creepkit.lower(law, "numba")
     x = np.column_stack([points, np.ones(len(points)), points[:, 0], points[:, 0] / 3])
     theta, given = compiled.internal(values)[0], tuple(values.values())
-    pairs = []
-    for function, entry, columns in zip(LAWS[law.name](math), ("rate", "sensitivity"), (1, 7 + theta.size), strict=True):
-        hand, out = loop_by_hand(function, several=entry != "rate"), np.empty((len(x), columns))
-        pairs.append((partial(hand, x, given, out), entry_call(compiled, entry, x, theta, out)))
-    return pairs
+    rate, derivatives = (
+        loop_by_hand(f, several) for f, several in zip(LAWS[law.name](math), (False, True), strict=True)
+    )
+    one, many = np.empty((len(x), 1)), np.empty((len(x), 7 + theta.size))
+    return [
+        (partial(rate, x, given, one), entry_call(compiled, "rate", x, theta, one)),
+        (partial(derivatives, x, given, many), entry_call(compiled, "sensitivity", x, theta, many)),
+    ]
 
 
 def loop_by_hand(function: Callable[..., Any], several: bool) -> Callable[..., Any]:
@@ -131,7 +136,9 @@ def loop_by_hand(function: Callable[..., Any], several: bool) -> Callable[..., A
 def entry_call(compiled: CompiledLaw, entry: str, x: Any, theta: Any, out: Any) -> Run:
     """A call of a compiled entry through its C pointer."""
     double = ctypes.POINTER(ctypes.c_double)
-    function = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, double, double, double)(getattr(compiled, entry).address)
+    function = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, double, double, double)(
+        getattr(compiled, entry).address
+    )
     pointers = [array.ctypes.data_as(double) for array in (x, theta, out)]
     return lambda: function(len(x), *pointers)
 

@@ -91,7 +91,8 @@ def main() -> None:
     rows = []
     for rtol in (1e-4, 1e-5, 1e-6):
         seconds, result = timed(lambda rtol=rtol: compiled(theta, rtol))
-        rows.append(Row(f"creepkit, tolerance {rtol:g}", CURVES, seconds, float(np.abs(result.strain / exact - 1).max())))
+        error = float(np.abs(result.strain / exact - 1).max())
+        rows.append(Row(f"creepkit, tolerance {rtol:g}", CURVES, seconds, error))
     seconds, result = timed(lambda: compiled(theta, 1e-5, True))
     rows.append(Row("creepkit, tolerance 1e-05, 9 sensitivities", CURVES, seconds))
     for method in ("LSODA", "Radau"):
@@ -102,7 +103,8 @@ def main() -> None:
         print(row)
     base = rows[1].seconds / rows[1].curves
     for row in rows[4:]:
-        print(f"{row.what} takes {row.seconds / row.curves / base:.0f} times the CPU of creepkit at its default tolerance")
+        ratio = row.seconds / row.curves / base
+        print(f"{row.what}: {ratio:.0f} times the CPU of creepkit at its default tolerance")
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import pytest
 from numba import njit
 from scipy.stats import qmc
 
+from creepkit.integration.problem import NO_SOLUTION, SOLVED, UNIAXIAL, Axes, Problem
 from creepkit.integration.response import (
     BY_LOG_WEIGHT,
     BY_MEAN,
@@ -19,7 +20,7 @@ from creepkit.integration.response import (
     gradient_of_update,
     respond,
 )
-from creepkit.integration.stage import NO_SOLUTION, SOLVED, UNIAXIAL, Axes, Problem, solve
+from creepkit.integration.stage import solve
 from creepkit.kernels import lower
 from creepkit.kernels.interface import MEAN, PRINCIPAL, STRAIN, STRESS, TIME, pointer
 from creepkit.language import CreepLaw, Param, State, mean_stress, parameters, principal_stress, states, stress

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import LawError, SolveError
-from creepkit.language import Elastic, arrhenius
-from creepkit.language.temperature import wachtman
+from creepkit.language import Elastic, arrhenius, wachtman
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import (
@@ -27,8 +26,8 @@ RATE = 1e-13 * 100.0**4
 
 
 def history(**changes) -> History:
-    plain = {"name": "test", "times": TIMES, "outputs": {}, "loading": constant_stress(100.0, "stress"), "temperature": 1000.0}
-    return History(**{**plain, **changes})
+    held = constant_stress(100.0, "stress")
+    return History(**{"name": "test", "times": TIMES, "outputs": {}, "loading": held, "temperature": 1000.0, **changes})
 
 
 def predicted(*histories: History, values=VALUES, **kwargs):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from creepkit.integration.batch import REASONS, Integration, PointTest, integrate
-    from creepkit.integration.point import Settings
+    from creepkit.integration.control import Settings
 
 __all__ = ["REASONS", "Integration", "PointTest", "Settings", "integrate"]
 

@@ -11,20 +11,19 @@ from numba import njit
 
 from creepkit.arrays import Floats, Ints, frozen
 from creepkit.errors import SolveError
-from creepkit.integration.point import (
+from creepkit.integration.control import Settings
+from creepkit.integration.endings import (
     DIVERGED,
     REACHED_END,
-    SINGULAR,
     STATE_LIMIT,
     STEP_TOO_SMALL,
     STRAIN_LIMIT,
     TOO_MANY_STEPS,
-    Kernel,
-    Settings,
-    integrate_point,
+    Limits,
 )
+from creepkit.integration.point import Kernel, integrate_point
+from creepkit.integration.problem import UNIAXIAL, Axes
 from creepkit.integration.segments import segments_of
-from creepkit.integration.stage import UNIAXIAL, Axes
 from creepkit.integration.step import Drive, room
 from creepkit.integration.tableau import SDIRK4, Tableau
 from creepkit.kernels.interface import CompiledLaw
@@ -37,7 +36,6 @@ REASONS = {
     DIVERGED: "the creep rate diverged",
     STEP_TOO_SMALL: "the time step became too small",
     TOO_MANY_STEPS: "the cap on steps was reached",
-    SINGULAR: "the sensitivities are singular",
 }
 """What each ending means, in words."""
 
@@ -168,7 +166,7 @@ def integrate_batch(
     work = room(initial.size, theta.shape[1], tableau.c.size)
     nothing = np.zeros((0, theta.shape[1]))
     for c in range(theta.shape[0]):
-        kernel = Kernel(theta[c], beta[c], initial, limits)
+        kernel = Kernel(theta[c], beta[c], Limits(settings.strain_limit, initial, limits))
         for k in range(drives.shape[0]):
             drive = Drive(drives[k, 0], drives[k, 1], axes)
             first, last = starts[k], starts[k + 1]

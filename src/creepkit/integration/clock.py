@@ -92,9 +92,7 @@ def velocity(clock: Clock, s: float) -> tuple[Moment, Moment]:
 
 
 @njit(cache=True, error_model="numpy")
-def _through(
-    tau: float, beta: float, s: float, reach: float, inner: float, power: float, change: float
-) -> Moment:
+def _through(tau: float, beta: float, s: float, reach: float, inner: float, power: float, change: float) -> Moment:
     """The part of a derivative of `moment` that goes through `reach`, which changes by `change`."""
     rise = s * change / (beta * inner)
     return Moment(tau * exp(power) * rise, rise + change / reach - s * change / inner)

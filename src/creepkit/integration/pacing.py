@@ -9,8 +9,8 @@ from numba import njit
 
 from creepkit.arrays import Floats
 from creepkit.integration.clock import SMALLEST_BETA, Clock, plain, shifted, virgin
+from creepkit.integration.problem import along_stress, place
 from creepkit.integration.segments import Segment, stress_rate, temperature_rate
-from creepkit.integration.stage import along_stress, place
 from creepkit.integration.step import Drive, Room
 from creepkit.kernels.interface import POINT_SIZE, STRAIN, TEMPERATURE, TIME, pointer
 

@@ -2,66 +2,58 @@
 
 from __future__ import annotations
 
-from math import exp, isfinite, sqrt
+from math import exp, inf, nan
 from typing import Any, NamedTuple
 
-import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats
 from creepkit.integration.clock import Clock, moment, position
+from creepkit.integration.control import (
+    VIRGIN_CAUTION,
+    Settings,
+    change_error,
+    fitted,
+    newton_tolerance,
+    strain_error,
+    stretch,
+)
+from creepkit.integration.dense import dense_change, dense_value
+from creepkit.integration.endings import (
+    DIVERGED,
+    REACHED_END,
+    STEP_TOO_SMALL,
+    TOO_MANY_STEPS,
+    Limits,
+    crossing,
+    limit_reached,
+)
 from creepkit.integration.pacing import choose_clock, move_clock
+from creepkit.integration.problem import SOLVED
 from creepkit.integration.segments import Segment, segment_of
-from creepkit.integration.stage import SOLVED
-from creepkit.integration.step import Drive, Room, advance, dense_change, dense_value, differentiate, error_of
+from creepkit.integration.step import Drive, Room, advance, differentiate
 from creepkit.integration.tableau import Tableau
 
-REACHED_END, STRAIN_LIMIT, STATE_LIMIT, DIVERGED, STEP_TOO_SMALL, TOO_MANY_STEPS, SINGULAR = range(7)
-"""How an integration ended; all but the first keep the history so far."""
-
-_SAFETY, _LEAST, _MOST = 0.9, 0.1, 8.0
 _SMALLEST_STEP = 1e-13
-_SENSITIVITY_SLACK = 10.0
-_VIRGIN_CAUTION = 10.0
-"""From a virgin state strain is a sum of broken powers of s, on which the first step is of order 1 and its error is up
-to 2.5 times the estimate; afterwards the estimate exceeds the error some twenty times."""
 _SMALLEST_FIRST_STEP = 1e-60
 
 
-class Settings(NamedTuple):
-    """How accurately, and how far, to integrate.
-
-    rtol : local error allowed in a step, relative to strain and to each state.
-    smallest : strain below which the error is relative to this instead.
-    strain_limit : creep strain at which the point has burst.
-    max_steps : cap on steps, accepted and rejected, of one history.
-    first, longest : first and longest step, as shares of a segment (in the position of its clock).
-    """
-
-    rtol: float = 1e-5
-    smallest: float = 1e-7
-    strain_limit: float = 1.0
-    max_steps: int = 2000
-    first: float = 0.02
-    longest: float = 0.2
-
-
-class Ending(NamedTuple):
-    """code : how it ended; time : s, where; steps, rejected : how many."""
-
-    code: int
-    time: float
-    steps: int
-    rejected: int
-
-
 class Kernel(NamedTuple):
-    """One candidate's numbers: theta (P,); beta, the leading exponent of time; initial states and limits (S,)."""
+    """One candidate's numbers: theta (P,); beta, the leading exponent of time; its limits."""
 
     theta: Floats
     beta: float
-    initial: Floats
-    limits: Floats
+    limits: Limits
+
+
+class Progress(NamedTuple):
+    """done : output times filled; steps, rejected : how many; code, time : how it ended and where, s."""
+
+    done: int
+    steps: int
+    rejected: int
+    code: int
+    time: float
 
 
 @njit(cache=True, error_model="numpy")
@@ -77,77 +69,119 @@ def integrate_point(
     work: Room,
     strain: Floats,
     jacobian: Floats,
-) -> Ending:
+) -> Progress:
     """Integrate from time zero and fill `strain` (times,) and `jacobian` (times, P) up to the end that is reached.
 
     segments : (segments, 6); times : (times,) s, non-decreasing, none beyond the last segment.
     jacobian : (times, P), or (0, P) to do without.
     """
-    _reset(kernel, work)
-    done, steps, rejected = 0, 0, 0
-    while done < times.size and times[done] <= 0.0:
-        strain[done] = 0.0
-        if jacobian.shape[0] > 0:
-            jacobian[done, :] = 0.0
-        done += 1
+    progress = Progress(_start(kernel, times, work, strain, jacobian), 0, 0, REACHED_END, 0.0)
     for k in range(segments.shape[0]):
         segment = segment_of(segments[k])
-        clock, rate = choose_clock(update, kernel.theta, kernel.beta, drive, segment, work.value, work)
-        if jacobian.shape[0] > 0:
-            due = times[done] if done < times.size and times[done] < segment.end else segment.end
-            move_clock(update, kernel.theta, kernel.beta, drive, segment, clock, due, work)
-        slope = rate * exp(moment(clock, 1e-12).log_pace) if rate > 0.0 else 1e-6
-        first = min(position(clock, times[done]), 1.0) if done < times.size else 1.0
-        s, h, grow = 0.0, min(settings.first, first), True
-        while s < 1.0:
-            if steps + rejected >= settings.max_steps:
-                return Ending(TOO_MANY_STEPS, _time_at(clock, s), steps, rejected)
-            h = min(h, settings.longest)
-            if s + 1.001 * h > 1.0:
-                h = 1.0 - s
-            if not (h >= _SMALLEST_STEP * s and h >= _SMALLEST_FIRST_STEP):
-                return Ending(_why_small(clock, s, slope, settings), _time_at(clock, s), steps, rejected)
-            flag = advance(
-                update, kernel.theta, drive, segment, clock, tableau, work, s, h, slope, _newton_tolerance(settings)
-            )
-            error = np.inf
-            if flag == SOLVED:
-                ahead = max(1.0, first / (s + h))
-                caution = _VIRGIN_CAUTION if s == 0.0 and clock.tau == 0.0 else 1.0
-                error = caution * _error(tableau, drive, segment, work, settings, h, ahead)
-            if error <= 1.0 and jacobian.shape[0] > 0:
-                flag = differentiate(sensitivity, kernel.theta, drive, segment, clock, tableau, work, s, h)
-                if flag != SOLVED:
-                    return Ending(SINGULAR, _time_at(clock, s), steps, rejected)
-                error = max(error, caution * _change_error(tableau, work, settings, h, ahead))
-            if not error <= 1.0:
-                rejected += 1
-                grow = False
-                h *= max(_LEAST, _SAFETY * error ** (-1.0 / (tableau.error_order + 1))) if isfinite(error) else _LEAST
-                continue
-            steps += 1
-            code = _limit_reached(kernel, settings, work)
-            share = 1.0 if code == REACHED_END else _crossing(kernel, settings, tableau, work, h)
-            done = _fill(clock, tableau, work, s, h, share, times, done, strain, jacobian)
-            if code != REACHED_END:
-                return Ending(code, _time_at(clock, s + share * h), steps, rejected)
-            s = 1.0 if h == 1.0 - s else s + h
-            _accept(work)
-            slope = work.slopes[tableau.c.size - 1, 0]
-            growth = _SAFETY * max(error, 1e-12) ** (-1.0 / (tableau.error_order + 1))
-            h *= min(_MOST if grow else 1.0, max(_LEAST, growth))
-            grow = True
-    last = segments[segments.shape[0] - 1, 1] if segments.shape[0] > 0 else 0.0
-    return Ending(REACHED_END, last, steps, rejected)
+        progress = _integrate_segment(
+            update, sensitivity, kernel, drive, segment, times, settings, tableau, work, strain, jacobian, progress
+        )
+        if progress.code != REACHED_END:
+            break
+    return progress
 
 
 @njit(cache=True, error_model="numpy")
-def _reset(kernel: Kernel, work: Room) -> None:
-    """Return to a virgin state."""
+def _start(kernel: Kernel, times: Floats, work: Room, strain: Floats, jacobian: Floats) -> int:
+    """Return to a virgin state; fill the outputs at time zero and return their number."""
     for v in range(work.value.size):
-        work.value[v] = kernel.initial[v - 1] if v > 0 else 0.0
+        work.value[v] = kernel.limits.initial[v - 1] if v > 0 else 0.0
         for p in range(work.change.shape[1]):
             work.change[v, p] = 0.0
+    done = 0
+    while done < times.size and times[done] <= 0.0:
+        strain[done] = 0.0
+        for p in range(jacobian.shape[1] if jacobian.shape[0] > 0 else 0):
+            jacobian[done, p] = 0.0
+        done += 1
+    return done
+
+
+@njit(cache=True, error_model="numpy")
+def _integrate_segment(
+    update: Any,
+    sensitivity: Any,
+    kernel: Kernel,
+    drive: Drive,
+    segment: Segment,
+    times: Floats,
+    settings: Settings,
+    tableau: Tableau,
+    work: Room,
+    strain: Floats,
+    jacobian: Floats,
+    progress: Progress,
+) -> Progress:
+    """March over one segment in the position s of its clock, from 0 to 1."""
+    done, steps, rejected = progress.done, progress.steps, progress.rejected
+    clock, rate = choose_clock(update, kernel.theta, kernel.beta, drive, segment, work.value, work)
+    if jacobian.shape[0] > 0:
+        due = min(times[done], segment.end) if done < times.size else segment.end
+        move_clock(update, kernel.theta, kernel.beta, drive, segment, clock, due, work)
+    first = min(position(clock, times[done]), 1.0) if done < times.size else 1.0
+    slope = rate * exp(moment(clock, 1e-12).log_pace) if rate > 0.0 else nan
+    s, h, growing = 0.0, min(settings.first, first), True
+    while s < 1.0:
+        h = fitted(s, h, settings.longest)
+        if steps + rejected >= settings.max_steps:
+            return Progress(done, steps, rejected, TOO_MANY_STEPS, _time_at(clock, s))
+        if not (h >= _SMALLEST_STEP * s and h >= _SMALLEST_FIRST_STEP):
+            return Progress(done, steps, rejected, _why_small(s, slope, settings), _time_at(clock, s))
+        error = _attempt(
+            update, sensitivity, kernel, drive, segment, clock, settings, tableau, work, s, h, slope, first, jacobian
+        )
+        if not error <= 1.0:
+            h, growing = h * stretch(tableau, error, False), False
+            rejected += 1
+            continue
+        steps += 1
+        code = limit_reached(kernel.limits, work)
+        share = 1.0 if code == REACHED_END else crossing(kernel.limits, tableau, work, h)
+        done = _fill(clock, tableau, work, s, h, share, times, done, strain, jacobian)
+        if code != REACHED_END:
+            return Progress(done, steps, rejected, code, _time_at(clock, s + share * h))
+        _accept(work)
+        slope = work.slopes[tableau.c.size - 1, 0]
+        s = 1.0 if h == 1.0 - s else s + h
+        h, growing = h * stretch(tableau, error, growing), True
+    return Progress(done, steps, rejected, REACHED_END, segment.end)
+
+
+@njit(cache=True, error_model="numpy")
+def _attempt(
+    update: Any,
+    sensitivity: Any,
+    kernel: Kernel,
+    drive: Drive,
+    segment: Segment,
+    clock: Clock,
+    settings: Settings,
+    tableau: Tableau,
+    work: Room,
+    s: float,
+    h: float,
+    slope: float,
+    first: float,
+    jacobian: Floats,
+) -> float:
+    """Try a step; return its error over what is allowed, infinite when a stage has no solution."""
+    guess = 1e-6 if not slope > 0.0 else slope
+    tolerance = newton_tolerance(settings)
+    if advance(update, kernel.theta, drive, segment, clock, tableau, work, s, h, guess, tolerance) != SOLVED:
+        return inf
+    ahead = max(1.0, first / (s + h))
+    caution = VIRGIN_CAUTION if s == 0.0 and clock.tau == 0.0 else 1.0
+    error = caution * strain_error(tableau, drive, segment, work, settings, h, ahead, slope)
+    if error <= 1.0 and jacobian.shape[0] > 0:
+        if differentiate(sensitivity, kernel.theta, drive, segment, clock, tableau, work, s, h) != SOLVED:
+            return inf
+        error = max(error, caution * change_error(tableau, work, settings, h, ahead))
+    return float(error)
 
 
 @njit(cache=True, error_model="numpy")
@@ -160,86 +194,14 @@ def _accept(work: Room) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _newton_tolerance(settings: Settings) -> float:
-    """Newton's last correction; its square, the error left, is a thousandth of the step's tolerance."""
-    return min(sqrt(1e-3 * settings.rtol), 1e-3)
-
-
-@njit(cache=True, error_model="numpy")
 def _time_at(clock: Clock, s: float) -> float:
     return moment(clock, s).time if s > 0.0 else clock.start
 
 
 @njit(cache=True, error_model="numpy")
-def _error(
-    tableau: Tableau, drive: Drive, segment: Segment, work: Room, settings: Settings, h: float, ahead: float
-) -> float:
-    """Largest local error of the step over what is allowed; infinite when creep strain falls, which it never does.
-
-    ahead : the first output's position over that of the step's end: until then only the strain there matters.
-    """
-    if work.new_value[0] < work.value[0]:
-        return np.inf
-    reach = work.new_value[0] * ahead
-    if drive.stiffness > 0.0:
-        stress = segment.end_stress - drive.stiffness * work.new_value[0]
-        reach = min(reach, abs(stress) / drive.stiffness)
-    worst = error_of(tableau, work, h, 0) / (settings.rtol * (reach + settings.smallest))
-    for v in range(1, work.value.size):
-        reach = max(abs(work.value[v]), abs(work.new_value[v])) + settings.smallest
-        worst = max(worst, error_of(tableau, work, h, v) / (settings.rtol * reach))
-    return worst if isfinite(worst) else np.inf
-
-
-@njit(cache=True, error_model="numpy")
-def _change_error(tableau: Tableau, work: Room, settings: Settings, h: float, ahead: float) -> float:
-    """Largest local error of the sensitivities of strain over what is allowed, in units of the strain itself."""
-    worst = 0.0
-    for p in range(work.change.shape[1]):
-        total = 0.0
-        for i in range(tableau.c.size):
-            total += tableau.error[i] * work.slope_changes[i, 0, p]
-        worst = max(worst, abs(h * total))
-    allowed = _SENSITIVITY_SLACK * settings.rtol * (work.new_value[0] * ahead + settings.smallest)
-    return worst / allowed if isfinite(worst) else np.inf
-
-
-@njit(cache=True, error_model="numpy")
-def _why_small(clock: Clock, s: float, slope: float, settings: Settings) -> int:
-    """A step that must shrink to nothing while the rate would burst the point at once: the rate diverges."""
+def _why_small(s: float, slope: float, settings: Settings) -> int:
+    """A step that shrinks to nothing while the rate would burst the point at once: the rate diverges."""
     return DIVERGED if slope * max(s, 1e-6) > settings.strain_limit else STEP_TOO_SMALL
-
-
-@njit(cache=True, error_model="numpy")
-def _passed(value: float, limit: float, initial: float) -> bool:
-    return value >= limit if limit > initial else value <= limit
-
-
-@njit(cache=True, error_model="numpy")
-def _limit_reached(kernel: Kernel, settings: Settings, work: Room) -> int:
-    """Which limit the new value has passed, if any."""
-    for i in range(kernel.limits.size):
-        if isfinite(kernel.limits[i]) and _passed(work.new_value[1 + i], kernel.limits[i], kernel.initial[i]):
-            return STATE_LIMIT
-    return STRAIN_LIMIT if work.new_value[0] >= settings.strain_limit else REACHED_END
-
-
-@njit(cache=True, error_model="numpy")
-def _crossing(kernel: Kernel, settings: Settings, tableau: Tableau, work: Room, h: float) -> float:
-    """Share of the step at which the first limit is passed, by bisection of the dense output."""
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        beyond = dense_value(tableau, work, h, middle, 0) >= settings.strain_limit
-        for i in range(kernel.limits.size):
-            if isfinite(kernel.limits[i]) and not beyond:
-                value = dense_value(tableau, work, h, middle, 1 + i)
-                beyond = _passed(value, kernel.limits[i], kernel.initial[i])
-        if beyond:
-            high = middle
-        else:
-            low = middle
-    return high
 
 
 @njit(cache=True, error_model="numpy")

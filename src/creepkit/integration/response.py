@@ -12,7 +12,7 @@ from numba import njit
 
 from creepkit.arrays import Floats
 from creepkit.integration.elimination import eliminate
-from creepkit.integration.stage import Axes, Problem, along_stress
+from creepkit.integration.problem import Axes, Problem, along_stress
 from creepkit.kernels.interface import MEAN, POINT_SIZE, PRINCIPAL, STRAIN, TEMPERATURE, TIME
 
 INPUTS = 7

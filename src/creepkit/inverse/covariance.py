@@ -120,12 +120,14 @@ def _size(nuisances: Sequence[Nuisance], kind: str, default: float) -> float:
 
 
 def estimated(residuals: Residuals, log_times: Floats, start: Scatter, nuisances: Sequence[Nuisance]) -> Scatter:
-    """The scatter of largest likelihood, beginning from `start`; sources at zero or with a given prior stay."""
-    given = {n.kind for n in nuisances if n.sd is not None}
+    """The scatter of largest likelihood, beginning from `start`.
+
+    Sources at zero or with a given prior stay, and so does the noise, which was measured from frame to frame.
+    """
+    given = {"noise", *(n.kind for n in nuisances if n.sd is not None)}
     free = [name for name in SOURCES if getattr(start, name) > 0 and name not in given]
     typical = float(np.median(1.0 / np.maximum(residuals.slopes[residuals.present], 1e-12)))
-    low = {"noise": 1e-5 * typical, "offset": 1e-5 * typical, "reach": 0.05}
-    high = {"noise": typical, "offset": typical, "reach": LONGEST}
+    low, high = {"offset": 1e-5 * typical, "reach": 0.05}, {"offset": typical, "reach": LONGEST}
 
     def scatter_at(x: Floats) -> Scatter:
         return replace(start, **{n: float(v) for n, v in zip(free, np.exp(x), strict=True)})

@@ -83,6 +83,7 @@ class _Document(_Strict):
     rms: float
     log_likelihood: float
     size: float = Field(gt=0)
+    freedom: float = Field(gt=0)
     tests: list[_Test]
     ranges: dict[str, tuple[float, float]]
     settings: _Settings
@@ -105,6 +106,7 @@ def to_json(fit: Identification) -> dict[str, Any]:
         "rms": fit.rms,
         "log_likelihood": fit.log_likelihood,
         "size": fit.size,
+        "freedom": fit.freedom,
         "tests": [{k: None if v != v else v for k, v in vars(m).items()} for m in fit.misfits],
         "ranges": {name: list(ends) for name, ends in fit.ranges.items()},
         "settings": {**vars(fit.settings), "limits": dict(fit.settings.limits)},
@@ -166,6 +168,7 @@ def from_json(data: Any, source: str = "identification") -> Identification:
         rms=document.rms,
         log_likelihood=document.log_likelihood,
         size=document.size,
+        freedom=document.freedom,
         misfits=tuple(_test(t) for t in document.tests),
         ranges=document.ranges,
         settings=Settings(**document.settings.model_dump()),

@@ -63,6 +63,7 @@ class Identification:
         its own offset (loading strain), none its own rate.
     ranges : {"stress", "temperature", "strain", "time": (low, high)} that the fitted frames cover; MPa, K, s.
     log_likelihood : of the fitted frames as if they were independent (working scatter).
+    freedom : degrees of freedom of the intervals (see inverse.uncertainty).
     size : number of effectively independent frames (about one a test when tests differ from one another).
     """
 
@@ -75,6 +76,7 @@ class Identification:
     rms: float
     log_likelihood: float
     size: float
+    freedom: float
     misfits: tuple[TestMisfit, ...]
     ranges: Mapping[str, tuple[float, float]]
     settings: Settings
@@ -154,7 +156,7 @@ class Identification:
 
     @property
     def _quantile(self) -> float:
-        return quantile(self.size, len(self.law.params))
+        return quantile(self.freedom)
 
     def _log_rates(
         self, stress: ArrayLike, temperature: ArrayLike | None, strain: ArrayLike | None, time: ArrayLike | None

@@ -64,7 +64,7 @@ def identify(
     start : conditioned coordinates to begin from instead of a global search (a refit).
     """
     settings = settings or Settings()
-    _check(law, histories, settings)
+    _check(law, histories, settings, nuisances)
     thin = [thinned(h, settings.frames) for h in histories]
     reference = reference or Reference.of(thin)
     coordinates = Coordinates(law, reference)
@@ -81,20 +81,19 @@ def identify(
     best, residuals, working = max(ends, key=lambda end: log_likelihood(end[1], log_times, end[2]))
     _check_bounds(law, coordinates, best.u)
     scatter = estimated(residuals, log_times, full_guess(working, len(thin), nuisances), nuisances)
-    size = effective_size(residuals, log_times, scatter)
-    factor, whole = whitener(residuals, log_times, working), whitener(residuals, log_times, scatter)
-    covariance = laplace(residuals, factor, whole, box, size)
+    covariance, freedom = laplace(residuals, log_times, working, scatter, box)
     misfits = tuple(_misfits(objective, residuals, expected_effects(residuals, log_times, scatter)))
     return Identification(
         law=law,
-        estimates=estimates(law, coordinates, best.u, covariance, quantile(size, len(law.params))),
+        estimates=estimates(law, coordinates, best.u, covariance, quantile(freedom)),
         u=best.u,
         covariance=covariance,
         reference=reference,
         scatter=scatter,
         rms=_pooled(misfits),
         log_likelihood=log_likelihood(residuals, log_times, working),
-        size=size,
+        size=effective_size(residuals, log_times, scatter),
+        freedom=freedom,
         misfits=misfits,
         ranges=_ranges(thin),
         settings=settings,
@@ -236,9 +235,17 @@ def _check_bounds(law: CreepLaw, coordinates: Coordinates, u: Floats) -> None:
             )
 
 
-def _check(law: CreepLaw, histories: Sequence[History], settings: Settings) -> None:
+def _check(
+    law: CreepLaw, histories: Sequence[History], settings: Settings, nuisances: Sequence[Nuisance]
+) -> None:
     if not histories:
         raise FitError(f"law '{law.name}': there are no histories to identify it from")
+    for nuisance in nuisances:
+        if nuisance.kind not in ("offset", "rate") or nuisance.scope != "test":
+            raise FitError(
+                f"nuisance '{nuisance.kind}' for {nuisance.scope} is not known to this identification; "
+                "allowed are 'offset' and 'rate', one for each test"
+            )
     if settings.loss not in LOSSES:
         raise FitError(f"loss '{settings.loss}' is not known; allowed are {', '.join(LOSSES)}")
     for history in histories:

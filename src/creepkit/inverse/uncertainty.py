@@ -2,21 +2,24 @@
 
 Values minimise r' W r with the working covariance W^-1; residuals really have the covariance C. With J = dr/du the
 covariance of the values is (J'WJ)^-1 J'W C W J (J'WJ)^-1, the sandwich, joined with a weak Gaussian prior of the
-variance of each parameter's bounds. Intervals are 95 %. Sizes of scatter come from the same data: with N effectively
-independent frames (about one a test when tests differ) and K parameters the covariance is scaled by N/(N - K) and
-quantiles are Student's with N - K degrees of freedom.
+variance of each parameter's bounds. Intervals are 95 %.
+
+Sizes of scatter come from the same few tests: with T tests and K parameters the part that the scatter between tests
+contributes is scaled by T/(T - K) and has T - K degrees of freedom, the rest those of its independent frames;
+Satterthwaite's formula joins them to the freedom of Student's quantile.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
 
 from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.covariance import Scatter, covariance, effective_size, whitener
 from creepkit.inverse.objective import Residuals
 from creepkit.inverse.search import Box
 from creepkit.language import CreepLaw
@@ -37,35 +40,46 @@ class Estimate:
     verdict: str
 
 
-def quantile(size: float, count: int) -> float:
-    """Half width of a 95 % interval in standard deviations, for `size` independent frames and `count` parameters."""
-    return float(student.ppf(0.975, max(size - count, 1.0)))
+def quantile(freedom: float) -> float:
+    """Half width of a 95 % interval in standard deviations."""
+    return float(student.ppf(0.975, max(freedom, 1.0)))
 
 
-def laplace(residuals: Residuals, working: Floats, whole: Floats, box: Box, size: float) -> Floats:
-    """Posterior covariance of u, (parameters, parameters).
-
-    working, whole : (tests, frames, frames) Cholesky factors of the working and of the whole covariance.
-    """
+def laplace(residuals: Residuals, log_times: Floats, working: Scatter, scatter: Scatter, box: Box) -> tuple[Floats, float]:
+    """Posterior covariance of u, (parameters, parameters), and its degrees of freedom."""
     assert residuals.jacobian is not None
-    count = box.width.size
-    white = np.linalg.solve(working, residuals.jacobian)
-    weighted = np.linalg.solve(np.swapaxes(working, 1, 2), white)
-    root = np.swapaxes(whole, 1, 2) @ weighted
-    bread = np.einsum("tfp,tfq->pq", white, white) + 1e-12 * np.diag(1.0 / box.width**2)
-    meat = np.einsum("tfp,tfq->pq", root, root) * max(size, 1.0) / max(size - count, 1.0)
-    scale = np.sqrt(np.diag(bread))
-    inner = np.linalg.pinv(bread / np.outer(scale, scale), hermitian=True, rcond=1e-13) / np.outer(scale, scale)
-    free = inner @ meat @ inner
+    count, tests = box.width.size, len(residuals.values)
+    factor = whitener(residuals, log_times, working)
+    white = np.linalg.solve(factor, residuals.jacobian)
+    weighted = np.linalg.solve(np.swapaxes(factor, 1, 2), white)
+    inner = _inverse(np.einsum("tfp,tfq->pq", white, white), box)
+
+    def part(source: Scatter) -> Floats:
+        meat = np.einsum("tfp,tfg,tgq->pq", weighted, covariance(residuals, log_times, source), weighted)
+        return np.asarray(inner @ meat @ inner)
+
+    within = part(replace(scatter, rate=0.0))
+    between = part(scatter) - within if scatter.rate > 0 else np.zeros_like(within)
+    freedoms = max(tests - count, 1.0), max(effective_size(residuals, log_times, replace(scatter, rate=0.0)) - count, 1.0)
+    between *= tests / freedoms[0]
+    share = float(np.mean(np.diag(between) / np.maximum(np.diag(between) + np.diag(within), 1e-300)))
+    freedom = 1.0 / (share**2 / freedoms[0] + (1 - share) ** 2 / freedoms[1])
     prior = np.diag(box.width**2 / 12.0)
-    return np.asarray(prior - prior @ np.linalg.solve(prior + free, prior))
+    return np.asarray(prior - prior @ np.linalg.solve(prior + within + between, prior)), freedom
 
 
-def estimates(law: CreepLaw, coordinates: Coordinates, u: Floats, covariance: Floats, wide: float) -> tuple[Estimate, ...]:
+def _inverse(information: Floats, box: Box) -> Floats:
+    """Inverse of the information; directions that it lacks get the width of the box a millionfold."""
+    information = information + 1e-12 * np.diag(1.0 / box.width**2)
+    scale = np.outer(*[np.sqrt(np.diag(information))] * 2)
+    return np.asarray(np.linalg.pinv(information / scale, hermitian=True, rcond=1e-13) / scale)
+
+
+def estimates(law: CreepLaw, coordinates: Coordinates, u: Floats, posterior: Floats, wide: float) -> tuple[Estimate, ...]:
     """Intervals of the author's parameters, `wide` standard deviations to each side."""
     theta = coordinates.theta(u)
     to_theta = coordinates.jacobian(u)
-    sd = np.sqrt(np.diag(to_theta @ covariance @ to_theta.T))
+    sd = np.sqrt(np.diag(to_theta @ posterior @ to_theta.T))
     found = []
     for (name, param), value, spread in zip(law.table.items(), theta, sd, strict=True):
         low, high = (param.to_internal(b) for b in param.bounds)
@@ -86,17 +100,17 @@ def _verdict(value: float, half: float, low: float, high: float) -> str:
 
 
 def band(
-    function: Callable[[Floats], Floats], u: Floats, covariance: Floats, step: float = 1e-4
+    function: Callable[[Floats], Floats], u: Floats, posterior: Floats, step: float = 1e-4
 ) -> tuple[Floats, Floats]:
     """Value and standard deviation of functions of u, by the delta method with central differences.
 
     function : u (parameters,) -> (...,); returns two arrays of that shape.
     """
-    sd = np.sqrt(np.diag(covariance))
+    sd = np.sqrt(np.diag(posterior))
     columns = []
     for k in range(u.size):
         h = np.zeros(u.size)
         h[k] = step * max(sd[k], 1e-8)
         columns.append((function(u + h) - function(u - h)) / (2 * h[k]))
     slope = np.stack(columns, axis=-1)
-    return function(u), np.sqrt(np.einsum("...i,ij,...j->...", slope, covariance, slope))
+    return function(u), np.sqrt(np.einsum("...i,ij,...j->...", slope, posterior, slope))

@@ -9,9 +9,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-import llvmlite.binding
 import numba
 import numpy as np
+from numba.core.registry import cpu_target
 
 from creepkit.arrays import Floats, frozen
 from creepkit.kernels import disk_cache
@@ -62,7 +62,7 @@ def _maker() -> str:
     digest = hashlib.sha256()
     for path in (*sorted(Path(__file__).parent.glob("*.py")), Path(str(symbols.__file__))):
         digest.update(path.read_bytes())
-    machine = (llvmlite.binding.get_host_cpu_name(), llvmlite.binding.get_host_cpu_features().flatten())
+    machine = cpu_target.target_context.codegen().magic_tuple()
     for word in (sys.version, numba.__version__, *machine):
         digest.update(word.encode())
     return digest.hexdigest()

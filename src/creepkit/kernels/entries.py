@@ -6,7 +6,7 @@ that name; what else is common to several results is called x0, x1 ...
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy
@@ -58,14 +58,12 @@ class Lowered:
     log_rate: Entry
     update: Entry
     sensitivity: Entry
+    log_sensitivity: Entry
 
 
-def entries(law: CreepLaw, pairing: bool = False) -> Lowered:
-    """Lower a law to its entries; the layout of `update` and `sensitivity` is that of kernels.interface.
-
-    pairing : as in `log_form`; slopes are paired in any case.
-    """
-    form = log_form(law, pairing)
+def entries(law: CreepLaw) -> Lowered:
+    """Lower a law to its entries; the layout of `update` and `sensitivity` is that of kernels.interface."""
+    form = log_form(law)
     names = Names(law, form)
     point = (*POINT, *law.states)
     size, variables = len(point), (*point, *form.theta)
@@ -78,18 +76,19 @@ def entries(law: CreepLaw, pairing: bool = False) -> Lowered:
         return [*first, *(row[k] for row in inner for k in columns)]
 
     terms = {symbol: sympy.exp(ln) for symbol, ln in zip(names.terms, form.terms, strict=True)}
-    rates = [sympy.Add(*terms), *form.state_rates]
     log_rate, weights, shares = _log_sum(names, form.terms)
-    log_rates = [log_rate, *form.state_rates]
-    to_point, to_theta = along(list(terms), 0, size), along(list(terms), size, len(variables))
+    rates, log_rates = [sympy.Add(*terms), *form.state_rates], [log_rate, *form.state_rates]
+    to_point, to_theta = along([*terms], 0, size), along([*terms], size, len(variables))
+    ln_to_point, ln_to_theta = along(weights, 0, size), along(weights, size, len(variables))
     return Lowered(
         law,
         form,
         names,
         rate=_entry("rate", names, terms, rates),
         log_rate=_entry("log_rate", names, shares, log_rates),
-        update=_entry("update", names, shares, [*log_rates, *along(weights, 0, size)]),
+        update=_entry("update", names, shares, [*log_rates, *ln_to_point]),
         sensitivity=_entry("sensitivity", names, terms, [*rates, *to_point, *to_theta]),
+        log_sensitivity=_entry("log_sensitivity", names, shares, [*log_rates, *ln_to_point, *ln_to_theta]),
     )
 
 

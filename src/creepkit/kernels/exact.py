@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import mpmath
@@ -25,13 +25,13 @@ class Exact:
         self._values = self._compiled(self._parts)
         self._columns = self._compiled([[row[k] for row in slopes] for k in range(len(self.variables))])
 
-    def terms(self, point: Sequence[float], theta: Sequence[float]) -> list[Any]:
+    def terms(self, point: Iterable[float], theta: Iterable[float]) -> list[Any]:
         """Each term at a point (six variables, then states) with internal parameters theta."""
         with mpmath.workdps(self.digits):
             plain = [self._plain(k, v) for k, v in enumerate(_numbers(point, theta))]
             return self._at(plain)[: len(self.law.terms)]
 
-    def rows(self, point: Sequence[float], theta: Sequence[float]) -> list[list[Any]]:
+    def rows(self, point: Iterable[float], theta: Iterable[float]) -> list[list[Any]]:
         """For the rate and each state rate: value, derivatives to the point and states, then to theta."""
         with mpmath.workdps(self.digits):
             plain = [self._plain(k, v) for k, v in enumerate(_numbers(point, theta))]
@@ -39,10 +39,11 @@ class Exact:
                 columns = self._columns(*plain)
             except (ZeroDivisionError, ValueError):  # slopes such as n x^n/x at x = 0
                 return self.differences(point, theta)
-            scaled = [[d * v if log else d for d in c] for c, v, log in zip(columns, plain, self._logarithmic, strict=True)]
+            chain = [v if log else 1 for v, log in zip(plain, self._logarithmic, strict=True)]
+            scaled = [[slope * c for slope in column] for column, c in zip(columns, chain, strict=True)]
             return self._rows([self._at(plain), *scaled])
 
-    def differences(self, point: Sequence[float], theta: Sequence[float]) -> list[list[Any]]:
+    def differences(self, point: Iterable[float], theta: Iterable[float]) -> list[list[Any]]:
         """The same with central differences, in four times the digits, for derivatives."""
         with mpmath.workdps(4 * self.digits):
             numbers = _numbers(point, theta)
@@ -77,5 +78,5 @@ def _slope(part: sympy.Expr, variable: sympy.Symbol) -> sympy.Expr:
     return sympy.diff(part, variable).replace(sympy.DiracDelta, lambda *_: sympy.S.Zero)
 
 
-def _numbers(point: Sequence[float], theta: Sequence[float]) -> list[Any]:
+def _numbers(point: Iterable[float], theta: Iterable[float]) -> list[Any]:
     return [mpmath.mpf(float(v)) for v in (*point, *theta)]

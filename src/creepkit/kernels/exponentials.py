@@ -1,4 +1,7 @@
-"""Differences of exponentials, paired so that they keep their digits: exp(a) - exp(b) where a is close to b."""
+"""Sums of exponentials that cancel, written so that they keep their digits: exp(a) - exp(b) where a is close to b.
+
+Only sums that vanish as a whole are rewritten: 1 - exp(-t/tau) is, n_inf + (n_0 - n_inf) exp(-t/tau) is not.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from creepkit.kernels.stable_functions import ExpDifference, Expm1
 
 
 def paired(total: sympy.Expr) -> sympy.Expr:
-    """Rewrite c exp(a) - c exp(b) as c ExpDifference(a, b), and c exp(a) - c as c Expm1(a), wherever they occur."""
+    """Rewrite sums of c exp(a) - c exp(b) as c ExpDifference(a, b), and of c exp(a) - c as c Expm1(a)."""
     if not total.has(sympy.exp):
         return total
     groups: dict[sympy.Expr, list[tuple[sympy.Expr, sympy.Expr]]] = defaultdict(list)
@@ -19,16 +22,9 @@ def paired(total: sympy.Expr) -> sympy.Expr:
         exponents = [f.args[0] for f in sympy.Mul.make_args(rest) if isinstance(f, sympy.exp)]
         others = [f for f in sympy.Mul.make_args(rest) if not isinstance(f, sympy.exp)]
         groups[sympy.Mul(*others)].append((number, sympy.Add(*exponents)))
-    if not any(_cancels(group) for group in groups.values()):
+    if not all(len(group) == 2 and group[0][0] + group[1][0] == 0 for group in groups.values()):
         return total
-    parts = []
-    for other, group in groups.items():
-        if _cancels(group):
-            (number, a), (_, b) = group
-            parts.append(number * other * _difference(a, b))
-        else:
-            parts += [number * other * sympy.exp(a) for number, a in group]
-    return sympy.Add(*parts)
+    return sympy.Add(*(other * _difference(*group) for other, group in groups.items()))
 
 
 def paired_everywhere(expression: sympy.Expr) -> sympy.Expr:
@@ -36,13 +32,7 @@ def paired_everywhere(expression: sympy.Expr) -> sympy.Expr:
     return expression.replace(lambda e: e.is_Add, paired)
 
 
-def _cancels(group: list[tuple[sympy.Expr, sympy.Expr]]) -> bool:
-    return len(group) == 2 and group[0][0] + group[1][0] == 0
-
-
-def _difference(a: sympy.Expr, b: sympy.Expr) -> sympy.Expr:
-    if b == 0:
-        return Expm1(a)
-    if a == 0:
-        return -Expm1(b)
-    return ExpDifference(a, b)
+def _difference(first: tuple[sympy.Expr, sympy.Expr], second: tuple[sympy.Expr, sympy.Expr]) -> sympy.Expr:
+    """Return k exp(a) - k exp(b), always with the same one of the two in front."""
+    (number, a), (_, b) = sorted((first, second), key=lambda pair: (pair[1] == 0, sympy.default_sort_key(pair[1])))
+    return number * (Expm1(a) if b == 0 else ExpDifference(a, b))

@@ -8,7 +8,7 @@ theta : (P,) internal parameters, the natural logarithm where the scale is log; 
     (the mask for {0}).
 out : one row a point,
     rate        (1 + S)                     rate 1/s, then each state's rate;
-    update      (1 + S) (1 + 6 + S)         [ln rate, state rates], then their derivatives with respect to x, row by row;
+    update      (1 + S) (1 + 6 + S)         [ln rate, state rates], then their derivatives to x, row by row;
     sensitivity (1 + S) (1 + 6 + S + P)     [rate, state rates], then derivatives to x, then derivatives to theta.
 The returned flags add up: 1 a rate is not finite, 2 a derivative is not finite.
 
@@ -61,7 +61,8 @@ class CompiledLaw:
     initial : (S,) states at time zero; limits : (S,) values at which the point has failed (inf: none).
     log_scale : (P,) which internal parameters are logarithms.
     leading : function of theta (..., P) giving the exponent beta of time in strain ~ t^beta as t -> 0+ from a
-        virgin state at constant stress, (...,).
+        virgin state at constant stress, (...,). Where an exponent varies with the point, a second argument
+        (..., 6 + S) says which; else it is taken at 100 MPa and 1000 K.
     """
 
     rate: Any
@@ -71,7 +72,7 @@ class CompiledLaw:
     log_scale: np.ndarray[Any, np.dtype[np.bool_]]
     initial: Floats
     limits: Floats
-    leading: Callable[[Floats], Floats]
+    leading: Callable[..., Floats]
     source: str
     fingerprint: str
 

@@ -7,12 +7,14 @@ that are bases of powers are floored (FLOOR below), never parameters.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import sympy
 
 from creepkit.errors import LawError
-from creepkit.kernels.exponentials import paired
+from creepkit.kernels.exponentials import paired, paired_everywhere
 from creepkit.kernels.stable_functions import (
     Coth,
     ExpDifference,
@@ -67,15 +69,10 @@ class LogForm:
     coefficients: tuple[tuple[int, ...], ...]
 
 
-def log_form(law: CreepLaw, pairing: bool = False) -> LogForm:
-    """Lower a law; LawError, naming the term, where it holds what no kernel can evaluate.
-
-    pairing : pair differences of exponentials inside exponents too. Values do not need it; it is for a target that
-        differentiates what it is given, and so would meet such differences in gradients.
-    """
+def log_form(law: CreepLaw) -> LogForm:
+    """Lower a law; LawError, naming the term, where it holds what no kernel can evaluate."""
     logs = _logarithms(law)
-    bases = {*POINT, *law.states}
-    lowering, inner = _Lowering(logs, bases, pairing), _Lowering(logs, bases, pairing=True)
+    lowering = _Lowering(logs, {*POINT, *law.states})
     rates = {f"rate of '{symbol}'": state.rate for symbol, state in law.states.items()}
     for place, expression in ({f"term '{k}'": v for k, v in law.terms.items()} | rates).items():
         _check(expression, f"law '{law.name}', {place}")
@@ -89,7 +86,7 @@ def log_form(law: CreepLaw, pairing: bool = False) -> LogForm:
     coefficients = [sorted(positions[s] for s in _coefficients(t) if s in logs) for t in law.terms.values()]
     return LogForm(
         terms=tuple(terms),
-        state_rates=tuple(inner.linear(state.rate) for state in law.states.values()),
+        state_rates=tuple(paired_everywhere(lowering.linear(state.rate)) for state in law.states.values()),
         theta=tuple(logs.get(s, s) for s in law.params),
         logs=logs,
         coefficients=tuple(map(tuple, coefficients)),
@@ -136,8 +133,8 @@ def _coefficients(term: sympy.Expr) -> set[sympy.Symbol]:
 class _Lowering:
     """One walk over a law's expressions. logs : {parameter: its logarithm}; bases : what FLOOR applies to."""
 
-    def __init__(self, logs: dict[sympy.Symbol, sympy.Symbol], bases: set[sympy.Symbol], pairing: bool) -> None:
-        self.logs, self.bases, self.pairing = logs, bases, pairing
+    def __init__(self, logs: dict[sympy.Symbol, sympy.Symbol], bases: set[sympy.Symbol]) -> None:
+        self.logs, self.bases = logs, bases
 
     # ---- logarithms ------------------------------------------------------------------------------------------------
 
@@ -168,7 +165,8 @@ class _Lowering:
         factors = list(sympy.Mul.make_args(rest))
         if number > 0:
             return sympy.Add(*(self.log_of(f) for f in (number, *factors)))
-        turned = next((f for f in factors if f.is_Add), None) or next((f for f in factors if self._may_be_negative(f)), None)
+        sums = [f for f in factors if f.is_Add]
+        turned = next(iter(sums or filter(self._may_be_negative, factors)), None)
         if turned is None:
             raise LawError(f"{e} is negative, and a rate is not; write recovery as a factor or an internal variable")
         factors.remove(turned)
@@ -211,11 +209,7 @@ class _Lowering:
         if isinstance(e, sympy.Abs) and e.args[0] in self.bases:
             return e.args[0]
         arguments = [self.linear(argument) for argument in e.args]
-        rewrite = _REWRITES.get(e.func)
-        if rewrite:
-            return rewrite(*arguments)
-        rebuilt = e.func(*arguments)
-        return paired(rebuilt) if self.pairing and rebuilt.is_Add else rebuilt
+        return _REWRITES.get(e.func, e.func)(*arguments)
 
     def _power(self, e: sympy.Pow) -> sympy.Expr:
         if not e.exp.is_Integer:
@@ -228,7 +222,7 @@ class _Lowering:
         return Log1p(self.linear(e - 1)) if e.is_Add and sympy.S.One in e.args else self.log_of(e)
 
 
-_REWRITES = {
+_REWRITES: dict[Any, Callable[..., sympy.Basic]] = {
     sympy.tanh: Tanh,
     sympy.coth: Coth,
     sympy.Abs: lambda x: sympy.Piecewise((x, x >= 0), (-x, True)),
@@ -237,14 +231,13 @@ _REWRITES = {
 }
 """Functions whose derivatives in sympy are distributions, or lose digits."""
 
-
-_LOGARITHMS = {sympy.sinh: LogSinh, sympy.cosh: LogCosh, sympy.tanh: LogTanh}
+_LOGARITHMS: dict[Any, Any] = {sympy.sinh: LogSinh, sympy.cosh: LogCosh, sympy.tanh: LogTanh}
 
 
 def _log_of_number(e: sympy.Expr) -> sympy.Expr:
     value = e.evalf(30)
     if value < 0:
-        raise LawError(f"the factor {e} is negative, and a rate is not; write recovery as a factor or an internal variable")
+        raise LawError(f"{e} is negative, and a rate is not; write recovery as a factor or an internal variable")
     if value == 1:
         return sympy.S.Zero
     return sympy.Float(sympy.log(value) if value > 0 else sympy.log(sympy.Float(TINY)), 17)

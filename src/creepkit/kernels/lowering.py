@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import linecache
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
 from itertools import islice
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, overload
-
-import numpy as np
 
 from creepkit.errors import LawError, nearest
 from creepkit.kernels.entries import Lowered, entries
@@ -69,30 +67,35 @@ class Kernel:
     (logarithms where the scale is log), by position, and check nothing.
     """
 
-    def __init__(self, lowered: Lowered, target: Target, functions: ModuleType) -> None:
+    def __init__(self, lowered: Lowered, target: ModuleType) -> None:
         law = lowered.law
-        parts = (lowered.rate, lowered.log_rate, lowered.sensitivity)
-        self.law, self.target = law, target
-        self.source = "\n".join([*described(law), "\n", *map(array_function, parts)])
-        name = f"<creepkit kernel {law.fingerprint} {target}>"
-        linecache.cache[name] = (len(self.source), None, self.source.splitlines(True), name)
-        self._functions: dict[str, Any] = {name: getattr(functions, name) for name in functions.__all__}
-        exec(compile(self.source, name, "exec"), self._functions)
-        self._alike = functions.alike
+        printed = (lowered.rate, lowered.log_rate, lowered.sensitivity, lowered.log_sensitivity)
+        self.law = law
+        self.source = "\n".join([*described(law), "\n", *map(array_function, printed)])
+        self._target = target
+        self._entries = target.bound(self._executed(), len(lowered.names.inputs) - len(law.params))
         self._states = [s.name for s in law.states]
         self._variables = [*(s.name for s in POINT), *self._states]
 
+    def _executed(self) -> dict[str, Callable[..., Any]]:
+        """Run the printed text, with lines that tracebacks can show."""
+        name = f"<creepkit kernel {self.law.fingerprint} {self._target.__name__}>"
+        linecache.cache[name] = (len(self.source), None, self.source.splitlines(True), name)
+        namespace = dict(self._target.FUNCTIONS)
+        exec(compile(self.source, name, "exec"), namespace)
+        return {entry: namespace[entry] for entry in ("rate", "log_rate", "sensitivity", "log_sensitivity")}
+
     def rate(self, values: Mapping[str, Any], **point: Any) -> Any:
         """Rate of equivalent creep strain, 1/s; inf or 0 where it is beyond float64 (log_rate is finite there)."""
-        return self._call("rate", self._arguments(values, point))[0]
+        return self._entries["rate"](*self._arguments(values, point))[0]
 
     def log_rate(self, values: Mapping[str, Any], **point: Any) -> Any:
         """Natural logarithm of the rate; finite where the rate itself over- or underflows, -1e30 where it is off."""
-        return self._call("log_rate", self._arguments(values, point))[0]
+        return self._entries["log_rate"](*self._arguments(values, point))[0]
 
     def state_rates(self, values: Mapping[str, Any], **point: Any) -> dict[str, Any]:
         """Rates of the internal variables, 1/s."""
-        out = self._call("rate", self._arguments(values, point))
+        out = self._entries["rate"](*self._arguments(values, point))
         return dict(zip(self._states, out[1:], strict=True))
 
     def derivatives(self, values: Mapping[str, Any], **point: Any) -> Derivatives:
@@ -101,29 +104,25 @@ class Kernel:
 
     def internal_rate(self, *arguments: Any) -> Any:
         """The rate."""
-        return self._call("rate", arguments)[0]
+        return self._entries["rate"](*arguments)[0]
 
     def internal_rates(self, *arguments: Any) -> Any:
         """The rate and every state rate, a tuple."""
-        return self._call("rate", arguments)
+        return self._entries["rate"](*arguments)
 
     def internal_log_rate(self, *arguments: Any) -> Any:
         """The logarithm of the rate."""
-        return self._call("log_rate", arguments)[0]
+        return self._entries["log_rate"](*arguments)[0]
 
     def internal_derivatives(self, *arguments: Any) -> Derivatives:
         """The rate and its derivatives."""
         rows, size, names = 1 + len(self._states), len(self._variables), self.law.names
-        out = iter(self._call("sensitivity", arguments))
+        out = iter(self._entries["sensitivity"](*arguments))
         values = list(islice(out, rows))
         point = [dict(zip(self._variables, islice(out, size), strict=True)) for _ in range(rows)]
         theta = [dict(zip(names, islice(out, len(names)), strict=True)) for _ in range(rows)]
         inner = [a | b for a, b in zip(point, theta, strict=True)]
         return Derivatives(values[0], point[0], theta[0], dict(zip(self._states, inner[1:], strict=True)))
-
-    def _call(self, entry: str, arguments: Sequence[Any]) -> Any:
-        with np.errstate(over="ignore", under="ignore", divide="ignore"):
-            return self._alike(self._functions[entry](*arguments), arguments)
 
     def _arguments(self, values: Mapping[str, Any], point: Mapping[str, Any]) -> Sequence[Any]:
         for name in point:
@@ -133,7 +132,7 @@ class Kernel:
             raise LawError(f"law '{self.law.name}' needs a stress, in MPa")
         if self.law.uses(POINT[3]) and "temperature" not in point:
             raise LawError(f"law '{self.law.name}' depends on temperature: give temperature in K")
-        given = {name: self._number(value) for name, value in point.items()}
+        given = {name: self._target.number(value) for name, value in point.items()}
         defaults = {"principal_stress": given["stress"], "mean_stress": given["stress"] / 3.0, "temperature": 1.0}
         defaults |= {s.name: z.initial for s, z in self.law.states.items()}
         return [*(given.get(n, defaults.get(n, 0.0)) for n in self._variables), *self._theta(values)]
@@ -144,14 +143,11 @@ class Kernel:
         missing = [name for name in self.law.names if name not in values]
         if missing:
             raise LawError(f"law '{self.law.name}' needs a value for {', '.join(missing)}")
-        log = self._functions["log_or_off"]
-        numbers = {n: self._number(values[n]) for n in self.law.names}
+        log = self._target.FUNCTIONS["log_or_off"]
+        numbers = {n: self._target.number(values[n]) for n in self.law.names}
         return [log(numbers[n]) if p.scale == "log" else numbers[n] for n, p in self.law.table.items()]
-
-    def _number(self, value: Any) -> Any:
-        return value if self.target == "torch" or isinstance(value, float) else np.asarray(value)
 
 
 @lru_cache(maxsize=256)
 def _kernel(law: CreepLaw, target: Target) -> Kernel:
-    return Kernel(entries(law, pairing=target == "torch"), target, import_module(f"creepkit.kernels.{target}_functions"))
+    return Kernel(entries(law), import_module(f"creepkit.kernels.{target}_target"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 
 import sympy
 
@@ -18,7 +18,17 @@ from creepkit.language.symbols import POINT
 _TAKEN = (
     *keyword.kwlist,
     *FUNCTIONS,
-    *("rate", "log_rate", "update", "sensitivity", "exponents", "COEFFICIENTS", "SIGNATURE", "cfunc"),
+    *(
+        "rate",
+        "log_rate",
+        "update",
+        "sensitivity",
+        "log_sensitivity",
+        "exponents",
+        "COEFFICIENTS",
+        "SIGNATURE",
+        "cfunc",
+    ),
     *("rows", "row", "x", "theta", "out", "flags", "range"),
 )
 _NUMBERED = re.compile(r"[xy]\d+")

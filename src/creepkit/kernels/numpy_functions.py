@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,12 +16,6 @@ __all__ = [
 asinh, atan, choose, power = np.arcsinh, np.arctan, np.where, np.power
 both, either, larger, smaller = np.logical_and, np.logical_or, np.maximum, np.minimum
 _LN2 = float(np.log(2.0))
-
-
-def alike(outputs: Sequence[Any], inputs: Sequence[Any]) -> list[Any]:
-    """Give every output the shape of all inputs together (zeros are printed as plain numbers)."""
-    shape = np.broadcast_shapes(*(np.shape(x) for x in inputs))
-    return [y if np.shape(y) == shape else np.broadcast_to(y, shape) for y in outputs]
 
 
 def log_or_off(x: Any) -> Any:
@@ -58,7 +51,11 @@ def log_floor(x: Any, floor: float) -> Any:
 def log_sinh(x: Any) -> Any:
     """Return ln sinh(x), x > 0."""
     x = np.maximum(x, 1e-30)
-    return x + np.log(-0.5 * np.expm1(-2.0 * x))
+    y = np.expm1(-2.0 * x)
+    y *= -0.5
+    y = np.log(y)
+    y += x
+    return y
 
 
 def log_cosh(x: Any) -> Any:
@@ -85,5 +82,8 @@ def coth(x: Any) -> Any:
 
 def exp_difference(a: Any, b: Any) -> Any:
     """exp(a) - exp(b) without cancellation."""
-    high, low = np.maximum(a, b), np.minimum(a, b)
-    return np.copysign(np.exp(high) * np.expm1(low - high), np.subtract(a, b))
+    high, size = np.maximum(a, b), np.minimum(a, b)
+    size -= high
+    size = np.expm1(size)
+    size *= np.exp(high)
+    return np.copysign(size, np.subtract(a, b))

@@ -78,6 +78,8 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
     _print_Pi = _print_Exp1 = _print_NumberSymbol
 
     def _print_Pow(self, e: Any, rational: bool = False, **_: Any) -> str:
+        if e.is_number:
+            return repr(float(e))
         base, tight = self._print(e.base), self.parenthesize(e.base, PRECEDENCE["Pow"])
         if e.exp == sympy.S.Half:
             return f"sqrt({base})"
@@ -104,13 +106,13 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
         return self._nested("either", list(e.args))
 
     def _nested(self, name: str, arguments: list[Any]) -> str:
-        text = self._print(arguments[0])
+        text: str = self._print(arguments[0])
         for argument in arguments[1:]:
             text = f"{name}({text}, {self._print(argument)})"
         return text
 
     def _print_Piecewise(self, e: Any) -> str:
-        text = self._print(e.args[-1].expr)
+        text: str = self._print(e.args[-1].expr)
         for branch, condition in reversed(e.args[:-1]):
             text = f"choose({self._print(condition)}, {self._print(branch)}, {text})"
         return text

@@ -88,20 +88,20 @@ def worst(truth: Truth, table: Table, forgive: bool = False) -> tuple[Difference
     values = derivatives = Difference()
     for k, (rows, got, log) in enumerate(zip(truth.rows, table.rows, table.logs, strict=True)):
         values = max(values, Difference(_log_difference(rows[0][0], log), k), key=_size)
-        for found in _differences(k, rows, got):
-            limit = VALUE_TOLERANCE if found.column == 0 else DERIVATIVE_TOLERANCE
-            judged = found if found.size <= limit else _judged(truth, float(got[found.row, found.column]), found, forgive)
-            if judged.column == 0:
-                values = max(values, judged, key=_size)
+        for seen in _differences(k, rows, got):
+            limit = VALUE_TOLERANCE if seen.column == 0 else DERIVATIVE_TOLERANCE
+            found = seen if seen.size <= limit else _judged(truth, table, seen, forgive)
+            if found.column == 0:
+                values = max(values, found, key=_size)
             else:
-                derivatives = max(derivatives, judged, key=_size)
+                derivatives = max(derivatives, found, key=_size)
     return values, derivatives
 
 
-def _judged(truth: Truth, got: float, where: Difference, forgive: bool) -> Difference:
+def _judged(truth: Truth, table: Table, where: Difference, forgive: bool) -> Difference:
     """A difference beyond the tolerance, looked at again with more digits and, if so wished, for cancellation."""
     k, row, column = where.sample, where.row, where.column
-    exact = truth.sharp(k)[row][column]
+    exact, got = truth.sharp(k)[row][column], float(table.rows[k, row, column])
     if forgive and abs(mpmath.mpf(got) - exact) <= _LAST_BITS * truth.last_bits(k)[row][column]:
         return Difference(0.0, k, row, column)
     return Difference(_relative(exact, got), k, row, column)

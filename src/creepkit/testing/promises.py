@@ -44,7 +44,8 @@ def printing(law: CreepLaw, _: Samples) -> Iterator[Check]:
     """LaTeX and source print, and the law survives pickling."""
     text, source = law.latex(), lower(law, "numpy").source
     balanced = text.count("{") == text.count("}") and text.count(r"\left") == text.count(r"\right")
-    yield Check("LaTeX and source print", balanced and "def rate" in source, f"{len(text)} and {len(source)} characters")
+    told = f"{len(text)} and {len(source)} characters"
+    yield Check("LaTeX and source print", balanced and "def rate" in source, told)
     again = pickle.loads(pickle.dumps(law))
     yield Check("pickle and equality", again == law and again.fingerprint == law.fingerprint, law.fingerprint)
 
@@ -55,8 +56,8 @@ def signs(law: CreepLaw, drawn: Samples) -> Iterator[Check]:
     for point, theta in zip(drawn.points, drawn.theta, strict=True):
         for label, value in zip(law.terms, exact.terms(point, theta), strict=True):
             if not (mpmath.im(value) == 0 and value >= 0):
-                detail = f"term '{label}' is {mpmath.nstr(value, 4)} 1/s at {_place(law, point)}; say where it holds in constraints"
-                yield Check("no term is negative", False, detail)
+                found = f"term '{label}' is {mpmath.nstr(value, 4)} 1/s at {_place(law, point)}"
+                yield Check("no term is negative", False, f"{found}; say in constraints where the law holds")
                 return
     yield Check("no term is negative", True, f"{len(drawn)} points")
 
@@ -141,7 +142,8 @@ def _verdict(name: str, law: CreepLaw, drawn: Samples, good: Bools) -> Check:
     if good.all():
         return Check(name, True, f"{good.size} points")
     first = int(np.flatnonzero(~good)[0])
-    return Check(name, False, f"not at {int((~good).sum())} of {good.size} points, such as {_place(law, drawn.points[first])}")
+    told = f"not at {int((~good).sum())} of {good.size} points, such as {_place(law, drawn.points[first])}"
+    return Check(name, False, told)
 
 
 def _place(law: CreepLaw, point: Floats) -> str:
@@ -180,8 +182,8 @@ def _switch_gap(law: CreepLaw, drawn: Samples, name: str, value: float) -> float
         fixed = law.fix(**{name: value})
     except LawError:  # no term is left
         return float(np.max(np.abs(off))) / NO_RATE
-    kept = {s.name for s in (*POINT, *fixed.states)}
-    expected = lower(fixed, "numpy").rate({n: values[n] for n in fixed.names}, **{n: v for n, v in point.items() if n in kept})
+    kept = {n: point[n] for n in (*(s.name for s in POINT), *(s.name for s in fixed.states))}
+    expected = lower(fixed, "numpy").rate({n: values[n] for n in fixed.names}, **kept)
     both = np.isfinite(off) & np.isfinite(expected)
     gap = np.abs(off[both] - expected[both]) / np.maximum(np.abs(expected[both]), NO_RATE)
     return float(gap.max(initial=0.0))
@@ -197,7 +199,8 @@ def _all_off(law: CreepLaw, drawn: Samples) -> tuple[bool, str]:
     """Rate 0 and a finite update, in every target."""
     for target, evaluate in TABLES.items():
         found = evaluate(law, drawn)
-        if not ((found.rows[:, 0, 0] < NO_RATE).all() and np.isfinite(found.rows).all() and np.isfinite(found.logs).all()):
+        finite = np.isfinite(found.rows).all() and np.isfinite(found.logs).all()
+        if not (finite and (found.rows[:, 0, 0] < NO_RATE).all()):
             return False, f"the {target} kernel leaves a rate, or a number that is not finite"
     compiled = lower(law, "numba")
     flags = [call(compiled, "update", p[None], t)[1] for p, t in zip(drawn.points, drawn.theta, strict=True)]

@@ -44,7 +44,7 @@ class Samples:
 
 
 def sample(law: CreepLaw, samples: int, seed: int = 0) -> Samples:
-    """Return at most `samples` Sobol points (a power of two) at which the law's constraints hold; fewer if they are rare."""
+    """Return Sobol points at which the law's constraints hold: `samples`, a power of two, or fewer if such are rare."""
     size = POINT_SIZE + len(law.states) + len(law.params)
     sequence = qmc.Sobol(size, seed=seed)
     points, theta = np.empty((0, POINT_SIZE + len(law.states))), np.empty((0, len(law.params)))

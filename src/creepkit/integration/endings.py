@@ -1,0 +1,57 @@
+"""How an integration may end: the limits of strain and states, and where in a step they are reached."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import NamedTuple
+
+from numba import njit
+
+from creepkit.arrays import Floats
+from creepkit.integration.dense import dense_value
+from creepkit.integration.step import Room
+from creepkit.integration.tableau import Tableau
+
+REACHED_END, STRAIN_LIMIT, STATE_LIMIT, DIVERGED, STEP_TOO_SMALL, TOO_MANY_STEPS = range(6)
+"""Codes of an ending; whatever it is, the history so far is kept."""
+
+
+class Limits(NamedTuple):
+    """Creep strain at which the point has burst; initial states and the values at which it has failed, (S,)."""
+
+    strain: float
+    initial: Floats
+    states: Floats
+
+
+@njit(cache=True, error_model="numpy")
+def _passed(limits: Limits, i: int, value: float) -> bool:
+    """Whether state `i` has passed its limit, coming from its initial value."""
+    if not isfinite(limits.states[i]):
+        return False
+    return bool(value >= limits.states[i] if limits.states[i] > limits.initial[i] else value <= limits.states[i])
+
+
+@njit(cache=True, error_model="numpy")
+def limit_reached(limits: Limits, work: Room) -> int:
+    """STATE_LIMIT or STRAIN_LIMIT when the new value has passed one, else REACHED_END."""
+    for i in range(limits.states.size):
+        if _passed(limits, i, work.new_value[1 + i]):
+            return STATE_LIMIT
+    return STRAIN_LIMIT if work.new_value[0] >= limits.strain else REACHED_END
+
+
+@njit(cache=True, error_model="numpy")
+def crossing(limits: Limits, tableau: Tableau, work: Room, h: float) -> float:
+    """Share of the step at which the first limit is passed, by bisection of the dense output."""
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        beyond = dense_value(tableau, work, h, middle, 0) >= limits.strain
+        for i in range(limits.states.size):
+            beyond = beyond or _passed(limits, i, dense_value(tableau, work, h, middle, 1 + i))
+        if beyond:
+            high = middle
+        else:
+            low = middle
+    return high

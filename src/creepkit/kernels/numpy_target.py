@@ -1,0 +1,33 @@
+"""Printed entries as functions of NumPy arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from creepkit.kernels import numpy_functions
+
+FUNCTIONS = {name: getattr(numpy_functions, name) for name in numpy_functions.__all__}
+"""What printed text calls."""
+
+
+def bound(printed: Mapping[str, Callable[..., Any]], width: int) -> dict[str, Callable[..., list[Any]]]:
+    """Return the printed entries with results that have the shape of all arguments together."""
+    return {name: _whole(entry) for name, entry in printed.items()}
+
+
+def number(value: Any) -> Any:
+    """A number or array, from what a user gives."""
+    return value if isinstance(value, float) else np.asarray(value)
+
+
+def _whole(entry: Callable[..., Any]) -> Callable[..., list[Any]]:
+    def call(*arguments: Any) -> list[Any]:
+        with np.errstate(over="ignore", under="ignore", divide="ignore"):
+            results = entry(*arguments)
+        shape = np.broadcast_shapes(*(np.shape(x) for x in arguments))
+        return [y if np.shape(y) == shape else np.broadcast_to(y, shape) for y in results]
+
+    return call

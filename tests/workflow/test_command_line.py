@@ -1,0 +1,155 @@
+"""The command line as a user runs it: from a folder of curves to a law, and one clear sentence when that cannot be."""
+
+import csv
+import importlib.util
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import creepkit as ck
+from creepkit.cli.app import app
+from creepkit.cli.demo import PLANTED
+
+CURVES = sorted(str(p) for p in PLANTED.glob("*.csv"))
+
+
+def creepkit(*words):
+    return CliRunner().invoke(app, [str(w) for w in words])
+
+
+def sentence(result):
+    """The one line on stderr of a failed command, after whatever progress was told."""
+    assert result.exit_code == 1, result.output
+    lines = [line for line in result.stderr.strip().splitlines() if not re.search(r": \d+ of \d+$", line)]
+    assert len(lines) == 1
+    assert lines[0].startswith("creepkit: ")
+    return lines[0]
+
+
+@pytest.fixture(scope="module")
+def identified(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("identified")
+    laws = ("--law", "strain-hardening", "--law", "norton")
+    result = creepkit("identify", *CURVES, *laws, "--to", folder, "--starts", 2, "--json")
+    assert result.exit_code == 0, result.output
+    return folder, json.loads(result.stdout)
+
+
+def test_identify_finds_the_planted_law_and_its_values(identified):
+    _, answer = identified
+    truth = json.loads((PLANTED / "truth.json").read_text())
+    assert answer["verdict"] == "decisive: strain-hardening*arrhenius"
+    best = answer["laws"][0]["parameters"]
+    assert all(best[name]["low"] <= value <= best[name]["high"] for name, value in truth["values"].items())
+
+
+def test_identify_leaves_json_plots_latex_and_python(identified):
+    folder, answer = identified
+    assert sorted(Path(f).name for f in answer["files"]) == sorted(p.name for p in folder.iterdir())
+    assert {p.suffix for p in folder.iterdir()} == {".json", ".png", ".tex", ".py"}
+
+
+def test_saved_identification_reloads_and_predicts(identified):
+    folder, _ = identified
+    fit = ck.load(folder / "strain-hardening-arrhenius.json")
+    again = fit.on(ck.read_histories(CURVES), ck.specimen("uniaxial"))
+    assert again.predict().values.shape[1] == len(CURVES)
+
+
+def test_exported_python_gives_the_identified_rate(identified):
+    """The module needs nothing but `math`; its rate is that of the identification at the same point."""
+    folder, _ = identified
+    fit = ck.load(folder / "strain-hardening-arrhenius.json")
+    spec = importlib.util.spec_from_file_location("exported_law", folder / "strain-hardening-arrhenius.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    rate, _, _ = fit.rate(80.0, 1073.15, strain=0.01)
+    assert module.rate(80.0, strain=0.01, temperature=1073.15) == pytest.approx(float(rate), rel=1e-6)
+
+
+def test_simulate_writes_a_curve_that_identify_reads(tmp_path):
+    path = tmp_path / "curve.csv"
+    result = creepkit("simulate", "norton", "--set", "A=1e-16", "--set", "n=5", "--stress", 100, "--end-h", 10,
+                      "--control", "stress", "--to", path)  # fmt: skip
+    assert result.exit_code == 0, result.output
+    (history,) = ck.read_histories(path)
+    assert history.outputs["strain"][-1] == pytest.approx(1e-16 * 100**5 * 36000, rel=1e-6)
+
+
+def test_simulate_prints_to_the_terminal():
+    result = creepkit("simulate", "norton", "--set", "A=1e-16", "--set", "n=5", "--stress", 100, "--end-h", 1, "--points", 3)
+    rows = [line for line in result.stdout.splitlines() if not line.startswith("#")]
+    assert list(csv.reader(rows))[0] == ["time_s", "strain"]
+
+
+def test_unknown_law_suggests_the_nearest(tmp_path):
+    told = sentence(creepkit("identify", *CURVES, "--law", "nortn", "--to", tmp_path / "none"))
+    assert "norton" in told
+    assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "empty"),
+        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,width_mm\n0,0\n1,1\n", "strain"),
+        ("# stress_furlong: 100\n# temperature_C: 800\ntime_s,strain\n0,0\n1,1e-4\n", "furlong"),
+        ("# stress_MPa: -100\n# temperature_C: 800\ntime_s,strain\n0,0\n1,1e-4\n", "stress"),
+        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain\n0,0\n5,1e-4\n3,2e-4\n", "bad.csv:6"),
+        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain\n0,0\n1,nan\n", "bad.csv:5"),
+        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain\n0,0\n", "one"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_one_sentence_and_nothing_is_written(tmp_path, text, words):
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    told = sentence(creepkit("identify", path, "--law", "norton", "--to", tmp_path / "out"))
+    assert "bad.csv" in told
+    assert words in told
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_law_is_never_evaluated_from_text(tmp_path):
+    told = sentence(creepkit("identify", *CURVES, "--law", "__import__('os').getcwd()", "--to", tmp_path / "out"))
+    assert "__import__" in told
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("def broken(:\n", "line 1"), ("raise ValueError('of its own')\n", "of its own"), ("x = 1\n", "hook")],
+)
+def test_a_broken_plugin_file_is_one_sentence(tmp_path, text, words):
+    path = tmp_path / "law_of_mine.py"
+    path.write_text(text)
+    told = sentence(creepkit("--plugin", path, "laws"))
+    assert "law_of_mine.py" in told
+    assert words in told
+
+
+def test_bounds_that_exclude_the_data_are_said(tmp_path):
+    plugin = tmp_path / "narrow.py"
+    plugin.write_text(
+        "from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress\n"
+        "A, n = parameters('A n')\n"
+        "LAW = CreepLaw(name='narrow', title='Narrow', terms={'t': A * stress**n}, references=('none',), params={\n"
+        "    A: Param('rate coefficient', unit='1/s', bounds=(1e-40, 1e-30), scale='log'),\n"
+        "    n: Param('stress exponent', bounds=(1, 3))})\n"
+        "@hookimpl\n"
+        "def creepkit_laws():\n"
+        "    return [LAW]\n"
+    )
+    told = sentence(creepkit("--plugin", plugin, "identify", *CURVES, "--law", "narrow", "--starts", 1, "--to", tmp_path / "o"))
+    assert "bounds exclude the data" in told
+    assert not (tmp_path / "o").exists()
+
+
+def test_demo_prints_the_truth_beside_the_answer(tmp_path):
+    result = creepkit("demo", "--to", tmp_path / "demo")
+    assert result.exit_code == 0, result.output
+    assert "the truth: strain-hardening" in result.stdout
+    assert (tmp_path / "demo" / "strain-hardening-arrhenius.png").stat().st_size > 20_000
+    assert "start" in result.stderr or sys.stderr.isatty()
