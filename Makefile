@@ -21,6 +21,9 @@ CPU_WHEELS := https://download.pytorch.org/whl/cpu
 # Two threads of torch on one busy core are far slower than one; pytest runs two workers instead.
 export OMP_NUM_THREADS := 1
 
+# numba looks at the file of a compiled function alone, not at those it calls: one cache for each state of the sources.
+export NUMBA_CACHE_DIR := $(CURDIR)/.venv/numba/$(shell cat src/creepkit/integration/*.py src/creepkit/kernels/*.py | cksum | cut -d' ' -f1)
+
 test: .venv/.ok
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check

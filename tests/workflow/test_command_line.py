@@ -96,7 +96,7 @@ def test_unknown_law_suggests_the_nearest(tmp_path):
     ("text", "words"),
     [
         ("", "empty"),
-        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,width_mm\n0,0\n1,1\n", "strain"),
+        ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain_sd\n0,1\n1,1\n", "strain"),
         ("# stress_furlong: 100\n# temperature_C: 800\ntime_s,strain\n0,0\n1,1e-4\n", "furlong"),
         ("# stress_MPa: -100\n# temperature_C: 800\ntime_s,strain\n0,0\n1,1e-4\n", "stress"),
         ("# stress_MPa: 100\n# temperature_C: 800\ntime_s,strain\n0,0\n5,1e-4\n3,2e-4\n", "bad.csv:6"),

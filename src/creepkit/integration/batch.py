@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -66,6 +67,11 @@ class PointTest:
             raise SolveError("stiffness must not be negative, and goes with prescribed strain, not with constant load")
         object.__setattr__(self, "times", times)
 
+    @cached_property
+    def segments(self) -> Floats:
+        """The programs merged, (segments, 6); kept, for a fit asks for them a thousand times."""
+        return segments_of(self.driving, self.temperature, float(self.times[-1]) if self.times.size else 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Integration:
@@ -106,7 +112,7 @@ def integrate(
     """Integrate every candidate, theta (candidates, P) in internal form, over every test."""
     theta = np.array(theta, dtype=float, order="C", ndmin=2)
     candidates, parameters = theta.shape
-    segments = [segments_of(t.driving, t.temperature, float(t.times[-1]) if t.times.size else 0.0) for t in tests]
+    segments = [t.segments for t in tests]
     starts = np.concatenate([[0], np.cumsum([t.times.size for t in tests], dtype=np.int64)])
     cuts = np.concatenate([[0], np.cumsum([s.shape[0] for s in segments], dtype=np.int64)])
     frames, rows = int(starts[-1]), candidates if jacobian else 0

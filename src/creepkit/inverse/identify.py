@@ -40,7 +40,7 @@ from creepkit.language import CreepLaw, temperature
 from creepkit.records import History, Nuisance, Predictor
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
-PUSH = 0.05
+PUSH = 1.0
 """How far, in ln, data may push a coefficient beyond its bounds against the fence before that is an error."""
 NUISANCES = (Nuisance("offset"), Nuisance("rate"))
 """Unless told otherwise: a loading-strain offset for each curve, and test-to-test scatter of the rate, both estimated."""

@@ -102,7 +102,7 @@ def multistart(
     seeds = [*extra, *_screened(objective, box, starts=starts, draws=draws, seed=seed)]
     found = []
     for k, u in enumerate(seeds):
-        found.append(refine(objective, box, factor, u, loss=loss))
+        found.append(refine(objective, box, factor, u, loss=loss, steps=30, tolerance=1e-5))
         if progress is not None:
             progress("start", k + 1, len(seeds))
     return sorted(found, key=lambda minimum: minimum.cost)
@@ -136,7 +136,7 @@ def from_single_terms(
 
 def refine(
     objective: Objective, box: Box, factor: Floats, start: Floats, *, loss: str = "linear",
-    steps: int = 80,
+    steps: int = 80, tolerance: float = 1e-10,
 ) -> Minimum:  # fmt: skip
     """Bounded least squares (scipy's trust region reflective) from one start, with analytic Jacobian.
 
@@ -169,9 +169,9 @@ def refine(
         x_scale=scale,
         loss=loss,
         max_nfev=steps,
-        ftol=1e-10,
-        xtol=1e-9,
-        gtol=1e-10,
+        ftol=tolerance,
+        xtol=10 * tolerance,
+        gtol=tolerance,
     )
     return Minimum(np.asarray(result.x), float(result.cost), bool(result.status > 0), int(result.nfev))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
 from typing import Any
 
 import mpmath
@@ -21,9 +22,7 @@ class Exact:
         logarithmic = {symbol for symbol, param in law.params.items() if param.scale == "log"}
         self._logarithmic = [v in logarithmic for v in self.variables]
         self._parts = [*law.terms.values(), *(state.rate for state in law.states.values())]
-        slopes = [[_slope(part, v) for v in self.variables] for part in self._parts]
         self._values = self._compiled(self._parts)
-        self._columns = self._compiled([[row[k] for row in slopes] for k in range(len(self.variables))])
 
     def terms(self, point: Iterable[float], theta: Iterable[float]) -> list[Any]:
         """Each term at a point (six variables, then states) with internal parameters theta."""
@@ -42,6 +41,11 @@ class Exact:
             chain = [v if log else 1 for v, log in zip(plain, self._logarithmic, strict=True)]
             scaled = [[slope * c for slope in column] for column, c in zip(columns, chain, strict=True)]
             return self._rows([self._at(plain), *scaled])
+
+    @cached_property
+    def _columns(self) -> Callable[..., Any]:
+        """For each variable, the derivatives of every part."""
+        return self._compiled([[_slope(part, v) for part in self._parts] for v in self.variables])
 
     def differences(self, point: Iterable[float], theta: Iterable[float]) -> list[list[Any]]:
         """The same with central differences, in four times the digits, for derivatives."""

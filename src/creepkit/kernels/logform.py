@@ -34,8 +34,9 @@ from creepkit.language.symbols import POINT, temperature
 FLOOR = 1e-30
 """Stress, strain, time and states below this act as this when they are bases of powers; slopes are those there."""
 
-TINY = 1e-300
-"""Composite bases, such as Max(stress - threshold, 0), are floored here: zero to any power above 1.04 is zero."""
+TINY = 1e-200
+"""Composite bases, such as Max(stress - threshold, 0), are floored here: a term that is zero becomes about 1e-200 1/s,
+small enough to be nothing and large enough for its slope, which is the term over this floor."""
 
 KNOWN = (
     *(sympy.exp, sympy.log, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth, sympy.asinh),
@@ -47,7 +48,7 @@ KNOWN = (
 _ALGEBRA = (sympy.Add, sympy.Mul, sympy.Pow, sympy.functions.elementary.piecewise.ExprCondPair)
 _CONDITIONS = (
     *(sympy.GreaterThan, sympy.StrictGreaterThan, sympy.LessThan, sympy.StrictLessThan, sympy.And, sympy.Or),
-    *(type(sympy.true), type(sympy.false)),
+    *(sympy.Not, type(sympy.true), type(sympy.false)),
 )
 
 
@@ -206,6 +207,8 @@ class _Lowering:
             return self._power(e)
         if isinstance(e, sympy.log):
             return self._logarithm(e.args[0])
+        if isinstance(e, sympy.Not):
+            return self.linear(sympy.to_nnf(e))
         if isinstance(e, sympy.Abs) and e.args[0] in self.bases:
             return e.args[0]
         arguments = [self.linear(argument) for argument in e.args]

@@ -18,18 +18,9 @@ from creepkit.language.symbols import POINT
 _TAKEN = (
     *keyword.kwlist,
     *FUNCTIONS,
-    *(
-        "rate",
-        "log_rate",
-        "update",
-        "sensitivity",
-        "log_sensitivity",
-        "exponents",
-        "COEFFICIENTS",
-        "SIGNATURE",
-        "cfunc",
-    ),
-    *("rows", "row", "x", "theta", "out", "flags", "range"),
+    *("rate", "log_rate", "update", "sensitivity", "log_sensitivity", "exponents"),
+    *("COEFFICIENTS", "SIGNATURE", "cfunc", "isfinite", "range"),
+    *("rows", "row", "x", "theta", "out", "flags"),
 )
 _NUMBERED = re.compile(r"[xy]\d+")
 

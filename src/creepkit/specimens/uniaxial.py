@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -125,6 +126,7 @@ class Uniaxial:
         return integration.integrate(kernel, kernel.internal(values), tests, settings=settings, jacobian=jacobian)
 
 
+@lru_cache(maxsize=4096)
 def point_test(history: History) -> PointTest:
     """What the material point of a uniaxial history goes through."""
     where = history.source or f"history '{history.name}'"

@@ -1,6 +1,6 @@
 """Make the curves of `creepkit demo`: a planted law, nine tests, and what real tests add to it.
 
-Run it to write them anew:  python examples/make_planted_curves.py FOLDER
+Run it to write them anew:  python examples/00_make_planted_curves.py FOLDER
 Strain hardening with an Arrhenius factor. At constant stress strain and time hardening are one and the same, so one
 test of each temperature has a step of stress after 40 h: that tells them apart. Each test has its own rate (10 % scatter), its own loading strain and
 white noise of the extensometer, drawn from one seed.

@@ -1,0 +1,42 @@
+"""Every example and every Python block of the README runs as it stands."""
+
+import re
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = sorted(p for p in (ROOT / "examples").glob("[0-9]*.py"))
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("script", EXAMPLES, ids=lambda p: p.stem)
+def test_example_runs(script, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(script)])
+    runpy.run_path(str(script), run_name="__main__")
+
+
+def test_example_of_a_law_agrees_with_its_closed_form(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["02"])
+    runpy.run_path(str(ROOT / "examples" / "02_a_law_of_your_own.py"), run_name="__main__")
+    told = capsys.readouterr().out
+    assert float(re.search(r"largest relative difference: (\S+)", told)[1]) < 1e-4
+    assert "fading: conforms" in told
+
+
+def test_readme_blocks_run_in_order(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", README, flags=re.S)
+    assert len(blocks) >= 3
+    space: dict[str, object] = {}
+    for block in blocks:
+        exec(compile(block, "README.md", "exec"), space)
+
+
+def test_readme_opens_with_the_two_commands():
+    first = README.split("```")[1]
+    assert "make demo" in first
+    assert "make test" in first
