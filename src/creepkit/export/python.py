@@ -65,7 +65,7 @@ def _description(law: CreepLaw, values: Mapping[str, float], code: str) -> list[
         unit = "" if param.unit == "1" else f" {param.unit}"
         lines.append(f"  {name} = {values[name]!r}{unit}, {param.meaning}")
     if f"{FLOOR!r})" in code:
-        lines.append(f"Stress, strain, time and internal variables that are bases of powers act as {FLOOR:g} below it.")
+        lines.append(f"Stress, strain and internal variables that are bases of powers act as {FLOOR:g} below it.")
     lines.append("A result beyond 1.8e308 raises OverflowError.")
     lines += [f"Valid where {sympy.sstr(relation)}." for relation in law.constraints]
     return [*lines, *(f"Source: {reference}" for reference in law.references)]

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from creepkit.language.printing import text_of_expression
+
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
 
 
 def text_of(fit: Identification) -> str:
     """The law, its values with 95 % intervals, the scatter between tests, and what is not determined."""
-    lines = [f"{fit.law.title or fit.law.name}", *(f"  {label}: {term}" for label, term in fit.law.terms.items()), ""]
+    lines = [f"{fit.law.title or fit.law.name}", *(f"  {label}: {text_of_expression(term)}" for label, term in fit.law.terms.items()), ""]
     width = max(len(e.name) for e in fit.estimates) if fit.estimates else 4
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"

@@ -29,14 +29,23 @@ from creepkit.kernels.stable_functions import (
     Tanh,
 )
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import POINT, temperature
+from creepkit.language.symbols import POINT, temperature, time
 
 FLOOR = 1e-30
-"""Stress, strain, time and states below this act as this when they are bases of powers; slopes are those there."""
+"""Stress, strain and states below this act as this when they are bases of powers; slopes are those there."""
+
+TIME_FLOOR = 1e-120
+"""The same for time: what t^m with m = -0.95 has done by 1e-30 s is 2 % of its strain at 1e6 s, by 1e-120 s 1e-6 of it."""
 
 TINY = 1e-200
 """Composite bases, such as Max(stress - threshold, 0), are floored here: a term that is zero becomes about 1e-200 1/s,
 small enough to be nothing and large enough for its slope, which is the term over this floor."""
+
+
+def floor_of(symbol: sympy.Symbol) -> sympy.Float:
+    """The floor of a variable of the point, or of a state, as the base of a power."""
+    return sympy.Float(TIME_FLOOR if symbol == time else FLOOR)
+
 
 KNOWN = (
     *(sympy.exp, sympy.log, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth, sympy.asinh),
@@ -48,7 +57,7 @@ KNOWN = (
 _ALGEBRA = (sympy.Add, sympy.Mul, sympy.Pow, sympy.functions.elementary.piecewise.ExprCondPair)
 _CONDITIONS = (
     *(sympy.GreaterThan, sympy.StrictGreaterThan, sympy.LessThan, sympy.StrictLessThan, sympy.And, sympy.Or),
-    *(sympy.Not, type(sympy.true), type(sympy.false)),
+    *(type(sympy.true), type(sympy.false)),
 )
 
 
@@ -158,7 +167,7 @@ class _Lowering:
             return self.linear(e.args[0])
         if e.func in _LOGARITHMS:
             return _LOGARITHMS[e.func](self.linear(e.args[0]))
-        return LogFloor(self.linear(e), sympy.Float(FLOOR if e in self.bases else TINY))
+        return LogFloor(self.linear(e), floor_of(e) if e in self.bases else sympy.Float(TINY))
 
     def _log_of_product(self, e: sympy.Mul) -> sympy.Expr:
         """Return the sum of logarithms; a negative number is moved into a factor: -3 (a - b) is 3 (b - a)."""
@@ -207,8 +216,6 @@ class _Lowering:
             return self._power(e)
         if isinstance(e, sympy.log):
             return self._logarithm(e.args[0])
-        if isinstance(e, sympy.Not):
-            return self.linear(sympy.to_nnf(e))
         if isinstance(e, sympy.Abs) and e.args[0] in self.bases:
             return e.args[0]
         arguments = [self.linear(argument) for argument in e.args]
@@ -219,7 +226,7 @@ class _Lowering:
             return sympy.exp(self.linear(e.exp) * self.log_of(e.base))
         base = self.linear(e.base)
         may_be_zero = e.base in self.bases and e.base != temperature
-        return Floored(base, sympy.Float(FLOOR)) ** e.exp if e.exp < 0 and may_be_zero else base**e.exp
+        return Floored(base, floor_of(e.base)) ** e.exp if e.exp < 0 and may_be_zero else base**e.exp
 
     def _logarithm(self, e: sympy.Expr) -> sympy.Expr:
         return Log1p(self.linear(e - 1)) if e.is_Add and sympy.S.One in e.args else self.log_of(e)

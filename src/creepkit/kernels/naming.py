@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 
 import sympy
 
-from creepkit.kernels.logform import FLOOR, LogForm
+from creepkit.kernels.logform import LogForm, floor_of
 from creepkit.kernels.printing import FUNCTIONS
 from creepkit.kernels.stable_functions import LogFloor
 from creepkit.language.law import CreepLaw
@@ -41,8 +41,8 @@ class Names:
         self.theta = self.inputs[len(POINT) + len(law.states) :]
         self._plain = {self._printed[ln]: self.word(symbol.name) for symbol, ln in form.logs.items()}
         self.constants = {*self.theta, *self._plain.values()}
-        bases = [self._printed[s] for s in (*POINT, *law.states)]
-        self._logs = {LogFloor(s, sympy.Float(FLOOR)): self.word(f"ln_{s.name}") for s in bases}
+        bases = (*POINT, *law.states)
+        self._logs = {LogFloor(self._printed[s], floor_of(s)): self.word(f"ln_{self._printed[s].name}") for s in bases}
         self.terms = tuple(self.word(label) for label in law.terms)
         self.logs_of_terms = tuple(self.word(f"ln_{label}") for label in law.terms)
         self.shares = tuple(self.word(f"share_of_{label}") for label in law.terms)

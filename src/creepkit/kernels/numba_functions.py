@@ -88,7 +88,7 @@ def log_sinh(x: Any) -> Any:
 def log_cosh(x: Any) -> Any:
     """Return ln cosh(x)."""
     y = abs(x)
-    return y + log1p(exp(-2.0 * y)) - _LN2
+    return log1p(2.0 * sinh(0.5 * y) ** 2) if y < 1.0 else y + log1p(exp(-2.0 * y)) - _LN2
 
 
 @_inlined

@@ -61,7 +61,8 @@ def log_sinh(x: Any) -> Any:
 def log_cosh(x: Any) -> Any:
     """Return ln cosh(x)."""
     x = np.absolute(x)
-    return x + np.log1p(np.exp(-2.0 * x)) - _LN2
+    small = np.log1p(2.0 * np.sinh(0.5 * np.minimum(x, 1.0)) ** 2)
+    return np.where(x < 1.0, small, x + np.log1p(np.exp(-2.0 * x)) - _LN2)
 
 
 def log_rise(x: Any) -> Any:

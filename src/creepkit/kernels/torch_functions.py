@@ -72,7 +72,8 @@ def log_sinh(x: Any) -> Any:
 def log_cosh(x: Any) -> Any:
     """Return ln cosh(x)."""
     x = torch.abs(x)
-    return x + torch.log1p(torch.exp(-2.0 * x)) - _LN2
+    small = torch.log1p(2.0 * torch.square(torch.sinh(0.5 * torch.clamp(x, max=1.0))))
+    return torch.where(x < 1.0, small, x + torch.log1p(torch.exp(-2.0 * x)) - _LN2)
 
 
 def log_rise(x: Any) -> Any:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 from sympy.printing.latex import LatexPrinter
+from sympy.printing.str import StrPrinter
 
 from creepkit.language.symbols import GAS_CONSTANT, LATEX, temperature
 
@@ -91,15 +92,37 @@ def equations_of(law: CreepLaw, printer: LawPrinter) -> list[tuple[str, list[str
 # ---- plain text ----------------------------------------------------------------------------------------------------
 
 
+class TermPrinter(StrPrinter):  # type: ignore[misc]
+    """Print expressions for people: Arrhenius factors as exp(-Q/R*(1/T - 1/1073.15))."""
+
+    def _print_exp(self, e: Any) -> str:
+        parts = [(part, activation_of(part)) for part in sympy.Add.make_args(e.args[0])]
+        text = "*".join(self._factor(found) for _, found in parts if found)
+        rest = sympy.Add(*(part for part, found in parts if not found))
+        if not text:
+            return f"exp({self._print(rest)})"
+        return text if rest == 0 else f"{text}*exp({self._print(rest)})"
+
+    def _factor(self, found: Activation) -> str:
+        falls = found.Q.could_extract_minus_sign()
+        sign, energy = ("", -found.Q) if falls else ("-", found.Q)
+        return f"exp({sign}{self._print(energy)}/R*(1/T - 1/{found.T_ref:g}))"
+
+
+def text_of_expression(expression: sympy.Basic) -> str:
+    """An expression as one line for people."""
+    return str(TermPrinter().doprint(expression))
+
+
 def text_of(law: CreepLaw) -> str:
     """Return the law as a small table for a terminal."""
     lines = [f"{law.name}: {law.title}" if law.title else law.name]
     lead = "rate ="
     for label, term in law.terms.items():
-        lines.append(f"  {lead:6} {sympy.sstr(term)}    [{label}]")
+        lines.append(f"  {lead:6} {text_of_expression(term)}    [{label}]")
         lead = "     +"
     for symbol, state in law.states.items():
-        lines.append(f"  d{symbol}/dt = {sympy.sstr(state.rate)}, from {state.initial:g}")
+        lines.append(f"  d{symbol}/dt = {text_of_expression(state.rate)}, from {state.initial:g}")
     for name, param in law.table.items():
         low, high = param.bounds
         off = "" if param.off is None or low <= param.off <= high else f" or {param.off:g}"
@@ -107,7 +130,7 @@ def text_of(law: CreepLaw) -> str:
         scale = ", log scale" if param.scale == "log" else ""
         lines.append(f"  {name:8} {param.meaning}: {low:g} to {high:g}{off}{unit}{scale}")
     for relation in law.constraints:
-        lines.append(f"  with {sympy.sstr(relation)}")
+        lines.append(f"  with {text_of_expression(relation)}")
     for reference in law.references:
         lines.append(f"  see {reference}")
     return "\n".join(lines)
