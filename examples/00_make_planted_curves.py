@@ -2,8 +2,8 @@
 
 Run it to write them anew:  python examples/00_make_planted_curves.py FOLDER
 Strain hardening with an Arrhenius factor. At constant stress strain and time hardening are one and the same, so one
-test of each temperature has a step of stress after 40 h: that tells them apart. Each test has its own rate (10 % scatter), its own loading strain and
-white noise of the extensometer, drawn from one seed.
+test of each temperature has a step of stress after 40 h: that tells them apart. Each test has its own rate (10 %
+scatter), its own loading strain and white noise of the extensometer, drawn from one seed.
 """
 
 import json
@@ -36,13 +36,17 @@ def main(folder: Path) -> None:
         for steps in stresses:
             own = {**TRUTH, "A": TRUTH["A"] * np.exp(rng.normal(0, RATE_SCATTER))}
             times = np.concatenate([[0.0], np.geomspace(60, 2e7, 4000)])
-            clean = ck.simulate(law, specimen, own, loading=ck.StressSteps(tuple(steps)), times=times, temperature=celsius + 273.15)
+            clean = ck.simulate(
+                law, specimen, own, loading=ck.StressSteps(tuple(steps)), times=times, temperature=celsius + 273.15
+            )
             strain = clean.outputs["strain"]
             end = times[: strain.size][strain < 0.03][-1]
             kept = np.unique(np.searchsorted(times[: strain.size], np.geomspace(60, end, 60)))
             noisy = strain[kept] + rng.normal(0, LOADING_STRAIN) + rng.normal(0, NOISE, kept.size)
             name = f"planted_{celsius}C_" + "_to_".join(f"{stress}" for _, stress in steps) + "MPa"
-            test = clean.replace(name=name, times=np.round(times[kept], 1), outputs={"strain": np.round(noisy, 7)}, source="")
+            test = clean.replace(
+                name=name, times=np.round(times[kept], 1), outputs={"strain": np.round(noisy, 7)}, source=""
+            )
             write_history(test, folder / f"{name}.csv")
     truth = {"law": "strain-hardening", "T_ref": T_REF, "values": TRUTH, "rate_scatter": RATE_SCATTER}
     (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n", encoding="utf-8")

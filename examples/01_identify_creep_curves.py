@@ -1,7 +1,7 @@
 """From creep curves to a law with error bars.
 
-    python examples/01_identify_creep_curves.py            the curves of `creepkit demo`, whose law is known
-    python examples/01_identify_creep_curves.py FOLDER     your own
+python examples/01_identify_creep_curves.py            the curves of `creepkit demo`, whose law is known
+python examples/01_identify_creep_curves.py FOLDER     your own
 """
 
 import sys

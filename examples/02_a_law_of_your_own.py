@@ -1,4 +1,4 @@
-"""A law that nobody shipped: written in ten lines, then checked, simulated, added to another, identified and printed."""
+"""A law that nobody shipped: written in ten lines, then checked, simulated, added to another and printed."""
 
 import numpy as np
 import sympy

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     import typer
 
     from creepkit.language.law import CreepLaw
-    from creepkit.language.thermal import Factor, TemperatureForm
     from creepkit.records import Exporter, Reader, Specimen
 
 PROJECT = "creepkit"

@@ -1,6 +1,6 @@
 """Every sensible law of the catalogue on measured creep curves: the table of the README.
 
-    python tests/benchmarks/measured_creep.py [--data FOLDER] [--sets alloy617 ...] [--laws norton ...] [--quick] [--plots FOLDER]
+    python tests/benchmarks/measured_creep.py [--data FOLDER] [--sets alloy617 ...] [--quick] [--plots FOLDER]
 
 Alloy 617 (750 to 1000 C) and CMSX-6 (980 C) up to 5 % strain; engineering strain under constant load is compared with
 true stress and logarithmic strain inside. Columns: parameters; rms of ln strain (each test's own loading strain taken
@@ -18,22 +18,34 @@ from creepkit.inverse.validation import leave_one_condition_out, loading_strains
 from creepkit.inverse.warmth import reference_temperature, several_temperatures
 
 LIMIT, LEVEL = 0.05, 0.01
+LAWS = (
+    "norton",
+    "hyperbolic-sine",
+    "strain-hardening",
+    "time-hardening",
+    "logarithmic",
+    "drifting-exponent",
+    "combined",
+)
+HEAD = "| law | K | rms ln strain | Z fitted | Z held out | rate between tests | BIC - best | CPU s | not determined |"
 
 
 def catalogue(histories):
     """{name: law}: each law alone, with temperature where the tests call for it, and what grows from them."""
-    plain = {name: ck.law(name) for name in (
-        "norton", "hyperbolic-sine", "strain-hardening", "time-hardening", "logarithmic", "drifting-exponent", "combined",
-    )}  # fmt: skip
+    plain = {name: ck.law(name) for name in LAWS}
     plain["norton + strain-hardening"] = ck.law("norton") + ck.law("strain-hardening")
     if not several_temperatures(histories):
         return plain
     T = reference_temperature(histories)
     warm = {f"{name} x arrhenius": law.times(ck.arrhenius(T_ref=T)) for name, law in plain.items()}
     warm["norton x arrhenius, n(T)"] = warm["norton x arrhenius"].with_temperature(n=ck.linear(T_ref=T))
-    warm["strain-hardening x arrhenius, n(T)"] = warm["strain-hardening x arrhenius"].with_temperature(n=ck.linear(T_ref=T))
+    warm["strain-hardening x arrhenius, n(T)"] = warm["strain-hardening x arrhenius"].with_temperature(
+        n=ck.linear(T_ref=T)
+    )
     warm["logarithmic x arrhenius, n(T)"] = warm["logarithmic x arrhenius"].with_temperature(n=ck.linear(T_ref=T))
-    warm["hyperbolic-sine x arrhenius, B(T)"] = warm["hyperbolic-sine x arrhenius"].with_temperature(B=ck.activated(T_ref=T))
+    warm["hyperbolic-sine x arrhenius, B(T)"] = warm["hyperbolic-sine x arrhenius"].with_temperature(
+        B=ck.activated(T_ref=T)
+    )
     own = [ck.law(name).times(ck.arrhenius(T_ref=T)) for name in ("norton", "strain-hardening")]
     warm["norton + strain-hardening, own Q"] = own[0] + own[1]
     return warm
@@ -63,8 +75,9 @@ def row(name, fit, histories, cpu, quick):
     fitted = times_to_strain(fit.law, fit.values, histories, fit.using, LEVEL, loading_strains(histories))
     held = "" if quick else f"{leave_one_condition_out(fit, histories, LEVEL)[0].z_factor:.2f}"
     ends = [e.name for e in fit.estimates if e.verdict != "determined"]
-    return [name, str(len(fit.law.params)), f"{fit.rms:.3f}", f"{fitted.z_factor:.2f}", held, f"{100 * fit.scatter.rate:.0f} %",
-            "", f"{cpu:.1f}", ", ".join(ends) or "all"]  # fmt: skip
+    scatter = f"{100 * fit.scatter.rate:.0f} %"
+    first = [name, str(len(fit.law.params)), f"{fit.rms:.3f}", f"{fitted.z_factor:.2f}", held, scatter]
+    return [*first, "", f"{cpu:.1f}", ", ".join(ends) or "all"]
 
 
 def main():
@@ -98,7 +111,7 @@ def main():
                 given.plots.mkdir(parents=True, exist_ok=True)
                 fit.plot(given.plots / f"{title}_{name.replace(' ', '_')}.png")
         print(f"\n{len(tests)} tests, {sum(m.frames for m in fits[0].misfits)} frames\n")
-        print("| law | parameters | rms ln strain | Z fitted | Z held out | rate between tests | BIC - best | CPU s | not determined |")
+        print(HEAD)
         print("|-|-|-|-|-|-|-|-|-|")
         for entry in rank(fits).laws:
             line = rows[fits.index(entry.fit)]

@@ -47,5 +47,9 @@ def planted(
         own = float(lower(law, "numpy").rate(values, stress=stress, temperature=T)) * np.exp(rng.normal(0, 1) * rate)
         times = np.geomspace(1e-2, 1, frames) * end / own
         strain = own * times + rng.normal(0, 1) * offset + rng.normal(0, 1, frames) * noise
-        tests.append(History(f"{stress:g}MPa_{T:g}K_{len(tests)}", times, {"strain": strain}, constant_stress(stress, "stress"), T))
+        tests.append(
+            History(
+                f"{stress:g}MPa_{T:g}K_{len(tests)}", times, {"strain": strain}, constant_stress(stress, "stress"), T
+            )
+        )
     return tests

@@ -64,7 +64,9 @@ def test_planted_scatter_is_found():
 
 def test_a_given_prior_stays():
     residuals, log_times = made(20, 20, 3, Scatter(2e-5, 0, 1e-4, 0.4, 0.1, 1.5))
-    found = estimated(residuals, log_times, Scatter(2e-5, 0, 7e-5, 0.5, 0.1, 1.5), (Nuisance("offset", sd=7e-5), Nuisance("rate")))
+    found = estimated(
+        residuals, log_times, Scatter(2e-5, 0, 7e-5, 0.5, 0.1, 1.5), (Nuisance("offset", sd=7e-5), Nuisance("rate"))
+    )
     assert found.offset == 7e-5
 
 

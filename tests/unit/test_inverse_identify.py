@@ -72,14 +72,16 @@ def test_one_stress_leaves_the_exponent_undetermined():
     assert verdicts["n"] == "not determined"
     assert any("one stress" in note for note in fit.notes)
     assert "not determined by these data" in str(fit)
-    rate, low, high = fit.rate(50.0, 1050.0)
+    _, low, high = fit.rate(50.0, 1050.0)
     assert low < 1e-16 * 50**5.2 < high
     assert float(high / low) < 2
 
 
 def test_power_law_and_sinh_over_a_narrow_stress_range_are_not_told_apart():
     """A sinh law at x << its curvature is a power law: BIC must not claim to know."""
-    tests = planted(NORTON, {"A": 1e-14, "n": 4.0}, [(s, 1050.0) for s in (50, 55, 60, 50, 55, 60)], seed=4, rate=0.1, noise=1e-5)
+    tests = planted(
+        NORTON, {"A": 1e-14, "n": 4.0}, [(s, 1050.0) for s in (50, 55, 60, 50, 55, 60)], seed=4, rate=0.1, noise=1e-5
+    )
     fits = [identify(law, tests, Steady(), settings=QUICK) for law in (NORTON, HYPERBOLIC_SINE)]
     ranking = rank(fits)
     assert {r.fit.law.name for r in ranking.remaining} == {"norton", "hyperbolic-sine"}
@@ -155,12 +157,16 @@ def test_bounds_that_exclude_the_data_are_reported():
 
 
 def test_a_given_offset_prior_is_used(tests):
-    fit = identify(LAW, tests, Steady(), settings=QUICK, nuisances=(Nuisance("offset", sd=5e-5), Nuisance("rate", sd=0.2)))
+    fit = identify(
+        LAW, tests, Steady(), settings=QUICK, nuisances=(Nuisance("offset", sd=5e-5), Nuisance("rate", sd=0.2))
+    )
     assert fit.scatter.offset == 5e-5
     assert fit.scatter.rate == 0.2
 
 
 def test_robust_loss_survives_a_wild_frame(tests):
-    wild = [h.replace(outputs={"strain": np.where(np.arange(h.times.size) == 30, 0.5, h.outputs["strain"])}) for h in tests]
+    wild = [
+        h.replace(outputs={"strain": np.where(np.arange(h.times.size) == 30, 0.5, h.outputs["strain"])}) for h in tests
+    ]
     fit = identify(LAW, wild, Steady(), settings=Settings(starts=3, draws=16, frames=20, loss="soft_l1"))
     assert fit.values["n"] == pytest.approx(5.2, abs=0.6)

@@ -21,7 +21,9 @@ from creepkit.language import parameters, strain, stress, time
 
 x, y = sympy.symbols("x y", real=True)
 ln_A, ln_B = sympy.symbols("ln_A ln_B", real=True)
-FUNCTIONS = [f for f in vars(stable_functions).values() if isinstance(f, type) and issubclass(f, Stable) and f != Stable]
+FUNCTIONS = [
+    f for f in vars(stable_functions).values() if isinstance(f, type) and issubclass(f, Stable) and f != Stable
+]
 ONE_ARGUMENT = [f for f in FUNCTIONS if f.nargs == sympy.FiniteSet(1)]
 
 

@@ -6,8 +6,8 @@ import pytest
 from foreign_laws import EQUATIONS, POWER, RATE, A, law, n
 
 from creepkit.kernels import lower
-from creepkit.kernels.module_text import module_text
 from creepkit.kernels.entries import entries
+from creepkit.kernels.module_text import module_text
 from creepkit.language import CreepLaw, parameters, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
@@ -69,7 +69,7 @@ def test_a_label_cannot_leave_its_comment(monkeypatch: pytest.MonkeyPatch) -> No
 
     assert float(lower(foreign, "numpy").rate({"A": 1e-10, "n": 2.0}, stress=3.0)) == pytest.approx(9e-10, rel=1e-14)
     text = module_text(entries(foreign))
-    assert [line for line in text.splitlines() if "SystemExit" in line][0].startswith("# ")
+    assert next(line for line in text.splitlines() if "SystemExit" in line).startswith("# ")
 
 
 def _by_sympy(foreign: CreepLaw, values: dict[str, float]) -> float:

@@ -26,7 +26,7 @@ def test_coverage_with_test_to_test_scatter_and_offsets():
     truth = {"A": 1e-16, "n": 5.2, "Q": 350e3}
     conditions = [(s, T) for T in (1000.0, 1050.0, 1100.0) for s in (30.0, 50.0, 80.0)]
     settings = Settings(starts=1, draws=8, frames=15)
-    covered = {name: 0 for name in (*truth, "rate")}
+    covered = dict.fromkeys((*truth, "rate"), 0)
     at = {"stress": 50.0, "temperature": 1050.0}
     true_rate = float(lower(law, "numpy").rate(truth, **at))
     for seed in range(REPEATS):

@@ -81,9 +81,11 @@ def test_simulate_writes_a_curve_that_identify_reads(tmp_path):
 
 
 def test_simulate_prints_to_the_terminal():
-    result = creepkit("simulate", "norton", "--set", "A=1e-16", "--set", "n=5", "--stress", 100, "--end-h", 1, "--points", 3)
+    result = creepkit(
+        "simulate", "norton", "--set", "A=1e-16", "--set", "n=5", "--stress", 100, "--end-h", 1, "--points", 3
+    )
     rows = [line for line in result.stdout.splitlines() if not line.startswith("#")]
-    assert list(csv.reader(rows))[0] == ["time_s", "strain"]
+    assert next(iter(csv.reader(rows))) == ["time_s", "strain"]
 
 
 def test_unknown_law_suggests_the_nearest(tmp_path):
@@ -142,7 +144,9 @@ def test_bounds_that_exclude_the_data_are_said(tmp_path):
         "def creepkit_laws():\n"
         "    return [LAW]\n"
     )
-    told = sentence(creepkit("--plugin", plugin, "identify", *CURVES, "--law", "narrow", "--starts", 1, "--to", tmp_path / "o"))
+    told = sentence(
+        creepkit("--plugin", plugin, "identify", *CURVES, "--law", "narrow", "--starts", 1, "--to", tmp_path / "o")
+    )
     assert "bounds exclude the data" in told
     assert not (tmp_path / "o").exists()
 

@@ -48,7 +48,8 @@ def command(
     named = [study.law(name) for name in dict.fromkeys(law)]
     histories = study.read_histories(files, reader)
     if up_to is not None:
-        histories = [h.up_to("strain", up_to) for h in histories]
+        histories = _cut(histories, up_to)
+    _warn_of_twins(histories)
     if temperature == "auto":
         from creepkit.inverse.warmth import with_arrhenius
 
@@ -59,6 +60,23 @@ def command(
         print_json(_answer(ranking, written))
     else:
         tell(ranking, written, histories)
+
+
+def _cut(histories: list[History], limit: float) -> list[History]:
+    """Frames up to a strain; a curve that has fewer than two of them is left out, and said."""
+    cut = [h.up_to("strain", limit) for h in histories]
+    kept = [h for h in cut if int((h.used & (h.times > 0)).sum()) >= 2]
+    for history in cut:
+        if history not in kept:
+            typer.echo(f"left out: {history.name} has no two frames below a strain of {limit:g}", err=True)
+    return kept
+
+
+def _warn_of_twins(histories: list[History]) -> None:
+    from creepkit.readers.duplicates import duplicates
+
+    for one, other in duplicates(histories):
+        typer.echo(f"note: {one} and {other} look like one test published twice; both count", err=True)
 
 
 def ranked(laws: Sequence[CreepLaw], histories: list[History], starts: int, seed: int, loss: str) -> Ranking:

@@ -85,7 +85,15 @@ class Coordinates:
 
     def _point(self, law: CreepLaw) -> list[float]:
         r = self.reference
-        return [r.stress, r.strain, r.time, r.temperature, r.stress, r.stress / 3, *(z.initial for z in law.states.values())]
+        return [
+            r.stress,
+            r.strain,
+            r.time,
+            r.temperature,
+            r.stress,
+            r.stress / 3,
+            *(z.initial for z in law.states.values()),
+        ]
 
     def _log_rate(self, kernel: Kernel, theta: Floats) -> Floats:
         return np.asarray(kernel.internal_log_rate(*self._point(kernel.law), *np.moveaxis(theta, -1, 0)), float)

@@ -151,7 +151,9 @@ def from_json(data: Any, source: str = "identification") -> Identification:
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "the document"
-        raise FitError(f"{source}: {place}: {first['msg'].lower()}; it is not an identification of this version") from None
+        raise FitError(
+            f"{source}: {place}: {first['msg'].lower()}; it is not an identification of this version"
+        ) from None
     law = law_from_json(document.law, source)
     size = len(law.params)
     covariance = np.array(document.covariance, float, ndmin=2) if size else np.zeros((0, 0))

@@ -43,7 +43,7 @@ LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
 PUSH = 1.0
 """How far, in ln, data may push a coefficient beyond its bounds against the fence before that is an error."""
 NUISANCES = (Nuisance("offset"), Nuisance("rate"))
-"""Unless told otherwise: a loading-strain offset for each curve, and test-to-test scatter of the rate, both estimated."""
+"""Unless told otherwise: a loading-strain offset of each curve and test-to-test scatter of the rate, both estimated."""
 
 
 def identify(
@@ -114,7 +114,9 @@ def _searched(
     """
     loss = "soft_l1" if settings.loss == "linear" else settings.loss
     few = max(2, settings.starts // 3)
-    singles = from_single_terms(objective, box, factor, starts=few, draws=settings.draws // 2, seed=settings.seed, loss=loss)
+    singles = from_single_terms(
+        objective, box, factor, starts=few, draws=settings.draws // 2, seed=settings.seed, loss=loss
+    )
     minima = multistart(
         objective, box, factor, starts=settings.starts, draws=settings.draws, seed=settings.seed, loss=loss,
         progress=progress, extra=singles,
@@ -122,8 +124,8 @@ def _searched(
     return _distinct(minima, box)
 
 
-def _distinct(minima: Sequence[Minimum], box: Box, most: int = 3, near: float = 0.02) -> list[Floats]:
-    """The best minima, at most three, that differ by more than 2 % of the box in some coordinate."""
+def _distinct(minima: Sequence[Minimum], box: Box, most: int = 2, near: float = 0.02) -> list[Floats]:
+    """The best minima, at most two, that differ by more than 2 % of the box in some coordinate."""
     kept: list[Floats] = []
     for minimum in minima:
         if all((np.abs(minimum.u - u) > near * box.width).any() for u in kept):
@@ -140,12 +142,13 @@ def _alternate(
     best, likelihood = Minimum(u, np.inf, False, 0), -np.inf
     for k in range(rounds):
         working = estimated(residuals, log_times, working, nuisances)
-        best = refine(objective, box, whitener(residuals, log_times, working), best.u, loss=settings.loss)
+        factor = whitener(residuals, log_times, working)
+        best = refine(objective, box, factor, best.u, loss=settings.loss, steps=40, tolerance=1e-8)
         residuals = objective.at(best.u)
         now = log_likelihood(residuals, log_times, working)
         if progress is not None:
             progress("round", k + 1, rounds)
-        if abs(now - likelihood) < 0.01:
+        if abs(now - likelihood) < 0.02:
             break
         likelihood = now
     return best, residuals, working
@@ -172,7 +175,7 @@ def _misfits(objective: Objective, residuals: Residuals, effects: tuple[Floats, 
 
 
 def _log_ratios(objective: Objective, residuals: Residuals, offset: Floats) -> Floats:
-    """ln(predicted + the test's offset) - ln(measured) where the measured strain is above the scale's floor, else NaN."""
+    """ln(predicted + the test's offset) - ln(measured) where the measured strain is above twice the floor, else NaN."""
     scale = objective.scale
     predicted = scale.backward(residuals.values + objective.compared)
     above = objective.present & (objective.measured > 2 * scale.floor)
@@ -230,14 +233,12 @@ def _check_bounds(law: CreepLaw, coordinates: Coordinates, u: Floats) -> None:
         if not low - PUSH <= theta[k] <= high + PUSH:
             found = param.from_internal(float(theta[k]))
             raise FitError(
-                f"law '{law.name}': the bounds exclude the data, which push {name} to {found:.3g} {param.unit} and it may "
-                f"lie from {param.bounds[0]:g} to {param.bounds[1]:g}; widen its bounds or choose another law"
+                f"law '{law.name}': the bounds exclude the data, which push {name} to {found:.3g} {param.unit} and it "
+                f"may lie from {param.bounds[0]:g} to {param.bounds[1]:g}; widen its bounds or choose another law"
             )
 
 
-def _check(
-    law: CreepLaw, histories: Sequence[History], settings: Settings, nuisances: Sequence[Nuisance]
-) -> None:
+def _check(law: CreepLaw, histories: Sequence[History], settings: Settings, nuisances: Sequence[Nuisance]) -> None:
     if not histories:
         raise FitError(f"law '{law.name}': there are no histories to identify it from")
     for nuisance in nuisances:

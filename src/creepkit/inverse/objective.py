@@ -67,7 +67,7 @@ class Objective:
         return Residuals(np.zeros_like(slopes), slopes, self.present, None, effect)
 
     def screen(self, u: Floats) -> Floats:
-        """Residuals of many candidates without derivatives: u (candidates, parameters) -> (candidates, tests, frames)."""
+        """Residuals without derivatives: u (candidates, parameters) -> (candidates, tests, frames)."""
         predicted, ends, _ = self._predict(u, jacobian=False)
         return np.where(self.present, self._extended(predicted, ends) - self.compared, 0.0)
 

@@ -35,7 +35,9 @@ def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
     found = fit.predict()
     for k, history in enumerate(fit.histories):
         offset = fit.misfits[k].offset
-        _draw_test(curves, residuals, history, found.of(k)[:, 0], offset, colours[k], named=len(fit.histories) <= CROWDED)
+        _draw_test(
+            curves, residuals, history, found.of(k)[:, 0], offset, colours[k], named=len(fit.histories) <= CROWDED
+        )
     _draw_rates(rates, fit)
     _finish(figure, (curves, residuals, rates), fit)
     if path is not None:

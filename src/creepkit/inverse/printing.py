@@ -12,7 +12,11 @@ if TYPE_CHECKING:
 
 def text_of(fit: Identification) -> str:
     """The law, its values with 95 % intervals, the scatter between tests, and what is not determined."""
-    lines = [f"{fit.law.title or fit.law.name}", *(f"  {label}: {text_of_expression(term)}" for label, term in fit.law.terms.items()), ""]
+    lines = [
+        f"{fit.law.title or fit.law.name}",
+        *(f"  {label}: {text_of_expression(term)}" for label, term in fit.law.terms.items()),
+        "",
+    ]
     width = max(len(e.name) for e in fit.estimates) if fit.estimates else 4
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
@@ -46,7 +50,11 @@ def notes_of(fit: Identification) -> list[str]:
         unit = "" if e.unit == "1" else f" {e.unit}"
         lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {e.low:.4g} to {e.high:.4g}, {e.verdict}")
     units = {"stress": "MPa", "temperature": "K", "strain": "", "time": "s"}
-    covered = (f"{name} {low:.4g} to {high:.4g} {units.get(name, '')}".strip() for name, (low, high) in fit.ranges.items())
+    covered = (
+        f"{name} {low:.4g} to {high:.4g} {units.get(name, '')}".strip() for name, (low, high) in fit.ranges.items()
+    )
     lines.append(f"valid within the tests: {', '.join(covered)}")
-    lines.append(f"rms of ln strain {fit.rms:.3g}; rates of single tests scatter by {100 * fit.scatter.rate:.0f} % (one sd)")
+    lines.append(
+        f"rms of ln strain {fit.rms:.3g}; rates of single tests scatter by {100 * fit.scatter.rate:.0f} % (one sd)"
+    )
     return [*lines, *fit.notes]

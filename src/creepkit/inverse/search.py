@@ -20,7 +20,7 @@ from creepkit.inverse.objective import Objective
 from creepkit.language import CreepLaw
 
 RATE_WINDOW = (-12.0, 6.0)
-"""Bounds of a term's log rate about the measured one: a term 1e-5 as fast as the data is absent, one 400 times is wrong."""
+"""Bounds of a term's log rate about the measured one: at 1e-5 of the data it is absent, at 400 times it is wrong."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -35,9 +35,7 @@ class Box:
     @classmethod
     def of(cls, law: CreepLaw, coordinates: Coordinates, log_rate: float) -> Box:
         """The law's bounds, with term rates within RATE_WINDOW of the measured log rate."""
-        low, high = (
-            np.array([p.to_internal(p.bounds[end]) for p in law.params.values()], float) for end in (0, 1)
-        )
+        low, high = (np.array([p.to_internal(p.bounds[end]) for p in law.params.values()], float) for end in (0, 1))
         for k in coordinates.rates:
             low[k], high[k] = log_rate + RATE_WINDOW[0], log_rate + RATE_WINDOW[1]
         return cls(low, high)
@@ -79,19 +77,28 @@ class Fences:
 
     def values(self, u: Floats) -> Floats:
         """(fences,) residuals at u."""
-        theta = self.coordinates.theta(u)[list(self.coordinates.rates)]
-        outside = np.maximum(theta - self.high, 0) + np.maximum(self.low - theta, 0)
-        margins = self._constraints(self.coordinates.theta(u))
-        return self.SLOPE * np.concatenate([outside, np.maximum(-margins, 0.0)])
+        theta = self.coordinates.theta(u)
+        margins = self._constraints(theta)
+        return self.SLOPE * np.concatenate([np.abs(self._outside(theta)), np.maximum(-margins, 0.0)])
 
     def jacobian(self, u: Floats) -> Floats:
-        """(fences, parameters), by central differences: cheap, and exact where a fence is linear."""
-        columns = []
-        for k in range(u.size):
-            step = np.zeros(u.size)
-            step[k] = 1e-6 * max(1.0, abs(u[k]))
-            columns.append((self.values(u + step) - self.values(u - step)) / (2 * step[k]))
-        return np.stack(columns, axis=1)
+        """(fences, parameters); constraints by central differences."""
+        theta = self.coordinates.theta(u)
+        rates = list(self.coordinates.rates)
+        slopes = np.sign(self._outside(theta))[:, None] * self.coordinates.jacobian(u)[rates]
+        columns = [np.zeros(0)] * u.size
+        if self._constraints(theta).size:
+            for k in range(u.size):
+                step = np.zeros(u.size)
+                step[k] = 1e-6 * max(1.0, abs(u[k]))
+                ends = (np.maximum(-self._constraints(self.coordinates.theta(v)), 0.0) for v in (u + step, u - step))
+                columns[k] = np.subtract(*ends) / (2 * step[k])
+        return self.SLOPE * np.concatenate([slopes, np.stack(columns, axis=1)])
+
+    def _outside(self, theta: Floats) -> Floats:
+        """How far each coefficient lies beyond its bounds, in ln: above positive, below negative."""
+        own = theta[list(self.coordinates.rates)]
+        return np.maximum(own - self.high, 0.0) + np.minimum(own - self.low, 0.0)
 
 
 def multistart(
@@ -204,7 +211,7 @@ def _screened(objective: Objective, box: Box, *, starts: int, draws: int, seed: 
             points[:, rates] -= np.clip(shift, -6, 6)[:, None]
     points = box.clip(points)
     misfit = objective.screen(points)
-    score = np.array([np.mean(np.arcsinh(m[objective.present])**2) for m in misfit])
+    score = np.array([np.mean(np.arcsinh(m[objective.present]) ** 2) for m in misfit])
     if not np.isfinite(score).any():
         raise FitError(f"law '{objective.law.name}': no point within its bounds can be simulated; widen the bounds")
     order = [int(k) for k in np.argsort(score) if k != 0][: max(starts - 1, 0)]
@@ -213,7 +220,7 @@ def _screened(objective: Objective, box: Box, *, starts: int, draws: int, seed: 
 
 def _unequal(count: int) -> Floats:
     """Shares .7, .2, .1 and so on: equal shares are a stationary point from which no search escapes."""
-    shares = np.array([0.7, *(0.3 * 0.67 ** k for k in range(1, count))])
+    shares = np.array([0.7, *(0.3 * 0.67**k for k in range(1, count))])
     return np.asarray(shares / shares.sum())
 
 
@@ -227,8 +234,8 @@ def _margins(law: CreepLaw, objective: Objective) -> Callable[[Floats], Floats]:
         return lambda _: np.zeros(0)
     sides = [relation.gts - relation.lts for relation in law.constraints]
     functions = [sympy.lambdify((*POINT, *law.states, *law.params), side, "numpy") for side in sides]
-    times = np.unique(np.concatenate([np.zeros(1), *(np.geomspace(1.0, h.times[-1], 60) for h in objective.histories[:1]),
-                                      objective.times[objective.present]]))  # fmt: skip
+    end = float(objective.times[objective.present].max())
+    times = np.concatenate([np.zeros(1), np.geomspace(1e-3 * end, end, 60)])
     warmth = np.unique([float(v) for h in objective.histories for v in h.temperature_program().values])
     time, temperature = (grid.ravel() for grid in np.meshgrid(times, warmth))
     stress = objective.coordinates.reference.stress

@@ -45,7 +45,9 @@ def quantile(freedom: float) -> float:
     return float(student.ppf(0.975, max(freedom, 1.0)))
 
 
-def laplace(residuals: Residuals, log_times: Floats, working: Scatter, scatter: Scatter, box: Box) -> tuple[Floats, float]:
+def laplace(
+    residuals: Residuals, log_times: Floats, working: Scatter, scatter: Scatter, box: Box
+) -> tuple[Floats, float]:
     """Posterior covariance of u, (parameters, parameters), and its degrees of freedom."""
     assert residuals.jacobian is not None
     count, tests = box.width.size, len(residuals.values)
@@ -60,7 +62,10 @@ def laplace(residuals: Residuals, log_times: Floats, working: Scatter, scatter: 
 
     within = part(replace(scatter, rate=0.0))
     between = part(scatter) - within if scatter.rate > 0 else np.zeros_like(within)
-    freedoms = max(tests - count, 1.0), max(effective_size(residuals, log_times, replace(scatter, rate=0.0)) - count, 1.0)
+    freedoms = (
+        max(tests - count, 1.0),
+        max(effective_size(residuals, log_times, replace(scatter, rate=0.0)) - count, 1.0),
+    )
     between *= tests / freedoms[0]
     share = float(np.mean(np.diag(between) / np.maximum(np.diag(between) + np.diag(within), 1e-300)))
     freedom = 1.0 / (share**2 / freedoms[0] + (1 - share) ** 2 / freedoms[1])
@@ -75,7 +80,9 @@ def _inverse(information: Floats, box: Box) -> Floats:
     return np.asarray(np.linalg.pinv(information / scale, hermitian=True, rcond=1e-13) / scale)
 
 
-def estimates(law: CreepLaw, coordinates: Coordinates, u: Floats, posterior: Floats, wide: float) -> tuple[Estimate, ...]:
+def estimates(
+    law: CreepLaw, coordinates: Coordinates, u: Floats, posterior: Floats, wide: float
+) -> tuple[Estimate, ...]:
     """Intervals of the author's parameters, `wide` standard deviations to each side."""
     theta = coordinates.theta(u)
     to_theta = coordinates.jacobian(u)

@@ -77,9 +77,7 @@ def times_to_strain(
     offsets : loading strain of each history, taken off what was measured; predictions carry none.
     """
     own = [0.0] * len(histories) if offsets is None else offsets
-    reached = [
-        (h, t) for h, o in zip(histories, own, strict=True) if (t := measured_time(h, level + o)) is not None
-    ]
+    reached = [(h, t) for h, o in zip(histories, own, strict=True) if (t := measured_time(h, level + o)) is not None]
     grids = [t * np.geomspace(1e-4, 1e4, 400) for _, t in reached]
     probes = [
         replace(h, times=grid, outputs={"strain": np.zeros(grid.size)}, used=EVERY_FRAME, standard_deviation={})
@@ -87,7 +85,9 @@ def times_to_strain(
     ]
     found = using.predict(law, values, probes)
     predicted = [_crossing(found.of(k)[:, 0], grid, level, found, k) for k, grid in enumerate(grids)]
-    return TimeComparison(level, tuple(h.name for h, _ in reached), np.array([t for _, t in reached]), np.array(predicted))
+    return TimeComparison(
+        level, tuple(h.name for h, _ in reached), np.array([t for _, t in reached]), np.array(predicted)
+    )
 
 
 def leave_one_condition_out(

@@ -35,7 +35,7 @@ FLOOR = 1e-30
 """Stress, strain and states below this act as this when they are bases of powers; slopes are those there."""
 
 TIME_FLOOR = 1e-120
-"""The same for time: what t^m with m = -0.95 has done by 1e-30 s is 2 % of its strain at 1e6 s, by 1e-120 s 1e-6 of it."""
+"""The same for time: with m = -0.95, t^m has done 2 % of its strain at 1e6 s by 1e-30 s, and 1e-6 of it by 1e-120 s."""
 
 TINY = 1e-200
 """Composite bases, such as Max(stress - threshold, 0), are floored here: a term that is zero becomes about 1e-200 1/s,

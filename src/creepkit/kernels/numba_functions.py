@@ -49,14 +49,14 @@ def either(a: Any, b: Any) -> Any:
 
 @_inlined
 def larger(a: Any, b: Any) -> Any:
-    """max(a, b)."""
-    return a if a >= b else b
+    """max(a, b); NaN when either is."""
+    return a if a >= b or a != a else b
 
 
 @_inlined
 def smaller(a: Any, b: Any) -> Any:
-    """min(a, b)."""
-    return a if a <= b else b
+    """min(a, b); NaN when either is."""
+    return a if a <= b or a != a else b
 
 
 @_inlined
@@ -67,20 +67,20 @@ def heaviside(x: Any) -> Any:
 
 @_inlined
 def floored(x: Any, floor: Any) -> Any:
-    """max(x, floor)."""
-    return x if x > floor else floor
+    """max(x, floor); NaN when x is."""
+    return floor if x < floor else x
 
 
 @_inlined
 def log_floor(x: Any, floor: Any) -> Any:
     """ln max(x, floor)."""
-    return log(x if x > floor else floor)
+    return log(floor if x < floor else x)
 
 
 @_inlined
 def log_sinh(x: Any) -> Any:
     """Return ln sinh(x), x > 0."""
-    y = x if x > 1e-30 else 1e-30
+    y = 1e-30 if x < 1e-30 else x
     return y + log(-0.5 * expm1(-2.0 * y))
 
 
@@ -94,14 +94,14 @@ def log_cosh(x: Any) -> Any:
 @_inlined
 def log_rise(x: Any) -> Any:
     """ln(1 - exp(-x)), x > 0."""
-    y = x if x > 1e-30 else 1e-30
+    y = 1e-30 if x < 1e-30 else x
     return log1p(-exp(-y)) if y > _LN2 else log(-expm1(-y))
 
 
 @_inlined
 def log_tanh(x: Any) -> Any:
     """Return ln tanh(x), x > 0."""
-    y = x if x > 1e-30 else 1e-30
+    y = 1e-30 if x < 1e-30 else x
     tail = exp(-2.0 * y)
     return (log1p(-tail) if 2.0 * y > _LN2 else log(-expm1(-2.0 * y))) - log1p(tail)
 
@@ -109,7 +109,7 @@ def log_tanh(x: Any) -> Any:
 @_inlined
 def coth(x: Any) -> Any:
     """coth(x), x > 0."""
-    return 1.0 / tanh(x if x > 1e-30 else 1e-30)
+    return 1.0 / tanh(1e-30 if x < 1e-30 else x)
 
 
 @_inlined

@@ -194,9 +194,7 @@ def _keeps_sign(expression: sympy.Expr, param: Param) -> list[sympy.Basic]:
     return [expression >= 0] if low >= 0 else [expression <= 0]
 
 
-def _numbered(
-    groups: list[list[str]], joint: str = "_", pattern: re.Pattern[str] = _INDEXED
-) -> list[list[str]]:
+def _numbered(groups: list[list[str]], joint: str = "_", pattern: re.Pattern[str] = _INDEXED) -> list[list[str]]:
     """Number the names that collide across groups; names that stand alone stay as they are."""
 
     def stem(name: str) -> str:

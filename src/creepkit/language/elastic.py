@@ -35,7 +35,5 @@ class Elastic:
 
     def at(self, T: float) -> Elastic:
         """The same record with numbers, at temperature `T` in K."""
-        E, nu = (
-            float(v.subs(temperature, T)) if isinstance(v, sympy.Expr) else float(v) for v in (self.E, self.nu)
-        )
+        E, nu = (float(v.subs(temperature, T)) if isinstance(v, sympy.Expr) else float(v) for v in (self.E, self.nu))
         return Elastic(E, nu)

@@ -184,7 +184,7 @@ def _float_from(arguments: list[Any]) -> sympy.Float:
         case [int() as mantissa, int() as exponent, int() as bits] if _is_normal(mantissa, exponent, bits):
             sign, size = int(mantissa < 0), abs(mantissa)
             return sympy.Float((sign, size, exponent, size.bit_length()) if size else 0, precision=bits)
-    raise LawError(f"{_shown(['float', *arguments])} is not a finite number in the form [\"float\", 0.1]")
+    raise LawError(f'{_shown(["float", *arguments])} is not a finite number in the form ["float", 0.1]')
 
 
 def _is_normal(mantissa: int, exponent: int, bits: int) -> bool:
@@ -196,7 +196,7 @@ def _is_normal(mantissa: int, exponent: int, bits: int) -> bool:
 
 def _rational_from(arguments: list[Any]) -> sympy.Rational:
     if [type(a) for a in arguments] != [int, int] or arguments[1] < 1:
-        raise LawError(f"{_shown(['rational', *arguments])} is not a fraction in the form [\"rational\", 1, 3]")
+        raise LawError(f'{_shown(["rational", *arguments])} is not a fraction in the form ["rational", 1, 3]')
     return sympy.Rational(*map(_small, arguments))
 
 

@@ -49,9 +49,7 @@ class Param:
         if self.scale == "log" and low <= 0:
             raise LawError(f"parameter '{self.meaning}': a log scale needs bounds above zero, found low = {low:g}")
         if self.scale == "log" and not self.unit:
-            raise LawError(
-                f"parameter '{self.meaning}': missing unit; write unit=\"1/s\", or unit=\"1\" if it has none"
-            )
+            raise LawError(f'parameter \'{self.meaning}\': missing unit; write unit="1/s", or unit="1" if it has none')
         object.__setattr__(self, "bounds", (low, high))
         object.__setattr__(self, "unit", self.unit or "1")
         if self.off is not None:
