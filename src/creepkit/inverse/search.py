@@ -98,7 +98,7 @@ class Fences:
     def _outside(self, theta: Floats) -> Floats:
         """How far each coefficient lies beyond its bounds, in ln: above positive, below negative."""
         own = theta[list(self.coordinates.rates)]
-        return np.maximum(own - self.high, 0.0) + np.minimum(own - self.low, 0.0)
+        return np.asarray(np.maximum(own - self.high, 0.0) + np.minimum(own - self.low, 0.0))
 
 
 def multistart(

@@ -15,10 +15,13 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+
+import numba
 
 SOURCE, SEAL = "law.py", "SHA256SUMS"
 
@@ -113,8 +116,20 @@ def _executed(key: str, path: Path) -> ModuleType:
     module = ModuleType(f"creepkit_kernel_{key}")
     module.__file__, module.__dict__["SOURCE"] = str(path), text
     sys.modules[module.__name__] = module  # numba finds the functions of cached machine code through their module
-    exec(compile(text, str(path), "exec"), module.__dict__)
+    with _machine_code_beside_the_source():
+        exec(compile(text, str(path), "exec"), module.__dict__)
     return module
+
+
+@contextmanager
+def _machine_code_beside_the_source() -> Iterator[None]:
+    """Overrule NUMBA_CACHE_DIR: the seal has to cover the machine code, and the folder moves as a whole."""
+    elsewhere = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = ""
+    try:
+        yield
+    finally:
+        numba.config.CACHE_DIR = elsewhere
 
 
 def _sums(folder: Path) -> str:

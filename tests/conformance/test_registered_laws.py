@@ -1,0 +1,21 @@
+"""Every law that is installed keeps what every law promises."""
+
+import pytest
+
+from creepkit.registry import default
+from creepkit.testing import check_law
+
+LAWS = sorted(default().laws())
+
+
+def test_there_are_laws_to_judge() -> None:
+    assert {"norton", "strain-hardening", "time-hardening", "hyperbolic-sine", "drifting-exponent", "combined"} <= {
+        *LAWS
+    }
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_registered_law_conforms(name: str) -> None:
+    report = check_law(default().law(name))
+
+    assert report.ok, str(report)
