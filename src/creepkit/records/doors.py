@@ -1,0 +1,59 @@
+"""The doors of plugins that read measured files and write laws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+from creepkit.records.history import History
+
+if TYPE_CHECKING:
+    from creepkit.language.law import CreepLaw
+
+
+@runtime_checkable
+class Reader(Protocol):
+    """Turns measured files into histories."""
+
+    @property
+    def name(self) -> str:
+        """Short, lower case, unique in the registry."""
+        ...
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        ...
+
+    def accepts(self, path: Path) -> bool:
+        """Say whether this reader understands the file or folder, without reading all of it."""
+        ...
+
+    def read(self, path: Path) -> list[History]:
+        """Return the histories in the file or folder; HistoryError with file and line when it cannot."""
+        ...
+
+
+@runtime_checkable
+class Exporter(Protocol):
+    """Writes a law and its values as text."""
+
+    @property
+    def name(self) -> str:
+        """Short, lower case, unique in the registry."""
+        ...
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        ...
+
+    @property
+    def suffix(self) -> str:
+        """Ending of a file's name, with its dot."""
+        ...
+
+    def text(self, law: CreepLaw, values: Mapping[str, float], notes: Sequence[str]) -> str:
+        """Return the text; `notes` (intervals, validity) become comments; ExportError when it cannot."""
+        ...

@@ -1,0 +1,121 @@
+"""What was measured: one test, and everything known about how it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats, frozen
+from creepkit.errors import HistoryError
+from creepkit.records.loading import Loading, Program
+
+if TYPE_CHECKING:
+    from creepkit.language.elastic import Elastic
+
+ZERO_CELSIUS = 273.15
+
+EVERY_FRAME: Bools = frozen([], dtype=bool)
+"""The value of History.used that marks every frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """One measured (or planned) test: outputs over time, and everything known about how it was made.
+
+    times : (frames,) s, strictly increasing.
+    outputs : {name: (frames,)}; uniaxial: "strain", equivalent creep strain as `strain_measure` says.
+    loading : what was imposed.
+    temperature : K, a number or a Program.
+    strain_measure : "logarithmic" or "engineering" (the observation operator of a uniaxial strain).
+    includes_elastic : whether the strain contains the elastic strain on loading.
+    used : (frames,) which frames a fit may use; EVERY_FRAME stands for all of them.
+    operator : which observation operator, and window, made the outputs (empty: the specimen's default).
+    """
+
+    name: str
+    times: Floats
+    outputs: Mapping[str, Floats]
+    loading: Loading
+    temperature: float | Program
+    specimen: str = "uniaxial"
+    elastic: Elastic | None = None
+    strain_measure: Literal["logarithmic", "engineering"] = "logarithmic"
+    includes_elastic: bool = False
+    standard_deviation: Mapping[str, Floats] = field(default_factory=dict)
+    used: Bools = field(default_factory=lambda: EVERY_FRAME)
+    geometry: Mapping[str, float] = field(default_factory=dict)
+    operator: str = ""
+    alloy: str = ""
+    labels: Mapping[str, str] = field(default_factory=dict)
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        where = self.source or f"history '{self.name}'"
+        times = frozen(self.times)
+        if times.ndim != 1 or times.size == 0:
+            raise HistoryError(f"{where}: no frames; a history needs at least one time")
+        if not np.isfinite(times).all() or times[0] < 0:
+            raise HistoryError(f"{where}: times must be finite and start at or after 0 s")
+        if (np.diff(times) <= 0).any():
+            k = int(np.argmax(np.diff(times) <= 0)) + 1
+            found = f"{times[k]:g} s after {times[k - 1]:g} s"
+            raise HistoryError(f"{where}: time does not increase at frame {k + 1} ({found})")
+        outputs = {name: frozen(values) for name, values in self.outputs.items()}
+        for name, values in outputs.items():
+            if values.shape != times.shape:
+                raise HistoryError(f"{where}: output '{name}' has {values.size} values for {times.size} times")
+        used = np.ones(times.size, bool) if self.used is EVERY_FRAME else self.used
+        if np.shape(used) != times.shape:
+            raise HistoryError(f"{where}: 'used' marks {np.size(used)} frames of {times.size}")
+        freeze = object.__setattr__
+        freeze(self, "times", times)
+        freeze(self, "outputs", MappingProxyType(outputs))
+        freeze(self, "used", frozen(used, dtype=bool))
+        if not isinstance(self.temperature, Program):
+            if not 0 < float(self.temperature) < 1e4:
+                raise HistoryError(f"{where}: temperature {self.temperature} K is not above 0 and below 10000 K")
+            freeze(self, "temperature", float(self.temperature))
+        sd = {n: frozen(np.broadcast_to(np.asarray(v, float), times.shape)) for n, v in self.standard_deviation.items()}
+        freeze(self, "standard_deviation", MappingProxyType(sd))
+        freeze(self, "geometry", MappingProxyType(dict(self.geometry)))
+        freeze(self, "labels", MappingProxyType(dict(self.labels)))
+
+    def replace(self, **changes: Any) -> History:
+        """The same history with some fields changed; new times are all used unless `used` is given too."""
+        if "times" in changes:
+            changes = {"used": EVERY_FRAME, **changes}
+        return replace(self, **changes)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        state = {f.name: getattr(self, f.name) for f in fields(self)}
+        return _history, ({k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()},)
+
+    def up_to(self, output: str, limit: float) -> History:
+        """Mark unused every frame from the first used one whose `output` exceeds `limit` on."""
+        over = np.flatnonzero((self.outputs[output] > limit) & self.used)
+        used = np.array(self.used)
+        if over.size:
+            used[over[0] :] = False
+        return self.replace(used=used)
+
+    def temperature_program(self) -> Program:
+        """Temperature over time, K."""
+        return self.temperature if isinstance(self.temperature, Program) else Program.constant(self.temperature)
+
+    @property
+    def condition(self) -> str:
+        """The nominal condition in words, '850 C, 43 MPa': what leave-one-condition-out holds out."""
+        load = self.loading.program().values
+        low, high = float(load.min()), float(load.max())
+        driven = f"{high:g}" if low == high or self.loading.quantity == "pressure" else f"{load[0]:g} to {load[-1]:g}"
+        T = self.temperature_program().values - ZERO_CELSIUS
+        warm = f"{T[0]:.0f}" if np.ptp(T) < 0.5 else f"{T[0]:.0f} to {T[-1]:.0f}"
+        return f"{warm} C, {driven} MPa"
+
+
+def _history(state: dict[str, Any]) -> History:
+    return History(**state)

@@ -1,0 +1,149 @@
+"""What is imposed on a specimen: programs in time, steps of stress, a jump of pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Literal, Protocol, runtime_checkable
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats, frozen
+from creepkit.errors import SolveError
+
+
+@dataclass(frozen=True)
+class Program:
+    """A piecewise linear function of time; a repeated time is a jump (the value after it holds from then on).
+
+    times : (breakpoints,) s, non-decreasing, starting at 0.
+    values : (breakpoints,).
+    """
+
+    times: Floats
+    values: Floats
+
+    def __post_init__(self) -> None:
+        times, values = frozen(np.atleast_1d(self.times)), frozen(np.atleast_1d(self.values))
+        if times.shape != values.shape or times.ndim != 1 or times.size == 0:
+            raise SolveError(f"a program needs as many values as times, found {values.size} and {times.size}")
+        if not (np.isfinite(times).all() and np.isfinite(values).all()):
+            raise SolveError("a program of times and values must hold finite numbers only")
+        if times[0] != 0.0 or (np.diff(times) < 0).any():
+            raise SolveError("the times of a program must start at 0 and never decrease")
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "values", values)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Program):
+            return NotImplemented
+        return np.array_equal(self.times, other.times) and np.array_equal(self.values, other.values)
+
+    def __hash__(self) -> int:
+        return hash((self.times.tobytes(), self.values.tobytes()))
+
+    @classmethod
+    def constant(cls, value: float) -> Program:
+        """The program that holds one value for ever."""
+        return cls(np.zeros(1), np.full(1, float(value)))
+
+    @classmethod
+    def steps(cls, steps: Sequence[tuple[float, float]]) -> Program:
+        """Constant pieces from (start time, value) pairs: [(0, 100), (3600, 120)]."""
+        times, values = [0.0], [float(steps[0][1])]
+        for start, value in steps[1:]:
+            times += [float(start)] * 2
+            values += [values[-1], float(value)]
+        return cls(np.array(times), np.array(values))
+
+    def at(self, times: ArrayLike) -> Floats:
+        """Values at `times` (any shape), the later one at a jump, the last one beyond the end."""
+        t = np.asarray(times, dtype=float)
+        k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, self.times.size - 1)
+        following = np.minimum(k + 1, self.times.size - 1)
+        width = self.times[following] - self.times[k]
+        share = np.divide(t - self.times[k], width, out=np.zeros_like(t), where=width > 0)
+        return np.asarray(self.values[k] + share * (self.values[following] - self.values[k]))
+
+
+@runtime_checkable
+class Loading(Protocol):
+    """What drives a specimen: one prescribed quantity as a piecewise linear program."""
+
+    @property
+    def quantity(self) -> Literal["stress", "pressure"]:
+        """What is prescribed."""
+        ...
+
+    def program(self) -> Program:
+        """The prescribed quantity over time, MPa."""
+        ...
+
+
+@dataclass(frozen=True)
+class StressSteps:
+    """Uniaxial loading by steps of stress: [(0, 100), (3600, 120)] is 100 MPa, then 120 MPa from one hour on.
+
+    control : "load" when the load is constant in each step (stress is engineering stress and true stress grows as
+        exp(strain)); "stress" when true stress is held.
+    """
+
+    steps: tuple[tuple[float, float], ...]
+    control: Literal["load", "stress"] = "load"
+    quantity: Literal["stress", "pressure"] = field(default="stress", init=False)
+
+    def __post_init__(self) -> None:
+        steps = tuple((float(t), float(s)) for t, s in self.steps)
+        if not steps or steps[0][0] != 0.0 or any(b[0] <= a[0] for a, b in pairwise(steps)):
+            raise SolveError("stress steps must start at time 0 and follow one another in time")
+        if any(not 0 <= s < 1e5 for _, s in steps):
+            raise SolveError(f"stress must lie from 0 to 1e5 MPa in every step, found {[s for _, s in steps]}")
+        if self.control not in ("load", "stress"):
+            raise SolveError(f"control is '{self.control}'; allowed are 'load' and 'stress'")
+        object.__setattr__(self, "steps", steps)
+
+    def program(self) -> Program:
+        """Stress over time, MPa."""
+        return Program.steps(self.steps)
+
+
+def constant_stress(stress: float, control: Literal["load", "stress"] = "load") -> StressSteps:
+    """One stress, MPa, held from time zero."""
+    return StressSteps(((0.0, stress),), control)
+
+
+@dataclass(frozen=True)
+class PressureJump:
+    """Gas pressure P1, then P2 from Tj on, each reached by a linear ramp; MPa and s."""
+
+    P1: float
+    P2: float
+    Tj: float
+    ramp: float = 5.0
+    quantity: Literal["stress", "pressure"] = field(default="pressure", init=False)
+
+    def __post_init__(self) -> None:
+        if not (self.P1 > 0 and self.P2 > 0 and self.ramp > 0 and self.Tj > self.ramp):
+            raise SolveError("a pressure jump needs P1, P2 and ramp above zero and Tj after the first ramp")
+
+    def program(self) -> Program:
+        """Pressure over time, MPa."""
+        times = np.array([0.0, self.ramp, self.Tj, self.Tj + self.ramp])
+        return Program(times, np.array([0.0, self.P1, self.P1, self.P2]))
+
+
+@dataclass(frozen=True)
+class RecordedLoading:
+    """A loading known as a program over time, MPa: a recorded column, or ramps that no simpler record describes.
+
+    control : as in StressSteps; without meaning for a pressure.
+    """
+
+    record: Program
+    quantity: Literal["stress", "pressure"]
+    control: Literal["load", "stress"] = "load"
+
+    def program(self) -> Program:
+        """Stress or pressure over time, MPa."""
+        return self.record
