@@ -12,6 +12,7 @@ from creepkit.language import (
     CreepLaw,
     Param,
     State,
+    activated,
     arrhenius,
     linear,
     parameters,
@@ -23,6 +24,7 @@ from creepkit.language import (
     time,
 )
 from creepkit.laws.combined import COMBINED
+from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
 
@@ -145,6 +147,7 @@ EQUATIONS = {
     ),
     "two activated": NORTON.times(arrhenius()) + NORTON.times(arrhenius()),
     "combined with temperature": COMBINED.times(arrhenius()).with_temperature(n_2=linear()),
+    "activated breakdown stress": HYPERBOLIC_SINE.times(arrhenius()).with_temperature(B=activated()),
     "exponent of time with temperature": TIME_HARDENING.with_temperature(m=linear(slope=(-1e-5, 1e-5))),
 }
 """{name: law}, each fit for every verb."""

@@ -22,11 +22,11 @@ VALUE, DERIVATIVE = 1e-12, 1e-10
 
 
 def law_of(name: str) -> CreepLaw:
-    """A law that ships, or a sum of two with temperature in rates, in an exponent and in the breakdown stress."""
+    """A law that ships, or a sum of two with temperature in the rates and in an exponent."""
     if name != "sum with temperature":
         return creepkit.law(name)
-    sinh = creepkit.law("hyperbolic-sine").with_temperature(B=creepkit.activated())
-    return (sinh + creepkit.law("strain-hardening")).times(creepkit.arrhenius()).with_temperature(n_2=creepkit.linear())
+    both = creepkit.law("hyperbolic-sine") + creepkit.law("strain-hardening")
+    return both.times(creepkit.arrhenius()).with_temperature(n_2=creepkit.linear())
 
 
 @functools.cache

@@ -20,22 +20,21 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
-import numba
+from numba.core import config
 
 SOURCE, SEAL = "law.py", "SHA256SUMS"
 
 _loaded: dict[str, ModuleType] = {}
+_numba_settings: Any = config
 
 
 def load(key: str, text: Callable[[], str]) -> ModuleType:
     """Return the module of `key`: from memory, from disk, or made from text() now."""
     if key not in _loaded:
-        folder = _shelf() / f"law_{key}"
-        if intact(folder):
-            _loaded[key] = _executed(key, folder / SOURCE)
-        else:
-            _loaded[key] = _built(key, folder, text())
+        folder = _place(f"law_{key}")
+        _loaded[key] = _executed(key, folder / SOURCE) if intact(folder) else _built(key, folder, text())
     return _loaded[key]
 
 
@@ -57,10 +56,15 @@ def intact(folder: Path) -> bool:
 # ---- folders -------------------------------------------------------------------------------------------------------
 
 
-def _shelf() -> Path:
-    """The cache folder where it can be written; else a private one for this process, with what is cached copied."""
+def _place(name: str) -> Path:
+    """Where a module belongs: in the cache folder, or in a private one when that cannot be written."""
     folder = cache_folder()
-    return folder if _writable(folder) else _private_copy(folder)
+    if _writable(folder):
+        return folder / name
+    private = _private_folder() / name
+    if intact(folder / name) and not private.exists():
+        shutil.copytree(folder / name, private)  # numba must be able to write beside the source
+    return private
 
 
 def _writable(folder: Path) -> bool:
@@ -73,13 +77,11 @@ def _writable(folder: Path) -> bool:
 
 
 @cache
-def _private_copy(folder: Path) -> Path:
-    private = Path(tempfile.mkdtemp(prefix="creepkit-"))
+def _private_folder() -> Path:
+    """A folder of this process, removed when it ends."""
+    private = tempfile.mkdtemp(prefix="creepkit-")
     atexit.register(shutil.rmtree, private, ignore_errors=True)
-    for cached in folder.glob("law_*") if folder.is_dir() else ():
-        if intact(cached):
-            shutil.copytree(cached, private / cached.name)
-    return private
+    return Path(private)
 
 
 # ---- making and loading --------------------------------------------------------------------------------------------
@@ -101,14 +103,23 @@ def _built(key: str, folder: Path, text: str) -> ModuleType:
 def _put(temporary: Path, folder: Path) -> None:
     """Rename the new folder into place; an intact one that is there already stays, a damaged one goes."""
     if folder.exists() and not intact(folder):
-        damaged = tempfile.mkdtemp(dir=folder.parent, prefix="damaged_")
-        os.replace(folder, Path(damaged) / folder.name)
-        shutil.rmtree(damaged, ignore_errors=True)
+        _remove(folder)
     try:
         os.rename(temporary, folder)
     except OSError:
         if not folder.exists():
             raise
+
+
+def _remove(folder: Path) -> None:
+    """Take a folder away whole, so that no process sees half of it."""
+    aside = tempfile.mkdtemp(dir=folder.parent, prefix="damaged_")
+    try:
+        os.replace(folder, Path(aside) / folder.name)
+    except FileNotFoundError:  # another process has just done it
+        return
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 def _executed(key: str, path: Path) -> ModuleType:
@@ -124,12 +135,12 @@ def _executed(key: str, path: Path) -> ModuleType:
 @contextmanager
 def _machine_code_beside_the_source() -> Iterator[None]:
     """Overrule NUMBA_CACHE_DIR: the seal has to cover the machine code, and the folder moves as a whole."""
-    elsewhere = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = ""
+    elsewhere = _numba_settings.CACHE_DIR
+    _numba_settings.CACHE_DIR = ""
     try:
         yield
     finally:
-        numba.config.CACHE_DIR = elsewhere
+        _numba_settings.CACHE_DIR = elsewhere
 
 
 def _sums(folder: Path) -> str:

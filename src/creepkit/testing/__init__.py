@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+import numpy as np
+
 from creepkit.errors import CreepkitError
 from creepkit.kernels.lowering import lower
 from creepkit.language.law import CreepLaw
@@ -62,6 +64,7 @@ def _kept(
 ) -> list[Check]:
     """The findings of one promise; one that cannot even be examined is a finding too."""
     try:
-        return list(promise(law, drawn))
+        with np.errstate(all="ignore"):
+            return list(promise(law, drawn))
     except (CreepkitError, ArithmeticError, ValueError) as error:
         return [Check(name, False, f"{type(error).__name__}: {error}")]

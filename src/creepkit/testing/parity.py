@@ -1,8 +1,9 @@
 """Parity: every target against 50-digit arithmetic, straight from the author's expression.
 
-Values and derivatives are compared relatively wherever float64 can hold them; the rate itself is compared in ln rate
-everywhere. Where a result is a small difference of large parts, no formula in float64 can keep ten digits of it; such
-a result is told from a wrong one by its error, which is no more than the last bits of the inputs make.
+Values and derivatives are compared relatively wherever float64 can hold them (and the rate, which derivatives are
+multiples of); the rate itself is compared in ln rate everywhere. Where a result is a small difference of large parts,
+no formula in float64 can keep ten digits of it; such a result is told from a wrong one by its error, which is no more
+than the last bits of the inputs make.
 """
 
 from __future__ import annotations
@@ -110,6 +111,8 @@ def _judged(truth: Truth, table: Table, where: Difference, forgive: bool) -> Dif
 def _differences(sample: int, rows: Sequence[Sequence[Any]], got: Any) -> Iterator[Difference]:
     for row, (true, numbers) in enumerate(zip(rows, got, strict=True)):
         if true[0] == 0 and abs(numbers[0]) < NO_RATE:
+            continue
+        if abs(true[0]) >= _LARGEST:
             continue
         for column, (a, b) in enumerate(zip(true, numbers, strict=True)):
             if a == 0 or _SMALLEST < abs(a) < _LARGEST:

@@ -1,0 +1,57 @@
+"""The way a laboratory would go, on real curves: CMSX-6 at 980 C (BAM, doi 10.5281/zenodo.13937986, CC BY 4.0)."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import creepkit as ck
+from creepkit.cli.app import app
+from creepkit.inverse.validation import loading_strains, times_to_strain
+
+CURVES = Path(__file__).parents[3] / "shared" / "data" / "uniaxial" / "cmsx6"
+pytestmark = pytest.mark.skipif(not CURVES.is_dir(), reason="the measured curves lie beside the project, not in it")
+
+
+@pytest.fixture(scope="module")
+def answer(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cmsx6")
+    words = [
+        "identify",
+        str(CURVES),
+        "--law",
+        "norton",
+        "--law",
+        "strain-hardening",
+        "--up-to",
+        "0.05",
+        "--starts",
+        "4",
+    ]
+    result = CliRunner().invoke(app, [*words, "--to", str(folder), "--json"])
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout), folder
+
+
+def test_stress_exponent_is_that_of_the_rupture_times(answer):
+    """Monkman and Grant: rupture time times creep rate is nearly constant, so both have one stress exponent.
+
+    Rupture times retyped from the data set: 78.7 and 74.5 h at 230 MPa, 180 and 170 h at 200, 491 and 484 h at 170.
+    Their log-log slope is 6.1; the Monkman-Grant exponent lies between 0.8 and 1, hence 15 % on either side.
+    """
+    stress = np.log([230, 230, 200, 200, 170, 170])
+    slope = -np.polyfit(stress, np.log([78.7, 74.5, 180, 170, 491, 484]), 1)[0]
+    found = next(law for law in answer[0]["laws"] if law["law"] == "norton")["parameters"]["n"]
+    assert 0.85 * slope < found["value"] < 1.15 * slope / 0.8
+    assert found["verdict"] == "determined"
+
+
+def test_times_to_one_percent_are_within_a_factor_of_two(answer):
+    """Z below 2 is what the field calls excellent (Holdsworth et al. 2008)."""
+    fit = ck.load(answer[1] / "norton.json")
+    tests = ck.read_histories(CURVES)
+    found = times_to_strain(fit.law, fit.values, tests, ck.specimen("uniaxial"), 0.01, loading_strains(tests))
+    assert found.measured.size == 6
+    assert found.z_factor < 2
