@@ -42,6 +42,8 @@ from creepkit.records import History, Nuisance, Predictor
 LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
 PUSH = 1.0
 """How far, in ln, data may push a coefficient beyond its bounds against the fence before that is an error."""
+ROUNDS = 8
+"""At most as often are the sizes of scatter and the values found from one another; three rounds usually do."""
 NUISANCES = (Nuisance("offset"), Nuisance("rate"))
 """Unless told otherwise: a loading-strain offset of each curve and test-to-test scatter of the rate, both estimated."""
 
@@ -61,7 +63,7 @@ def identify(
 
     using : predictor, such as the specimen "uniaxial".
     nuisances : what differs between tests; sd=None estimates the spread from the data.
-    start : conditioned coordinates to begin from instead of a global search (a refit).
+    start : conditioned coordinates to begin from instead of a global search; a refit takes two rounds at most.
     """
     settings = settings or Settings()
     _check(law, histories, settings, nuisances)
@@ -77,7 +79,10 @@ def identify(
         candidates = _searched(objective, box, whitener(objective.before_fit(), log_times, working), settings, progress)
     else:
         candidates = [box.clip(np.asarray(start, float))]
-    ends = [_alternate(objective, box, log_times, u, working, nuisances, settings, progress) for u in candidates]
+    rounds = ROUNDS if start is None else 2
+    ends = [
+        _alternate(objective, box, log_times, u, working, nuisances, settings, progress, rounds) for u in candidates
+    ]
     best, residuals, working = max(ends, key=lambda end: log_likelihood(end[1], log_times, end[2]))
     _check_bounds(law, coordinates, best.u)
     scatter = estimated(residuals, log_times, full_guess(working, len(thin), nuisances), nuisances)
@@ -135,7 +140,7 @@ def _distinct(minima: Sequence[Minimum], box: Box, most: int = 2, near: float = 
 
 def _alternate(
     objective: Objective, box: Box, log_times: Floats, u: Floats, working: Scatter, nuisances: Sequence[Nuisance],
-    settings: Settings, progress: Progress | None, rounds: int = 8,
+    settings: Settings, progress: Progress | None, rounds: int,
 ) -> tuple[Minimum, Residuals, Scatter]:  # fmt: skip
     """Working scatter given the law, law given the scatter, until the likelihood no longer grows."""
     residuals = objective.at(u)

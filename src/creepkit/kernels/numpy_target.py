@@ -27,7 +27,13 @@ def _whole(entry: Callable[..., Any]) -> Callable[..., list[Any]]:
     def call(*arguments: Any) -> list[Any]:
         with np.errstate(over="ignore", under="ignore", divide="ignore"):
             results = entry(*arguments)
-        shape = np.broadcast_shapes(*(np.shape(x) for x in arguments))
-        return [y if np.shape(y) == shape else np.broadcast_to(y, shape) for y in results]
+        shapes = {np.shape(x) for x in arguments} - {()}
+        shape = shapes.pop() if len(shapes) == 1 else np.broadcast_shapes(*shapes)
+        numbers = {y: np.broadcast_to(y, shape) for y in {y for y in results if type(y) is float}}
+        return [numbers[y] if type(y) is float else _shaped(y, shape) for y in results]
 
     return call
+
+
+def _shaped(y: Any, shape: tuple[int, ...]) -> Any:
+    return y if np.shape(y) == shape else np.broadcast_to(y, shape)

@@ -102,14 +102,23 @@ def _on_tensors(entry: Entry) -> Entry:
     def call(*arguments: Any) -> Sequence[Any]:
         tensors = [x for x in arguments if isinstance(x, torch.Tensor)] or [torch.zeros((), dtype=torch.float64)]
         dtype = functools.reduce(torch.promote_types, {x.dtype for x in tensors}, torch.float32)
-        return entry(*(torch.as_tensor(x, dtype=dtype, device=tensors[0].device) for x in arguments))
+        like = tensors[0].new_empty((), dtype=dtype)
+        return entry(*(_alike(x, like) for x in arguments))
 
     return call
 
 
+def _alike(x: Any, like: Any) -> Any:
+    if isinstance(x, torch.Tensor) and x.dtype == like.dtype:
+        return x
+    return torch.as_tensor(x, dtype=like.dtype, device=like.device)
+
+
 def _whole(results: Sequence[Any], inputs: Sequence[Any]) -> list[Any]:
-    """Give every result the shape of all inputs together (zeros are printed as plain numbers)."""
-    shape = torch.broadcast_shapes(*(x.shape for x in inputs))  # type: ignore[no-untyped-call]
-    tensors = [y if isinstance(y, torch.Tensor) else inputs[0].new_full((), y) for y in results]
-    own = [y.clone() if any(y is x for x in inputs) else y for y in tensors]
+    """Give every result the shape of all inputs together, and a memory of its own (zeros are printed as numbers)."""
+    shapes = {x.shape for x in inputs} - {torch.Size()}
+    shape = shapes.pop() if len(shapes) == 1 else torch.broadcast_shapes(*shapes)  # type: ignore[no-untyped-call]
+    numbers = {y: inputs[0].new_full((), y).expand(shape) for y in {y for y in results if type(y) is float}}
+    given = {id(x) for x in inputs}
+    own = (numbers[y] if type(y) is float else y.clone() if id(y) in given else y for y in results)
     return [y if y.shape == shape else y.expand(shape) for y in own]
