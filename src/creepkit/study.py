@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit import registry
-from creepkit.errors import FitError, SolveError
+from creepkit.errors import FitError, LawError, SolveError
 from creepkit.language import symbols
-from creepkit.records import EVERY_FRAME, History, Loading, Nuisance, Predictor, Program, Specimen, Status
+from creepkit.records import History, Loading, Nuisance, Predictor, Program, Specimen, Status
 
 if TYPE_CHECKING:
     from creepkit.arrays import ArrayLike
@@ -64,8 +65,8 @@ def read_histories(paths: str | Path | Iterable[str | Path], reader: str | None 
 
 
 def simulate(
-    law: CreepLaw,
-    using: Predictor,
+    law: CreepLaw | str,
+    using: Predictor | str,
     values: Mapping[str, float],
     *,
     loading: Loading,
@@ -77,8 +78,12 @@ def simulate(
     """Return the history that a law with these values predicts: what a perfect test would have measured.
 
     using : a specimen, a surrogate or a closed form; values : {parameter: value} in the law's units.
-    times : (frames,) s; temperature : K; `elastic` in MPa. The history of a specimen that bursts ends there.
+    times : (frames,) s; temperature : K; `elastic` in MPa. The history of a specimen that bursts ends
+    there, and its label `burst_s` says when.
     """
+    law, using = _law(law), _predictor(using)
+    if not hasattr(loading, "program"):
+        raise SolveError(f"loading is {loading!r}; write constant_stress(50) or StressSteps(((0, 50), (3600, 60)))")
     if temperature is None and law.uses(symbols.temperature):
         raise SolveError(f"law '{law.name}' depends on temperature: give temperature= in K")
     plan = History(
@@ -98,16 +103,17 @@ def simulate(
         raise SolveError(f"the simulation of law '{law.name}' stopped at {end:g} s: {told}; check values and loading")
     rows = prediction.of(0)
     alive = np.isfinite(rows).all(axis=1)
-    if not alive.any():
-        raise SolveError(f"the simulation of law '{law.name}' burst at {end:g} s, before the first time asked for")
+    if alive.sum() < min(2, alive.size):
+        raise SolveError(f"the simulation of law '{law.name}' burst at {end:g} s, before the times asked for")
     outputs = dict(zip(prediction.outputs, rows[alive].T, strict=True))
-    return plan.replace(times=plan.times[alive], outputs=outputs, used=EVERY_FRAME)
+    labels = {} if status == Status.COMPLETE else {"burst_s": f"{end:.6g}"}
+    return plan.replace(times=plan.times[alive], outputs=outputs, labels=labels)
 
 
 def identify(
-    law: CreepLaw,
+    law: CreepLaw | str,
     histories: Sequence[History],
-    using: Predictor | None = None,
+    using: Predictor | str | None = None,
     *,
     nuisances: Sequence[Nuisance] | None = None,
     starts: int = 8,
@@ -118,26 +124,31 @@ def identify(
 ) -> Identification:
     """Identify the parameters of a law from all histories at once, with 95 % intervals.
 
-    using : a specimen or any predictor; by default the specimen that the histories name.
+    law : a law or its name; using : a specimen (or its name) or any predictor; by default what the histories name.
     nuisances : what differs between tests; by default an offset of each curve and test-to-test scatter of the rate.
     starts, seed : of the search, which includes the centre of the bounds; frames : looked at in each history.
-    loss : "linear", or a robust loss of scipy's least_squares such as "soft_l1".
+    loss : "linear", or a robust loss of scipy's least_squares such as "soft_l1" (for the values; intervals stay
+        Gaussian).
     """
     from creepkit.inverse.identification import Settings
-    from creepkit.inverse.identify import NUISANCES
     from creepkit.inverse.identify import identify as run
 
-    settings = Settings(starts=starts, draws=max(64, 8 * starts), frames=frames, seed=seed, loss=loss)
-    chosen = using or _specimen_of(histories)
-    given = NUISANCES if nuisances is None else nuisances
-    return run(law, histories, chosen, nuisances=given, settings=settings, progress=progress)
+    histories = _histories(histories)
+    settings = Settings(starts=starts, draws=_draws(starts), frames=frames, seed=seed, loss=loss)
+    if nuisances is not None:
+        settings = replace(settings, nuisances=tuple(nuisances))
+    chosen = _specimen_of(histories) if using is None else _predictor(using)
+    return run(_law(law), histories, chosen, settings=settings, progress=progress)
 
 
 def rank(fits: Sequence[Identification]) -> Ranking:
     """Rank identifications of the same histories by BIC, with weights and a verdict."""
+    from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection import rank as run
 
-    return run(fits)
+    if isinstance(fits, Identification):
+        raise FitError("rank() takes a list of identifications, found a single one")
+    return run(list(fits))
 
 
 def load(path: str | Path) -> Identification:
@@ -145,6 +156,39 @@ def load(path: str | Path) -> Identification:
     from creepkit.inverse.files import load as run
 
     return run(path)
+
+
+def _draws(starts: int) -> int:
+    """Sobol points to screen for so many starts: eight each, a power of two, and at least 64."""
+    return max(64, 1 << (8 * max(int(starts), 1) - 1).bit_length())
+
+
+def _law(given: CreepLaw | str) -> CreepLaw:
+    """The law itself, or the one of that name."""
+    if isinstance(given, str):
+        return law(given)
+    if not hasattr(given, "terms"):
+        raise LawError(f"a creep law or its name is needed, found {type(given).__name__}")
+    return given
+
+
+def _predictor(given: Predictor | str) -> Predictor:
+    """The predictor itself, or the specimen of that name."""
+    if isinstance(given, str):
+        return specimen(given)
+    if not hasattr(given, "predict"):
+        raise SolveError(f"a specimen, its name or another predictor is needed, found {type(given).__name__}")
+    return given
+
+
+def _histories(given: Sequence[History]) -> list[History]:
+    if isinstance(given, (str, Path, History)):
+        raise FitError("histories must be a list of them: read_histories(path) returns one, [history] makes one")
+    histories = list(given)
+    strangers = [type(h).__name__ for h in histories if not isinstance(h, History)]
+    if strangers:
+        raise FitError(f"histories must be a list of them, found {strangers[0]} in it; use read_histories(path)")
+    return histories
 
 
 def _specimen_of(histories: Sequence[History]) -> Specimen:
@@ -158,7 +202,7 @@ def _specimen_of(histories: Sequence[History]) -> Specimen:
 
 
 def export(
-    source: CreepLaw | Identification,
+    source: CreepLaw | Identification | str,
     language: str,
     values: Mapping[str, float] | None = None,
     *,
@@ -179,8 +223,7 @@ def export(
 
         law, values, notes = source.law, source.values if values is None else values, [*notes_of(source), *notes]
     else:
-        law, values = source, values or {}
+        law, values = _law(source), values or {}
     if to is not None:
         write_text(law, values, exporter, to, notes)
     return export_text(law, values, exporter, notes)
-

@@ -2,7 +2,8 @@
 
 Hand and kernel run alternately on the same points; a figure is the median over the repeats of the ratio of their CPU
 times (the issue allows 1.3). `rate` is the rate alone, `all` the rate with its derivatives to the point and to every
-parameter. Compiled entries are called for all rows at once, torch runs on one thread.
+parameter. Compiled entries are called for all rows at once, torch runs on one thread. A call of a kernel for arrays
+costs some 10 us more than its arithmetic, one for tensors some 50 us, which a few thousand rows make small.
 """
 
 from __future__ import annotations

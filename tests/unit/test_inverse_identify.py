@@ -1,6 +1,7 @@
 """identify(): planted values come back inside their intervals, and what is not determined is said."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -139,7 +140,7 @@ def test_what_cannot_be_fitted_is_said(tests):
     with pytest.raises(FitError, match="no histories"):
         identify(LAW, [], Steady())
     with pytest.raises(FitError, match="loss 'cubic'"):
-        identify(LAW, tests, Steady(), settings=Settings(loss="cubic"))
+        Settings(loss="cubic")
     with pytest.raises(FitError, match="fewer than two usable frames"):
         identify(LAW, [tests[0].replace(used=np.zeros(tests[0].times.size, bool))], Steady())
 
@@ -158,7 +159,7 @@ def test_bounds_that_exclude_the_data_are_reported():
 
 def test_a_given_offset_prior_is_used(tests):
     fit = identify(
-        LAW, tests, Steady(), settings=QUICK, nuisances=(Nuisance("offset", sd=5e-5), Nuisance("rate", sd=0.2))
+        LAW, tests, Steady(), settings=replace(QUICK, nuisances=(Nuisance("offset", sd=5e-5), Nuisance("rate", sd=0.2)))
     )
     assert fit.scatter.offset == 5e-5
     assert fit.scatter.rate == 0.2
@@ -170,3 +171,95 @@ def test_robust_loss_survives_a_wild_frame(tests):
     ]
     fit = identify(LAW, wild, Steady(), settings=Settings(starts=3, draws=16, frames=20, loss="soft_l1"))
     assert fit.values["n"] == pytest.approx(5.2, abs=0.6)
+
+
+# ---- found by hand, and kept ---------------------------------------------------------------------------------------
+
+
+def test_activation_energy_at_one_temperature_is_not_determined():
+    """The data do not touch Q at all: its interval is that of its bounds, not of zero width."""
+    conditions = [(s, 1073.15) for s in (30.0, 50.0, 80.0, 120.0)]
+    fit = identify(LAW, planted(LAW, TRUTH, conditions, seed=1, rate=0.1, noise=1e-5), Steady(), settings=QUICK)
+    (energy,) = (e for e in fit.estimates if e.name == "Q")
+    assert energy.verdict == "not determined"
+    assert energy.high - energy.low > 5e5
+
+
+def test_two_tests_assume_a_scatter_between_them_and_say_so():
+    """Two tests that scatter by 25 %: over 20 campaigns the interval of n must cover the truth nearly always."""
+    covered = 0
+    for seed in range(20):
+        tests = planted(
+            NORTON, {"A": 1e-14, "n": 4.0}, [(40.0, 1050.0), (90.0, 1050.0)], seed=seed, rate=0.25, noise=1e-5
+        )
+        fit = identify(NORTON, tests, Steady(), settings=Settings(starts=1, draws=8, frames=12))
+        (n,) = (e for e in fit.estimates if e.name == "n")
+        covered += n.low <= 4.0 <= n.high
+    assert covered >= 17
+    assert any("assumed to scatter" in note for note in fit.notes)
+
+
+def test_scatter_of_rates_is_found_when_the_coefficient_is_fixed():
+    """With A fixed, the effect of a test's rate is the slope in ln t: planted tests without scatter must show none."""
+    tests = planted(NORTON, {"A": 1e-14, "n": 4.0}, [(s, 1050.0) for s in (40, 60, 80, 100)], seed=2, noise=1e-5)
+    fit = identify(NORTON.fix(A=1e-14), tests, Steady(), settings=QUICK)
+    assert fit.scatter.rate < 0.02
+    assert fit.values["n"] == pytest.approx(4.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("fixed", [{"A_1": 1e-16, "A_2": 1e-17}, {"A_1": 1e-16, "n_1": 5.0}])
+def test_sums_with_fixed_parts_are_identified(fixed):
+    law = (NORTON + NORTON).fix(**fixed)
+    tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(s, 1050.0) for s in (30, 50, 80)], seed=3, noise=1e-5)
+    assert np.isfinite(identify(law, tests, Steady(), settings=QUICK).rms)
+
+
+def test_a_law_without_parameters_is_refused(tests):
+    with pytest.raises(FitError, match="no parameter left"):
+        identify(NORTON.fix(A=1e-16, n=5.0), tests, Steady())
+
+
+def test_strains_that_never_rise_are_refused(tests):
+    flat = [h.replace(outputs={"strain": np.zeros(h.times.size)}) for h in tests]
+    with pytest.raises(FitError, match="no strain"):
+        identify(LAW, flat, Steady(), settings=QUICK)
+
+
+def test_fits_to_different_frames_are_not_ranked(fit, tests):
+    short = identify(LAW, [h.up_to("strain", 0.01) for h in tests], Steady(), settings=QUICK)
+    with pytest.raises(FitError, match="cannot be ranked"):
+        rank([fit, short])
+
+
+def test_refit_keeps_the_nuisances(tests):
+    plain = identify(LAW, tests, Steady(), settings=replace(QUICK, nuisances=()))
+    again = refit(plain, tests[:-1])
+    assert again.scatter.rate == again.scatter.offset == 0.0
+
+
+def test_histories_of_one_name_are_refused(tests):
+    with pytest.raises(FitError, match="two histories are called"):
+        identify(LAW, [tests[0], tests[0]], Steady())
+
+
+def test_attaching_histories_goes_by_name(fit, tests):
+    assert [h.name for h in fit.on(tests[::-1], Steady()).histories] == [h.name for h in tests]
+    with pytest.raises(FitError, match="not among the histories"):
+        fit.on(tests[:1], Steady())
+
+
+def test_settings_and_nuisances_that_mean_nothing_are_refused():
+    with pytest.raises(FitError, match="starts is 0"):
+        Settings(starts=0)
+    with pytest.raises(FitError, match="about zero"):
+        Settings(nuisances=(Nuisance("offset", mean=0.01, sd=1e-3),))
+
+
+def test_noise_of_a_smooth_sparse_curve_is_small():
+    """Primary creep t^0.1 without noise at 12 frames even in ln t: under 0.1 % of the end strain is taken for noise."""
+    from creepkit.inverse.scales import frame_noise
+    from creepkit.records import History, constant_stress
+
+    times = np.geomspace(1e2, 1e6, 12)
+    curve = History("smooth", times, {"strain": 0.01 * (times / 1e6) ** 0.1}, constant_stress(100.0), 1000.0)
+    assert frame_noise(curve, "strain") < 1e-5

@@ -187,6 +187,20 @@ def test_batches_of_candidates_are_differentiated_by_torch_func(law: CreepLaw, t
     torch.testing.assert_close(found, expected, rtol=1e-10, atol=1e-300)
 
 
+def test_gradients_of_damage_rates_are_theirs() -> None:
+    """d/dr of B s^k (1 - omega)^-r is that times -ln(1 - omega)."""
+    kernel, r = (
+        lower(EQUATIONS["Kachanov-Rabotnov"], "torch"),
+        torch.tensor(4.0, dtype=torch.float64, requires_grad=True),
+    )
+    values = {"A": 1e-12, "n": 3.0, "B": 1e-8, "k": 2.0, "r": r}
+
+    rate = kernel.state_rates(values, stress=50.0, principal_stress=40.0, omega=0.5)["omega"]
+    (slope,) = torch.autograd.grad(rate, r)
+
+    assert float(slope) == pytest.approx(1e-8 * 40.0**2 * 0.5**-4 * np.log(2), rel=1e-13)
+
+
 @torch_warns
 def test_second_derivatives_are_those_of_norton() -> None:
     """ln f = ln A + n ln s, so d2/ds2 = -n/s^2 and d2/(ds dn) = 1/s."""

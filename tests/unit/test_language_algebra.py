@@ -47,9 +47,7 @@ def rate(law, point=POINT, **values):
 def test_the_combined_law_is_equation_2_of_the_paper():
     assert COMBINED.names == ("A_1", "n_1", "B", "A_2", "n_2", "m_1", "A_3", "n_3", "m_2")
     values = dict(A_1=1e-9, n_1=2, B=80, A_2=2e-17, n_2=4, m_1=-0.3, A_3=3e-15, n_3=3, m_2=-0.4)
-    expected = (
-        1e-9 * math.sinh(120 / 80) ** 2 + 2e-17 * 120**4 * 0.013**-0.3 + 3e-15 * 120**3 * 3.6e4**-0.4
-    )
+    expected = 1e-9 * math.sinh(120 / 80) ** 2 + 2e-17 * 120**4 * 0.013**-0.3 + 3e-15 * 120**3 * 3.6e4**-0.4
     assert rate(COMBINED, **values) == pytest.approx(expected, rel=1e-13)
 
 

@@ -98,7 +98,7 @@ def test_a_simulation_that_bursts_ends_there() -> None:
     run = simulate(Steady(Status.BURST, end=3.0))
 
     assert run.times.tolist() == [1.0, 2.0]
-    with pytest.raises(SolveError, match=r"burst at 0.5 s, before the first time asked for"):
+    with pytest.raises(SolveError, match=r"burst at 0.5 s, before the times asked for"):
         simulate(Steady(Status.BURST, end=0.5))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -45,6 +46,7 @@ def command(
         raise FitError(f"--temperature {temperature} is not known; allowed are auto and none")
     if up_to is not None and not up_to > 0:
         raise FitError(f"--up-to {up_to:g} is not a strain above zero; write 0.05 for 5 %")
+    _check_folder(to)
     named = [study.law(name) for name in dict.fromkeys(law)]
     histories = study.read_histories(files, reader)
     if up_to is not None:
@@ -60,6 +62,17 @@ def command(
         print_json(_answer(ranking, written))
     else:
         tell(ranking, written, histories)
+
+
+def _check_folder(folder: Path) -> None:
+    """Say now, not after all the work, that results cannot be written there."""
+    from creepkit.errors import FitError
+
+    existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
+    if not existing.is_dir():
+        raise FitError(f"--to {folder}: {existing} is a file; name a folder for the results")
+    if not os.access(existing, os.W_OK):
+        raise FitError(f"--to {folder}: {existing} cannot be written to; name another folder for the results")
 
 
 def _cut(histories: list[History], limit: float) -> list[History]:

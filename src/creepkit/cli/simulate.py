@@ -32,8 +32,8 @@ def command(
     chosen = study.law(law)
     if control not in ("load", "stress"):
         raise SolveError(f"--control {control} is not known; allowed are load and stress")
-    if not end_h > 0:
-        raise SolveError(f"--end-h {end_h:g} is not a time above zero")
+    if not 0 < end_h < 1e9:
+        raise SolveError(f"--end-h {end_h:g} is not a time above zero (and below 1e9 h)")
     steps = _steps(stress, "--stress")
     warmth: Program = Program.steps([(t, c + ZERO_CELSIUS) for t, c in _steps(temperature_c, "--temperature-c")])
     history = study.simulate(
@@ -41,6 +41,8 @@ def command(
         loading=StressSteps(tuple(steps), "load" if control == "load" else "stress"),
         times=np.linspace(0, 3600 * end_h, points), temperature=warmth, name=chosen.name,
     )  # fmt: skip
+    if "burst_s" in history.labels:
+        typer.echo(f"the bar burst at {float(history.labels['burst_s']) / 3600:.4g} h; the curve ends there", err=True)
     if to is None:
         typer.echo(history_text(history), nl=False)
     else:

@@ -133,9 +133,7 @@ def _far(part: _Activated, printer: LawPrinter) -> str:
     return f"{_infinite(printer.doprint(part.coefficient))} {rest}{factors}"
 
 
-def _far_value(
-    law: CreepLaw, part: _Activated, values: Mapping[str, float], printer: LawPrinter
-) -> str:
+def _far_value(law: CreepLaw, part: _Activated, values: Mapping[str, float], printer: LawPrinter) -> str:
     """A_inf = A exp[Q/(R T_ref)] and its number, which may lie far outside double range."""
     name = printer.doprint(part.coefficient)
     fractions = [rf"\frac{{{printer.doprint(f.Q)}}}{{R \cdot {f.T_ref:g}\,\mathrm{{K}}}}" for f in part.factors]

@@ -29,6 +29,8 @@ from creepkit.records import Nuisance
 
 LONGEST = 3.0
 """Longest reach of the drift in ln t, a factor 20 in time: what lasts longer is scatter of the rate."""
+ASSUMED_RATE = 0.3
+"""Scatter of ln rate between tests that is assumed when fewer than three of them can show it."""
 _JITTER = 1e-10
 SOURCES = ("noise", "misfit", "offset", "rate", "drift", "reach")
 
@@ -107,9 +109,9 @@ def working_guess(noise: float, floor: float, nuisances: Sequence[Nuisance]) -> 
     return Scatter(noise=max(noise, 1e-3 * floor), misfit=0.3, offset=_size(nuisances, "offset", floor))
 
 
-def full_guess(working: Scatter, tests: int, nuisances: Sequence[Nuisance]) -> Scatter:
-    """Where the estimate of the whole scatter begins; scatter between tests needs three of them to be seen."""
-    rate = _size(nuisances, "rate", 0.3) if tests >= 3 else 0.0
+def full_guess(working: Scatter, nuisances: Sequence[Nuisance]) -> Scatter:
+    """Where the estimate of the whole scatter begins."""
+    rate = _size(nuisances, "rate", ASSUMED_RATE)
     return replace(working, misfit=0.3 * working.misfit, rate=rate, drift=0.5 * working.misfit, reach=1.0)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,6 +16,7 @@ from creepkit.inverse.covariance import Scatter
 from creepkit.inverse.identification import Identification, Settings, TestMisfit
 from creepkit.inverse.uncertainty import Estimate
 from creepkit.language.tree import law_from_json, law_to_json
+from creepkit.records import Nuisance
 
 KIND = "creepkit identification"
 LARGEST = 50_000_000
@@ -62,13 +62,18 @@ class _Test(_Strict):
     rate_factor: float
 
 
+class _Nuisance(_Strict):
+    kind: Literal["offset", "rate"]
+    sd: float | None = Field(gt=0)
+
+
 class _Settings(_Strict):
     starts: int = Field(ge=1)
     draws: int = Field(ge=1)
     frames: int = Field(ge=2)
     seed: int
     loss: str
-    limits: dict[str, float]
+    nuisances: list[_Nuisance]
 
 
 class _Document(_Strict):
@@ -109,7 +114,7 @@ def to_json(fit: Identification) -> dict[str, Any]:
         "freedom": fit.freedom,
         "tests": [{k: None if v != v else v for k, v in vars(m).items()} for m in fit.misfits],
         "ranges": {name: list(ends) for name, ends in fit.ranges.items()},
-        "settings": {**vars(fit.settings), "limits": dict(fit.settings.limits)},
+        "settings": {**vars(fit.settings), "nuisances": [{"kind": n.kind, "sd": n.sd} for n in fit.settings.nuisances]},
         "provenance": dict(fit.provenance),
         "converged": fit.converged,
         "notes": list(fit.notes),
@@ -119,13 +124,14 @@ def to_json(fit: Identification) -> dict[str, Any]:
 def save(fit: Identification, path: Path) -> Path:
     """Write to a temporary name, then rename: a file is whole or absent."""
     text = json.dumps(to_json(fit), indent=1, allow_nan=False) + "\n"
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, path)
     except OSError as error:
-        raise FitError(f"{path}: cannot be written ({error.strerror}); choose a folder that exists") from None
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(text)
-    os.replace(temporary, path)
+        raise FitError(f"{path}: cannot be written ({error.strerror}); choose a file in a folder that exists") from None
+    finally:
+        temporary.unlink(missing_ok=True)
     return path
 
 
@@ -173,11 +179,16 @@ def from_json(data: Any, source: str = "identification") -> Identification:
         freedom=document.freedom,
         misfits=tuple(_test(t) for t in document.tests),
         ranges=document.ranges,
-        settings=Settings(**document.settings.model_dump()),
+        settings=_settings(document.settings),
         provenance=document.provenance,
         converged=document.converged,
         notes=tuple(document.notes),
     )
+
+
+def _settings(s: _Settings) -> Settings:
+    nuisances = tuple(Nuisance(n.kind, sd=n.sd) for n in s.nuisances)
+    return Settings(**{**s.model_dump(), "nuisances": nuisances})
 
 
 def _test(t: _Test) -> TestMisfit:

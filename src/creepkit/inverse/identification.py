@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
+from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates, Reference
 from creepkit.inverse.covariance import Scatter
 from creepkit.inverse.uncertainty import Estimate, band, quantile
 from creepkit.language import CreepLaw
-from creepkit.records import History, Prediction, Predictor
+from creepkit.records import History, Nuisance, Prediction, Predictor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,16 +41,48 @@ class TestMisfit:
     rate_factor: float = 1.0
 
 
+LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
+
+
 @dataclass(frozen=True)
 class Settings:
-    """What a run can be repeated from."""
+    """What a run can be repeated from.
+
+    draws : Sobol points that are screened, a power of two is best; frames : looked at in each history.
+    loss : of values only; intervals and scatter are Gaussian and see outliers as scatter.
+    nuisances : what differs between tests; unless told otherwise a loading-strain offset of each curve and
+        test-to-test scatter of the rate, both estimated.
+    """
 
     starts: int = 8
     draws: int = 64
     frames: int = 40
     seed: int = 0
     loss: str = "linear"
-    limits: Mapping[str, float] = field(default_factory=dict)
+    nuisances: tuple[Nuisance, ...] = (Nuisance("offset"), Nuisance("rate"))
+
+    def __post_init__(self) -> None:
+        for name, least in (("starts", 1), ("draws", 1), ("frames", 2), ("seed", 0)):
+            value = getattr(self, name)
+            if int(value) != value or value < least:
+                raise FitError(f"{name} is {value!r}; it must be a whole number of at least {least}")
+        if self.loss not in LOSSES:
+            raise FitError(f"loss '{self.loss}' is not known; allowed are {', '.join(LOSSES)}")
+        for nuisance in self.nuisances:
+            _check_nuisance(nuisance)
+
+
+def _check_nuisance(nuisance: Nuisance) -> None:
+    plain = nuisance.mean == 0 and not np.isfinite(nuisance.bounds).any() and nuisance.scope == "test"
+    if (
+        nuisance.kind not in ("offset", "rate")
+        or not plain
+        or (nuisance.sd is not None and not np.isfinite(nuisance.sd))
+    ):
+        raise FitError(
+            f"nuisance {nuisance} is not known to this identification; allowed are Nuisance('offset') and "
+            "Nuisance('rate'), one for each test, about zero, with sd= a finite number or None to estimate it"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,14 +161,16 @@ class Identification:
         """Predict histories (by default those that were fitted) at the identified values."""
         predictor = using or self.using
         if predictor is None:
-            from creepkit.errors import FitError
-
             raise FitError("this identification was loaded from a file: give using=, the specimen it was made with")
         return predictor.predict(self.law, self.values, list(histories or self.histories))
 
     def on(self, histories: Sequence[History], using: Predictor) -> Identification:
-        """The same answer with histories and specimen attached, as after load(), for plots and predictions."""
-        return replace(self, histories=tuple(histories), using=using)
+        """The same answer with its histories (found by name) and specimen attached, as after load(), for plots."""
+        by_name = {h.name: h for h in histories}
+        missing = [m.name for m in self.misfits if m.name not in by_name]
+        if missing:
+            raise FitError(f"this identification was made from '{missing[0]}', which is not among the histories given")
+        return replace(self, histories=tuple(by_name[m.name] for m in self.misfits), using=using)
 
     def save(self, path: str | Path) -> Path:
         """Write the identification as JSON (to a temporary name, then renamed)."""
@@ -164,6 +199,8 @@ class Identification:
         from creepkit.kernels import lower
 
         kernel, coordinates, r = lower(self.law, "numpy"), self.coordinates, self.reference
+        if (np.asarray(stress, float) < 0).any():
+            raise FitError("a creep rate was asked for at a negative stress; give the von Mises stress, in MPa")
         point = [
             np.asarray(default if given is None else given, float)
             for given, default in ((stress, r.stress), (strain, r.strain), (time, r.time), (temperature, r.temperature))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 
@@ -11,8 +12,10 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.inverse.checks import check_bounds, check_histories, check_strains
 from creepkit.inverse.coordinates import Coordinates, Reference
 from creepkit.inverse.covariance import (
+    ASSUMED_RATE,
     Scatter,
     effective_size,
     estimated,
@@ -28,6 +31,7 @@ from creepkit.inverse.objective import Objective, Residuals
 from creepkit.inverse.scales import frame_noise, log_scale_for
 from creepkit.inverse.search import (
     Box,
+    Fences,
     Minimum,
     Progress,
     from_single_terms,
@@ -39,13 +43,20 @@ from creepkit.inverse.uncertainty import estimates, laplace, quantile
 from creepkit.language import CreepLaw, temperature
 from creepkit.records import History, Nuisance, Predictor
 
-LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
-PUSH = 1.0
-"""How far, in ln, data may push a coefficient beyond its bounds against the fence before that is an error."""
 ROUNDS = 8
 """At most as often are the sizes of scatter and the values found from one another; three rounds usually do."""
-NUISANCES = (Nuisance("offset"), Nuisance("rate"))
-"""Unless told otherwise: a loading-strain offset of each curve and test-to-test scatter of the rate, both estimated."""
+FEW_TESTS = 3
+"""Below this many tests the scatter between them cannot be seen, and is assumed."""
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """Where values and working scatter agree: the optimum, its residuals, and the likelihood."""
+
+    minimum: Minimum
+    residuals: Residuals
+    working: Scatter
+    likelihood: float
 
 
 def identify(
@@ -53,7 +64,6 @@ def identify(
     histories: Sequence[History],
     using: Predictor,
     *,
-    nuisances: Sequence[Nuisance] = NUISANCES,
     settings: Settings | None = None,
     start: Floats | None = None,
     reference: Reference | None = None,
@@ -61,67 +71,78 @@ def identify(
 ) -> Identification:
     """Identify the parameters of `law` from `histories` by multi-start least squares, then by their likelihood.
 
-    using : predictor, such as the specimen "uniaxial".
-    nuisances : what differs between tests; sd=None estimates the spread from the data.
+    using : predictor, such as the specimen that study.specimen("uniaxial") returns.
     start : conditioned coordinates to begin from instead of a global search; a refit takes two rounds at most.
     """
     settings = settings or Settings()
-    _check(law, histories, settings, nuisances)
+    check_histories(law, histories)
     thin = [thinned(h, settings.frames) for h in histories]
-    reference = reference or Reference.of(thin)
-    coordinates = Coordinates(law, reference)
+    coordinates = Coordinates(law, reference or Reference.of(thin))
     objective = Objective(law, thin, using, coordinates, log_scale_for(thin, "strain"))
+    check_strains(objective)
     box = Box.of(law, coordinates, measured_log_rate(objective))
-    log_times = np.log(objective.times)
     noise = float(np.median([frame_noise(h, "strain") for h in histories]))
-    working = working_guess(noise, objective.scale.floor, nuisances)
+    working = working_guess(noise, objective.scale.floor, settings.nuisances)
     if start is None:
-        candidates = _searched(objective, box, whitener(objective.before_fit(), log_times, working), settings, progress)
+        starts, rounds = _searched(objective, box, working, settings, progress), ROUNDS
     else:
-        candidates = [box.clip(np.asarray(start, float))]
-    rounds = ROUNDS if start is None else 2
-    ends = [
-        _alternate(objective, box, log_times, u, working, nuisances, settings, progress, rounds) for u in candidates
-    ]
-    best, residuals, working = max(ends, key=lambda end: log_likelihood(end[1], log_times, end[2]))
-    _check_bounds(law, coordinates, best.u)
-    scatter = estimated(residuals, log_times, full_guess(working, len(thin), nuisances), nuisances)
-    covariance, freedom = laplace(residuals, log_times, working, scatter, box)
+        starts, rounds = [box.clip(np.asarray(start, float))], 2
+    ends = [_alternate(objective, box, u, working, settings, progress, rounds) for u in starts]
+    best = max(ends, key=lambda end: end.likelihood)
+    check_bounds(objective, best.minimum.u)
+    return _answer(objective, box, best, settings, histories)
+
+
+def _answer(
+    objective: Objective, box: Box, best: _Fitted, settings: Settings, histories: Sequence[History]
+) -> Identification:
+    """Scatter, intervals and misfits at the optimum."""
+    law, coordinates, residuals = objective.law, objective.coordinates, best.residuals
+    log_times, u, known = np.log(objective.times), best.minimum.u, _with_known_rate(settings.nuisances, len(histories))
+    scatter = estimated(residuals, log_times, full_guess(best.working, known), known)
+    given = any(n.kind == "rate" and n.sd is not None for n in known)
+    posterior, freedom = laplace(residuals, log_times, best.working, scatter, box, rate_known=given)
     misfits = tuple(_misfits(objective, residuals, expected_effects(residuals, log_times, scatter)))
     return Identification(
         law=law,
-        estimates=estimates(law, coordinates, best.u, covariance, quantile(freedom)),
-        u=best.u,
-        covariance=covariance,
-        reference=reference,
+        estimates=estimates(law, coordinates, u, posterior, quantile(freedom)),
+        u=u,
+        covariance=posterior,
+        reference=coordinates.reference,
         scatter=scatter,
         rms=_pooled(misfits),
-        log_likelihood=log_likelihood(residuals, log_times, working),
+        log_likelihood=best.likelihood,
         size=effective_size(residuals, log_times, scatter),
         freedom=freedom,
         misfits=misfits,
-        ranges=_ranges(thin),
+        ranges=_ranges(objective.histories),
         settings=settings,
-        provenance=_provenance(law, objective),
-        converged=best.converged,
-        notes=_notes(law, objective, best),
+        provenance=_provenance(objective, settings),
+        converged=best.minimum.converged,
+        notes=_notes(objective, best.minimum, settings),
         histories=tuple(histories),
-        using=using,
+        using=objective.using,
     )
 
 
+def _with_known_rate(nuisances: Sequence[Nuisance], tests: int) -> tuple[Nuisance, ...]:
+    """The nuisances, with the scatter between tests assumed where too few tests could show it."""
+    if tests >= FEW_TESTS:
+        return tuple(nuisances)
+    return tuple(replace(n, sd=ASSUMED_RATE) if n.kind == "rate" and n.sd is None else n for n in nuisances)
+
+
 def _searched(
-    objective: Objective, box: Box, factor: Floats, settings: Settings, progress: Progress | None
+    objective: Objective, box: Box, working: Scatter, settings: Settings, progress: Progress | None
 ) -> list[Floats]:
     """Global search with a covariance that is broad and fixed, and a loss that no single curve can capture.
 
     The few best minima that differ; their likelihoods decide, since the covariance is not yet known here.
     """
+    factor = whitener(objective.before_fit(), np.log(objective.times), working)
     loss = "soft_l1" if settings.loss == "linear" else settings.loss
-    few = max(2, settings.starts // 3)
-    singles = from_single_terms(
-        objective, box, factor, starts=few, draws=settings.draws // 2, seed=settings.seed, loss=loss
-    )
+    few, half = max(2, settings.starts // 3), settings.draws // 2
+    singles = from_single_terms(objective, box, factor, starts=few, draws=half, seed=settings.seed, loss=loss)
     minima = multistart(
         objective, box, factor, starts=settings.starts, draws=settings.draws, seed=settings.seed, loss=loss,
         progress=progress, extra=singles,
@@ -139,32 +160,33 @@ def _distinct(minima: Sequence[Minimum], box: Box, most: int = 2, near: float = 
 
 
 def _alternate(
-    objective: Objective, box: Box, log_times: Floats, u: Floats, working: Scatter, nuisances: Sequence[Nuisance],
-    settings: Settings, progress: Progress | None, rounds: int,
-) -> tuple[Minimum, Residuals, Scatter]:  # fmt: skip
-    """Working scatter given the law, law given the scatter, until the likelihood no longer grows."""
-    residuals = objective.at(u)
-    best, likelihood = Minimum(u, np.inf, False, 0), -np.inf
+    objective: Objective, box: Box, u: Floats, working: Scatter, settings: Settings, progress: Progress | None,
+    rounds: int,
+) -> _Fitted:  # fmt: skip
+    """Working scatter given the law, law given the scatter, until the likelihood no longer grows; the best round."""
+    log_times = np.log(objective.times)
+    residuals, best = objective.at(u), None
     for k in range(rounds):
-        working = estimated(residuals, log_times, working, nuisances)
+        working = estimated(residuals, log_times, working, settings.nuisances)
         factor = whitener(residuals, log_times, working)
-        best = refine(objective, box, factor, best.u, loss=settings.loss, steps=40, tolerance=1e-8)
-        residuals = objective.at(best.u)
-        now = log_likelihood(residuals, log_times, working)
+        minimum = refine(objective, box, factor, u, loss=settings.loss, steps=40, tolerance=1e-8)
+        u, residuals = minimum.u, objective.at(minimum.u)
+        now = _Fitted(minimum, residuals, working, log_likelihood(residuals, log_times, working))
         if progress is not None:
             progress("round", k + 1, rounds)
-        if abs(now - likelihood) < 0.02:
+        gain = np.inf if best is None else now.likelihood - best.likelihood
+        best = now if best is None or gain > 0 else best
+        if abs(gain) < 0.02:
             break
-        likelihood = now
-    return best, residuals, working
+    assert best is not None
+    return best
 
 
 def refit(fit: Identification, histories: Sequence[History]) -> Identification:
     """The same law on other histories, starting where `fit` ended (for hold-out and resampling)."""
     if fit.using is None:
         raise FitError("cannot refit an identification that was loaded from a file without its specimen")
-    settings = replace(fit.settings, starts=1)
-    return identify(fit.law, histories, fit.using, settings=settings, start=fit.u, reference=fit.reference)
+    return identify(fit.law, histories, fit.using, settings=fit.settings, start=fit.u, reference=fit.reference)
 
 
 def _misfits(objective: Objective, residuals: Residuals, effects: tuple[Floats, Floats]) -> list[TestMisfit]:
@@ -180,11 +202,12 @@ def _misfits(objective: Objective, residuals: Residuals, effects: tuple[Floats, 
 
 
 def _log_ratios(objective: Objective, residuals: Residuals, offset: Floats) -> Floats:
-    """ln(predicted + the test's offset) - ln(measured) where the measured strain is above twice the floor, else NaN."""
+    """ln((predicted + the test's offset) / measured) where the measured strain is above twice the floor, else NaN."""
     scale = objective.scale
-    predicted = scale.backward(residuals.values + objective.compared)
+    predicted = scale.backward(residuals.values + objective.compared) + offset[:, None]
     above = objective.present & (objective.measured > 2 * scale.floor)
-    return np.where(above, scale.forward(predicted + offset[:, None]) - objective.compared, np.nan)
+    measured = np.where(above, objective.measured, 1.0)
+    return np.where(above, np.log(np.maximum(predicted, scale.floor) / measured), np.nan)
 
 
 def _pooled(misfits: Sequence[TestMisfit]) -> float:
@@ -205,58 +228,43 @@ def _ranges(histories: Sequence[History]) -> dict[str, tuple[float, float]]:
     return {name: (float(min(values)), float(max(values))) for name, values in spread.items()}
 
 
-def _provenance(law: CreepLaw, objective: Objective) -> dict[str, object]:
+def _provenance(objective: Objective, settings: Settings) -> dict[str, str | int]:
+    law = objective.law
     return {
         "creepkit": version("creepkit"),
         "law": law.name,
         "fingerprint": law.fingerprint,
         "specimen": getattr(objective.using, "name", type(objective.using).__name__),
         "evaluations": objective.evaluations,
+        "data": _digest(objective, settings),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
 
-def _notes(law: CreepLaw, objective: Objective, best: Minimum) -> tuple[str, ...]:
-    notes = []
+def _digest(objective: Objective, settings: Settings) -> str:
+    """What was compared, and how: identifications that share it can be ranked against one another."""
+    digest = hashlib.sha256()
+    for array in (objective.measured, objective.times, objective.present):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    names = [h.name for h in objective.histories]
+    digest.update(repr((names, objective.scale, settings.loss, settings.nuisances)).encode())
+    return digest.hexdigest()[:16]
+
+
+def _notes(objective: Objective, best: Minimum, settings: Settings) -> tuple[str, ...]:
+    notes, law, tests = [], objective.law, objective.histories
     if not best.converged:
-        notes.append("the last refinement stopped at its cap of steps: raise settings.starts or look at the plot")
-    warmth = {round(float(v), 1) for h in objective.histories for v in h.temperature_program().values}
-    if len(warmth) > 1 and max(warmth) - min(warmth) > 5 and not law.uses(temperature):
+        notes.append("the last refinement stopped at its cap of steps: raise starts or look at the plot")
+    warmth = {round(float(v), 1) for h in tests for v in h.temperature_program().values}
+    if max(warmth) - min(warmth) > 5 and not law.uses(temperature):
         notes.append(f"the tests span {min(warmth):.0f} to {max(warmth):.0f} K and this law knows no temperature")
-    stresses = {round(float(v), 3) for h in objective.histories for v in h.loading.program().values}
+    stresses = {round(float(v), 3) for h in tests for v in h.loading.program().values}
     if len(stresses) == 1:
         notes.append("all tests have one stress: the stress dependence is not determined by them")
+    if len(tests) < FEW_TESTS and any(n.kind == "rate" and n.sd is None for n in settings.nuisances):
+        notes.append(f"fewer than {FEW_TESTS} tests: their rates are assumed to scatter by {100 * ASSUMED_RATE:.0f} %")
+    if float(objective.measured.max()) > 0.5:
+        notes.append("strains above 0.5 were fitted: a column in percent must say so, as strain_pct")
+    if (Fences(objective).violations(best.u) > 1e-3).any():
+        notes.append("a constraint of the law does not hold over the tests at these values")
     return tuple(notes)
-
-
-def _check_bounds(law: CreepLaw, coordinates: Coordinates, u: Floats) -> None:
-    """A coefficient that the data push through its bounds is an error: the answer would be the bound's, not theirs."""
-    theta = coordinates.theta(u)
-    for k in coordinates.rates:
-        name, param = law.names[k], law.table[law.names[k]]
-        low, high = (param.to_internal(b) for b in param.bounds)
-        if not low - PUSH <= theta[k] <= high + PUSH:
-            found = param.from_internal(float(theta[k]))
-            raise FitError(
-                f"law '{law.name}': the bounds exclude the data, which push {name} to {found:.3g} {param.unit} and it "
-                f"may lie from {param.bounds[0]:g} to {param.bounds[1]:g}; widen its bounds or choose another law"
-            )
-
-
-def _check(law: CreepLaw, histories: Sequence[History], settings: Settings, nuisances: Sequence[Nuisance]) -> None:
-    if not histories:
-        raise FitError(f"law '{law.name}': there are no histories to identify it from")
-    for nuisance in nuisances:
-        if nuisance.kind not in ("offset", "rate") or nuisance.scope != "test":
-            raise FitError(
-                f"nuisance '{nuisance.kind}' for {nuisance.scope} is not known to this identification; "
-                "allowed are 'offset' and 'rate', one for each test"
-            )
-    if settings.loss not in LOSSES:
-        raise FitError(f"loss '{settings.loss}' is not known; allowed are {', '.join(LOSSES)}")
-    for history in histories:
-        if int((history.used & (history.times > 0)).sum()) < 2:
-            raise FitError(f"history '{history.name}' has fewer than two usable frames after time zero")
-    frames = sum(int(h.used.sum()) for h in histories)
-    if frames <= len(law.params):
-        raise FitError(f"law '{law.name}' has {len(law.params)} parameters and the histories only {frames} frames")

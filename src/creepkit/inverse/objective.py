@@ -84,7 +84,7 @@ class Objective:
         wide = np.where(np.isfinite(wide), wide, np.nan)
         wide = _held(wide, alive & self.present)
         slopes = np.where(alive, slopes, 0.0)
-        effect = wide[..., list(self._rate_positions())].sum(axis=-1)
+        effect = self._rate_effect(wide, values)
         mask = self.present
         to_u = wide @ self.coordinates.jacobian(u)
         return Residuals(
@@ -92,8 +92,20 @@ class Objective:
             np.where(mask[..., None], to_u, 0.0), np.where(mask, effect, 0.0),
         )  # fmt: skip
 
-    def _rate_positions(self) -> tuple[int, ...]:
-        return self.coordinates.rates
+    def _rate_effect(self, slopes: Floats, residual: Floats) -> Floats:
+        """Derivative of the compared quantity to ln of a factor on all rates of a test, (tests, frames).
+
+        The sum over the terms' coefficients; where a term has none of its own, the slope in ln t, which is the same
+        for a law without explicit time at constant stress (strain depends on factor x time alone).
+        """
+        if len(self.coordinates.rates) == len(self.law.terms):
+            return np.asarray(slopes[..., list(self.coordinates.rates)].sum(axis=-1))
+        compared = residual + self.compared
+        effect = np.zeros_like(compared)
+        for k, present in enumerate(self.present):
+            if present.sum() > 1:
+                effect[k, present] = np.gradient(compared[k, present], np.log(self.times[k, present]))
+        return effect
 
     def _predict(self, u: Floats, jacobian: bool) -> tuple[Floats, Floats, Floats | None]:
         theta = self.coordinates.theta(u)

@@ -50,7 +50,11 @@ def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
     _finish_residuals(residuals, fit)
     figure.suptitle(f"{fit.law.title or fit.law.name}   ({len(fit.histories)} tests)", fontsize=11)
     if path is not None:
-        figure.savefig(path, dpi=130)
+        try:
+            figure.savefig(path, dpi=130)
+        except (OSError, ValueError) as error:
+            told = str(error).splitlines()[0]
+            raise FitError(f"{path}: the plot cannot be written ({told}); name a .png, .svg or .pdf file") from None
     return figure
 
 

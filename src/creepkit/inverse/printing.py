@@ -33,9 +33,10 @@ def text_of(fit: Identification) -> str:
     lines.append(f"  local stress exponent there: {n:.3g} [{low:.3g}, {high:.3g}]")
     s = fit.scatter
     frames = sum(m.frames for m in fit.misfits)
+    tests = "1 test" if len(fit.misfits) == 1 else f"{len(fit.misfits)} tests"
     lines += [
         "",
-        f"  {len(fit.misfits)} tests, {frames} frames: rms of ln strain {fit.rms:.3g}, BIC {fit.bic:.1f}",
+        f"  {tests}, {frames} frames: rms of ln strain {fit.rms:.3g}",
         f"  scatter (one sd): rate between tests {100 * s.rate:.0f} %, loading strain {s.offset:.2g}, "
         f"frame noise {s.noise:.2g}, what the law cannot follow {100 * s.drift:.1f} % of strain",
     ]

@@ -35,15 +35,25 @@ def log_scale_for(histories: Sequence[History], output: str) -> LogScale:
     ends = [float(np.max(h.outputs[output][h.used], initial=0.0)) for h in histories]
     noise = np.median([frame_noise(h, output) for h in histories])
     typical = float(np.median(ends))
-    return LogScale(max(0.01 * typical, 3.0 * float(noise), 1e-9))
+    return LogScale(max(0.01 * typical, 3.0 * float(noise), 1e-14))
 
 
 def frame_noise(history: History, output: str) -> float:
-    """Standard deviation of one output from frame to frame, from second differences (robust; 0 for under 5 frames)."""
-    t, y = history.times[history.used], history.outputs[output][history.used]
-    if t.size < 5:
+    """Standard deviation of one output from frame to frame; 0 for under 6 frames.
+
+    From third differences, robustly, in time or in its logarithm, whichever calls less of the curve noise.
+    """
+    late = history.used & (history.times > 0)
+    t, y = history.times[late], history.outputs[output][late]
+    if t.size < 6:
         return 0.0
-    share = (t[1:-1] - t[:-2]) / (t[2:] - t[:-2])
-    bend = y[1:-1] - (1 - share) * y[:-2] - share * y[2:]
-    size = np.sqrt(1 + share**2 + (1 - share) ** 2)
-    return float(1.4826 * np.median(np.abs(bend / size)))
+    return min(_third_differences(x, y) for x in (t, np.log(t)))
+
+
+def _third_differences(x: Floats, y: Floats) -> float:
+    """Spread of what is left of four neighbours once a parabola is taken off, in units of one frame's error."""
+    four = np.lib.stride_tricks.sliding_window_view(x, 4)
+    apart = four[:, :, None] - four[:, None, :] + np.eye(4)
+    weights = 1.0 / apart.prod(axis=2)
+    left = (weights * np.lib.stride_tricks.sliding_window_view(y, 4)).sum(axis=1)
+    return float(1.4826 * np.median(np.abs(left / np.sqrt((weights**2).sum(axis=1)))))

@@ -66,7 +66,7 @@ class Fences:
     Each is zero inside and grows linearly outside: coefficients are not box variables in conditioned coordinates.
     """
 
-    SLOPE = 30.0
+    SLOPE = 300.0
 
     def __init__(self, objective: Objective) -> None:
         self.coordinates, law = objective.coordinates, objective.law
@@ -79,13 +79,17 @@ class Fences:
         """(fences,) residuals at u."""
         theta = self.coordinates.theta(u)
         margins = self._constraints(theta)
-        return self.SLOPE * np.concatenate([np.abs(self._outside(theta)), np.maximum(-margins, 0.0)])
+        return self.SLOPE * np.concatenate([np.abs(self.outside(theta)), np.maximum(-margins, 0.0)])
+
+    def violations(self, u: Floats) -> Floats:
+        """How far each constraint is violated at u; 0 where it holds."""
+        return np.maximum(-self._constraints(self.coordinates.theta(u)), 0.0)
 
     def jacobian(self, u: Floats) -> Floats:
         """(fences, parameters); constraints by central differences."""
         theta = self.coordinates.theta(u)
         rates = list(self.coordinates.rates)
-        slopes = np.sign(self._outside(theta))[:, None] * self.coordinates.jacobian(u)[rates]
+        slopes = np.sign(self.outside(theta))[:, None] * self.coordinates.jacobian(u)[rates]
         columns = [np.zeros(0)] * u.size
         if self._constraints(theta).size:
             for k in range(u.size):
@@ -95,7 +99,7 @@ class Fences:
                 columns[k] = np.subtract(*ends) / (2 * step[k])
         return self.SLOPE * np.concatenate([slopes, np.stack(columns, axis=1)])
 
-    def _outside(self, theta: Floats) -> Floats:
+    def outside(self, theta: Floats) -> Floats:
         """How far each coefficient lies beyond its bounds, in ln: above positive, below negative."""
         own = theta[list(self.coordinates.rates)]
         return np.asarray(np.maximum(own - self.high, 0.0) + np.minimum(own - self.low, 0.0))
@@ -127,6 +131,8 @@ def from_single_terms(
         return []
     for label in law.terms:
         single = law.only(label)
+        if not single.params:
+            continue
         coordinates = Coordinates(single, objective.coordinates.reference)
         part = Objective(single, objective.histories, objective.using, coordinates, objective.scale, objective.output)
         own = [law.names.index(name) for name in single.names]
@@ -134,9 +140,10 @@ def from_single_terms(
         minimum = multistart(part, inner, factor, starts=starts, draws=draws, seed=seed, loss=loss)[0]
         u = 0.5 * (box.low + box.high)
         u[own] = minimum.u
-        rates = list(objective.coordinates.rates)
-        level = max((u[k] for k in rates if k in own), default=float(u[rates[0]]))
-        u[[k for k in rates if k not in own]] = level - np.log(20.0)
+        rates = objective.coordinates.rates
+        level = [u[k] for k in rates if k in own] or [0.5 * (box.low + box.high)[k] for k in rates]
+        for k in rates:
+            u[k] = u[k] if k in own else max(level) - np.log(20.0)
         found.append(box.clip(u))
     return found
 
@@ -225,7 +232,10 @@ def _unequal(count: int) -> Floats:
 
 
 def _margins(law: CreepLaw, objective: Objective) -> Callable[[Floats], Floats]:
-    """How far each constraint is from being violated at the frames' times and temperatures, worst over the tests."""
+    """How far each constraint is from being violated, the worst over the stresses, temperatures and times of the tests.
+
+    A margin that is not a number counts as violated.
+    """
     import sympy
 
     from creepkit.language.symbols import POINT
@@ -234,16 +244,28 @@ def _margins(law: CreepLaw, objective: Objective) -> Callable[[Floats], Floats]:
         return lambda _: np.zeros(0)
     sides = [relation.gts - relation.lts for relation in law.constraints]
     functions = [sympy.lambdify((*POINT, *law.states, *law.params), side, "numpy") for side in sides]
-    end = float(objective.times[objective.present].max())
-    times = np.concatenate([np.zeros(1), np.geomspace(1e-3 * end, end, 60)])
-    warmth = np.unique([float(v) for h in objective.histories for v in h.temperature_program().values])
-    time, temperature = (grid.ravel() for grid in np.meshgrid(times, warmth))
-    stress = objective.coordinates.reference.stress
-    point = [stress, objective.coordinates.reference.strain, time, temperature, stress, stress / 3]
+    point = _visited(objective)
     inner = [state.initial for state in law.states.values()]
 
     def margins(theta: Floats) -> Floats:
         values = [np.exp(t) if p.scale == "log" else t for p, t in zip(law.params.values(), theta, strict=True)]
-        return np.array([float(np.min(f(*point, *inner, *values))) for f in functions])
+        with np.errstate(all="ignore"):
+            found = np.array([float(np.min(f(*point, *inner, *values))) for f in functions])
+        return np.where(np.isfinite(found), found, -1.0)
 
     return margins
+
+
+def _visited(objective: Objective) -> list[Floats]:
+    """The six variables of the point over every test's stresses and temperatures, and times from first to last."""
+    pairs = {
+        (float(s), float(T))
+        for h in objective.histories
+        for s in h.loading.program().values
+        for T in h.temperature_program().values
+    }
+    end = float(objective.times[objective.present].max())
+    times = np.concatenate([np.zeros(1), np.geomspace(1e-3 * end, end, 60)])
+    stress, temperature = (np.repeat([pair[k] for pair in sorted(pairs)], times.size) for k in (0, 1))
+    strain = np.full(stress.size, objective.coordinates.reference.strain)
+    return [stress, strain, np.tile(times, len(pairs)), temperature, stress, stress / 3]

@@ -1,6 +1,8 @@
 """Ranking of identified laws by BIC, with weights: a set of laws, "decisive" only above 0.95.
 
-All laws are judged by the same number of independent frames, the median of what their residuals say.
+All laws are judged by the same number of independent frames: what the residuals of the best-fitting one say. The
+criterion weighs -2 ln L by independent frames over frames, as one does for correlated residuals; it is a rule, not a
+theorem.
 """
 
 from __future__ import annotations
@@ -55,10 +57,12 @@ def rank(fits: Sequence[Identification]) -> Ranking:
     """Rank identifications made from the same histories."""
     if not fits:
         raise FitError("there are no identifications to rank")
-    tests = {tuple(m.name for m in fit.misfits) for fit in fits}
-    if len(tests) > 1:
-        raise FitError("the identifications were made from different histories and cannot be ranked")
-    size = float(np.median([fit.size for fit in fits]))
+    if len({fit.provenance.get("data") for fit in fits}) > 1:
+        raise FitError(
+            "the identifications were made from different histories, frames, losses or nuisances and cannot be ranked; "
+            "make them alike"
+        )
+    size = max(fits, key=lambda fit: fit.log_likelihood).size
     score = np.array([information_criterion(fit, size) for fit in fits])
     excess = score - score.min()
     weight = np.exp(-0.5 * excess)

@@ -1,8 +1,8 @@
 """Intervals: Laplace's approximation with correlated residuals, and what the data leave undetermined.
 
 Values minimise r' W r with the working covariance W^-1; residuals really have the covariance C. With J = dr/du the
-covariance of the values is (J'WJ)^-1 J'W C W J (J'WJ)^-1, the sandwich, joined with a weak Gaussian prior of the
-variance of each parameter's bounds. Intervals are 95 %.
+covariance of the values is H^-1 (J'W C W J + P) H^-1, the sandwich, with H = J'WJ + P and P a weak Gaussian prior of
+the variance of each parameter's bounds: what the data do not touch keeps the width of its bounds. Intervals are 95 %.
 
 Sizes of scatter come from the same few tests: with T tests and K parameters the part that the scatter between tests
 contributes is scaled by T/(T - K) and has T - K degrees of freedom, the rest those of its independent frames;
@@ -46,38 +46,41 @@ def quantile(freedom: float) -> float:
 
 
 def laplace(
-    residuals: Residuals, log_times: Floats, working: Scatter, scatter: Scatter, box: Box
+    residuals: Residuals, log_times: Floats, working: Scatter, scatter: Scatter, box: Box, *, rate_known: bool = False
 ) -> tuple[Floats, float]:
-    """Posterior covariance of u, (parameters, parameters), and its degrees of freedom."""
+    """Posterior covariance of u, (parameters, parameters), and its degrees of freedom.
+
+    rate_known : the scatter of the rate between tests was given and not estimated from them.
+    """
     assert residuals.jacobian is not None
     count, tests = box.width.size, len(residuals.values)
     factor = whitener(residuals, log_times, working)
     white = np.linalg.solve(factor, residuals.jacobian)
     weighted = np.linalg.solve(np.swapaxes(factor, 1, 2), white)
-    inner = _inverse(np.einsum("tfp,tfq->pq", white, white), box)
+    prior = np.diag(12.0 / box.width**2)
+    inner = _inverse(np.einsum("tfp,tfq->pq", white, white) + prior)
 
-    def part(source: Scatter) -> Floats:
-        meat = np.einsum("tfp,tfg,tgq->pq", weighted, covariance(residuals, log_times, source), weighted)
-        return np.asarray(inner @ meat @ inner)
+    def meat(source: Scatter) -> Floats:
+        c = covariance(residuals, log_times, source)
+        return np.asarray(np.einsum("tfp,tfg,tgq->pq", weighted, c, weighted))
 
-    within = part(replace(scatter, rate=0.0))
-    between = part(scatter) - within if scatter.rate > 0 else np.zeros_like(within)
-    freedoms = (
-        max(tests - count, 1.0),
-        max(effective_size(residuals, log_times, replace(scatter, rate=0.0)) - count, 1.0),
-    )
-    between *= tests / freedoms[0]
-    share = float(np.mean(np.diag(between) / np.maximum(np.diag(between) + np.diag(within), 1e-300)))
-    freedom = 1.0 / (share**2 / freedoms[0] + (1 - share) ** 2 / freedoms[1])
-    prior = np.diag(box.width**2 / 12.0)
-    return np.asarray(prior - prior @ np.linalg.solve(prior + within + between, prior)), freedom
+    alone = replace(scatter, rate=0.0)
+    own = meat(alone)
+    within = inner @ (own + prior) @ inner
+    between = inner @ (meat(scatter) - own) @ inner
+    free = max(tests - count, 1.0), max(effective_size(residuals, log_times, alone) - count, 1.0)
+    if rate_known:
+        free = (1e9, free[1])
+    else:
+        between *= tests / free[0]
+    share = float(np.mean(np.diag(between) / np.maximum(np.diag(between + within), 1e-300)))
+    return within + between, 1.0 / (share**2 / free[0] + (1 - share) ** 2 / free[1])
 
 
-def _inverse(information: Floats, box: Box) -> Floats:
-    """Inverse of the information; directions that it lacks get the width of the box a millionfold."""
-    information = information + 1e-12 * np.diag(1.0 / box.width**2)
-    scale = np.outer(*[np.sqrt(np.diag(information))] * 2)
-    return np.asarray(np.linalg.pinv(information / scale, hermitian=True, rcond=1e-13) / scale)
+def _inverse(matrix: Floats) -> Floats:
+    """Inverse of a positive matrix whose rows differ by orders of magnitude."""
+    scale = np.sqrt(np.diag(matrix))
+    return np.asarray(np.linalg.inv(matrix / np.outer(scale, scale)) / np.outer(scale, scale))
 
 
 def estimates(
@@ -90,8 +93,9 @@ def estimates(
     found = []
     for (name, param), value, spread in zip(law.table.items(), theta, sd, strict=True):
         low, high = (param.to_internal(b) for b in param.bounds)
+        value = min(max(value, low), high)
+        value = low if value - low < 1e-9 * (high - low) else high if high - value < 1e-9 * (high - low) else value
         a, b = max(value - wide * spread, low), min(value + wide * spread, high)
-        a, b = min(a, value), max(b, value)
         middle, bottom, top = (param.from_internal(float(v)) for v in (value, a, b))
         verdict = _verdict(float(value), float(wide * spread), low, high)
         found.append(Estimate(name, middle, bottom, top, param.unit, verdict))

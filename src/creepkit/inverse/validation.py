@@ -80,7 +80,14 @@ def times_to_strain(
     reached = [(h, t) for h, o in zip(histories, own, strict=True) if (t := measured_time(h, level + o)) is not None]
     grids = [t * np.geomspace(1e-4, 1e4, 400) for _, t in reached]
     probes = [
-        replace(h, times=grid, outputs={"strain": np.zeros(grid.size)}, used=EVERY_FRAME, standard_deviation={})
+        replace(
+            h,
+            times=grid,
+            outputs={"strain": np.zeros(grid.size)},
+            used=EVERY_FRAME,
+            standard_deviation={},
+            includes_elastic=False,
+        )
         for (h, _), grid in zip(reached, grids, strict=True)
     ]
     found = using.predict(law, values, probes)

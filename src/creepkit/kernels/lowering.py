@@ -61,7 +61,7 @@ class Kernel:
 
     Each method takes `values`, {parameter: number or array} in the author's units (0 switches a rate coefficient
     off), and the point by keyword: stress and mean_stress, principal_stress in MPa, strain, time in s, temperature
-    in K, and states by name. Strain and time default to 0 (floored at 1e-30 where they are bases of powers).
+    in K, and states by name. Strain and time default to 0 (floored where they are bases of powers).
 
     Methods that begin with `internal` take the six variables of the point, the states, then the internal parameters
     (logarithms where the scale is log), by position, and check nothing.

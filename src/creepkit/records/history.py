@@ -75,9 +75,12 @@ class History:
         freeze(self, "times", times)
         freeze(self, "outputs", MappingProxyType(outputs))
         freeze(self, "used", frozen(used, dtype=bool))
+        warmth = (
+            self.temperature.values if isinstance(self.temperature, Program) else np.array([float(self.temperature)])
+        )
+        if not ((warmth > 0) & (warmth < 1e4)).all():
+            raise HistoryError(f"{where}: a temperature of {warmth.min():g} K is not above 0 and below 10000 K")
         if not isinstance(self.temperature, Program):
-            if not 0 < float(self.temperature) < 1e4:
-                raise HistoryError(f"{where}: temperature {self.temperature} K is not above 0 and below 10000 K")
             freeze(self, "temperature", float(self.temperature))
         sd = {n: frozen(np.broadcast_to(np.asarray(v, float), times.shape)) for n, v in self.standard_deviation.items()}
         freeze(self, "standard_deviation", MappingProxyType(sd))

@@ -1,9 +1,9 @@
 """The conformance kit: check_law(law) says whether a law is fit for every verb. `creepkit check FILE` runs it.
 
 Points are Sobol samples of the full bounds and of stress 1e-3 to 2000 MPa, strain 1e-12 to 1, time 1e-3 to 1e6 s,
-temperature 600 to 1600 K, wherever the law's constraints hold. Stress, strain, time and states are floored at 1e-30
-where they are bases of powers, so that rates at zero strain and zero time are finite; composite bases, such as
-Max(stress - threshold, 0), at 1e-200.
+temperature 600 to 1600 K, wherever the law's constraints hold. So that rates at zero strain and zero time are finite,
+stress, strain and states are floored at 1e-30 and time at 1e-120 s where they are bases of powers; composite bases,
+such as Max(stress - threshold, 0), at 1e-200.
 """
 
 from __future__ import annotations
