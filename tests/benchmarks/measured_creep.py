@@ -70,10 +70,10 @@ def usable(histories):
     return [h for h in cut if (h.used & (h.times > 0)).sum() >= 2]
 
 
-def row(name, fit, histories, cpu, quick):
+def row(name, fit, histories, cpu, largest):
     """One line of the table, without BIC."""
     fitted = times_to_strain(fit.law, fit.values, histories, fit.using, LEVEL, loading_strains(histories))
-    held = "" if quick else f"{leave_one_condition_out(fit, histories, LEVEL)[0].z_factor:.2f}"
+    held = "-" if len(fit.law.params) > largest else f"{leave_one_condition_out(fit, histories, LEVEL)[0].z_factor:.2f}"
     ends = [e.name for e in fit.estimates if e.verdict != "determined"]
     scatter = f"{100 * fit.scatter.rate:.0f} %"
     first = [name, str(len(fit.law.params)), f"{fit.rms:.3f}", f"{fitted.z_factor:.2f}", held, scatter]
@@ -87,6 +87,7 @@ def main():
     parser.add_argument("--sets", nargs="*")
     parser.add_argument("--laws", nargs="*")
     parser.add_argument("--quick", action="store_true", help="no leave-one-condition-out")
+    parser.add_argument("--held-out", type=int, default=7, help="hold out for laws of up to so many parameters")
     parser.add_argument("--plots", type=Path)
     given = parser.parse_args()
     for title, histories in sets(given.data).items():
@@ -104,7 +105,7 @@ def main():
             except ck.errors.FitError as error:
                 print(f"no fit: {error}", flush=True)
                 continue
-            rows.append(row(name, fit, tests, time.process_time() - before, given.quick))
+            rows.append(row(name, fit, tests, time.process_time() - before, 0 if given.quick else given.held_out))
             fits.append(fit)
             print("done:", " | ".join(rows[-1]), flush=True)
             if given.plots:

@@ -137,7 +137,8 @@ def _searched(
 ) -> list[Floats]:
     """Global search with a covariance that is broad and fixed, and a loss that no single curve can capture.
 
-    The few best minima that differ; their likelihoods decide, since the covariance is not yet known here.
+    The best minima that differ, or for a sum the best one and its best term: a sum must not end worse than its terms.
+    Their likelihoods decide, since the covariance is not yet known here.
     """
     factor = whitener(objective.before_fit(), np.log(objective.times), working)
     loss = "soft_l1" if settings.loss == "linear" else settings.loss
@@ -147,7 +148,7 @@ def _searched(
         objective, box, factor, starts=settings.starts, draws=settings.draws, seed=settings.seed, loss=loss,
         progress=progress, extra=singles,
     )  # fmt: skip
-    return _distinct(minima, box)
+    return [minima[0].u, singles[0]] if singles else _distinct(minima, box)
 
 
 def _distinct(minima: Sequence[Minimum], box: Box, most: int = 2, near: float = 0.02) -> list[Floats]:
