@@ -150,8 +150,8 @@ def test_condition_in_words(loading, temperature, words):
         ({"times": [-1, 0, 1]}, "history 'a': times must be finite and start at or after 0 s"),
         ({"times": [0, 1, np.inf]}, "history 'a': times must be finite"),
         ({"outputs": {"strain": [0.0]}}, "history 'a': output 'strain' has 1 values for 3 times"),
-        ({"temperature": -5.0}, "history 'a': temperature -5.0 K is not above 0"),
-        ({"temperature": np.nan}, "history 'a': temperature nan K"),
+        ({"temperature": -5.0}, "history 'a': a temperature of -5 K is not above 0"),
+        ({"temperature": np.nan}, "history 'a': a temperature of nan K"),
         ({"times": [], "source": "x.csv"}, "^x.csv: no frames"),
     ],
 )

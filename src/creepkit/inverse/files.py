@@ -162,15 +162,15 @@ def from_json(data: Any, source: str = "identification") -> Identification:
         ) from None
     law = law_from_json(document.law, source)
     size = len(law.params)
-    covariance = np.array(document.covariance, float, ndmin=2) if size else np.zeros((0, 0))
-    names = tuple(e.name for e in document.estimates)
-    if names != law.names or len(document.u) != size or covariance.shape != (size, size):
+    names, rows = tuple(e.name for e in document.estimates), document.covariance
+    square = len(rows) == size and all(len(row) == size for row in rows)
+    if names != law.names or len(document.u) != size or not square:
         raise FitError(f"{source}: estimates, u and covariance do not belong to the {size} parameters of the law")
     return Identification(
         law=law,
         estimates=tuple(Estimate(**e.model_dump()) for e in document.estimates),
         u=np.array(document.u),
-        covariance=covariance,
+        covariance=np.array(rows, float).reshape(size, size),
         reference=Reference(**document.reference.model_dump()),
         scatter=Scatter(**document.scatter.model_dump()),
         rms=document.rms,
