@@ -10,12 +10,16 @@ loading strain); scatter of the rate between tests; BIC less the best; CPU secon
 
 import argparse
 import time
+from collections import defaultdict
 from pathlib import Path
+
+import numpy as np
 
 import creepkit as ck
 from creepkit.inverse.selection import rank
-from creepkit.inverse.validation import leave_one_condition_out, loading_strains, times_to_strain
+from creepkit.inverse.validation import leave_one_condition_out, loading_strains, measured_time, times_to_strain
 from creepkit.inverse.warmth import reference_temperature, several_temperatures
+from creepkit.readers.duplicates import duplicates
 
 LIMIT, LEVEL = 0.05, 0.01
 LAWS = (
@@ -70,6 +74,18 @@ def usable(histories):
     return [h for h in cut if (h.used & (h.times > 0)).sum() >= 2]
 
 
+def spread_of_repeats(histories):
+    """(Z, tests beyond the first of each condition): what repeats of one condition scatter, which no law can better."""
+    twins = {other for _, other in duplicates(histories)}
+    logs = defaultdict(list)
+    for h, start in zip(histories, loading_strains(histories), strict=True):
+        if h.name not in twins and (reached := measured_time(h, LEVEL + start)) is not None:
+            logs[h.condition].append(np.log10(reached))
+    freedom = sum(len(v) - 1 for v in logs.values())
+    squares = sum(((np.array(v) - np.mean(v)) ** 2).sum() for v in logs.values())
+    return 10 ** (2.5 * np.sqrt(squares / freedom)), freedom
+
+
 def row(name, fit, histories, cpu, largest):
     """One line of the table, without BIC."""
     fitted = times_to_strain(fit.law, fit.values, histories, fit.using, LEVEL, loading_strains(histories))
@@ -95,6 +111,7 @@ def main():
             continue
         print(f"\n### {title}", flush=True)
         tests = usable(histories)
+        print("repeats of one condition alone: Z = {:.2f}, from {} pairs".format(*spread_of_repeats(tests)), flush=True)
         fits, rows = [], []
         for name, law in catalogue(tests).items():
             if given.laws and name not in given.laws:
