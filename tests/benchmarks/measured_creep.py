@@ -31,7 +31,10 @@ LAWS = (
     "drifting-exponent",
     "combined",
 )
-HEAD = "| law | K | rms ln strain | Z fitted | Z held out | rate between tests | BIC - best | CPU s | not determined |"
+HEAD = (
+    "| law | K | rms ln strain | Z fitted | Z held out | rate between tests | BIC - best | CPU s "
+    "| not determined, or at a bound |"
+)
 
 
 def catalogue(histories):
@@ -111,7 +114,9 @@ def main():
             continue
         print(f"\n### {title}", flush=True)
         tests = usable(histories)
-        print("repeats of one condition alone: Z = {:.2f}, from {} pairs".format(*spread_of_repeats(tests)), flush=True)
+        print(
+            "repeats of one condition alone: Z = {:.2f}, from {} repeats".format(*spread_of_repeats(tests)), flush=True
+        )
         fits, rows = [], []
         for name, law in catalogue(tests).items():
             if given.laws and name not in given.laws:

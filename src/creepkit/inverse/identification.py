@@ -125,11 +125,6 @@ class Identification:
         return {e.name: e.value for e in self.estimates}
 
     @property
-    def bic(self) -> float:
-        """Bayesian information criterion with as many observations as there are independent frames."""
-        return information_criterion(self, self.size)
-
-    @property
     def coordinates(self) -> Coordinates:
         """The map between conditioned coordinates and parameters."""
         return Coordinates(self.law, self.reference)
