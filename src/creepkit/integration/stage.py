@@ -15,7 +15,7 @@ the trial stress. Since kernels give ln f, the equation is nearly linear in x at
 
 from __future__ import annotations
 
-from math import inf, isfinite, log
+from math import exp, inf, isfinite, log
 from typing import Any
 
 from numba import njit
@@ -39,6 +39,7 @@ from creepkit.integration.problem import (
 from creepkit.kernels.interface import STRAIN, pointer
 
 _ITERATIONS = 80
+_NEAR = 4
 
 
 @njit(cache=True, error_model="numpy")
@@ -66,7 +67,51 @@ def solve(
     if problem.trial <= 0.0:
         place(row, axes, 0.0, problem.strain)
         return 0.0, SOLVED if problem.trial == 0.0 else NO_SOLUTION
+    if problem.stiffness > 0.0:
+        increment, flag = _from_near(update, theta, axes, problem, row, out, guess, tolerance)
+        if flag == SOLVED:
+            return increment, flag
     return _solve_scalar(update, theta, axes, problem, row, out, guess, tolerance)
+
+
+@njit(cache=True, error_model="numpy")
+def _from_near(
+    update: Any,
+    theta: Floats,
+    axes: Axes,
+    problem: Problem,
+    row: Floats,
+    out: Floats,
+    guess: float,
+    tolerance: float,
+) -> tuple[float, int]:
+    """The same Newton's method in x from a good guess, without its bracket and half of its logarithms.
+
+    A finite element asks a hundred thousand times a second, nearly always from next to the answer.
+    """
+    increment, log_weight = guess, log(problem.weight)
+    share = problem.stiffness * increment / problem.trial
+    for _ in range(_NEAR):
+        if not 1e-280 < share < 0.9999:
+            break
+        elastic = 1.0 - share
+        stress = problem.trial * elastic
+        place(row, axes, stress, problem.strain + increment)
+        update(1, pointer(row), pointer(theta), pointer(out))
+        if out[0] < NO_RATE:
+            break
+        residual = log(increment) - log_weight - out[0]
+        slope = elastic * (1.0 - increment * out[1 + STRAIN]) + share * stress * along_stress(out, 1, axes)
+        step = -residual / slope
+        if not (slope > 0.0 and abs(step) < 1.0):
+            break
+        ratio = share / elastic * exp(step)
+        share = ratio / (1.0 + ratio)
+        increment = problem.trial / problem.stiffness * share
+        if abs(step) <= tolerance:
+            place(row, axes, problem.trial * (1.0 - share), problem.strain + increment)
+            return increment, SOLVED
+    return 0.0, TOO_MANY
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,0 +1,82 @@
+"""Equilibrium of a stage by Newton's method: full steps, and cheap ones with the tangent of the step before."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any, NamedTuple
+
+from numba import njit
+
+from creepkit.arrays import Floats
+from creepkit.fem.band import factorize, solve_factorized
+from creepkit.fem.body import Body
+from creepkit.fem.element import BALANCED, Forces, Points, assemble
+from creepkit.fem.material import PointRoom, Stage
+
+FOUND, NO_STRESS, UNSTABLE, TOO_FAR, TOO_MANY = range(5)
+"""Flags: found; a point had no solution; the tangent is not positive definite; corrections grow; too many of them."""
+
+_ITERATIONS = 16
+_KEEP = 0.1
+"""The tangent is kept while each correction is at most this share of the one before."""
+
+
+class Outcome(NamedTuple):
+    """Flag, and how many passes with and without a new tangent it took."""
+
+    flag: int
+    full: int
+    light: int
+
+
+@njit(cache=True, error_model="numpy")
+def balance(
+    update: Any,
+    theta: Floats,
+    body: Body,
+    stage: Stage,
+    displacement: Floats,
+    points: Points,
+    room: PointRoom,
+    forces: Forces,
+    tolerance: float,
+    longest: float,
+) -> Outcome:
+    """Bring `displacement` (2 nodes,) to equilibrium; corrections below `tolerance`, mm, end the search.
+
+    longest : mm, corrections are cut to this.
+    """
+    before, full, light, stiff = 0.0, 0, 0, True
+    for iteration in range(_ITERATIONS):
+        if assemble(update, theta, body, stage, displacement, points, room, forces, stiff) != BALANCED:
+            return Outcome(NO_STRESS, full, light)
+        if stiff:
+            full += 1
+            if not factorize(forces.band, body.size, body.width, forces.block):
+                return Outcome(UNSTABLE, full, light)
+        else:
+            light += 1
+        solve_factorized(forces.band, body.size, body.width, forces.residual)
+        size = _largest(forces.residual, body.size)
+        if not isfinite(size) or (iteration > 6 and size > before):
+            return Outcome(TOO_FAR, full, light)
+        factor = min(1.0, longest / size) if size > 0.0 else 1.0
+        for k in range(displacement.size):
+            equation = body.equations[k]
+            if equation >= 0:
+                displacement[k] -= factor * forces.residual[equation]
+        if size <= tolerance:
+            return Outcome(FOUND, full, light)
+        stiff = factor < 1.0 or (iteration > 0 and size > _KEEP * before)
+        before = size
+    return Outcome(TOO_MANY, full, light)
+
+
+@njit(cache=True, error_model="numpy")
+def _largest(values: Floats, size: int) -> float:
+    worst = 0.0
+    for k in range(size):
+        if not isfinite(values[k]):
+            return values[k]
+        worst = max(worst, abs(values[k]))
+    return worst
