@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -113,31 +113,39 @@ def simulate(
 def identify(
     law: CreepLaw | str,
     histories: Sequence[History],
-    using: Predictor | str | None = None,
+    using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     *,
     nuisances: Sequence[Nuisance] | None = None,
+    weights: Literal["noise"] | Mapping[str, float] = "noise",
     starts: int = 8,
     frames: int = 40,
     seed: int = 0,
     loss: str = "linear",
+    test_loss: str = "gaussian",
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Identification:
     """Identify the parameters of a law from all histories at once, with 95 % intervals.
 
-    law : a law or its name; using : a specimen (or its name) or any predictor; by default what the histories name.
-    nuisances : what differs between tests; by default an offset of each curve and test-to-test scatter of the rate.
+    law : a law or its name; using : a specimen (or its name) or any predictor, or {specimen: predictor}; by default
+        what the histories name.
+    nuisances : what differs between tests; by default an offset of each output and test-to-test scatter of the rate.
+    weights : "noise", or {output: weight} of relative squared errors, such as {"amplitude": 0.99, "width": 0.005,
+        "shape": 0.005} of the paper's loss.
     starts, seed : of the search, which includes the centre of the bounds; frames : looked at in each history.
-    loss : "linear", or a robust loss of scipy's least_squares such as "soft_l1" (for the values; intervals stay
-        Gaussian).
+    loss : of frames: "linear", or a robust loss of scipy's least_squares such as "soft_l1" (for the values; intervals
+        stay Gaussian); test_loss : of whole tests: "gaussian", or "student", with which a test far from the others
+        loses its pull.
     """
     from creepkit.inverse.identification import Settings
     from creepkit.inverse.identify import identify as run
 
     histories = _histories(histories)
-    settings = Settings(starts=starts, draws=_draws(starts), frames=frames, seed=seed, loss=loss)
+    settings = Settings(
+        starts=starts, draws=_draws(starts), frames=frames, seed=seed, loss=loss, test_loss=test_loss, weights=weights
+    )
     if nuisances is not None:
         settings = replace(settings, nuisances=tuple(nuisances))
-    chosen = _specimen_of(histories) if using is None else _predictor(using)
+    chosen = _specimens_of(histories) if using is None else _predictors(using)
     return run(_law(law), histories, chosen, settings=settings, progress=progress)
 
 
@@ -191,11 +199,19 @@ def _histories(given: Sequence[History]) -> list[History]:
     return histories
 
 
-def _specimen_of(histories: Sequence[History]) -> Specimen:
+def _predictors(given: Predictor | str | Mapping[str, Predictor | str]) -> Predictor | dict[str, Predictor]:
+    """One predictor, or one for each specimen."""
+    if isinstance(given, Mapping):
+        return {name: _predictor(one) for name, one in given.items()}
+    return _predictor(given)
+
+
+def _specimens_of(histories: Sequence[History]) -> Predictor | dict[str, Predictor]:
+    """The specimen that the histories name, or all of them by name."""
     names = sorted({h.specimen for h in histories})
-    if len(names) != 1:
-        raise FitError(f"the histories name {len(names)} specimens ({', '.join(names) or 'none'}): say using=")
-    return specimen(names[0])
+    if not names:
+        raise FitError("there are no histories to identify a law from")
+    return specimen(names[0]) if len(names) == 1 else {name: specimen(name) for name in names}
 
 
 # ---- text ----------------------------------------------------------------------------------------------------------

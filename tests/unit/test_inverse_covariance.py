@@ -1,21 +1,30 @@
 """Scatter: the likelihood is the textbook one, and planted sizes are found again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from creepkit.inverse.covariance import (
-    Scatter,
-    covariance,
-    effective_size,
-    estimated,
-    expected_effects,
-    log_likelihood,
-)
+from creepkit.inverse.covariance import covariance, effective_size, expected_effects, log_likelihood
 from creepkit.inverse.objective import Residuals
+from creepkit.inverse.scatter import OutputScatter, Scatter
+from creepkit.inverse.sizes import estimated
 from creepkit.records import Nuisance
 
 BOTH = (Nuisance("offset"), Nuisance("rate"))
+
+
+def sizes(noise, misfit=0.0, offset=0.0, rate=0.0, drift=0.0, reach=1.0):
+    """Scatter of strains alone."""
+    return Scatter({"strain": OutputScatter(noise, misfit, offset, drift, reach)}, rate)
+
+
+def residuals_of(values, slopes, present, times, effect, output=None):
+    """Residuals of tests that are all trusted alike."""
+    output = np.zeros(values.shape, np.int64) if output is None else output
+    loudness, trust = np.ones(values.shape), np.ones(len(values))
+    return Residuals(values, slopes, present, np.log(times), None, effect, output, loudness, trust)
 
 
 def made(tests, frames, seed, scatter):
@@ -24,56 +33,55 @@ def made(tests, frames, seed, scatter):
     times = np.tile(np.geomspace(10, 1e5, frames), (tests, 1))
     strain = 1e-4 + 2e-2 * times / times.max()
     slopes = 1 / strain
-    shape = Residuals(np.zeros_like(slopes), slopes, np.ones_like(slopes, bool), None, 0.7 * np.ones_like(slopes))
-    factor = np.linalg.cholesky(covariance(shape, np.log(times), scatter))
-    values = (factor @ rng.normal(size=(tests, frames, 1)))[..., 0]
-    return Residuals(values, slopes, shape.present, None, shape.rate_effect), np.log(times)
+    effect = 0.7 * np.ones_like(slopes)
+    shape = residuals_of(np.zeros_like(slopes), slopes, np.ones_like(slopes, bool), times, effect)
+    factor = np.linalg.cholesky(covariance(shape, scatter))
+    return replace(shape, values=(factor @ rng.normal(size=(tests, frames, 1)))[..., 0])
 
 
 def test_likelihood_is_that_of_a_multivariate_normal():
-    scatter = Scatter(noise=1e-5, offset=2e-5, rate=0.3, drift=0.05, reach=1.5)
-    residuals, log_times = made(3, 12, 0, scatter)
-    c = covariance(residuals, log_times, scatter)
+    scatter = sizes(noise=1e-5, offset=2e-5, rate=0.3, drift=0.05, reach=1.5)
+    residuals = made(3, 12, 0, scatter)
+    c = covariance(residuals, scatter)
     truth = sum(multivariate_normal(np.zeros(12), c[k]).logpdf(residuals.values[k]) for k in range(3))
-    assert log_likelihood(residuals, log_times, scatter) == pytest.approx(truth, rel=1e-10)
+    assert log_likelihood(residuals, scatter) == pytest.approx(truth, rel=1e-10)
 
 
 def test_absent_frames_do_not_count():
-    scatter = Scatter(noise=1e-5, offset=2e-5, rate=0.3, drift=0.05, reach=1.5)
-    whole, log_times = made(2, 12, 1, scatter)
+    scatter = sizes(noise=1e-5, offset=2e-5, rate=0.3, drift=0.05, reach=1.5)
+    whole = made(2, 12, 1, scatter)
     present = whole.present.copy()
     present[1, 7:] = False
-    part = Residuals(np.where(present, whole.values, 0), np.where(present, whole.slopes, 0), present, None,
-                     np.where(present, whole.rate_effect, 0))  # fmt: skip
-    c = covariance(whole, log_times, scatter)
+    part = replace(whole, present=present, values=np.where(present, whole.values, 0),
+                   slopes=np.where(present, whole.slopes, 0),
+                   rate_effect=np.where(present, whole.rate_effect, 0))  # fmt: skip
+    c = covariance(whole, scatter)
     truth = multivariate_normal(np.zeros(12), c[0]).logpdf(whole.values[0])
     truth += multivariate_normal(np.zeros(7), c[1][:7, :7]).logpdf(whole.values[1, :7])
-    assert log_likelihood(part, log_times, scatter) == pytest.approx(truth, rel=1e-10)
+    assert log_likelihood(part, scatter) == pytest.approx(truth, rel=1e-10)
 
 
 def test_planted_scatter_is_found():
     """150 tests: the standard error of a standard deviation from 150 draws is 6 %, so 25 % is four of them."""
-    truth = Scatter(noise=2e-5, offset=1e-4, rate=0.4, drift=0.1, reach=1.5)
-    residuals, log_times = made(150, 30, 2, truth)
-    found = estimated(residuals, log_times, Scatter(2e-5, 0, 3e-5, 0.5, 0.2, 2.0), BOTH)
-    assert found.offset == pytest.approx(truth.offset, rel=0.25)
+    truth = sizes(noise=2e-5, offset=1e-4, rate=0.4, drift=0.1, reach=1.5)
+    residuals = made(150, 30, 2, truth)
+    found = estimated(residuals, sizes(2e-5, 0, 3e-5, 0.5, 0.2, 2.0), BOTH)
+    assert found["strain"].offset == pytest.approx(truth["strain"].offset, rel=0.25)
     assert found.rate == pytest.approx(truth.rate, rel=0.25)
-    assert found.drift == pytest.approx(truth.drift, rel=0.25)
-    assert found.reach == pytest.approx(truth.reach, rel=0.5)
+    assert found["strain"].drift == pytest.approx(truth["strain"].drift, rel=0.25)
+    assert found["strain"].reach == pytest.approx(truth["strain"].reach, rel=0.5)
 
 
 def test_a_given_prior_stays():
-    residuals, log_times = made(20, 20, 3, Scatter(2e-5, 0, 1e-4, 0.4, 0.1, 1.5))
-    found = estimated(
-        residuals, log_times, Scatter(2e-5, 0, 7e-5, 0.5, 0.1, 1.5), (Nuisance("offset", sd=7e-5), Nuisance("rate"))
-    )
-    assert found.offset == 7e-5
+    residuals = made(20, 20, 3, sizes(2e-5, 0, 1e-4, 0.4, 0.1, 1.5))
+    found = estimated(residuals, sizes(2e-5, 0, 7e-5, 0.5, 0.1, 1.5), (Nuisance("offset", sd=7e-5), Nuisance("rate")))
+    assert found["strain"].offset == 7e-5
 
 
 def test_effective_size_counts_a_test_once_when_its_residuals_move_together():
-    residuals, log_times = made(6, 40, 4, Scatter(1e-6, 0.0, 0.0, 1.0, 0.0, 1.0))
-    assert effective_size(residuals, log_times, Scatter(1e-6, 0.0, 0.0, 1.0, 0.0, 1.0)) == pytest.approx(6, rel=0.01)
-    assert effective_size(residuals, log_times, Scatter(1e-1, 0.0, 0.0, 0.0, 0.0, 1.0)) == pytest.approx(240, rel=0.01)
+    residuals = made(6, 40, 4, sizes(1e-6, 0.0, 0.0, 1.0, 0.0, 1.0))
+    assert effective_size(residuals, sizes(1e-6, 0.0, 0.0, 1.0, 0.0, 1.0)) == pytest.approx(6, rel=0.01)
+    assert effective_size(residuals, sizes(1e-1, 0.0, 0.0, 0.0, 0.0, 1.0)) == pytest.approx(240, rel=0.01)
 
 
 def test_expected_effects_find_the_offset_and_rate_of_each_test():
@@ -83,7 +91,67 @@ def test_expected_effects_find_the_offset_and_rate_of_each_test():
     slopes, effect = 1 / strain, np.ones_like(strain)
     offset, log_factor = np.array([3e-5, -2e-5]), np.array([0.2, -0.1])
     residual = -(slopes * offset[:, None] + effect * log_factor[:, None])
-    shape = Residuals(residual, slopes, np.ones_like(slopes, bool), None, effect)
-    found = expected_effects(shape, np.log(times), Scatter(1e-8, 0.0, 1e-3, 2.0, 0.0, 1.0))
-    np.testing.assert_allclose(found[0], offset, rtol=1e-2)
+    shape = residuals_of(residual, slopes, np.ones_like(slopes, bool), times, effect)
+    found = expected_effects(shape, sizes(1e-8, 0.0, 1e-3, 2.0, 0.0, 1.0))
+    np.testing.assert_allclose(found[0][:, 0], offset, rtol=1e-2)
     np.testing.assert_allclose(found[1], log_factor, rtol=1e-2)
+
+
+# ---- several outputs -----------------------------------------------------------------------------------------------
+
+
+def two_outputs():
+    """Two tests of two outputs end to end, five frames each; only the rate joins them."""
+    rng = np.random.default_rng(5)
+    times = np.tile(np.geomspace(10, 1e4, 5), (2, 2))
+    output = np.repeat([[0, 1]], 5, axis=1).repeat(2, axis=0)
+    slopes, effect = 1 + rng.uniform(size=(2, 10)), rng.normal(size=(2, 10))
+    scatter = Scatter(
+        {"amplitude": OutputScatter(0.1, 0.2, 0.3, 0.4, 1.0), "width": OutputScatter(0.2, 0.1, 0.5, 0.3, 2.0)}, 0.6
+    )
+    return residuals_of(rng.normal(size=(2, 10)), slopes, np.ones((2, 10), bool), times, effect, output), scatter
+
+
+def by_hand(residuals, scatter, test):
+    """The covariance of one test, entry by entry."""
+    r, c = residuals, np.zeros((10, 10))
+    for i in range(10):
+        for j in range(10):
+            a, b = (list(scatter.outputs.values())[r.output[test, k]] for k in (i, j))
+            c[i, j] = scatter.rate**2 * r.rate_effect[test, i] * r.rate_effect[test, j]
+            if a is b:
+                lag = abs(r.log_times[test, i] - r.log_times[test, j])
+                c[i, j] += a.drift**2 * np.exp(-lag / a.reach) + a.offset**2 * r.slopes[test, i] * r.slopes[test, j]
+            if i == j:
+                c[i, j] += (a.noise * r.slopes[test, i]) ** 2 + a.misfit**2
+    return c
+
+
+def test_outputs_share_the_rate_alone():
+    residuals, scatter = two_outputs()
+    for k, found in enumerate(covariance(residuals, scatter)):
+        np.testing.assert_allclose(found, by_hand(residuals, scatter, k), rtol=1e-7, atol=1e-8)
+
+
+def test_a_test_of_little_trust_scatters_more():
+    residuals, scatter = two_outputs()
+    plain, doubted = covariance(residuals, scatter), covariance(residuals.trusting(np.array([1.0, 0.25])), scatter)
+    np.testing.assert_allclose(doubted[0], plain[0])
+    np.testing.assert_allclose(doubted[1], 4 * plain[1])
+
+
+def test_slopes_of_the_likelihood_are_its_differences():
+    from creepkit.inverse.sizes import _Likelihood
+
+    residuals, scatter = two_outputs()
+    free = [(o, n) for o in scatter.outputs for n in ("misfit", "offset", "drift", "reach")] + [("", "rate")]
+    likelihood = _Likelihood(residuals.trusting(np.array([1.0, 0.3])), scatter, free)
+    x = np.log([*(getattr(scatter[o], n) for o, n in free[:-1]), scatter.rate])
+    slope = likelihood.cost(x)[1]
+    for k in range(x.size):
+        step = np.zeros(x.size)
+        step[k] = 1e-5
+        difference = (likelihood.cost(x + step)[0] - likelihood.cost(x - step)[0]) / 2e-5
+        assert slope[k] == pytest.approx(difference, rel=1e-5, abs=1e-7)
+    ends = [likelihood.cost(x + d)[0] + log_likelihood(likelihood.residuals, likelihood.scatter(x + d)) for d in (0, 1)]
+    assert ends[0] == pytest.approx(ends[1], rel=1e-12)

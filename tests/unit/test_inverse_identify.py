@@ -161,7 +161,7 @@ def test_a_given_offset_prior_is_used(tests):
     fit = identify(
         LAW, tests, Steady(), settings=replace(QUICK, nuisances=(Nuisance("offset", sd=5e-5), Nuisance("rate", sd=0.2)))
     )
-    assert fit.scatter.offset == 5e-5
+    assert fit.scatter["strain"].offset == 5e-5
     assert fit.scatter.rate == 0.2
 
 
@@ -234,7 +234,7 @@ def test_fits_to_different_frames_are_not_ranked(fit, tests):
 def test_refit_keeps_the_nuisances(tests):
     plain = identify(LAW, tests, Steady(), settings=replace(QUICK, nuisances=()))
     again = refit(plain, tests[:-1])
-    assert again.scatter.rate == again.scatter.offset == 0.0
+    assert again.scatter.rate == again.scatter["strain"].offset == 0.0
 
 
 def test_histories_of_one_name_are_refused(tests):

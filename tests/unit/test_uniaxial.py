@@ -18,7 +18,8 @@ from creepkit.records import (
     StressSteps,
     constant_stress,
 )
-from creepkit.specimens.uniaxial import Uniaxial, creepkit_specimens, elastic_strain
+from creepkit.specimens.elastic_part import elastic_strain
+from creepkit.specimens.uniaxial import Uniaxial, creepkit_specimens
 
 TIMES = np.array([0.0, 10.0, 100.0, 1000.0])
 VALUES = {"A": 1e-13, "n": 4.0}

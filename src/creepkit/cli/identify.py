@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection import Ranking
     from creepkit.language import CreepLaw
-    from creepkit.records import History
+    from creepkit.records import History, Nuisance
 
 
 def command(
@@ -32,7 +32,17 @@ def command(
     up_to: Annotated[float | None, typer.Option(help="Use frames up to this strain only, such as 0.05.")] = None,
     starts: Annotated[int, typer.Option(min=1, help="Starts of the search.")] = 8,
     seed: Annotated[int, typer.Option(help="Seed of the search.")] = 0,
-    loss: Annotated[str, typer.Option(help="linear, soft_l1, huber, cauchy or arctan.")] = "linear",
+    loss: Annotated[str, typer.Option(help="Of frames: linear, soft_l1, huber, cauchy or arctan.")] = "linear",
+    test_loss: Annotated[
+        str, typer.Option(help="Of whole tests: gaussian; or student, with which one far from its twins weighs less.")
+    ] = "gaussian",
+    weights: Annotated[
+        str, typer.Option(help="noise, or weights of relative squared errors: amplitude=0.99,width=0.005,shape=0.005.")
+    ] = "noise",
+    nuisance: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KIND[=MEAN[:SD]]", help="What differs between tests, such as thickness=0.4935:0.027."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
 ) -> None:
     """Fit laws to creep curves and rank them.
@@ -56,7 +66,8 @@ def command(
         from creepkit.inverse.warmth import with_arrhenius
 
         named = [with_arrhenius(one, histories) for one in named]
-    ranking = ranked(named, histories, starts, seed, loss)
+    how = {"loss": loss, "test_loss": test_loss, "weights": weights_of(weights), "nuisances": nuisances_of(nuisance)}
+    ranking = ranked(named, histories, starts=starts, seed=seed, **how)
     written = write(ranking, to)
     if as_json:
         print_json(_answer(ranking, written))
@@ -92,7 +103,46 @@ def _warn_of_twins(histories: list[History]) -> None:
         typer.echo(f"note: {one} and {other} look like one test published twice; both count", err=True)
 
 
-def ranked(laws: Sequence[CreepLaw], histories: list[History], starts: int, seed: int, loss: str) -> Ranking:
+def weights_of(text: str) -> Any:
+    """The weights of outputs, from text such as amplitude=0.99,width=0.01; or the word noise."""
+    from creepkit.errors import FitError
+
+    if text == "noise":
+        return text
+    pairs = [part.partition("=") for part in text.split(",")]
+    try:
+        return {name.strip(): float(value) for name, _, value in pairs}
+    except ValueError:
+        raise FitError(f"--weights {text} is not known; write noise or amplitude=0.99,width=0.005") from None
+
+
+def nuisances_of(texts: Sequence[str] | None) -> list[Nuisance] | None:
+    """The usual offset and rate, and those named: temperature, thickness=0.4935 or thickness=0.4935:0.027."""
+    from typing import get_args
+
+    from creepkit.errors import FitError
+    from creepkit.records import Nuisance
+    from creepkit.records.prediction import Kind
+
+    if not texts:
+        return None
+    found = [Nuisance("offset"), Nuisance("rate")]
+    for text in texts:
+        kind, _, rest = text.partition("=")
+        mean, _, sd = rest.partition(":")
+        try:
+            numbers = float(mean or 0.0), float(sd) if sd else None
+        except ValueError:
+            raise FitError(f"--nuisance {text}: '{rest}' is not MEAN or MEAN:SD, such as 0.4935:0.027") from None
+        known = [one for one in get_args(Kind) if one == kind]
+        if not known:
+            raise FitError(f"--nuisance {text}: '{kind}' is not known; allowed are {', '.join(get_args(Kind))}")
+        found = [n for n in found if n.kind != kind]
+        found.append(Nuisance(known[0], mean=numbers[0], sd=numbers[1]))
+    return found
+
+
+def ranked(laws: Sequence[CreepLaw], histories: list[History], **how: Any) -> Ranking:
     """Fit each law, showing progress, and rank them."""
     from creepkit import study
     from creepkit.inverse.selection import rank
@@ -104,7 +154,7 @@ def ranked(laws: Sequence[CreepLaw], histories: list[History], starts: int, seed
             def tick(task: str, done: int, total: int, name: str = one.name) -> None:
                 progress.tick(f"{name}, {task}", done, total)
 
-            fits.append(study.identify(one, histories, starts=starts, seed=seed, loss=loss, progress=tick))
+            fits.append(study.identify(one, histories, progress=tick, **how))
     return rank(fits)
 
 
@@ -138,19 +188,28 @@ def tell(ranking: Ranking, written: list[Path], histories: list[History]) -> Non
         (
             entry.fit.law.name,
             str(len(entry.fit.law.params)),
-            f"{entry.fit.rms:.3f}",
-            f"{100 * entry.fit.scatter.rate:.0f} %",
-            f"{100 * entry.fit.scatter.drift:.0f} %",
+            *_misfit(entry.fit),
             f"{entry.excess:.1f}",
             f"{entry.weight:.3f}",
         )
         for entry in ranking.laws
     ]
-    columns = ("law", "parameters", "rms ln strain", "test to test", "not followed", "BIC - best", "weight")
+    columns = ("law", "parameters", *_misfit_columns(ranking.best), "BIC - best", "weight")
     print_table(f"{len(histories)} tests", columns, rows)
     typer.echo(f"{ranking.verdict}\n\n{ranking.best}\n")
     for path in written:
         typer.echo(f"wrote {path}")
+
+
+def _misfit_columns(fit: Identification) -> tuple[str, ...]:
+    first = next(iter(fit.errors))
+    return ("rms ln strain" if first == "strain" else f"error of {first}", "test to test", "not followed")
+
+
+def _misfit(fit: Identification) -> tuple[str, ...]:
+    first = next(iter(fit.errors))
+    met = f"{fit.rms:.3f}" if first == "strain" else f"{fit.errors[first].rse:.3g}"
+    return met, f"{100 * fit.scatter.rate:.0f} %", f"{100 * fit.scatter[first].drift:.0f} %"
 
 
 def _answer(ranking: Ranking, written: list[Path]) -> dict[str, Any]:
@@ -164,9 +223,18 @@ def _answer(ranking: Ranking, written: list[Path]) -> dict[str, Any]:
 def _summary(fit: Identification) -> dict[str, Any]:
     return {
         "law": fit.law.name,
-        "rms_ln_strain": fit.rms,
+        **({"rms_ln_strain": fit.rms} if "strain" in fit.errors else {}),
+        "errors": {name: _numbers(vars(e)) for name, e in fit.errors.items()},
         "parameters": {e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
                        for e in fit.estimates},
+        "nuisances": [_numbers(vars(n)) for n in fit.nuisances],
         "scatter": fit.scatter.to_dict(),
         "notes": list(fit.notes),
     }  # fmt: skip
+
+
+def _numbers(record: dict[str, Any]) -> dict[str, Any]:
+    """The same with null for what JSON cannot hold."""
+    import math
+
+    return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in record.items()}

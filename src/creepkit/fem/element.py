@@ -8,17 +8,20 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats, Ints
-from creepkit.fem.body import Body
+from creepkit.fem.body import Body, band_shape
 from creepkit.fem.material import (
     CREEP_COMPONENTS,
     EQUIVALENT,
     PointRoom,
     Stage,
-    creep,
+    axes_of,
+    creep_safely,
     creep_slopes,
+    creep_slopes_with_states,
     elastic_part,
     following,
     log_stress,
+    problem_of,
     tangent_moduli,
 )
 from creepkit.fem.pressure import side_force, side_stiffness
@@ -35,9 +38,10 @@ from creepkit.fem.strain import (
     piola_tangent,
     to_gradient,
 )
-from creepkit.integration.problem import SOLVED
+from creepkit.integration.problem import SOLVED, TOO_MANY
 from creepkit.integration.response import INPUTS
-from creepkit.kernels.interface import POINT_SIZE
+from creepkit.integration.stage import solve_near
+from creepkit.kernels.interface import POINT_SIZE, TEMPERATURE, TIME
 
 BALANCED, INVERTED, POINT_FAILED = range(3)
 """Flags of an assembly."""
@@ -51,7 +55,7 @@ class Points(NamedTuple):
     value : (points, V) creep components, equivalent creep strain, states, at the start of the step.
     base : (points, V) history of the stage. increments : (points,) D. states : (points, S) at the end of the stage.
     slopes : (stages, points, V) d value/ds. mises : (points,) von Mises stress of the Cauchy stress, MPa.
-    directions : (points, 4) w/e and e. deviator : (points, 6) derivatives of the stress components y that are conjugate
+    directions : (points, 3) w/e. deviator : (points, 6) derivatives of the stress components y that are conjugate
         to w, from the last tangent: 11, 22, 33, 12, 13, 23.
     """
 
@@ -68,8 +72,8 @@ class Points(NamedTuple):
 class Forces(NamedTuple):
     """residual : (size + width + 4,) internal less external forces; band, flat : the tangent, as rows and laid flat.
 
-    block : room of the factorisation; element : (4, 8, 8) rr, rz, zr, zz; local : (2, 8) displacements;
-    inner : (2, 8) forces; products : (7, 8); side : (2, 3); sides : (4, 3, 3); ends : (2, 3) current coordinates.
+    block : room of the factorisation; element : (3, 8, 8) rr, rz, zz; local : (2, 8) displacements;
+    inner : (2, 8) forces; products : (8, 8); side : (2, 3); sides : (4, 3, 3); ends : (2, 3) current coordinates.
     """
 
     residual: Floats
@@ -85,7 +89,6 @@ class Forces(NamedTuple):
     ends: Floats
 
 
-@njit(cache=True, error_model="numpy")
 def point_room(states: int, parameters: int) -> PointRoom:
     """Working arrays for one point."""
     size, width = 1 + states, POINT_SIZE + states
@@ -99,7 +102,6 @@ def point_room(states: int, parameters: int) -> PointRoom:
     )
 
 
-@njit(cache=True, error_model="numpy")
 def points_of(count: int, states: int, stages: int) -> Points:
     """Virgin points."""
     size = EQUIVALENT + 1 + states
@@ -110,27 +112,27 @@ def points_of(count: int, states: int, stages: int) -> Points:
         np.zeros((count, states)),
         np.zeros((stages, count, size)),
         np.zeros(count),
-        np.zeros((count, CREEP_COMPONENTS + 1)),
+        np.zeros((count, CREEP_COMPONENTS)),
         np.zeros((count, 6)),
     )
 
 
-@njit(cache=True, error_model="numpy")
-def forces_of(size: int, width: int, rows: int, columns: int) -> Forces:
-    """Room for forces and tangent; rows, columns : of `body.band_shape`."""
+def forces_of(body: Body) -> Forces:
+    """Room for forces and tangent."""
+    rows, columns = band_shape(body.size, body.width)
     flat = np.zeros(rows * columns + 1)
     return Forces(
-        np.zeros(size + width + 4),
-        flat[:-1].reshape((rows, columns)),
-        flat,
-        np.zeros((4, width + 1)),
-        np.zeros((4, 8, 8)),
-        np.zeros((2, 8)),
-        np.zeros((2, 8)),
-        np.zeros((7, 8)),
-        np.zeros((2, 3)),
-        np.zeros((4, 3, 3)),
-        np.zeros((2, 3)),
+        residual=np.zeros(body.size + body.width + 4),
+        band=flat[:-1].reshape(rows, columns),
+        flat=flat,
+        block=np.zeros((4, body.width + 1)),
+        element=np.zeros((3, 8, 8)),
+        local=np.zeros((2, 8)),
+        inner=np.zeros((2, 8)),
+        products=np.zeros((8, 8)),
+        side=np.zeros((2, 3)),
+        sides=np.zeros((4, 3, 3)),
+        ends=np.zeros((2, 3)),
     )
 
 
@@ -146,71 +148,85 @@ def assemble(
     forces: Forces,
     stiff: bool,
 ) -> int:
-    """Out-of-balance forces, creep increments and von Mises stresses; with `stiff` the tangent made symmetric too."""
-    forces.residual[:] = 0.0
+    """Out-of-balance forces, creep increments and von Mises stresses; with `stiff` the tangent made symmetric too.
+
+    One long loop over arrays with names of their own: views of rows and tuples of arrays cost more than the physics.
+    """
+    elements, equations, weights, places = body.elements, body.equations, body.weights, body.places
+    by_radius, by_height, over_radius = body.by_radius, body.by_height, body.over_radius
+    base, increments, states, mises = points.base, points.increments, points.states, points.mises
+    directions, deviator = points.directions, points.deviator
+    row, out, tangent = room.row, room.out, room.tangent
+    gradient, matrix, response = room.gradient, room.matrix, room.response
+    residual, flat, local, inner = forces.residual, forces.flat, forces.local, forces.inner
+    products, element = forces.products, forces.element
+    count = states.shape[1]
+    creeps = stage.weight > 0.0
+    clear(residual)
     if stiff:
-        forces.flat[:] = 0.0
-    for e in range(body.elements.shape[0]):
-        gather(body.elements[e], displacement, forces.local)
-        forces.inner[:] = 0.0
-        if stiff:
-            forces.element[:3] = 0.0
+        clear(flat)
+    row[TIME], row[TEMPERATURE] = stage.time, stage.temperature
+    for e in range(elements.shape[0]):
+        gather(elements, e, displacement, local)
+        _clear_element(inner, element, stiff)
         for g in range(4):
             k = 4 * e + g
-            by_r, by_z, over_r = body.by_radius[e, g], body.by_height[e, g], body.over_radius[e, g]
-            at = kinematics(deformation(by_r, by_z, over_r, forces.local))
+            at = kinematics(deformation(by_radius, by_height, over_radius, e, g, local))
             if not at.volume > 0.0:
                 return INVERTED
-            P, solved = _point(update, theta, stage, at, points, k, room, stiff)
-            if not solved:
-                return POINT_FAILED
-            weight = body.weights[e, g]
-            add_force(by_r, by_z, over_r, P, weight, forces.inner)
-            if stiff:
-                add_stiffness(by_r, by_z, over_r, room.tangent, weight, forces.products, forces.element)
-        _scatter(body, e, forces, stiff)
+            elastic = elastic_part(stage, at, base, k)
+            increment, axes = 0.0, axes_of(elastic)
+            problem = problem_of(stage, elastic, base[k, EQUIVALENT])
+            if creeps and elastic.equivalent > 0.0:
+                flag = TOO_MANY
+                for i in range(count):
+                    row[POINT_SIZE + i] = states[k, i]
+                if count == 0:
+                    increment, flag = solve_near(
+                        update, theta, axes, problem, row, out, increments[k], stage.tolerance
+                    )
+                if flag != SOLVED:
+                    increment, flag = creep_safely(
+                        update, theta, axes, problem, base, k, row, out, increments[k], stage.tolerance
+                    )
+                if flag != SOLVED:
+                    return POINT_FAILED
+                for i in range(count):
+                    states[k, i] = row[POINT_SIZE + i]
+            increments[k] = increment
+            mises[k] = problem.trial - problem.stiffness * increment
+            inverse = 1.0 / elastic.equivalent if elastic.equivalent > 0.0 else 0.0
+            directions[k, 0], directions[k, 1] = elastic.hoop * inverse, elastic.difference * inverse
+            directions[k, 2] = elastic.shear * inverse
+            stress = log_stress(stage, elastic, increment)
+            slopes = energy_slopes(at, stress)
+            add_force(by_radius, by_height, over_radius, e, g, to_gradient(at.F, slopes), weights[e, g], inner)
+            if not stiff:
+                continue
+            by = (0.0, 0.0, 0.0)
+            if increment > 0.0 and count == 0:
+                by = creep_slopes(axes, problem, increment, out)
+            elif increment > 0.0:
+                by = creep_slopes_with_states(axes, problem, increment, out, gradient, matrix, response)
+            moduli = tangent_moduli(stage, elastic, increment, following(stage, elastic, increment, by), True)
+            keep_deviator(moduli, deviator, k)
+            piola_tangent(at, moduli, stress, slopes, tangent)
+            add_stiffness(by_radius, by_height, over_radius, e, g, tangent, weights[e, g], products, element)
+        scatter_force(elements, equations, e, inner, residual)
+        if stiff:
+            scatter_stiffness(places, e, element, flat)
     _press(body, stage.pressure, displacement, forces, stiff)
     return BALANCED
 
 
 @njit(cache=True, error_model="numpy")
-def _point(
-    update: Any, theta: Floats, stage: Stage, at: Kinematics, points: Points, k: int, room: PointRoom, stiff: bool
-) -> tuple[Five, bool]:
-    """First Piola-Kirchhoff stress of one point; with `stiff` its tangent dP/dF too, in the room."""
-    base = points.base[k]
-    elastic = elastic_part(stage, at, base)
-    for i in range(points.states.shape[1]):
-        room.row[POINT_SIZE + i] = points.states[k, i]
-    increment, flag = creep(update, theta, stage, elastic, base, points.increments[k], room)
-    if flag != SOLVED:
-        return (0.0, 0.0, 0.0, 0.0, 0.0), False
-    for i in range(points.states.shape[1]):
-        points.states[k, i] = room.row[POINT_SIZE + i]
-    points.increments[k] = increment
-    points.mises[k] = 3.0 * stage.shear * (elastic.equivalent - increment) / elastic.volume
-    inverse, direction = 1.0 / elastic.equivalent if elastic.equivalent > 0.0 else 0.0, points.directions[k]
-    direction[0], direction[1] = elastic.hoop * inverse, elastic.difference * inverse
-    direction[2], direction[3] = elastic.shear * inverse, elastic.equivalent
-    stress = log_stress(stage, elastic, increment)
-    slopes = energy_slopes(at, stress)
-    if stiff:
-        by_trial, by_principal, by_mean = creep_slopes(stage, elastic, base, increment, room)
-        follow = following(stage, elastic, increment, by_trial, by_principal, by_mean)
-        moduli = tangent_moduli(stage, elastic, increment, follow, True)
-        _keep_deviator(moduli, points.deviator[k])
-        piola_tangent(at, moduli, stress, slopes, room.tangent)
-    return to_gradient(at.F, slopes), True
-
-
-@njit(cache=True, error_model="numpy")
-def _keep_deviator(moduli: tuple[Four, Four, Four, Four], kept: Floats) -> None:
+def keep_deviator(moduli: tuple[Four, Four, Four, Four], kept: Floats, k: int) -> None:
     """Derivatives of y to w, from the moduli: w_1 is E33 at fixed trace and E11 - E22."""
-    kept[0] = 1.5 * (moduli[HOOP][HOOP] - moduli[HOOP][SUM])
-    kept[1], kept[2] = moduli[DIFFERENCE][DIFFERENCE], moduli[SHEAR][SHEAR]
-    kept[3] = moduli[DIFFERENCE][HOOP] - moduli[DIFFERENCE][SUM]
-    kept[4] = moduli[SHEAR][HOOP] - moduli[SHEAR][SUM]
-    kept[5] = moduli[DIFFERENCE][SHEAR]
+    kept[k, 0] = 1.5 * (moduli[HOOP][HOOP] - moduli[HOOP][SUM])
+    kept[k, 1], kept[k, 2] = moduli[DIFFERENCE][DIFFERENCE], moduli[SHEAR][SHEAR]
+    kept[k, 3] = moduli[DIFFERENCE][HOOP] - moduli[DIFFERENCE][SUM]
+    kept[k, 4] = moduli[SHEAR][HOOP] - moduli[SHEAR][SUM]
+    kept[k, 5] = moduli[DIFFERENCE][SHEAR]
 
 
 @njit(cache=True, error_model="numpy")
@@ -221,109 +237,128 @@ def error_forces(
 
     Through the tangent of the stage, which damps what the stage would damp.
     """
-    forces.residual[:] = 0.0
-    for e in range(body.elements.shape[0]):
-        gather(body.elements[e], displacement, forces.local)
-        forces.inner[:] = 0.0
+    elements, equations, all_weights = body.elements, body.equations, body.weights
+    by_radius, by_height, over_radius = body.by_radius, body.by_height, body.over_radius
+    rates, kept, local, inner, residual = points.slopes, points.deviator, forces.local, forces.inner, forces.residual
+    clear(residual)
+    for e in range(elements.shape[0]):
+        gather(elements, e, displacement, local)
+        _clear_element(inner, forces.element, False)
         for g in range(4):
             k = 4 * e + g
-            by_r, by_z, over_r = body.by_radius[e, g], body.by_height[e, g], body.over_radius[e, g]
-            at = kinematics(deformation(by_r, by_z, over_r, forces.local))
+            at = kinematics(deformation(by_radius, by_height, over_radius, e, g, local))
             a, b, c = 0.0, 0.0, 0.0
             for i in range(weights.size):
-                a += weights[i] * points.slopes[i, k, 0]
-                b += weights[i] * points.slopes[i, k, 1]
-                c += weights[i] * points.slopes[i, k, 2]
-            kept = points.deviator[k]
-            first = kept[0] * a + kept[3] * b + kept[4] * c
+                a += weights[i] * rates[i, k, 0]
+                b += weights[i] * rates[i, k, 1]
+                c += weights[i] * rates[i, k, 2]
+            first = kept[k, 0] * a + kept[k, 3] * b + kept[k, 4] * c
             stress = (
                 first / 3.0,
-                -(kept[3] * a + kept[1] * b + kept[5] * c),
+                -(kept[k, 3] * a + kept[k, 1] * b + kept[k, 5] * c),
                 -2.0 / 3.0 * first,
-                -(kept[4] * a + kept[5] * b + kept[2] * c),
+                -(kept[k, 4] * a + kept[k, 5] * b + kept[k, 2] * c),
             )
             P = to_gradient(at.F, energy_slopes(at, stress))
-            add_force(by_r, by_z, over_r, P, body.weights[e, g], forces.inner)
-        _scatter(body, e, forces, False)
+            add_force(by_radius, by_height, over_radius, e, g, P, all_weights[e, g], inner)
+        scatter_force(elements, equations, e, inner, residual)
 
 
 @njit(cache=True, error_model="numpy")
-def gather(nodes: Ints, displacement: Floats, local: Floats) -> None:
+def clear(values: Floats) -> None:
+    """Set a vector to zero."""
+    for k in range(values.size):
+        values[k] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _clear_element(inner: Floats, element: Floats, stiff: bool) -> None:
+    for i in range(2):
+        for a in range(8):
+            inner[i, a] = 0.0
+    if stiff:
+        for i in range(3):
+            for a in range(8):
+                for b in range(8):
+                    element[i, a, b] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def gather(elements: Ints, e: int, displacement: Floats, local: Floats) -> None:
+    """Displacements (2, 8) of an element."""
     for a in range(8):
-        local[0, a] = displacement[2 * nodes[a]]
-        local[1, a] = displacement[2 * nodes[a] + 1]
+        node = elements[e, a]
+        local[0, a] = displacement[2 * node]
+        local[1, a] = displacement[2 * node + 1]
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
-def deformation(by_r: Floats, by_z: Floats, over_r: Floats, local: Floats) -> Five:
+def deformation(by_r: Floats, by_z: Floats, over_r: Floats, e: int, g: int, local: Floats) -> Five:
     """Deformation gradient of a point from the displacements (2, 8) of its element."""
     f11, f12, f21, f22, f33 = 1.0, 0.0, 0.0, 1.0, 1.0
     for a in range(8):
-        f11 += by_r[a] * local[0, a]
-        f12 += by_z[a] * local[0, a]
-        f33 += over_r[a] * local[0, a]
-        f21 += by_r[a] * local[1, a]
-        f22 += by_z[a] * local[1, a]
+        f11 += by_r[e, g, a] * local[0, a]
+        f12 += by_z[e, g, a] * local[0, a]
+        f33 += over_r[e, g, a] * local[0, a]
+        f21 += by_r[e, g, a] * local[1, a]
+        f22 += by_z[e, g, a] * local[1, a]
     return f11, f12, f21, f22, f33
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
-def add_force(by_r: Floats, by_z: Floats, over_r: Floats, P: Five, weight: float, inner: Floats) -> None:
+def add_force(
+    by_r: Floats, by_z: Floats, over_r: Floats, e: int, g: int, P: Five, weight: float, inner: Floats
+) -> None:
     """Add the internal force of a point to (2, 8)."""
     p0, p1, p2, p3, p4 = weight * P[0], weight * P[1], weight * P[2], weight * P[3], weight * P[4]
     for a in range(8):
-        inner[0, a] += by_r[a] * p0 + by_z[a] * p1 + over_r[a] * p4
-        inner[1, a] += by_r[a] * p2 + by_z[a] * p3
+        inner[0, a] += by_r[e, g, a] * p0 + by_z[e, g, a] * p1 + over_r[e, g, a] * p4
+        inner[1, a] += by_r[e, g, a] * p2 + by_z[e, g, a] * p3
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
 def add_stiffness(
-    by_r: Floats, by_z: Floats, over_r: Floats, A: Floats, weight: float, products: Floats, element: Floats
-) -> None:
-    """Add the symmetric stiffness of a point to the blocks rr, rz, zz of (4, 8, 8)."""
+    by_r: Floats, by_z: Floats, over_r: Floats, e: int, g: int, A: Floats, weight: float, products: Floats,
+    element: Floats,
+) -> None:  # fmt: skip
+    """Add the symmetric stiffness of a point to the blocks rr, rz, zz of (3, 8, 8)."""
     for b in range(8):
-        x, y, h = weight * by_r[b], weight * by_z[b], weight * over_r[b]
+        x, y, h = weight * by_r[e, g, b], weight * by_z[e, g, b], weight * over_r[e, g, b]
         products[0, b] = A[0, 0] * x + A[0, 1] * y + A[0, 4] * h
         products[1, b] = A[1, 0] * x + A[1, 1] * y + A[1, 4] * h
         products[2, b] = A[4, 0] * x + A[4, 1] * y + A[4, 4] * h
         products[3, b] = A[0, 2] * x + A[0, 3] * y
         products[4, b] = A[1, 2] * x + A[1, 3] * y
         products[5, b] = A[4, 2] * x + A[4, 3] * y
+        products[6, b] = A[2, 2] * x + A[2, 3] * y
+        products[7, b] = A[3, 2] * x + A[3, 3] * y
     for a in range(8):
-        x, y, h = by_r[a], by_z[a], over_r[a]
-        rr, rz = element[0, a], element[1, a]
+        x, y, h = by_r[e, g, a], by_z[e, g, a], over_r[e, g, a]
         for b in range(8):
-            rr[b] += x * products[0, b] + y * products[1, b] + h * products[2, b]
-        for b in range(8):
-            rz[b] += x * products[3, b] + y * products[4, b] + h * products[5, b]
-    for b in range(8):
-        x, y = weight * by_r[b], weight * by_z[b]
-        products[0, b] = A[2, 2] * x + A[2, 3] * y
-        products[1, b] = A[3, 2] * x + A[3, 3] * y
-    for a in range(8):
-        x, y, zz = by_r[a], by_z[a], element[2, a]
-        for b in range(8):
-            zz[b] += x * products[0, b] + y * products[1, b]
+            element[0, a, b] += x * products[0, b] + y * products[1, b] + h * products[2, b]
+            element[1, a, b] += x * products[3, b] + y * products[4, b] + h * products[5, b]
+            element[2, a, b] += x * products[6, b] + y * products[7, b]
 
 
 @njit(cache=True, error_model="numpy")
-def _scatter(body: Body, e: int, forces: Forces, stiff: bool) -> None:
-    nodes, flat = body.elements[e], forces.flat
-    for i in range(2):
-        for a in range(8):
-            equation = body.equations[2 * nodes[a] + i]
+def scatter_force(elements: Ints, equations: Ints, e: int, inner: Floats, residual: Floats) -> None:
+    """Add an element's forces (2, 8) to its equations."""
+    for a in range(8):
+        for i in range(2):
+            equation = equations[2 * elements[e, a] + i]
             if equation >= 0:
-                forces.residual[equation] += forces.inner[i, a]
-    if not stiff:
-        return
-    rr, rz, zz = forces.element[0], forces.element[1], forces.element[2]
-    places = body.places[e]
+                residual[equation] += inner[i, a]
+
+
+@njit(cache=True, error_model="numpy")
+def scatter_stiffness(places: Ints, e: int, element: Floats, flat: Floats) -> None:
+    """Add an element's blocks rr, rz, zz to the band."""
     for a in range(8):
         for b in range(a, 8):
-            flat[places[0, a, b]] += rr[a, b]
-            flat[places[2, a, b]] += zz[a, b]
+            flat[places[e, 0, a, b]] += element[0, a, b]
+            flat[places[e, 2, a, b]] += element[2, a, b]
         for b in range(8):
-            flat[places[1, a, b]] += rz[a, b]
+            flat[places[e, 1, a, b]] += element[1, a, b]
 
 
 @njit(cache=True, error_model="numpy")

@@ -29,7 +29,7 @@ class Outcome(NamedTuple):
     light: int
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def balance(
     update: Any,
     theta: Floats,
@@ -46,8 +46,9 @@ def balance(
 
     longest : mm, corrections are cut to this.
     """
-    before, full, light, stiff = 0.0, 0, 0, True
+    before, size, factor, full, light = 0.0, 0.0, 1.0, 0, 0
     for iteration in range(_ITERATIONS):
+        stiff = iteration == 0 or factor < 1.0 or (iteration > 1 and size > _KEEP * before)
         if assemble(update, theta, body, stage, displacement, points, room, forces, stiff) != BALANCED:
             return Outcome(NO_STRESS, full, light)
         if stiff:
@@ -57,7 +58,7 @@ def balance(
         else:
             light += 1
         solve_factorized(forces.band, body.size, body.width, forces.residual)
-        size = _largest(forces.residual, body.size)
+        before, size = size, _largest(forces.residual, body.size)
         if not isfinite(size) or (iteration > 6 and size > before):
             return Outcome(TOO_FAR, full, light)
         factor = min(1.0, longest / size) if size > 0.0 else 1.0
@@ -67,8 +68,6 @@ def balance(
                 displacement[k] -= factor * forces.residual[equation]
         if size <= tolerance:
             return Outcome(FOUND, full, light)
-        stiff = factor < 1.0 or (iteration > 0 and size > _KEEP * before)
-        before = size
     return Outcome(TOO_MANY, full, light)
 
 

@@ -10,10 +10,11 @@ from numba import njit
 
 from creepkit.arrays import Floats, Ints
 from creepkit.fem.body import Body
-from creepkit.fem.element import Forces, Points, error_forces, forces_of, point_room, points_of
-from creepkit.fem.equilibrium import FOUND, NO_STRESS, UNSTABLE, Outcome, balance
+from creepkit.fem.element import Forces, Points, clear, error_forces, forces_of, point_room, points_of
+from creepkit.fem.equilibrium import FOUND, UNSTABLE, balance
 from creepkit.fem.band import solve_factorized
 from creepkit.fem.material import EQUIVALENT, PointRoom, Stage
+from creepkit.fem.strain import Three
 from creepkit.integration.clock import Clock, moment, plain, position, virgin
 from creepkit.integration.tableau import Tableau
 
@@ -63,6 +64,19 @@ class Record(NamedTuple):
     values: Floats
     mises: Floats
     counts: Ints
+
+
+class Rooms(NamedTuple):
+    """Working arrays of a march: points, one point, forces; displacements (2 nodes,) now, at the start of the step, and
+    (stages, 2 nodes) at the stages.
+    """
+
+    points: Points
+    point: PointRoom
+    forces: Forces
+    displacement: Floats
+    start: Floats
+    stages: Floats
 
 
 class Ended(NamedTuple):
@@ -140,6 +154,40 @@ def finish(points: Points, tableau: Tableau, h: float) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy")
+def copy(source: Floats, target: Floats) -> None:
+    """Copy a vector."""
+    for k in range(source.size):
+        target[k] = source[k]
+
+
+@njit(cache=True, error_model="numpy")
+def _start(points: Points, initial: Floats) -> None:
+    """Virgin points."""
+    for k in range(points.value.shape[0]):
+        points.increments[k] = 0.0
+        points.mises[k] = 0.0
+        for v in range(points.value.shape[1]):
+            points.value[k, v] = initial[v - EQUIVALENT - 1] if v > EQUIVALENT else 0.0
+            for i in range(points.slopes.shape[0]):
+                points.slopes[i, k, v] = 0.0
+        for i in range(initial.size):
+            points.states[k, i] = initial[i]
+
+
+def rooms_of(body: Body, states: int, stages: int) -> Rooms:
+    """Allocate the working arrays."""
+    size = body.equations.size
+    return Rooms(
+        points_of(4 * len(body.elements), states, stages),
+        point_room(states, 0),
+        forces_of(body),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros((stages, size)),
+    )
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def march(
     update: Any,
     theta: Floats,
@@ -152,44 +200,39 @@ def march(
     limits: Floats,
     settings: Settings,
     tableau: Tableau,
-    shape: tuple[int, int],
+    rooms: Rooms,
     record: Record,
 ) -> Ended:
     """Run the program; fill `record` from its first row on, which holds the body at rest.
 
     segments : (segments, 10). pattern : (2 nodes,) displacement of held nodes for a unit of motion, mm.
-    initial, limits : (S,) states. shape : of the band.
+    initial, limits : (S,) states.
     """
-    states = initial.size
-    points = points_of(4 * body.elements.shape[0], states, tableau.c.size)
-    for k in range(points.value.shape[0]):
-        for i in range(states):
-            points.value[k, EQUIVALENT + 1 + i] = initial[i]
-            points.states[k, i] = initial[i]
-    room, forces = point_room(states, 0), forces_of(body.size, body.width, shape[0], shape[1])
-    u = np.zeros(pattern.size)
+    points, room, forces, u = rooms.points, rooms.point, rooms.forces, rooms.displacement
+    _start(points, initial)
+    clear(u)
     ended = Ended(1, REACHED_END, 0.0)
-    before = np.zeros(3)
+    before = (0.0, 0.0, 0.0)
     for n in range(segments.shape[0]):
         segment = segments[n]
         if _jumps(before, segment):
             ended = _jump(
-                update, theta, poisson, body, segment, n, pattern, before, settings, points, room, forces, u, record, ended
+                update, theta, poisson, body, segment, n, pattern, before, settings, rooms, record, ended
             )
             if ended.code != REACHED_END:
                 return ended
         ended = _segment(
             update, theta, clock_of(segment, beta), poisson, body, segment, n, pattern, limits, initial, settings, tableau,
-            points, room, forces, u, record, ended,
+            rooms, record, ended,
         )  # fmt: skip
         if ended.code != REACHED_END:
             return ended
-        before[0], before[1], before[2] = segment[END_PRESSURE], segment[END_MODULUS], segment[END_MOTION]
+        before = (segment[END_PRESSURE], segment[END_MODULUS], segment[END_MOTION])
     return ended
 
 
 @njit(cache=True, error_model="numpy")
-def _jumps(before: Floats, segment: Floats) -> bool:
+def _jumps(before: Three, segment: Floats) -> bool:
     """Whether load, modulus or motion is another than at the end of the segment before."""
     if segment[PRESSURE] != before[0] or segment[MOTION] != before[2]:
         return True
@@ -209,13 +252,15 @@ def largest_rise(body: Body, u: Floats) -> float:
     return worst
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _jump(
-    update: Any, theta: Floats, poisson: float, body: Body, segment: Floats, n: int, pattern: Floats, before: Floats,
-    settings: Settings, points: Points, room: PointRoom, forces: Forces, u: Floats, record: Record, ended: Ended,
+    update: Any, theta: Floats, poisson: float, body: Body, segment: Floats, n: int, pattern: Floats, before: Three,
+    settings: Settings, rooms: Rooms, record: Record, ended: Ended,
 ) -> Ended:  # fmt: skip
     """The elastic change at a sudden change of load, in as many parts as it needs; recorded at the segment's start."""
-    done, part, start = 0.0, 1.0, u.copy()
+    points, u, start = rooms.points, rooms.displacement, rooms.start
+    done, part = 0.0, 1.0
+    copy(u, start)
     for k in range(points.value.shape[0]):
         for v in range(points.value.shape[1]):
             points.base[k, v] = points.value[k, v]
@@ -227,15 +272,16 @@ def _jump(
         motion = before[2] + now * (segment[MOTION] - before[2])
         hold(body, pattern, motion, u)
         newton = settings.newton * (0.01 + largest_rise(body, u))
-        outcome = balance(update, theta, body, stage, u, points, room, forces, newton, 1.0)
+        outcome = balance(update, theta, body, stage, u, points, rooms.point, rooms.forces, newton, 1.0)
         record.counts[2] += outcome.full
         record.counts[3] += outcome.light
         if outcome.flag == FOUND:
-            done, start = now, u.copy()
+            done = now
+            copy(u, start)
             if done == 1.0:
                 return keep(record, ended, segment[START], n, u, points)
         else:
-            u[:] = start
+            copy(start, u)
             part *= 0.25
             if part < 1e-5:
                 break
@@ -255,24 +301,25 @@ def keep(record: Record, ended: Ended, time: float, n: int, u: Floats, points: P
     """Write a row of the record."""
     row = ended.records
     record.times[row], record.segments[row] = time, n
-    record.displacements[row] = u
-    record.mises[row] = points.mises
+    copy(u, record.displacements[row])
+    copy(points.mises, record.mises[row])
     if record.values.shape[0] > 0:
-        record.values[row] = points.value
+        for k in range(points.value.shape[0]):
+            copy(points.value[k], record.values[row, k])
     return Ended(row + 1, REACHED_END, time)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _segment(
     update: Any, theta: Floats, clock: Clock, poisson: float, body: Body, segment: Floats, n: int, pattern: Floats,
-    limits: Floats, initial: Floats, settings: Settings, tableau: Tableau, points: Points, room: PointRoom, forces: Forces,
-    u: Floats, record: Record, ended: Ended,
+    limits: Floats, initial: Floats, settings: Settings, tableau: Tableau, rooms: Rooms, record: Record, ended: Ended,
 ) -> Ended:  # fmt: skip
     """March over one segment in the position s of its clock, from 0 to 1."""
     s, elapsed, length = 0.0, 0.0, segment[END] - segment[START]
     h = position(clock, segment[START] + min(settings.first, length))
     first, failures = ended.records - 1, 0
-    start, stage_u = u.copy(), np.zeros((tableau.c.size, u.size))
+    points, u, start = rooms.points, rooms.displacement, rooms.start
+    copy(u, start)
     while s < 1.0:
         reach = position(clock, segment[START] + min(2.0 * elapsed + settings.first, length))
         h = min(h, reach - s)
@@ -281,11 +328,11 @@ def _segment(
         if record.counts[0] + record.counts[1] >= settings.max_steps:
             return Ended(ended.records, TOO_MANY_STEPS, ended.time)
         outcome, error = _step(
-            update, theta, clock, poisson, body, segment, pattern, settings, tableau, points, room, forces, u, start,
-            stage_u, record, first, ended.records, s, h,
+            update, theta, clock, poisson, body, segment, pattern, settings, tableau, rooms, record, first,
+            ended.records, s, h,
         )  # fmt: skip
         if outcome != FOUND or not error <= 1.0:
-            u[:] = start
+            copy(start, u)
             record.counts[1] += 1
             failures += 1
             h *= 0.25 if outcome != FOUND else max(0.2, 0.9 / sqrt(error))
@@ -300,7 +347,7 @@ def _segment(
         time = segment[END] if s == 1.0 else moment(clock, s).time
         elapsed = time - segment[START]
         ended = keep(record, ended, time, n, u, points)
-        start[:] = u
+        copy(u, start)
         if largest_rise(body, u) >= settings.deflection_limit:
             return Ended(ended.records, DEFLECTION_LIMIT, time)
         if worst >= settings.strain_limit:
@@ -328,13 +375,16 @@ def _failed(points: Points, limits: Floats, initial: Floats) -> bool:
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _step(
     update: Any, theta: Floats, clock: Clock, poisson: float, body: Body, segment: Floats, pattern: Floats,
-    settings: Settings, tableau: Tableau, points: Points, room: PointRoom, forces: Forces, u: Floats, start: Floats,
-    stage_u: Floats, record: Record, first: int, rows: int, s: float, h: float,
+    settings: Settings, tableau: Tableau, rooms: Rooms, record: Record, first: int, rows: int, s: float, h: float,
 ) -> tuple[int, float]:  # fmt: skip
-    """Try one step from `s`; `u` ends where the last stage does. Return a flag and the error over what is allowed."""
+    """Try one step from `s`; the displacement ends where the last stage does.
+
+    Return a flag and the error over what is allowed.
+    """
+    points, forces, u, start, stage_u = rooms.points, rooms.forces, rooms.displacement, rooms.start, rooms.stages
     last = tableau.c.size - 1
     scale = 0.01 + largest_rise(body, start)
     stage = stage_at(segment, poisson, segment[START], 0.0, 1e-3)
@@ -347,13 +397,13 @@ def _step(
         _predict(record, first, rows, stage_u, i, start, clock, segment, s, tableau, h, u)
         motion = segment[MOTION] + (segment[END_MOTION] - segment[MOTION]) * (now.time - clock.start) / clock.length
         hold(body, pattern, motion, u)
-        outcome = balance(update, theta, body, stage, u, points, room, forces, settings.newton * scale, 1.0)
+        outcome = balance(update, theta, body, stage, u, points, rooms.point, forces, settings.newton * scale, 1.0)
         record.counts[2] += outcome.full
         record.counts[3] += outcome.light
         if outcome.flag != FOUND:
             return outcome.flag, 0.0
         set_slopes(points, share, i)
-        stage_u[i] = u
+        copy(u, stage_u[i])
     error_forces(body, stage, u, points, h * tableau.error, forces)
     solve_factorized(forces.band, body.size, body.width, forces.residual)
     error = 0.0
@@ -367,7 +417,8 @@ def _guess(points: Points, share: float, i: int, last: int) -> None:
     """Guess increments and states of stage `i` from the stage (or the step) before."""
     before = i - 1 if i > 0 else last
     for k in range(points.value.shape[0]):
-        points.increments[k] = max(points.slopes[before, k, EQUIVALENT] * share, 1e-300)
+        increment = points.slopes[before, k, EQUIVALENT] * share
+        points.increments[k] = increment if increment > 0.0 else 1e-6
         for v in range(points.states.shape[1]):
             at = EQUIVALENT + 1 + v
             points.states[k, v] = points.base[k, at] + share * points.slopes[before, k, at]

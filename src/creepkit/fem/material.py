@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.fem.strain import DIFFERENCE, HOOP, SHEAR, SUM, Four, Kinematics
-from creepkit.integration.problem import SOLVED, Axes, Problem, along_stress
+from creepkit.fem.strain import DIFFERENCE, HOOP, SHEAR, SUM, Four, Kinematics, Three
+from creepkit.integration.problem import Axes, Problem, along_stress
 from creepkit.integration.response import (
     BY_MEAN,
     BY_PRINCIPAL,
@@ -30,7 +30,7 @@ from creepkit.integration.response import (
     respond,
 )
 from creepkit.integration.stage import solve
-from creepkit.kernels.interface import MEAN, PRINCIPAL, STRAIN, TEMPERATURE, TIME
+from creepkit.kernels.interface import MEAN, PRINCIPAL, STRAIN
 
 CREEP_COMPONENTS = 3
 EQUIVALENT = 3
@@ -84,12 +84,12 @@ class PointRoom(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def elastic_part(stage: Stage, at: Kinematics, base: Floats) -> Elastic:
-    """The elastic predictor from the total strain and the history (3 + 1 + S,)."""
+def elastic_part(stage: Stage, at: Kinematics, base: Floats, k: int) -> Elastic:
+    """The elastic predictor of point `k` from the total strain and the history (points, 3 + 1 + S)."""
     strain, volume = at.strain, at.volume
     trace = strain[SUM] + strain[HOOP]
-    hoop = strain[HOOP] - trace / 3.0 - base[0]
-    difference, shear = strain[DIFFERENCE] - base[1], strain[SHEAR] - base[2]
+    hoop = strain[HOOP] - trace / 3.0 - base[k, 0]
+    difference, shear = strain[DIFFERENCE] - base[k, 1], strain[SHEAR] - base[k, 2]
     radius2 = difference * difference + shear * shear
     equivalent = sqrt(hoop * hoop + radius2 / 3.0)
     top = max(2.0 * hoop, sqrt(radius2) - hoop) / (3.0 * equivalent) if equivalent > 0.0 else 0.0
@@ -103,28 +103,27 @@ def axes_of(elastic: Elastic) -> Axes:
 
 
 @njit(cache=True, error_model="numpy")
-def problem_of(stage: Stage, elastic: Elastic, base: Floats) -> Problem:
-    """The stage of `integration.stage` at this point."""
+def problem_of(stage: Stage, elastic: Elastic, strain: float) -> Problem:
+    """The stage of `integration.stage` at this point; strain : equivalent creep strain so far."""
     stiffness = 3.0 * stage.shear / elastic.volume
-    return Problem(stiffness * elastic.equivalent, stiffness, 0.0, stage.weight, base[EQUIVALENT])
+    return Problem(stiffness * elastic.equivalent, stiffness, 0.0, stage.weight, strain)
 
 
 @njit(cache=True, error_model="numpy")
-def creep(
-    update: Any, theta: Floats, stage: Stage, elastic: Elastic, base: Floats, guess: float, room: PointRoom
+def creep_safely(
+    update: Any,
+    theta: Floats,
+    axes: Axes,
+    problem: Problem,
+    base: Floats,
+    k: int,
+    row: Floats,
+    out: Floats,
+    guess: float,
+    tolerance: float,
 ) -> tuple[float, int]:
-    """Creep increment D of the stage and a flag; the room's row holds the solution, its output the slopes there.
-
-    On entry the row's states are a guess.
-    """
-    if stage.weight == 0.0 or elastic.equivalent == 0.0:
-        return 0.0, SOLVED
-    room.row[TIME] = stage.time
-    room.row[TEMPERATURE] = stage.temperature
-    problem = problem_of(stage, elastic, base)
-    return solve(
-        update, theta, axes_of(elastic), problem, base[EQUIVALENT + 1 :], room.row, room.out, guess, stage.tolerance
-    )
+    """Creep increment D of point `k` and a flag, from any guess and for any law; base : (points, 3 + 1 + S)."""
+    return solve(update, theta, axes, problem, base[k, EQUIVALENT + 1 :], row, out, guess, tolerance)
 
 
 @njit(cache=True, error_model="numpy")
@@ -137,25 +136,27 @@ def log_stress(stage: Stage, elastic: Elastic, increment: float) -> Four:
 
 
 @njit(cache=True, error_model="numpy")
-def creep_slopes(
-    stage: Stage, elastic: Elastic, base: Floats, increment: float, room: PointRoom
-) -> tuple[float, float, float]:
-    """Derivatives of D to the trial stress, and to shifts of the largest principal and of the mean stress."""
-    if increment == 0.0:
-        return 0.0, 0.0, 0.0
-    problem, axes, out = problem_of(stage, elastic, base), axes_of(elastic), room.out
-    if room.matrix.shape[0] == 1:
-        by_stress = increment * along_stress(out, 1, axes)
-        divisor = 1.0 / (1.0 + by_stress * problem.stiffness - increment * out[1 + STRAIN])
-        by_mean, by_principal = increment * out[1 + MEAN], increment * out[1 + PRINCIPAL]
-        return by_stress * divisor, by_principal * divisor, by_mean * divisor
-    gradient_of_update(out, problem, increment, room.gradient)
+def creep_slopes(axes: Axes, problem: Problem, increment: float, out: Floats) -> Three:
+    """Derivatives of D to the trial stress, and to shifts of the largest principal and of the mean stress.
+
+    out : output of the entry `update` of a law without states, at the solution.
+    """
+    by_stress = increment * along_stress(out, 1, axes)
+    divisor = 1.0 / (1.0 + by_stress * problem.stiffness - increment * out[1 + STRAIN])
+    return by_stress * divisor, increment * out[1 + PRINCIPAL] * divisor, increment * out[1 + MEAN] * divisor
+
+
+@njit(cache=True, error_model="numpy")
+def creep_slopes_with_states(
+    axes: Axes, problem: Problem, increment: float, out: Floats, gradient: Floats, matrix: Floats, response: Floats
+) -> Three:
+    """The same for a law with states; zero where the equations are singular."""
+    size = matrix.shape[0]
+    gradient_of_update(out, problem, increment, gradient)
     stress = problem.trial - problem.stiffness * increment
-    size = room.matrix.shape[0]
-    if not respond(axes, problem, increment, stress, out[1:size], room.gradient, room.matrix, room.response):
+    if not respond(axes, problem, increment, stress, out[1:size], gradient, matrix, response):
         return 0.0, 0.0, 0.0
-    answer = room.response[0]
-    return answer[BY_TRIAL], answer[BY_PRINCIPAL], answer[BY_MEAN]
+    return response[0, BY_TRIAL], response[0, BY_PRINCIPAL], response[0, BY_MEAN]
 
 
 class Following(NamedTuple):
@@ -168,12 +169,11 @@ class Following(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def following(
-    stage: Stage, elastic: Elastic, increment: float, by_trial: float, by_principal: float, by_mean: float
-) -> Following:
-    """Chain the derivatives of D through trial stress, largest principal and mean stress."""
+def following(stage: Stage, elastic: Elastic, increment: float, by: Three) -> Following:
+    """Chain the derivatives `by` of D to trial, largest principal and mean stress."""
     if increment == 0.0:
         return Following(0.0, 0.0, 0.0, 0.0)
+    by_trial, by_principal, by_mean = by
     e, stiffness = elastic.equivalent, 3.0 * stage.shear / elastic.volume
     stress = stiffness * (e - increment)
     along = by_trial * stiffness / e

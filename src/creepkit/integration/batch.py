@@ -70,7 +70,7 @@ class PointTest:
     @cached_property
     def segments(self) -> Floats:
         """The programs merged, (segments, 6); kept, for a fit asks for them a thousand times."""
-        return segments_of(self.driving, self.temperature, float(self.times[-1]) if self.times.size else 0.0)
+        return segments_of(self.driving, self.temperature, end=float(self.times[-1]) if self.times.size else 0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,13 +42,16 @@ def temperature_rate(segment: Segment) -> float:
     return (segment.end_temperature - segment.temperature) / (segment.end - segment.start)
 
 
-def segments_of(stress: Program, temperature: Program, end: float) -> Floats:
-    """Merge two programs from 0 to `end` (s) into segments, (segments, 6); every breakpoint is a boundary."""
-    marks = np.concatenate([stress.times, temperature.times, [0.0, end]])
+def segments_of(*programs: Program, end: float) -> Floats:
+    """Merge programs from 0 to `end` (s) into segments, (segments, 2 + 2 programs); every breakpoint is a boundary.
+
+    Columns: start and end, s, then the values of each program at both.
+    """
+    marks = np.concatenate([*(program.times for program in programs), [0.0, end]])
     marks = np.unique(marks[marks <= end])
     starts, ends = marks[:-1], marks[1:]
     columns = [starts, ends]
-    for program in (stress, temperature):
+    for program in programs:
         columns += [program.at(starts), _just_before(program, ends)]
     return np.ascontiguousarray(np.stack(columns, axis=1))
 

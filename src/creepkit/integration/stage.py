@@ -67,51 +67,7 @@ def solve(
     if problem.trial <= 0.0:
         place(row, axes, 0.0, problem.strain)
         return 0.0, SOLVED if problem.trial == 0.0 else NO_SOLUTION
-    if problem.stiffness > 0.0:
-        increment, flag = _from_near(update, theta, axes, problem, row, out, guess, tolerance)
-        if flag == SOLVED:
-            return increment, flag
     return _solve_scalar(update, theta, axes, problem, row, out, guess, tolerance)
-
-
-@njit(cache=True, error_model="numpy")
-def _from_near(
-    update: Any,
-    theta: Floats,
-    axes: Axes,
-    problem: Problem,
-    row: Floats,
-    out: Floats,
-    guess: float,
-    tolerance: float,
-) -> tuple[float, int]:
-    """The same Newton's method in x from a good guess, without its bracket and half of its logarithms.
-
-    A finite element asks a hundred thousand times a second, nearly always from next to the answer.
-    """
-    increment, log_weight = guess, log(problem.weight)
-    share = problem.stiffness * increment / problem.trial
-    for _ in range(_NEAR):
-        if not 1e-280 < share < 0.9999:
-            break
-        elastic = 1.0 - share
-        stress = problem.trial * elastic
-        place(row, axes, stress, problem.strain + increment)
-        update(1, pointer(row), pointer(theta), pointer(out))
-        if out[0] < NO_RATE:
-            break
-        residual = log(increment) - log_weight - out[0]
-        slope = elastic * (1.0 - increment * out[1 + STRAIN]) + share * stress * along_stress(out, 1, axes)
-        step = -residual / slope
-        if not (slope > 0.0 and abs(step) < 1.0):
-            break
-        ratio = share / elastic * exp(step)
-        share = ratio / (1.0 + ratio)
-        increment = problem.trial / problem.stiffness * share
-        if abs(step) <= tolerance:
-            place(row, axes, problem.trial * (1.0 - share), problem.strain + increment)
-            return increment, SOLVED
-    return 0.0, TOO_MANY
 
 
 @njit(cache=True, error_model="numpy")
@@ -132,13 +88,14 @@ def _solve_scalar(
         now = unfold(problem, x)
         place(row, axes, now.stress, problem.strain + now.increment)
         update(1, pointer(row), pointer(theta), pointer(out))
-        if out[0] < NO_RATE:
+        nothing = out[0] < NO_RATE
+        if nothing and now.stress > 0.99 * problem.trial:
             place(row, axes, problem.trial, problem.strain)
             return 0.0, SOLVED
-        residual = now.log_increment - log_weight - out[0]
-        if not isfinite(residual):
+        residual = inf if nothing else now.log_increment - log_weight - out[0]
+        if not isfinite(residual) and not nothing:
             return 0.0, NOT_FINITE
-        slope = _slope(now, out, axes)
+        slope = _slope(now, out, axes) if not nothing else 1.0
         if residual > 0.0:
             high = x
         else:
@@ -171,3 +128,44 @@ def _cautious(x: float, step: float, low: float, high: float) -> float:
     if isfinite(low) and isfinite(high):
         return 0.5 * (low + high) - x
     return min(max(step, -60.0), 60.0)
+
+
+@njit(cache=True, error_model="numpy")
+def solve_near(
+    update: Any,
+    theta: Floats,
+    axes: Axes,
+    problem: Problem,
+    row: Floats,
+    out: Floats,
+    guess: float,
+    tolerance: float,
+) -> tuple[float, int]:
+    """As `solve`, for a law without states under k > 0, from a good guess: no bracket and half of the logarithms.
+
+    TOO_MANY when the guess was not good enough. A finite element asks ten million times a minute, nearly always
+    from next to the answer.
+    """
+    increment, log_weight = guess, log(problem.weight)
+    share = problem.stiffness * increment / problem.trial
+    for _ in range(_NEAR):
+        if not 1e-280 < share < 0.9999:
+            break
+        elastic = 1.0 - share
+        stress = problem.trial * elastic
+        place(row, axes, stress, problem.strain + increment)
+        update(1, pointer(row), pointer(theta), pointer(out))
+        if out[0] < NO_RATE:
+            break
+        residual = log(increment) - log_weight - out[0]
+        slope = elastic * (1.0 - increment * out[1 + STRAIN]) + share * stress * along_stress(out, 1, axes)
+        step = -residual / slope
+        if not (slope > 0.0 and abs(step) < 1.0):
+            break
+        ratio = share / elastic * exp(step)
+        share = ratio / (1.0 + ratio)
+        increment = problem.trial / problem.stiffness * share
+        if abs(step) <= tolerance:
+            place(row, axes, problem.trial * (1.0 - share), problem.strain + increment)
+            return increment, SOLVED
+    return 0.0, TOO_MANY

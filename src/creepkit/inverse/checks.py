@@ -8,20 +8,25 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.inverse.fences import Fences
+from creepkit.inverse.frames import measured
 from creepkit.inverse.objective import Objective
-from creepkit.inverse.search import Fences
+from creepkit.inverse.scales import LOGARITHMIC
+from creepkit.inverse.together import outputs_of, predictor_of
 from creepkit.language import CreepLaw
-from creepkit.records import History
+from creepkit.records import History, Predictor
 
 PUSH = 1.0
 """Force of the data against the bounds of a coefficient, in units of misfit per frame and ln, that is an error."""
+VISIBLE = 5.0
+"""Growth of an output, in units of its noise, that is creep."""
 
 
 def check_bounds(objective: Objective, u: Floats) -> None:
     """A coefficient that the data push hard against its bounds is an error: the answer would be the bound's."""
     law, coordinates, fences = objective.law, objective.coordinates, Fences(objective)
     theta = coordinates.theta(u)
-    limit = PUSH * int(objective.present.sum())
+    limit = PUSH * int(objective.entries.present.sum())
     for k, beyond in zip(coordinates.rates, fences.outside(theta), strict=True):
         name, param = law.names[k], law.table[law.names[k]]
         if fences.SLOPE**2 * abs(beyond) > limit:
@@ -33,31 +38,52 @@ def check_bounds(objective: Objective, u: Floats) -> None:
             )
 
 
-def check_strains(objective: Objective) -> None:
-    """Some strain must rise above the floor of the scale."""
-    if not (objective.present & (objective.measured > 2 * objective.scale.floor)).any():
-        raise FitError("no strain of these histories rises above its noise; there is no creep to identify a law from")
+def check_growth(objective: Objective) -> None:
+    """Some strain must rise above the floor of its scale, or some other output grow beyond its noise."""
+    entries = objective.entries
+    for position, (name, scale) in enumerate(zip(entries.outputs, entries.scales, strict=True)):
+        mine = entries.leading & (entries.output == position)
+        if name in LOGARITHMIC:
+            if (mine & (entries.measured > 2 * scale.floor)).any():
+                return
+            continue
+        for values in (entries.measured[k, row] for k, row in enumerate(mine)):
+            if values.size and np.ptp(values) > VISIBLE * entries.noise[position]:
+                return
+    grown = dict.fromkeys(entries.outputs[k] for k in entries.output[entries.leading])
+    raise FitError(
+        f"no {' or '.join(grown)} of these histories rises above its noise; there is no creep to identify a law from"
+    )
 
 
-def check_histories(law: CreepLaw, histories: Sequence[History]) -> None:
-    """There must be parameters, and named histories with enough finite strains to find them from."""
+def check_histories(law: CreepLaw, histories: Sequence[History], using: Predictor) -> None:
+    """There must be parameters, and named histories with enough finite outputs to find them from."""
     if not histories:
         raise FitError(f"law '{law.name}': there are no histories to identify it from")
     if not law.params:
         raise FitError(f"law '{law.name}' has no parameter left to identify")
     names = [h.name for h in histories]
     for history in histories:
-        if "strain" not in history.outputs:
-            raise FitError(
-                f"history '{history.name}' has no output 'strain'; it has {', '.join(history.outputs) or 'none'}"
-            )
         if names.count(history.name) > 1:
             raise FitError(f"two histories are called '{history.name}'; give each its own name")
-        used = history.used & (history.times > 0)
-        if int(used.sum()) < 2:
-            raise FitError(f"history '{history.name}' has fewer than two usable frames after time zero")
-        if not np.isfinite(history.outputs["strain"][used]).all():
-            raise FitError(f"history '{history.name}' has a strain that is not a finite number; mark the frame unused")
+        _check_outputs(history, using)
     frames = sum(int(h.used.sum()) for h in histories)
     if frames <= len(law.params):
         raise FitError(f"law '{law.name}' has {len(law.params)} parameters and the histories only {frames} frames")
+
+
+def _check_outputs(history: History, using: Predictor) -> None:
+    """Frames without a number are left out, output by output; an infinite one is a mistake."""
+    outputs = outputs_of(using, history)
+    if not outputs:
+        known = ", ".join(getattr(predictor_of(using, history), "outputs", ())) or "nothing"
+        raise FitError(
+            f"history '{history.name}' has none of the outputs that are predicted ({known}); "
+            f"it has {', '.join(history.outputs) or 'none'}"
+        )
+    used = history.used & (history.times > 0)
+    if int((used & measured(history)).sum()) < 2:
+        raise FitError(f"history '{history.name}' has fewer than two usable frames after time zero")
+    for name in outputs:
+        if np.isinf(history.outputs[name][used]).any():
+            raise FitError(f"history '{history.name}' has an infinite {name}; mark the frame unused")

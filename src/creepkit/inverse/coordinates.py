@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.inverse.nominal import end_strain, stresses
 from creepkit.kernels import Kernel, lower
 from creepkit.language import CreepLaw
-from creepkit.records import History
+from creepkit.records import History, Predictor
 
 
 @dataclass(frozen=True)
@@ -28,13 +29,16 @@ class Reference:
     temperature: float
 
     @classmethod
-    def of(cls, histories: Sequence[History], output: str = "strain") -> Reference:
-        """The middle of what was measured: geometric means of stress and time, of half the end strain; median T."""
-        stresses = [float(np.exp(np.mean(np.log(np.maximum(h.loading.program().values, 1e-6))))) for h in histories]
+    def of(cls, histories: Sequence[History], using: Predictor | None = None) -> Reference:
+        """The middle of what was measured: geometric means of stress and time, of half the end strain; median T.
+
+        using : where it states reference stresses, they count (see inverse.nominal).
+        """
+        levels = [float(np.exp(np.mean(np.log(np.maximum(stresses(h, using), 1e-6))))) for h in histories]
         times = [float(h.times[h.used][-1]) for h in histories]
-        strains = [max(float(np.max(h.outputs[output][h.used])), 1e-7) for h in histories]
+        strains = [end_strain(h) for h in histories]
         warmth = [float(np.mean(h.temperature_program().values)) for h in histories]
-        middle = [float(np.exp(np.mean(np.log(v)))) for v in (stresses, strains, times)]
+        middle = [float(np.exp(np.mean(np.log(v)))) for v in (levels, strains, times)]
         return cls(middle[0], 0.5 * middle[1], 0.5 * middle[2], float(np.median(warmth)))
 
 
@@ -64,6 +68,13 @@ class Coordinates:
             part[..., k] = 0.0
             theta[..., k] = u[..., k] - self._log_rate(kernel, part[..., positions])
         return theta
+
+    def values(self, u: Floats) -> dict[str, float]:
+        """{parameter: value} in the author's units, of one u."""
+        theta = self.theta(u)
+        return {
+            name: float(param.from_internal(t)) for (name, param), t in zip(self.law.table.items(), theta, strict=True)
+        }
 
     def u(self, theta: Floats) -> Floats:
         """Conditioned coordinates of internal parameters."""

@@ -12,13 +12,17 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Reference
-from creepkit.inverse.covariance import Scatter
-from creepkit.inverse.identification import Identification, Settings, TestMisfit
+from creepkit.inverse.identification import Identification, NuisanceEstimate, OutputMisfit, Settings, TestMisfit
+from creepkit.inverse.measures import Errors
+from creepkit.inverse.scatter import OutputScatter, Scatter
 from creepkit.inverse.uncertainty import Estimate
 from creepkit.language.tree import law_from_json, law_to_json
 from creepkit.records import Nuisance
+from creepkit.records.prediction import Kind
 
 KIND = "creepkit identification"
+VERSION = 2
+"""Version 1 knew one output, strain, and no explicit nuisances."""
 LARGEST = 50_000_000
 """Bytes; no identification is near it, and a reader must not swallow what it cannot hold."""
 
@@ -43,13 +47,33 @@ class _Reference(_Strict):
     temperature: float = Field(gt=0)
 
 
-class _Scatter(_Strict):
+class _OutputScatter(_Strict):
     noise: float = Field(ge=0)
     misfit: float = Field(ge=0)
     offset: float = Field(ge=0)
-    rate: float = Field(ge=0)
     drift: float = Field(ge=0)
     reach: float = Field(gt=0)
+
+
+class _Scatter(_Strict):
+    rate: float = Field(ge=0)
+    outputs: dict[str, _OutputScatter]
+
+
+class _Errors(_Strict):
+    frames: int = Field(ge=0)
+    rse: float | None
+    mse: float | None
+    mae: float | None
+    relative: float | None
+    chi_square: float | None
+
+
+class _Output(_Strict):
+    output: str
+    errors: _Errors
+    offset: float
+    noise: float = Field(ge=0)
 
 
 class _Test(_Strict):
@@ -58,13 +82,28 @@ class _Test(_Strict):
     frames: int = Field(ge=0)
     rms: float | None
     bias: float | None
-    offset: float
     rate_factor: float
+    weight: float = Field(gt=0)
+    outputs: list[_Output]
 
 
 class _Nuisance(_Strict):
-    kind: Literal["offset", "rate"]
-    sd: float | None = Field(gt=0)
+    kind: Kind
+    scope: Literal["test", "alloy", "all"]
+    output: str
+    mean: float
+    sd: float | Literal["inf"] | None
+    bounds: tuple[float | None, float | None]
+
+
+class _NuisanceEstimate(_Strict):
+    kind: Kind
+    scope: Literal["test", "alloy", "all"]
+    member: str
+    value: float
+    sd: float = Field(ge=0)
+    mean: float
+    spread: float | Literal["inf"]
 
 
 class _Settings(_Strict):
@@ -74,22 +113,26 @@ class _Settings(_Strict):
     seed: int
     loss: str
     nuisances: list[_Nuisance]
+    weights: Literal["noise"] | dict[str, float]
+    test_loss: str
 
 
 class _Document(_Strict):
     kind: Literal["creepkit identification"]
-    version: Literal[1]
+    version: Literal[2]
     law: dict[str, Any]
     estimates: list[_Estimate]
     u: list[float]
     covariance: list[list[float]]
     reference: _Reference
     scatter: _Scatter
-    rms: float
+    rms: float | None
     log_likelihood: float
     size: float = Field(gt=0)
     freedom: float = Field(gt=0)
     tests: list[_Test]
+    errors: dict[str, _Errors]
+    nuisances: list[_NuisanceEstimate]
     ranges: dict[str, tuple[float, float]]
     settings: _Settings
     provenance: dict[str, str | int | float | list[str]]
@@ -101,24 +144,44 @@ def to_json(fit: Identification) -> dict[str, Any]:
     """The identification as JSON-able data."""
     return {
         "kind": KIND,
-        "version": 1,
+        "version": VERSION,
         "law": law_to_json(fit.law),
         "estimates": [vars(e) for e in fit.estimates],
         "u": fit.u.tolist(),
         "covariance": fit.covariance.tolist(),
         "reference": vars(fit.reference),
         "scatter": fit.scatter.to_dict(),
-        "rms": fit.rms,
+        "rms": _number(fit.rms),
         "log_likelihood": fit.log_likelihood,
         "size": fit.size,
         "freedom": fit.freedom,
-        "tests": [{k: None if v != v else v for k, v in vars(m).items()} for m in fit.misfits],
+        "tests": [_plain_test(m) for m in fit.misfits],
+        "errors": {name: _plain(e) for name, e in fit.errors.items()},
+        "nuisances": [_plain(n) for n in fit.nuisances],
         "ranges": {name: list(ends) for name, ends in fit.ranges.items()},
-        "settings": {**vars(fit.settings), "nuisances": [{"kind": n.kind, "sd": n.sd} for n in fit.settings.nuisances]},
+        "settings": _plain_settings(fit.settings),
         "provenance": dict(fit.provenance),
         "converged": fit.converged,
         "notes": list(fit.notes),
     }
+
+
+def _number(value: float) -> float | str | None:
+    """What JSON can hold: null for what is not a number, "inf" for what has no end."""
+    return None if value != value else "inf" if value == np.inf else value
+
+
+def _plain(record: Any) -> dict[str, Any]:
+    return {k: _number(v) if isinstance(v, float) else v for k, v in vars(record).items()}
+
+
+def _plain_test(m: TestMisfit) -> dict[str, Any]:
+    return {**_plain(m), "outputs": [{**_plain(o), "errors": _plain(o.errors)} for o in m.outputs]}
+
+
+def _plain_settings(s: Settings) -> dict[str, Any]:
+    nuisances = [{**_plain(n), "bounds": [v if np.isfinite(v) else None for v in n.bounds]} for n in s.nuisances]
+    return {**vars(s), "nuisances": nuisances, "weights": s.weights if isinstance(s.weights, str) else dict(s.weights)}
 
 
 def save(fit: Identification, path: Path) -> Path:
@@ -152,6 +215,8 @@ def load(path: str | Path) -> Identification:
 
 def from_json(data: Any, source: str = "identification") -> Identification:
     """Rebuild an identification from JSON data, or say in one sentence what is wrong with it."""
+    if isinstance(data, dict) and data.get("kind") == KIND and data.get("version") == 1:
+        raise FitError(f"{source}: written by an earlier creepkit, in version 1 of the format; identify again")
     try:
         document = _Document.model_validate(data)
     except ValidationError as error:
@@ -172,8 +237,8 @@ def from_json(data: Any, source: str = "identification") -> Identification:
         u=np.array(document.u),
         covariance=np.array(rows, float).reshape(size, size),
         reference=Reference(**document.reference.model_dump()),
-        scatter=Scatter(**document.scatter.model_dump()),
-        rms=document.rms,
+        scatter=_scatter(document.scatter),
+        rms=float("nan") if document.rms is None else document.rms,
         log_likelihood=document.log_likelihood,
         size=document.size,
         freedom=document.freedom,
@@ -181,16 +246,35 @@ def from_json(data: Any, source: str = "identification") -> Identification:
         ranges=document.ranges,
         settings=_settings(document.settings),
         provenance=document.provenance,
+        errors={name: _errors(e) for name, e in document.errors.items()},
+        nuisances=tuple(NuisanceEstimate(**{**n.model_dump(), "spread": float(n.spread)}) for n in document.nuisances),
         converged=document.converged,
         notes=tuple(document.notes),
     )
 
 
+def _scatter(s: _Scatter) -> Scatter:
+    return Scatter({name: OutputScatter(**sizes.model_dump()) for name, sizes in s.outputs.items()}, s.rate)
+
+
 def _settings(s: _Settings) -> Settings:
-    nuisances = tuple(Nuisance(n.kind, sd=n.sd) for n in s.nuisances)
+    nuisances = tuple(
+        Nuisance(n.kind, n.scope, n.output, n.mean, None if n.sd is None else float(n.sd), _ends(n.bounds))
+        for n in s.nuisances
+    )
     return Settings(**{**s.model_dump(), "nuisances": nuisances})
+
+
+def _ends(bounds: tuple[float | None, float | None]) -> tuple[float, float]:
+    return (-np.inf if bounds[0] is None else bounds[0]), (np.inf if bounds[1] is None else bounds[1])
 
 
 def _test(t: _Test) -> TestMisfit:
     rms, bias = (float("nan") if v is None else v for v in (t.rms, t.bias))
-    return TestMisfit(t.name, t.condition, t.frames, rms, bias, t.offset, t.rate_factor)
+    outputs = tuple(OutputMisfit(o.output, _errors(o.errors), o.offset, o.noise) for o in t.outputs)
+    return TestMisfit(t.name, t.condition, t.frames, rms, bias, t.rate_factor, t.weight, outputs)
+
+
+def _errors(e: _Errors) -> Errors:
+    numbers = [float("nan") if v is None else v for v in (e.rse, e.mse, e.mae, e.relative, e.chi_square)]
+    return Errors(e.frames, *numbers)

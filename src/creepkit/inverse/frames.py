@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from creepkit.arrays import Ints
+from creepkit.arrays import Bools, Ints
 from creepkit.records import History
 
 
 def chosen_frames(history: History, count: int) -> Ints:
     """Indices of at most `count` used frames after time zero, half spread in ln t and half in t."""
-    usable = np.flatnonzero(history.used & (history.times > 0))
+    usable = np.flatnonzero(history.used & (history.times > 0) & measured(history))
     if usable.size <= count:
         return usable
     t = history.times[usable]
@@ -21,8 +21,14 @@ def chosen_frames(history: History, count: int) -> Ints:
     return np.asarray(usable[np.unique(nearest)])
 
 
+def measured(history: History) -> Bools:
+    """(frames,) whether any output has a number there."""
+    present = [np.isfinite(values) for values in history.outputs.values()]
+    return np.asarray(np.any(present, axis=0)) if present else np.zeros(history.times.size, bool)
+
+
 def thinned(history: History, count: int) -> History:
-    """The history at its chosen frames only."""
+    """The history at its chosen frames only, all outputs of a frame together."""
     k = chosen_frames(history, count)
     return replace(
         history,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,22 +12,45 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates, Reference
-from creepkit.inverse.covariance import Scatter
+from creepkit.inverse.effects import member_of
+from creepkit.inverse.measures import Errors
+from creepkit.inverse.scatter import Scatter
+from creepkit.inverse.settings import Settings
+from creepkit.inverse.together import predict
 from creepkit.inverse.uncertainty import Estimate, band, quantile
 from creepkit.language import CreepLaw
-from creepkit.records import History, Nuisance, Prediction, Predictor
+from creepkit.records import EXPLICIT, History, Prediction, Predictor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+__all__ = ["Identification", "NuisanceEstimate", "OutputMisfit", "Settings", "TestMisfit", "information_criterion"]
+
+
+@dataclass(frozen=True)
+class OutputMisfit:
+    """One output of one test.
+
+    errors : over all used frames of the history, with the test's own offset and nuisances.
+    offset : estimated offset that the law does not explain (loading strain), in the output's unit.
+    noise : typical standard deviation of a frame, in the output's unit.
+    """
+
+    output: str
+    errors: Errors
+    offset: float = 0.0
+    noise: float = 0.0
 
 
 @dataclass(frozen=True)
 class TestMisfit:
     """One test in the fit.
 
-    rms, bias : root mean square and mean of ln((predicted + offset) / measured) over its fitted frames.
-    offset : estimated loading strain that the law does not explain, in the output's unit.
+    frames : how many entries count (strains above twice the floor of their scale, all frames of other outputs).
+    rms, bias : root mean square and mean of ln((predicted + offset) / measured) over its fitted strains, else NaN.
     rate_factor : estimated factor of this test's creep rate on the law's (heat-to-heat scatter).
+    weight : of the test in the fit; below one where test_loss="student" found it far from the others.
     """
 
     __test__ = False  # not a test case, whatever its name says to pytest
@@ -37,52 +60,39 @@ class TestMisfit:
     frames: int
     rms: float
     bias: float
-    offset: float = 0.0
     rate_factor: float = 1.0
+    weight: float = 1.0
+    outputs: tuple[OutputMisfit, ...] = ()
 
+    def __getitem__(self, output: str) -> OutputMisfit:
+        for one in self.outputs:
+            if one.output == output:
+                return one
+        raise FitError(
+            f"test '{self.name}' has no output '{output}'; it has {', '.join(o.output for o in self.outputs)}"
+        )
 
-LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
+    @property
+    def offset(self) -> float:
+        """Offset of its first output."""
+        return self.outputs[0].offset if self.outputs else 0.0
 
 
 @dataclass(frozen=True)
-class Settings:
-    """What a run can be repeated from.
+class NuisanceEstimate:
+    """What was found of one explicit nuisance of one test, alloy or all tests.
 
-    draws : Sobol points that are screened, a power of two is best; frames : looked at in each history.
-    loss : of values only; intervals and scatter are Gaussian and see outliers as scatter.
-    nuisances : what differs between tests; unless told otherwise a loading-strain offset of each curve and
-        test-to-test scatter of the rate, both estimated.
+    member : name of the test or alloy, or "all". value, sd : estimate and its standard deviation, in the kind's unit.
+    mean, spread : of the prior; a spread that was to be estimated, as it was.
     """
 
-    starts: int = 8
-    draws: int = 64
-    frames: int = 40
-    seed: int = 0
-    loss: str = "linear"
-    nuisances: tuple[Nuisance, ...] = (Nuisance("offset"), Nuisance("rate"))
-
-    def __post_init__(self) -> None:
-        for name, least in (("starts", 1), ("draws", 1), ("frames", 2), ("seed", 0)):
-            value = getattr(self, name)
-            if int(value) != value or value < least:
-                raise FitError(f"{name} is {value!r}; it must be a whole number of at least {least}")
-        if self.loss not in LOSSES:
-            raise FitError(f"loss '{self.loss}' is not known; allowed are {', '.join(LOSSES)}")
-        for nuisance in self.nuisances:
-            _check_nuisance(nuisance)
-
-
-def _check_nuisance(nuisance: Nuisance) -> None:
-    plain = nuisance.mean == 0 and not np.isfinite(nuisance.bounds).any() and nuisance.scope == "test"
-    if (
-        nuisance.kind not in ("offset", "rate")
-        or not plain
-        or (nuisance.sd is not None and not np.isfinite(nuisance.sd))
-    ):
-        raise FitError(
-            f"nuisance {nuisance} is not known to this identification; allowed are Nuisance('offset') and "
-            "Nuisance('rate'), one for each test, about zero, with sd= a finite number or None to estimate it"
-        )
+    kind: str
+    scope: str
+    member: str
+    value: float
+    sd: float
+    mean: float
+    spread: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,10 +102,13 @@ class Identification:
     estimates : one Estimate for each parameter, in the law's order.
     u, covariance : conditioned coordinates at the optimum and their posterior covariance (see inverse.coordinates).
     scatter : standard deviations of the sources of scatter, found from the data.
-    rms : root mean square of ln((predicted + offset) / measured) over the fitted frames of all tests; each test has
-        its own offset (loading strain), none its own rate.
+    rms : root mean square of ln((predicted + offset) / measured) over the fitted strains of all tests; each test has
+        its own offset (loading strain), none its own rate. NaN without strains.
+    errors : {output: Errors} over all used frames of all tests, whatever was minimised.
+    nuisances : what was found of explicit nuisances.
     ranges : {"stress", "temperature", "strain", "time": (low, high)} that the fitted frames cover; MPa, K, s.
-    log_likelihood : of the fitted frames as if they were independent (working scatter).
+    log_likelihood : of the fitted frames as if they were independent (working scatter), with explicit nuisances
+        integrated out.
     freedom : degrees of freedom of the intervals (see inverse.uncertainty).
     size : number of effectively independent frames (about one a test when tests differ from one another).
     """
@@ -114,6 +127,8 @@ class Identification:
     ranges: Mapping[str, tuple[float, float]]
     settings: Settings
     provenance: Mapping[str, Any]
+    errors: Mapping[str, Errors] = field(default_factory=dict)
+    nuisances: tuple[NuisanceEstimate, ...] = ()
     converged: bool = True
     notes: tuple[str, ...] = ()
     histories: tuple[History, ...] = ()
@@ -152,12 +167,33 @@ class Identification:
         half = self._quantile * sd
         return middle, middle - half, middle + half
 
-    def predict(self, histories: list[History] | None = None, using: Predictor | None = None) -> Prediction:
-        """Predict histories (by default those that were fitted) at the identified values."""
+    def predict(
+        self, histories: Sequence[History] | None = None, using: Predictor | None = None, *, own: bool = True
+    ) -> Prediction:
+        """Predict histories (by default those that were fitted) at the identified values.
+
+        own : fitted tests, known by name, with their own nuisances and offsets; else, and all other histories, with
+            what is known of their alloy or of all tests, or the prior means, and without offset.
+        """
         predictor = using or self.using
         if predictor is None:
             raise FitError("this identification was loaded from a file: give using=, the specimen it was made with")
-        return predictor.predict(self.law, self.values, list(histories or self.histories))
+        tests = list(histories or self.histories)
+        found = predict(predictor, self.law, self.values, tests, effects=self.effects(tests, own=own))
+        by_name = {m.name: m for m in self.misfits} if own else {}
+        for k, history in enumerate(tests):
+            for one in by_name[history.name].outputs if history.name in by_name else ():
+                found.values[:, k, :, found.outputs.index(one.output)] += one.offset
+        return found
+
+    def effects(self, histories: Sequence[History], *, own: bool = True) -> dict[str, Floats]:
+        """{kind: (1, tests)} explicit nuisances of histories, as predictors take them."""
+        found = {(n.kind, n.member): n.value for n in self.nuisances if own or n.scope != "test"}
+        return {
+            n.kind: np.array([[found.get((n.kind, member_of(n, h)), n.mean) for h in histories]])
+            for n in self.settings.nuisances
+            if n.kind in EXPLICIT
+        }
 
     def on(self, histories: Sequence[History], using: Predictor) -> Identification:
         """The same answer with its histories (found by name) and specimen attached, as after load(), for plots."""

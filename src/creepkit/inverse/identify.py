@@ -1,68 +1,43 @@
-"""identify: one law over all curves, stresses and temperatures, with intervals."""
+"""identify: one law over all tests, stresses and temperatures, with intervals."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
-from importlib.metadata import version
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.checks import check_bounds, check_histories, check_strains
+from creepkit.inverse.alternation import EXPENSIVE, Effort, Fitted, alternate, free
+from creepkit.inverse.checks import check_bounds, check_growth, check_histories
 from creepkit.inverse.coordinates import Coordinates, Reference
-from creepkit.inverse.covariance import (
-    ASSUMED_RATE,
-    Scatter,
-    effective_size,
-    estimated,
-    expected_effects,
-    full_guess,
-    log_likelihood,
-    whitener,
-    working_guess,
-)
+from creepkit.inverse.covariance import effective_size, expected_effects, whitener
+from creepkit.inverse.effects import Unknowns
+from creepkit.inverse.entries import Entries
 from creepkit.inverse.frames import thinned
-from creepkit.inverse.identification import Identification, Settings, TestMisfit
-from creepkit.inverse.objective import Objective, Residuals
-from creepkit.inverse.scales import frame_noise, log_scale_for
-from creepkit.inverse.search import (
-    Box,
-    Fences,
-    Minimum,
-    Progress,
-    from_single_terms,
-    measured_log_rate,
-    multistart,
-    refine,
-)
+from creepkit.inverse.identification import Identification, NuisanceEstimate
+from creepkit.inverse.misfits import misfits, pooled_errors, pooled_rms
+from creepkit.inverse.nominal import measured_log_rate
+from creepkit.inverse.objective import Objective
+from creepkit.inverse.provenance import FEW_TESTS, notes, provenance, ranges
+from creepkit.inverse.scatter import ASSUMED_RATE, full_guess
+from creepkit.inverse.search import Box, Minimum, Progress, from_single_terms, multistart
+from creepkit.inverse.settings import Settings
+from creepkit.inverse.sizes import estimated
+from creepkit.inverse.together import Together, predict, screening_of
 from creepkit.inverse.uncertainty import estimates, laplace, quantile
-from creepkit.language import CreepLaw, temperature
+from creepkit.inverse.weighting import Weighting
+from creepkit.language import CreepLaw
 from creepkit.records import History, Nuisance, Predictor
 
-ROUNDS = 8
-"""At most as often are the sizes of scatter and the values found from one another; three rounds usually do."""
-FEW_TESTS = 3
-"""Below this many tests the scatter between them cannot be seen, and is assumed."""
-
-
-@dataclass(frozen=True)
-class _Fitted:
-    """Where values and working scatter agree: the optimum, its residuals, and the likelihood."""
-
-    minimum: Minimum
-    residuals: Residuals
-    working: Scatter
-    likelihood: float
+REFIT_ROUNDS = 2
 
 
 def identify(
     law: CreepLaw,
     histories: Sequence[History],
-    using: Predictor,
+    using: Predictor | Mapping[str, Predictor],
     *,
     settings: Settings | None = None,
     start: Floats | None = None,
@@ -71,57 +46,83 @@ def identify(
 ) -> Identification:
     """Identify the parameters of `law` from `histories` by multi-start least squares, then by their likelihood.
 
-    using : predictor, such as the specimen that study.specimen("uniaxial") returns.
+    using : predictor, such as the specimen that study.specimen("uniaxial") returns, or {specimen: predictor} where
+        histories are of several. One that offers screening() is searched with that stand-in and then refined.
     start : conditioned coordinates to begin from instead of a global search; a refit takes two rounds at most.
     """
     settings = settings or Settings()
-    check_histories(law, histories)
+    if isinstance(using, Mapping):
+        using = Together(dict(using))
+    check_histories(law, histories, using)
     thin = [thinned(h, settings.frames) for h in histories]
-    coordinates = Coordinates(law, reference or Reference.of(thin))
-    objective = Objective(law, thin, using, coordinates, log_scale_for(thin, "strain"))
-    check_strains(objective)
-    box = Box.of(law, coordinates, measured_log_rate(objective))
-    noise = float(np.median([frame_noise(h, "strain") for h in histories]))
-    working = working_guess(noise, objective.scale.floor, settings.nuisances)
+    coordinates, entries = Coordinates(law, reference or Reference.of(thin, using)), Entries.of(thin, using, histories)
+    unknowns = Unknowns.of(settings.nuisances, thin, using)
+    objective = Objective(law, thin, using, coordinates, entries, unknowns)
+    check_growth(objective)
+    box, weighting = Box.of(law, coordinates, measured_log_rate(thin)), Weighting(settings, entries)
+    stand_in = screening_of(using)
+    effort = Effort() if stand_in is None else EXPENSIVE
+    screened = 0
     if start is None:
-        starts, rounds = _searched(objective, box, working, settings, progress), ROUNDS
+        search = objective.asking(stand_in or using, law, coordinates)
+        starts = _searched(search, box, weighting, progress)
+        screened = search.evaluations
     else:
-        starts, rounds = [box.clip(np.asarray(start, float))], 2
-    ends = [_alternate(objective, box, u, working, settings, progress, rounds) for u in starts]
+        starts, effort = [box.clip(np.asarray(start, float))], replace(effort, rounds=REFIT_ROUNDS)
+    ends = []
+    for u in starts:
+        objective.unknowns = unknowns
+        ends.append(alternate(objective, box.beside(unknowns), free(objective, u), weighting, effort, progress))
     best = max(ends, key=lambda end: end.likelihood)
-    check_bounds(objective, best.minimum.u)
-    return _answer(objective, box, best, settings, histories)
+    objective.unknowns = best.unknowns
+    check_bounds(objective, best.minimum.u[: len(law.params)])
+    return _answer(objective, box, best, weighting, histories, screened)
 
 
 def _answer(
-    objective: Objective, box: Box, best: _Fitted, settings: Settings, histories: Sequence[History]
+    objective: Objective, box: Box, best: Fitted, weighting: Weighting, histories: Sequence[History], screened: int
 ) -> Identification:
     """Scatter, intervals and misfits at the optimum."""
-    law, coordinates, residuals = objective.law, objective.coordinates, best.residuals
-    log_times, u, known = np.log(objective.times), best.minimum.u, _with_known_rate(settings.nuisances, len(histories))
-    scatter = estimated(residuals, log_times, full_guess(best.working, known), known)
+    law, coordinates, residuals, settings = objective.law, objective.coordinates, best.residuals, weighting.settings
+    size, x, known = len(law.params), best.minimum.u, _with_known_rate(settings.nuisances, len(histories))
+    u = x[:size]
+    scatter = estimated(residuals, full_guess(weighting.measured(best.working), known), known)
     given = any(n.kind == "rate" and n.sd is not None for n in known)
-    posterior, freedom = laplace(residuals, log_times, best.working, scatter, box, rate_known=given)
-    misfits = tuple(_misfits(objective, residuals, expected_effects(residuals, log_times, scatter)))
+    wide = box.beside(best.unknowns)
+    posterior, freedom = laplace(residuals, best.working, scatter, wide, best.unknowns, rate_known=given)
+    found = predict(
+        objective.using, law, coordinates.values(u), list(histories), effects=best.unknowns.effects(x[size:])
+    )
+    tests = misfits(objective, residuals, expected_effects(residuals, scatter), histories, found)
+    own = _nuisances(best.unknowns, x[size:], np.sqrt(np.diag(posterior))[size:])
     return Identification(
         law=law,
-        estimates=estimates(law, coordinates, u, posterior, quantile(freedom)),
+        estimates=estimates(law, coordinates, u, posterior[:size, :size], quantile(freedom)),
         u=u,
-        covariance=posterior,
+        covariance=posterior[:size, :size],
         reference=coordinates.reference,
         scatter=scatter,
-        rms=_pooled(misfits),
+        rms=pooled_rms(tests),
         log_likelihood=best.likelihood,
-        size=effective_size(residuals, log_times, scatter),
+        size=effective_size(residuals, scatter),
         freedom=freedom,
-        misfits=misfits,
-        ranges=_ranges(objective.histories),
+        misfits=tests,
+        ranges=ranges(objective),
         settings=settings,
-        provenance=_provenance(objective, settings),
+        provenance=provenance(objective, settings, screened),
+        errors=pooled_errors(histories, found, tests),
+        nuisances=own,
         converged=best.minimum.converged,
-        notes=_notes(objective, best.minimum, settings),
+        notes=notes(objective, best, settings, tests, own),
         histories=tuple(histories),
         using=objective.using,
+    )
+
+
+def _nuisances(unknowns: Unknowns, e: Floats, sd: Floats) -> tuple[NuisanceEstimate, ...]:
+    return tuple(
+        NuisanceEstimate(n.kind, n.scope, member, float(value), float(s), n.mean, float(spread))
+        for n, member, value, s, spread in zip(unknowns.nuisances, unknowns.members, e, sd, unknowns.sd, strict=True)
     )
 
 
@@ -132,15 +133,13 @@ def _with_known_rate(nuisances: Sequence[Nuisance], tests: int) -> tuple[Nuisanc
     return tuple(replace(n, sd=ASSUMED_RATE) if n.kind == "rate" and n.sd is None else n for n in nuisances)
 
 
-def _searched(
-    objective: Objective, box: Box, working: Scatter, settings: Settings, progress: Progress | None
-) -> list[Floats]:
+def _searched(objective: Objective, box: Box, weighting: Weighting, progress: Progress | None) -> list[Floats]:
     """Global search with a covariance that is broad and fixed, and a loss that no single curve can capture.
 
     The best minima that differ, or for a sum the best one and its best term: a sum must not end worse than its terms.
     Their likelihoods decide, since the covariance is not yet known here.
     """
-    factor = whitener(objective.before_fit(), np.log(objective.times), working)
+    settings, factor = weighting.settings, whitener(objective.before_fit(), weighting.guess())
     loss = "soft_l1" if settings.loss == "linear" else settings.loss
     few, half = max(2, settings.starts // 3), settings.draws // 2
     singles = from_single_terms(objective, box, factor, starts=few, draws=half, seed=settings.seed, loss=loss)
@@ -160,112 +159,8 @@ def _distinct(minima: Sequence[Minimum], box: Box, most: int = 2, near: float = 
     return kept[:most]
 
 
-def _alternate(
-    objective: Objective, box: Box, u: Floats, working: Scatter, settings: Settings, progress: Progress | None,
-    rounds: int,
-) -> _Fitted:  # fmt: skip
-    """Working scatter given the law, law given the scatter, until the likelihood no longer grows; the best round."""
-    log_times = np.log(objective.times)
-    residuals, best = objective.at(u), None
-    for k in range(rounds):
-        working = estimated(residuals, log_times, working, settings.nuisances)
-        factor = whitener(residuals, log_times, working)
-        minimum = refine(objective, box, factor, u, loss=settings.loss, steps=40, tolerance=1e-8)
-        u, residuals = minimum.u, objective.at(minimum.u)
-        now = _Fitted(minimum, residuals, working, log_likelihood(residuals, log_times, working))
-        if progress is not None:
-            progress("round", k + 1, rounds)
-        gain = np.inf if best is None else now.likelihood - best.likelihood
-        best = now if best is None or gain > 0 else best
-        if abs(gain) < 0.02:
-            break
-    assert best is not None
-    return best
-
-
 def refit(fit: Identification, histories: Sequence[History]) -> Identification:
     """The same law on other histories, starting where `fit` ended (for hold-out and resampling)."""
     if fit.using is None:
         raise FitError("cannot refit an identification that was loaded from a file without its specimen")
     return identify(fit.law, histories, fit.using, settings=fit.settings, start=fit.u, reference=fit.reference)
-
-
-def _misfits(objective: Objective, residuals: Residuals, effects: tuple[Floats, Floats]) -> list[TestMisfit]:
-    found = []
-    offset, log_factor = effects
-    ratios = _log_ratios(objective, residuals, offset)
-    for k, history in enumerate(objective.histories):
-        r = ratios[k][np.isfinite(ratios[k])]
-        rms, bias = (float(np.sqrt(np.mean(r**2))), float(np.mean(r))) if r.size else (np.nan, np.nan)
-        own = float(offset[k]), float(np.exp(log_factor[k]))
-        found.append(TestMisfit(history.name, history.condition, int(r.size), rms, bias, *own))
-    return found
-
-
-def _log_ratios(objective: Objective, residuals: Residuals, offset: Floats) -> Floats:
-    """ln((predicted + the test's offset) / measured) where the measured strain is above twice the floor, else NaN."""
-    scale = objective.scale
-    predicted = scale.backward(residuals.values + objective.compared) + offset[:, None]
-    above = objective.present & (objective.measured > 2 * scale.floor)
-    measured = np.where(above, objective.measured, 1.0)
-    return np.where(above, np.log(np.maximum(predicted, scale.floor) / measured), np.nan)
-
-
-def _pooled(misfits: Sequence[TestMisfit]) -> float:
-    """Root mean square over the frames of all tests."""
-    frames = np.array([m.frames for m in misfits], float)
-    squares = np.array([m.rms**2 if m.frames else 0.0 for m in misfits])
-    return float(np.sqrt((frames * squares).sum() / frames.sum()))
-
-
-def _ranges(histories: Sequence[History]) -> dict[str, tuple[float, float]]:
-    """What the fitted frames cover."""
-    spread = {
-        "stress": [v for h in histories for v in h.loading.program().values],
-        "temperature": [v for h in histories for v in h.temperature_program().values],
-        "strain": [v for h in histories for v in (0.0, float(h.outputs["strain"].max()))],
-        "time": [v for h in histories for v in (float(h.times[0]), float(h.times[-1]))],
-    }
-    return {name: (float(min(values)), float(max(values))) for name, values in spread.items()}
-
-
-def _provenance(objective: Objective, settings: Settings) -> dict[str, str | int]:
-    law = objective.law
-    return {
-        "creepkit": version("creepkit"),
-        "law": law.name,
-        "fingerprint": law.fingerprint,
-        "specimen": getattr(objective.using, "name", type(objective.using).__name__),
-        "evaluations": objective.evaluations,
-        "data": _digest(objective, settings),
-        "when": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
-
-
-def _digest(objective: Objective, settings: Settings) -> str:
-    """What was compared, and how: identifications that share it can be ranked against one another."""
-    digest = hashlib.sha256()
-    for array in (objective.measured, objective.times, objective.present):
-        digest.update(np.ascontiguousarray(array).tobytes())
-    names = [h.name for h in objective.histories]
-    digest.update(repr((names, objective.scale, settings.loss, settings.nuisances)).encode())
-    return digest.hexdigest()[:16]
-
-
-def _notes(objective: Objective, best: Minimum, settings: Settings) -> tuple[str, ...]:
-    notes, law, tests = [], objective.law, objective.histories
-    if not best.converged:
-        notes.append("the last refinement stopped at its cap of steps: raise starts or look at the plot")
-    warmth = {round(float(v), 1) for h in tests for v in h.temperature_program().values}
-    if max(warmth) - min(warmth) > 5 and not law.uses(temperature):
-        notes.append(f"the tests span {min(warmth):.0f} to {max(warmth):.0f} K and this law knows no temperature")
-    stresses = {round(float(v), 3) for h in tests for v in h.loading.program().values}
-    if len(stresses) == 1:
-        notes.append("all tests have one stress: the stress dependence is not determined by them")
-    if len(tests) < FEW_TESTS and any(n.kind == "rate" and n.sd is None for n in settings.nuisances):
-        notes.append(f"fewer than {FEW_TESTS} tests: their rates are assumed to scatter by {100 * ASSUMED_RATE:.0f} %")
-    if float(objective.measured.max()) > 0.5:
-        notes.append("strains above 0.5 were fitted: a column in percent must say so, as strain_pct")
-    if (Fences(objective).violations(best.u) > 1e-3).any():
-        notes.append("a constraint of the law does not hold over the tests at these values")
-    return tuple(notes)

@@ -1,143 +1,186 @@
-"""The objective: residuals of all tests on their scale, with exact Jacobians, in conditioned coordinates.
+"""The objective: residuals of all tests on their scales, with exact Jacobians, in conditioned coordinates.
 
-A candidate that bursts before a test ends keeps its last value and then grows with ln(t / t_burst): the residual
-stays finite and keeps growing the earlier it burst, so a search can find its way back.
+A candidate that bursts before a test ends goes on from the ceiling of its scale and grows with ln(t / t_burst): the
+residual stays finite and keeps growing the earlier it burst, so a search can find its way back.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats
-from creepkit.errors import FitError
+from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.scales import LogScale
+from creepkit.inverse.differences import author_values, differentiated
+from creepkit.inverse.effects import Unknowns
+from creepkit.inverse.entries import Entries
+from creepkit.inverse.scales import LinearScale
+from creepkit.inverse.together import predict
 from creepkit.language import CreepLaw
-from creepkit.records import History, Predictor
+from creepkit.records import History, Prediction, Predictor
 
 BURST_SLOPE = 3.0
 """Growth of the compared quantity per unit of ln(t / t_burst) after a burst; strains above it are not data."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Residuals:
-    """Predicted minus measured, padded to the longest test.
+    """Predicted minus measured, for each test the entries of its outputs end to end (see inverse.entries).
 
-    values, slopes : (tests, frames) residual, and dg/dy at the prediction (what one unit of offset changes).
-    jacobian : (tests, frames, parameters) with respect to u, or None.
-    rate_effect : (tests, frames) derivative with respect to ln of a factor on this test's creep rate, or None.
-    present : (tests, frames) which entries are data; the others are zero.
+    values, slopes : (tests, entries) residual, and dg/dy at the prediction (what one unit of offset changes).
+    present : (tests, entries) which entries are data; the others are zero.
+    log_times : (tests, entries) ln of time.
+    jacobian : (tests, entries, unknowns) with respect to x = (u, e), or None.
+    rate_effect : (tests, entries) derivative with respect to ln of a factor on this test's creep rate.
+    output : (tests, entries) position of the entry's output; loudness : its noise over that of its output.
+    trust : (tests,) weight of each test; the covariance of a test is divided by it.
     """
 
     values: Floats
     slopes: Floats
     present: Bools
-    jacobian: Floats | None = None
-    rate_effect: Floats | None = None
+    log_times: Floats
+    jacobian: Floats | None
+    rate_effect: Floats
+    output: Ints
+    loudness: Floats
+    trust: Floats
+
+    def trusting(self, trust: Floats) -> Residuals:
+        """The same with other weights of tests."""
+        return replace(self, trust=trust)
 
 
 class Objective:
     """Residuals of a law's candidates against histories."""
 
     def __init__(
-        self, law: CreepLaw, histories: Sequence[History], using: Predictor, coordinates: Coordinates, scale: LogScale,
-        output: str = "strain",
+        self, law: CreepLaw, histories: Sequence[History], using: Predictor, coordinates: Coordinates,
+        entries: Entries, unknowns: Unknowns,
     ) -> None:  # fmt: skip
         self.law, self.histories, self.using = law, list(histories), using
-        self.coordinates, self.scale, self.output = coordinates, scale, output
-        frames = max(h.times.size for h in self.histories)
-        shape = (len(self.histories), frames)
-        self.measured, self.times, self.present = np.zeros(shape), np.ones(shape), np.zeros(shape, bool)
-        for k, h in enumerate(self.histories):
-            size = h.times.size
-            if output not in h.outputs:
-                raise FitError(f"history '{h.name}' has no output '{output}'; it has {', '.join(h.outputs)}")
-            self.measured[k, :size], self.times[k, :size] = h.outputs[output], h.times
-            self.present[k, :size] = h.used
-        self.compared = self.scale.forward(self.measured)
+        self.coordinates, self.entries, self.unknowns = coordinates, entries, unknowns
+        self.compared = entries.forward(entries.measured)
         self.evaluations = 0
+
+    def asking(self, using: Predictor, law: CreepLaw, coordinates: Coordinates) -> Objective:
+        """The same entries asked of another predictor or law, unknowns of tests held at their means."""
+        return Objective(law, self.histories, using, coordinates, self.entries, replace(self.unknowns, held=True))
 
     def before_fit(self) -> Residuals:
         """Slopes as the measured values have them, so that a covariance exists before anything was predicted."""
-        slopes = np.where(self.present, self.scale.slope(self.measured), 0.0)
-        effect = slopes * np.maximum(self.measured, 0.0)
-        return Residuals(np.zeros_like(slopes), slopes, self.present, None, effect)
+        measured = self.entries.measured
+        slopes = np.where(self.entries.present, self.entries.slope(measured), 0.0)
+        return self._residuals(np.zeros_like(slopes), slopes, None, slopes * np.maximum(measured, 0.0))
 
     def screen(self, u: Floats) -> Floats:
-        """Residuals without derivatives: u (candidates, parameters) -> (candidates, tests, frames)."""
-        predicted, ends, _ = self._predict(u, jacobian=False)
-        return np.where(self.present, self._extended(predicted, ends) - self.compared, 0.0)
+        """Residuals without derivatives, unknowns of tests at their means: (candidates, parameters) to entries."""
+        effects = replace(self.unknowns, held=True).effects(np.zeros(0))
+        values = author_values(self.law, self.coordinates.theta(u))
+        found = predict(self.using, self.law, values, self.histories, effects=effects)
+        self.evaluations += len(u)
+        predicted = self.entries.taken(found.values, found)
+        return np.where(self.entries.present, self._extended(predicted, found.end_times) - self.compared, 0.0)
 
-    def at(self, u: Floats) -> Residuals:
-        """Residuals of one candidate with exact derivatives."""
-        predicted, ends, jacobian = self._predict(u[None], jacobian=True)
-        assert jacobian is not None
-        values = self._extended(predicted, ends)[0] - self.compared
-        strain, inner = predicted[0], jacobian[0]
-        alive = np.isfinite(strain)
-        slopes = self.scale.slope(np.where(alive, strain, 1.0))
+    def excess(self, misfit: Floats) -> Floats:
+        """(candidates,) by how much rates are too high, in ln: the median over what grows with creep.
+
+        On a logarithmic scale the residual itself; on a linear one ln of predicted over measured growth, and more
+        after a burst.
+        """
+        entries, now = self.entries, misfit + self.compared
+        logs = np.where(entries.leading, misfit, np.nan)
+        for position, scale in enumerate(entries.scales):
+            mine = entries.leading & (entries.output == position) & entries.present
+            if not isinstance(scale, LinearScale) or not mine.any():
+                continue
+            first = mine.argmax(axis=1)[:, None]
+            grown = now - np.take_along_axis(now, np.broadcast_to(first, (*now.shape[:2], 1)), axis=2)
+            own = self.compared - np.take_along_axis(self.compared, first, axis=1)
+            burst = np.maximum(now - scale.ceiling, 0.0)
+            ratio = np.log(np.maximum(grown, 1e-12) / np.maximum(own, 0.01)) + burst
+            logs = np.where(mine, np.where(own > 0.01, ratio, np.nan), logs)
+        return np.array([np.nanmedian(each) if np.isfinite(each).any() else 0.0 for each in logs[:, entries.present]])
+
+    def at(self, x: Floats) -> Residuals:
+        """Residuals of one candidate x = (u, e) with exact derivatives."""
+        size, entries = len(self.law.params), self.entries
+        u, e = x[:size], x[size:]
+        found = differentiated(
+            self.using, self.law, self.coordinates.theta(u), self.histories, self.unknowns.effects(e)
+        )
+        self.evaluations += 1
+        assert found.jacobian is not None
+        predicted = entries.taken(found.values, found)[0]
+        values = self._extended(predicted[None], found.end_times)[0] - self.compared
+        alive = np.isfinite(predicted)
+        slopes = entries.slope(np.where(alive, predicted, 1.0))
+        inner = self._inner(found, slopes, alive)
+        effect = self._rate_effect(inner[..., :size], values)
+        to_x = np.concatenate([inner[..., :size] @ self.coordinates.jacobian(u), inner[..., size:]], axis=-1)
+        return self._residuals(values, np.where(alive, slopes, 0.0), to_x, effect)
+
+    def _inner(self, found: Prediction, slopes: Floats, alive: Bools) -> Floats:
+        """Derivatives of what is compared to internal parameters and unknowns of tests."""
+        assert found.jacobian is not None
+        wide = self.entries.taken(found.jacobian, found)[0]
+        if self.unknowns.size:
+            own = {kind: self.entries.taken(s, found)[0] for kind, s in found.effect_jacobian.items()}
+            wide = np.concatenate([wide, self.unknowns.columns(own)], axis=-1)
         with np.errstate(invalid="ignore"):
-            wide = slopes[..., None] * inner
+            wide = slopes[..., None] * wide
         wide = np.where(np.isfinite(wide), wide, np.nan)
-        wide = _held(wide, alive & self.present)
-        slopes = np.where(alive, slopes, 0.0)
-        effect = self._rate_effect(wide, values)
-        mask = self.present
-        to_u = wide @ self.coordinates.jacobian(u)
+        return _held(wide, alive & self.entries.present, self.entries.output)
+
+    def _residuals(self, values: Floats, slopes: Floats, jacobian: Floats | None, effect: Floats) -> Residuals:
+        entries, mask = self.entries, self.entries.present
         return Residuals(
-            np.where(mask, values, 0.0), np.where(mask, slopes, 0.0), mask,
-            np.where(mask[..., None], to_u, 0.0), np.where(mask, effect, 0.0),
+            np.where(mask, values, 0.0), np.where(mask, slopes, 0.0), mask, entries.log_times,
+            None if jacobian is None else np.where(mask[..., None], jacobian, 0.0), np.where(mask, effect, 0.0),
+            entries.output, entries.loudness, np.ones(len(mask)),
         )  # fmt: skip
 
     def _rate_effect(self, slopes: Floats, residual: Floats) -> Floats:
-        """Derivative of the compared quantity to ln of a factor on all rates of a test, (tests, frames).
+        """Derivative of the compared quantity to ln of a factor on all rates of a test, (tests, entries).
 
         The sum over the terms' coefficients; where a term has none of its own, the slope in ln t, which is the same
         for a law without explicit time at constant stress (strain depends on factor x time alone).
         """
         if len(self.coordinates.rates) == len(self.law.terms):
             return np.asarray(slopes[..., list(self.coordinates.rates)].sum(axis=-1))
-        compared = residual + self.compared
+        compared, entries = residual + self.compared, self.entries
         effect = np.zeros_like(compared)
-        for k, present in enumerate(self.present):
-            if present.sum() > 1:
-                effect[k, present] = np.gradient(compared[k, present], np.log(self.times[k, present]))
+        for k, present in enumerate(entries.present):
+            for position in np.unique(entries.output[k, present]):
+                row = present & (entries.output[k] == position)
+                if row.sum() > 1:
+                    effect[k, row] = np.gradient(compared[k, row], entries.log_times[k, row])
         return effect
 
-    def _predict(self, u: Floats, jacobian: bool) -> tuple[Floats, Floats, Floats | None]:
-        theta = self.coordinates.theta(u)
-        values = {
-            name: np.exp(theta[:, k]) if param.scale == "log" else theta[:, k]
-            for k, (name, param) in enumerate(self.law.table.items())
-        }
-        found = self.using.predict(self.law, values, self.histories, jacobian=jacobian)
-        self.evaluations += len(u)
-        column = found.outputs.index(self.output)
-        slope = None if found.jacobian is None else found.jacobian[..., column, :]
-        return found.values[..., column], found.end_times, slope
-
     def _extended(self, predicted: Floats, ends: Floats) -> Floats:
-        """g of the prediction, carried on after a burst; (candidates, tests, frames)."""
+        """g of the prediction, carried on after a burst; (candidates, tests, entries)."""
         alive = np.isfinite(predicted)
-        compared = self.scale.forward(np.where(alive, predicted, 0.0))
-        lost = self.present & ~alive
+        compared = self.entries.forward(np.where(alive, predicted, 0.0))
+        lost = self.entries.present & ~alive
         if lost.any():
-            top = self.scale.forward(np.asarray(1.0))
-            late = np.log(np.maximum(self.times / np.maximum(ends[..., None], 1e-12), 1.0))
+            top = self.entries.spread([scale.ceiling for scale in self.entries.scales])
+            late = np.log(np.maximum(self.entries.times / np.maximum(ends[..., None], 1e-12), 1.0))
             compared = np.where(lost, top + BURST_SLOPE * late, compared)
         return compared
 
 
-def _held(jacobian: Floats, alive: Bools) -> Floats:
-    """Derivatives of lost frames: those of the last frame alive in the test, a direction back to life."""
+def _held(jacobian: Floats, alive: Bools, output: Ints) -> Floats:
+    """Derivatives of lost frames: those of the output's last frame alive in the test, a direction back to life."""
     if alive.all():
         return jacobian
-    frames = np.arange(alive.shape[1])
-    last = np.maximum.accumulate(np.where(alive, frames, -1), axis=1)
-    first = np.where(alive.any(axis=1), alive.argmax(axis=1), 0)
-    index = np.where(last >= 0, last, first[:, None])
+    frames = np.broadcast_to(np.arange(alive.shape[1]), alive.shape)
+    index = np.array(frames)
+    for position in np.unique(output):
+        mine = alive & (output == position)
+        last = np.maximum.accumulate(np.where(mine, frames, -1), axis=1)
+        first = np.where(mine.any(axis=1), mine.argmax(axis=1), 0)
+        index = np.where(output == position, np.where(last >= 0, last, first[:, None]), index)
     held = np.take_along_axis(jacobian, index[..., None], axis=1)
     return np.where(np.isfinite(held), held, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,10 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.records import ZERO_CELSIUS, History
+from creepkit.inverse.nominal import stresses
+from creepkit.inverse.plotting_linear import draw_linear
+from creepkit.inverse.scales import LOGARITHMIC, usable
+from creepkit.records import ZERO_CELSIUS, History, Prediction
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +29,7 @@ TELLING = 0.02
 
 
 def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
-    """Draw three panels: the tests, ln(identified / measured) over time, and rate over stress with 95 % bands."""
+    """Draw the tests, what is left of them over time, and rate over stress with 95 % bands; two panels an output."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -33,21 +37,15 @@ def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
         raise FitError(
             "this identification was loaded without its histories: attach them with fit.on(histories, using)"
         )
-    figure = Figure(figsize=(13.5, 4.8), layout="constrained")
+    shown = list(dict.fromkeys(m.outputs[0].output for m in fit.misfits))
+    figure = Figure(figsize=(4.5 + 9.0 * len(shown), 4.8), layout="constrained")
     FigureCanvasAgg(figure)
-    tests, residuals, rates = figure.subplots(1, 3, width_ratios=(1.25, 1.0, 1.0))
+    *panels, rates = figure.subplots(1, 2 * len(shown) + 1, width_ratios=(*(1.25, 1.0) * len(shown), 1.0))
     found, colours = fit.predict(), _colours(fit.histories)
-    draw = _draw_parity if len(fit.histories) > CROWDED else _draw_curve
-    for k, history in enumerate(fit.histories):
-        used = history.used & (history.times > 0)
-        hours, predicted = history.times[used] / 3600.0, found.of(k)[used, 0]
-        measured = history.outputs["strain"][used] - fit.misfits[k].offset
-        draw(tests, hours, measured, predicted, colours[k], history.condition)
-        good = (measured > TELLING * measured[-1]) & (predicted > 0)
-        residuals.plot(hours[good], np.log(predicted[good] / measured[good]), lw=0.9, color=colours[k], alpha=0.8)
+    for k, output in enumerate(shown):
+        draw = _draw_strains if output in LOGARITHMIC else draw_linear
+        draw((panels[2 * k], panels[2 * k + 1]), fit, output, found, colours)
     _draw_rates(rates, fit)
-    _finish_tests(tests, fit)
-    _finish_residuals(residuals, fit)
     figure.suptitle(f"{fit.law.title or fit.law.name}   ({len(fit.histories)} tests)", fontsize=11)
     if path is not None:
         try:
@@ -56,6 +54,26 @@ def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
             told = str(error).splitlines()[0]
             raise FitError(f"{path}: the plot cannot be written ({told}); name a .png, .svg or .pdf file") from None
     return figure
+
+
+def _draw_strains(
+    panels: tuple[Axes, Axes], fit: Identification, output: str, found: Prediction, colours: Sequence[Any]
+) -> None:
+    """Strains less loading strain, and ln(identified / measured)."""
+    tests, residuals = panels
+    draw = _draw_parity if len(fit.histories) > CROWDED else _draw_curve
+    for k, history in enumerate(fit.histories):
+        if fit.misfits[k].outputs[0].output != output:
+            continue
+        used, offset = usable(history, output), fit.misfits[k].offset
+        hours = history.times[used] / 3600.0
+        predicted = found.of(k)[used, found.outputs.index(output)] - offset
+        measured = history.outputs[output][used] - offset
+        draw(tests, hours, measured, predicted, colours[k], history.condition)
+        good = (measured > TELLING * measured[-1]) & (predicted > 0)
+        residuals.plot(hours[good], np.log(predicted[good] / measured[good]), lw=0.9, color=colours[k], alpha=0.8)
+    _finish_tests(tests, fit)
+    _finish_residuals(residuals, fit)
 
 
 def _draw_curve(axes: Axes, hours: Floats, measured: Floats, predicted: Floats, colour: Any, label: str) -> None:
@@ -69,7 +87,8 @@ def _draw_parity(axes: Axes, _: Floats, measured: Floats, predicted: Floats, col
 
 
 def _finish_tests(axes: Axes, fit: Identification) -> None:
-    top = 100 * max(float(np.max(h.outputs["strain"][h.used])) for h in fit.histories)
+    strained = [h for h in fit.histories if "strain" in h.outputs]
+    top = 100 * max(float(np.max(h.outputs["strain"][usable(h, "strain")])) for h in strained)
     axes.set(xscale="log", yscale="log", ylim=(1e-3 * top, 2 * top))
     axes.grid(alpha=0.25)
     if len(fit.histories) <= CROWDED:
@@ -94,8 +113,8 @@ def _finish_residuals(axes: Axes, fit: Identification) -> None:
 
 
 def _draw_rates(axes: Axes, fit: Identification) -> None:
-    stresses = [v for h in fit.histories for v in h.loading.program().values if v > 0]
-    grid = np.geomspace(0.8 * min(stresses), 1.25 * max(stresses), 60)
+    levels_of_stress = [v for h in fit.histories for v in stresses(h, fit.using) if v > 0]
+    grid = np.geomspace(0.8 * min(levels_of_stress), 1.25 * max(levels_of_stress), 60)
     levels = np.unique(np.round([float(np.mean(h.temperature_program().values)) for h in fit.histories], 0))
     levels = levels[np.linspace(0, levels.size - 1, min(levels.size, 5)).round().astype(int)]
     for T, colour in zip(levels, _shades(levels), strict=True):

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 from creepkit.language.printing import text_of_expression
 
 if TYPE_CHECKING:
-    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.identification import Identification, NuisanceEstimate
+
+UNITS = {"amplitude": "mm", "width": "mm", "thickness": "mm", "window": "mm", "temperature": "K"}
 
 
 def text_of(fit: Identification) -> str:
@@ -16,32 +18,111 @@ def text_of(fit: Identification) -> str:
         f"{fit.law.title or fit.law.name}",
         *(f"  {label}: {text_of_expression(term)}" for label, term in fit.law.terms.items()),
         "",
+        *_values(fit),
+        *_reference(fit),
+        "",
+        *_strains(fit),
+        *_linear_outputs(fit),
+        *_table(fit),
     ]
-    width = max(len(e.name) for e in fit.estimates) if fit.estimates else 4
+    lines += [f"  note: {note}" for note in fit.notes]
+    return "\n".join(lines)
+
+
+def _values(fit: Identification) -> list[str]:
+    width, lines = max(len(e.name) for e in fit.estimates) if fit.estimates else 4, []
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
         note = "" if e.verdict == "determined" else f"   <- {e.verdict} by these data"
         note = "   <- at its bound" if e.verdict == "at its bound" else note
         lines.append(f"  {e.name:{width}} = {e.value:.5g}  [{e.low:.4g}, {e.high:.4g}]{unit}{note}")
+    return lines
+
+
+def _reference(fit: Identification) -> list[str]:
     r = fit.reference
     rate, low, high = (float(v) for v in fit.rate(r.stress))
-    lines.append(
+    n, less, more = (float(v) for v in fit.local_exponent(r.stress))
+    return [
         f"  rate at {r.stress:.4g} MPa, {r.temperature:.0f} K, strain {r.strain:.2g}, {r.time:.3g} s: "
-        f"{rate:.3g} [{low:.3g}, {high:.3g}] 1/s"
-    )
-    n, low, high = (float(v) for v in fit.local_exponent(r.stress))
-    lines.append(f"  local stress exponent there: {n:.3g} [{low:.3g}, {high:.3g}]")
-    s = fit.scatter
-    frames = sum(m.frames for m in fit.misfits)
-    tests = "1 test" if len(fit.misfits) == 1 else f"{len(fit.misfits)} tests"
-    lines += [
-        "",
-        f"  {tests}, {frames} frames: rms of ln strain {fit.rms:.3g}",
-        f"  scatter (one sd): rate between tests {100 * s.rate:.0f} %, loading strain {s.offset:.2g}, "
+        f"{rate:.3g} [{low:.3g}, {high:.3g}] 1/s",
+        f"  local stress exponent there: {n:.3g} [{less:.3g}, {more:.3g}]",
+    ]
+
+
+def _tests(count: int) -> str:
+    return "1 test" if count == 1 else f"{count} tests"
+
+
+def _strains(fit: Identification) -> list[str]:
+    if "strain" not in fit.scatter.outputs:
+        return []
+    s, mine = fit.scatter["strain"], [m for m in fit.misfits if m.outputs and m.outputs[0].output == "strain"]
+    return [
+        f"  {_tests(len(mine))}, {sum(m.frames for m in mine)} frames: rms of ln strain {fit.rms:.3g}",
+        f"  scatter (one sd): rate between tests {100 * fit.scatter.rate:.0f} %, loading strain {s.offset:.2g}, "
         f"frame noise {s.noise:.2g}, what the law cannot follow {100 * s.drift:.1f} % of strain",
     ]
-    lines += [f"  note: {note}" for note in fit.notes]
-    return "\n".join(lines)
+
+
+def _linear_outputs(fit: Identification) -> list[str]:
+    """Errors of outputs that are compared as they are, over all used frames of all tests."""
+    lines = []
+    for name, e in fit.errors.items():
+        if name == "strain":
+            continue
+        unit, s = f" {UNITS[name]}" if name in UNITS else "", fit.scatter[name]
+        lines.append(
+            f"  {name}: relative squared error {e.rse:.3g}, rms {e.mse**0.5:.3g}{unit} ({100 * e.relative:.2g} %), "
+            f"noise {s.noise:.2g}{unit}, offsets {s.offset:.2g}{unit}, reduced chi-square {e.chi_square:.3g}"
+        )
+    if lines and "strain" not in fit.errors:
+        count = _tests(len(fit.misfits))
+        lines.append(f"  {count}; scatter of the rate between tests (one sd) {100 * fit.scatter.rate:.0f} %")
+    return lines
+
+
+def _table(fit: Identification) -> list[str]:
+    """One line a test: its error, its offset and weight, and what was found of its nuisances."""
+    bulges = [m for m in fit.misfits if m.outputs and m.outputs[0].output != "strain"]
+    own = {(n.kind, n.member): n for n in fit.nuisances if n.scope == "test"}
+    kinds = list(dict.fromkeys(n.kind for n in fit.nuisances if n.scope == "test"))
+    if not (bulges or kinds):
+        return [*_shared(fit)]
+    width = max(len(m.name) for m in fit.misfits)
+    head = f"  {'test':{width}}  {'condition':22} {'error':>9} {'chi2':>8} {'offset':>9} {'rate':>6} {'weight':>6}"
+    lines = ["", head + "".join(f" {kind + _unit(kind):>18}" for kind in kinds)]
+    for m in fit.misfits:
+        first = m.outputs[0]
+        found = [own.get((kind, m.name)) for kind in kinds]
+        lines.append(
+            f"  {m.name:{width}}  {m.condition:22} {first.errors.rse:9.2g} {first.errors.chi_square:8.3g} "
+            f"{first.offset:9.2g} {m.rate_factor:6.2f} {m.weight:6.2f}"
+            + "".join(f" {'-' if n is None else _plus_minus(n):>18}" for n in found)
+        )
+    return [*lines, *_shared(fit)]
+
+
+def _shared(fit: Identification) -> list[str]:
+    """Nuisances that tests share, and spreads that were estimated."""
+    lines = [
+        f"  {n.kind} of {n.member or 'one alloy'}{_unit(n.kind)}: {_plus_minus(n)}"
+        for n in fit.nuisances
+        if n.scope != "test"
+    ]
+    for nuisance in fit.settings.nuisances:
+        found = [n.spread for n in fit.nuisances if n.kind == nuisance.kind]
+        if nuisance.sd is None and found:
+            lines.append(f"  {nuisance.kind}: spread estimated as {found[0]:.3g}{_unit(nuisance.kind)}")
+    return lines
+
+
+def _plus_minus(n: NuisanceEstimate) -> str:
+    return f"{n.value:.4g} +- {n.sd:.2g}"
+
+
+def _unit(kind: str) -> str:
+    return f", {UNITS[kind]}" if kind in UNITS else ""
 
 
 def notes_of(fit: Identification) -> list[str]:
@@ -55,7 +136,7 @@ def notes_of(fit: Identification) -> list[str]:
         f"{name} {low:.4g} to {high:.4g} {units.get(name, '')}".strip() for name, (low, high) in fit.ranges.items()
     )
     lines.append(f"valid within the tests: {', '.join(covered)}")
-    lines.append(
-        f"rms of ln strain {fit.rms:.3g}; rates of single tests scatter by {100 * fit.scatter.rate:.0f} % (one sd)"
-    )
-    return [*lines, *fit.notes]
+    scatter = f"rates of single tests scatter by {100 * fit.scatter.rate:.0f} % (one sd)"
+    met = [f"rms of ln strain {fit.rms:.3g}"] if "strain" in fit.errors else []
+    met += [f"relative squared error of {name} {e.rse:.3g}" for name, e in fit.errors.items() if name != "strain"]
+    return [*lines, "; ".join([*met, scatter]), *fit.notes]

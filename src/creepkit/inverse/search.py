@@ -16,6 +16,8 @@ from scipy.stats import qmc
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.effects import Unknowns
+from creepkit.inverse.fences import Fences
 from creepkit.inverse.objective import Objective
 from creepkit.language import CreepLaw
 
@@ -27,7 +29,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Box:
-    """Bounds in conditioned coordinates, (parameters,) each."""
+    """Bounds of the unknowns of a search, (unknowns,) each, and the scale on which it steps."""
 
     low: Floats
     high: Floats
@@ -39,6 +41,11 @@ class Box:
         for k in coordinates.rates:
             low[k], high[k] = log_rate + RATE_WINDOW[0], log_rate + RATE_WINDOW[1]
         return cls(low, high)
+
+    def beside(self, unknowns: Unknowns) -> Box:
+        """The box of x = (u, e), with the limits of the unknowns of tests."""
+        n = unknowns.size
+        return Box(np.concatenate([self.low, unknowns.low[:n]]), np.concatenate([self.high, unknowns.high[:n]]))
 
     def clip(self, u: Floats) -> Floats:
         """The nearest point inside."""
@@ -58,51 +65,6 @@ class Minimum:
     cost: float
     converged: bool
     evaluations: int
-
-
-class Fences:
-    """Extra residuals that keep the author's bounds of coefficients and the law's constraints.
-
-    Each is zero inside and grows linearly outside: coefficients are not box variables in conditioned coordinates.
-    """
-
-    SLOPE = 300.0
-
-    def __init__(self, objective: Objective) -> None:
-        self.coordinates, law = objective.coordinates, objective.law
-        ends = [(p.to_internal(p.bounds[0]), p.to_internal(p.bounds[1])) for p in law.params.values()]
-        self.low = np.array([ends[k][0] for k in self.coordinates.rates])
-        self.high = np.array([ends[k][1] for k in self.coordinates.rates])
-        self._constraints = _margins(law, objective)
-
-    def values(self, u: Floats) -> Floats:
-        """(fences,) residuals at u."""
-        theta = self.coordinates.theta(u)
-        margins = self._constraints(theta)
-        return self.SLOPE * np.concatenate([np.abs(self.outside(theta)), np.maximum(-margins, 0.0)])
-
-    def violations(self, u: Floats) -> Floats:
-        """How far each constraint is violated at u; 0 where it holds."""
-        return np.maximum(-self._constraints(self.coordinates.theta(u)), 0.0)
-
-    def jacobian(self, u: Floats) -> Floats:
-        """(fences, parameters); constraints by central differences."""
-        theta = self.coordinates.theta(u)
-        rates = list(self.coordinates.rates)
-        slopes = np.sign(self.outside(theta))[:, None] * self.coordinates.jacobian(u)[rates]
-        columns = [np.zeros(0)] * u.size
-        if self._constraints(theta).size:
-            for k in range(u.size):
-                step = np.zeros(u.size)
-                step[k] = 1e-6 * max(1.0, abs(u[k]))
-                ends = (np.maximum(-self._constraints(self.coordinates.theta(v)), 0.0) for v in (u + step, u - step))
-                columns[k] = np.subtract(*ends) / (2 * step[k])
-        return self.SLOPE * np.concatenate([slopes, np.stack(columns, axis=1)])
-
-    def outside(self, theta: Floats) -> Floats:
-        """How far each coefficient lies beyond its bounds, in ln: above positive, below negative."""
-        own = theta[list(self.coordinates.rates)]
-        return np.asarray(np.maximum(own - self.high, 0.0) + np.minimum(own - self.low, 0.0))
 
 
 def multistart(
@@ -135,10 +97,11 @@ def from_single_terms(
         if not single.params:
             continue
         coordinates = Coordinates(single, objective.coordinates.reference)
-        part = Objective(single, objective.histories, objective.using, coordinates, objective.scale, objective.output)
+        part = objective.asking(objective.using, single, coordinates)
         own = [law.names.index(name) for name in single.names]
         inner = Box(box.low[own], box.high[own])
         minimum = multistart(part, inner, factor, starts=starts, draws=draws, seed=seed, loss=loss)[0]
+        objective.evaluations += part.evaluations
         u = 0.5 * (box.low + box.high)
         u[own] = minimum.u
         rates = objective.coordinates.rates
@@ -155,7 +118,7 @@ def refine(
 ) -> Minimum:  # fmt: skip
     """Bounded least squares (scipy's trust region reflective) from one start, with analytic Jacobian.
 
-    factor : (tests, frames, frames) Cholesky factors of the covariance, which stay as they are during the search.
+    factor : (tests, entries, entries) Cholesky factors of the covariance, which stay as they are during the search.
     """
     fences = Fences(objective)
     memory: dict[bytes, tuple[Floats, Floats]] = {}
@@ -174,7 +137,9 @@ def refine(
             )
         return memory[key]
 
-    scale = 0.1 * box.width
+    scale, own = 0.1 * box.width, objective.unknowns.size
+    if own:
+        scale[-own:] = np.minimum(objective.unknowns.sd, box.width[-own:])
     room = 1e-9 * box.width
     result = least_squares(
         lambda u: evaluate(u)[0],
@@ -191,16 +156,6 @@ def refine(
     return Minimum(np.asarray(result.x), float(result.cost), bool(result.status > 0), int(result.nfev))
 
 
-def measured_log_rate(objective: Objective) -> float:
-    """Median over tests of the log of end strain over end time: the scale of rates that the data speak of."""
-    logs = []
-    for k, history in enumerate(objective.histories):
-        last = int(np.flatnonzero(objective.present[k])[-1])
-        strain = max(float(objective.measured[k, last]), 1e-9)
-        logs.append(np.log(strain / history.times[last]))
-    return float(np.median(logs))
-
-
 def _screened(objective: Objective, box: Box, *, starts: int, draws: int, seed: int) -> list[Floats]:
     """The centre, and the best draws after a shift of all rates to the level of the data."""
     unit = qmc.Sobol(box.low.size, seed=seed).random(draws)
@@ -214,12 +169,11 @@ def _screened(objective: Objective, box: Box, *, starts: int, draws: int, seed: 
         shares[0] = _unequal(len(rates))
         points[:, rates] = level + np.log(np.maximum(shares, 1e-4))
         for _ in range(3):
-            misfit = objective.screen(box.clip(points))
-            shift = np.array([np.median(m[objective.present]) for m in misfit])
+            shift = objective.excess(objective.screen(box.clip(points)))
             points[:, rates] -= np.clip(shift, -6, 6)[:, None]
     points = box.clip(points)
     misfit = objective.screen(points)
-    score = np.array([np.mean(np.arcsinh(m[objective.present]) ** 2) for m in misfit])
+    score = np.array([np.mean(np.arcsinh(m[objective.entries.present]) ** 2) for m in misfit])
     if not np.isfinite(score).any():
         raise FitError(f"law '{objective.law.name}': no point within its bounds can be simulated; widen the bounds")
     order = [int(k) for k in np.argsort(score) if k != 0][: max(starts - 1, 0)]
@@ -230,43 +184,3 @@ def _unequal(count: int) -> Floats:
     """Shares .7, .2, .1 and so on: equal shares are a stationary point from which no search escapes."""
     shares = np.array([0.7, *(0.3 * 0.67**k for k in range(1, count))])
     return np.asarray(shares / shares.sum())
-
-
-def _margins(law: CreepLaw, objective: Objective) -> Callable[[Floats], Floats]:
-    """How far each constraint is from being violated, the worst over the stresses, temperatures and times of the tests.
-
-    A margin that is not a number counts as violated.
-    """
-    import sympy
-
-    from creepkit.language.symbols import POINT
-
-    if not law.constraints:
-        return lambda _: np.zeros(0)
-    sides = [relation.gts - relation.lts for relation in law.constraints]
-    functions = [sympy.lambdify((*POINT, *law.states, *law.params), side, "numpy") for side in sides]
-    point = _visited(objective)
-    inner = [state.initial for state in law.states.values()]
-
-    def margins(theta: Floats) -> Floats:
-        values = [np.exp(t) if p.scale == "log" else t for p, t in zip(law.params.values(), theta, strict=True)]
-        with np.errstate(all="ignore"):
-            found = np.array([float(np.min(f(*point, *inner, *values))) for f in functions])
-        return np.where(np.isfinite(found), found, -1.0)
-
-    return margins
-
-
-def _visited(objective: Objective) -> list[Floats]:
-    """The six variables of the point over every test's stresses and temperatures, and times from first to last."""
-    pairs = {
-        (float(s), float(T))
-        for h in objective.histories
-        for s in h.loading.program().values
-        for T in h.temperature_program().values
-    }
-    end = float(objective.times[objective.present].max())
-    times = np.concatenate([np.zeros(1), np.geomspace(1e-3 * end, end, 60)])
-    stress, temperature = (np.repeat([pair[k] for pair in sorted(pairs)], times.size) for k in (0, 1))
-    strain = np.full(stress.size, objective.coordinates.reference.strain)
-    return [stress, strain, np.tile(times, len(pairs)), temperature, stress, stress / 3]

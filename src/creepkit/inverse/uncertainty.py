@@ -2,7 +2,9 @@
 
 Values minimise r' W r with the working covariance W^-1; residuals really have the covariance C. With J = dr/du the
 covariance of the values is H^-1 (J'W C W J + P) H^-1, the sandwich, with H = J'WJ + P and P a weak Gaussian prior of
-the variance of each parameter's bounds: what the data do not touch keeps the width of its bounds. Intervals are 95 %.
+the variance of each parameter's bounds: what the data do not touch keeps the width of its bounds. Unknowns of tests
+(thickness and so on) stand in x beside the parameters, with their own priors in P, so that the intervals of the law
+hold their uncertainty. Intervals are 95 %.
 
 Sizes of scatter come from the same few tests: with T tests and K parameters the part that the scatter between tests
 contributes is scaled by T/(T - K) and has T - K degrees of freedom, the rest those of its independent frames;
@@ -19,8 +21,10 @@ from scipy.stats import t as student
 
 from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.covariance import Scatter, covariance, effective_size, whitener
+from creepkit.inverse.covariance import covariance, effective_size, whitener
+from creepkit.inverse.effects import Unknowns
 from creepkit.inverse.objective import Residuals
+from creepkit.inverse.scatter import Scatter
 from creepkit.inverse.search import Box
 from creepkit.language import CreepLaw
 
@@ -46,38 +50,59 @@ def quantile(freedom: float) -> float:
 
 
 def laplace(
-    residuals: Residuals, log_times: Floats, working: Scatter, scatter: Scatter, box: Box, *, rate_known: bool = False
+    residuals: Residuals, working: Scatter, scatter: Scatter, box: Box, unknowns: Unknowns, *, rate_known: bool = False
 ) -> tuple[Floats, float]:
-    """Posterior covariance of u, (parameters, parameters), and its degrees of freedom.
+    """Posterior covariance of x = (u, e), (unknowns, unknowns), and its degrees of freedom.
 
     rate_known : the scatter of the rate between tests was given and not estimated from them.
     """
     assert residuals.jacobian is not None
-    count, tests = box.width.size, len(residuals.values)
-    factor = whitener(residuals, log_times, working)
+    count, tests = box.width.size - unknowns.size, len(residuals.values)
+    factor = whitener(residuals, working)
     white = np.linalg.solve(factor, residuals.jacobian)
     weighted = np.linalg.solve(np.swapaxes(factor, 1, 2), white)
-    prior = np.diag(12.0 / box.width**2)
-    inner = _inverse(np.einsum("tfp,tfq->pq", white, white) + prior)
+    prior = np.diag(np.concatenate([12.0 / box.width[:count] ** 2, unknowns.precision]))
+    inner = inverse(np.einsum("tfp,tfq->pq", white, white) + prior)
 
     def meat(source: Scatter) -> Floats:
-        c = covariance(residuals, log_times, source)
-        return np.asarray(np.einsum("tfp,tfg,tgq->pq", weighted, c, weighted))
+        c = covariance(residuals, source)
+        return np.asarray(np.einsum("tfp,tfg,tgq->pq", weighted, c, weighted, optimize=True))
 
     alone = replace(scatter, rate=0.0)
     own = meat(alone)
     within = inner @ (own + prior) @ inner
     between = inner @ (meat(scatter) - own) @ inner
-    free = max(tests - count, 1.0), max(effective_size(residuals, log_times, alone) - count, 1.0)
+    free = max(tests - count, 1.0), max(effective_size(residuals, alone) - count, 1.0)
     if rate_known:
         free = (1e9, free[1])
     else:
         between *= tests / free[0]
-    share = float(np.mean(np.diag(between) / np.maximum(np.diag(between + within), 1e-300)))
-    return within + between, 1.0 / (share**2 / free[0] + (1 - share) ** 2 / free[1])
+    share = np.diag(between)[:count] / np.maximum(np.diag(between + within)[:count], 1e-300)
+    part = float(np.mean(share))
+    return within + between, 1.0 / (part**2 / free[0] + (1 - part) ** 2 / free[1])
 
 
-def _inverse(matrix: Floats) -> Floats:
+def curvature(residuals: Residuals, working: Scatter) -> Floats:
+    """J' W J of x = (u, e), (unknowns, unknowns)."""
+    assert residuals.jacobian is not None
+    white = np.linalg.solve(whitener(residuals, working), residuals.jacobian)
+    return np.asarray(np.einsum("tfp,tfq->pq", white, white))
+
+
+def marginal(likelihood: float, curve: Floats, e: Floats, unknowns: Unknowns) -> float:
+    """Log-likelihood with the unknowns of tests integrated out, by Laplace's approximation.
+
+    curve : J' W J of x. A prior without end counts as one of the width of the unknown's limits.
+    """
+    if not unknowns.size:
+        return likelihood
+    sd = np.minimum(unknowns.sd, (unknowns.high - unknowns.low) / np.sqrt(12.0))
+    own = curve[-unknowns.size :, -unknowns.size :] * np.outer(sd, sd) + np.eye(unknowns.size)
+    distance = (e - unknowns.mean) * np.sqrt(unknowns.precision)
+    return float(likelihood - 0.5 * (distance**2).sum() - 0.5 * np.linalg.slogdet(own)[1])
+
+
+def inverse(matrix: Floats) -> Floats:
     """Inverse of a positive matrix whose rows differ by orders of magnitude."""
     scale = np.sqrt(np.diag(matrix))
     return np.asarray(np.linalg.inv(matrix / np.outer(scale, scale)) / np.outer(scale, scale))

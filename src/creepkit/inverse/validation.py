@@ -1,4 +1,4 @@
-"""How well a law predicts: time to a strain, its Z factor, and leave-one-condition-out.
+"""How well a law predicts uniaxial tests: time to a strain, its Z factor, and leave-one-condition-out.
 
 Z = 10^(2.5 s), with s the standard deviation of log10(measured / predicted time): the factor within which almost all
 times fall (Holdsworth et al. (2008), Int. J. Pressure Vessels and Piping 85, 80; below 2 is excellent, to 4 usual).

@@ -10,11 +10,24 @@ from creepkit.records.loading import (
     StressSteps,
     constant_stress,
 )
-from creepkit.records.prediction import Nuisance, Prediction, Predictor, Specimen, Status
+from creepkit.records.prediction import (
+    ABSOLUTE,
+    EXPLICIT,
+    Effects,
+    Nuisance,
+    Prediction,
+    Predictor,
+    Screened,
+    Specimen,
+    Status,
+)
 
 __all__ = [
+    "ABSOLUTE",
     "EVERY_FRAME",
+    "EXPLICIT",
     "ZERO_CELSIUS",
+    "Effects",
     "Exporter",
     "History",
     "Loading",
@@ -25,6 +38,7 @@ __all__ = [
     "Program",
     "Reader",
     "RecordedLoading",
+    "Screened",
     "Specimen",
     "Status",
     "StressSteps",

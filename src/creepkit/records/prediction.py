@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import TYPE_CHECKING, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -15,6 +15,10 @@ from creepkit.records.history import History
 
 if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
+
+
+Effects: TypeAlias = Mapping[str, Floats]
+"""{kind: (candidates or 1, tests)}: the value of an explicit nuisance in each test."""
 
 
 class Status(IntEnum):
@@ -36,6 +40,8 @@ class Prediction:
     status : (candidates, tests) Status of each row; end_times : (candidates, tests) s, where it ended.
     jacobian : (candidates, tests, times, outputs, parameters) or None: derivatives with respect to the law's
         *internal* parameters (the natural logarithm where the scale is log), in the law's order.
+    effect_jacobian : {kind: (candidates, tests, times, outputs)}: derivatives with respect to each test's own effect,
+        in the unit of that kind (see Nuisance); without the kinds that the predictor cannot differentiate.
     """
 
     values: Floats
@@ -45,6 +51,7 @@ class Prediction:
     end_times: Floats
     jacobian: Floats | None = None
     times: tuple[Floats, ...] = ()
+    effect_jacobian: Mapping[str, Floats] = field(default_factory=dict)
 
     def of(self, test: int, candidate: int = 0) -> Floats:
         """Outputs of one test, (times, outputs)."""
@@ -53,7 +60,12 @@ class Prediction:
 
 @runtime_checkable
 class Predictor(Protocol):
-    """Anything that predicts histories from a law and its values: specimen, surrogate or closed form."""
+    """Anything that predicts histories from a law and its values: specimen, surrogate or closed form.
+
+    Optional attributes, looked for by name: `outputs`, the names of what is predicted; `effects`, the kinds of
+    explicit nuisances that predict() understands; `reference_stress(history)`, the von Mises stress, MPa, that stands
+    for the test (a number, or one for each level of its loading); `screening()`, see Screened.
+    """
 
     def predict(
         self,
@@ -62,11 +74,24 @@ class Predictor(Protocol):
         histories: Sequence[History],
         *,
         jacobian: bool = False,
+        effects: Effects | None = None,
     ) -> Prediction:
         """Predict each history's outputs at its times.
 
         values : {parameter: number or (candidates,)} in the author's units; 0 may switch a parameter off.
+        effects : {kind: (candidates or 1, tests)} of what differs from test to test, measured as Nuisance says. A
+            kind that the predictor does not know is a SolveError. With `jacobian` the prediction has the derivatives
+            to the kinds given in `effect_jacobian`.
         """
+        ...
+
+
+@runtime_checkable
+class Screened(Predictor, Protocol):
+    """A predictor too expensive for a global search, with a cheap stand-in of the same outputs and effects."""
+
+    def screening(self) -> Predictor:
+        """Return the stand-in; it may be some per cent off and need not know derivatives."""
         ...
 
 
@@ -90,17 +115,31 @@ class Specimen(Predictor, Protocol):
         ...
 
 
+Kind: TypeAlias = Literal["offset", "rate", "thickness", "modulus", "temperature", "window"]
+
+EXPLICIT: tuple[Kind, ...] = ("thickness", "modulus", "temperature", "window")
+"""Kinds that change the simulation; "offset" and "rate" only change how its residuals scatter."""
+ABSOLUTE: tuple[Kind, ...] = ("thickness", "window")
+"""Kinds that are lengths in themselves, so that their prior mean is one too; the others are deviations, about zero."""
+
+
 @dataclass(frozen=True)
 class Nuisance:
     """Something unknown about a test that is not part of the law, with its prior.
 
-    kind : "offset" (added to an output), "rate" (ln of a factor on this test's creep rate: heat-to-heat scatter),
-        "thickness" (apex, mm), "modulus" (relative), "temperature" (K) or "window" (mm).
+    kind : "offset" (added to an output, in its unit), "rate" (ln of a factor on this test's creep rate: heat-to-heat
+        scatter), "thickness" (the apex thickness itself, mm), "window" (the radius within which the profile was
+        observed, mm), "modulus" (relative change of Young's modulus: .05 makes it 5 % stiffer) or "temperature"
+        (K above what the history says).
     scope : one unknown for each "test", each "alloy", or for "all" tests together.
-    mean, sd : Gaussian prior; sd = inf leaves it free, sd = None lets the fit estimate the spread.
+    output : to which output an offset belongs; "" stands for each output having its own.
+    mean, sd : Gaussian prior, in the unit of the kind; sd = inf leaves it free, sd = None lets the fit estimate the
+        spread. A thickness and a window are lengths, and so is their mean: `Nuisance("thickness", mean=0.4935,
+        sd=0.027)` says what was measured on such plates and replaces what histories and specimen say.
+    bounds : hard limits, in the same unit.
     """
 
-    kind: Literal["offset", "rate", "thickness", "modulus", "temperature", "window"]
+    kind: Kind
     scope: Literal["test", "alloy", "all"] = "test"
     output: str = ""
     mean: float = 0.0

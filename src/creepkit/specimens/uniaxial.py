@@ -18,8 +18,10 @@ from creepkit import integration, kernels
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
-from creepkit.records import History, Loading, Prediction, Program, Specimen, Status
+from creepkit.records import Effects, History, Loading, Prediction, Program, Specimen, Status
+from creepkit.specimens.elastic_part import observed
 from creepkit.specimens.run import Run
+from creepkit.specimens.uniaxial_effects import KINDS, predict_with
 
 if TYPE_CHECKING:
     from creepkit.integration import Integration, PointTest
@@ -41,6 +43,7 @@ class Uniaxial:
     name: str = field(default="uniaxial", init=False)
     title: str = field(default="Uniaxial tension under steps of stress or load", init=False)
     outputs: tuple[str, ...] = field(default=("strain",), init=False)
+    effects: tuple[str, ...] = field(default=KINDS, init=False)
 
     def __post_init__(self) -> None:
         if not 1e-13 <= self.tolerance <= 1e-2:
@@ -61,8 +64,23 @@ class Uniaxial:
         histories: Sequence[History],
         *,
         jacobian: bool = False,
+        effects: Effects | None = None,
     ) -> Prediction:
-        """Predict the strain of each history at its times, for numbers or (candidates,) values of the parameters."""
+        """Predict the strain of each history at its times, for numbers or (candidates,) values of the parameters.
+
+        effects : "temperature" (K above what the history says) and "modulus" (relative change, of the elastic part).
+        """
+
+        def plain(values: Mapping[str, ArrayLike], histories: Sequence[History], jacobian: bool) -> Prediction:
+            return self._predict(law, values, histories, jacobian)
+
+        if effects:
+            return predict_with(plain, values, histories, effects, jacobian)
+        return plain(values, histories, jacobian)
+
+    def _predict(
+        self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], jacobian: bool
+    ) -> Prediction:
         result = self._integrate(law, values, histories, jacobian)
         candidates, longest = result.strain.shape[0], max((h.times.size for h in histories), default=0)
         strain = np.full((candidates, len(histories), longest, 1), np.nan)
@@ -143,21 +161,6 @@ def point_test(history: History) -> PointTest:
         times=history.times,
         constant_load=getattr(history.loading, "control", "stress") == "load",
     )
-
-
-def observed(history: History, creep: Floats) -> Floats:
-    """The strain that a history's instrument shows, (candidates, times), from logarithmic creep strain."""
-    strain = np.expm1(creep) if history.strain_measure == "engineering" else creep
-    return strain + elastic_strain(history) if history.includes_elastic else strain
-
-
-def elastic_strain(history: History) -> Floats:
-    """Nominal stress over the modulus at each time, (times,)."""
-    if history.elastic is None:
-        return np.zeros(history.times.size)
-    temperatures, which = np.unique(history.temperature_program().at(history.times), return_inverse=True)
-    moduli = np.array([float(history.elastic.at(float(T)).E) for T in temperatures])
-    return np.asarray(history.loading.program().at(history.times) / moduli[which])
 
 
 def _stretch(history: History, creep: Floats) -> Floats:

@@ -1,0 +1,219 @@
+"""The mesh in an input deck of Abaqus or CalculiX: its cards, and what each of them adds to a draft."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from creepkit.errors import SolveError, nearest
+from creepkit.fem.cells import number, text_of, whole
+from creepkit.fem.drafts import Draft, Element
+
+T = TypeVar("T")
+
+TYPES = {"CAX4": 4, "CAX4R": 4, "CAX8": 8, "CAX8R": 8}
+"""Nodes of the element types that are read."""
+
+NAMED_SUPPORTS = {"ENCASTRE": (True, True), "PINNED": (True, True), "XSYMM": (True, False), "YSYMM": (False, True)}
+"""Whether r and z are held by the supports that Abaqus knows by name."""
+
+
+@dataclass
+class Card:
+    """One *KEYWORD with its options in capitals and its data lines as (place, cells)."""
+
+    name: str
+    options: dict[str, str]
+    place: str
+    rows: list[tuple[str, list[str]]] = field(default_factory=list)
+
+    def option(self, name: str) -> str:
+        """An option that must be there."""
+        if not self.options.get(name):
+            raise SolveError(f"{self.place}: *{self.name} has no {name}; write *{self.name}, {name}=...")
+        return self.options[name]
+
+
+@dataclass
+class Deck:
+    """A draft and the sets and surfaces of its deck, by name in capitals."""
+
+    draft: Draft
+    node_sets: dict[str, dict[int, None]] = field(default_factory=dict)
+    element_sets: dict[str, dict[int, None]] = field(default_factory=dict)
+    surfaces: dict[str, set[tuple[int, int]]] = field(default_factory=dict)
+
+    def nodes(self, place: str, cell: str) -> list[int]:
+        """The node of a number, or those of a set."""
+        return _members(place, cell, self.node_sets, self.draft.nodes, "node")
+
+    def elements(self, place: str, cell: str) -> list[int]:
+        """The element of a number, or those of a set."""
+        return _members(place, cell, self.element_sets, self.draft.elements, "element")
+
+
+def read_deck(path: Path, pressed: str | None, top: str | None) -> Draft:
+    """The mesh of a deck as a draft."""
+    cards = list(_cards(path))
+    deck = Deck(Draft(path))
+    for steps in (_MESH, _USES):
+        for card in cards:
+            if card.name in steps:
+                steps[card.name](deck, card)
+    if pressed is not None:
+        deck.draft.pressed = set(_named(path, pressed, deck.surfaces, "surface"))
+    if top is not None:
+        deck.draft.top = set(_named(path, top, deck.node_sets, "node set"))
+    return deck.draft
+
+
+def _cards(path: Path) -> Iterator[Card]:
+    """The cards of a deck; a keyword line that ends in a comma goes on in the next line."""
+    card: Card | None = None
+    head = ""
+    for line, text in enumerate(text_of(path).splitlines(), 1):
+        text, place = text.strip(), f"{path}:{line}"
+        if not text or text.startswith("**"):
+            continue
+        if text.startswith("*") or head:
+            head += text
+            if head.endswith(","):
+                continue
+            if card is not None:
+                yield card
+            card, head = _card(place, head), ""
+        elif card is not None:
+            card.rows.append((place, [cell.strip() for cell in text.split(",")]))
+        else:
+            raise SolveError(f"{place}: data before any keyword; an input deck begins with a line such as *NODE")
+    if card is not None:
+        yield card
+
+
+def _card(place: str, head: str) -> Card:
+    name, *words = (word.strip() for word in head[1:].split(","))
+    pairs = (word.partition("=") for word in words)
+    options = {key.strip().upper(): value.strip().strip('"').upper() for key, _, value in pairs}
+    return Card(" ".join(name.upper().split()), options, place)
+
+
+def _node(deck: Deck, card: Card) -> None:
+    for place, cells in card.rows:
+        label = whole(place, "node", cells[0])
+        r, z = (number(place, name, cell or "0") for name, cell in zip("rz", [*cells[1:], "", ""], strict=False))
+        deck.draft.add_node(label, r, z, place)
+        _collect(deck.node_sets, card.options.get("NSET"), [label])
+
+
+def _element(deck: Deck, card: Card) -> None:
+    kind = card.option("TYPE")
+    if kind not in TYPES:
+        raise SolveError(f"{card.place}: element type {kind} is not supported; allowed are {', '.join(TYPES)}")
+    cells: list[str] = []
+    for place, row in card.rows:
+        cells += [cell for cell in row if cell]
+        if len(cells) <= TYPES[kind] and row[-1] == "":
+            continue
+        if len(cells) != TYPES[kind] + 1:
+            raise SolveError(
+                f"{place}: an element {kind} has a number and {TYPES[kind]} nodes, found {len(cells)} cells"
+            )
+        label, *nodes = (whole(place, "element or node", cell) for cell in cells)
+        deck.draft.add_element(label, Element(tuple(nodes), place))
+        _collect(deck.element_sets, card.options.get("ELSET"), [label])
+        cells = []
+
+
+def _set(deck: Deck, card: Card) -> None:
+    sets, members = (deck.node_sets, deck.nodes) if card.name == "NSET" else (deck.element_sets, deck.elements)
+    name = card.option(card.name)
+    sets.setdefault(name, {})
+    for place, cells in card.rows:
+        if "GENERATE" in card.options:
+            first, last, step = (whole(place, "range", cell) for cell in [*[c for c in cells if c], "1"][:3])
+            cells = [str(label) for label in range(first, last + 1, step)]
+        for cell in cells:
+            _collect(sets, name, members(place, cell) if cell else [])
+
+
+def _surface(deck: Deck, card: Card) -> None:
+    sides = deck.surfaces.setdefault(card.option("NAME"), set())
+    if card.options.get("TYPE", "ELEMENT") == "ELEMENT":
+        for place, cells in card.rows:
+            sides |= {(element, _face(place, cells, "S")) for element in deck.elements(place, cells[0])}
+
+
+def _boundary(deck: Deck, card: Card) -> None:
+    for place, cells in card.rows:
+        what = cells[1].upper() if len(cells) > 1 else ""
+        if what in NAMED_SUPPORTS:
+            r, z = NAMED_SUPPORTS[what]
+        else:
+            first, last, motion = ([*cells[1:], "", "", ""])[:3]
+            begin = whole(place, "first direction", first)
+            directions = range(begin, whole(place, "last direction", last or first) + 1)
+            if motion and number(place, "motion", motion) != 0:
+                raise SolveError(f"{place}: a motion of {motion} mm is prescribed; only nodes at rest are read, with 0")
+            r, z = 1 in directions, 2 in directions
+        deck.draft.hold(deck.nodes(place, cells[0]), r, z)
+
+
+def _distributed(deck: Deck, card: Card) -> None:
+    for place, cells in card.rows:
+        label = cells[1].upper() if len(cells) > 1 else ""
+        if card.name == "DSLOAD" and label == "P":
+            deck.draft.pressed |= set(_named(place, cells[0], deck.surfaces, "surface"))
+        elif card.name == "DLOAD" and label[:1] == "P":
+            side = _face(place, cells, "P")
+            deck.draft.pressed |= {(element, side) for element in deck.elements(place, cells[0])}
+
+
+def _include(deck: Deck, card: Card) -> None:
+    raise SolveError(f"{card.place}: *INCLUDE is not followed; put the included lines into {deck.draft.path.name}")
+
+
+_MESH: Mapping[str, Callable[[Deck, Card], None]] = {
+    "INCLUDE": _include,
+    "NODE": _node,
+    "ELEMENT": _element,
+    "NSET": _set,
+    "ELSET": _set,
+}
+_USES: Mapping[str, Callable[[Deck, Card], None]] = {
+    "SURFACE": _surface,
+    "BOUNDARY": _boundary,
+    "DLOAD": _distributed,
+    "DSLOAD": _distributed,
+}
+
+
+def _collect(sets: dict[str, dict[int, None]], name: str | None, members: list[int]) -> None:
+    if name:
+        sets.setdefault(name, {}).update(dict.fromkeys(members))
+
+
+def _members(
+    place: str, cell: str, sets: Mapping[str, Mapping[int, None]], known: Mapping[int, object], what: str
+) -> list[int]:
+    """One number, or the members of a set; the name of an instance before a point is dropped."""
+    if not cell.isdigit():
+        return list(_named(place, cell, sets, f"{what} set"))
+    if int(cell) not in known:
+        raise SolveError(f"{place}: there is no {what} {cell}; name one of the {len(known)} {what}s given before")
+    return [int(cell)]
+
+
+def _named(place: str | Path, name: str, known: Mapping[str, Iterable[T]], what: str) -> Iterable[T]:
+    key = name.upper().rpartition(".")[2]
+    if key not in known:
+        raise SolveError(f"{place}: there is no {what} '{name}'; {nearest(key, known)}")
+    return known[key]
+
+
+def _face(place: str, cells: list[str], letter: str) -> int:
+    label = cells[1].upper() if len(cells) > 1 else ""
+    if label not in {f"{letter}{k}" for k in range(1, 5)}:
+        raise SolveError(f"{place}: '{label}' is no side of a quadrilateral; allowed are {letter}1 to {letter}4")
+    return int(label[1])

@@ -1,0 +1,167 @@
+"""The adaptive march of a point in six components over programs; output times are ends of steps."""
+
+from __future__ import annotations
+
+from math import exp, inf, isfinite
+from typing import NamedTuple
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.integration.clock import Clock, moment, plain, position, virgin
+from creepkit.integration.control import VIRGIN_CAUTION, Settings, stretch
+from creepkit.integration.endings import (
+    DIVERGED,
+    REACHED_END,
+    STATE_LIMIT,
+    STEP_TOO_SMALL,
+    STRAIN_LIMIT,
+    TOO_MANY_STEPS,
+)
+from creepkit.integration.segments import segments_of
+from creepkit.integration.tableau import Tableau
+from creepkit.integration.tensor_point import EQUIVALENT, TensorPoint
+from creepkit.records import Program
+
+_SMALLEST_STEP, _SMALLEST_FIRST_STEP = 1e-13, 1e-60
+
+
+class Segment(NamedTuple):
+    """start and end, s; the six imposed quantities and the temperature at both, (7,)."""
+
+    start: float
+    end: float
+    first: Floats
+    last: Floats
+
+    def at(self, time: float) -> Floats:
+        """The imposed quantities and the temperature within the segment."""
+        return np.asarray(self.first + (time - self.start) / (self.end - self.start) * (self.last - self.first))
+
+
+def segments_along(programs: list[Program], end: float) -> list[Segment]:
+    """Merge the programs from 0 to `end`, so that each is a straight line in every segment."""
+    rows = segments_of(*programs, end=end)
+    return [Segment(row[0], row[1], row[2::2], row[3::2]) for row in rows]
+
+
+class March:
+    """A march of a virgin point from time zero; `history` holds its vectors at the output times reached."""
+
+    def __init__(self, point: TensorPoint, settings: Settings, tableau: Tableau, outputs: Floats) -> None:
+        self.point, self.settings, self.tableau, self.outputs = point, settings, tableau, outputs
+        self.value = np.concatenate([np.zeros(EQUIVALENT + 1), point.law.initial])
+        self.slopes = np.zeros((tableau.stages, self.value.size))
+        self.history: list[Floats] = []
+        self.time, self.steps, self.tried = 0.0, 0, 0
+        self._record()
+
+    def along(self, segments: list[Segment]) -> int:
+        """Go through the segments; return the code of the ending."""
+        for segment in segments:
+            code = self._through(segment)
+            if code != REACHED_END:
+                return code
+        return REACHED_END
+
+    def _record(self) -> None:
+        while len(self.history) < self.outputs.size and self.outputs[len(self.history)] <= self.time:
+            self.history.append(self.value)
+
+    def _through(self, segment: Segment) -> int:
+        """March over one segment in the position s of its clock, from 0 to 1."""
+        clock = self._clock(segment)
+        s, h = 0.0, self.settings.first
+        while s < 1.0:
+            goal, time = self._goal(clock, segment)
+            h = min(h, self.settings.longest)
+            last = s + 1.001 * h > goal
+            step = goal - s if last else h
+            if self.tried >= self.settings.max_steps:
+                return TOO_MANY_STEPS
+            if not (step >= _SMALLEST_STEP * s and step >= _SMALLEST_FIRST_STEP):
+                return self._why_small(s)
+            self.tried += 1
+            new, error = self._attempt(segment, clock, s, step)
+            if not error <= 1.0:
+                h = step * stretch(self.tableau, error, False)
+                continue
+            grown = step * stretch(self.tableau, error, True)
+            h = max(h, grown) if last else grown
+            code = self._limit(new)
+            if code != REACHED_END:
+                self.time = moment(clock, s + step * self._crossing(new, step)).time
+                return code
+            s, self.value, self.steps = (goal if last else s + step), new, self.steps + 1
+            self.time = time if last else moment(clock, s).time
+            self._record()
+        return REACHED_END
+
+    def _clock(self, segment: Segment) -> Clock:
+        """A clock in which a virgin point creeps evenly, else plain time."""
+        length = segment.end - segment.start
+        if self.value[EQUIVALENT] > 0.0:
+            return plain(segment.start, length)
+        beta = float(np.reshape(self.point.law.leading(self.point.theta[None]), -1)[0])
+        return virgin(segment.start, length, beta)
+
+    def _goal(self, clock: Clock, segment: Segment) -> tuple[float, float]:
+        """Position and time of the next output, or of the segment's end."""
+        done = len(self.history)
+        if done < self.outputs.size and self.outputs[done] < segment.end:
+            return position(clock, self.outputs[done]), float(self.outputs[done])
+        return 1.0, segment.end
+
+    def _attempt(self, segment: Segment, clock: Clock, s: float, h: float) -> tuple[Floats, float]:
+        """The vector after a step and its error over what is allowed, infinite when a stage has no solution."""
+        tableau, slopes = self.tableau, np.zeros_like(self.slopes)
+        slope = self.slopes[-1] if s > 0.0 else np.zeros_like(self.value)
+        for i in range(tableau.stages):
+            base = self.value + h * tableau.a[i, :i] @ slopes[:i]
+            now, share = moment(clock, s + tableau.c[i] * h), tableau.a[i, i] * h
+            imposed = segment.at(now.time)
+            answer = self.point.stage(
+                base, base + share * slope, imposed[:6], now.time, float(imposed[6]), share * exp(now.log_pace)
+            )
+            if answer is None:
+                return self.value, inf
+            slopes[i] = slope = (answer - base) / share
+        new = self.value + h * tableau.a[-1] @ slopes
+        error = self._error(new, h * tableau.error @ slopes) * (VIRGIN_CAUTION if s == 0.0 and clock.tau == 0.0 else 1)
+        if error <= 1.0:
+            self.slopes = slopes
+        return new, error
+
+    def _error(self, new: Floats, errors: Floats) -> float:
+        """Largest local error over what is allowed; under prescribed strain the elastic strain counts as well."""
+        if new[EQUIVALENT] < self.value[EQUIVALENT]:
+            return inf
+        reach = np.maximum(np.abs(new), np.abs(self.value))
+        reach[:EQUIVALENT] = reach[EQUIVALENT]
+        if not self.point.free.all():
+            elastic = self.point.equivalent_stress / (3 * self.point.shear)
+            reach[: EQUIVALENT + 1] = np.minimum(reach[: EQUIVALENT + 1], elastic)
+        worst = float(np.max(np.abs(errors) / (self.settings.rtol * (reach + self.settings.smallest))))
+        return worst if isfinite(worst) else inf
+
+    def _limit(self, new: Floats) -> int:
+        """STATE_LIMIT or STRAIN_LIMIT when a vector has passed one, else REACHED_END."""
+        limits, initial, states = self.point.law.limits, self.point.law.initial, new[EQUIVALENT + 1 :]
+        passed = np.where(limits > initial, states >= limits, states <= limits) & np.isfinite(limits)
+        if passed.any():
+            return STATE_LIMIT
+        return STRAIN_LIMIT if new[EQUIVALENT] >= self.settings.strain_limit else REACHED_END
+
+    def _crossing(self, new: Floats, h: float) -> float:
+        """Share of the step at which the first limit is passed, by bisection of the dense output."""
+        low, high, powers = 0.0, 1.0, 1 + np.arange(self.tableau.dense.shape[1])
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            between = self.value + h * (self.tableau.dense @ middle**powers) @ self.slopes
+            low, high = (low, middle) if self._limit(between) != REACHED_END else (middle, high)
+        return high
+
+    def _why_small(self, s: float) -> int:
+        """A step that shrinks to nothing while the rate would burst the point at once: the rate diverges."""
+        rate = self.slopes[-1, EQUIVALENT] * max(s, 1e-6)
+        return DIVERGED if rate > self.settings.strain_limit else STEP_TOO_SMALL

@@ -1,0 +1,169 @@
+"""The stage of one point in six components: Newton's method in the strains that are free.
+
+Small strain, isotropic elasticity, creep along the deviator of stress:
+
+    sigma = C (eps - eps_cr)        d(eps_cr)/dt = 3/2 f(q, p, t, T, states) s/q        dp/dt = f
+
+with q the von Mises stress and s the deviator. The direction of s is that of the trial stress, so what remains is the
+scalar problem of `integration.stage` with k = 3G; its derivatives come from `integration.response`. A finite element
+does the same at each of its points. Tensors are vectors of the components 11, 22, 33, 12, 23, 13, with shear strains
+of the tensor, half of the engineering ones.
+"""
+
+from __future__ import annotations
+
+from math import isfinite, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats
+from creepkit.integration.problem import SOLVED, Axes, Problem
+from creepkit.integration.response import BY_MEAN, BY_PRINCIPAL, BY_TRIAL, INPUTS, gradient_of_update, respond
+from creepkit.integration.stage import solve
+from creepkit.kernels.calling import call
+from creepkit.kernels.interface import POINT_SIZE, STRESS, TEMPERATURE, TIME, CompiledLaw
+
+EQUIVALENT = 6
+"""Place of the equivalent creep strain in a point's vector: six creep strains, then this, then the states."""
+
+_UNIT = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+_TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+_ROWS, _COLUMNS = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
+_DEVIATOR = np.eye(6) - np.outer(_UNIT, _UNIT) / 3.0
+
+_ITERATIONS = 30
+_BALANCE, _NO_STRESS = 1e-9, 1e-12
+_LAST_CORRECTION = 1e-8
+_FIRST_INCREMENT = 1e-6
+
+
+class Trial(NamedTuple):
+    """The stress if nothing crept: mean stress, deviator (6,), von Mises stress q, in MPa, and the axes it fixes.
+
+    along : (6,) derivative of the deviator's largest principal stress to the deviator.
+    """
+
+    mean: float
+    s: Floats
+    q: float
+    axes: Axes
+    along: Floats
+
+
+class Answer(NamedTuple):
+    """The vector after a stage, (7 + S,), the stress, (6,), and its consistent tangent to the strain, (6, 6)."""
+
+    vector: Floats
+    stress: Floats
+    tangent: Floats
+
+
+def trial_of(stress: Floats) -> Trial:
+    """Take a stress apart."""
+    mean = float(stress[:3].mean())
+    s = stress - mean * _UNIT
+    q = sqrt(1.5 * float((_TWICE * s) @ s))
+    tensor = np.empty((3, 3))
+    tensor[_ROWS, _COLUMNS] = tensor[_COLUMNS, _ROWS] = s
+    values, vectors = np.linalg.eigh(tensor)
+    axis = vectors[:, -1]
+    slope = float(values[-1]) / q if q > 0.0 else 0.0
+    return Trial(mean, s, q, Axes(mean, slope, mean, 0.0), _TWICE * axis[_ROWS] * axis[_COLUMNS])
+
+
+class TensorPoint:
+    """A material and the components of strain that are free, with working arrays; its vector is (7 + S,)."""
+
+    def __init__(self, law: CompiledLaw, theta: Floats, elastic: tuple[float, float], held: Bools) -> None:
+        E, nu = elastic
+        size = 1 + law.states
+        self.law, self.theta, self.free = law, theta, ~held
+        self.shear, self.bulk = E / (2 * (1 + nu)), E / (3 * (1 - 2 * nu))
+        self.stiffness = self.bulk * np.outer(_UNIT, _UNIT) + 2 * self.shear * _DEVIATOR
+        self.row, self.out = np.zeros(POINT_SIZE + law.states), np.zeros(size * (1 + POINT_SIZE + law.states))
+
+    @property
+    def equivalent_stress(self) -> float:
+        """The von Mises stress at the end of the last stage, MPa."""
+        return float(self.row[STRESS])
+
+    def elastic_answer(self, imposed: Floats, creep: Floats) -> tuple[Floats, Floats]:
+        """Stress and strain when creep strains are known; `imposed` mixes stresses and strains."""
+        free, strain = self.free, np.where(self.free, 0.0, imposed)
+        known = self.stiffness @ (strain - creep)
+        strain[free] = np.linalg.solve(self.stiffness[np.ix_(free, free)], (imposed - known)[free])
+        return np.where(free, imposed, self.stiffness @ (strain - creep)), strain
+
+    def stage(
+        self, base: Floats, guess: Floats, imposed: Floats, time: float, temperature: float, weight: float
+    ) -> Floats | None:
+        """The vector at the end of a stage that starts from `base` with a weight in s; None when there is none."""
+        free = self.free
+        _, strain = self.elastic_answer(imposed, guess[:6])
+        self.row[TIME], self.row[TEMPERATURE] = time, temperature
+        for _ in range(_ITERATIONS):
+            answer = self.answer(strain, base, guess, weight)
+            if answer is None:
+                return None
+            residual = (answer.stress - imposed)[free]
+            if np.abs(residual).max(initial=0.0) <= _BALANCE * np.abs(answer.stress).max() + _NO_STRESS:
+                return answer.vector
+            strain[free] -= np.linalg.solve(answer.tangent[np.ix_(free, free)], residual)
+        return None
+
+    def answer(self, strain: Floats, base: Floats, guess: Floats, weight: float) -> Answer | None:
+        """What follows from a strain at the end of the stage whose time and temperature stand in the row."""
+        trial = trial_of(self.stiffness @ (strain - base[:6]))
+        if not isfinite(trial.q):
+            return None
+        problem = Problem(trial.q, 3 * self.shear, 0.0, weight, max(float(base[EQUIVALENT]), 0.0))
+        vector = self._creep(base, guess, trial, problem)
+        if vector is None:
+            return None
+        tangent = self._tangent(trial, problem, float(vector[EQUIVALENT] - base[EQUIVALENT]))
+        stress = trial.mean * _UNIT + self._share(trial) * trial.s
+        return None if tangent is None else Answer(vector, stress, tangent)
+
+    def _share(self, trial: Trial) -> float:
+        """What creep leaves of the deviator."""
+        return float(self.row[STRESS]) / trial.q if trial.q > 0.0 else 1.0
+
+    def _creep(self, base: Floats, guess: Floats, trial: Trial, problem: Problem) -> Floats | None:
+        """The vector after the creep that a trial stress brings about; the law's row is left at the solution."""
+        states = base[EQUIVALENT + 1 :].copy()
+        self.row[POINT_SIZE:] = guess[EQUIVALENT + 1 :]
+        first = float(guess[EQUIVALENT] - base[EQUIVALENT])
+        first = first if first > 0.0 else _FIRST_INCREMENT
+        increment, flag = solve(
+            self.law.update, self.theta, trial.axes, problem, states, self.row, self.out, first, _LAST_CORRECTION
+        )
+        flow = 1.5 * increment * trial.s / trial.q if trial.q > 0.0 else np.zeros(6)
+        change = np.concatenate([flow, [increment], self.row[POINT_SIZE:] - states])
+        return base + change if flag == SOLVED else None
+
+    def _tangent(self, trial: Trial, problem: Problem, increment: float) -> Floats | None:
+        """Derivative of stress to strain after `_creep`, (6, 6); None when it has none."""
+        if trial.q == 0.0:
+            return self.stiffness
+        answer = self._response(trial.axes, problem, increment)
+        if answer is None:
+            return None
+        share, G = self._share(trial), self.shear
+        d_q = 3 * G * _TWICE * trial.s / trial.q
+        d_mean = self.bulk * _UNIT
+        d_slope = (2 * G * (trial.along - _UNIT / 3) - trial.axes.principal_slope * d_q) / trial.q
+        d_principal = d_mean + self.row[STRESS] * d_slope
+        d_increment = answer[BY_TRIAL] * d_q + answer[BY_PRINCIPAL] * d_principal + answer[BY_MEAN] * d_mean
+        d_share = ((1 - share) * d_q - problem.stiffness * d_increment) / trial.q
+        return np.outer(_UNIT, d_mean) + 2 * G * share * _DEVIATOR + np.outer(trial.s, d_share)
+
+    def _response(self, axes: Axes, problem: Problem, increment: float) -> Floats | None:
+        """Derivatives of the creep increment to the inputs of the stage."""
+        size = 1 + self.law.states
+        out, _ = call(self.law, "update", self.row[None], self.theta)
+        gradient, response = np.zeros((size, self.row.size)), np.zeros((size, INPUTS + size - 1))
+        gradient_of_update(out[0], problem, increment, gradient)
+        rates, stress = out[0, 1:size].copy(), float(self.row[STRESS])
+        regular = respond(axes, problem, increment, stress, rates, gradient, np.zeros((size, size)), response)
+        return response[0] if regular and np.isfinite(response[0]).all() else None

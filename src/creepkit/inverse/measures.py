@@ -1,0 +1,73 @@
+"""How far predictions are from measurements, in the numbers that papers quote.
+
+The relative squared error sum (p - m)^2 / sum (m - mean m)^2 of Eq. (4) of Chen et al. depends on what `mean` is:
+`about="all"` takes one mean over all frames of all tests, the pooled value quoted here unless told otherwise;
+`about="test"` each test's own mean, which alone makes sense for a single test and is larger; `about="frame"` the mean
+of all tests at the same frame, the letter of Eq. (4) ("the averaged output vectors at the i-th time step").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.errors import FitError
+
+
+def relative_squared_error(
+    measured: Sequence[ArrayLike], predicted: Sequence[ArrayLike], about: Literal["all", "test", "frame"] = "all"
+) -> float:
+    """Return sum (p - m)^2 / sum (m - mean)^2 over all frames of all tests; each test a (frames,) array."""
+    truth = [np.asarray(m, float) for m in measured]
+    squares = sum(float(((np.asarray(p, float) - m) ** 2).sum()) for m, p in zip(truth, predicted, strict=True))
+    return squares / squares_about(truth, about) if squares_about(truth, about) > 0 else float("nan")
+
+
+def squares_about(truth: Sequence[Floats], about: Literal["all", "test", "frame"] = "all") -> float:
+    """Sum of (m - mean)^2 over all frames of all tests."""
+    if about == "test":
+        return sum(float(((m - m.mean()) ** 2).sum()) for m in truth if m.size)
+    if about == "all":
+        joined = np.concatenate(truth) if truth else np.zeros(0)
+        return float(((joined - joined.mean()) ** 2).sum()) if joined.size else 0.0
+    if len({m.size for m in truth}) > 1:
+        raise FitError('about="frame" needs tests of as many frames each; use "all" or "test"')
+    table = np.stack(truth)
+    return float(((table - table.mean(axis=0)) ** 2).sum())
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of one output, of one test or of all.
+
+    frames : how many were compared. rse : relative squared error (about the mean of just these frames).
+    mse, mae : mean squared and mean absolute error, in the output's unit. relative : rms error over the rms of what was
+    measured. chi_square : mean of (error / noise)^2; one would be noise alone. NaN where a frame was not predicted.
+    """
+
+    frames: int
+    rse: float
+    mse: float
+    mae: float
+    relative: float
+    chi_square: float
+
+
+def errors(measured: Floats, predicted: Floats, noise: Floats) -> Errors:
+    """Errors of predicted against measured values, (frames,) each; noise : (frames,) standard deviations."""
+    nan = float("nan")
+    if measured.size == 0:
+        return Errors(0, nan, nan, nan, nan, nan)
+    off = predicted - measured
+    mse = float(np.mean(off**2))
+    typical = float(np.mean(measured**2))
+    known = noise > 0
+    chi_square = float(np.mean((off[known] / noise[known]) ** 2)) if known.any() else nan
+    return Errors(
+        measured.size, relative_squared_error([measured], [predicted]), mse, float(np.mean(np.abs(off))),
+        float(np.sqrt(mse / typical)) if typical > 0 else nan, chi_square,
+    )  # fmt: skip

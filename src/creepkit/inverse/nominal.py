@@ -1,0 +1,64 @@
+"""The one stress and strain that stand for a test, where a law is looked at in a single point.
+
+A uniaxial test has them. For a bulge test a predictor may state its reference stress; else they are those of the
+paper's dimple: von Mises stress about 12.5 times the pressure and 30 mm of amplitude per unit of strain (the
+one-degree-of-freedom model of that dimple gives 17 to 8 and 45 to 10 mm between first creep and 2 mm). They only
+place coordinates and starts, so that a factor of two does no harm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.inverse.scales import usable
+from creepkit.inverse.together import predictor_of
+from creepkit.records import History, Predictor
+
+STRESS_PER_PRESSURE = 12.5
+AMPLITUDE_PER_STRAIN = 30.0
+"""mm."""
+
+
+def stresses(history: History, using: Predictor | None = None) -> Floats:
+    """The reference stresses that a test visits, MPa."""
+    offered = None if using is None else getattr(predictor_of(using, history), "reference_stress", None)
+    levels = history.loading.program().values
+    if offered is not None:
+        return np.atleast_1d(np.asarray(offered(history), float))
+    if history.loading.quantity == "stress":
+        return levels
+    return STRESS_PER_PRESSURE * np.unique(levels[levels > 0])
+
+
+def end_strain(history: History) -> float:
+    """The largest strain that a test reached, as far as its outputs tell."""
+    if "strain" in history.outputs:
+        return max(float(np.max(history.outputs["strain"][usable(history, "strain")], initial=0.0)), 1e-7)
+    return max(_amplitude_growth(history)[0] / AMPLITUDE_PER_STRAIN, 1e-7)
+
+
+def measured_log_rate(histories: Sequence[History]) -> float:
+    """Median over tests of the log of strain over time: the scale of rates that the data speak of."""
+    logs = []
+    for history in histories:
+        if "strain" in history.outputs:
+            last = int(np.flatnonzero(usable(history, "strain"))[-1])
+            strain, time = float(history.outputs["strain"][last]), float(history.times[last])
+        else:
+            growth, time = _amplitude_growth(history)
+            strain = growth / AMPLITUDE_PER_STRAIN
+        logs.append(np.log(max(strain, 1e-9) / time))
+    return float(np.median(logs))
+
+
+def _amplitude_growth(history: History) -> tuple[float, float]:
+    """How much the output that grows with creep did so between the first and last usable frame, and in which time."""
+    output = "amplitude" if "amplitude" in history.outputs else next(iter(history.outputs))
+    k = np.flatnonzero(usable(history, output))
+    values, times = history.outputs[output][k], history.times[k]
+    if k.size < 2:
+        return 0.0, float(history.times[-1])
+    return abs(float(values[-1] - values[0])), float(times[-1] - times[0])

@@ -1,0 +1,103 @@
+"""What an identification says about itself: where it came from, what it covers, and what to be wary of."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+
+import numpy as np
+
+from creepkit.inverse.alternation import Fitted
+from creepkit.inverse.fences import Fences
+from creepkit.inverse.identification import NuisanceEstimate, TestMisfit
+from creepkit.inverse.nominal import end_strain, stresses
+from creepkit.inverse.objective import Objective
+from creepkit.inverse.scatter import ASSUMED_RATE
+from creepkit.inverse.settings import Settings
+from creepkit.language import temperature
+
+FEW_TESTS = 3
+"""Below this many tests the scatter between them cannot be seen, and is assumed."""
+DISTRUSTED = 0.5
+"""Weight below which a test is named."""
+
+
+def ranges(objective: Objective) -> dict[str, tuple[float, float]]:
+    """What the fitted frames cover."""
+    tests = objective.histories
+    spread = {
+        "stress": [v for h in tests for v in stresses(h, objective.using)],
+        "temperature": [v for h in tests for v in h.temperature_program().values],
+        "strain": [0.0, *(end_strain(h) for h in tests)],
+        "time": [v for h in tests for v in (float(h.times[0]), float(h.times[-1]))],
+    }
+    return {name: (float(min(values)), float(max(values))) for name, values in spread.items()}
+
+
+def provenance(objective: Objective, settings: Settings, screened: int) -> dict[str, str | int]:
+    """Versions, fingerprints and counts; one evaluation is one candidate on all tests.
+
+    screened : evaluations of the global search, by the stand-in where the predictor has one.
+    """
+    law = objective.law
+    return {
+        "creepkit": version("creepkit"),
+        "law": law.name,
+        "fingerprint": law.fingerprint,
+        "specimen": getattr(objective.using, "name", type(objective.using).__name__),
+        "evaluations": objective.evaluations,
+        "search_evaluations": screened,
+        "data": _digest(objective, settings),
+        "when": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _digest(objective: Objective, settings: Settings) -> str:
+    """What was compared, and how: identifications that share it can be ranked against one another."""
+    digest, entries = hashlib.sha256(), objective.entries
+    for array in (entries.measured, entries.times, entries.present, entries.output):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    names = [h.name for h in objective.histories]
+    weights = settings.weights if isinstance(settings.weights, str) else sorted(settings.weights.items())
+    how = (names, entries.outputs, entries.scales, settings.loss, settings.test_loss, weights, settings.nuisances)
+    digest.update(repr(how).encode())
+    return digest.hexdigest()[:16]
+
+
+def notes(
+    objective: Objective, best: Fitted, settings: Settings, tests: Sequence[TestMisfit],
+    nuisances: Sequence[NuisanceEstimate],
+) -> tuple[str, ...]:  # fmt: skip
+    """What to be wary of, one sentence each."""
+    found, law, histories = [], objective.law, objective.histories
+    if not best.minimum.converged:
+        found.append("the last refinement stopped at its cap of steps: raise starts or look at the plot")
+    warmth = {round(float(v), 1) for h in histories for v in h.temperature_program().values}
+    if max(warmth) - min(warmth) > 5 and not law.uses(temperature):
+        found.append(f"the tests span {min(warmth):.0f} to {max(warmth):.0f} K and this law knows no temperature")
+    levels = {round(float(v), 3) for h in histories for v in stresses(h, objective.using)}
+    if len(levels) == 1:
+        found.append("all tests have one stress: the stress dependence is not determined by them")
+    if len(histories) < FEW_TESTS and any(n.kind == "rate" and n.sd is None for n in settings.nuisances):
+        found.append(f"fewer than {FEW_TESTS} tests: their rates are assumed to scatter by {100 * ASSUMED_RATE:.0f} %")
+    strains = [float(h.outputs["strain"].max()) for h in histories if "strain" in h.outputs]
+    if max(strains, default=0.0) > 0.5:
+        found.append("strains above 0.5 were fitted: a column in percent must say so, as strain_pct")
+    if (Fences(objective).violations(best.minimum.u[: len(law.params)]) > 1e-3).any():
+        found.append("a constraint of the law does not hold over the tests at these values")
+    return (*found, *_of_tests(objective, tests, nuisances))
+
+
+def _of_tests(objective: Objective, tests: Sequence[TestMisfit], nuisances: Sequence[NuisanceEstimate]) -> list[str]:
+    found = [
+        f"test '{m.name}' is far from the others and weighs {m.weight:.2g} of one"
+        for m in tests
+        if m.weight < DISTRUSTED
+    ]
+    unknowns = objective.unknowns
+    for n, low, high in zip(nuisances, unknowns.low, unknowns.high, strict=True):
+        if min(n.value - low, high - n.value) < 1e-4 * (high - low):
+            found.append(f"the {n.kind} of '{n.member}' lies at its bound, {n.value:.4g}")
+    return found

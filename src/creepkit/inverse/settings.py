@@ -1,0 +1,86 @@
+"""What a run of an identification can be repeated from, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from creepkit.errors import FitError
+from creepkit.records import ABSOLUTE, EXPLICIT, Nuisance
+
+LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
+TEST_LOSSES = ("gaussian", "student")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a run can be repeated from.
+
+    draws : Sobol points that are screened, a power of two is best; frames : looked at in each history, with all
+        their outputs.
+    loss : of frames, and of values only; intervals and scatter are Gaussian and see outliers as scatter.
+    test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its pull.
+    weights : "noise", the likelihood with the scatter that the data show, or {output: weight}: then values minimise
+        the sum of weight times relative squared error (see inverse.measures), as the paper's loss does.
+    nuisances : what differs between tests; unless told otherwise an offset of each output and test-to-test scatter
+        of the rate, both estimated.
+    """
+
+    starts: int = 8
+    draws: int = 64
+    frames: int = 40
+    seed: int = 0
+    loss: str = "linear"
+    nuisances: tuple[Nuisance, ...] = (Nuisance("offset"), Nuisance("rate"))
+    weights: Literal["noise"] | Mapping[str, float] = "noise"
+    test_loss: str = "gaussian"
+
+    def __post_init__(self) -> None:
+        for name, least in (("starts", 1), ("draws", 1), ("frames", 2), ("seed", 0)):
+            value = getattr(self, name)
+            if int(value) != value or value < least:
+                raise FitError(f"{name} is {value!r}; it must be a whole number of at least {least}")
+        if self.loss not in LOSSES:
+            raise FitError(f"loss '{self.loss}' is not known; allowed are {', '.join(LOSSES)}")
+        if self.test_loss not in TEST_LOSSES:
+            raise FitError(f"test_loss '{self.test_loss}' is not known; allowed are {' and '.join(TEST_LOSSES)}")
+        _check_weights(self.weights)
+        for nuisance in self.nuisances:
+            _check_nuisance(nuisance)
+        kinds = [(n.kind, n.output) for n in self.nuisances]
+        for kind, output in kinds:
+            if kinds.count((kind, output)) > 1:
+                raise FitError(f"nuisance '{kind}' is given twice; give one, with the scope that matters most")
+
+
+def _check_weights(weights: Literal["noise"] | Mapping[str, float]) -> None:
+    if isinstance(weights, str):
+        if weights != "noise":
+            raise FitError(f'weights is "{weights}"; allowed are "noise" and a mapping such as {{"amplitude": 0.99}}')
+        return
+    bad = [f"{name}: {value!r}" for name, value in weights.items() if not (np.isfinite(value) and value > 0)]
+    if bad or not weights:
+        found = bad[0] if bad else "none"
+        raise FitError(f"weights must be numbers above zero for at least one output, found {found}")
+
+
+def _check_nuisance(nuisance: Nuisance) -> None:
+    n, finite = nuisance, nuisance.sd is None or np.isfinite(nuisance.sd)
+    if n.output and n.kind != "offset":
+        raise FitError(f"nuisance '{n.kind}' acts on a whole test: it has no output, found output='{n.output}'")
+    if n.kind not in EXPLICIT:
+        if n.mean != 0 or np.isfinite(n.bounds).any() or n.scope != "test" or not finite:
+            raise FitError(
+                f"nuisance {n} is not known to this identification: Nuisance('offset') and Nuisance('rate') are one "
+                "for each test, about zero, with sd= a finite number or None to estimate it"
+            )
+        return
+    if n.kind in ABSOLUTE and not (np.isfinite(n.mean) and n.mean > 0):
+        raise FitError(
+            f"nuisance '{n.kind}' is a length in mm and needs its prior mean, such as mean=0.4935; found {n.mean:g}"
+        )
+    if not n.bounds[0] <= n.mean <= n.bounds[1]:
+        raise FitError(f"nuisance '{n.kind}': its mean {n.mean:g} lies outside its bounds {n.bounds}")

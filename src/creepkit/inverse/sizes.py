@@ -1,0 +1,105 @@
+"""The sizes of scatter of largest marginal likelihood, with its exact gradient.
+
+A first-order mixed-effects model: Pinheiro & Bates (2000), Mixed-Effects Models in S and S-PLUS, ch. 7. With
+G = C^-1 - C^-1 r r' C^-1 the derivative of -ln L to any size is tr(G dC) / 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from creepkit.arrays import Floats
+from creepkit.inverse.covariance import company, covariance, lags
+from creepkit.inverse.objective import Residuals
+from creepkit.inverse.scatter import Scatter, given_sizes
+from creepkit.records import Nuisance
+
+LONGEST = 3.0
+"""Longest reach of the drift in ln t, a factor 20 in time: what lasts longer is scatter of the rate."""
+SOURCES = ("misfit", "offset", "drift", "reach")
+
+
+def estimated(
+    residuals: Residuals, start: Scatter, nuisances: Sequence[Nuisance], *, fixed: Sequence[str] = ()
+) -> Scatter:
+    """The scatter of largest likelihood, beginning from `start`.
+
+    Sources at zero, named in `fixed` or with a given prior stay, and so does the noise, which was measured.
+    """
+    given = given_sizes(nuisances, list(start.outputs))
+    free = [
+        (o, n) for n in SOURCES for o, sizes in start.outputs.items()
+        if getattr(sizes, n) > 0 and (o, n) not in given and n not in fixed
+    ]  # fmt: skip
+    free += [("", "rate")] if start.rate > 0 and ("", "rate") not in given else []
+    if not free:
+        return start
+    likelihood = _Likelihood(residuals, start, free)
+    bounds = [_bounds(residuals, start, output, name) for output, name in free]
+    x0 = np.array([np.clip(np.log(_size(start, *one)), *b) for one, b in zip(free, bounds, strict=True)])
+    options = {"maxiter": 60, "ftol": 1e-9}
+    found = minimize(likelihood.cost, x0, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
+    return likelihood.scatter(found.x)
+
+
+class _Likelihood:
+    """-ln L, but for a constant, as a function of the logarithms of some sizes."""
+
+    def __init__(self, residuals: Residuals, start: Scatter, free: Sequence[tuple[str, str]]) -> None:
+        self.residuals, self.start, self.free = residuals, start, free
+        self.names, self.lags = list(start.outputs), lags(residuals)
+        present = residuals.present[:, :, None] & residuals.present[:, None, :]
+        self.company = company(residuals) & present
+
+    def scatter(self, x: Floats) -> Scatter:
+        """The scatter with these logarithms of the free sizes."""
+        found = self.start
+        for (output, name), value in zip(self.free, np.exp(x), strict=True):
+            found = replace(found, rate=float(value)) if not output else found.changed(output, **{name: float(value)})
+        return found
+
+    def cost(self, x: Floats) -> tuple[float, Floats]:
+        """Value and gradient."""
+        r, scatter = self.residuals, self.scatter(x)
+        inverse = np.linalg.inv(covariance(r, scatter))
+        log_det = -np.linalg.slogdet(inverse)[1].sum()
+        pulled = (inverse @ r.values[..., None])[..., 0]
+        value = 0.5 * (float((r.values * pulled).sum()) + float(log_det))
+        slope = (inverse - pulled[:, :, None] * pulled[:, None, :]) / r.trust[:, None, None]
+        return value, np.array([self._slope(slope, scatter, output, name) for output, name in self.free])
+
+    def _slope(self, G: Floats, scatter: Scatter, output: str, name: str) -> float:
+        """tr(G dC / d ln size) / 2."""
+        r = self.residuals
+        if not output:
+            d = r.rate_effect
+            return scatter.rate**2 * float(np.einsum("ti,tij,tj->", d, G, d))
+        sizes, mine = scatter[output], r.present & (r.output == self.names.index(output))
+        if name == "misfit":
+            return sizes.misfit**2 * float(np.einsum("tii->ti", G)[mine].sum())
+        if name == "offset":
+            s = np.where(mine, r.slopes, 0.0)
+            return sizes.offset**2 * float(np.einsum("ti,tij,tj->", s, G, s))
+        kept = np.exp(-self.lags / sizes.reach) * (self.company & mine[:, :, None])
+        if name == "drift":
+            return sizes.drift**2 * float((G * kept).sum())
+        return 0.5 * sizes.drift**2 * float((G * kept * self.lags).sum()) / sizes.reach
+
+
+def _size(scatter: Scatter, output: str, name: str) -> float:
+    return scatter.rate if not output else float(getattr(scatter[output], name))
+
+
+def _bounds(residuals: Residuals, scatter: Scatter, output: str, name: str) -> tuple[float, float]:
+    """Logarithms of what a size may be: an offset up to the typical output itself."""
+    if name == "reach":
+        return float(np.log(0.05)), float(np.log(LONGEST))
+    if name != "offset":
+        return float(np.log(1e-4)), float(np.log(5.0))
+    mine = residuals.present & (residuals.output == list(scatter.outputs).index(output))
+    typical = float(np.median(1.0 / np.maximum(residuals.slopes[mine], 1e-12)))
+    return float(np.log(1e-5 * typical)), float(np.log(typical))

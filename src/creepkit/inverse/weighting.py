@@ -1,0 +1,102 @@
+"""What pulls how hard: outputs by their noise or by given weights, tests by how far they are from the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import FitError
+from creepkit.inverse.covariance import expected_effects, whitener
+from creepkit.inverse.entries import Entries
+from creepkit.inverse.measures import squares_about
+from creepkit.inverse.objective import Residuals
+from creepkit.inverse.scatter import Scatter, working_guess
+from creepkit.inverse.settings import Settings
+from creepkit.inverse.sizes import estimated
+
+FREEDOM = 4.0
+"""Degrees of freedom of Student's t for whole tests; the usual choice where tails are unknown (Lange et al. 1989)."""
+UNWEIGHTED = 1e-6
+"""Share of the pull that an output keeps which the weights do not name."""
+
+
+class Weighting:
+    """How the working scatter follows from settings: by likelihood, or by the weights of outputs."""
+
+    def __init__(self, settings: Settings, entries: Entries) -> None:
+        self.settings, self.entries = settings, entries
+        self.relative: Mapping[str, float] | None = None
+        if not isinstance(settings.weights, str):
+            self.relative = _variances(settings.weights, entries)
+
+    def guess(self) -> Scatter:
+        """The working scatter before anything was fitted."""
+        start = working_guess(self.entries, self.settings.nuisances)
+        return start if self.relative is None else self._scaled(start, 0.3 / min(self.relative.values()))
+
+    def working(self, residuals: Residuals, last: Scatter) -> Scatter:
+        """The working scatter, given residuals."""
+        nuisances = self.settings.nuisances
+        if self.relative is None:
+            return estimated(residuals, last, nuisances)
+        own = expected_effects(residuals, last)[0]
+        left = residuals.values + residuals.slopes * np.take_along_axis(own, residuals.output, axis=1)
+        sizes = self.entries.spread([self.relative[name] for name in self.entries.outputs])
+        white = (left / sizes)[residuals.present] ** 2 * _each(residuals)[residuals.present]
+        scaled = self._scaled(last, float(np.sqrt(np.mean(white))))
+        return estimated(residuals, scaled, nuisances, fixed=("misfit",))
+
+    def _scaled(self, scatter: Scatter, size: float) -> Scatter:
+        """Misfits in the ratio that the weights ask for, without noise of their own."""
+        assert self.relative is not None
+        for name, relative in self.relative.items():
+            scatter = scatter.changed(name, noise=0.0, misfit=max(size, 1e-6) * relative)
+        return scatter
+
+    def measured(self, working: Scatter) -> Scatter:
+        """The scatter from which the whole covariance is estimated: with the noise that was measured."""
+        guess = working_guess(self.entries, self.settings.nuisances)
+        for name, sizes in guess.outputs.items():
+            working = working.changed(name, noise=sizes.noise)
+            if self.relative is not None:
+                working = working.changed(name, misfit=sizes.misfit)
+        return working
+
+
+def _variances(weights: Mapping[str, float], entries: Entries) -> dict[str, float]:
+    """{output: standard deviation} of independent entries, whose weighted squares are then weight x relative error."""
+    unknown = [name for name in weights if name not in entries.outputs]
+    if unknown:
+        raise FitError(f"weights name '{unknown[0]}', which is not among the outputs {', '.join(entries.outputs)}")
+    compared, found = entries.forward(entries.measured), {}
+    largest = max(weights.values())
+    for position, name in enumerate(entries.outputs):
+        mine = entries.present & (entries.output == position)
+        total = squares_about([compared[mine]])
+        found[name] = float(np.sqrt(total / max(weights.get(name, 0.0), UNWEIGHTED * largest)))
+    return found
+
+
+def _each(residuals: Residuals) -> Floats:
+    return np.broadcast_to(residuals.trust[:, None], residuals.values.shape)
+
+
+def trusts(residuals: Residuals, working: Scatter) -> Floats:
+    """(tests,) weights (nu + 1) / (nu + m / s): m the mean squared white residual of a test, s its median over tests.
+
+    Each output is judged on its own, and the worst one counts: amplitudes far from those of the twins are not hidden
+    among good widths. Iterated with the fit this is the likelihood of tests that scatter as Student's t does: one
+    like the others weighs one, one of ten times their error a twentieth.
+    """
+    plain = residuals.trusting(np.ones(len(residuals.values)))
+    white = np.linalg.solve(whitener(plain, working), plain.values[..., None])[..., 0]
+    worst = np.zeros(len(white))
+    for position in range(len(working.outputs)):
+        mine = plain.present & (plain.output == position)
+        having = mine.any(axis=1)
+        mean = (np.where(mine, white, 0.0) ** 2).sum(axis=1) / np.maximum(mine.sum(axis=1), 1)
+        typical = max(float(np.median(mean[having])), 1e-300)
+        worst = np.maximum(worst, mean / typical)
+    return np.asarray((FREEDOM + 1) / (FREEDOM + np.maximum(worst, 1.0)))

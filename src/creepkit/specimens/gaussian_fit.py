@@ -1,0 +1,154 @@
+"""The least squares fit of a generalised Gaussian to profiles, compiled, with its exact derivatives to them.
+
+Newton's method with the complete second derivatives, damped where it must be (Levenberg, Marquardt). At the answer the
+same matrix gives the derivatives to the data by the implicit function theorem.
+"""
+
+from __future__ import annotations
+
+from math import exp, isfinite, log
+
+import numpy as np
+from numba import njit
+
+from creepkit.arrays import Floats, Ints
+from creepkit.specimens.gaussian_sum import Grid, Normal, best_amplitude, derivatives_to_profile, solve, sum_up
+
+FITTED, AT_REST, FAILED = 0, 1, 2
+"""What became of a frame: fitted; no displacement to fit; no fit that deserves the name."""
+
+AT_REST_BELOW = 1e-9
+"""Displacement in mm below which a frame shows none; cameras see some 1e-3, solvers resolve some 1e-12."""
+
+_WIDTHS = (log(0.02), log(20.0))
+_SHAPES = (log(0.25), log(40.0))
+"""Least and greatest ln(S / window) and ln p of an answer: beyond them a profile shows an edge or its middle alone."""
+
+_UNEXPLAINED = 0.2
+"""Share of the sum of squares that a fit leaves less of: noise of D/4 leaves as much, noise alone nearly all."""
+
+_CLEAR = 0.03
+"""Share below which a minimum is the one: that of a plate's profile is below 0.001, of noise of D/10 some 0.03."""
+
+_STARTS = ((0.0, 2.0), (0.0, 4.0), (0.0, 1.2), (0.25, 2.0), (0.5, 2.0), (1.0, 2.0))
+"""(S / window, or 0 for where the profile has fallen to D/e; p): where fits start that no frame before them warms."""
+
+_ITERATIONS = 60
+_LONGEST_STEP = 0.5
+_CONVERGED = 1e-7  # Newton squares it: the step taken last leaves 1e-13 or so
+
+
+@njit(cache=True, error_model="numpy")
+def fit_frames(grid: Grid, samples: Floats, fits: Floats, states: Ints, pulls: Floats) -> None:
+    """Fit every frame of samples (frames, radii), in mm.
+
+    fits : (frames, 3) becomes D in mm, S / window and p, each frame starting from the last one fitted.
+    states : (frames,) becomes FITTED, AT_REST or FAILED.
+    pulls : (frames, 3, radii) becomes the derivatives of `fits` to `samples`; with a length of zero they are left out.
+    """
+    normal = Normal(np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(1))
+    x, last = np.zeros(3), np.full(2, np.nan)
+    for k in range(samples.shape[0]):
+        fits[k] = np.nan
+        states[k], scale = _state_and_scale(samples[k])
+        if states[k] != FITTED:
+            continue
+        y = samples[k] / scale
+        if not _fit(grid, y, last, x, normal):
+            states[k] = FAILED
+            continue
+        last[:] = x[1:]
+        fits[k, 0], fits[k, 1], fits[k, 2] = scale * x[0], exp(x[1]), exp(x[2])
+        if pulls.shape[0] > 0:
+            derivatives_to_profile(grid, x, normal, pulls[k])
+            pulls[k, 1] *= fits[k, 1] / scale
+            pulls[k, 2] *= fits[k, 2] / scale
+
+
+@njit(cache=True, error_model="numpy")
+def _state_and_scale(profile: Floats) -> tuple[int, float]:
+    """FITTED when the profile can be fitted, and its largest size."""
+    total, largest = 0.0, 0.0
+    for value in profile:
+        total += abs(value)
+        largest = max(largest, abs(value))
+    if not isfinite(total):
+        return FAILED, largest
+    return (FITTED if largest > AT_REST_BELOW else AT_REST), largest
+
+
+@njit(cache=True, error_model="numpy")
+def _fit(grid: Grid, y: Floats, last: Floats, x: Floats, normal: Normal) -> bool:
+    """Fit one profile, largest value 1; `x` (3,) and `normal` are the answer.
+
+    The first clear fit is taken, begun at the answer before it or else at the starts; of noisy ones, the best of all.
+    """
+    whole = _half_square(grid, y)
+    trial, least = np.empty(3), _UNEXPLAINED * whole
+    for k in range(-1, len(_STARTS)):
+        if k < 0:
+            trial[1:] = last
+        else:
+            width, shape = _STARTS[k]
+            trial[1] = log(width) if width > 0.0 else _fallen(grid, y)
+            trial[2] = log(shape)
+        if isfinite(trial[1]) and _descend(grid, y, trial, normal) and normal.squares[0] < least:
+            x[:] = trial
+            least = normal.squares[0]
+            if least < _CLEAR * whole:
+                return True
+    if least == _UNEXPLAINED * whole:
+        return False
+    sum_up(grid, y, x, normal)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _half_square(grid: Grid, y: Floats) -> float:
+    """Half the weighted sum of squares of a profile itself."""
+    along, around = 0.0, 0.0
+    for i in range(y.size):
+        along += grid.radial[i] * y[i] * y[i]
+    for weight in grid.angular:
+        around += weight
+    return 0.5 * along * around
+
+
+@njit(cache=True, error_model="numpy")
+def _fallen(grid: Grid, y: Floats) -> float:
+    """ln(r / window) of the place where a profile has fallen to 1/e of its largest value."""
+    peak = int(np.argmax(np.abs(y)))
+    for i in range(peak + 1, y.size):
+        if y[i] * y[peak] < y[peak] * y[peak] * exp(-1.0):
+            return float(grid.log_radius[i])
+    return 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _descend(grid: Grid, y: Floats, x: Floats, normal: Normal) -> bool:
+    """Minimise from ln S and ln p in `x`; true when a strict minimum was reached that the grid can see."""
+    step, trial = np.empty(3), x.copy()
+    x[0] = best_amplitude(grid, y, x)
+    sum_up(grid, y, x, normal)
+    squares, damping = normal.squares[0], 0.0
+    for _ in range(_ITERATIONS):
+        if not solve(normal, damping, step):
+            damping = max(4.0 * damping, 1e-3)
+            continue
+        longest = max(abs(step[1]), abs(step[2]))
+        shrink = min(1.0, _LONGEST_STEP / longest) if longest > 0.0 else 1.0
+        for v in range(3):
+            trial[v] = x[v] - shrink * step[v]
+        sum_up(grid, y, trial, normal)
+        close = damping == 0.0 and longest < _CONVERGED and abs(step[0]) < _CONVERGED
+        if close or normal.squares[0] <= squares:
+            x[:] = trial
+            squares = normal.squares[0]
+            damping = 0.0 if damping < 1e-5 else 0.1 * damping
+        else:
+            damping = max(4.0 * damping, 1e-3)
+            sum_up(grid, y, x, normal)
+        if close:
+            inside = _WIDTHS[0] < x[1] < _WIDTHS[1] and _SHAPES[0] < x[2] < _SHAPES[1]
+            return inside and solve(normal, 0.0, step)
+    return False

@@ -1,0 +1,86 @@
+"""Displacement between the nodes of the observed surface: quadratic along each side, as the finite elements have it.
+
+A side has a first, a middle and a last node; at the local coordinate c from -1 to 1 radius and displacement are
+sum_k N_k(c) times the values of these nodes, with N = (c(c - 1)/2, 1 - c^2, c(c + 1)/2).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats, Ints
+from creepkit.errors import SolveError
+
+_ROUNDING = 1e-9
+"""mm by which a wanted radius may lie outside the nodes: a window that ends on a node ends inside."""
+
+
+class Interpolation(NamedTuple):
+    """Matrices (wanted, nodes) from the displacement of the nodes to that at wanted radii, and to its slope d/dr."""
+
+    values: Floats
+    slopes: Floats
+
+
+def interpolation(radii_nodes: ArrayLike, wanted: ArrayLike) -> Floats:
+    """Matrix (wanted, nodes) from the displacement of the top nodes to that at `wanted` radii, mm.
+
+    radii_nodes : (nodes,) mm, corner and middle nodes in turn from the axis outwards, in the undeformed plate.
+
+        >>> interpolation([0, 1, 2], [0.5]) @ [0.0, 1.0, 4.0]
+        array([0.25])
+    """
+    return interpolate(radii_nodes, wanted).values
+
+
+def interpolate(radii_nodes: ArrayLike, wanted: ArrayLike) -> Interpolation:
+    """As `interpolation`, with the slopes; where two sides meet, the mean of theirs."""
+    nodes, radii = checked_radii(radii_nodes), np.atleast_1d(np.asarray(wanted, dtype=float))
+    outside = ~((radii >= nodes[0] - _ROUNDING) & (radii <= nodes[-1] + _ROUNDING))
+    if outside.any():
+        raise SolveError(
+            f"no displacement is known at a radius of {radii[outside][0]:g} mm; the observed surface reaches from "
+            f"{nodes[0]:g} to {nodes[-1]:g} mm, ask for radii within it"
+        )
+    inner, outer = (
+        _on_sides(nodes, radii, np.searchsorted(nodes[::2], radii + nudge) - 1) for nudge in (-_ROUNDING, _ROUNDING)
+    )
+    return Interpolation(0.5 * (inner.values + outer.values), 0.5 * (inner.slopes + outer.slopes))
+
+
+def checked_radii(radii: ArrayLike) -> Floats:
+    """Radii of top nodes as an array; SolveError unless they can be corner and middle nodes of sides."""
+    nodes = np.asarray(radii, dtype=float)
+    if nodes.ndim != 1 or nodes.size < 3 or nodes.size % 2 == 0:
+        raise SolveError(
+            f"the observed surface has radii of shape {nodes.shape}; it needs corner and middle nodes in turn, an odd "
+            "number of three or more"
+        )
+    if not np.isfinite(nodes).all() or nodes[0] < 0.0 or (np.diff(nodes) <= 0.0).any():
+        raise SolveError("the radii of the observed surface must be finite, not negative and increasing outwards")
+    share = (nodes[1::2] - nodes[:-2:2]) / (nodes[2::2] - nodes[:-2:2])
+    if not ((share > 0.25) & (share < 0.75)).all():
+        k = 2 * int(np.argmax(np.abs(share - 0.5))) + 1
+        raise SolveError(
+            f"node {k} of the observed surface, at a radius of {nodes[k]:g} mm, is not in the middle half of its side; "
+            "middle and corner nodes must come in turn"
+        )
+    return nodes
+
+
+def _on_sides(nodes: Floats, radii: Floats, side: Ints) -> Interpolation:
+    """The matrices at radii that lie on the sides of these numbers, or at an end of them."""
+    side = np.clip(side, 0, nodes.size // 2 - 1)
+    first, middle, last = nodes[2 * side], nodes[2 * side + 1], nodes[2 * side + 2]
+    bend, reach = 0.5 * (first + last) - middle, 0.5 * (last - first)
+    ahead = radii - middle
+    c = 2.0 * ahead / (reach + np.sqrt(np.maximum(reach**2 + 4.0 * bend * ahead, 0.0)))
+    shapes = np.stack([0.5 * c * (c - 1.0), 1.0 - c**2, 0.5 * c * (c + 1.0)], axis=1)
+    slopes = np.stack([c - 0.5, -2.0 * c, c + 0.5], axis=1) / (reach + 2.0 * bend * c)[:, None]
+    columns = 2 * side[:, None] + np.arange(3)
+    matrices = Interpolation(np.zeros((radii.size, nodes.size)), np.zeros((radii.size, nodes.size)))
+    np.put_along_axis(matrices.values, columns, shapes, axis=1)
+    np.put_along_axis(matrices.slopes, columns, slopes, axis=1)
+    return matrices

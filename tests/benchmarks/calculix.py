@@ -1,0 +1,210 @@
+"""CalculiX and creepkit on the same mesh: accuracy and CPU time, one row for each case and cetol.
+
+Run it from the root of the project where `ccx` is on the PATH (Debian: calculix-ccx):
+
+    python tests/benchmarks/calculix.py [N3 N7 TH c1 c2 c3] [--cetol 1e-4 1e-5] [--refinement 1] [--alone]
+
+CalculiX is backward Euler, so two values of cetol give the limit of small increments on this mesh, and with it the
+error in time of either code; differences are the largest from 10 min on, in percent of the apex at the end. CPU
+time is that of the processes, user and system; creepkit's is the mean of several runs after the compiler's work is
+done. --alone leaves creepkit out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import shutil
+import subprocess
+import tempfile
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from calculix_deck import Deck, Norton, displacements, extrapolated, increments
+
+from creepkit.arrays import Floats
+from creepkit.fem.mesh import Mesh
+from creepkit.language import CreepLaw, Elastic
+from creepkit.laws.norton import NORTON
+from creepkit.laws.time_hardening import TIME_HARDENING
+from creepkit.records import Loading, PressureJump, Program, RecordedLoading
+from creepkit.specimens.dimple import DimpleGeometry
+
+TIMES = np.array([150, 600, 1800, 3600, 7200, 10800, 14400, 14550, 21600, 28800, 36000, 43200], dtype=float)
+LONGEST_WAIT = 3600.0
+"""Seconds after which CalculiX is taken to be stuck."""
+
+_REPEATS = 20
+_SETTLED = 600.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A specimen, a law that CalculiX has, E in MPa (nu is 0.3), a pressure and the converged apex at 12 h, mm.
+
+    first : CalculiX's first increment, s; with a load at once and t^m a longer one ends in divergence.
+    """
+
+    geometry: DimpleGeometry
+    creep: Norton
+    E: float
+    loading: Loading
+    apex: float
+    first: float = 0.01
+
+    @property
+    def law(self) -> tuple[CreepLaw, dict[str, float]]:
+        """The same law in creepkit."""
+        values = {"A": self.creep.A, "n": self.creep.n}
+        return (TIME_HARDENING, values | {"m": self.creep.m}) if self.creep.m else (NORTON, values)
+
+
+def _at_once(*steps: tuple[float, float]) -> RecordedLoading:
+    return RecordedLoading(Program.steps(steps), "pressure")
+
+
+DIMPLE = DimpleGeometry()
+PLATE = DimpleGeometry(
+    apex_thickness=1.0,
+    cavity_radius=5.0,
+    roof_radial=1.0,
+    roof_axial=1.5,
+    plate_thickness=4.0,
+    outer_radius=7.5,
+    clamped=("rim",),
+)
+CASES = {
+    "N3": Case(DIMPLE, Norton(2e-12, 3.0), 150e3, PressureJump(8.0, 8.0, 14400.0), 1.197059),
+    "N7": Case(DIMPLE, Norton(5e-21, 7.0), 100e3, PressureJump(8.0, 10.0, 14400.0), 0.914546),
+    "TH": Case(DIMPLE, Norton(3e-11, 3.2, -0.4), 200e3, PressureJump(8.0, 8.0, 14400.0), 1.121230),
+    "c1": Case(PLATE, Norton(1e-13, 4.3), 150e3, _at_once((0.0, 8.0)), 0.673673),
+    "c2": Case(PLATE, Norton(6e-19, 7.0), 100e3, _at_once((0.0, 8.0), (14400.0, 10.0)), 0.489343),
+    "c3": Case(PLATE, Norton(1.2e-10, 3.2, -0.4), 200e3, _at_once((0.0, 6.0)), 0.163046, first=1e-4),
+}
+"""Ramped over 5 s on the true dimple; at once on a plate with a fillet, its rim held."""
+
+
+class Stopped(RuntimeError):
+    """CalculiX did not reach the end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """displacements : (times, nodes, 2) mm. increments, iterations : of CalculiX. cpu : s, user and system."""
+
+    displacements: Floats
+    increments: int
+    iterations: int
+    cpu: float
+
+
+def run(deck: Deck) -> Result:
+    """Run CalculiX on one thread in a folder of its own."""
+    program = shutil.which("ccx")
+    if program is None:
+        raise SystemExit("CalculiX is not installed: no 'ccx' on the PATH; on Debian, apt install calculix-ccx")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "job.inp").write_text(deck.text())
+        before = _children()
+        done = subprocess.run(
+            [program, "job"],
+            cwd=folder,
+            env=os.environ | {"OMP_NUM_THREADS": "1"},
+            capture_output=True,
+            text=True,
+            timeout=LONGEST_WAIT,
+        )
+        cpu = _children() - before
+        if done.returncode != 0 or "Job finished" not in done.stdout:
+            raise Stopped(
+                f"CalculiX stopped with code {done.returncode} at cetol {deck.cetol:g}: {_error(done.stdout)}"
+            )
+        with (folder / "job.dat").open() as dat, (folder / "job.sta").open() as sta:
+            return Result(displacements(dat, deck), *increments(sta), cpu)
+
+
+def _error(output: str) -> str:
+    """What CalculiX says went wrong."""
+    said = [line.strip() for line in output.splitlines() if "*ERROR" in line]
+    return said[-1] if said else "it says nothing"
+
+
+def _children() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def theirs(case: Case, mesh: Mesh, cetols: list[float]) -> list[Result]:
+    """CalculiX's runs, the coarsest first; the apex is their only node."""
+    deck = Deck(mesh, case.E, 0.3, case.creep, case.loading.program(), TIMES, mesh.top[:1], first=case.first)
+    return [run(replace(deck, cetol=cetol)) for cetol in sorted(cetols, reverse=True)]
+
+
+def ours(case: Case, refinement: float) -> tuple[Floats, float]:
+    """Apex displacement, (times,) mm, and CPU seconds a run."""
+    from creepkit.specimens.bulge import Bulge
+
+    law, values = case.law
+    specimen = Bulge(geometry=case.geometry, refinement=refinement)
+
+    def simulate() -> Floats:
+        found = specimen.simulate(law, values, loading=case.loading, times=TIMES, elastic=Elastic(E=case.E))
+        return np.asarray(found.displacement(radius=0.0))
+
+    apex = simulate()
+    start = time.process_time()
+    for _ in range(_REPEATS):
+        simulate()
+    return apex, (time.process_time() - start) / _REPEATS
+
+
+def difference(found: Floats, reference: Floats) -> float:
+    """Largest difference from 10 min on, percent of the last value of the reference."""
+    late = TIMES >= _SETTLED
+    return float(100 * np.abs(found - reference)[late].max() / reference[-1])
+
+
+def report(name: str, cetols: list[float], refinement: float, alone: bool) -> None:
+    """Run one case and print its rows."""
+    case = CASES[name]
+    mesh = case.geometry.mesh(refinement)
+    runs = theirs(case, mesh, cetols)
+    apexes = [r.displacements[:, 0, 1] for r in runs]
+    limit = extrapolated(apexes[-2], apexes[-1], (runs[-2].increments, runs[-1].increments))
+    converged = 100 * (limit[-1] / case.apex - 1)
+    print(f"{name}: {len(mesh.elements)} elements; limit {limit[-1]:.6f} mm at 12 h, {converged:+.3f} % of converged")
+    own, cpu = (None, np.nan) if alone else ours(case, refinement)
+    for cetol, result, apex in zip(sorted(cetols, reverse=True), runs, apexes, strict=True):
+        row = f"  ccx {cetol:7.0e} {result.increments:5d} increments {result.cpu:8.2f} s"
+        ratio = "" if alone else f"   {result.cpu / cpu:7.0f} times the CPU of creepkit"
+        print(f"{row} {difference(apex, limit):8.3f} %{ratio}")
+    if own is not None:
+        print(f"  creepkit {'':23s} {cpu:8.4f} s {difference(own, limit):8.3f} %", flush=True)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="*", default=list(CASES), help="some of " + " ".join(CASES))
+    parser.add_argument("--cetol", nargs="+", type=float, default=[1e-4, 1e-5])
+    parser.add_argument("--refinement", type=float, default=1.0)
+    parser.add_argument("--alone", action="store_true", help="leave creepkit out")
+    given = parser.parse_args()
+    unknown = [name for name in given.cases if name not in CASES]
+    if unknown:
+        parser.error(f"no case is called {', '.join(unknown)}; there are {', '.join(CASES)}")
+    if len(set(given.cetol)) < 2:
+        parser.error("two values of cetol are needed, for the limit of small increments")
+    for name in given.cases:
+        try:
+            report(name, given.cetol, given.refinement, given.alone)
+        except Stopped as stopped:
+            print(f"{name}: {stopped}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,233 @@
+"""The dimple's mesh against closed forms of its section, over the whole family."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from creepkit.errors import SolveError
+from creepkit.fem.mesh_checks import half_bandwidth, outline, quality
+from creepkit.fem.shape import discretize, refuse_inverted
+from creepkit.fem.strip import strip_nodes
+from creepkit.specimens.dimple import DimpleGeometry
+from creepkit.specimens.dimple_columns import sides
+
+TAPERED = DimpleGeometry()
+FILLET = DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",))
+THIN = DimpleGeometry(0.2, 5.0, 1.0, 0.3, 4.0, 7.5)
+NO_WALL = DimpleGeometry(roof_axial=3.5)
+SHORT_WALL = DimpleGeometry(roof_axial=3.45)
+SHORT_FLOOR = DimpleGeometry(roof_radial=7.2)
+THICK = DimpleGeometry(3.0, 7.5, 7.5, 0.9, 4.0, 10.0)
+FAMILY = [TAPERED, FILLET, THIN, NO_WALL, SHORT_WALL, SHORT_FLOOR, THICK]
+
+
+def area(g: DimpleGeometry) -> float:
+    """Section of the disc less that of the cavity: floor, quarter ellipse and what lies below it."""
+    R, a, b, h, H = g.cavity_radius, g.roof_radial, g.roof_axial, g.apex_thickness, g.plate_thickness
+    return g.outer_radius * H - (R - a) * (H - h) - a * (H - h - b) - np.pi / 4 * a * b
+
+
+def volume(g: DimpleGeometry) -> float:
+    """Volume over 2 pi, from the first moment of a quarter ellipse about r = R - a: a^2 b / 3."""
+    R, a, b, h, H = g.cavity_radius, g.roof_radial, g.roof_axial, g.apex_thickness, g.plate_thickness
+    below = (R - a) ** 2 / 2 * (H - h) + (R**2 - (R - a) ** 2) / 2 * (H - h - b)
+    return g.outer_radius**2 / 2 * H - below - (R - a) * np.pi / 4 * a * b - a**2 * b / 3
+
+
+def errors(g: DimpleGeometry, refinement: float) -> np.ndarray:
+    at = discretize(g.mesh(refinement))
+    found = np.array([(at.weights / at.points[:, :, 0]).sum(), at.weights.sum()])
+    return np.abs(found / [area(g), volume(g)] - 1)
+
+
+def test_the_production_meshes():
+    tapered, fillet = TAPERED.mesh(), FILLET.mesh()
+    assert [len(m.elements) for m in (tapered, fillet)] == [48, 80]
+    assert [half_bandwidth(m.elements) for m in (tapered, fillet)] == [33, 33]
+    assert tapered.nodes.size == 354
+    np.testing.assert_allclose(tapered.nodes[:9:2, 1], 3.5 + 0.5 * np.array([0, 0.3, 0.5, 0.7, 1]), rtol=1e-14)
+    np.testing.assert_allclose(fillet.nodes[:9:2, 1], [3, 3.25, 3.5, 3.75, 4], rtol=1e-14)
+    np.testing.assert_allclose(fillet.nodes[fillet.pressed[:10, 2], 0], 0.4 * np.arange(1, 11), rtol=1e-13)
+    assert quality(tapered).sine.min() > 0.6
+    assert quality(fillet).sine.min() > 0.7
+
+
+def test_twice_the_refinement_is_twice_the_elements_each_way():
+    for g in (TAPERED, FILLET, THIN, NO_WALL):
+        coarse, fine = g.mesh(), g.mesh(2)
+        assert len(fine.elements) == 4 * len(coarse.elements)
+        assert len(fine.top) - 1 == 2 * (len(coarse.top) - 1)
+    assert len(TAPERED.mesh(1.5).elements) == (15 + 3) * 6
+    assert len(TAPERED.mesh(0.5).elements) == (5 + 1) * 2
+
+
+@pytest.mark.parametrize("g", FAMILY, ids=range(len(FAMILY)))
+def test_area_and_volume_converge_with_the_fourth_order(g):
+    coarse, fine = errors(g, 2), errors(g, 4)
+    assert coarse.max() < 1e-4
+    assert g is SHORT_WALL or (np.log2(coarse / fine) > 3.5)[fine > 1e-12].all()  # its wall has no column before 5.5
+
+
+def test_a_short_wall_gets_a_column_when_columns_are_short_enough():
+    coarse, fine = errors(SHORT_WALL, 6), errors(SHORT_WALL, 12)
+    assert (np.log2(coarse / fine) > 3.5).all()
+
+
+@pytest.mark.parametrize("g", FAMILY, ids=range(len(FAMILY)))
+@pytest.mark.parametrize("refinement", [0.5, 1, 1.7])
+def test_sides_are_where_they_belong(g, refinement):
+    mesh = g.mesh(refinement)
+    r, z = mesh.nodes[mesh.pressed.ravel()].T
+    R, a, b = g.cavity_radius, g.roof_radial, g.roof_axial
+    roof = g.plate_thickness - g.apex_thickness - b
+    on_roof = z > roof
+    np.testing.assert_allclose(((np.maximum(r - R + a, 0) / a) ** 2 + ((z - roof) / b) ** 2)[on_roof], 1, rtol=1e-12)
+    np.testing.assert_allclose(r[~on_roof], R, rtol=1e-13)
+    first, last = mesh.nodes[mesh.pressed[:, 0]], mesh.nodes[mesh.pressed[:, 2]]
+    np.testing.assert_array_equal(first[1:], last[:-1])
+    np.testing.assert_allclose([first[0], last[-1]], [[0, g.plate_thickness - g.apex_thickness], [R, 0]], rtol=1e-14)
+    top = mesh.nodes[mesh.top]
+    assert (np.diff(top[:, 0]) > 0).all()
+    assert len(top) % 2 == 1
+    assert (top[[0, -1], 0] == [0, g.outer_radius]).all()
+    assert (top[:, 1] == g.plate_thickness).all()
+    assert {len(np.unique(side)) for side in mesh.pressed} == {3}
+
+
+@pytest.mark.parametrize("g", FAMILY, ids=range(len(FAMILY)))
+@pytest.mark.parametrize("clamped", [("bottom",), ("rim",), ("bottom", "rim")])
+def test_what_is_clamped_is_held_and_nothing_else(g, clamped):
+    g = g.replace(clamped=clamped)
+    mesh = g.mesh()
+    r, z = mesh.nodes.T
+    where = np.zeros(len(r), bool)
+    if "bottom" in clamped:
+        where |= z == 0
+    if "rim" in clamped:
+        where |= r == g.outer_radius
+    np.testing.assert_array_equal(mesh.held[:, 1], where)
+    np.testing.assert_array_equal(mesh.held[:, 0], where | (r == 0))
+    assert (r == 0).sum() == 9
+
+
+def test_the_outline_is_the_cavity_the_top_the_rim_the_ground_and_the_axis():
+    for g in FAMILY:
+        mesh = g.mesh()
+        columns, layers = len(mesh.pressed), 4
+        assert len(outline(mesh.elements)) == 2 * (columns + layers)
+
+
+def test_the_section_encloses_the_area():
+    for g in FAMILY:
+        r, z = g.section(4000).T
+        shoelace = 0.5 * abs((r[:-1] * z[1:] - r[1:] * z[:-1]).sum())
+        assert shoelace == pytest.approx(area(g), rel=1e-6)
+
+
+@st.composite
+def dimples(draw) -> DimpleGeometry:
+    share = st.floats(0, 1)
+    R = 10 ** draw(st.floats(0, 1.5))
+    a = R * (0.1 + 0.9 * min(1.0, 1.3 * draw(share)))
+    H = R * 10 ** (-0.8 + draw(share))
+    h = H * (0.05 + 0.65 * draw(share))
+    b = (H - h) * (0.1 + 0.9 * min(1.0, 1.2 * draw(share)))
+    return DimpleGeometry(h, R, a, b, H, R * (1 + 10 ** -draw(share)))
+
+
+@settings(max_examples=150, deadline=None)
+@given(dimples(), st.sampled_from([0.5, 0.75, 1.0, 1.3, 2.0]))
+def test_every_dimple_of_a_wide_family_has_a_sound_mesh(g, refinement):
+    mesh = g.mesh(refinement)
+    refuse_inverted(mesh)
+    worst = quality(mesh)
+    assert worst.sine.min() > 0.04
+    assert worst.evenness.min() > 0.01
+
+
+@pytest.mark.parametrize("g", FAMILY, ids=range(len(FAMILY)))
+@pytest.mark.parametrize("field", DimpleGeometry.lengths)
+def test_velocities_of_the_nodes_are_the_differences_of_the_mesh(g, field):
+    layout, value = g._layout(1.0), getattr(g, field)
+    step = 1e-6 * value
+
+    def nodes(x):
+        return strip_nodes(*sides(g._dimensions()._replace(**{field: x}), layout), layout.breaks)
+
+    one, other = (nodes(value + s * step) for s in (1, -1))
+    central = (one - other) / (2 * step)
+    velocity = g.mesh_velocity(field)
+    # at the ends of the allowed range, as roof_radial = cavity_radius, the curve goes on with another curvature
+    np.testing.assert_allclose(velocity, central, atol=5e-6)
+
+
+def test_velocities_move_the_boundary_as_the_length_says():
+    mesh = TAPERED.mesh()
+    thicker = TAPERED.mesh_velocity("apex_thickness")
+    np.testing.assert_allclose(thicker[mesh.top, 1], 0, atol=1e-15)
+    roof = mesh.pressed[:10].ravel()
+    np.testing.assert_allclose(thicker[roof], np.tile([0.0, -1.0], (roof.size, 1)), atol=1e-14)
+    wider = TAPERED.mesh_velocity("outer_radius")
+    np.testing.assert_allclose(wider[mesh.nodes[:, 0] == 10.0], [[1.0, 0.0]] * 5, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"apex_thickness": -0.1},
+            "dimple: apex_thickness is -0.1; allowed is a number from 0.001 to 10000, a length in mm",
+        ),
+        ({"apex_thickness": 0}, "dimple: apex_thickness is 0; allowed is a number from 0.001 to 10000, a length in mm"),
+        (
+            {"roof_axial": float("nan")},
+            "dimple: roof_axial is nan; allowed is a number from 0.001 to 10000, a length in mm",
+        ),
+        (
+            {"outer_radius": "10"},
+            "dimple: outer_radius is '10'; allowed is a number from 0.001 to 10000, a length in mm",
+        ),
+        (
+            {"roof_axial": 3.6},
+            "dimple: the roof would stand above the plate: roof_axial 3.6 mm and apex_thickness 0.5 mm add up to 4.1 "
+            "mm, allowed is up to plate_thickness 4 mm; make one of them smaller or the plate thicker",
+        ),
+        (
+            {"roof_radial": 8},
+            "dimple: roof_radial is 8 mm; allowed is up to cavity_radius 7.5 mm, where the roof reaches from the axis "
+            "to the wall; make it smaller or the cavity wider",
+        ),
+        (
+            {"outer_radius": 7.5},
+            "dimple: outer_radius is 7.5 mm; allowed is above cavity_radius 7.5 mm, for a rim must stand around the "
+            "cavity; make it larger or the cavity narrower",
+        ),
+        ({"clamped": ()}, "dimple: clamped is empty; allowed are 'bottom', 'rim' or both, for the plate must be held"),
+        (
+            {"clamped": ("top",)},
+            "dimple: clamped is 'top'; allowed are 'bottom', 'rim' or both, for the plate must be held",
+        ),
+    ],
+)
+def test_impossible_dimples_are_refused(changes, message):
+    with pytest.raises(SolveError, match=f"^{re.escape(message)}$"):
+        TAPERED.replace(**changes)
+
+
+def test_impossible_questions_are_refused():
+    message = (
+        "dimple: refinement is 0.1; allowed is a number from 0.5 to 16, 2 giving twice as many elements each way as 1, "
+        "the mesh for production"
+    )
+    with pytest.raises(SolveError, match=f"^{re.escape(message)}$"):
+        TAPERED.mesh(0.1)
+    with pytest.raises(SolveError, match="^dimple: no length is called 'roof_axil'; did you mean 'roof_axial'?"):
+        TAPERED.mesh_velocity("roof_axil")
+
+
+def test_clamped_edges_may_be_given_in_any_way():
+    assert TAPERED.replace(clamped="rim").clamped == ("rim",)
+    assert TAPERED.replace(clamped=["rim", "bottom", "rim"]) == TAPERED

@@ -1,0 +1,153 @@
+"""The eight-node element, strips of it, and what is said of meshes, against polynomials and closed forms."""
+
+import re
+
+import numpy as np
+import pytest
+
+from creepkit.errors import SolveError
+from creepkit.fem.mesh import CORNERS, Mesh
+from creepkit.fem.mesh_checks import half_bandwidth, outline, quality
+from creepkit.fem.shape import POINTS, discretize, geometry_change, shape_functions, shape_gradients
+from creepkit.fem.strip import strip, strip_nodes
+
+MIDDLES = 0.5 * (CORNERS + np.roll(CORNERS, -1, axis=0))
+NODES = np.vstack([CORNERS, MIDDLES])
+CENTRE = np.array([3.0, 0.0])
+PLACES = np.random.default_rng(1).uniform(-1, 1, (40, 2))
+
+
+def ring(columns: int, layers: int, bend: float = 0.4) -> Mesh:
+    """A quarter of a ring around (3, 0), from radius 1 to 2; its nodes lie on rays, at uneven places by `bend`."""
+    angle = np.linspace(np.pi / 2, 0, 2 * columns + 1)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    breaks = np.linspace(0, 1, layers + 1) ** (1 + bend)
+    body = strip(CENTRE + circle, CENTRE + 2 * circle, breaks)
+    held = np.zeros(body.nodes.shape, bool)
+    held[body.last] = True
+    return Mesh(body.nodes, body.elements, held, body.inner, [])
+
+
+def test_shape_functions_are_one_at_their_node_and_zero_at_the_others():
+    np.testing.assert_allclose(shape_functions(NODES), np.eye(8), atol=1e-15)
+
+
+def test_shape_functions_reproduce_every_serendipity_monomial():
+    powers = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (2, 1), (1, 2)]
+    for i, j in powers:
+        at_nodes, there = NODES[:, 0] ** i * NODES[:, 1] ** j, PLACES[:, 0] ** i * PLACES[:, 1] ** j
+        np.testing.assert_allclose(shape_functions(PLACES) @ at_nodes, there, atol=1e-14)
+
+
+def test_shape_gradients_are_the_differences_of_the_values():
+    step = 1e-6
+    for k in range(2):
+        move = step * np.eye(2)[k]
+        slope = (shape_functions(PLACES + move) - shape_functions(PLACES - move)) / (2 * step)
+        np.testing.assert_allclose(shape_gradients(PLACES)[:, :, k], slope, atol=1e-9)
+
+
+def test_points_are_those_of_gauss_near_the_corner_of_their_number():
+    for i, j in [(0, 0), (1, 0), (3, 2), (2, 2), (3, 3)]:
+        exact = (2 / (i + 1) if i % 2 == 0 else 0) * (2 / (j + 1) if j % 2 == 0 else 0)
+        assert (POINTS[:, 0] ** i * POINTS[:, 1] ** j).sum() == pytest.approx(exact, abs=1e-15)
+    assert (np.sign(POINTS) == CORNERS).all()
+
+
+def test_a_linear_field_has_its_gradient_at_every_point_of_a_curved_mesh():
+    mesh = ring(5, 3)
+    at = discretize(mesh)
+    values = (2.0 + 3.0 * mesh.nodes[:, 0] - 5.0 * mesh.nodes[:, 1])[mesh.elements][:, None]
+    np.testing.assert_allclose((at.by_radius * values).sum(axis=2), 3.0, atol=1e-12)
+    np.testing.assert_allclose((at.by_height * values).sum(axis=2), -5.0, atol=1e-12)
+    there = 2.0 + 3.0 * at.points[:, :, 0] - 5.0 * at.points[:, :, 1]
+    np.testing.assert_allclose((at.over_radius * values).sum(axis=2), there / at.points[:, :, 0], atol=1e-12)
+
+
+def test_area_and_volume_of_a_ring_converge_with_the_fourth_order():
+    area, first_moment = 0.75 * np.pi, 3 * 0.75 * np.pi + 7 / 3  # of r; the centroid of the quarter is 28/(9 pi) off
+    errors = []
+    for n in (2, 4, 8):
+        at = discretize(ring(n, n))
+        errors.append([(at.weights / at.points[:, :, 0]).sum() / area - 1, at.weights.sum() / first_moment - 1])
+    orders = np.log2(np.abs(np.array(errors[:-1]) / errors[1:]))
+    assert (orders > 3.7).all()
+    assert np.abs(errors[-1]).max() < 1e-5
+
+
+def test_geometry_change_is_the_derivative_of_what_the_mesh_becomes():
+    mesh = ring(3, 2)
+    velocity = np.random.default_rng(2).normal(size=mesh.nodes.shape)
+    change, step = geometry_change(mesh, velocity), 1e-6
+    ahead, behind = (discretize(mesh.moved(mesh.nodes + s * velocity)) for s in (step, -step))
+    at = discretize(mesh)
+    growth = np.log(ahead.weights / behind.weights) / (2 * step)
+    np.testing.assert_allclose(np.trace(change.gradient, axis1=2, axis2=3) + change.hoop, growth, atol=1e-8)
+    slopes = np.stack([at.by_radius, at.by_height], axis=3)
+    moved = (np.stack([ahead.by_radius, ahead.by_height], 3) - np.stack([behind.by_radius, behind.by_height], 3)) / 2e-6
+    np.testing.assert_allclose(-np.einsum("epaj,epji->epai", slopes, change.gradient), moved, atol=1e-6)
+
+
+@pytest.mark.parametrize(("columns", "layers"), [(1, 1), (5, 3), (12, 4)])
+def test_a_strip_is_numbered_across(columns, layers):
+    mesh = ring(columns, layers)
+    assert len(mesh.elements) == columns * layers
+    assert len(mesh.nodes) == (columns + 1) * (2 * layers + 1) + columns * (layers + 1)
+    assert set(mesh.elements.ravel()) == set(range(len(mesh.nodes)))
+    assert half_bandwidth(mesh.elements) == 6 * layers + 9
+
+
+def test_sides_of_a_strip_lie_on_its_lines_with_the_solid_to_their_left():
+    angle = np.linspace(np.pi / 2, 0, 9)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    body = strip(CENTRE + circle, CENTRE + 2 * circle, np.array([0, 0.2, 1.0]))
+    for sides, radius, sense in ((body.inner, 1, -1), (body.outer, 2, 1)):
+        ends = body.nodes[sides] - CENTRE
+        np.testing.assert_allclose(np.hypot(*ends.reshape(-1, 2).T), radius, rtol=1e-14)
+        first, last = ends[:, 0], ends[:, 2]
+        assert (sense * (first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0]) > 0).all()
+    np.testing.assert_array_equal(body.inner_line[::2], np.append(body.inner[:, 0], body.inner[-1, 2]))
+    np.testing.assert_array_equal(body.outer_line[::2], np.append(body.outer[:, 2], body.outer[-1, 0]))
+    np.testing.assert_allclose(body.nodes[body.first][:, 0], 3.0, atol=1e-15)
+    np.testing.assert_allclose(body.nodes[body.last][:, 1], 0.0, atol=1e-15)
+    np.testing.assert_allclose(body.nodes[body.last][:, 0], [4, 4.1, 4.2, 4.6, 5.0], rtol=1e-14)
+
+
+def test_nodes_of_a_strip_are_linear_in_its_sides():
+    rng, breaks = np.random.default_rng(3), np.array([0, 0.3, 1.0])
+    a, b, c, d = rng.normal(size=(4, 7, 2))
+    both = strip_nodes(a + 2 * c, b + 2 * d, breaks)
+    np.testing.assert_allclose(both, strip_nodes(a, b, breaks) + 2 * strip_nodes(c, d, breaks), atol=1e-14)
+
+
+def test_the_outline_of_a_strip_are_its_four_sides():
+    mesh = ring(5, 3)
+    assert len(outline(mesh.elements)) == 2 * (5 + 3)
+
+
+def test_quality_is_one_of_a_rectangle_and_the_sine_of_a_parallelogram():
+    for lean, sine in ((0.0, 1.0), (1.0, np.sqrt(0.5))):
+        nodes = NODES @ [[2.0, 0.0], [lean, 1.0]] + [5.0, 0.0]
+        worst = quality(Mesh(nodes, [np.arange(8)], np.zeros((8, 2), bool), [], []))
+        assert worst.sine == pytest.approx(sine)
+        assert worst.evenness == pytest.approx(1.0)
+
+
+def test_an_inverted_element_is_refused():
+    mesh = ring(3, 2)
+    inverted = mesh.elements.copy()
+    inverted[4] = inverted[4][[0, 3, 2, 1, 7, 6, 5, 4]]
+    message = (
+        "element 4 of the mesh, near r = 4.11 mm, z = 0.2974 mm, is inverted (1 of 6 elements are); number its "
+        "corners anticlockwise and keep its middle nodes near the middle of its sides, or change the refinement of a "
+        "mesh that was made here"
+    )
+    with pytest.raises(SolveError, match=f"^{re.escape(message)}$"):
+        discretize(Mesh(mesh.nodes, inverted, mesh.held, mesh.pressed, mesh.top))
+
+
+def test_a_middle_node_beyond_a_quarter_of_its_side_is_refused():
+    nodes = NODES + CENTRE
+    nodes[4] = [2.4, -1.0]
+    with pytest.raises(SolveError, match="element 0 of the mesh, near r = 3 mm, z = 0 mm, is inverted"):
+        discretize(Mesh(nodes, [np.arange(8)], np.zeros((8, 2), bool), [], []))
