@@ -22,7 +22,7 @@ CPU_WHEELS := https://download.pytorch.org/whl/cpu
 export OMP_NUM_THREADS := 1
 
 # numba looks at the file of a compiled function alone, not at those it calls: one cache for each state of the sources.
-export NUMBA_CACHE_DIR := $(CURDIR)/.venv/numba/$(shell cat src/creepkit/integration/*.py src/creepkit/kernels/*.py | cksum | cut -d' ' -f1)
+export NUMBA_CACHE_DIR := $(CURDIR)/.venv/numba/$(shell cat src/creepkit/{integration,kernels,fem}/*.py src/creepkit/specimens/gaussian_*.py | cksum | cut -d' ' -f1)
 
 test: .venv/.ok
 	$(BIN)/ruff check

@@ -16,9 +16,9 @@ from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Elastic
 from creepkit.records import History, Prediction, PressureJump
 
-NOMINAL = {"thickness": 0.5, "window": 7.5, "modulus": 0.0, "temperature": 0.0}
-STEPS, END = 22, 4 * 3600.0
-"""Times of the integration after its first minutes, which do not depend on the frames, up to the longest test, s."""
+END = 4 * 3600.0
+GRID = np.concatenate([[0.0], np.geomspace(60.0, 1200.0, 8), np.linspace(1800.0, END, 22)])
+"""s; times of the integration, the same whatever frames a history has."""
 LIMIT = 2.4
 """mm; a larger dimple has burst."""
 
@@ -62,80 +62,79 @@ class OneDegree:
         self, law: CreepLaw, values: Mapping[str, Any], histories: Sequence[History], *, jacobian: bool = False,
         effects: Mapping[str, np.ndarray] | None = None,
     ) -> Prediction:  # fmt: skip
-        kernel = lower(law, "numpy")
         theta = [np.atleast_1d(np.log(values[n]) if p.scale == "log" else values[n]) for n, p in law.table.items()]
         theta = np.stack(np.broadcast_arrays(*theta), axis=-1)
         for kind in effects or {}:
             if kind not in self.effects:
                 raise SolveError(f"{self.name} does not know the nuisance '{kind}'")
-        if effects:
-            count = max(len(theta), *(len(v) for v in effects.values()))
-            theta = np.broadcast_to(theta, (count, theta.shape[-1]))
-        self.calls.append(len(theta))
-        found, ends = self._run(kernel, theta, histories, effects or {})
-        slopes, own = None, {}
-        if jacobian and self.exact:
-            slopes = np.stack(
-                [self._slope(kernel, theta, histories, effects or {}, p) for p in range(theta.shape[1])], -1
-            )
-            own = {kind: self._slope(kernel, theta, histories, effects, kind) for kind in effects or {}}
+        count = max(len(theta), *(len(v) for v in effects.values())) if effects else len(theta)
+        own = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in (effects or {}).items()}
+        theta = np.broadcast_to(theta, (count, theta.shape[-1]))
+        self.calls.append(count)
+        found, ends = self._run(law, theta, histories, own)
+        slopes, changes = self._slopes(law, theta, histories, own) if jacobian and self.exact else (None, {})
         lengths = np.array([h.times.size for h in histories])
         status = np.where(np.isfinite(ends), 1, 0)
-        return Prediction(found, self.outputs, lengths, status, ends, slopes, effect_jacobian=own)
+        return Prediction(found, self.outputs, lengths, status, ends, slopes, effect_jacobian=changes)
 
-    def _slope(self, kernel, theta, histories, effects, which):
-        sides = []
-        for sign in (1, -1):
-            moved, other = theta.copy(), dict(effects)
-            if isinstance(which, str):
-                other[which] = effects[which] + sign * 1e-4
-            else:
-                moved[:, which] += sign * 1e-4
-            sides.append(self._run(kernel, moved, histories, other)[0])
-        return (sides[0] - sides[1]) / 2e-4
+    def _slopes(self, law, theta, histories, effects):
+        """Central differences of one candidate, in one batch: (parameters), then (kinds)."""
+        size, step = theta.shape[1], 1e-4
+        count = size + len(effects)
+        points = np.repeat(theta, 2 * count, axis=0)
+        moved = {kind: np.repeat(v, 2 * count, axis=0) for kind, v in effects.items()}
+        for k in range(count):
+            for row, sign in ((k, 1), (count + k, -1)):
+                if k < size:
+                    points[row, k] += sign * step
+                else:
+                    moved[list(effects)[k - size]][row] += sign * step
+        found = self._run(law, points, histories, moved)[0]
+        slope = (found[:count] - found[count:]) / (2 * step)
+        own = {kind: slope[size + k][None] for k, kind in enumerate(effects)}
+        return np.moveaxis(slope[:size], 0, -1)[None], own
 
-    def _run(self, kernel, theta, histories, effects):
-        longest = max(h.times.size for h in histories)
-        out = np.full((len(theta), len(histories), longest, 3), np.nan)
-        ends = np.full((len(theta), len(histories)), np.inf)
+    def _run(self, law, theta, histories, effects):
+        shape = len(theta), len(histories)
+        D, ends = self._amplitude(law, theta, histories, effects)
+        window = np.broadcast_to(effects.get("window", 7.5), shape) - 7.5
+        out = np.full((*shape, max(h.times.size for h in histories), 3), np.nan)
         for t, history in enumerate(histories):
-            own = {kind: np.broadcast_to(v[:, t], (len(theta),)) for kind, v in effects.items()}
-            D, end = self._amplitude(kernel, theta, history, own)
-            window = own.get("window", NOMINAL["window"]) * np.ones(len(theta)) - 7.5
-            out[:, t, : D.shape[1], 0] = D * (1 - 0.004 * window[:, None])
-            out[:, t, : D.shape[1], 1] = 3.9 - 0.6 * (1 - np.exp(-D / 0.3)) + 0.03 * window[:, None]
-            out[:, t, : D.shape[1], 2] = 2.02 + 0.25 * D + 0.1 * D**2 - 0.02 * window[:, None]
-            ends[:, t] = end
+            d = np.stack([np.interp(history.times, GRID, each, right=np.nan) for each in D[:, t]])
+            off, size = window[:, t, None], history.times.size
+            out[:, t, :size, 0] = d * (1 - 0.004 * off)
+            out[:, t, :size, 1] = 3.9 - 0.6 * (1 - np.exp(-d / 0.3)) + 0.03 * off
+            out[:, t, :size, 2] = 2.02 + 0.25 * d + 0.1 * d**2 - 0.02 * off
         return out, ends
 
-    def _amplitude(self, kernel, theta, history, own):
-        """(candidates, times) by Heun's rule."""
-        h = own.get("thickness", history.geometry.get("apex_thickness", 0.5)) * np.ones(len(theta))
-        T = float(history.temperature) + own.get("temperature", np.zeros(len(theta)))
-        E = history.elastic.E * (1 + own.get("modulus", np.zeros(len(theta))))
-        program = history.loading.program()
-        grid = np.concatenate([[0.0], np.geomspace(60.0, 1200.0, 8), np.linspace(1800.0, END, STEPS)])
-        D, eps = np.full((len(theta), grid.size), np.nan), np.full(len(theta), 1e-6)
-        creep, end = np.zeros(len(theta)), np.full(len(theta), np.inf)
+    def _amplitude(self, law, theta, histories, own):
+        """(candidates, tests, grid) by Heun's rule, NaN after a burst; and when that was."""
+        shape = len(theta), len(histories)
+        nominal = np.array([h.geometry.get("apex_thickness", 0.5) for h in histories])
+        h = np.broadcast_to(own.get("thickness", nominal), shape)
+        T = np.array([float(test.temperature) for test in histories]) + own.get("temperature", np.zeros(shape))
+        E = np.array([test.elastic.E for test in histories]) * (1 + own.get("modulus", np.zeros(shape)))
+        pressures = np.stack([test.loading.program().at(GRID) for test in histories], axis=1)
+        kernel, columns = lower(law, "numpy"), theta.T[..., None]
 
-        def speed(c, e, t):
-            P = float(program.at(t))
-            total = np.maximum(elastic(P, E, h) + c, 0.03)
-            stress = np.maximum(k(np.minimum(total, 2 * LIMIT), h) * P, 1e-3)
-            log = kernel.internal_log_rate(stress, e, max(t, 1.0), T, stress, stress / 3, *theta.T)
+        def speed(c, e, P, t):
+            D = np.clip(elastic(P, E, h) + c, 0.03, 2 * LIMIT)
+            stress = np.maximum(k(D, h) * P, 1e-3)
+            log = kernel.internal_log_rate(stress, e, max(t, 1.0), T, stress, stress / 3, *columns)
             f = np.exp(np.minimum(log, 5.0))
-            return self.coarseness * kappa(np.minimum(total, 2 * LIMIT), h) * f, f
+            return self.coarseness * kappa(D, h) * f, f
 
-        for j, t in enumerate(grid):
+        creep, strain, end = np.zeros(shape), np.full(shape, 1e-6), np.full(shape, np.inf)
+        D = np.empty((*shape, GRID.size))
+        for j, (t, P) in enumerate(zip(GRID, pressures, strict=True)):
             if j:
-                dt, before = t - grid[j - 1], grid[j - 1]
-                a, fa = speed(creep, eps, before)
-                b, fb = speed(creep + a * dt, eps + fa * dt, t)
-                creep, eps = creep + 0.5 * dt * (a + b), eps + 0.5 * dt * (fa + fb)
-                gone = (creep > LIMIT) & np.isinf(end)
-                end[gone] = t
-            D[:, j] = np.where(np.isinf(end), elastic(float(program.at(t)), E, h) + creep, np.nan)
-        return np.stack([np.interp(history.times, grid, d, right=np.nan) for d in D]), end
+                dt = t - GRID[j - 1]
+                a, fa = speed(creep, strain, pressures[j - 1], GRID[j - 1])
+                b, fb = speed(creep + a * dt, strain + fa * dt, P, t)
+                creep, strain = creep + 0.5 * dt * (a + b), strain + 0.5 * dt * (fa + fb)
+                end = np.where((creep > LIMIT) & np.isinf(end), t, end)
+            D[..., j] = np.where(np.isinf(end), elastic(P, E, h) + creep, np.nan)
+        return D, end
 
 
 @dataclass(frozen=True)

@@ -126,6 +126,20 @@ def test_bounds_of_a_nuisance_hold(tests):
     assert any("lies at its bound" in note for note in fit.notes)
 
 
+def test_intervals_cover_where_thicknesses_and_rates_scatter():
+    """Twelve campaigns, rates scattering by 10 % beside thicknesses by 4 %: of 36 intervals of 95 % at least 30 hold.
+
+    Thicknesses take up most of the scatter of the rate; intervals that believed them would hold in three of four.
+    """
+    held = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed + 40)
+        scattered = [replace(p, rate=np.exp(0.1 * rng.normal())) for p in plans(seed)]
+        tests = planted(LAW, TRUTH, scattered, seed=seed, frames=24)
+        held += sum(inside(identify(LAW, tests, EXACT, settings=replace(WITH_THICKNESS, frames=12))).values())
+    assert held >= 30
+
+
 # ---- what pulls how hard -------------------------------------------------------------------------------------------
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from creepkit.inverse.covariance import covariance, effective_size, expected_effects, log_likelihood
-from creepkit.inverse.objective import Residuals
+from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.scatter import OutputScatter, Scatter
 from creepkit.inverse.sizes import estimated
 from creepkit.records import Nuisance

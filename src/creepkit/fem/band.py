@@ -113,20 +113,16 @@ def eliminate_rows(rows: Floats, size: int, width: int) -> bool:
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
 def solve_rows(rows: Floats, size: int, width: int, x: Floats) -> None:
-    """Overwrite ``x`` (size, columns) by the solution for every column."""
-    columns = x.shape[1]
-    for i in range(size):
-        value = x[i]
-        for r in range(i + 1, min(i + width + 1, size)):
-            factor, target = rows[r, width - (r - i)], x[r]
-            for c in range(columns):
-                target[c] -= factor * value[c]
-    for i in range(size - 1, -1, -1):
-        value = x[i]
-        for j in range(i + 1, min(i + width + 1, size)):
-            factor, other = rows[i, width + j - i], x[j]
-            for c in range(columns):
-                value[c] -= factor * other[c]
-        inverse = 1.0 / rows[i, width]
-        for c in range(columns):
-            value[c] *= inverse
+    """Overwrite ``x`` (columns, size) by the solutions, one right-hand side a row."""
+    for c in range(x.shape[0]):
+        for i in range(size):
+            first = max(0, i - width)
+            shift, total = width - i, x[c, i]
+            for j in range(first, i):
+                total -= rows[i, shift + j] * x[c, j]
+            x[c, i] = total
+        for i in range(size - 1, -1, -1):
+            shift, total = width - i, x[c, i]
+            for j in range(i + 1, min(i + width + 1, size)):
+                total -= rows[i, shift + j] * x[c, j]
+            x[c, i] = total / rows[i, width]

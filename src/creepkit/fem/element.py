@@ -32,7 +32,6 @@ from creepkit.fem.strain import (
     SUM,
     Five,
     Four,
-    Kinematics,
     energy_slopes,
     kinematics,
     piola_tangent,
@@ -182,9 +181,7 @@ def assemble(
                 for i in range(count):
                     row[POINT_SIZE + i] = states[k, i]
                 if count == 0:
-                    increment, flag = solve_near(
-                        update, theta, axes, problem, row, out, increments[k], stage.tolerance
-                    )
+                    increment, flag = solve_near(update, theta, axes, problem, row, out, increments[k], stage.tolerance)
                 if flag != SOLVED:
                     increment, flag = creep_safely(
                         update, theta, axes, problem, base, k, row, out, increments[k], stage.tolerance

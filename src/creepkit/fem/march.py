@@ -9,10 +9,10 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats, Ints
+from creepkit.fem.band import solve_factorized
 from creepkit.fem.body import Body
 from creepkit.fem.element import Forces, Points, clear, error_forces, forces_of, point_room, points_of
 from creepkit.fem.equilibrium import FOUND, UNSTABLE, balance
-from creepkit.fem.band import solve_factorized
 from creepkit.fem.material import EQUIVALENT, PointRoom, Stage
 from creepkit.fem.strain import Three
 from creepkit.integration.clock import Clock, moment, plain, position, virgin
@@ -55,7 +55,9 @@ class Record(NamedTuple):
     """Accepted steps: (records,) times s, segment of each; displacements (records, 2 nodes); and if kept, the points.
 
     values : (records or 0, points, V). mises : (records, points) MPa. counts : (4,) accepted, rejected, full and light
-    passes of equilibrium.
+    passes of equilibrium. For sensitivities, where the step began and its length in the position of its clock, (records, 2)
+    `places`; and, if kept, what the stages found: displacements (records or 0, stages, 2 nodes) in `stages`, and
+    `slopes` (records or 0, stages, points, V).
     """
 
     times: Floats
@@ -64,6 +66,9 @@ class Record(NamedTuple):
     values: Floats
     mises: Floats
     counts: Ints
+    places: Floats
+    stages: Floats
+    slopes: Floats
 
 
 class Rooms(NamedTuple):
@@ -201,12 +206,14 @@ def march(
     settings: Settings,
     tableau: Tableau,
     rooms: Rooms,
+    script: Floats,
     record: Record,
 ) -> Ended:
     """Run the program; fill `record` from its first row on, which holds the body at rest.
 
     segments : (segments, 10). pattern : (2 nodes,) displacement of held nodes for a unit of motion, mm.
-    initial, limits : (S,) states.
+    initial, limits : (S,) states. script : (records, 2) places of another march, to make the very same steps; (0, 2) for
+    steps by error control.
     """
     points, room, forces, u = rooms.points, rooms.point, rooms.forces, rooms.displacement
     _start(points, initial)
@@ -216,14 +223,12 @@ def march(
     for n in range(segments.shape[0]):
         segment = segments[n]
         if _jumps(before, segment):
-            ended = _jump(
-                update, theta, poisson, body, segment, n, pattern, before, settings, rooms, record, ended
-            )
+            ended = _jump(update, theta, poisson, body, segment, n, pattern, before, settings, rooms, record, ended)
             if ended.code != REACHED_END:
                 return ended
         ended = _segment(
             update, theta, clock_of(segment, beta), poisson, body, segment, n, pattern, limits, initial, settings, tableau,
-            rooms, record, ended,
+            rooms, script, record, ended,
         )  # fmt: skip
         if ended.code != REACHED_END:
             return ended
@@ -312,7 +317,8 @@ def keep(record: Record, ended: Ended, time: float, n: int, u: Floats, points: P
 @njit(cache=True, error_model="numpy", inline="always")
 def _segment(
     update: Any, theta: Floats, clock: Clock, poisson: float, body: Body, segment: Floats, n: int, pattern: Floats,
-    limits: Floats, initial: Floats, settings: Settings, tableau: Tableau, rooms: Rooms, record: Record, ended: Ended,
+    limits: Floats, initial: Floats, settings: Settings, tableau: Tableau, rooms: Rooms, script: Floats, record: Record,
+    ended: Ended,
 ) -> Ended:  # fmt: skip
     """March over one segment in the position s of its clock, from 0 to 1."""
     s, elapsed, length = 0.0, 0.0, segment[END] - segment[START]
@@ -325,13 +331,16 @@ def _segment(
         h = min(h, reach - s)
         if s + 1.0001 * h > 1.0:
             h = 1.0 - s
+        told = ended.records < script.shape[0]
+        if told:
+            h = min(script[ended.records, 1], 1.0 - s)
         if record.counts[0] + record.counts[1] >= settings.max_steps:
             return Ended(ended.records, TOO_MANY_STEPS, ended.time)
         outcome, error = _step(
             update, theta, clock, poisson, body, segment, pattern, settings, tableau, rooms, record, first,
             ended.records, s, h,
         )  # fmt: skip
-        if outcome != FOUND or not error <= 1.0:
+        if outcome != FOUND or not (error <= 1.0 or told):
             copy(start, u)
             record.counts[1] += 1
             failures += 1
@@ -343,6 +352,13 @@ def _segment(
         failures = 0
         record.counts[0] += 1
         worst, _ = finish(points, tableau, h)
+        row = ended.records
+        record.places[row, 0], record.places[row, 1] = s, h
+        if record.stages.shape[0] > 0:
+            for i in range(tableau.c.size):
+                copy(rooms.stages[i], record.stages[row, i])
+                for k in range(points.value.shape[0]):
+                    copy(points.slopes[i, k], record.slopes[row, i, k])
         s = 1.0 if h == 1.0 - s else s + h
         time = segment[END] if s == 1.0 else moment(clock, s).time
         elapsed = time - segment[START]

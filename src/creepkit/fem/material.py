@@ -159,20 +159,11 @@ def creep_slopes_with_states(
     return response[0, BY_TRIAL], response[0, BY_PRINCIPAL], response[0, BY_MEAN]
 
 
-class Following(NamedTuple):
-    """How D follows the elastic predictor: derivatives to the three components of w and to tr E."""
-
-    hoop: float
-    difference: float
-    shear: float
-    trace: float
-
-
 @njit(cache=True, error_model="numpy")
-def following(stage: Stage, elastic: Elastic, increment: float, by: Three) -> Following:
-    """Chain the derivatives `by` of D to trial, largest principal and mean stress."""
+def following(stage: Stage, elastic: Elastic, increment: float, by: Three) -> Four:
+    """Derivatives of D to the three components of w and to tr E, from those `by` trial, largest principal, mean stress."""
     if increment == 0.0:
-        return Following(0.0, 0.0, 0.0, 0.0)
+        return 0.0, 0.0, 0.0, 0.0
     by_trial, by_principal, by_mean = by
     e, stiffness = elastic.equivalent, 3.0 * stage.shear / elastic.volume
     stress = stiffness * (e - increment)
@@ -193,14 +184,16 @@ def following(stage: Stage, elastic: Elastic, increment: float, by: Three) -> Fo
             difference += turned * elastic.difference / radius
             shear += turned * elastic.shear / radius
         trace += (by_mean + by_principal) * (stage.bulk / elastic.volume - elastic.mean)
-    return Following(hoop, difference, shear, trace)
+    return hoop, difference, shear, trace
 
 
 @njit(cache=True, error_model="numpy")
 def tangent_moduli(
-    stage: Stage, elastic: Elastic, increment: float, follow: Following, symmetric: bool
+    stage: Stage, elastic: Elastic, increment: float, follow: Four, symmetric: bool
 ) -> tuple[Four, Four, Four, Four]:
     """Consistent tangent dT/dE, exact or its symmetric part; rows and columns in the order of the strains.
+
+    follow : derivatives of D to w and to tr E, see `following`.
 
     y_i = 3G (1 - D/e) g_i w_i is conjugate to w_i, and dy_i = 3G (1 - D/e) g_i dw_i + g_i w_i (v_j dw_j + v_t dtr).
     """
@@ -209,8 +202,8 @@ def tangent_moduli(
     inverse = shear3 / e if increment > 0.0 else 0.0
     d0, d1, d2 = elastic.hoop, elastic.difference * third, elastic.shear * third
     bend = inverse * increment / (e * e) if increment > 0.0 else 0.0
-    v0, v1, v2 = bend * d0 - inverse * follow.hoop, bend * d1 - inverse * follow.difference, bend * d2 - inverse * follow.shear
-    vt = -inverse * follow.trace
+    v0, v1, v2 = bend * d0 - inverse * follow[0], bend * d1 - inverse * follow[1], bend * d2 - inverse * follow[2]
+    vt = -inverse * follow[3]
     a00, a01, a02 = shear3 * left + d0 * v0, d0 * v1, d0 * v2
     a10, a11, a12 = d1 * v0, stage.shear * left + d1 * v1, d1 * v2
     a20, a21, a22 = d2 * v0, d2 * v1, stage.shear * left + d2 * v2

@@ -9,7 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
+from creepkit.errors import SolveError
 from creepkit.fem.body import Body
+from creepkit.fem.element import point_room
 from creepkit.fem.march import (
     DEFLECTION_LIMIT,
     LIMIT_LOAD,
@@ -23,6 +25,9 @@ from creepkit.fem.march import (
     march,
     rooms_of,
 )
+from creepkit.fem.sensitivity import DONE, Columns, change_room
+from creepkit.fem.sensitivity import differentiate as replay
+from creepkit.fem.shape import GeometryChange
 from creepkit.fem.timeline import Timeline
 from creepkit.integration.segments import segments_of
 from creepkit.integration.tableau import SDIRK2
@@ -76,8 +81,10 @@ class Simulation:
     """A march that was made: its accepted steps, and how it ended.
 
     times : (steps,) s, from rest at 0 on. displacements : (steps, nodes, 2) mm. mises : (steps, points) MPa.
+    places : (steps, 2) where each step began in its segment, and its length.
     values : (steps, points, 4 + S) creep components, equivalent creep strain and states, or None if not kept.
     status, end_time, reason : how it ended. counts : accepted and rejected steps, full and light passes of equilibrium.
+    beta : exponent of the clock (see integration.clock). record : what `differentiate` replays, if kept.
     """
 
     times: Floats
@@ -89,6 +96,9 @@ class Simulation:
     reason: str
     counts: Ints
     timeline: Timeline
+    beta: float
+    places: Floats
+    record: Record | None = None
 
     def at(self, values: Floats, times: Floats) -> Floats:
         """Values (steps, ...) of the accepted steps at other times, (times, ...); NaN after the end."""
@@ -97,25 +107,24 @@ class Simulation:
 
 def simulate(
     law: CompiledLaw, theta: Floats, body: Body, course: Course, *, settings: Settings | None = None,
-    keep_points: bool = False,
+    keep_points: bool = False, keep_stages: bool = False, like: Simulation | None = None,
 ) -> Simulation:  # fmt: skip
-    """March one body through its course; theta : (P,) internal parameters."""
+    """March one body through its course; theta : (P,) internal parameters.
+
+    keep_points : keep strains and states of all points; keep_stages : keep what `differentiate` needs.
+    like : make the very steps of another simulation, so that the two may be differenced.
+    """
     settings = settings or Settings()
     theta = np.ascontiguousarray(theta, dtype=float)
-    beta = float(np.asarray(law.leading(theta)))
-    rows, size, points = settings.max_steps + len(course.segments) + 2, body.equations.size, 4 * len(body.elements)
-    record = Record(
-        np.zeros(rows),
-        np.zeros(rows, np.int64),
-        np.zeros((rows, size)),
-        np.zeros((rows if keep_points else 0, points, 4 + law.states)),
-        np.zeros((rows, points)),
-        np.zeros(4, np.int64),
-    )
-    pattern = np.zeros(size) if course.pattern is None else np.ascontiguousarray(course.pattern, dtype=float).ravel()
+    beta = float(np.asarray(law.leading(theta))) if like is None else like.beta
+    script = np.zeros((0, 2)) if like is None else like.places
+    record = _record(law, body, course, settings, keep_points, keep_stages)
+    pattern = np.zeros(body.equations.size)
+    if course.pattern is not None:
+        pattern[:] = np.ravel(course.pattern)
     ended = march(
         law.update, theta, beta, course.poisson, body, course.segments, pattern, np.array(law.initial),
-        np.array(law.limits), settings, SDIRK2, rooms_of(body, law.states, SDIRK2.stages), record,
+        np.array(law.limits), settings, SDIRK2, rooms_of(body, law.states, SDIRK2.stages), script, record,
     )  # fmt: skip
     n = ended.records
     return Simulation(
@@ -127,5 +136,73 @@ def simulate(
         end_time=float(ended.time),
         reason=REASONS[int(ended.code)],
         counts=record.counts,
-        timeline=Timeline.of(record.times[:n], record.segments[:n], course.segments[:, 0], beta),
+        timeline=Timeline.of(record.times[:n], record.segments[:n], course.segments[:, 0]),
+        beta=beta,
+        places=record.places[:n].copy(),
+        record=record if keep_stages else None,
     )
+
+
+def _record(
+    law: CompiledLaw, body: Body, course: Course, settings: Settings, keep_points: bool, keep_stages: bool
+) -> Record:
+    """Room for as many steps as the settings allow; memory is only taken where it is written."""
+    rows, size, points = settings.max_steps + len(course.segments) + 2, body.equations.size, 4 * len(body.elements)
+    kept, values = rows if keep_stages else 0, 4 + law.states
+    return Record(
+        times=np.zeros(rows),
+        segments=np.zeros(rows, np.int64),
+        displacements=np.zeros((rows, size)),
+        values=np.zeros((rows if keep_points else 0, points, values)),
+        mises=np.zeros((rows, points)),
+        counts=np.zeros(4, np.int64),
+        places=np.zeros((rows, 2)),
+        stages=np.zeros((kept, SDIRK2.stages, size)),
+        slopes=np.zeros((kept, SDIRK2.stages, points, values)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """Derivatives of a march.
+
+    surface : (steps, top, C) of u_z of the observed nodes, to the law's internal parameters, then to the directions
+        of the load program, then to the numbers of the geometry.
+    times : (steps, D) of the times of the steps, s, to the directions.
+    """
+
+    surface: Floats
+    times: Floats
+
+
+def differentiate(
+    law: CompiledLaw, theta: Floats, body: Body, course: Course, made: Simulation, *,
+    directions: Floats | None = None, velocities: Sequence[tuple[GeometryChange, Floats]] = (),
+) -> Change:  # fmt: skip
+    """Exact derivatives of a march that kept its stages.
+
+    directions : (D, segments, 10) derivatives of `course.segments`.
+    velocities : for each number of the geometry its GeometryChange and the velocities (nodes, 2) of the nodes.
+    """
+    if made.record is None:
+        raise SolveError("this simulation kept no stages; simulate with keep_stages=True to differentiate it")
+    theta = np.ascontiguousarray(theta, dtype=float)
+    segments = course.segments
+    along = np.zeros((0, *segments.shape)) if directions is None else np.ascontiguousarray(directions, dtype=float)
+    points = (len(velocities), *body.weights.shape)
+    columns = Columns(
+        along,
+        np.array([g.gradient for g, _ in velocities]).reshape(*points, 2, 2),
+        np.array([g.hoop for g, _ in velocities]).reshape(points),
+        np.array([np.ravel(v) for _, v in velocities]).reshape(len(velocities), body.equations.size),
+    )
+    count, total = made.times.size, theta.size + len(along) + len(velocities)
+    surface, times = np.zeros((count, body.top.size, total)), np.zeros((count, len(along)))
+    flag = replay(
+        law.sensitivity, theta, made.beta, course.poisson, body, segments, columns, SDIRK2,
+        np.array(law.initial), made.record, count, point_room(law.states, theta.size),
+        change_room(body, law.states, SDIRK2.stages, total, len(along)), surface, times,
+    )  # fmt: skip
+    if flag != DONE:
+        surface[:] = np.nan
+    return Change(surface, times)

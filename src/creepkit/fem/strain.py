@@ -179,7 +179,12 @@ def _row(at: Kinematics, moduli: Four) -> Four:
     """Moduli of one stress to the strains, turned into derivatives to alpha."""
     s, d, h, x = moduli
     a, u, v = at.by_sum, at.by_difference, at.by_shear
-    return s * a[0] + d * u[0] + x * v[0], s * a[1] + d * u[1] + x * v[1], s * a[2] + d * u[2] + x * v[2], h * at.by_hoop
+    return (
+        s * a[0] + d * u[0] + x * v[0],
+        s * a[1] + d * u[1] + x * v[1],
+        s * a[2] + d * u[2] + x * v[2],
+        h * at.by_hoop,
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -194,9 +199,7 @@ def _sum(a: float, b: float, c: float, x: Four, y: Four, z: Four) -> Four:
 
 
 @njit(cache=True, error_model="numpy")
-def piola_tangent(
-    at: Kinematics, moduli: tuple[Four, Four, Four, Four], stress: Four, slopes: Four, A: Floats
-) -> None:
+def piola_tangent(at: Kinematics, moduli: tuple[Four, Four, Four, Four], stress: Four, slopes: Four, A: Floats) -> None:
     """A = dP/dF, (5, 5), from the moduli dT/dE, which need not be symmetric; `slopes` as `energy_slopes` gives them."""
     along, across, hoop, shear = (
         _row(at, moduli[0]), _row(at, moduli[1]), _row(at, moduli[2]), _row(at, moduli[3]),

@@ -20,19 +20,18 @@ OFFSET = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """The accepted steps: (steps,) times s and rows where each segment begins.
+    """The accepted steps of a march.
 
-    starts : (segments reached,) s. rows : (segments reached + 1,) first row of each segment, which for a load without
-    a jump is the last row of the segment before.
+    times : (steps,) s. starts : (segments reached,) s. rows : first and last step of each segment; without a jump of
+    the load the first is the last one of the segment before.
     """
 
     times: Floats
     starts: Floats
     rows: tuple[tuple[int, int], ...]
-    beta: float
 
     @classmethod
-    def of(cls, times: Floats, segments: Ints, starts: Floats, beta: float) -> Timeline:
+    def of(cls, times: Floats, segments: Ints, starts: Floats) -> Timeline:
         """From the rows of a record and the starts of the program's segments."""
         rows = []
         reached = int(segments[-1]) + 1
@@ -41,7 +40,7 @@ class Timeline:
             at_start = np.flatnonzero((segments == n) & (times == starts[n]))
             first = int(at_start[-1]) if at_start.size else int(mine[0]) - 1
             rows.append((first, int(mine[-1])))
-        return cls(np.array(times), np.array(starts[:reached]), tuple(rows), beta)
+        return cls(np.array(times), np.array(starts[:reached]), tuple(rows))
 
     def interpolate(self, values: Floats, times: Floats) -> Floats:
         """Values (steps, ...) at other times, (times, ...); NaN after the last step.
@@ -57,6 +56,10 @@ class Timeline:
                 knots = self.times[first : last + 1] - self.starts[n]
                 out[mine] = _spline(knots, values[first : last + 1], times[mine] - self.starts[n])
         return out
+
+    def moved(self, times: Floats, starts: Floats) -> Timeline:
+        """The same steps at other times, the segments beginning at others too."""
+        return Timeline(self.times + times, self.starts + starts, self.rows)
 
 
 def _spline(knots: Floats, values: Floats, elapsed: Floats) -> Floats:

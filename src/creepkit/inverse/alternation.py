@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.covariance import log_likelihood, whitener
 from creepkit.inverse.effects import Unknowns
-from creepkit.inverse.objective import Objective, Residuals
+from creepkit.inverse.objective import Objective
+from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.scatter import Scatter
 from creepkit.inverse.search import Box, Minimum, Progress, refine
 from creepkit.inverse.uncertainty import curvature, inverse, marginal
@@ -108,6 +110,7 @@ def _with_spreads(unknowns: Unknowns, curve: Floats, x: Floats) -> Unknowns:
     return unknowns
 
 
-def free(objective: Objective, u: Floats) -> Floats:
-    """x = (u, e) with the unknowns of tests at their means."""
-    return np.concatenate([u, objective.unknowns.mean[: objective.unknowns.size]])
+def free(unknowns: Unknowns, u: Floats, known: Mapping[tuple[str, str], float]) -> Floats:
+    """x = (u, e) with the unknowns of tests where they are known, {(kind, member): value}, else at their means."""
+    owners = zip(unknowns.nuisances, unknowns.members, unknowns.mean, strict=True)
+    return np.concatenate([u, [known.get((n.kind, member), float(mean)) for n, member, mean in owners]])

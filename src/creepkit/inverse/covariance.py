@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.objective import Residuals
+from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.scatter import Scatter
 
 _JITTER = 1e-10
@@ -34,6 +34,8 @@ def covariance(residuals: Residuals, scatter: Scatter) -> Floats:
     c += offset[:, :, None] * offset[:, None, :]
     c = np.where(company(residuals), c, 0.0) if len(scatter.outputs) > 1 else c
     c += scatter.rate**2 * d[:, :, None] * d[:, None, :]
+    if residuals.known is not None:
+        c += residuals.known @ np.swapaxes(residuals.known, 1, 2)
     k = np.arange(s.shape[1])
     noise = scatter.at(output, "noise") * residuals.loudness
     c[:, k, k] = c[:, k, k] * (1 + 1e-9) + (noise * s) ** 2 + scatter.at(output, "misfit") ** 2 + _JITTER

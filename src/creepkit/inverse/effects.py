@@ -13,6 +13,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
+from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.together import offers, predictor_of
 from creepkit.records import ABSOLUTE, EXPLICIT, History, Nuisance, Predictor
 
@@ -96,6 +97,19 @@ class Unknowns:
                 if unknown >= 0:
                     out[test, :, unknown] = slopes[kind][test]
         return out
+
+    def integrated(self, residuals: Residuals, e: Floats) -> Residuals:
+        """The residuals that tests would leave at their prior means, with the priors as part of the scatter.
+
+        To first order. At its estimate an unknown has taken up what scatter between tests it can, so that the size of
+        that scatter cannot be read off the residuals there. Unknowns that tests share stay as estimated.
+        """
+        own = [k for k, n in enumerate(self.nuisances) if n.scope == "test" and np.isfinite(self.sd[k])]
+        if not own or residuals.jacobian is None:
+            return residuals
+        slopes = residuals.jacobian[..., -self.size :][..., own]
+        values = residuals.values - slopes @ (e - self.mean)[own]
+        return replace(residuals, values=values, known=slopes * self.sd[own])
 
     def with_spread(self, e: Floats, variance: Floats) -> Unknowns:
         """The spreads to be estimated, as the unknowns show them: mean of (e - mean)^2 and their own variance."""

@@ -5,139 +5,24 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Reference
-from creepkit.inverse.identification import Identification, NuisanceEstimate, OutputMisfit, Settings, TestMisfit
+from creepkit.inverse.document import KIND, VERSION, Document, ErrorsPart, ScatterPart, SettingsPart, TestPart
+from creepkit.inverse.findings import NuisanceEstimate, OutputMisfit, TestMisfit
+from creepkit.inverse.identification import Identification, Settings
 from creepkit.inverse.measures import Errors
 from creepkit.inverse.scatter import OutputScatter, Scatter
 from creepkit.inverse.uncertainty import Estimate
 from creepkit.language.tree import law_from_json, law_to_json
 from creepkit.records import Nuisance
-from creepkit.records.prediction import Kind
 
-KIND = "creepkit identification"
-VERSION = 2
-"""Version 1 knew one output, strain, and no explicit nuisances."""
 LARGEST = 50_000_000
 """Bytes; no identification is near it, and a reader must not swallow what it cannot hold."""
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-
-class _Estimate(_Strict):
-    name: str
-    value: float
-    low: float
-    high: float
-    unit: str
-    verdict: Literal["determined", "at its bound", "not determined"]
-
-
-class _Reference(_Strict):
-    stress: float = Field(gt=0)
-    strain: float = Field(gt=0)
-    time: float = Field(gt=0)
-    temperature: float = Field(gt=0)
-
-
-class _OutputScatter(_Strict):
-    noise: float = Field(ge=0)
-    misfit: float = Field(ge=0)
-    offset: float = Field(ge=0)
-    drift: float = Field(ge=0)
-    reach: float = Field(gt=0)
-
-
-class _Scatter(_Strict):
-    rate: float = Field(ge=0)
-    outputs: dict[str, _OutputScatter]
-
-
-class _Errors(_Strict):
-    frames: int = Field(ge=0)
-    rse: float | None
-    mse: float | None
-    mae: float | None
-    relative: float | None
-    chi_square: float | None
-
-
-class _Output(_Strict):
-    output: str
-    errors: _Errors
-    offset: float
-    noise: float = Field(ge=0)
-
-
-class _Test(_Strict):
-    name: str
-    condition: str
-    frames: int = Field(ge=0)
-    rms: float | None
-    bias: float | None
-    rate_factor: float
-    weight: float = Field(gt=0)
-    outputs: list[_Output]
-
-
-class _Nuisance(_Strict):
-    kind: Kind
-    scope: Literal["test", "alloy", "all"]
-    output: str
-    mean: float
-    sd: float | Literal["inf"] | None
-    bounds: tuple[float | None, float | None]
-
-
-class _NuisanceEstimate(_Strict):
-    kind: Kind
-    scope: Literal["test", "alloy", "all"]
-    member: str
-    value: float
-    sd: float = Field(ge=0)
-    mean: float
-    spread: float | Literal["inf"]
-
-
-class _Settings(_Strict):
-    starts: int = Field(ge=1)
-    draws: int = Field(ge=1)
-    frames: int = Field(ge=2)
-    seed: int
-    loss: str
-    nuisances: list[_Nuisance]
-    weights: Literal["noise"] | dict[str, float]
-    test_loss: str
-
-
-class _Document(_Strict):
-    kind: Literal["creepkit identification"]
-    version: Literal[2]
-    law: dict[str, Any]
-    estimates: list[_Estimate]
-    u: list[float]
-    covariance: list[list[float]]
-    reference: _Reference
-    scatter: _Scatter
-    rms: float | None
-    log_likelihood: float
-    size: float = Field(gt=0)
-    freedom: float = Field(gt=0)
-    tests: list[_Test]
-    errors: dict[str, _Errors]
-    nuisances: list[_NuisanceEstimate]
-    ranges: dict[str, tuple[float, float]]
-    settings: _Settings
-    provenance: dict[str, str | int | float | list[str]]
-    converged: bool
-    notes: list[str]
 
 
 def to_json(fit: Identification) -> dict[str, Any]:
@@ -218,7 +103,7 @@ def from_json(data: Any, source: str = "identification") -> Identification:
     if isinstance(data, dict) and data.get("kind") == KIND and data.get("version") == 1:
         raise FitError(f"{source}: written by an earlier creepkit, in version 1 of the format; identify again")
     try:
-        document = _Document.model_validate(data)
+        document = Document.model_validate(data)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "the document"
@@ -253,11 +138,11 @@ def from_json(data: Any, source: str = "identification") -> Identification:
     )
 
 
-def _scatter(s: _Scatter) -> Scatter:
+def _scatter(s: ScatterPart) -> Scatter:
     return Scatter({name: OutputScatter(**sizes.model_dump()) for name, sizes in s.outputs.items()}, s.rate)
 
 
-def _settings(s: _Settings) -> Settings:
+def _settings(s: SettingsPart) -> Settings:
     nuisances = tuple(
         Nuisance(n.kind, n.scope, n.output, n.mean, None if n.sd is None else float(n.sd), _ends(n.bounds))
         for n in s.nuisances
@@ -269,12 +154,12 @@ def _ends(bounds: tuple[float | None, float | None]) -> tuple[float, float]:
     return (-np.inf if bounds[0] is None else bounds[0]), (np.inf if bounds[1] is None else bounds[1])
 
 
-def _test(t: _Test) -> TestMisfit:
+def _test(t: TestPart) -> TestMisfit:
     rms, bias = (float("nan") if v is None else v for v in (t.rms, t.bias))
     outputs = tuple(OutputMisfit(o.output, _errors(o.errors), o.offset, o.noise) for o in t.outputs)
     return TestMisfit(t.name, t.condition, t.frames, rms, bias, t.rate_factor, t.weight, outputs)
 
 
-def _errors(e: _Errors) -> Errors:
+def _errors(e: ErrorsPart) -> Errors:
     numbers = [float("nan") if v is None else v for v in (e.rse, e.mse, e.mae, e.relative, e.chi_square)]
     return Errors(e.frames, *numbers)

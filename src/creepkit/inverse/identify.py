@@ -15,8 +15,9 @@ from creepkit.inverse.coordinates import Coordinates, Reference
 from creepkit.inverse.covariance import effective_size, expected_effects, whitener
 from creepkit.inverse.effects import Unknowns
 from creepkit.inverse.entries import Entries
+from creepkit.inverse.findings import NuisanceEstimate
 from creepkit.inverse.frames import thinned
-from creepkit.inverse.identification import Identification, NuisanceEstimate
+from creepkit.inverse.identification import Identification
 from creepkit.inverse.misfits import misfits, pooled_errors, pooled_rms
 from creepkit.inverse.nominal import measured_log_rate
 from creepkit.inverse.objective import Objective
@@ -41,6 +42,7 @@ def identify(
     *,
     settings: Settings | None = None,
     start: Floats | None = None,
+    known: Sequence[NuisanceEstimate] = (),
     reference: Reference | None = None,
     progress: Progress | None = None,
 ) -> Identification:
@@ -49,6 +51,7 @@ def identify(
     using : predictor, such as the specimen that study.specimen("uniaxial") returns, or {specimen: predictor} where
         histories are of several. One that offers screening() is searched with that stand-in and then refined.
     start : conditioned coordinates to begin from instead of a global search; a refit takes two rounds at most.
+    known : explicit nuisances as they were found before, to begin from.
     """
     settings = settings or Settings()
     if isinstance(using, Mapping):
@@ -69,10 +72,10 @@ def identify(
         screened = search.evaluations
     else:
         starts, effort = [box.clip(np.asarray(start, float))], replace(effort, rounds=REFIT_ROUNDS)
-    ends = []
+    wide, before, ends = box.beside(unknowns), {(n.kind, n.member): n.value for n in known}, []
     for u in starts:
         objective.unknowns = unknowns
-        ends.append(alternate(objective, box.beside(unknowns), free(objective, u), weighting, effort, progress))
+        ends.append(alternate(objective, wide, free(unknowns, u, before), weighting, effort, progress))
     best = max(ends, key=lambda end: end.likelihood)
     objective.unknowns = best.unknowns
     check_bounds(objective, best.minimum.u[: len(law.params)])
@@ -86,7 +89,8 @@ def _answer(
     law, coordinates, residuals, settings = objective.law, objective.coordinates, best.residuals, weighting.settings
     size, x, known = len(law.params), best.minimum.u, _with_known_rate(settings.nuisances, len(histories))
     u = x[:size]
-    scatter = estimated(residuals, full_guess(weighting.measured(best.working), known), known)
+    at_means = best.unknowns.integrated(residuals, x[size:])
+    scatter = estimated(at_means, full_guess(weighting.measured(best.working), known), known)
     given = any(n.kind == "rate" and n.sd is not None for n in known)
     wide = box.beside(best.unknowns)
     posterior, freedom = laplace(residuals, best.working, scatter, wide, best.unknowns, rate_known=given)
@@ -163,4 +167,6 @@ def refit(fit: Identification, histories: Sequence[History]) -> Identification:
     """The same law on other histories, starting where `fit` ended (for hold-out and resampling)."""
     if fit.using is None:
         raise FitError("cannot refit an identification that was loaded from a file without its specimen")
-    return identify(fit.law, histories, fit.using, settings=fit.settings, start=fit.u, reference=fit.reference)
+    return identify(
+        fit.law, histories, fit.using, settings=fit.settings, start=fit.u, known=fit.nuisances, reference=fit.reference
+    )

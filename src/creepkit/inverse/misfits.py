@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.identification import OutputMisfit, TestMisfit
+from creepkit.inverse.findings import OutputMisfit, TestMisfit
 from creepkit.inverse.measures import Errors, errors
-from creepkit.inverse.objective import Objective, Residuals
+from creepkit.inverse.objective import Objective
+from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.scales import LOGARITHMIC, noise_of, usable
 from creepkit.inverse.together import outputs_of
 from creepkit.records import History, Prediction

@@ -7,7 +7,7 @@ residual stays finite and keeps growing the earlier it burst, so a search can fi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.differences import author_values, differentiated
 from creepkit.inverse.effects import Unknowns
 from creepkit.inverse.entries import Entries
+from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.scales import LinearScale
 from creepkit.inverse.together import predict
 from creepkit.language import CreepLaw
@@ -24,33 +25,8 @@ from creepkit.records import History, Prediction, Predictor
 BURST_SLOPE = 3.0
 """Growth of the compared quantity per unit of ln(t / t_burst) after a burst; strains above it are not data."""
 
-
-@dataclass(frozen=True, eq=False)
-class Residuals:
-    """Predicted minus measured, for each test the entries of its outputs end to end (see inverse.entries).
-
-    values, slopes : (tests, entries) residual, and dg/dy at the prediction (what one unit of offset changes).
-    present : (tests, entries) which entries are data; the others are zero.
-    log_times : (tests, entries) ln of time.
-    jacobian : (tests, entries, unknowns) with respect to x = (u, e), or None.
-    rate_effect : (tests, entries) derivative with respect to ln of a factor on this test's creep rate.
-    output : (tests, entries) position of the entry's output; loudness : its noise over that of its output.
-    trust : (tests,) weight of each test; the covariance of a test is divided by it.
-    """
-
-    values: Floats
-    slopes: Floats
-    present: Bools
-    log_times: Floats
-    jacobian: Floats | None
-    rate_effect: Floats
-    output: Ints
-    loudness: Floats
-    trust: Floats
-
-    def trusting(self, trust: Floats) -> Residuals:
-        """The same with other weights of tests."""
-        return replace(self, trust=trust)
+REMEMBERED = 4
+"""Candidates whose residuals are kept: a search ends at one that it has seen, and the next begins there."""
 
 
 class Objective:
@@ -64,6 +40,7 @@ class Objective:
         self.coordinates, self.entries, self.unknowns = coordinates, entries, unknowns
         self.compared = entries.forward(entries.measured)
         self.evaluations = 0
+        self._seen: dict[bytes, Residuals] = {}
 
     def asking(self, using: Predictor, law: CreepLaw, coordinates: Coordinates) -> Objective:
         """The same entries asked of another predictor or law, unknowns of tests held at their means."""
@@ -105,7 +82,14 @@ class Objective:
         return np.array([np.nanmedian(each) if np.isfinite(each).any() else 0.0 for each in logs[:, entries.present]])
 
     def at(self, x: Floats) -> Residuals:
-        """Residuals of one candidate x = (u, e) with exact derivatives."""
+        """Residuals of one candidate x = (u, e) with exact derivatives; the last few are remembered."""
+        key = x.tobytes()
+        if key not in self._seen:
+            self._seen = dict([*self._seen.items()][1 - REMEMBERED :])
+            self._seen[key] = self._computed(x)
+        return self._seen[key]
+
+    def _computed(self, x: Floats) -> Residuals:
         size, entries = len(self.law.params), self.entries
         u, e = x[:size], x[size:]
         found = differentiated(

@@ -124,6 +124,9 @@ def _draw_rates(axes: Axes, fit: Identification) -> None:
     axes.set(xscale="log", yscale="log", xlabel="stress, MPa", ylabel="creep rate, 1/s")
     axes.grid(alpha=0.25)
     axes.legend(fontsize=8, title="identified, 95 % band", title_fontsize=8)
+    if grid[-1] < 10 * grid[0]:
+        for place in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+            place("{x:g}")
     axes.set_title(f"rate at strain {fit.reference.strain:.1e}, {fit.reference.time / 3600:.3g} h", fontsize=10)
 
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 LEGEND = 12
 """At most so many tests are named."""
+HEADROOM = 1.4
+"""Top of the panel over the largest value, so that the names do not lie on the curves."""
 FULL = 0.5
 """Weight below which a test is drawn dashed."""
 
@@ -42,11 +44,11 @@ def draw_linear(
 
 
 def _finish(tests: Axes, left: Axes, fit: Identification, output: str) -> None:
-    tests.set(xlabel="time, h", ylabel=f"{output}, mm", ylim=(0, None))
+    tests.set(xlabel="time, h", ylabel=f"{output}, mm", ylim=(0, HEADROOM * tests.get_ylim()[1]))
     tests.set_title("measured (dots), identified (lines)", fontsize=10)
     drawn = sum(m.outputs[0].output == output for m in fit.misfits)
     if drawn <= LEGEND:
-        tests.legend(fontsize=6.5, loc="upper left")
+        tests.legend(fontsize=6.5, loc="upper left", ncols=2)
     errors = fit.errors[output]
     left.set(xlabel="time, h", ylabel=f"{output}, measured less identified, um")
     left.axhline(0, color="black", lw=0.8)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from creepkit.language.printing import text_of_expression
 
 if TYPE_CHECKING:
-    from creepkit.inverse.identification import Identification, NuisanceEstimate
+    from creepkit.inverse.findings import NuisanceEstimate
+    from creepkit.inverse.identification import Identification
 
 UNITS = {"amplitude": "mm", "width": "mm", "thickness": "mm", "window": "mm", "temperature": "K"}
 
@@ -88,7 +89,7 @@ def _table(fit: Identification) -> list[str]:
     own = {(n.kind, n.member): n for n in fit.nuisances if n.scope == "test"}
     kinds = list(dict.fromkeys(n.kind for n in fit.nuisances if n.scope == "test"))
     if not (bulges or kinds):
-        return [*_shared(fit)]
+        return _shared(fit)
     width = max(len(m.name) for m in fit.misfits)
     head = f"  {'test':{width}}  {'condition':22} {'error':>9} {'chi2':>8} {'offset':>9} {'rate':>6} {'weight':>6}"
     lines = ["", head + "".join(f" {kind + _unit(kind):>18}" for kind in kinds)]

@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.inverse.alternation import Fitted
 from creepkit.inverse.fences import Fences
-from creepkit.inverse.identification import NuisanceEstimate, TestMisfit
+from creepkit.inverse.findings import NuisanceEstimate, TestMisfit
 from creepkit.inverse.nominal import end_strain, stresses
 from creepkit.inverse.objective import Objective
 from creepkit.inverse.scatter import ASSUMED_RATE
@@ -78,7 +78,7 @@ def notes(
     if max(warmth) - min(warmth) > 5 and not law.uses(temperature):
         found.append(f"the tests span {min(warmth):.0f} to {max(warmth):.0f} K and this law knows no temperature")
     levels = {round(float(v), 3) for h in histories for v in stresses(h, objective.using)}
-    if len(levels) == 1:
+    if len(levels) == 1 and all(h.loading.quantity == "stress" for h in histories):
         found.append("all tests have one stress: the stress dependence is not determined by them")
     if len(histories) < FEW_TESTS and any(n.kind == "rate" and n.sd is None for n in settings.nuisances):
         found.append(f"fewer than {FEW_TESTS} tests: their rates are assumed to scatter by {100 * ASSUMED_RATE:.0f} %")

@@ -10,16 +10,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
 from creepkit.arrays import Floats
 from creepkit.inverse.covariance import company, covariance, lags
-from creepkit.inverse.objective import Residuals
+from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.scatter import Scatter, given_sizes
 from creepkit.records import Nuisance
 
 LONGEST = 3.0
 """Longest reach of the drift in ln t, a factor 20 in time: what lasts longer is scatter of the rate."""
+LOST = float(np.log(30.0))
+"""A source that falls by more than this may have been overshot, to where the likelihood no longer feels it: from half
+way the search is made again."""
 SOURCES = ("misfit", "offset", "drift", "reach")
 
 
@@ -41,9 +44,17 @@ def estimated(
     likelihood = _Likelihood(residuals, start, free)
     bounds = [_bounds(residuals, start, output, name) for output, name in free]
     x0 = np.array([np.clip(np.log(_size(start, *one)), *b) for one, b in zip(free, bounds, strict=True)])
+    best = _least(likelihood, x0, bounds)
+    lost = best.x < x0 - LOST
+    if lost.any():
+        best = min(best, _least(likelihood, np.where(lost, x0 - 0.5 * LOST, best.x), bounds), key=lambda end: end.fun)
+    return likelihood.scatter(best.x)
+
+
+def _least(likelihood: _Likelihood, x0: Floats, bounds: Sequence[tuple[float, float]]) -> OptimizeResult:
+    inside = np.clip(x0, [low for low, _ in bounds], [high for _, high in bounds])
     options = {"maxiter": 60, "ftol": 1e-9}
-    found = minimize(likelihood.cost, x0, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
-    return likelihood.scatter(found.x)
+    return minimize(likelihood.cost, inside, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
 
 
 class _Likelihood:

@@ -97,8 +97,8 @@ def predict(
 
 
 def offers(using: Predictor, kind: str) -> bool:
-    """Whether a predictor knows an explicit nuisance; one that does not say which it knows is asked to try."""
-    return kind in getattr(using, "effects", (kind,))
+    """Whether a predictor knows an explicit nuisance: it names those it does in `effects`."""
+    return kind in getattr(using, "effects", ())
 
 
 def predictor_of(using: Predictor, history: History) -> Predictor:

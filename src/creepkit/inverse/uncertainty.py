@@ -23,7 +23,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.covariance import covariance, effective_size, whitener
 from creepkit.inverse.effects import Unknowns
-from creepkit.inverse.objective import Residuals
+from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.scatter import Scatter
 from creepkit.inverse.search import Box
 from creepkit.language import CreepLaw

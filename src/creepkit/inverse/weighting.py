@@ -11,7 +11,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.covariance import expected_effects, whitener
 from creepkit.inverse.entries import Entries
 from creepkit.inverse.measures import squares_about
-from creepkit.inverse.objective import Residuals
+from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.scatter import Scatter, working_guess
 from creepkit.inverse.settings import Settings
 from creepkit.inverse.sizes import estimated
@@ -86,9 +86,9 @@ def _each(residuals: Residuals) -> Floats:
 def trusts(residuals: Residuals, working: Scatter) -> Floats:
     """(tests,) weights (nu + 1) / (nu + m / s): m the mean squared white residual of a test, s its median over tests.
 
-    Each output is judged on its own, and the worst one counts: amplitudes far from those of the twins are not hidden
-    among good widths. Iterated with the fit this is the likelihood of tests that scatter as Student's t does: one
-    like the others weighs one, one of ten times their error a twentieth.
+    Each output is judged on its own, and the worst one counts, if it is worse than the median: amplitudes far from
+    those of the twins are not hidden among good widths. Iterated with the fit this is the likelihood of tests that
+    scatter as Student's t does: one like the others weighs one, one of ten times their error a twentieth.
     """
     plain = residuals.trusting(np.ones(len(residuals.values)))
     white = np.linalg.solve(whitener(plain, working), plain.values[..., None])[..., 0]

@@ -62,9 +62,10 @@ class Prediction:
 class Predictor(Protocol):
     """Anything that predicts histories from a law and its values: specimen, surrogate or closed form.
 
-    Optional attributes, looked for by name: `outputs`, the names of what is predicted; `effects`, the kinds of
-    explicit nuisances that predict() understands; `reference_stress(history)`, the von Mises stress, MPa, that stands
-    for the test (a number, or one for each level of its loading); `screening()`, see Screened.
+    Optional attributes, looked for by name: `outputs`, the names of what is predicted, first the one that grows with
+    creep; `effects`, the kinds of explicit nuisances that predict() understands (none without it);
+    `reference_stress(history)`, the von Mises stress, MPa, that stands for the test (a number, or one for each level
+    of its loading); `screening()`, see Screened.
     """
 
     def predict(

@@ -1,29 +1,19 @@
-"""Run: what one simulated test gave."""
+"""Run: what one simulated test gave; a history like a measured one, that also says how it ended."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
-from creepkit.arrays import Floats, frozen
-from creepkit.records import Status
+from creepkit.records import History, Status
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
-    """A simulated test up to where it ended.
+class Run(History):
+    """A simulated test up to where it ended: the times asked for that were reached, and the outputs there.
 
-    times : (frames,) s, those asked for that were reached. outputs : {name: (frames,)}.
     status : how it ended; end_time : s, where; reason : why, in words (empty when complete).
     """
 
-    times: Floats
-    outputs: Mapping[str, Floats]
-    status: Status
-    end_time: float
+    status: Status = Status.COMPLETE
+    end_time: float = 0.0
     reason: str = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "times", frozen(self.times))
-        object.__setattr__(self, "outputs", MappingProxyType({n: frozen(v) for n, v in self.outputs.items()}))

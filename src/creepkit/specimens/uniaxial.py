@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -43,7 +43,9 @@ class Uniaxial:
     name: str = field(default="uniaxial", init=False)
     title: str = field(default="Uniaxial tension under steps of stress or load", init=False)
     outputs: tuple[str, ...] = field(default=("strain",), init=False)
-    effects: tuple[str, ...] = field(default=KINDS, init=False)
+
+    effects: ClassVar[tuple[str, ...]] = KINDS
+    """Kinds of explicit nuisances that predict() understands."""
 
     def __post_init__(self) -> None:
         if not 1e-13 <= self.tolerance <= 1e-2:

@@ -1,0 +1,136 @@
+"""The bulge test: gas pressure on the cavity of a dimple, seen by cameras that watch its flat top.
+
+The dimple is simulated by finite elements (see `fem`); what is observed are amplitude, width and shape of the
+generalised Gaussian fitted to the displacement of the top (see `specimens.observation`), from the start of the first
+pressure ramp on. Creep acts during ramps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.errors import SolveError
+from creepkit.hookspecs import hookimpl
+from creepkit.records import Effects, History, Loading, Prediction, Program, Specimen, Status
+from creepkit.specimens.dimple import DimpleGeometry
+from creepkit.specimens.observation import OBSERVED, Observation
+
+if TYPE_CHECKING:
+    from creepkit.fem.mesh import Mesh
+    from creepkit.language import CreepLaw, Elastic
+    from creepkit.specimens.bulge_run import BulgeRun
+
+_RANGES = {
+    "tolerance": (1e-6, 0.1),
+    "deflection_limit": (1e-3, 1e3),
+    "strain_limit": (1e-3, 10.0),
+    "max_steps": (10, 100_000),
+}
+
+
+@dataclass(frozen=True)
+class Bulge:
+    """A dimple under gas pressure.
+
+    geometry : the dimple; its fields may be given to `replace` directly. A history's own geometry (such as its
+        measured apex_thickness, mm) takes precedence in a prediction.
+    observation : the observation operator of histories that name none.
+    mesh : a mesh of another body (read from files, say) in place of the geometry's own; refinement : of the latter.
+    tolerance : estimated error of the displacements in a step, over their largest plus 0.01 mm; 0.01 keeps a 12 h
+        history within .2 % of its largest displacement.
+    deflection_limit : mm, displacement of the top at which the dimple has burst. strain_limit : creep strain at which
+        a point has. max_steps : cap on the steps of one simulation, so on its cost.
+    threads : simulations that run side by side; None for one on each core.
+    """
+
+    geometry: DimpleGeometry = field(default_factory=DimpleGeometry)
+    observation: Observation = field(default_factory=Observation)
+    mesh: Mesh | None = None
+    refinement: float = 1.0
+    tolerance: float = 1e-2
+    deflection_limit: float = 3.0
+    strain_limit: float = 1.0
+    max_steps: int = 1000
+    threads: int | None = None
+    name: str = field(default="bulge", init=False)
+    title: str = field(default="Bulge test of a dimple under gas pressure, by finite elements", init=False)
+    outputs: tuple[str, ...] = field(default=OBSERVED, init=False)
+
+    effects: ClassVar[tuple[str, ...]] = ("thickness", "modulus", "temperature", "window")
+    """Kinds of explicit nuisances that predict() understands."""
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in _RANGES.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise SolveError(f"bulge specimen: {name} is {value:g}; allowed are {low:g} to {high:g}")
+
+    def replace(self, **changes: Any) -> Bulge:
+        """The same specimen with some fields, or lengths of its geometry, changed: replace(apex_thickness=0.48)."""
+        own = {f.name for f in fields(self) if f.init}
+        inner = {name: changes.pop(name) for name in list(changes) if name not in own}
+        if inner:
+            changes["geometry"] = changes.get("geometry", self.geometry).replace(**inner)
+        return replace(self, **changes)
+
+    def predict(
+        self,
+        law: CreepLaw,
+        values: Mapping[str, ArrayLike],
+        histories: Sequence[History],
+        *,
+        jacobian: bool = False,
+        effects: Effects | None = None,
+    ) -> Prediction:
+        """Predict amplitude, width and shape of each history at its times; see records.Predictor."""
+        from creepkit.specimens.bulge_prediction import predict
+
+        return predict(self, law, values, histories, jacobian, effects or {})
+
+    def simulate(
+        self,
+        law: CreepLaw,
+        values: Mapping[str, float],
+        *,
+        loading: Loading,
+        times: ArrayLike,
+        elastic: Elastic | None = None,
+        temperature: float | Program = 293.15,
+        name: str = "simulated",
+    ) -> BulgeRun:
+        """Run one test with everything kept: outputs, displacements, stresses and strains. times s, temperature K."""
+        from creepkit.specimens.bulge_run import simulate
+
+        if elastic is None:
+            raise SolveError("a bulge test needs elastic data: give elastic=Elastic(E=...), E in MPa")
+        plan = History(
+            name=name, times=np.atleast_1d(np.asarray(times, float)), outputs={}, loading=loading,
+            temperature=temperature, specimen=self.name, elastic=elastic,
+            operator=str(self.observation), source=f"simulation of law '{law.name}'",
+        )  # fmt: skip
+        return simulate(self, law, values, plan)
+
+    def reference_stress(self, history: History) -> Floats:
+        """The von Mises stress, MPa, that stands for each pressure level of a test: 12.5 P (t/.5 mm)^-1.15 for the default.
+
+        k = sigma/P of the one-degree-of-freedom model at .3 to .5 mm of deflection of the default dimple; for others
+        scaled as a plate of the same radius to thickness.
+        """
+        thickness = history.geometry.get("apex_thickness", self.geometry.apex_thickness)
+        slender = self.geometry.cavity_radius / 7.5 * 0.5 / thickness
+        levels = np.unique(history.loading.program().values)
+        return np.asarray(12.5 * slender**1.15 * levels[levels > 0])
+
+
+@hookimpl
+def creepkit_specimens() -> list[Specimen]:
+    """The paper's dimple."""
+    return [Bulge()]
+
+
+__all__ = ["Bulge", "Status", "creepkit_specimens"]
