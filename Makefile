@@ -1,5 +1,5 @@
 # make test   set up .venv, then check style, types, floors and run all tests, those of plugins/ included
-# make demo   set up .venv, then identify a law from a few noisy creep curves and leave a plot in demo/
+# make demo   set up .venv, then identify a law from a virtual bulge test and leave plots in demo/
 #
 # TORCH chooses another build of torch: make test TORCH='torch==2.13.0' on a machine with a GPU.
 
@@ -36,11 +36,11 @@ demo: .venv/.ok
 	$(BIN)/creepkit demo --to demo
 
 .venv/.ok: pyproject.toml $(PLUGINS:%=%/pyproject.toml)
-	@echo "set-up 1/4: virtual environment .venv"
+	@echo "set-up 1/5: virtual environment .venv"
 	@for python in $(PYTHONS); do \
 	    if $$python -c 'import ensurepip, venv' >/dev/null 2>&1; then $$python -m venv .venv; exit 0; fi; \
 	done; echo "none of $(PYTHONS) can make a virtual environment; install one of them, with its venv module" >&2; exit 1
-	@echo "set-up 2/4: torch"
+	@echo "set-up 2/5: torch"
 ifdef TORCH
 	@$(PIP) $(TORCH)
 else
@@ -48,10 +48,12 @@ else
 	    || $(PIP) --retries 1 --timeout 20 --extra-index-url $(CPU_WHEELS) '$(TORCH_CPU)' 2>/dev/null \
 	    || $(PIP) '$(TORCH_ANY)'
 endif
-	@echo "set-up 3/4: creepkit and what it needs"
+	@echo "set-up 3/5: creepkit and what it needs"
 	@$(PIP) --editable '.[dev]'
-	@echo "set-up 4/4: plugins"
+	@echo "set-up 4/5: plugins"
 	@for plugin in $(PLUGINS); do $(PIP) --no-build-isolation --editable $$plugin; done
+	@echo "set-up 5/5: compile the solver"
+	@$(BIN)/python -c 'from creepkit.cli.demo import prepare; prepare()'
 	@touch $@
 
 clean:

@@ -13,6 +13,7 @@ from creepkit import registry
 from creepkit.errors import FitError, LawError, SolveError
 from creepkit.language import symbols
 from creepkit.records import History, Loading, Nuisance, Predictor, Program, Specimen, Status
+from creepkit.specimens.run import Run, Runnable, run_of
 
 if TYPE_CHECKING:
     from creepkit.arrays import ArrayLike
@@ -74,40 +75,38 @@ def simulate(
     temperature: float | Program | None = None,
     elastic: Elastic | None = None,
     name: str = "simulated",
-) -> History:
+) -> Run:
     """Return the history that a law with these values predicts: what a perfect test would have measured.
 
     using : a specimen, a surrogate or a closed form; values : {parameter: value} in the law's units.
-    times : (frames,) s; temperature : K; `elastic` in MPa. The history of a specimen that bursts ends
-    there, and its label `burst_s` says when.
+    loading : holds its last value beyond its last breakpoint. times : (frames,) s; temperature : K.
+    elastic : E in MPa; a bulge test needs it, and a uniaxial strain then includes the elastic part.
+
+    A test that bursts, meets its limit load or loses convergence is an answer too: the history ends there, and says so
+    in `status`, `end_time` and `reason`. A specimen may return more, such as the stresses of a BulgeRun.
     """
     law, using = _law(law), _predictor(using)
     if not hasattr(loading, "program"):
-        raise SolveError(f"loading is {loading!r}; write constant_stress(50) or StressSteps(((0, 50), (3600, 60)))")
+        raise SolveError(f"loading is {loading!r}; write constant_stress(50) or PressureJump(P1=8, P2=10, Tj=14400)")
     if temperature is None and law.uses(symbols.temperature):
         raise SolveError(f"law '{law.name}' depends on temperature: give temperature= in K")
     plan = History(
         name=name,
-        times=np.asarray(times, float),
+        times=np.atleast_1d(np.asarray(times, float)),
         outputs={},
         loading=loading,
         temperature=ROOM_TEMPERATURE if temperature is None else temperature,
         specimen=getattr(using, "name", "uniaxial"),
         elastic=elastic,
+        includes_elastic=elastic is not None and loading.quantity == "stress",
         source=f"simulation of law '{law.name}'",
     )
-    prediction = using.predict(law, law.values(values), [plan])
-    status, end = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
-    if status not in (Status.COMPLETE, Status.BURST):
-        told = status.name.lower().replace("_", " ")
-        raise SolveError(f"the simulation of law '{law.name}' stopped at {end:g} s: {told}; check values and loading")
-    rows = prediction.of(0)
-    alive = np.isfinite(rows).all(axis=1)
-    if alive.sum() < min(2, alive.size):
-        raise SolveError(f"the simulation of law '{law.name}' burst at {end:g} s, before the times asked for")
-    outputs = dict(zip(prediction.outputs, rows[alive].T, strict=True))
-    labels = {} if status == Status.COMPLETE else {"burst_s": f"{end:.6g}"}
-    return plan.replace(times=plan.times[alive], outputs=outputs, labels=labels)
+    values = law.values(values)
+    if isinstance(using, Runnable):
+        return using.run(law, values, plan)
+    found = using.predict(law, values, [plan])
+    status, end = Status(int(found.status[0, 0])), float(found.end_times[0, 0])
+    return run_of(Run, plan, found.outputs, found.of(0), status, end)
 
 
 def identify(

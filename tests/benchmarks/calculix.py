@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 from calculix_deck import Deck, Norton, displacements, extrapolated, increments
 
+import creepkit as ck
 from creepkit.arrays import Floats
 from creepkit.fem.mesh import Mesh
 from creepkit.language import CreepLaw, Elastic
@@ -147,13 +148,15 @@ def theirs(case: Case, mesh: Mesh, cetols: list[float]) -> list[Result]:
 def ours(case: Case, refinement: float) -> tuple[Floats, float]:
     """Apex displacement, (times,) mm, and CPU seconds a run."""
     from creepkit.specimens.bulge import Bulge
+    from creepkit.specimens.bulge_run import BulgeRun
 
     law, values = case.law
     specimen = Bulge(geometry=case.geometry, refinement=refinement)
 
     def simulate() -> Floats:
-        found = specimen.simulate(law, values, loading=case.loading, times=TIMES, elastic=Elastic(E=case.E))
-        return np.asarray(found.displacement(radius=0.0))
+        found = ck.simulate(law, specimen, values, loading=case.loading, times=TIMES, elastic=Elastic(E=case.E))
+        assert isinstance(found, BulgeRun)
+        return found.displacement(radius=0.0)
 
     apex = simulate()
     start = time.process_time()

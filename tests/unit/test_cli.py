@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
+import creepkit as ck
 from creepkit.cli.app import COMMANDS, app
 from creepkit.registry import default
 
@@ -217,3 +218,112 @@ def test_a_file_without_laws_cannot_be_checked() -> None:
     Path("commands.py").write_text(COMMAND.format(name="greet"))
 
     assert "offers no law" in one_line(creepkit("check", "commands.py"))
+
+
+# ---- simulate ------------------------------------------------------------------------------------------------------
+
+NORTON = ("simulate", "norton", "--set", "A=5e-13", "--set", "n=3", "--end-h", "2")
+DIMPLE = (*NORTON, "--specimen", "bulge", "--modulus-gpa", "150")
+
+
+def test_a_dimple_is_simulated_with_all_it_needs_in_the_head() -> None:
+    jump = ("--pressure", "8", "--pressure", "3600:10")
+    rest = ("--geometry", "apex_thickness=0.48", "--every", "600", "--to", "run.csv", "--picture", "section.png")
+    result = creepkit(*DIMPLE, *jump, *rest)
+
+    assert result.exit_code == 0, result.output
+    assert result.stdout == "wrote run.csv: 13 frames to 2 h\n"
+    (run,) = ck.read_histories("run.csv")
+    dimple = ck.specimen("bulge").replace(apex_thickness=0.48)
+    loading = ck.PressureJump(8, 10, 3600)
+    same = ck.simulate("norton", dimple, {"A": 5e-13, "n": 3}, loading=loading, times=run.times, elastic=run.elastic)
+    assert (run.loading, run.elastic, run.operator) == (loading, ck.Elastic(E=150e3), "profile 0-7.5 mm")
+    assert run.geometry == same.geometry
+    assert run.outputs["amplitude"].tolist() == same.outputs["amplitude"].tolist()
+    assert Path("section.png").stat().st_size > 20_000
+
+
+def test_the_cameras_of_a_dimple_take_a_frame_every_150_s() -> None:
+    lines = creepkit(*DIMPLE, "--pressure", "8").stdout.splitlines()
+
+    assert "# pressure_1_MPa: 8.0" in lines
+    assert [line.split(",")[0] for line in lines[-2:]] == ["7050.0", "7200.0"]
+
+
+def test_more_pressures_are_a_program_of_ramps() -> None:
+    steps = [word for step in ("8", "3600:10", "5000:0") for word in ("--pressure", step)]
+    lines = creepkit(*DIMPLE, *steps).stdout.splitlines()
+
+    assert (
+        "# pressure_program: 0.0 s 0.0 MPa; 5.0 s 8.0 MPa; 3600.0 s 8.0 MPa; 3605.0 s 10.0 MPa; 5000.0 s 10.0 MPa; "
+        "5005.0 s 0.0 MPa"
+    ) in lines
+
+
+def test_a_burst_is_told_and_the_history_ends_there() -> None:
+    result = creepkit(*DIMPLE, "--pressure", "8", "--set", "A=1e-10", "--to", "run.csv")
+
+    assert result.exit_code == 0
+    assert " h: the surface reached the deflection limit; the history ends there\n" in result.stderr
+    (run,) = ck.read_histories("run.csv")
+    assert run.times[-1] < float(run.labels["burst_s"]) < 7200
+    assert run.labels["ended"] == "the surface reached the deflection limit"
+
+
+def test_a_bar_with_a_modulus_has_its_elastic_strain() -> None:
+    creepkit(
+        *NORTON, "--stress", "100", "--control", "stress", "--modulus-gpa", "100", "--points", "3", "--to", "bar.csv"
+    )
+
+    (run,) = ck.read_histories("bar.csv")
+    assert run.outputs["strain"].tolist() == pytest.approx([1e-3, 1e-3 + 5e-7 * 3600, 1e-3 + 5e-7 * 7200], rel=1e-6)
+    assert run.includes_elastic
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((*DIMPLE, "--stress", "8"), "--stress belongs to --specimen uniaxial, found --specimen bulge"),
+        (
+            (*DIMPLE, "--pressure", "8", "--control", "load"),
+            "--control belongs to --specimen uniaxial, found --specimen bulge",
+        ),
+        ((*NORTON, "--pressure", "8"), "--pressure belongs to --specimen bulge, found --specimen uniaxial"),
+        (
+            (*NORTON, "--stress", "8", "--picture", "x.png"),
+            "--picture belongs to --specimen bulge, found --specimen uniaxial",
+        ),
+        ((*NORTON, "--specimen", "cube"), "--specimen cube is not known; allowed are uniaxial and bulge"),
+        (NORTON, "a bar needs a stress: give --stress, such as 100, or --specimen bulge with --pressure"),
+        (DIMPLE, "a dimple needs a pressure: give --pressure, such as 8, or 7200:10 for a later step"),
+        (
+            (*NORTON, "--specimen", "bulge", "--pressure", "8"),
+            "a dimple needs a modulus: give --modulus-gpa, such as 150",
+        ),
+        ((*DIMPLE, "--pressure", "-8"), "--pressure -8: the first pressure starts at 0 s, none is negative, and each"),
+        ((*DIMPLE, "--pressure", "8", "--pressure", "2:9"), "comes 5 s or more after the one before"),
+        ((*DIMPLE, "--pressure", "high"), "--pressure high: write a number, or SECONDS:NUMBER for a later step"),
+        (
+            (*DIMPLE, "--pressure", "8", "--geometry", "thickness=1"),
+            "--geometry: no length is called 'thickness'; did you mean 'apex_thickness'?",
+        ),
+        (
+            (*DIMPLE, "--pressure", "8", "--geometry", "apex_thickness"),
+            "--geometry apex_thickness: write NAME=NUMBER, such as apex_thickness=0.48",
+        ),
+        (
+            (*DIMPLE, "--pressure", "8", "--every", "60", "--points", "9"),
+            "--points and --every both say when frames are taken; give one of them",
+        ),
+        (
+            (*DIMPLE, "--pressure", "8", "--every", "9999"),
+            "--every 9999 s is not a step of a test of 7200 s (allowed are 1 to 1000000 frames)",
+        ),
+        (
+            (*DIMPLE, "--pressure", "8", "--picture", "none/section.png"),
+            "none/section.png: the picture cannot be written",
+        ),
+    ],
+)
+def test_a_simulation_that_makes_no_sense_is_one_line(words: tuple[str, ...], said: str) -> None:
+    assert said in one_line(creepkit(*words))

@@ -1,6 +1,8 @@
 """The verbs, with plugins and predictors made for the occasion."""
 
+import pickle
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -98,13 +100,45 @@ def test_a_simulation_that_bursts_ends_there() -> None:
     run = simulate(Steady(Status.BURST, end=3.0))
 
     assert run.times.tolist() == [1.0, 2.0]
-    with pytest.raises(SolveError, match=r"burst at 0.5 s, before the times asked for"):
-        simulate(Steady(Status.BURST, end=0.5))
+    assert (run.status, run.end_time, run.reason) == (Status.BURST, 3.0, "burst")
+    assert run.labels == {"ended": "burst", "burst_s": "3"}
+    assert str(run) == "simulated: ended at 3 s (burst); 2 frames to 2 s, where strain 0.0002"
 
 
-def test_a_simulation_that_fails_says_so() -> None:
-    with pytest.raises(SolveError, match=r"law 'norton' stopped at 3 s: not converged"):
-        simulate(Steady(Status.NOT_CONVERGED, end=3.0))
+def test_a_simulation_that_fails_is_an_answer_up_to_there() -> None:
+    run = simulate(Steady(Status.NOT_CONVERGED, end=3.0))
+
+    assert run.times.tolist() == [1.0, 2.0]
+    assert (run.status, run.labels) == (Status.NOT_CONVERGED, {"ended": "not converged"})
+
+
+@pytest.mark.parametrize("times", [(1.0, 2.0), (0.0, 1.0)])
+def test_a_simulation_without_any_of_its_times_is_an_error(times: tuple[float, ...]) -> None:
+    with pytest.raises(SolveError) as said:
+        simulate(Steady(Status.BURST, end=0.5), times)
+    assert str(said.value) == (
+        "simulation of law 'norton' ended at 0.5 s, before any of the times asked for: burst; "
+        "check values, loading and times"
+    )
+
+
+def test_numbers_after_the_end_are_left_out() -> None:
+    """A predictor that fills in values after its own end."""
+
+    class Careless(Steady):
+        def predict(self, *args: object, **kwargs: object) -> Prediction:
+            told = super().predict(*args, **kwargs)
+            return replace(told, values=np.nan_to_num(told.values, nan=9.0))
+
+    assert simulate(Careless(Status.BURST, end=3.0)).outputs["strain"].tolist() == pytest.approx([1e-4, 2e-4])
+
+
+def test_a_run_survives_a_pickle() -> None:
+    run = simulate(Steady(Status.BURST, end=3.0))
+    again = pickle.loads(pickle.dumps(run))
+
+    assert type(again) is type(run)
+    assert (again.status, again.reason) == (run.status, run.reason)
 
 
 def test_a_law_that_needs_a_temperature_asks_for_it() -> None:

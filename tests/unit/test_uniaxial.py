@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import creepkit as ck
 from creepkit.errors import LawError, SolveError
 from creepkit.language import Elastic, arrhenius, wachtman
 from creepkit.laws.norton import NORTON
@@ -110,12 +111,13 @@ def test_a_heating_ramp_is_integrated() -> None:
 
 def test_a_burst_keeps_the_history_so_far() -> None:
     fast = {"A": 1e-9, "n": 4.0}
-    run = Uniaxial().simulate(NORTON, fast, loading=constant_stress(100.0), times=[1.0, 2.0, 1e3])
+    run = ck.simulate(NORTON, Uniaxial(), fast, loading=constant_stress(100.0), times=[1.0, 2.0, 1e3])
     assert run.status is Status.BURST
     assert run.end_time == pytest.approx((1 - np.exp(-4)) / (4 * 0.1), rel=1e-4)
     np.testing.assert_allclose(run.outputs["strain"], -np.log1p(-0.4 * run.times) / 4, rtol=1e-4)
     assert run.times.tolist() == [1.0, 2.0]
     assert run.reason == "creep strain reached the strain limit"
+    assert run.labels == {"ended": run.reason, "burst_s": f"{run.end_time:.6g}"}
     result = Uniaxial().predict(NORTON, fast, [history(loading=constant_stress(100.0), times=[1.0, 2.0, 1e3])])
     assert result.status[0, 0] == Status.BURST
     assert np.isfinite(result.of(0)[:2]).all()
@@ -123,11 +125,12 @@ def test_a_burst_keeps_the_history_so_far() -> None:
 
 
 def test_simulate_adds_the_elastic_strain_when_elastic_data_are_given() -> None:
-    run = Uniaxial().simulate(
-        NORTON, VALUES, loading=constant_stress(100.0, "stress"), times=TIMES, elastic=Elastic(E=150e3)
-    )
+    held = constant_stress(100.0, "stress")
+    run = ck.simulate(NORTON, Uniaxial(), VALUES, loading=held, times=TIMES, elastic=Elastic(E=150e3))
     np.testing.assert_allclose(run.outputs["strain"], RATE * TIMES + 100 / 150e3, rtol=1e-9)
     assert (run.status, run.reason, run.end_time) == (Status.COMPLETE, "", 1000.0)
+    assert run.includes_elastic
+    np.testing.assert_array_equal(Uniaxial().run(NORTON, VALUES, run).outputs["strain"], run.outputs["strain"])
 
 
 def test_tolerance_tightens_the_answer() -> None:
@@ -171,4 +174,4 @@ def test_elastic_strain_needs_elastic_data() -> None:
 
 def test_a_missing_value_is_named() -> None:
     with pytest.raises(LawError, match="needs a value for n"):
-        Uniaxial().simulate(NORTON, {"A": 1e-13}, loading=constant_stress(100.0), times=TIMES)
+        ck.simulate(NORTON, Uniaxial(), {"A": 1e-13}, loading=constant_stress(100.0), times=TIMES)

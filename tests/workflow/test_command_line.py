@@ -4,6 +4,7 @@ import csv
 import importlib.util
 import json
 import re
+import runpy
 import sys
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from typer.testing import CliRunner
 
 import creepkit as ck
 from creepkit.cli.app import app
-from creepkit.cli.demo import PLANTED
+from creepkit.cli.demo import PLANTED, PLANTED_BULGE
 
 CURVES = sorted(str(p) for p in PLANTED.glob("*.csv"))
 
@@ -151,8 +152,28 @@ def test_bounds_that_exclude_the_data_are_said(tmp_path):
     assert not (tmp_path / "o").exists()
 
 
-def test_demo_prints_the_truth_beside_the_answer(tmp_path):
+def test_demo_finds_the_law_of_a_virtual_bulge_test(tmp_path):
     result = creepkit("demo", "--to", tmp_path / "demo")
+    assert result.exit_code == 0, result.output
+    assert "decisive: strain-hardening" in result.stdout
+    told = result.stdout.split("the truth: strain-hardening")[1]
+    assert len(re.findall(r"│ yes +│", told)) == 3
+    for name in ("strain-hardening.png", "strain-hardening-section.png"):
+        assert (tmp_path / "demo" / name).stat().st_size > 20_000
+
+
+def test_the_virtual_bulge_test_is_what_its_script_makes(tmp_path):
+    """Its numbers are rounded to a micrometre and to 1e-4; another platform may round one the other way."""
+    script = Path(__file__).parents[2] / "examples" / "00_make_a_virtual_bulge_test.py"
+    runpy.run_path(str(script))["main"](tmp_path)
+    (made,), (shipped,) = (ck.read_histories(folder / "virtual_bulge_test.csv") for folder in (tmp_path, PLANTED_BULGE))
+    for name, digit in (("amplitude", 1e-6), ("width", 1e-4), ("shape", 1e-4)):
+        assert made.outputs[name] == pytest.approx(shipped.outputs[name], abs=2 * digit)
+    assert (tmp_path / "truth.json").read_text() == (PLANTED_BULGE / "truth.json").read_text()
+
+
+def test_demo_of_bars_prints_the_truth_beside_the_answer(tmp_path):
+    result = creepkit("demo", "--uniaxial", "--to", tmp_path / "demo")
     assert result.exit_code == 0, result.output
     assert "the truth: strain-hardening" in result.stdout
     assert (tmp_path / "demo" / "strain-hardening-arrhenius.png").stat().st_size > 20_000

@@ -1,8 +1,8 @@
 """Banded factorisations in compiled code: Cholesky for the tangent made symmetric, LU for the exact one.
 
 Symmetric matrices are kept as columns below the diagonal, ``band[j, k] = K[j + k, j]``; four columns are eliminated
-at a time, so that each entry is loaded once for four of them. Rows of zeros (identity on the diagonal up to a multiple of four)
-pad the end, and zeros the side, so that no loop asks where the matrix stops.
+at a time, so that each entry is loaded once for four of them. Rows of zeros (with ones on the diagonal up to a multiple
+of four) pad the end, and zeros the side, so that no loop asks where the matrix stops.
 """
 
 from __future__ import annotations

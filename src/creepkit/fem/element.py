@@ -7,7 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from creepkit.arrays import Floats, Ints
+from creepkit.arrays import Floats
+from creepkit.fem.blocks import (
+    add_force,
+    add_stiffness,
+    clear,
+    clear_element,
+    deformation,
+    gather,
+    scatter_force,
+    scatter_stiffness,
+    set_products,
+)
 from creepkit.fem.body import Body, band_shape
 from creepkit.fem.material import (
     CREEP_COMPONENTS,
@@ -30,7 +41,6 @@ from creepkit.fem.strain import (
     HOOP,
     SHEAR,
     SUM,
-    Five,
     Four,
     energy_slopes,
     kinematics,
@@ -45,8 +55,6 @@ from creepkit.kernels.interface import POINT_SIZE, TEMPERATURE, TIME
 BALANCED, INVERTED, POINT_FAILED = range(3)
 """Flags of an assembly."""
 
-_FAST = {"reassoc", "contract", "nsz"}
-
 
 class Points(NamedTuple):
     """The state of all points, element by element; V = 3 + 1 + S.
@@ -55,7 +63,8 @@ class Points(NamedTuple):
     base : (points, V) history of the stage. increments : (points,) D. states : (points, S) at the end of the stage.
     slopes : (stages, points, V) d value/ds. mises : (points,) von Mises stress of the Cauchy stress, MPa.
     directions : (points, 3) w/e. deviator : (points, 6) derivatives of the stress components y that are conjugate
-        to w, from the last tangent: 11, 22, 33, 12, 13, 23.
+        to w, from the last tangent: 11, 22, 33, 12, 13, 23. trials : (points, 2) trial stress at which D was found
+        last, MPa (negative: none in this stage), and dD/d(trial stress) of the last tangent.
     """
 
     value: Floats
@@ -66,13 +75,14 @@ class Points(NamedTuple):
     mises: Floats
     directions: Floats
     deviator: Floats
+    trials: Floats
 
 
 class Forces(NamedTuple):
     """residual : (size + width + 4,) internal less external forces; band, flat : the tangent, as rows and laid flat.
 
     block : room of the factorisation; element : (3, 8, 8) rr, rz, zz; local : (2, 8) displacements;
-    inner : (2, 8) forces; products : (8, 8); side : (2, 3); sides : (4, 3, 3); ends : (2, 3) current coordinates.
+    inner : (2, 8) forces; products : (16, 8); side : (2, 3); sides : (4, 3, 3); ends : (2, 3) current coordinates.
     """
 
     residual: Floats
@@ -113,6 +123,7 @@ def points_of(count: int, states: int, stages: int) -> Points:
         np.zeros(count),
         np.zeros((count, CREEP_COMPONENTS)),
         np.zeros((count, 6)),
+        np.full((count, 2), -1.0),
     )
 
 
@@ -128,7 +139,7 @@ def forces_of(body: Body) -> Forces:
         element=np.zeros((3, 8, 8)),
         local=np.zeros((2, 8)),
         inner=np.zeros((2, 8)),
-        products=np.zeros((8, 8)),
+        products=np.zeros((16, 8)),
         side=np.zeros((2, 3)),
         sides=np.zeros((4, 3, 3)),
         ends=np.zeros((2, 3)),
@@ -146,15 +157,18 @@ def assemble(
     room: PointRoom,
     forces: Forces,
     stiff: bool,
+    tolerance: float,
 ) -> int:
     """Out-of-balance forces, creep increments and von Mises stresses; with `stiff` the tangent made symmetric too.
+
+    tolerance : on the last local Newton correction of ln D; the error left is its square.
 
     One long loop over arrays with names of their own: views of rows and tuples of arrays cost more than the physics.
     """
     elements, equations, weights, places = body.elements, body.equations, body.weights, body.places
     by_radius, by_height, over_radius = body.by_radius, body.by_height, body.over_radius
     base, increments, states, mises = points.base, points.increments, points.states, points.mises
-    directions, deviator = points.directions, points.deviator
+    directions, deviator, trials = points.directions, points.deviator, points.trials
     row, out, tangent = room.row, room.out, room.tangent
     gradient, matrix, response = room.gradient, room.matrix, room.response
     residual, flat, local, inner = forces.residual, forces.flat, forces.local, forces.inner
@@ -167,7 +181,7 @@ def assemble(
     row[TIME], row[TEMPERATURE] = stage.time, stage.temperature
     for e in range(elements.shape[0]):
         gather(elements, e, displacement, local)
-        _clear_element(inner, element, stiff)
+        clear_element(inner, element, stiff)
         for g in range(4):
             k = 4 * e + g
             at = kinematics(deformation(by_radius, by_height, over_radius, e, g, local))
@@ -180,17 +194,20 @@ def assemble(
                 flag = TOO_MANY
                 for i in range(count):
                     row[POINT_SIZE + i] = states[k, i]
+                if trials[k, 0] >= 0.0:
+                    guess = increments[k] + trials[k, 1] * (problem.trial - trials[k, 0])
+                    increments[k] = guess if guess > 0.0 else increments[k]
                 if count == 0:
-                    increment, flag = solve_near(update, theta, axes, problem, row, out, increments[k], stage.tolerance)
+                    increment, flag = solve_near(update, theta, axes, problem, row, out, increments[k], tolerance)
                 if flag != SOLVED:
                     increment, flag = creep_safely(
-                        update, theta, axes, problem, base, k, row, out, increments[k], stage.tolerance
+                        update, theta, axes, problem, base, k, row, out, increments[k], tolerance
                     )
                 if flag != SOLVED:
                     return POINT_FAILED
                 for i in range(count):
                     states[k, i] = row[POINT_SIZE + i]
-            increments[k] = increment
+            increments[k], trials[k, 0] = increment, problem.trial
             mises[k] = problem.trial - problem.stiffness * increment
             inverse = 1.0 / elastic.equivalent if elastic.equivalent > 0.0 else 0.0
             directions[k, 0], directions[k, 1] = elastic.hoop * inverse, elastic.difference * inverse
@@ -205,10 +222,13 @@ def assemble(
                 by = creep_slopes(axes, problem, increment, out)
             elif increment > 0.0:
                 by = creep_slopes_with_states(axes, problem, increment, out, gradient, matrix, response)
+            trials[k, 1] = by[0]
             moduli = tangent_moduli(stage, elastic, increment, following(stage, elastic, increment, by), True)
             keep_deviator(moduli, deviator, k)
             piola_tangent(at, moduli, stress, slopes, tangent)
-            add_stiffness(by_radius, by_height, over_radius, e, g, tangent, weights[e, g], products, element)
+            set_products(by_radius, by_height, over_radius, e, g, tangent, weights[e, g], products)
+            if g % 2 == 1:
+                add_stiffness(by_radius, by_height, over_radius, e, g, products, element)
         scatter_force(elements, equations, e, inner, residual)
         if stiff:
             scatter_stiffness(places, e, element, flat)
@@ -240,7 +260,7 @@ def error_forces(
     clear(residual)
     for e in range(elements.shape[0]):
         gather(elements, e, displacement, local)
-        _clear_element(inner, forces.element, False)
+        clear_element(inner, forces.element, False)
         for g in range(4):
             k = 4 * e + g
             at = kinematics(deformation(by_radius, by_height, over_radius, e, g, local))
@@ -259,103 +279,6 @@ def error_forces(
             P = to_gradient(at.F, energy_slopes(at, stress))
             add_force(by_radius, by_height, over_radius, e, g, P, all_weights[e, g], inner)
         scatter_force(elements, equations, e, inner, residual)
-
-
-@njit(cache=True, error_model="numpy")
-def clear(values: Floats) -> None:
-    """Set a vector to zero."""
-    for k in range(values.size):
-        values[k] = 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def _clear_element(inner: Floats, element: Floats, stiff: bool) -> None:
-    for i in range(2):
-        for a in range(8):
-            inner[i, a] = 0.0
-    if stiff:
-        for i in range(3):
-            for a in range(8):
-                for b in range(8):
-                    element[i, a, b] = 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def gather(elements: Ints, e: int, displacement: Floats, local: Floats) -> None:
-    """Displacements (2, 8) of an element."""
-    for a in range(8):
-        node = elements[e, a]
-        local[0, a] = displacement[2 * node]
-        local[1, a] = displacement[2 * node + 1]
-
-
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
-def deformation(by_r: Floats, by_z: Floats, over_r: Floats, e: int, g: int, local: Floats) -> Five:
-    """Deformation gradient of a point from the displacements (2, 8) of its element."""
-    f11, f12, f21, f22, f33 = 1.0, 0.0, 0.0, 1.0, 1.0
-    for a in range(8):
-        f11 += by_r[e, g, a] * local[0, a]
-        f12 += by_z[e, g, a] * local[0, a]
-        f33 += over_r[e, g, a] * local[0, a]
-        f21 += by_r[e, g, a] * local[1, a]
-        f22 += by_z[e, g, a] * local[1, a]
-    return f11, f12, f21, f22, f33
-
-
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
-def add_force(
-    by_r: Floats, by_z: Floats, over_r: Floats, e: int, g: int, P: Five, weight: float, inner: Floats
-) -> None:
-    """Add the internal force of a point to (2, 8)."""
-    p0, p1, p2, p3, p4 = weight * P[0], weight * P[1], weight * P[2], weight * P[3], weight * P[4]
-    for a in range(8):
-        inner[0, a] += by_r[e, g, a] * p0 + by_z[e, g, a] * p1 + over_r[e, g, a] * p4
-        inner[1, a] += by_r[e, g, a] * p2 + by_z[e, g, a] * p3
-
-
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
-def add_stiffness(
-    by_r: Floats, by_z: Floats, over_r: Floats, e: int, g: int, A: Floats, weight: float, products: Floats,
-    element: Floats,
-) -> None:  # fmt: skip
-    """Add the symmetric stiffness of a point to the blocks rr, rz, zz of (3, 8, 8)."""
-    for b in range(8):
-        x, y, h = weight * by_r[e, g, b], weight * by_z[e, g, b], weight * over_r[e, g, b]
-        products[0, b] = A[0, 0] * x + A[0, 1] * y + A[0, 4] * h
-        products[1, b] = A[1, 0] * x + A[1, 1] * y + A[1, 4] * h
-        products[2, b] = A[4, 0] * x + A[4, 1] * y + A[4, 4] * h
-        products[3, b] = A[0, 2] * x + A[0, 3] * y
-        products[4, b] = A[1, 2] * x + A[1, 3] * y
-        products[5, b] = A[4, 2] * x + A[4, 3] * y
-        products[6, b] = A[2, 2] * x + A[2, 3] * y
-        products[7, b] = A[3, 2] * x + A[3, 3] * y
-    for a in range(8):
-        x, y, h = by_r[e, g, a], by_z[e, g, a], over_r[e, g, a]
-        for b in range(8):
-            element[0, a, b] += x * products[0, b] + y * products[1, b] + h * products[2, b]
-            element[1, a, b] += x * products[3, b] + y * products[4, b] + h * products[5, b]
-            element[2, a, b] += x * products[6, b] + y * products[7, b]
-
-
-@njit(cache=True, error_model="numpy")
-def scatter_force(elements: Ints, equations: Ints, e: int, inner: Floats, residual: Floats) -> None:
-    """Add an element's forces (2, 8) to its equations."""
-    for a in range(8):
-        for i in range(2):
-            equation = equations[2 * elements[e, a] + i]
-            if equation >= 0:
-                residual[equation] += inner[i, a]
-
-
-@njit(cache=True, error_model="numpy")
-def scatter_stiffness(places: Ints, e: int, element: Floats, flat: Floats) -> None:
-    """Add an element's blocks rr, rz, zz to the band."""
-    for a in range(8):
-        for b in range(a, 8):
-            flat[places[e, 0, a, b]] += element[0, a, b]
-            flat[places[e, 2, a, b]] += element[2, a, b]
-        for b in range(8):
-            flat[places[e, 1, a, b]] += element[1, a, b]
 
 
 @njit(cache=True, error_model="numpy")

@@ -17,7 +17,9 @@ FOUND, NO_STRESS, UNSTABLE, TOO_FAR, TOO_MANY = range(5)
 """Flags: found; a point had no solution; the tangent is not positive definite; corrections grow; too many of them."""
 
 _ITERATIONS = 16
-_KEEP = 0.1
+_LOOSE = 0.03
+"""Tolerance of the points' own equations in the first pass, from which the displacements move anyway."""
+_KEEP = 0.3
 """The tangent is kept while each correction is at most this share of the one before."""
 
 
@@ -41,15 +43,17 @@ def balance(
     forces: Forces,
     tolerance: float,
     longest: float,
+    tight: float,
 ) -> Outcome:
     """Bring `displacement` (2 nodes,) to equilibrium; corrections below `tolerance`, mm, end the search.
 
-    longest : mm, corrections are cut to this.
+    longest : mm, corrections are cut to this. tight : tolerance of the points' own equations once near.
     """
     before, size, factor, full, light = 0.0, 0.0, 1.0, 0, 0
     for iteration in range(_ITERATIONS):
         stiff = iteration == 0 or factor < 1.0 or (iteration > 1 and size > _KEEP * before)
-        if assemble(update, theta, body, stage, displacement, points, room, forces, stiff) != BALANCED:
+        local = max(tight, _LOOSE) if iteration == 0 else tight
+        if assemble(update, theta, body, stage, displacement, points, room, forces, stiff, local) != BALANCED:
             return Outcome(NO_STRESS, full, light)
         if stiff:
             full += 1
@@ -76,6 +80,6 @@ def _largest(values: Floats, size: int) -> float:
     worst = 0.0
     for k in range(size):
         if not isfinite(values[k]):
-            return values[k]
+            return float(values[k])
         worst = max(worst, abs(values[k]))
     return worst

@@ -44,7 +44,7 @@ class Stage(NamedTuple):
     """What all points of a stage share.
 
     weight : gamma h dt/ds, s; 0 for a purely elastic change. time : s. temperature : K. bulk, shear : K and G, MPa.
-    pressure : MPa. tolerance : on the last local Newton correction of ln D.
+    pressure : MPa.
     """
 
     weight: float
@@ -53,7 +53,6 @@ class Stage(NamedTuple):
     bulk: float
     shear: float
     pressure: float
-    tolerance: float
 
 
 class Elastic(NamedTuple):
@@ -161,7 +160,7 @@ def creep_slopes_with_states(
 
 @njit(cache=True, error_model="numpy")
 def following(stage: Stage, elastic: Elastic, increment: float, by: Three) -> Four:
-    """Derivatives of D to the three components of w and to tr E, from those `by` trial, largest principal, mean stress."""
+    """Derivatives of D to w (three) and to tr E, from those `by` trial, largest principal and mean stress."""
     if increment == 0.0:
         return 0.0, 0.0, 0.0, 0.0
     by_trial, by_principal, by_mean = by

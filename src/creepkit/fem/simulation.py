@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -11,8 +11,10 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.fem.body import Body
+from creepkit.fem.columns import Columns, change_room
 from creepkit.fem.element import point_room
-from creepkit.fem.march import (
+from creepkit.fem.march import march
+from creepkit.fem.record import (
     DEFLECTION_LIMIT,
     LIMIT_LOAD,
     LOST_CONVERGENCE,
@@ -22,10 +24,9 @@ from creepkit.fem.march import (
     TOO_MANY_STEPS,
     Record,
     Settings,
-    march,
     rooms_of,
 )
-from creepkit.fem.sensitivity import DONE, Columns, change_room
+from creepkit.fem.sensitivity import DONE
 from creepkit.fem.sensitivity import differentiate as replay
 from creepkit.fem.shape import GeometryChange
 from creepkit.fem.timeline import Timeline
@@ -67,7 +68,7 @@ class Course:
     modulus: Program
     end: float
     poisson: float = 0.3
-    motion: Program = Program.constant(0.0)
+    motion: Program = field(default_factory=lambda: Program.constant(0.0))
     pattern: Floats | None = None
 
     @cached_property
@@ -136,7 +137,7 @@ def simulate(
         end_time=float(ended.time),
         reason=REASONS[int(ended.code)],
         counts=record.counts,
-        timeline=Timeline.of(record.times[:n], record.segments[:n], course.segments[:, 0]),
+        timeline=Timeline.of(record.times[:n], record.segments[:n], course.segments, beta),
         beta=beta,
         places=record.places[:n].copy(),
         record=record if keep_stages else None,

@@ -30,7 +30,7 @@ Five = tuple[float, float, float, float, float]
 
 _SERIES = 0.05
 _SHORT = 0.004
-"""Below the first y the series of phi is used with 14 terms, below the second with 7; what is left out is under 1e-17."""
+"""Below the first y the series of phi has 14 terms, below the second 7; what is left out is under 1e-17."""
 
 
 class Kinematics(NamedTuple):

@@ -1,18 +1,21 @@
 """Timeline: values between the accepted steps of a march, by splines in a variable in which they are smooth.
 
-Each segment of the load program has its own spline, in ln(t - t0 + 20 s): creep after a change of load decays over
-decades of time. Splines of sparse steps fail before the steps do, so the steps of a march may at most double the time
-elapsed since the segment began.
+Each segment of the load program has its own spline, in x = ln(1 + (y/20 s)^beta): creep after a change of load decays
+over decades of the time y since then (beta = 1); creep of a virgin body begins as a power beta of the time y since zero.
+Splines of sparse steps fail before the steps do, so the steps of a march may at most double the time elapsed since the
+segment began.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from creepkit.arrays import Floats, Ints
+from creepkit.fem.record import PRESSURE, START
+from creepkit.integration.clock import SMALLEST_BETA
 
 OFFSET = 20.0
 """s; twice the first step after a change of load."""
@@ -23,24 +26,31 @@ class Timeline:
     """The accepted steps of a march.
 
     times : (steps,) s. starts : (segments reached,) s. rows : first and last step of each segment; without a jump of
-    the load the first is the last one of the segment before.
+    the load the first is the last one of the segment before. origins : (segments reached,) s, zero of the time y.
+    exponents : (segments reached,) beta.
     """
 
     times: Floats
     starts: Floats
     rows: tuple[tuple[int, int], ...]
+    origins: Floats
+    exponents: Floats
 
     @classmethod
-    def of(cls, times: Floats, segments: Ints, starts: Floats) -> Timeline:
-        """From the rows of a record and the starts of the program's segments."""
+    def of(cls, times: Floats, segments: Ints, program: Floats, beta: float = 1.0) -> Timeline:
+        """From the rows of a record and the program (segments, 10); beta : the law's leading exponent of time."""
         rows = []
-        reached = int(segments[-1]) + 1
-        for n in range(reached):
+        reached = program[: int(segments[-1]) + 1]
+        starts = reached[:, START].copy()
+        for n, start in enumerate(starts):
             mine = np.flatnonzero(segments == n)
-            at_start = np.flatnonzero((segments == n) & (times == starts[n]))
+            at_start = np.flatnonzero((segments == n) & (times == start))
             first = int(at_start[-1]) if at_start.size else int(mine[0]) - 1
             rows.append((first, int(mine[-1])))
-        return cls(np.array(times), np.array(starts[:reached]), tuple(rows))
+        # a pressure that rises from nothing gives no power of time; long after zero only the change of load matters
+        young = np.where(starts == 0.0, reached[:, PRESSURE] != 0.0, starts <= OFFSET) & (beta < 1.0)
+        exponents = np.where(young, max(beta, SMALLEST_BETA), 1.0)
+        return cls(np.array(times), starts, tuple(rows), np.where(young, 0.0, starts), exponents)
 
     def interpolate(self, values: Floats, times: Floats) -> Floats:
         """Values (steps, ...) at other times, (times, ...); NaN after the last step.
@@ -53,17 +63,27 @@ class Timeline:
         for n, (first, last) in enumerate(self.rows):
             mine = (which == n) & (times <= self.times[-1] * (1 + 1e-12))
             if mine.any():
-                knots = self.times[first : last + 1] - self.starts[n]
-                out[mine] = _spline(knots, values[first : last + 1], times[mine] - self.starts[n])
+                known = slice(first, last + 1)
+                before, after = self._variable(n, self.times[known]), self._variable(n, times[mine])
+                out[mine] = _spline(before, values[known], after)
         return out
 
     def moved(self, times: Floats, starts: Floats) -> Timeline:
         """The same steps at other times, the segments beginning at others too."""
-        return Timeline(self.times + times, self.starts + starts, self.rows)
+        origins = np.where(self.origins == self.starts, self.origins + starts, self.origins)
+        return replace(self, times=self.times + times, starts=self.starts + starts, origins=origins)
+
+    def _variable(self, n: int, times: Floats) -> Floats:
+        """What the values of segment `n` are smooth in."""
+        first, last = self.rows[n]
+        elapsed = np.maximum(times - self.origins[n], 0.0)
+        if last - first == 1:  # a single step: the few seconds of a ramp, elastic and so straight
+            return np.asarray(elapsed)
+        return np.asarray(np.log1p((elapsed / OFFSET) ** self.exponents[n]))
 
 
-def _spline(knots: Floats, values: Floats, elapsed: Floats) -> Floats:
-    """Values at times since the segment began."""
-    if knots.size == 1:
-        return np.repeat(values, elapsed.size, axis=0)
-    return np.asarray(CubicSpline(np.log(knots + OFFSET), values)(np.log(elapsed + OFFSET)))
+def _spline(before: Floats, values: Floats, after: Floats) -> Floats:
+    """Values at places `after` from those at `before`."""
+    if before.size == 1:
+        return np.repeat(values, after.size, axis=0)
+    return np.asarray(CubicSpline(before, values)(after))

@@ -95,7 +95,8 @@ class History:
 
     def __reduce__(self) -> tuple[Any, ...]:
         state = {f.name: getattr(self, f.name) for f in fields(self)}
-        return _history, ({k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()},)
+        plain = {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
+        return _history, (type(self), plain)
 
     def up_to(self, output: str, limit: float) -> History:
         """Mark unused every frame from the first used one whose `output` exceeds `limit` on."""
@@ -120,5 +121,5 @@ class History:
         return f"{warm} C, {driven} MPa"
 
 
-def _history(state: dict[str, Any]) -> History:
-    return History(**state)
+def _history(kind: type[History], state: dict[str, Any]) -> History:
+    return kind(**state)

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
-from creepkit.errors import SolveError
+from creepkit.errors import SolveError, nearest
 from creepkit.hookspecs import hookimpl
-from creepkit.records import Effects, History, Loading, Prediction, Program, Specimen, Status
+from creepkit.records import Effects, History, Prediction, Predictor, Specimen
 from creepkit.specimens.dimple import DimpleGeometry
 from creepkit.specimens.observation import OBSERVED, Observation
 
 if TYPE_CHECKING:
     from creepkit.fem.mesh import Mesh
-    from creepkit.language import CreepLaw, Elastic
+    from creepkit.language import CreepLaw
     from creepkit.specimens.bulge_run import BulgeRun
 
 _RANGES = {
@@ -69,10 +69,16 @@ class Bulge:
             value = getattr(self, name)
             if not low <= value <= high:
                 raise SolveError(f"bulge specimen: {name} is {value:g}; allowed are {low:g} to {high:g}")
+        if self.threads is not None and (self.threads != int(self.threads) or self.threads < 1):
+            allowed = "whole numbers above zero, or None for all cores"
+            raise SolveError(f"bulge specimen: threads is {self.threads}; allowed are {allowed}")
 
     def replace(self, **changes: Any) -> Bulge:
         """The same specimen with some fields, or lengths of its geometry, changed: replace(apex_thickness=0.48)."""
         own = {f.name for f in fields(self) if f.init}
+        known = own | {f.name for f in fields(self.geometry)}
+        for name in changes.keys() - known:
+            raise SolveError(f"a bulge specimen has no field '{name}'; {nearest(name, known)}")
         inner = {name: changes.pop(name) for name in list(changes) if name not in own}
         if inner:
             changes["geometry"] = changes.get("geometry", self.geometry).replace(**inner)
@@ -92,31 +98,20 @@ class Bulge:
 
         return predict(self, law, values, histories, jacobian, effects or {})
 
-    def simulate(
-        self,
-        law: CreepLaw,
-        values: Mapping[str, float],
-        *,
-        loading: Loading,
-        times: ArrayLike,
-        elastic: Elastic | None = None,
-        temperature: float | Program = 293.15,
-        name: str = "simulated",
-    ) -> BulgeRun:
-        """Run one test with everything kept: outputs, displacements, stresses and strains. times s, temperature K."""
-        from creepkit.specimens.bulge_run import simulate
+    def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
+        """Run one test, keeping displacements, stresses and strains of the whole dimple; see BulgeRun."""
+        from creepkit.specimens.bulge_run import run
 
-        if elastic is None:
-            raise SolveError("a bulge test needs elastic data: give elastic=Elastic(E=...), E in MPa")
-        plan = History(
-            name=name, times=np.atleast_1d(np.asarray(times, float)), outputs={}, loading=loading,
-            temperature=temperature, specimen=self.name, elastic=elastic,
-            operator=str(self.observation), source=f"simulation of law '{law.name}'",
-        )  # fmt: skip
-        return simulate(self, law, values, plan)
+        return run(self, law, values, plan)
+
+    def screening(self) -> Predictor:
+        """The stand-in of one degree of freedom, for searches."""
+        from creepkit.specimens.reduced import ReducedBulge
+
+        return ReducedBulge(self)
 
     def reference_stress(self, history: History) -> Floats:
-        """The von Mises stress, MPa, that stands for each pressure level of a test: 12.5 P (t/.5 mm)^-1.15 for the default.
+        """The von Mises stress, MPa, that stands for each pressure level: 12.5 P (t/.5 mm)^-1.15 for the default.
 
         k = sigma/P of the one-degree-of-freedom model at .3 to .5 mm of deflection of the default dimple; for others
         scaled as a plate of the same radius to thickness.
@@ -131,6 +126,3 @@ class Bulge:
 def creepkit_specimens() -> list[Specimen]:
     """The paper's dimple."""
     return [Bulge()]
-
-
-__all__ = ["Bulge", "Status", "creepkit_specimens"]

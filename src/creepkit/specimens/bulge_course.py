@@ -51,6 +51,8 @@ def setup(specimen: Bulge, history: History, effects: Mapping[str, float]) -> Se
         raise SolveError(
             f"{where}: a bulge specimen is loaded by pressure, found {history.loading.quantity}; use PressureJump"
         )
+    if history.times[-1] <= 0.0:
+        raise SolveError(f"{where}: the last time is 0 s, where the load only begins; ask for a time after it")
     if history.elastic is None:
         raise SolveError(f"{where}: a bulge test needs elastic data; set elastic=Elastic(E=...), E in MPa")
     pressure = history.loading.program()

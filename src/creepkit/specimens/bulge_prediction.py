@@ -14,7 +14,7 @@ import numpy as np
 from creepkit import kernels
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError
-from creepkit.fem.march import Settings
+from creepkit.fem.record import Settings
 from creepkit.fem.simulation import simulate
 from creepkit.records import Effects, History, Prediction, Status
 from creepkit.specimens.bulge_course import setup

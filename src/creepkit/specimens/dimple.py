@@ -70,7 +70,7 @@ class DimpleGeometry:
     def mesh(self, refinement: float = 1.0) -> Mesh:
         """A structured mesh; `refinement` 2 has twice as many elements each way, 0.5 is the least.
 
-        1 is meant for production: 12 columns of 4 layers in the tapered dimple, 20 of 4 in a plate with a fillet.
+        1 is meant for production: 10 columns of 5 layers in the tapered dimple, 15 of 5 in a plate with a fillet.
         """
         layout = self._layout(refinement)
         inner, outer = (side.real for side in sides(self._dimensions(), layout))

@@ -16,12 +16,21 @@ from creepkit.arrays import Floats
 Numbers: TypeAlias = NDArray[np.inexact[Any]]
 
 QUARTER = 0.5 * np.pi
-LAYERS = 4
-GRADED = np.array([0.0, 0.3, 0.5, 0.7, 1.0])
-"""Ends of the layers of a tapered dimple, from the cavity; a plate with a fillet has uniform ones."""
+TAPERED = np.array([0.0, 0.16, 0.38, 0.57, 0.68, 1.0])
+PLATE = np.array([0.0, 0.17, 0.4, 0.6, 0.83, 1.0])
+"""Ends of the layers, from the cavity, of a tapered dimple and of a plate with a fillet.
 
-SHIFT = 0.1
+Their number decides: creep stress has a kink where bending changes sign, sharper for larger exponents, and the more
+layers the less it matters on which side of the kink a point lies.
+"""
+
+LAYERS = len(PLATE) - 1
+
+SHIFT = 1 / 3
 """How much denser the columns of a tapered roof are at its middle, where it bulges most."""
+
+LATER = 1.35
+"""How much later the top of a tapered dimple fans out, for its roof bulges where the columns stand upright."""
 
 
 class Dimensions(NamedTuple):
@@ -79,7 +88,7 @@ def layout_of(size: Dimensions, refinement: float) -> Layout:
         roof=fine[1],
         wall=fine[2],
         corner=_same_place(corner, columns, fine),
-        power=_power(size, coarse, corner),
+        power=_power(size, coarse, corner) * (1.0 + LATER * taper),
         breaks=_breaks(taper, refinement),
     )
 
@@ -102,17 +111,17 @@ def sides(size: Dimensions, layout: Layout) -> tuple[Numbers, Numbers]:
 
 
 def _columns(size: Dimensions, refinement: float) -> tuple[int, int, int]:
-    """Columns of floor, roof and wall; unrefined 0, 10, 2 in the paper's dimple and 10, 8, 2 where a = R / 5.
+    """Columns of floor, roof and wall; unrefined 0, 8, 2 in the paper's dimple and 8, 6, 1 where a = R / 5.
 
     None of floor or wall is much shorter than those of the roof; what is shorter than half of one has none.
     """
     alpha = size.roof_radial / size.cavity_radius
     start, end = size.span
     height = (end - QUARTER) * size.roof_axial / size.plate_thickness
-    roof = round(refinement * round(7.5 + 2.5 * alpha))
+    roof = round(refinement * round(5.5 + 2.5 * alpha))
     floor, wall = (
         min(max(1, round(refinement * max(1, round(wanted)))), round(angle / (QUARTER / roof)))
-        for wanted, angle in ((12.5 * (1 - alpha), -start), (4.5 * height, end - QUARTER))
+        for wanted, angle in ((10.0 * (1 - alpha), -start), (3.9 * height, end - QUARTER))
     )
     return floor, roof, wall
 
@@ -153,8 +162,8 @@ def _same_place(line: int, old: tuple[int, int, int], new: tuple[int, int, int])
 
 def _breaks(taper: float, refinement: float) -> Floats:
     layers = max(2, round(LAYERS * refinement))
-    uniform = np.linspace(0.0, 1.0, LAYERS + 1)
-    return np.interp(np.linspace(0.0, 1.0, layers + 1), uniform, taper * GRADED + (1 - taper) * uniform)
+    even = np.linspace(0.0, 1.0, LAYERS + 1)
+    return np.interp(np.linspace(0.0, 1.0, layers + 1), even, taper * TAPERED + (1 - taper) * PLATE)
 
 
 def _angles(size: Dimensions, layout: Layout) -> Numbers:

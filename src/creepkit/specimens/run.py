@@ -2,9 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, runtime_checkable
 
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import SolveError
 from creepkit.records import History, Status
+
+if TYPE_CHECKING:
+    from creepkit.language import CreepLaw
+
+IN_WORDS = {
+    Status.COMPLETE: "",
+    Status.BURST: "burst",
+    Status.NOT_CONVERGED: "not converged",
+    Status.OUTSIDE_DOMAIN: "outside the domain",
+}
+"""What a status means where nobody gives a reason."""
+
+_Kind = TypeVar("_Kind", bound="Run")
 
 
 @dataclass(frozen=True, eq=False)
@@ -12,8 +31,57 @@ class Run(History):
     """A simulated test up to where it ended: the times asked for that were reached, and the outputs there.
 
     status : how it ended; end_time : s, where; reason : why, in words (empty when complete).
+    A run that ended early has the label `ended`, with the reason, and `burst_s` if it burst.
     """
 
     status: Status = Status.COMPLETE
     end_time: float = 0.0
     reason: str = ""
+
+    def __str__(self) -> str:
+        how = "complete" if self.status is Status.COMPLETE else f"ended at {self.end_time:g} s ({self.reason})"
+        last = ", ".join(f"{name} {values[-1]:.4g}" for name, values in self.outputs.items())
+        return f"{self.name}: {how}; {self.times.size} frames to {self.times[-1]:g} s, where {last}"
+
+
+@runtime_checkable
+class Runnable(Protocol):
+    """A specimen that says more of one test than its outputs: how it ended and why, and what else it keeps."""
+
+    def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> Run:
+        """Run the test that a history without outputs describes."""
+        ...
+
+
+def run_of(
+    kind: type[_Kind],
+    plan: History,
+    names: Sequence[str],
+    rows: Floats,
+    status: Status,
+    end_time: float,
+    reason: str = "",
+    **more: Any,
+) -> _Kind:
+    """The run of a plan: its frames up to the end; SolveError if it ended before any of them.
+
+    rows : (times of the plan, names) outputs. more : fields that this kind of run has beside those of Run.
+    """
+    reason = reason or IN_WORDS[status]
+    reached = np.isfinite(rows).all(axis=1)
+    labels = dict(plan.labels)
+    if status is not Status.COMPLETE:
+        reached &= plan.times <= end_time
+        labels["ended"] = reason
+    if status is Status.BURST:
+        labels["burst_s"] = f"{end_time:.6g}"
+    # at rest, at time zero, there is nothing that an end could spare
+    if not (reached & ((plan.times > 0.0) | (plan.times[-1] == 0.0))).any():
+        raise SolveError(
+            f"{plan.source or plan.name} ended at {end_time:g} s, before any of the times asked for: {reason}; "
+            "check values, loading and times"
+        )
+    known = {f.name: getattr(plan, f.name) for f in fields(History)}
+    outputs = {name: rows[reached, k] for k, name in enumerate(names)}
+    frames = {"times": plan.times[reached], "used": plan.used[reached], "outputs": outputs, "labels": labels}
+    return kind(**{**known, **frames, **more}, status=status, end_time=end_time, reason=reason)

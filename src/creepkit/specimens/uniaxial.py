@@ -18,14 +18,14 @@ from creepkit import integration, kernels
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
-from creepkit.records import Effects, History, Loading, Prediction, Program, Specimen, Status
+from creepkit.records import Effects, History, Prediction, Specimen, Status
 from creepkit.specimens.elastic_part import observed
-from creepkit.specimens.run import Run
+from creepkit.specimens.run import Run, run_of
 from creepkit.specimens.uniaxial_effects import KINDS, predict_with
 
 if TYPE_CHECKING:
     from creepkit.integration import Integration, PointTest
-    from creepkit.language import CreepLaw, Elastic
+    from creepkit.language import CreepLaw
 
 
 @dataclass(frozen=True)
@@ -103,37 +103,12 @@ class Uniaxial:
             times=tuple(h.times for h in histories),
         )
 
-    def simulate(
-        self,
-        law: CreepLaw,
-        values: Mapping[str, float],
-        *,
-        loading: Loading,
-        times: ArrayLike,
-        temperature: float | Program = 293.15,
-        elastic: Elastic | None = None,
-    ) -> Run:
-        """Run one test; its strain includes the elastic part when `elastic` is given. times in s, temperature in K."""
-        plan = History(
-            name=law.name,
-            times=np.atleast_1d(np.asarray(times, dtype=float)),
-            outputs={},
-            loading=loading,
-            temperature=temperature,
-            elastic=elastic,
-            includes_elastic=elastic is not None,
-            source=f"simulation of law '{law.name}'",
-        )
+    def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> Run:
+        """Run one test: what its history would show at its times, and how it ended."""
         result = self._integrate(law, law.values(values), [plan], jacobian=False)
         strain = observed(plan, result.of(0))[0]
-        reached = np.isfinite(strain)
-        return Run(
-            times=plan.times[reached],
-            outputs={"strain": strain[reached]},
-            status=Status(int(result.status[0, 0])),
-            end_time=float(result.end_times[0, 0]),
-            reason=integration.REASONS[int(result.endings[0, 0])],
-        )
+        end, reason = float(result.end_times[0, 0]), integration.REASONS[int(result.endings[0, 0])]
+        return run_of(Run, plan, self.outputs, strain[:, None], Status(int(result.status[0, 0])), end, reason)
 
     def _integrate(
         self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], jacobian: bool

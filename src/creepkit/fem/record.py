@@ -1,0 +1,133 @@
+"""What a march is told, what it works with and what it leaves: settings, segments, rooms, record of steps."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from creepkit.arrays import Floats, Ints
+from creepkit.fem.body import Body
+from creepkit.fem.element import Forces, Points, forces_of, point_room, points_of
+from creepkit.fem.material import EQUIVALENT, PointRoom
+
+(
+    REACHED_END,
+    DEFLECTION_LIMIT,
+    STRAIN_LIMIT,
+    STATE_LIMIT,
+    LIMIT_LOAD,
+    LOST_CONVERGENCE,
+    TOO_MANY_STEPS,
+) = range(7)
+"""Codes of an ending; whatever it is, the history so far is kept."""
+
+START, END, PRESSURE, END_PRESSURE, WARMTH, END_WARMTH, MODULUS, END_MODULUS, MOTION, END_MOTION = range(10)
+"""Columns of a segment: times s, pressures MPa, temperatures K, moduli E MPa, motion of held nodes, at both ends."""
+
+
+class Settings(NamedTuple):
+    """How accurately, and how far, to march.
+
+    tolerance : estimated error of a step's displacements over (0.01 mm + the largest of them).
+    newton : last correction of equilibrium over the same.
+    first : s, the first step after a change of load; each next one is at most the time elapsed since plus this.
+    deflection_limit : mm, displacement of the observed surface at which the body has burst.
+    strain_limit : creep strain at which a point has burst. max_steps : cap on steps, accepted and rejected.
+    """
+
+    tolerance: float = 1e-2
+    newton: float = 1e-4
+    first: float = 10.0
+    deflection_limit: float = 3.0
+    strain_limit: float = 1.0
+    max_steps: int = 1000
+
+
+class Record(NamedTuple):
+    """Accepted steps: (records,) times s, segment of each; displacements (records, 2 nodes); and if kept, the points.
+
+    values : (records or 0, points, V). mises : (records, points) MPa. counts : (4,) accepted, rejected, full and light
+    passes of equilibrium. places : (records, 2) where a step began and its length, in the position of its clock.
+    stages, slopes : if kept, what the stages found: displacements (records or 0, stages, 2 nodes), and d value/ds
+    (records or 0, stages, points, V).
+    """
+
+    times: Floats
+    segments: Ints
+    displacements: Floats
+    values: Floats
+    mises: Floats
+    counts: Ints
+    places: Floats
+    stages: Floats
+    slopes: Floats
+
+
+class Rooms(NamedTuple):
+    """Working arrays of a march: points, one point, forces; displacements (2 nodes,) now, at the start of the step, and
+    (stages, 2 nodes) at the stages.
+    """
+
+    points: Points
+    point: PointRoom
+    forces: Forces
+    displacement: Floats
+    start: Floats
+    stages: Floats
+
+
+class Ended(NamedTuple):
+    """Number of records, code, time s."""
+
+    records: int
+    code: int
+    time: float
+
+
+def rooms_of(body: Body, states: int, stages: int) -> Rooms:
+    """Allocate the working arrays."""
+    size = body.equations.size
+    return Rooms(
+        points_of(4 * len(body.elements), states, stages),
+        point_room(states, 0),
+        forces_of(body),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros((stages, size)),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def make_virgin(points: Points, initial: Floats) -> None:
+    """Virgin points."""
+    for k in range(points.value.shape[0]):
+        points.increments[k] = 0.0
+        points.mises[k] = 0.0
+        for v in range(points.value.shape[1]):
+            points.value[k, v] = initial[v - EQUIVALENT - 1] if v > EQUIVALENT else 0.0
+            for i in range(points.slopes.shape[0]):
+                points.slopes[i, k, v] = 0.0
+        for i in range(initial.size):
+            points.states[k, i] = initial[i]
+
+
+@njit(cache=True, error_model="numpy")
+def copy(source: Floats, target: Floats) -> None:
+    """Copy a vector."""
+    for k in range(source.size):
+        target[k] = source[k]
+
+
+@njit(cache=True, error_model="numpy")
+def keep(record: Record, ended: Ended, time: float, n: int, u: Floats, points: Points) -> Ended:
+    """Write a row of the record."""
+    row = ended.records
+    record.times[row], record.segments[row] = time, n
+    copy(u, record.displacements[row])
+    copy(points.mises, record.mises[row])
+    if record.values.shape[0] > 0:
+        for k in range(points.value.shape[0]):
+            copy(points.value[k], record.values[row, k])
+    return Ended(row + 1, REACHED_END, time)

@@ -1,0 +1,143 @@
+"""Pictures of a simulated bulge test: its deformed section coloured by a field, and its outputs over time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.arrays import Floats, Ints
+from creepkit.errors import SolveError
+from creepkit.fem.mesh import CORNERS
+from creepkit.fem.mesh_checks import SIDES, outline
+from creepkit.fem.shape import POINTS, shape_functions
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from creepkit.specimens.bulge_run import BulgeRun
+
+FINENESS = 6
+"""Facets along the side of an element: its curved sides look smooth."""
+
+_LABELS = {"stress": "von Mises stress, MPa", "creep strain": "equivalent creep strain"}
+_GREY = "0.45"
+
+
+def section(run: BulgeRun, time: float, name: str, path: str | Path | None = None) -> Figure:
+    """The deformed section, both halves, coloured by a field, over the outline at rest; true to scale."""
+    from matplotlib.tri import Triangulation
+
+    field = run.field(name, time)
+    body = run.made.body
+    moved = body.nodes + run._at(run.simulation.displacements, time)
+    figure = _figure(9.0, 3.1)
+    axes = figure.subplots()
+    places, facets = _facets(moved[body.elements])
+    values = _at_facets(field.values.reshape(-1, 4), body.elements)
+    for side in (1.0, -1.0):
+        half = Triangulation(side * places[:, 0], places[:, 1], facets)
+        coloured = axes.tripcolor(half, values, shading="gouraud", cmap="viridis", rasterized=True)
+        coloured.set_clim(field.values.min(), field.values.max())
+        _draw_outline(axes, body.nodes, body.elements, side, color=_GREY, lw=0.8, ls=(0, (4, 3)))
+        _draw_outline(axes, moved, body.elements, side, color="black", lw=0.9)
+    figure.colorbar(coloured, ax=axes, label=_LABELS.get(name, name), shrink=0.8, pad=0.01, aspect=18)
+    pressure = float(run.made.course.pressure.at(time))
+    axes.set(aspect="equal", xlabel="r, mm", ylabel="z, mm")
+    axes.set_title(f"{run.name}: {_duration(time)}, {pressure:.3g} MPa (dashed: at rest)", fontsize=10)
+    axes.spines[["top", "right"]].set_visible(False)
+    _save(figure, path)
+    return figure
+
+
+def outputs(run: BulgeRun, path: str | Path | None = None) -> Figure:
+    """Amplitude, width, shape and pressure over time, one below the other."""
+    figure = _figure(6.4, 6.6)
+    panels = figure.subplots(4, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0, 0.8))
+    hours, units = run.times / 3600.0, {"amplitude": ", mm", "width": ", mm"}
+    for axes, (name, values) in zip(panels, run.outputs.items(), strict=False):
+        axes.plot(hours, values, lw=1.5, color="tab:blue")
+        axes.set_ylabel(f"{name}{units.get(name, '')}")
+    program = run.made.course.pressure
+    inside = program.times[program.times < run.end_time]
+    knots = np.unique(np.concatenate([inside, [0.0, run.end_time]]))
+    panels[3].plot(knots / 3600.0, program.at(knots), lw=1.5, color="tab:red")
+    panels[3].set(ylabel="pressure, MPa", xlabel="time, h")
+    panels[0].set_ylim(bottom=0.0)
+    panels[3].set_ylim(0.0, 1.15 * max(float(program.values.max()), 1e-9))
+    for axes in panels:
+        axes.grid(alpha=0.25)
+    ended = f", ended at {_duration(run.end_time)}: {run.reason}" if run.reason else ""
+    figure.suptitle(f"{run.name}{ended}", fontsize=10)
+    figure.align_ylabels(panels)
+    _save(figure, path)
+    return figure
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _facets(nodes: Floats) -> tuple[Floats, Ints]:
+    """Corners (corners, 2) and triangles (triangles, 3) of elements (elements, 8, 2) cut into small pieces."""
+    side = FINENESS + 1
+    corners = np.einsum("pa,eai->epi", shape_functions(_grid()), nodes).reshape(-1, 2)
+    first = np.add.outer(side * np.arange(FINENESS), np.arange(FINENESS)).ravel()
+    one = np.stack([first, first + 1, first + side + 1], axis=1)
+    other = np.stack([first, first + side + 1, first + side], axis=1)
+    pieces = np.concatenate([one, other])
+    return corners, (side**2 * np.arange(len(nodes))[:, None, None] + pieces).reshape(-1, 3)
+
+
+def _at_facets(values: Floats, elements: Ints) -> Floats:
+    """Values (elements, 4 points) at the corners of the facets.
+
+    Bilinear through the points of an element, then the mean of the elements that meet at a node, then quadratic
+    between the nodes; never beyond what the points hold.
+    """
+    nodes = np.vstack([CORNERS, 0.5 * (CORNERS + np.roll(CORNERS, -1, axis=0))])
+    scaled, signs = nodes / np.abs(POINTS[0, 0]), np.sign(POINTS)
+    own = values @ (0.25 * np.prod(1.0 + scaled[:, None] * signs, axis=2)).T
+    count = np.bincount(elements.ravel())
+    mean = np.bincount(elements.ravel(), weights=own.ravel()) / np.maximum(count, 1)
+    smooth = mean[elements] @ shape_functions(_grid()).T
+    return np.clip(smooth, values.min(), values.max()).ravel()
+
+
+def _grid() -> Floats:
+    """(places, 2) local coordinates of the corners of the facets."""
+    ticks = np.linspace(-1.0, 1.0, FINENESS + 1)
+    return np.stack([a.ravel() for a in np.meshgrid(ticks, ticks)], axis=1)
+
+
+def _draw_outline(axes: Axes, nodes: Floats, elements: Ints, side: float, **style: object) -> None:
+    """The sides that belong to one element only, but for those on the axis."""
+    from matplotlib.collections import LineCollection
+
+    ticks = np.linspace(-1.0, 1.0, FINENESS + 1)[:, None]
+    weights = np.hstack([0.5 * ticks * (ticks - 1.0), 1.0 - ticks**2, 0.5 * ticks * (ticks + 1.0)])
+    chosen = outline(elements)
+    ends = nodes[elements[chosen[:, 0, None], SIDES[chosen[:, 1]]]]
+    curves = np.einsum("pa,eai->epi", weights, ends[(ends[:, :, 0] > 1e-9).any(axis=1)])
+    axes.add_collection(LineCollection(list(curves * [side, 1.0]), **style))  # type: ignore[arg-type]
+
+
+def _duration(time: float) -> str:
+    return f"{time / 3600:.4g} h" if time >= 3600 else f"{time:.4g} s"
+
+
+def _save(figure: Figure, path: str | Path | None) -> None:
+    if path is None:
+        return
+    try:
+        figure.savefig(path, dpi=160)
+    except (OSError, ValueError) as error:
+        told = str(error).splitlines()[0]
+        raise SolveError(f"{path}: the picture cannot be written ({told}); name a .png, .svg or .pdf file") from None

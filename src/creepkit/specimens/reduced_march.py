@@ -1,0 +1,334 @@
+"""The one-degree-of-freedom model in time: many candidates in many tests at once, in the same number of steps.
+
+    sigma* = k(D, h) P,   d eps/dt = f(sigma*, eps, t, T),   dD_cr/dt = kappa(D, h) d eps/dt,   D = D_el(P/E, h) + D_cr
+
+by the implicit midpoint rule in s = t^beta, in which strain begins as a straight line, so that t^m and strain hardening
+need no small first steps. The point stands for the middle of the roof: its stress is equibiaxial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from creepkit.arrays import Bools, Floats, Ints
+from creepkit.records import History, Status
+from creepkit.specimens.bulge_course import Setup, setup
+from creepkit.specimens.reduced_tables import EXPONENTS, Grid, Place, Tables
+
+if TYPE_CHECKING:
+    from creepkit.specimens.bulge import Bulge
+
+FIRST, GROWTH, SHARE = 2.5, 0.5, 1.0 / 24.0
+"""Steps: s, the first one after a change of load; of the time elapsed since, each later one; of the test, the longest."""
+RAMP_STEPS = 4
+"""Steps of a ramp from zero to the largest pressure."""
+MEAN_STRESS = 2.0 / 3.0
+"""Over the von Mises stress, in equibiaxial tension."""
+
+_OFFSET = 20.0
+"""s; creep after a change of load decays over decades of time since then."""
+_SECANTS = 2
+"""The first estimate comes from the step before: an error of the increment of some 0.1 % is left."""
+_SLOPES = (-10.0, -0.2)
+"""Slope of residuals to unknowns that a step may have: -1 without feedback, steeper where deflection softens."""
+_PUSH = 1.05
+_STRESS_FLOOR = 1e-6
+"""MPa; creep without pressure."""
+_REST = 1e-12
+"""mm."""
+_LARGEST = np.log(1e2)
+"""ln of the largest strain increment; the dimple has burst long before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """When a test is looked at: nodes (nodes,) with time s, pressure MPa and temperature K; weights of frames.
+
+    frames : (frames, nodes) the values at the history's times as sums of those at nodes.
+    """
+
+    made: Setup
+    times: Floats
+    pressure: Floats
+    temperature: Floats
+    frames: Floats
+
+
+@lru_cache(maxsize=1024)
+def schedule(specimen: Bulge, history: History) -> Schedule:
+    """The schedule of a test; complains as the specimen does where the test cannot be simulated."""
+    made = setup(specimen, history, {})
+    segments, largest = made.course.segments, float(made.course.pressure.values.max())
+    times, columns, rows = [np.zeros(0)], [np.zeros((0, 2))], []
+    count, before, origin = 0, np.full(2, np.nan), 0.0
+    for start, end, P, P_end, T, T_end in segments[:, :6]:
+        if P != before[0] or P_end != P:
+            origin = start
+        ramp = abs(P_end - P) / largest if largest > 0 else 0.0
+        inner = _ramp(start, end, ramp) if P_end != P else _hold(start, end, origin, SHARE * segments[-1, 1])
+        share = ((inner - start) / (end - start))[:, None]
+        fresh = bool((before != (P, T)).any())
+        taken = slice(0 if fresh else 1, None)
+        times.append(inner[taken])
+        columns.append(((1 - share) * [P, T] + share * [P_end, T_end])[taken])
+        rows.append((count if fresh else count - 1, count + times[-1].size - 1))
+        count, before = count + times[-1].size, np.array([P_end, T_end])
+        origin = end if P_end != P else origin
+    nodes, values = np.concatenate(times), np.concatenate(columns)
+    frames = _weights(nodes, rows, segments[:, 0], history.times)
+    return Schedule(made, nodes, values[:, 0], values[:, 1], frames)
+
+
+def _weights(nodes: Floats, rows: Sequence[tuple[int, int]], starts: Floats, times: Floats) -> Floats:
+    """Weights (times, nodes) of splines in ln(t - t0 + 20 s), one for each segment; before a jump at its very time.
+
+    rows : first and last node of each segment; starts : s.
+    """
+    out = np.zeros((times.size, nodes.size))
+    which = np.maximum(np.searchsorted(starts, times, side="left") - 1, 0)
+    for n, (first, last) in enumerate(rows):
+        mine, known = which == n, slice(first, last + 1)
+        if mine.any():
+            spline = CubicSpline(np.log(nodes[known] - starts[n] + _OFFSET), np.eye(last + 1 - first))
+            out[mine, known] = spline(np.log(times[mine] - starts[n] + _OFFSET))
+    return out
+
+
+def _ramp(start: float, end: float, share: float) -> Floats:
+    """Nodes of a segment in which the pressure changes by a share of the largest one."""
+    return np.linspace(start, end, max(1, int(np.ceil(RAMP_STEPS * share))) + 1)
+
+
+def _hold(start: float, end: float, origin: float, longest: float) -> Floats:
+    """Nodes of a segment of constant pressure, in steps that grow with the time since the load changed."""
+    nodes = [start]
+    while nodes[-1] < end:
+        step = min(max(GROWTH * (nodes[-1] - origin), FIRST), max(longest, FIRST))
+        nodes.append(nodes[-1] + step)
+    nodes[-1] = end
+    return np.array(nodes)
+
+
+class Point(NamedTuple):
+    """Where a law is asked, each (candidates, tests): MPa, strain, s, K; states (S, candidates, tests)."""
+
+    stress: Floats
+    strain: Floats
+    time: Floats
+    temperature: Floats
+    states: Floats
+
+
+Rates = Callable[[Point], tuple[Floats, Floats]]
+"""ln of the strain rate and the rates of states (S, ...), at a point."""
+
+
+def rates_of(kernel: Any, theta: Floats) -> Rates:
+    """The rates of a law lowered for NumPy; theta : (candidates, parameters) internal."""
+    columns = theta.T[:, :, None]
+
+    def rates(point: Point) -> tuple[Floats, Floats]:
+        arguments = (
+            point.stress, point.strain, point.time, point.temperature, point.stress, MEAN_STRESS * point.stress,
+            *point.states, *columns,
+        )  # fmt: skip
+        log = np.asarray(kernel.internal_log_rate(*arguments))
+        if not len(point.states):
+            return log, point.states
+        return log, np.array(kernel.internal_rates(*arguments)[1:])
+
+    return rates
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """What is marched, all broadcastable to (nodes, candidates, tests).
+
+    times s, pressure MPa, temperature K, elastic deflection mm at nodes; beta (1, candidates, 1) exponent of the clock.
+    tables, grid, row : of the dimples, and which row (candidates, tests) is whose. initial, limits : (S,) of states.
+    deflection_limit mm, strain_limit : of what has not burst.
+    """
+
+    times: Floats
+    pressure: Floats
+    temperature: Floats
+    elastic: Floats
+    beta: Floats
+    tables: Tables
+    grid: Grid
+    row: Ints
+    initial: Floats
+    limits: Floats
+    deflection_limit: float
+    strain_limit: float
+
+
+class Ended(NamedTuple):
+    """Outputs (nodes, candidates, tests, 3); Status and time s of the end, (candidates, tests)."""
+
+    outputs: Floats
+    status: Ints
+    end_times: Floats
+
+
+def march(batch: Batch, rates: Rates) -> Ended:
+    """March all rows to the end of their tests, or to where they burst; outputs stay as they are from there on."""
+    shape = (batch.times.shape[0], *batch.row.shape)
+    clock, state = _clock(batch), _virgin(batch)
+    status = np.full(shape[1:], int(Status.COMPLETE))
+    ends = np.array(np.broadcast_to(batch.times[-1], shape[1:]))
+    amplitude, exponent = np.zeros(shape), np.ones(shape)
+    amplitude[0] = batch.elastic[0]
+    for j in range(1, shape[0]):
+        after, exponent[j] = _stepped(batch, rates, clock, j, state)
+        reached = batch.elastic[j] + after.creep
+        lost, burst = _ended(batch, after, reached)
+        alive = status == Status.COMPLETE
+        status = np.where(alive & lost, int(Status.NOT_CONVERGED), np.where(alive & burst, int(Status.BURST), status))
+        going = alive & ~lost & ~burst
+        ends = np.where(alive & ~going, _moment(batch, j, amplitude[j - 1], reached, burst), ends)
+        stuck = np.where(alive & burst, batch.deflection_limit, amplitude[j - 1])
+        amplitude[j] = np.where(going, reached, stuck)
+        state = State(*(np.where(going, new, old) for new, old in zip(after, state, strict=True)))
+    exponent[0] = exponent[1]
+    return Ended(_observed(batch, amplitude, exponent), status, ends)
+
+
+class State(NamedTuple):
+    """Where rows are: creep deflection mm, strain, ln of the last rate (candidates, tests); states (S, ...)."""
+
+    creep: Floats
+    strain: Floats
+    log_rate: Floats
+    states: Floats
+
+
+class Clock(NamedTuple):
+    """Of each step, broadcastable to (steps, candidates, tests): time s of its middle in the position t^beta, the
+    share of the step's time before it, and ln of dt/ds times the step's length in s.
+    """
+
+    time: Floats
+    share: Floats
+    log_weight: Floats
+
+
+def _virgin(batch: Batch) -> State:
+    rows = batch.row.shape
+    states = np.broadcast_to(batch.initial[:, None, None], (batch.initial.size, *rows))
+    return State(np.zeros(rows), np.zeros(rows), np.full(rows, np.log(1e-9)), states)
+
+
+def _clock(batch: Batch) -> Clock:
+    t = batch.times
+    position = t**batch.beta
+    middle = (0.5 * (position[1:] + position[:-1])) ** (1.0 / batch.beta)
+    length = np.diff(t, axis=0)
+    share = np.divide(middle - t[:-1], length, out=np.full(middle.shape, 0.5), where=length > 0)
+    weight = np.diff(position, axis=0) / batch.beta * np.maximum(middle, 1e-300) ** (1.0 - batch.beta)
+    return Clock(middle, share, np.log(np.maximum(weight, 1e-300)))
+
+
+def _stepped(batch: Batch, rates: Rates, clock: Clock, j: int, state: State) -> tuple[State, Floats]:
+    """The state at node j from that at the node before, and the local stress exponent on the way.
+
+    Unknown are ln of the strain increment and the states in the middle; each is found by secants of its own residual.
+    """
+    P, T = (v[j - 1] + clock.share[j - 1] * (v[j] - v[j - 1]) for v in (batch.pressure, batch.temperature))
+    log_weight = clock.log_weight[j - 1]
+    rest = 0.5 * (batch.elastic[j - 1] + batch.elastic[j]) + state.creep
+
+    def at(unknown: Floats, push: float = 1.0, strained: float = 1.0) -> tuple[Floats, Floats, Floats]:
+        """What the unknowns should be by what they are; growth mm per strain there, and ln of the rate.
+
+        push, strained : factors on stress and strain.
+        """
+        increment = np.exp(np.minimum(unknown[0], _LARGEST))
+        growth = _growth(batch, rest + 0.5 * _growth(batch, rest) * increment)
+        stress = np.exp(_placed(batch, rest + 0.5 * growth * increment).of(batch.tables.stress, batch.row))
+        stress = np.maximum(push * stress * P, _STRESS_FLOOR)
+        time = np.broadcast_to(clock.time[j - 1], stress.shape)
+        log_rate, state_rates = rates(Point(stress, strained * (state.strain + 0.5 * increment), time, T, unknown[1:]))
+        middle = state.states + 0.5 * np.exp(log_weight) * state_rates
+        return np.concatenate([(log_rate + log_weight)[None], middle]), growth, log_rate
+
+    x, last, (wanted, growth, log_rate) = _secants(
+        at, np.concatenate([(state.log_rate + log_weight)[None], state.states])
+    )
+    stress_exponent, strain_exponent = (
+        (at(last, *push)[2] - log_rate) / np.log(_PUSH) for push in ((_PUSH, 1.0), (1.0, _PUSH))
+    )
+    # strain that grows as stress^n strain^m is in proportion to stress^(n / (1 - m)) everywhere
+    exponent = stress_exponent / np.maximum(1.0 - strain_exponent, 0.2)
+    increment = np.exp(np.minimum(x[0], _LARGEST))
+    after = State(state.creep + growth * increment, state.strain + increment, log_rate, 2.0 * x[1:] - state.states)
+    return after, exponent
+
+
+Asked = Callable[[Floats], tuple[Floats, Floats, Floats]]
+
+
+def _secants(at: Asked, x: Floats) -> tuple[Floats, Floats, tuple[Floats, Floats, Floats]]:
+    """Solve at(x)[0] = x element by element: the solution, where it was asked last, and what was said there.
+
+    As many secants for every row, so that what a row gives does not depend on the rows beside it.
+    """
+    said = at(x)
+    residual, slope = said[0] - x, np.full(x.shape, -1.0)
+    for _ in range(_SECANTS):
+        step = -residual / slope
+        x = x + step
+        said = at(x)
+        change = said[0] - x - residual
+        slope = np.divide(change, step, out=np.full(x.shape, -1.0), where=np.abs(step) > 1e-9 * (1.0 + np.abs(x)))
+        slope = np.clip(slope, *_SLOPES)
+        residual = residual + change
+    return x - residual / slope, x, said
+
+
+def _growth(batch: Batch, deflection: Floats) -> Floats:
+    """kappa, mm."""
+    return np.exp(_placed(batch, deflection).of(batch.tables.growth, batch.row))
+
+
+def _placed(batch: Batch, deflection: Floats) -> Place:
+    return batch.grid.place(np.maximum(deflection, _REST))
+
+
+def _ended(batch: Batch, after: State, reached: Floats) -> tuple[Bools, Bools]:
+    """Which rows have lost their way (a rate that is no number), and which have burst."""
+    lost = ~(np.isfinite(reached) & np.isfinite(after.states).all(axis=0))
+    far = (reached > batch.deflection_limit) | (after.strain > batch.strain_limit)
+    return lost, ~lost & (far | (after.states >= batch.limits[:, None, None]).any(axis=0))
+
+
+def _moment(batch: Batch, j: int, before: Floats, reached: Floats, burst: Bools) -> Floats:
+    """When rows ended in the step to node j, s: where the deflection crossed its limit."""
+    grown = np.where(burst, reached - before, 1.0)
+    beyond = burst & (reached > batch.deflection_limit)
+    share = np.where(
+        beyond, (batch.deflection_limit - before) / np.where(beyond, grown, 1.0), np.where(burst, 1.0, 0.0)
+    )
+    start, end = batch.times[j - 1], batch.times[j]
+    return np.asarray(start + np.clip(share, 0.0, 1.0) * (end - start))
+
+
+def _observed(batch: Batch, amplitude: Floats, exponent: Floats) -> Floats:
+    """Amplitude, width and shape: of elastic and of creeping dimples in the proportion of their deflections."""
+    place, count = _placed(batch, amplitude), len(EXPONENTS)
+    inverse = 1.0 / np.array(EXPONENTS)
+    flexibility = np.clip(1.0 / np.clip(exponent, EXPONENTS[0], EXPONENTS[-1]), inverse[-1], inverse[0])
+    which = np.clip(np.searchsorted(-inverse, -flexibility, side="right") - 1, 0, count - 2)
+    share = ((inverse[which] - flexibility) / (inverse[which] - inverse[which + 1]))[..., None]
+    rows = batch.tables.shapes.reshape(-1, *batch.tables.shapes.shape[2:])
+    low, high = (place.of(rows, batch.row * count + which + k) for k in (0, 1))
+    creeping = low + share * (high - low)
+    elastic = place.of(batch.tables.elastic_shapes, np.broadcast_to(batch.row, amplitude.shape))
+    part = np.clip(batch.elastic / np.maximum(amplitude, _REST), 0.0, 1.0)[..., None]
+    return np.concatenate([amplitude[..., None], creeping + part * (elastic - creeping)], axis=-1)

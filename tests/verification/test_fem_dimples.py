@@ -1,0 +1,137 @@
+"""Bulging dimples against converged runs of another code: five of the true dimple, four of one with a flat floor."""
+
+from __future__ import annotations
+
+import json
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from fem_cases import BENCHMARKS, course, run
+
+from creepkit.fem.simulation import Course, Simulation
+from creepkit.language import CreepLaw
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
+from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
+from creepkit.laws.norton import NORTON
+from creepkit.laws.time_hardening import TIME_HARDENING
+from creepkit.records import PressureJump, Program, Status
+from creepkit.specimens.dimple import DimpleGeometry
+from creepkit.specimens.observation import Observation
+from creepkit.specimens.top_profile import interpolation
+
+TAPERED = DimpleGeometry()
+FILLET = DimpleGeometry(
+    apex_thickness=1, cavity_radius=5, roof_radial=1, roof_axial=1.5, plate_thickness=4, outer_radius=7.5,
+    clamped=("rim",),
+)  # fmt: skip
+END = 43200.0
+TRUE = json.loads((BENCHMARKS / "dimple_reference.json").read_text())["cases"]
+FLAT = json.loads((BENCHMARKS / "fe_reference.json").read_text())
+DRIFT = {"n0": "n_0", "ninf": "n_inf", "C": "C", "td": "tau_d", "tr": "tau_r"}
+ACCURATE = {"tolerance": 1e-3, "newton": 1e-6}
+
+
+class Case(NamedTuple):
+    """A law, its values and the course of a test."""
+
+    law: CreepLaw
+    values: dict[str, float]
+    course: Course
+
+
+def true_case(name: str) -> Case:
+    """A case of dimple_reference.json: ramps of 5 s."""
+    case, law = TRUE[name], dict(TRUE[name]["law"])
+    kind = law.pop("type")
+    if kind == "nt":
+        law = {"A": case["A_at_T"], "m": 0.0, **{ours: law[theirs] for theirs, ours in DRIFT.items()}}
+    laws = {"norton": NORTON, "time": TIME_HARDENING, "sinh": HYPERBOLIC_SINE, "nt": DRIFTING_EXPONENT}
+    pressure = PressureJump(case["P1"], case["P2"], case["Tj"] or 0.5 * END).program()
+    return Case(laws[kind], law, course(pressure, END, case["E"]))
+
+
+def flat_case(name: str) -> Case:
+    """A case of fe_reference.json, spelled out from its `spec`: pressure at once, and its jump at once at 4 h."""
+    combined = {"A_1": 1e-8, "n_1": 3, "B": 60, "A_2": 1e-13, "n_2": 4, "m_1": -0.3, "A_3": 1e-11, "n_3": 3, "m_2": -0.4}
+    jump = Program.steps([(0.0, 8.0), (14400.0, 10.0)])
+    return {
+        "c1": Case(NORTON, {"A": 1e-13, "n": 4.3}, course(8.0, END, 150e3)),
+        "c2": Case(NORTON, {"A": 6e-19, "n": 7}, course(jump, END, 100e3)),
+        "c3": Case(TIME_HARDENING, {"A": 1.2e-10, "n": 3.2, "m": -0.4}, course(6.0, END, 200e3)),
+        "c4": Case(COMBINED, combined, course(jump, END, 150e3)),
+    }[name]
+
+
+def simulated(geometry: DimpleGeometry, case: Case, refinement: float, **settings):
+    """Radii of the top nodes and the finished run."""
+    mesh = geometry.mesh(refinement)
+    made = run(mesh, case.course, case.law, case.values, **settings)
+    assert made.status == Status.COMPLETE
+    return mesh.nodes[mesh.top, 0], made.displacements[:, mesh.top, 1], made
+
+
+def observed(radii, profiles, made: Simulation, times) -> dict[str, np.ndarray]:
+    """Histories at `times` by the names of dimple_reference.json."""
+    points = made.at(profiles @ interpolation(radii, [0, 2, 4]).T, times)
+    fit = made.at(Observation().observe(radii, profiles), times)
+    return dict(zip(("apex", "u_r2", "u_r4", "D_amp", "S_d", "S_p"), [*points.T, *fit.T], strict=True))
+
+
+@pytest.mark.parametrize("name", TRUE)
+def test_true_dimple_on_the_mesh_for_production(name: str) -> None:
+    """Targets of the project: displacements within 0.2 % of the largest, width and shape within 0.4 %."""
+    case = TRUE[name]
+    found = observed(*simulated(TAPERED, true_case(name), 1.0), np.array(case["times_s"], float))
+    largest = max(case["apex"])
+    for key in ("apex", "u_r2", "u_r4", "D_amp"):
+        np.testing.assert_allclose(found[key], case[key], rtol=0, atol=2e-3 * largest, err_msg=key)
+    for key in ("S_d", "S_p"):
+        np.testing.assert_allclose(found[key], case[key], rtol=4e-3, err_msg=key)
+
+
+@pytest.mark.parametrize("name", TRUE)
+def test_true_dimple_converges(name: str) -> None:
+    """Twice as fine, with a tenth of the tolerance: displacements within 0.03 %, width and shape within 0.06 %.
+
+    The references estimate their own error at 0.02 %, in single values of N7 and SINH at 0.1 %.
+    """
+    case = TRUE[name]
+    found = observed(*simulated(TAPERED, true_case(name), 2.0, **ACCURATE), np.array(case["times_s"], float))
+    for key in ("apex", "u_r2", "u_r4", "D_amp"):
+        np.testing.assert_allclose(found[key], case[key], rtol=0, atol=3e-4 * max(case["apex"]), err_msg=key)
+    for key in ("S_d", "S_p"):
+        np.testing.assert_allclose(found[key], case[key], rtol=6e-4, err_msg=key)
+
+
+def flat_errors(name: str, refinement: float, **settings) -> tuple[float, float, float]:
+    """Errors of elastic apex (relative), apex history and final top profile, over the largest apex."""
+    case = FLAT["cases"][name]
+    radii, profiles, made = simulated(FILLET, flat_case(name), refinement, **settings)
+    history = made.at(profiles[:, 0], np.array(FLAT["times_s"])) - case["apex"]
+    wanted = {float(r): u for r, u in case["final_top_profile_uz"].items()}
+    profile = interpolation(radii, list(wanted)) @ profiles[-1] - list(wanted.values())
+    largest = max(case["apex"])
+    return profiles[1, 0] / case["u_elastic"] - 1, np.abs(history).max() / largest, np.abs(profile).max() / largest
+
+
+@pytest.mark.parametrize(("name", "refinement"), [("c1", 1.0), ("c2", 1.5), ("c3", 1.0), ("c4", 1.0)])
+def test_flat_dimple_within_two_per_mille(name: str, refinement: float) -> None:
+    """Targets of the project, on the mesh for production; n = 7 of c2 takes one of half as many elements again.
+
+    (It ends at -0.21 % on that for production.) The values at 4 h are those before the jump of c2 and c4.
+    """
+    elastic, history, profile = flat_errors(name, refinement)
+    assert abs(elastic) < 1e-3
+    assert history < 2e-3
+    assert profile < 2e-3
+
+
+@pytest.mark.parametrize("name", FLAT["cases"])
+def test_flat_dimple_converges(name: str) -> None:
+    """Twice as fine: within 0.1 %, as the references estimate themselves at 0.05 to 0.13 % (c2 0.25 % at 4 h)."""
+    elastic, history, profile = flat_errors(name, 2.0, **ACCURATE)
+    assert abs(elastic) < 1e-4
+    assert history < 1e-3
+    assert profile < 1e-3
