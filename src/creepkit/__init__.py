@@ -34,11 +34,14 @@ if TYPE_CHECKING:
     from creepkit.study import law as law
     from creepkit.study import laws as laws
     from creepkit.study import load as load
+    from creepkit.study import moduli as moduli
     from creepkit.study import rank as rank
     from creepkit.study import read_histories as read_histories
     from creepkit.study import simulate as simulate
     from creepkit.study import specimen as specimen
     from creepkit.study import specimens as specimens
+    from creepkit.study import suspects as suspects
+    from creepkit.study import with_suspects_marked as with_suspects_marked
 
     __version__: str
 
@@ -46,7 +49,8 @@ _HOMES = {
     "creepkit.kernels": "lower",
     "creepkit.language": "CreepLaw Elastic Param State activated arrhenius exponential inverse linear wachtman",
     "creepkit.records": "History Nuisance PressureJump Program StressSteps constant_stress",
-    "creepkit.study": "export identify law laws load rank read_histories simulate specimen specimens",
+    "creepkit.study": "export identify law laws load moduli rank read_histories simulate specimen specimens "
+    "suspects with_suspects_marked",
 }
 _PUBLIC = {name: home for home, names in _HOMES.items() for name in names.split()}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -18,8 +18,10 @@ from creepkit.specimens.run import Run, Runnable, run_of
 if TYPE_CHECKING:
     from creepkit.arrays import ArrayLike
     from creepkit.inverse.identification import Identification
+    from creepkit.inverse.moduli import Moduli
     from creepkit.inverse.selection import Ranking
     from creepkit.language import CreepLaw, Elastic
+    from creepkit.readers.suspects import Suspect
 
 ROOM_TEMPERATURE = 293.15
 """K; stands where a law does not ask for a temperature."""
@@ -60,6 +62,27 @@ def read_histories(paths: str | Path | Iterable[str | Path], reader: str | None 
 
     readers = [found.value for found in registry.default().readers().values()]
     return run(paths, readers, reader)
+
+
+def suspects(histories: Sequence[History], specimen: Predictor | str | None = None) -> tuple[Suspect, ...]:
+    """Return what looks wrong in histories: unloading, falling amplitudes, outliers, tests far from others.
+
+    specimen : what the first frames are compared with, which should show its elastic deflection; None believes them.
+    """
+    from creepkit.readers.suspects import suspects as run
+
+    return run(_histories(histories), None if specimen is None else _predictor(specimen))
+
+
+def with_suspects_marked(histories: Sequence[History], kinds: Collection[str] | None = None) -> list[History]:
+    """Return the histories with suspect frames unused and a label that says which; whole tests stay.
+
+    kinds : of "unloading", "falling" and "outlier"; all of them by default.
+    """
+    from creepkit.readers.suspects import OF_FRAMES
+    from creepkit.readers.suspects import with_suspects_marked as run
+
+    return run(_histories(histories), OF_FRAMES if kinds is None else kinds)
 
 
 # ---- models --------------------------------------------------------------------------------------------------------
@@ -146,6 +169,23 @@ def identify(
         settings = replace(settings, nuisances=tuple(nuisances))
     chosen = _specimens_of(histories) if using is None else _predictors(using)
     return run(_law(law), histories, chosen, settings=settings, progress=progress)
+
+
+def moduli(
+    law: CreepLaw | str, histories: Sequence[History], using: Predictor | str | None = None, *, frames: int = 15
+) -> Moduli:
+    """Identify each bulge test's Young's modulus from its first frames, and Wachtman's form through them.
+
+    law : what creeps meanwhile, with its temperature; frames : used frames looked at, the paper's 15 by default.
+    `[h.replace(elastic=found.elastic) for h in histories]` then fixes the moduli.
+    """
+    from creepkit.inverse.moduli import identify_moduli as run
+
+    histories = _histories(histories)
+    chosen = _predictors(using) if using is not None else _specimens_of(histories)
+    if isinstance(chosen, Mapping):
+        raise FitError("moduli are identified from tests of one specimen; give those alone, and using= that one")
+    return run(_law(law), histories, chosen, frames=frames)
 
 
 def rank(fits: Sequence[Identification]) -> Ranking:

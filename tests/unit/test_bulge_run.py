@@ -93,8 +93,8 @@ def test_a_run_says_what_prediction_says(run: BulgeRun) -> None:
 def test_stresses_are_those_of_figure_2c_of_the_paper() -> None:
     """8 MPa, then 10 MPa: from 40 to 160 MPa at .5, 2 and 4 h (Chen et al., Fig. 2c, whose caption has these values).
 
-    160 MPa is the largest, at .5 h, before any jump. Where the roof merges with the rim some points carry less than
-    40; the figure's colours do not tell how few, so one in twenty is let go.
+    160 MPa is the largest, at .5 h, before any jump. Where bending changes its sign some points carry less than 40; the
+    figure's colours do not tell how few, so one in twenty is let go.
     """
     law = {"A": 7.4e-17, "C": 2.7, "n_0": 4.9, "n_inf": 4.3, "tau_d": 13823.6, "tau_r": 8090.4, "m": 0.0}
     jump, times = ck.PressureJump(8, 10, 7200), [1800.0, 7200.0, 14400.0]
@@ -104,7 +104,6 @@ def test_stresses_are_those_of_figure_2c_of_the_paper() -> None:
     assert high.argmax() == 0
     places, values = run.field("stress")
     assert (np.quantile(values[:, places[:, 0] <= 7.5], 0.05, axis=1) > 40).all()
-    assert (run.mises_range(within=6.0).low > 40).all()
 
 
 def test_the_range_is_of_points_within_a_radius(run: BulgeRun) -> None:

@@ -45,12 +45,13 @@ def errors(g: DimpleGeometry, refinement: float) -> np.ndarray:
 
 def test_the_production_meshes():
     tapered, fillet = TAPERED.mesh(), FILLET.mesh()
-    assert [len(m.elements) for m in (tapered, fillet)] == [48, 80]
-    assert [half_bandwidth(m.elements) for m in (tapered, fillet)] == [33, 33]
-    assert tapered.nodes.size == 354
-    np.testing.assert_allclose(tapered.nodes[:9:2, 1], 3.5 + 0.5 * np.array([0, 0.3, 0.5, 0.7, 1]), rtol=1e-14)
-    np.testing.assert_allclose(fillet.nodes[:9:2, 1], [3, 3.25, 3.5, 3.75, 4], rtol=1e-14)
-    np.testing.assert_allclose(fillet.nodes[fillet.pressed[:10, 2], 0], 0.4 * np.arange(1, 11), rtol=1e-13)
+    assert [len(m.elements) for m in (tapered, fillet)] == [50, 75]
+    assert [half_bandwidth(m.elements) for m in (tapered, fillet)] == [39, 39]
+    assert tapered.nodes.size == 362
+    layers = np.array([0, 0.16, 0.38, 0.57, 0.68, 1])
+    np.testing.assert_allclose(tapered.nodes[:11:2, 1], 3.5 + 0.5 * layers, rtol=1e-14)
+    np.testing.assert_allclose(fillet.nodes[:11:2, 1], [3, 3.17, 3.4, 3.6, 3.83, 4], rtol=1e-14)
+    np.testing.assert_allclose(fillet.nodes[fillet.pressed[:8, 2], 0], 0.5 * np.arange(1, 9), rtol=1e-13)
     assert quality(tapered).sine.min() > 0.6
     assert quality(fillet).sine.min() > 0.7
 
@@ -60,8 +61,8 @@ def test_twice_the_refinement_is_twice_the_elements_each_way():
         coarse, fine = g.mesh(), g.mesh(2)
         assert len(fine.elements) == 4 * len(coarse.elements)
         assert len(fine.top) - 1 == 2 * (len(coarse.top) - 1)
-    assert len(TAPERED.mesh(1.5).elements) == (15 + 3) * 6
-    assert len(TAPERED.mesh(0.5).elements) == (5 + 1) * 2
+    assert len(TAPERED.mesh(1.5).elements) == (12 + 3) * 8
+    assert len(TAPERED.mesh(0.5).elements) == (4 + 1) * 2
 
 
 @pytest.mark.parametrize("g", FAMILY, ids=range(len(FAMILY)))
@@ -110,13 +111,13 @@ def test_what_is_clamped_is_held_and_nothing_else(g, clamped):
         where |= r == g.outer_radius
     np.testing.assert_array_equal(mesh.held[:, 1], where)
     np.testing.assert_array_equal(mesh.held[:, 0], where | (r == 0))
-    assert (r == 0).sum() == 9
+    assert (r == 0).sum() == 11
 
 
 def test_the_outline_is_the_cavity_the_top_the_rim_the_ground_and_the_axis():
     for g in FAMILY:
         mesh = g.mesh()
-        columns, layers = len(mesh.pressed), 4
+        columns, layers = len(mesh.pressed), 5
         assert len(outline(mesh.elements)) == 2 * (columns + layers)
 
 
@@ -168,7 +169,7 @@ def test_velocities_move_the_boundary_as_the_length_says():
     mesh = TAPERED.mesh()
     thicker = TAPERED.mesh_velocity("apex_thickness")
     np.testing.assert_allclose(thicker[mesh.top, 1], 0, atol=1e-15)
-    roof = mesh.pressed[:10].ravel()
+    roof = mesh.pressed[:8].ravel()
     np.testing.assert_allclose(thicker[roof], np.tile([0.0, -1.0], (roof.size, 1)), atol=1e-14)
     wider = TAPERED.mesh_velocity("outer_radius")
     np.testing.assert_allclose(wider[mesh.nodes[:, 0] == 10.0], [[1.0, 0.0]] * 5, atol=1e-14)

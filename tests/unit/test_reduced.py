@@ -182,7 +182,9 @@ def random_case(law, own, rng):
     return values, test
 
 
-@pytest.mark.parametrize(("kind", "median", "at_end"), [("single", 0.05, 0.03), ("sinh", 0.10, 0.04), ("drifting", 0.06, 0.03)])
+@pytest.mark.parametrize(
+    ("kind", "median", "at_end"), [("single", 0.05, 0.03), ("sinh", 0.10, 0.04), ("drifting", 0.06, 0.03)]
+)
 def test_a_few_per_cent_off_the_finite_elements(kind, median, at_end):
     """Medians of the relative error of D reported for such tables: .038 (.014 at 12 h), .085 (.024), .043 (.019)."""
     rng, errors, shapes = np.random.default_rng(11), [], []
@@ -244,18 +246,33 @@ def test_a_modulus_that_depends_on_temperature():
     falling = Elastic(1.5e5 - 50.0 * symbols.temperature)
     same = REDUCED.predict(NORTON, SLOW, [JUMP.replace(elastic=falling)]).of(0)
     np.testing.assert_allclose(same, REDUCED.predict(NORTON, SLOW, [JUMP]).of(0), rtol=1e-12)
-    softer = REDUCED.predict(NORTON, SLOW, [JUMP.replace(elastic=falling)], effects={"temperature": np.array([[100.0]])})
-    np.testing.assert_allclose(softer.of(0), REDUCED.predict(NORTON, SLOW, [JUMP.replace(elastic=Elastic(9.5e4))]).of(0))
+    softer = REDUCED.predict(
+        NORTON, SLOW, [JUMP.replace(elastic=falling)], effects={"temperature": np.array([[100.0]])}
+    )
+    np.testing.assert_allclose(
+        softer.of(0), REDUCED.predict(NORTON, SLOW, [JUMP.replace(elastic=Elastic(9.5e4))]).of(0)
+    )
 
 
 def test_what_it_says_is_smooth():
     """Central differences of two sizes agree: nothing switches on the way."""
+
     def slope(step):
         A = SLOW["A"] * np.exp(np.array([step, -step]))
         up, down = REDUCED.predict(NORTON, {"A": A, "n": SLOW["n"]}, [JUMP]).values[:, 0]
         return (up - down)[1:, 0] / (2 * step)
 
     np.testing.assert_allclose(slope(1e-4), slope(1e-3), rtol=5e-3)
+
+
+def test_a_jump_to_the_same_pressure_changes_nothing():
+    """Its ramp is a segment of its own, in which nothing happens: 12 h at 8 MPa either way, but for the 5 s ramp."""
+    times = np.linspace(150, 12 * HOURS, 100)
+    held_on = Program(np.array([0.0, 5.0]), np.array([0.0, 8.0]))
+    plain = history(times, RecordedLoading(held_on, "pressure"), elastic=Elastic(1e5))
+    split = plain.replace(loading=PressureJump(8.0, 8.0, 20000.0))
+    one, two = (REDUCED.predict(NORTON, SLOW, [test]).of(0) for test in (plain, split))
+    np.testing.assert_allclose(one, two, rtol=1e-3)
 
 
 def test_bursts_end_rows():

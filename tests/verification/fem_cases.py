@@ -10,8 +10,8 @@ import numpy as np
 
 from creepkit import kernels
 from creepkit.fem.body import body_of
-from creepkit.fem.record import Settings
 from creepkit.fem.mesh import Mesh
+from creepkit.fem.record import Settings
 from creepkit.fem.shape import discretize
 from creepkit.fem.simulation import Course, Simulation, simulate
 from creepkit.fem.strip import Strip, strip

@@ -12,6 +12,9 @@ from creepkit.fem.mesh import Mesh
 from creepkit.fem.strip import Strip
 from creepkit.records import Program
 
+if not BENCHMARKS.is_dir():
+    pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)
+
 RADIUS, E, NU = 100.0, 2e5, 0.3
 TABLE = json.loads((BENCHMARKS / "closed_form_references.json").read_text())["thin_circular_plate_norton"]["table"]
 CALCULIX = json.loads((BENCHMARKS / "plate_ccx_checks.json").read_text())
@@ -32,7 +35,8 @@ def graded(columns: int, last: float) -> np.ndarray:
     for _ in range(100):
         ratio = 0.5 * (least + most)
         least, most = (least, ratio) if last * (ratio**columns - 1) > RADIUS * (ratio - 1) else (ratio, most)
-    return RADIUS * np.concatenate([[0.0], np.cumsum(ratio ** -np.arange(columns))]) / np.sum(ratio ** -np.arange(columns))
+    radii = np.concatenate([[0.0], np.cumsum(ratio ** -np.arange(columns, dtype=float))])
+    return RADIUS * radii / radii[-1]
 
 
 def elastic_deflection(pressure: float, thickness: float, support: str) -> float:
@@ -43,8 +47,8 @@ def elastic_deflection(pressure: float, thickness: float, support: str) -> float
 @pytest.mark.parametrize("thickness", [1.0, 2.0])
 @pytest.mark.parametrize("support", SUPPORT)
 def test_small_deflection(support: str, thickness: float) -> None:
-    """Within 1.5e-3 of the thin plate: shear adds 4.6 (h/a)^2 = 4.6e-4 to the clamped one (Reissner), 1.8e-3 if twice as
-    thick, less what an edge does that is clamped over its height.
+    """Within 1.5e-3 of the thin plate: shear adds 4.6 (h/a)^2 to the clamped one (Reissner), 4.6e-4 and 1.8e-3, and an
+    edge that is clamped over its height takes as much off.
     """
     body, mesh = plate(thickness, 4, support == "clamped", graded(24, 0.1 * thickness))
     made = run(mesh, course(1e-6, 1.0, E), newton=1e-9)

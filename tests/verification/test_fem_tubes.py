@@ -12,19 +12,22 @@ import pytest
 from fem_cases import (
     BENCHMARKS,
     block,
+    coaxial_stresses,
     course,
     left_of,
     mesh_of,
     right_of,
     run,
     shell,
-    coaxial_stresses,
     steady_velocity,
 )
 
 from creepkit.fem.mesh import Mesh
 from creepkit.laws.norton import NORTON
 from creepkit.records import Program
+
+if not BENCHMARKS.is_dir():
+    pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)
 
 CLOSED_FORMS = json.loads((BENCHMARKS / "closed_form_references.json").read_text())
 TUBES = {case["name"]: case for case in CLOSED_FORMS["thick_cylinder_plane_strain_norton"]["cases"]}
@@ -33,7 +36,7 @@ CALCULIX = json.loads((BENCHMARKS / "thick_cylinder_ccx_check.json").read_text()
 
 
 def tube(inner: float, outer: float, columns: int) -> Mesh:
-    """A slice of a tube in plane strain, pressed from inside; the inner and the outer corner are the first and last node."""
+    """A slice of a tube in plane strain, pressed from inside; its first node lies inside, its last one outside."""
     body = block(np.linspace(inner, outer, columns + 1), [0.0, (outer - inner) / 4])
     return mesh_of(body, z=np.arange(len(body.nodes)), pressed=left_of(body))
 
@@ -114,7 +117,7 @@ def maxwell():
 
 def test_maxwell_tube(maxwell) -> None:
     """u(r, t) of closed_form_references.json after 0.1, 0.5 and 0.9 s. Steps and strains of 4e-7 leave 2e-5."""
-    mesh, made = maxwell
+    _, made = maxwell
     for node, r in ((0, 1), (-1, 2)):
         rows = [row for row in CLOSED_FORMS["maxwell_thick_cylinder_transient"]["case"]["rows"] if row["r"] == r]
         found = made.at(made.displacements[:, node, 0], np.array([row["t"] for row in rows[1:]])) / SMALL
@@ -136,7 +139,7 @@ def test_maxwell_tube_against_code_aster(maxwell) -> None:
 def test_a_bar_drawn_and_then_held() -> None:
     """code_aster ssna107a: rate = sigma^2, E = 1, drawn by 0.25 a second to t = 2, then held: 0.21616 at t = 4.
 
-    Its law is not stated beside its numbers; this one is the only reading of "N = 2, K = 1" that gives the axial stress:
+    Its law is not stated beside its numbers; this reading of "N = 2, K = 1" gives the axial stress to all its digits:
     sigma = sqrt(v) tanh(sqrt(v) t), then 1/(1/sigma + t). The radial displacement -0.2109 it gives at r = 2 is no
     multiple of what follows from a uniform state, -0.25 + 0.2 sigma = -0.2068 of the radius, and is left out.
     Strains are scaled by 1e-6, as small strains would have it: A becomes 1e6 and the stress 1e-6 of theirs.

@@ -163,12 +163,12 @@ def test_demo_finds_the_law_of_a_virtual_bulge_test(tmp_path):
 
 
 def test_the_virtual_bulge_test_is_what_its_script_makes(tmp_path):
-    """Its numbers are rounded to a micrometre and to 1e-4; another platform may round one the other way."""
+    """To a third of its noise: the solver may change within its tolerance."""
     script = Path(__file__).parents[2] / "examples" / "00_make_a_virtual_bulge_test.py"
     runpy.run_path(str(script))["main"](tmp_path)
     (made,), (shipped,) = (ck.read_histories(folder / "virtual_bulge_test.csv") for folder in (tmp_path, PLANTED_BULGE))
-    for name, digit in (("amplitude", 1e-6), ("width", 1e-4), ("shape", 1e-4)):
-        assert made.outputs[name] == pytest.approx(shipped.outputs[name], abs=2 * digit)
+    for name, noise in (("amplitude", 1.5e-3), ("width", 0.02), ("shape", 0.02)):
+        assert made.outputs[name] == pytest.approx(shipped.outputs[name], abs=noise / 3)
     assert (tmp_path / "truth.json").read_text() == (PLANTED_BULGE / "truth.json").read_text()
 
 

@@ -21,7 +21,7 @@ PLANTED = Path(__file__).parent / "planted"
 PLANTED_BULGE = Path(__file__).parent / "planted_bulge"
 """A bulge test of one dimple, and the truth behind it."""
 LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
-BULGE_LAWS = ("norton", "strain-hardening")
+BULGE_LAWS = ("norton", "strain-hardening", "time-hardening")
 
 
 def command(
@@ -72,9 +72,10 @@ def _of_a_dimple(histories: list[History]) -> Ranking:
     from creepkit.records import Nuisance
 
     (test,) = histories
+    levels = dict.fromkeys(f"{value:g}" for value in test.loading.program().values if value > 0)
     typer.echo(
         "a bulge test made by this package, with the noise of cameras, from a law that is now forgotten:\n"
-        f"  {test.condition}, {test.times.size} frames to {test.times[-1] / 3600:.0f} h, top raised by "
+        f"  {' then '.join(levels)} MPa, {test.times.size} frames to {test.times[-1] / 3600:.0f} h, top raised by "
         f"{test.outputs['amplitude'][-1]:.2f} mm; every candidate is simulated by finite elements"
     )
     laws = [study.law(name) for name in BULGE_LAWS]

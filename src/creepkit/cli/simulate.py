@@ -191,8 +191,11 @@ def _numbers(texts: Sequence[str], option: str, example: str) -> dict[str, float
     values: dict[str, float] = {}
     for text in texts:
         name, _, number = text.partition("=")
+        name = name.strip()
+        if name in values:
+            raise SolveError(f"{option} {text}: {name} is given twice; keep one of them")
         try:
-            values[name.strip()] = float(number)
+            values[name] = float(number)
         except ValueError:
             raise SolveError(f"{option} {text}: write NAME=NUMBER, such as {example}") from None
     return values

@@ -122,6 +122,8 @@ def creep_safely(
     tolerance: float,
 ) -> tuple[float, int]:
     """Creep increment D of point `k` and a flag, from any guess and for any law; base : (points, 3 + 1 + S)."""
+    if not guess > 0.0:  # the point was at rest; a logarithm of nothing lies too far from any answer
+        guess = 1e-6 * problem.trial / problem.stiffness
     return solve(update, theta, axes, problem, base[k, EQUIVALENT + 1 :], row, out, guess, tolerance)
 
 

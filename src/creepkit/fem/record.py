@@ -126,6 +126,8 @@ def keep(record: Record, ended: Ended, time: float, n: int, u: Floats, points: P
     row = ended.records
     record.times[row], record.segments[row] = time, n
     copy(u, record.displacements[row])
+    if record.stages.shape[0] > 0 and record.places[row, 1] == 0.0:
+        copy(u, record.stages[row, 0])
     copy(points.mises, record.mises[row])
     if record.values.shape[0] > 0:
         for k in range(points.value.shape[0]):

@@ -50,57 +50,26 @@ def differentiate(
 ) -> int:
     """Fill `surface` (records, top, C), changes of u_z of the observed nodes, and `times` (records, D), s.
 
-    record : of a march that kept its stages; count : its rows. The first row is the body at rest.
+    record : of a march that kept its stages; count : its rows. The first row is the body at rest; a row whose step has
+    no length is a sudden change of load, with one stage.
     """
     _start(room, initial)
     for row in range(1, count):
         n = record.segments[row]
         segment, s, h = segments[n], record.places[row, 0], record.places[row, 1]
-        if h == 0.0:
-            set_inputs(segments, columns.directions, n, beta, 0.0, True, room.inputs)
-            stage = stage_at(segment, poisson, segment[START], 0.0)
-            if not _stage(
-                sensitivity,
-                theta,
-                stage,
-                body,
-                columns,
-                tableau,
-                record,
-                row,
-                0,
-                0.0,
-                point,
-                room,
-                record.displacements[row],
-            ):
+        sudden = h == 0.0
+        for i in range(1 if sudden else tableau.c.size):
+            at, time, weight = s + tableau.c[i] * h, segment[START], 0.0
+            if not sudden:
+                now = moment(clock_of(segment, beta), at)
+                time, weight = now.time, tableau.a[i, i] * h * exp(now.log_pace)
+            stage = stage_at(segment, poisson, time, weight)
+            set_inputs(segments, columns.directions, n, beta, at, sudden, room.inputs)
+            if not _stage(sensitivity, theta, stage, body, columns, tableau, record, row, i, h, point, room):
                 return SINGULAR
-            _write_times(columns.directions, n, START, times[row])
-        else:
-            for i in range(tableau.c.size):
-                place_now = s + tableau.c[i] * h
-                now = moment(clock_of(segment, beta), place_now)
-                weight = tableau.a[i, i] * h * exp(now.log_pace)
-                stage = stage_at(segment, poisson, now.time, weight)
-                set_inputs(segments, columns.directions, n, beta, place_now, False, room.inputs)
-                if not _stage(
-                    sensitivity,
-                    theta,
-                    stage,
-                    body,
-                    columns,
-                    tableau,
-                    record,
-                    row,
-                    i,
-                    h,
-                    point,
-                    room,
-                    record.stages[row, i],
-                ):
-                    return SINGULAR
-            for d in range(times.shape[1]):
-                times[row, d] = room.inputs[BY_MOMENT, d]
+        for d in range(times.shape[1]):
+            times[row, d] = room.inputs[BY_MOMENT, d]
+        if not sudden:
             _advance(record, row, tableau, h, room)
         for k in range(body.top.size):
             equation = body.equations[2 * body.top[k] + 1]
@@ -119,12 +88,6 @@ def _start(room: ChangeRoom, initial: Floats) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _write_times(directions: Floats, n: int, column: int, times: Floats) -> None:
-    for d in range(directions.shape[0]):
-        times[d] = directions[d, n, column]
-
-
-@njit(cache=True, error_model="numpy")
 def _advance(record: Record, row: int, tableau: Tableau, h: float, room: ChangeRoom) -> None:
     """Move history and its changes to the end of the step."""
     last = tableau.c.size - 1
@@ -138,7 +101,7 @@ def _advance(record: Record, row: int, tableau: Tableau, h: float, room: ChangeR
                     change[k, v, c] += factor * rates[i, k, v, c]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _stage(
     sensitivity: Any,
     theta: Floats,
@@ -152,10 +115,9 @@ def _stage(
     h: float,
     point: PointRoom,
     room: ChangeRoom,
-    displacement: Floats,
 ) -> bool:
     """Changes of the displacements (left in room.right) and of the slopes of stage `i`; False when singular."""
-    share = tableau.a[i, i] * h
+    share, displacement = tableau.a[i, i] * h, record.stages[row, i]
     clear_rows(room.rows)
     clear_rows(room.right)
     assemble_changes(

@@ -1,7 +1,7 @@
 """Timeline: values between the accepted steps of a march, by splines in a variable in which they are smooth.
 
-Each segment of the load program has its own spline, in x = ln(1 + (y/20 s)^beta): creep after a change of load decays
-over decades of the time y since then (beta = 1); creep of a virgin body begins as a power beta of the time y since zero.
+Each segment of the load program has its own spline, in x = ln(1 + (y/20 s)^beta). After a change of load creep decays
+over decades of the time y since then: beta = 1. In a virgin body it begins as a power beta of the time y since zero.
 Splines of sparse steps fail before the steps do, so the steps of a march may at most double the time elapsed since the
 segment began.
 """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,8 @@ LEAST = 12
 """Frames under one load below which nothing is said of noise."""
 SAME_LOAD, SAME_TEMPERATURE = 0.01, 2.0
 """Relative change of the load, and K, that begin a new part of a test."""
+OTHER_WAY = 0.3
+"""Of a frame's miss: how far its neighbours must miss the other way if it is to be off alone."""
 _DECIMALS = 0.5
 """Of the smallest step between values: noise cannot be seen below."""
 _MOST = 0.05
@@ -40,7 +43,10 @@ class Finding(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Frames under one load and temperature; raised : whether the load is at least what it was before; first : of the test."""
+    """Frames under one load and temperature.
+
+    load : MPa. raised : whether it is at least what it was before. first : whether the part is the test's first.
+    """
 
     frames: Ints
     load: float
@@ -100,14 +106,13 @@ def falling(history: History) -> Iterator[Finding]:
         top = int(np.argmax(smooth))
         fall = float(smooth[top] - smooth[top:].min())
         if fall > max(FALL_NOISE * noise(t, y), FALL * float(np.abs(smooth).max())):
-            start = top if part.first else 0
             lowest = top + int(np.argmin(smooth[top:]))
-            how = "is held" if part.first else "was raised"
+            kept = f"{history.loading.quantity} {'is held at' if part.first else 'was raised to'} {part.load:g} MPa"
             reason = (
-                f"falls by {_amount(history, fall)} from {t[top]:g} s to {t[lowest]:g} s, {fall / noise(t, y):.0f} times "
-                f"the noise, though the {history.loading.quantity} {how} at {part.load:g} MPa"
-            ).replace("was raised at", "was raised to")
-            yield Finding(tuple(map(int, part.frames[start:])), reason)
+                f"falls by {_amount(history, fall)} from {t[top]:g} s to {t[lowest]:g} s, "
+                f"{fall / noise(t, y):.0f} times the noise, though the {kept}"
+            )
+            yield Finding(tuple(map(int, part.frames[top if part.first else 0 :])), reason)
 
 
 def outliers(history: History) -> Iterator[Finding]:
@@ -118,12 +123,12 @@ def outliers(history: History) -> Iterator[Finding]:
         for _ in range(int(_MOST * part.frames.size) + 1):
             if kept.size < LEAST:
                 break
-            misses = _misses(history.times[kept], values[kept])
-            ratio = np.abs(misses) / np.maximum(_rough(misses), sigma)
+            misses, reach = _misses(history.times[kept], values[kept])
+            ratio = np.where(_alone(misses), np.abs(misses) / np.maximum(_rough(misses), sigma), 0.0)
             worst = int(np.argmax(ratio))
             if not ratio[worst] > JUMP * (1 + FEW / kept.size):
                 break
-            off = _amount(history, float(misses[worst]))
+            off = _amount(history, float(misses[worst] * reach[worst]))
             frame = int(kept[worst + 2])
             reason = f"at {history.times[frame]:g} s off its neighbours by {off}, {ratio[worst]:.0f} times the noise"
             yield Finding((frame,), reason)
@@ -140,7 +145,7 @@ def parts_of(history: History) -> list[Part]:
     new = (np.abs(np.diff(load)) > SAME_LOAD * load.max()) | (np.abs(np.diff(warm)) > SAME_TEMPERATURE)
     edges = np.flatnonzero(np.concatenate([[True], new, [True]]))
     parts = []
-    for first, after in zip(edges[:-1], edges[1:], strict=True):
+    for first, after in pairwise(edges):
         raised = bool(first == 0 or load[first] >= load[first - 1])
         parts.append(Part(frames[first:after], float(load[first]), raised, bool(first == 0)))
     return parts
@@ -148,22 +153,22 @@ def parts_of(history: History) -> list[Part]:
 
 def noise(times: Floats, values: Floats) -> float:
     """Standard deviation of white noise, robust, from what frames miss the cubic through their neighbours by."""
-    misses = _misses(times, values)
+    misses, _ = _misses(times, values)
     steps = np.abs(np.diff(values))
     least = _DECIMALS * float(steps[steps > 0].min(initial=np.inf)) if (steps > 0).any() else 1e-12
     return max(float(1.4826 * np.median(np.abs(misses))), min(least, float(np.ptp(values)) or least))
 
 
-def _misses(times: Floats, values: Floats) -> Floats:
-    """What each frame but the outer two misses the cubic of its neighbours by, over what unit noise would make it.
+def _misses(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """What each frame but the outer two misses the cubic of its neighbours by, over what unit noise makes it, and that.
 
     The cubic is one in time or in its logarithm, whichever misses less: some tests are read evenly, some over decades.
     """
     found = [_missed(x, values) for x in (times, np.log(times))]
-    return min(found, key=lambda misses: float(np.median(np.abs(misses))))
+    return min(found, key=lambda pair: float(np.median(np.abs(pair[0]))))
 
 
-def _missed(x: Floats, y: Floats) -> Floats:
+def _missed(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     around = np.stack([x[:-4], x[1:-3], x[3:-1], x[4:]])
     own, values = x[2:-2], np.stack([y[:-4], y[1:-3], y[3:-1], y[4:]])
     weights = np.ones_like(around)
@@ -171,7 +176,8 @@ def _missed(x: Floats, y: Floats) -> Floats:
         for b in range(4):
             if a != b:
                 weights[a] *= (own - around[b]) / (around[a] - around[b])
-    return np.asarray((y[2:-2] - (weights * values).sum(axis=0)) / np.sqrt(1.0 + (weights**2).sum(axis=0)))
+    reach = np.sqrt(1.0 + (weights**2).sum(axis=0))
+    return np.asarray((y[2:-2] - (weights * values).sum(axis=0)) / reach), reach
 
 
 def _rough(misses: Floats) -> Floats:
@@ -181,6 +187,16 @@ def _rough(misses: Floats) -> Floats:
         near = np.concatenate([size[max(k - 7, 0) : max(k - 2, 0)], size[k + 3 : k + 8]])
         out[k] = 1.4826 * float(np.median(near)) if near.size else 0.0
     return out
+
+
+def _alone(misses: Floats) -> Bools:
+    """Where a single frame is off: its neighbours then miss the other way, by 2/3 of it when evenly spaced.
+
+    Where a curve bends too sharply for cubics they miss the same way.
+    """
+    others = -np.sign(misses)[:, None] * np.stack([np.roll(misses, 1), np.roll(misses, -1)], axis=1)
+    others[0, 0] = others[-1, 1] = np.inf
+    return np.asarray((others > OTHER_WAY * np.abs(misses)[:, None]).all(axis=1))
 
 
 def _running_median(values: Floats, width: int = 5) -> Floats:

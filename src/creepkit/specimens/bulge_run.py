@@ -82,8 +82,8 @@ class BulgeRun(Run):
     def mises_range(self, times: ArrayLike | None = None, within: float | None = None) -> Range:
         """Least and greatest von Mises stress of the integration points at radii up to `within` mm.
 
-        By default the whole roof, up to the radius of the cavity. The least lies where it merges with the rim, which
-        carries next to nothing; within 0.8 of that radius it is several times larger.
+        By default the whole roof, up to the radius of the cavity. The least of these hangs on the mesh: it is that of
+        the point nearest to where bending changes its sign.
         """
         reach = self.made.geometry.cavity_radius if within is None else float(within)
         chosen = self.places[:, 0] <= reach

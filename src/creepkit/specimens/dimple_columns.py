@@ -29,6 +29,10 @@ LAYERS = len(PLATE) - 1
 SHIFT = 1 / 3
 """How much denser the columns of a tapered roof are at its middle, where it bulges most."""
 
+STEEPEST = 1.5
+"""Largest power of the fan over the columns it runs through: the middle node of the last side along the top then lies
+at .32 of it, and at .25 the element would fold."""
+
 LATER = 1.35
 """How much later the top of a tapered dimple fans out, for its roof bulges where the columns stand upright."""
 
@@ -83,12 +87,14 @@ def layout_of(size: Dimensions, refinement: float) -> Layout:
     columns, fine = _columns(size, 1.0), _columns(size, refinement)
     coarse = Layout(*columns, 1, SHIFT * taper, 1.0, _breaks(taper, 1.0))
     corner = _corner(size, coarse)
+    turn = _same_place(corner, columns, fine)
+    wanted = _power(size, coarse, corner) * (1.0 + LATER * taper)
     return coarse._replace(
         floor=fine[0],
         roof=fine[1],
         wall=fine[2],
-        corner=_same_place(corner, columns, fine),
-        power=_power(size, coarse, corner) * (1.0 + LATER * taper),
+        corner=turn,
+        power=min(wanted, max(1.2, STEEPEST * (min(turn, fine[0] + fine[1]) - fine[0]))),
         breaks=_breaks(taper, refinement),
     )
 

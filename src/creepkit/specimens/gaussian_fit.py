@@ -6,7 +6,7 @@ same matrix gives the derivatives to the data by the implicit function theorem.
 
 from __future__ import annotations
 
-from math import exp, isfinite, log
+from math import exp, isfinite, log, nan
 
 import numpy as np
 from numba import njit
@@ -47,22 +47,31 @@ def fit_frames(grid: Grid, samples: Floats, fits: Floats, states: Ints, pulls: F
     pulls : (frames, 3, radii) becomes the derivatives of `fits` to `samples`; with a length of zero they are left out.
     """
     normal = Normal(np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(1))
-    x, last = np.zeros(3), np.full(2, np.nan)
+    x, last, y = np.zeros(3), np.zeros(3), np.zeros(samples.shape[1])
+    last[1] = nan
     for k in range(samples.shape[0]):
-        fits[k] = np.nan
+        fits[k, 0], fits[k, 1], fits[k, 2] = nan, nan, nan
         states[k], scale = _state_and_scale(samples[k])
         if states[k] != FITTED:
             continue
-        y = samples[k] / scale
+        for i in range(y.size):
+            y[i] = samples[k, i] / scale
         if not _fit(grid, y, last, x, normal):
             states[k] = FAILED
             continue
-        last[:] = x[1:]
+        _copy(x, last)
         fits[k, 0], fits[k, 1], fits[k, 2] = scale * x[0], exp(x[1]), exp(x[2])
         if pulls.shape[0] > 0:
             derivatives_to_profile(grid, x, normal, pulls[k])
-            pulls[k, 1] *= fits[k, 1] / scale
-            pulls[k, 2] *= fits[k, 2] / scale
+            for i in range(y.size):
+                pulls[k, 1, i] *= fits[k, 1] / scale
+                pulls[k, 2, i] *= fits[k, 2] / scale
+
+
+@njit(cache=True, error_model="numpy")
+def _copy(source: Floats, target: Floats) -> None:
+    for v in range(source.size):
+        target[v] = source[v]
 
 
 @njit(cache=True, error_model="numpy")
@@ -87,13 +96,13 @@ def _fit(grid: Grid, y: Floats, last: Floats, x: Floats, normal: Normal) -> bool
     trial, least = np.empty(3), _UNEXPLAINED * whole
     for k in range(-1, len(_STARTS)):
         if k < 0:
-            trial[1:] = last
+            _copy(last, trial)
         else:
             width, shape = _STARTS[k]
             trial[1] = log(width) if width > 0.0 else _fallen(grid, y)
             trial[2] = log(shape)
         if isfinite(trial[1]) and _descend(grid, y, trial, normal) and normal.squares[0] < least:
-            x[:] = trial
+            _copy(trial, x)
             least = normal.squares[0]
             if least < _CLEAR * whole:
                 return True
@@ -117,7 +126,9 @@ def _half_square(grid: Grid, y: Floats) -> float:
 @njit(cache=True, error_model="numpy")
 def _fallen(grid: Grid, y: Floats) -> float:
     """ln(r / window) of the place where a profile has fallen to 1/e of its largest value."""
-    peak = int(np.argmax(np.abs(y)))
+    peak = 0
+    for i in range(1, y.size):
+        peak = i if abs(y[i]) > abs(y[peak]) else peak
     for i in range(peak + 1, y.size):
         if y[i] * y[peak] < y[peak] * y[peak] * exp(-1.0):
             return float(grid.log_radius[i])
@@ -127,7 +138,7 @@ def _fallen(grid: Grid, y: Floats) -> float:
 @njit(cache=True, error_model="numpy")
 def _descend(grid: Grid, y: Floats, x: Floats, normal: Normal) -> bool:
     """Minimise from ln S and ln p in `x`; true when a strict minimum was reached that the grid can see."""
-    step, trial = np.empty(3), x.copy()
+    step, trial = np.empty(3), np.empty(3)
     x[0] = best_amplitude(grid, y, x)
     sum_up(grid, y, x, normal)
     squares, damping = normal.squares[0], 0.0
@@ -142,7 +153,7 @@ def _descend(grid: Grid, y: Floats, x: Floats, normal: Normal) -> bool:
         sum_up(grid, y, trial, normal)
         close = damping == 0.0 and longest < _CONVERGED and abs(step[0]) < _CONVERGED
         if close or normal.squares[0] <= squares:
-            x[:] = trial
+            _copy(trial, x)
             squares = normal.squares[0]
             damping = 0.0 if damping < 1e-5 else 0.1 * damping
         else:

@@ -85,7 +85,10 @@ def sum_up(grid: Grid, y: Floats, x: Floats, normal: Normal) -> None:
     """Half the sum of squares at x = (D, ln S, ln p), and its derivatives, into `normal`."""
     p, squares = exp(x[2]), 0.0
     slope, matrix, diagonal = normal.slope, normal.matrix, normal.diagonal
-    slope[:], matrix[:], diagonal[:] = 0.0, 0.0, 0.0
+    for v in range(3):
+        slope[v], diagonal[v] = 0.0, 0.0
+        for w in range(3):
+            matrix[v, w] = 0.0
     for j in range(grid.angular.size):
         g, first, second = _angle(grid, p, j)
         for i in range(y.size):
@@ -143,11 +146,14 @@ def derivatives_to_profile(grid: Grid, x: Floats, normal: Normal, pull: Floats) 
     """Derivatives (3, radii) of x = (D, ln S, ln p) to the profile, `normal` being that of the answer."""
     p, inverse, solution = exp(x[2]), np.empty((3, 3)), np.empty(3)
     for v in range(3):
-        normal.slope[:] = 0.0
+        normal.slope[0], normal.slope[1], normal.slope[2] = 0.0, 0.0, 0.0
         normal.slope[v] = 1.0
         solve(normal, 0.0, solution)
-        inverse[v] = solution
-    pull[:] = 0.0
+        for w in range(3):
+            inverse[v, w] = solution[w]
+    for v in range(pull.shape[0]):
+        for i in range(pull.shape[1]):
+            pull[v, i] = 0.0
     for j in range(grid.angular.size):
         g, first, _ = _angle(grid, p, j)
         for i in range(pull.shape[1]):
@@ -156,5 +162,5 @@ def derivatives_to_profile(grid: Grid, x: Floats, normal: Normal, pull: Floats) 
             weight = grid.angular[j] * grid.radial[i] * m
             fq = x[0] * q * p
             for v in range(3):
-                row = inverse[v]
-                pull[v, i] += weight * (row[0] + fq * (row[1] - row[2] * (far + first)))
+                a, b, c = inverse[v, 0], inverse[v, 1], inverse[v, 2]
+                pull[v, i] += weight * (a + fq * (b - c * (far + first)))

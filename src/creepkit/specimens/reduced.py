@@ -19,12 +19,17 @@ from creepkit.errors import SolveError
 from creepkit.records import Effects, History, Prediction, Status
 from creepkit.specimens.dimple import DimpleGeometry
 from creepkit.specimens.observation import OBSERVED
-from creepkit.specimens.reduced_march import Batch, Ended, Schedule, march, rates_of, schedule
+from creepkit.specimens.reduced_march import Batch, Ended, march, rates_of
+from creepkit.specimens.reduced_schedule import Schedule, schedule
 from creepkit.specimens.reduced_tables import LOAD_GRID, Tables, deflection_grid, tables
 
 if TYPE_CHECKING:
+    from creepkit.kernels.interface import CompiledLaw
     from creepkit.language import CreepLaw, Elastic
     from creepkit.specimens.bulge import Bulge
+
+_NO_LOAD = 1e-15
+"""P/E of a dimple at rest: its deflection is a million times below the least one measured."""
 
 
 @dataclass(frozen=True)
@@ -52,34 +57,51 @@ class ReducedBulge:
         effects: Effects | None = None,
     ) -> Prediction:
         """Predict amplitude, width and shape of each history at its times; see records.Predictor."""
-        assumed = dict(effects or {})
-        for kind in assumed:
-            if kind not in self.effects:
-                raise SolveError(f"a bulge specimen does not know the nuisance '{kind}'; it knows {self.effects}")
         compiled = kernels.lower(law, "numba")
         theta = compiled.internal(values)
+        assumed = _known(self.effects, effects or {})
         shape = (max([len(theta), *(len(v) for v in assumed.values())]), len(histories))
         theta = np.broadcast_to(theta, (shape[0], theta.shape[1]))
         assumed = {kind: np.broadcast_to(value, shape) for kind, value in assumed.items()}
         plans = [schedule(self.specimen, history) for history in histories]
-        thin, row = self._dimples(plans, assumed, shape)
-        times, pressure, warmth = _stacked(plans)
-        temperature = warmth[:, None, :] + assumed.get("temperature", np.zeros((1, shape[1])))
-        stiffness = _moduli(histories, temperature) * (1.0 + assumed.get("modulus", np.zeros((1, shape[1]))))
-        _refuse_soft(histories, stiffness)
-        load = np.maximum(np.broadcast_to(pressure[:, None, :] / stiffness, (len(times), *shape)), 1e-15)
-        batch = Batch(
-            times[:, None, :], pressure[:, None, :], temperature,
-            np.exp(LOAD_GRID.place(load, beyond=True).of(thin.elastic, np.broadcast_to(row, load.shape))),
-            _beta(compiled.leading(theta), shape[0]), thin, deflection_grid(self.specimen), row,
-            np.array(compiled.initial), np.array(compiled.limits), self.specimen.deflection_limit,
-            self.specimen.strain_limit,
-        )  # fmt: skip
+        batch = self._batch(compiled, theta, histories, plans, assumed)
         return _prediction(histories, plans, march(batch, rates_of(kernels.lower(law, "numpy"), theta)))
 
     def reference_stress(self, history: History) -> Floats:
         """As the specimen's."""
         return self.specimen.reference_stress(history)
+
+    def _batch(
+        self,
+        law: CompiledLaw,
+        theta: Floats,
+        histories: Sequence[History],
+        plans: Sequence[Schedule],
+        effects: Mapping[str, Floats],
+    ) -> Batch:
+        """What is marched: tests side by side, with what is assumed of them put in."""
+        shape = (len(theta), len(histories))
+        thin, row = self._dimples(plans, effects, shape)
+        times, pressure, temperature = (values[:, None, :] for values in _stacked(plans))
+        temperature = temperature + effects.get("temperature", 0.0)
+        modulus = _moduli(histories, temperature) * (1.0 + np.asarray(effects.get("modulus", 0.0)))
+        _refuse_soft(histories, modulus)
+        load = np.broadcast_to(np.maximum(pressure / modulus, _NO_LOAD), (len(times), *shape))
+        elastic = LOAD_GRID.place(load, beyond=True).of(thin.elastic, np.broadcast_to(row, load.shape))
+        return Batch(
+            times=times,
+            pressure=pressure,
+            temperature=temperature,
+            elastic=np.exp(elastic),
+            beta=_beta(law.leading(theta), len(theta)),
+            tables=thin,
+            grid=deflection_grid(self.specimen),
+            row=row,
+            initial=np.array(law.initial),
+            limits=np.array(law.limits),
+            deflection_limit=self.specimen.deflection_limit,
+            strain_limit=self.specimen.strain_limit,
+        )
 
     def _dimples(
         self, plans: Sequence[Schedule], effects: Mapping[str, Floats], shape: tuple[int, int]
@@ -102,8 +124,16 @@ class ReducedBulge:
         return tables(self.specimen, geometry, made.observation.replace(window=window))
 
 
+def _known(kinds: Sequence[str], effects: Effects) -> dict[str, Floats]:
+    """The effects, each of a kind that is known."""
+    for kind in effects:
+        if kind not in kinds:
+            raise SolveError(f"a bulge specimen does not know the nuisance '{kind}'; it knows {', '.join(kinds)}")
+    return dict(effects)
+
+
 def _stacked(plans: Sequence[Schedule]) -> tuple[Floats, Floats, Floats]:
-    """Times, pressures and temperatures of all tests, (nodes, tests) each; the last node of shorter tests is repeated."""
+    """Times, pressures and temperatures of all tests, (nodes, tests); shorter tests repeat their last node."""
     count = max(plan.times.size for plan in plans)
 
     def padded(values: Sequence[Floats]) -> Floats:

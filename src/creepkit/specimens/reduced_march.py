@@ -8,111 +8,31 @@ need no small first steps. The point stands for the middle of the roof: its stre
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.records import History, Status
-from creepkit.specimens.bulge_course import Setup, setup
+from creepkit.records import Status
 from creepkit.specimens.reduced_tables import EXPONENTS, Grid, Place, Tables
 
-if TYPE_CHECKING:
-    from creepkit.specimens.bulge import Bulge
-
-FIRST, GROWTH, SHARE = 2.5, 0.5, 1.0 / 24.0
-"""Steps: s, the first one after a change of load; of the time elapsed since, each later one; of the test, the longest."""
-RAMP_STEPS = 4
-"""Steps of a ramp from zero to the largest pressure."""
 MEAN_STRESS = 2.0 / 3.0
 """Over the von Mises stress, in equibiaxial tension."""
 
-_OFFSET = 20.0
-"""s; creep after a change of load decays over decades of time since then."""
 _SECANTS = 2
 """The first estimate comes from the step before: an error of the increment of some 0.1 % is left."""
 _SLOPES = (-10.0, -0.2)
 """Slope of residuals to unknowns that a step may have: -1 without feedback, steeper where deflection softens."""
 _PUSH = 1.05
+"""Factor on stress and on strain that shows their exponents."""
 _STRESS_FLOOR = 1e-6
 """MPa; creep without pressure."""
 _REST = 1e-12
 """mm."""
 _LARGEST = np.log(1e2)
 """ln of the largest strain increment; the dimple has burst long before."""
-
-
-@dataclass(frozen=True, eq=False)
-class Schedule:
-    """When a test is looked at: nodes (nodes,) with time s, pressure MPa and temperature K; weights of frames.
-
-    frames : (frames, nodes) the values at the history's times as sums of those at nodes.
-    """
-
-    made: Setup
-    times: Floats
-    pressure: Floats
-    temperature: Floats
-    frames: Floats
-
-
-@lru_cache(maxsize=1024)
-def schedule(specimen: Bulge, history: History) -> Schedule:
-    """The schedule of a test; complains as the specimen does where the test cannot be simulated."""
-    made = setup(specimen, history, {})
-    segments, largest = made.course.segments, float(made.course.pressure.values.max())
-    times, columns, rows = [np.zeros(0)], [np.zeros((0, 2))], []
-    count, before, origin = 0, np.full(2, np.nan), 0.0
-    for start, end, P, P_end, T, T_end in segments[:, :6]:
-        if P != before[0] or P_end != P:
-            origin = start
-        ramp = abs(P_end - P) / largest if largest > 0 else 0.0
-        inner = _ramp(start, end, ramp) if P_end != P else _hold(start, end, origin, SHARE * segments[-1, 1])
-        share = ((inner - start) / (end - start))[:, None]
-        fresh = bool((before != (P, T)).any())
-        taken = slice(0 if fresh else 1, None)
-        times.append(inner[taken])
-        columns.append(((1 - share) * [P, T] + share * [P_end, T_end])[taken])
-        rows.append((count if fresh else count - 1, count + times[-1].size - 1))
-        count, before = count + times[-1].size, np.array([P_end, T_end])
-        origin = end if P_end != P else origin
-    nodes, values = np.concatenate(times), np.concatenate(columns)
-    frames = _weights(nodes, rows, segments[:, 0], history.times)
-    return Schedule(made, nodes, values[:, 0], values[:, 1], frames)
-
-
-def _weights(nodes: Floats, rows: Sequence[tuple[int, int]], starts: Floats, times: Floats) -> Floats:
-    """Weights (times, nodes) of splines in ln(t - t0 + 20 s), one for each segment; before a jump at its very time.
-
-    rows : first and last node of each segment; starts : s.
-    """
-    out = np.zeros((times.size, nodes.size))
-    which = np.maximum(np.searchsorted(starts, times, side="left") - 1, 0)
-    for n, (first, last) in enumerate(rows):
-        mine, known = which == n, slice(first, last + 1)
-        if mine.any():
-            spline = CubicSpline(np.log(nodes[known] - starts[n] + _OFFSET), np.eye(last + 1 - first))
-            out[mine, known] = spline(np.log(times[mine] - starts[n] + _OFFSET))
-    return out
-
-
-def _ramp(start: float, end: float, share: float) -> Floats:
-    """Nodes of a segment in which the pressure changes by a share of the largest one."""
-    return np.linspace(start, end, max(1, int(np.ceil(RAMP_STEPS * share))) + 1)
-
-
-def _hold(start: float, end: float, origin: float, longest: float) -> Floats:
-    """Nodes of a segment of constant pressure, in steps that grow with the time since the load changed."""
-    nodes = [start]
-    while nodes[-1] < end:
-        step = min(max(GROWTH * (nodes[-1] - origin), FIRST), max(longest, FIRST))
-        nodes.append(nodes[-1] + step)
-    nodes[-1] = end
-    return np.array(nodes)
 
 
 class Point(NamedTuple):
@@ -193,7 +113,7 @@ def march(batch: Batch, rates: Rates) -> Ended:
         status = np.where(alive & lost, int(Status.NOT_CONVERGED), np.where(alive & burst, int(Status.BURST), status))
         going = alive & ~lost & ~burst
         ends = np.where(alive & ~going, _moment(batch, j, amplitude[j - 1], reached, burst), ends)
-        stuck = np.where(alive & burst, batch.deflection_limit, amplitude[j - 1])
+        stuck = np.where(alive & burst, np.fmin(reached, batch.deflection_limit), amplitude[j - 1])
         amplitude[j] = np.where(going, reached, stuck)
         state = State(*(np.where(going, new, old) for new, old in zip(after, state, strict=True)))
     exponent[0] = exponent[1]
@@ -258,9 +178,8 @@ def _stepped(batch: Batch, rates: Rates, clock: Clock, j: int, state: State) -> 
         middle = state.states + 0.5 * np.exp(log_weight) * state_rates
         return np.concatenate([(log_rate + log_weight)[None], middle]), growth, log_rate
 
-    x, last, (wanted, growth, log_rate) = _secants(
-        at, np.concatenate([(state.log_rate + log_weight)[None], state.states])
-    )
+    first = np.concatenate([(state.log_rate + log_weight)[None], state.states])
+    x, last, (_, growth, log_rate) = _secants(at, first)
     stress_exponent, strain_exponent = (
         (at(last, *push)[2] - log_rate) / np.log(_PUSH) for push in ((_PUSH, 1.0), (1.0, _PUSH))
     )

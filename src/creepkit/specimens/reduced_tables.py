@@ -65,8 +65,8 @@ class Tables:
     """Tables of one observed dimple at some thicknesses; with a row for each.
 
     thicknesses : (rows,) mm. stress, growth : (rows, deflections) ln k and ln kappa (mm).
-    shapes : (rows, exponents, deflections, 2) width mm and shape in steady creep; elastic_shapes : (rows, deflections, 2).
-    elastic : (rows, loads) ln of the elastic deflection, mm.
+    shapes : (rows, exponents, deflections, 2) width mm and shape in steady creep; elastic_shapes : (rows, deflections,
+    2) those of an elastic dimple. elastic : (rows, loads) ln of the elastic deflection, mm.
     """
 
     thicknesses: Floats
@@ -118,24 +118,24 @@ class Grid(NamedTuple):
 
     first: float
     step: float
-    count: int
+    length: int
 
     @classmethod
-    def between(cls, least: float, most: float, count: int) -> Grid:
+    def between(cls, least: float, most: float, length: int) -> Grid:
         """From the least to the most."""
-        return cls(float(np.log(least)), float(np.log(most / least)) / (count - 1), count)
+        return cls(float(np.log(least)), float(np.log(most / least)) / (length - 1), length)
 
     @property
     def points(self) -> Floats:
-        """(count,) x."""
-        return np.exp(self.first + self.step * np.arange(self.count))
+        """(length,) x."""
+        return np.asarray(np.exp(self.first + self.step * np.arange(self.length)))
 
     def place(self, x: Floats, *, beyond: bool = False) -> Place:
         """Where x lies; beyond : carry the end intervals on instead of holding the end values."""
         position = (np.log(x) - self.first) / self.step
         if not beyond:
-            position = np.fmin(np.fmax(position, 0.0), self.count - 1.0)
-        interval = np.fmin(np.fmax(position, 0.0), self.count - 2.0).astype(np.int64)
+            position = np.fmin(np.fmax(position, 0.0), self.length - 1.0)
+        interval = np.fmin(np.fmax(position, 0.0), self.length - 2.0).astype(np.int64)
         return Place(interval, position - interval)
 
 
@@ -186,7 +186,7 @@ def _row(thickness: float, runs: tuple[Trial, ...], points: Floats, operator: Ob
 
 
 def _fitted(exponents: Floats, logs: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """ln k and ln kappa, (deflections,), from ln(dD/dt / (A P^n)), (exponents, deflections); NaN where none was reached.
+    """ln k and ln kappa, (deflections,), from ln(dD/dt / (A P^n)), (exponents, deflections), NaN where not reached.
 
     Least squares in n at each deflection; beyond where fewer than two exponents led, the last values go on.
     """
@@ -205,7 +205,8 @@ def _fitted(exponents: Floats, logs: Floats, points: Floats) -> tuple[Floats, Fl
         slope = (spread * (y - mean_y)).sum(axis=0) / (spread**2).sum(axis=0)
         level = mean_y - slope * mean_n
     where = np.arange(points.size)
-    return tuple(np.interp(where, where[usable], values[usable]) for values in (slope, level))  # type: ignore[return-value]
+    k, kappa = (np.interp(where, where[usable], values[usable]) for values in (slope, level))
+    return k, kappa
 
 
 def _log_rate(run: Trial, amplitude: Floats, points: Floats) -> Floats:
@@ -258,19 +259,16 @@ def _thicknesses(specimen: Bulge, geometry: DimpleGeometry) -> list[float]:
 def _norton(specimen: Bulge, body: Body, exponent: float, guess: float) -> Trial:
     """A Norton run at 1 MPa until the dimple bursts."""
     level = np.log(_RATE) - exponent * np.log(guess)
-    course = Course(
-        Program(np.array([0.0, 5.0]), np.array([0.0, 1.0])), Program.constant(1.0), Program.constant(_STIFFNESS), _LONGEST
-    )  # fmt: skip
+    pressure = Program(np.array([0.0, 5.0]), np.array([0.0, 1.0]))
+    course = Course(pressure, Program.constant(1.0), Program.constant(_STIFFNESS), _LONGEST)
     return _observable(specimen, body, course, np.array([level, exponent]), level)
 
 
 def _elastic(specimen: Bulge, body: Body) -> Trial:
     """An elastic run in which P/E rises to the end of its range, or till the dimple is as deep as can be."""
     end = 1e4
-    course = Course(
-        Program(np.array([0.0, end]), np.array([0.0, 1.0])), Program.constant(1.0),
-        Program.constant(1.0 / _LOAD_RANGE[1]), end,
-    )  # fmt: skip
+    pressure = Program(np.array([0.0, end]), np.array([0.0, 1.0]))
+    course = Course(pressure, Program.constant(1.0), Program.constant(1.0 / _LOAD_RANGE[1]), end)
     found = _observable(specimen, body, course, np.array([-np.inf, 1.0]), 0.0)
     return found._replace(times=found.times * _LOAD_RANGE[1] / end)
 

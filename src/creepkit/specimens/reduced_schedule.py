@@ -1,0 +1,96 @@
+"""When the one-degree-of-freedom model looks at a test: nodes that thin out after each change of load, and splines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from creepkit.arrays import Floats
+from creepkit.records import History
+from creepkit.specimens.bulge_course import Setup, setup
+
+if TYPE_CHECKING:
+    from creepkit.specimens.bulge import Bulge
+
+FIRST, GROWTH, SHARE = 2.5, 0.7, 1.0 / 16.0
+"""Steps: the first after a change of load, s; later ones over the time since; the longest over the test."""
+RAMP_STEPS = 4
+"""Steps of a ramp from zero to the largest pressure."""
+_OFFSET = 20.0
+"""s; creep after a change of load decays over decades of time since then."""
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """When a test is looked at: nodes (nodes,) with time s, pressure MPa and temperature K; weights of frames.
+
+    frames : (frames, nodes) the values at the history's times as sums of those at nodes.
+    """
+
+    made: Setup
+    times: Floats
+    pressure: Floats
+    temperature: Floats
+    frames: Floats
+
+
+@lru_cache(maxsize=1024)
+def schedule(specimen: Bulge, history: History) -> Schedule:
+    """The schedule of a test; complains as the specimen does where the test cannot be simulated."""
+    made = setup(specimen, history, {})
+    segments, largest = made.course.segments, float(made.course.pressure.values.max())
+    nodes, values, rows, origins = [np.zeros(0)], [np.zeros((0, 2))], [], []
+    count, before, origin = 0, np.full(2, np.nan), 0.0
+    for start, end, P, P_end, T, T_end in segments[:, :6]:
+        moving = P_end != P
+        origin = start if moving or before[0] != P else origin
+        inner = _ramp(start, end, abs(P_end - P) / largest) if moving else _hold(start, end, origin, segments[-1, 1])
+        # where nothing jumps the node that ends a segment begins the next one
+        old = int((before == (P, T)).all())
+        share = ((inner - start) / (end - start))[old:, None]
+        nodes.append(inner[old:])
+        values.append((1 - share) * [P, T] + share * [P_end, T_end])
+        rows.append((count - old, count + inner.size - old - 1))
+        origins.append(origin)
+        count, before = count + inner.size - old, np.array([P_end, T_end])
+        origin = end if moving else origin
+    times, columns = np.concatenate(nodes), np.concatenate(values)
+    frames = _weights(times, rows, segments[:, 0], np.array(origins), history.times)
+    return Schedule(made, times, columns[:, 0], columns[:, 1], frames)
+
+
+def _ramp(start: float, end: float, share: float) -> Floats:
+    """Nodes of a segment in which the pressure changes by a share of the largest one."""
+    return np.linspace(start, end, max(1, int(np.ceil(RAMP_STEPS * share))) + 1)
+
+
+def _hold(start: float, end: float, origin: float, whole: float) -> Floats:
+    """Nodes of a segment of constant pressure, in steps that grow with the time since the load changed.
+
+    whole : s, length of the test.
+    """
+    nodes, longest = [start], max(SHARE * whole, FIRST)
+    while nodes[-1] < end:
+        nodes.append(nodes[-1] + min(max(GROWTH * (nodes[-1] - origin), FIRST), longest))
+    nodes[-1] = end
+    return np.array(nodes)
+
+
+def _weights(nodes: Floats, rows: Sequence[tuple[int, int]], starts: Floats, origins: Floats, times: Floats) -> Floats:
+    """Weights (times, nodes) of splines in ln(t - t0 + 20 s), one for each segment; before a jump at its very time.
+
+    rows : first and last node of each segment; starts : s; origins : t0, s, when the load changed last.
+    """
+    out = np.zeros((times.size, nodes.size))
+    which = np.maximum(np.searchsorted(starts, times, side="left") - 1, 0)
+    for n, (first, last) in enumerate(rows):
+        mine, known = which == n, slice(first, last + 1)
+        if mine.any():
+            spline = CubicSpline(np.log(nodes[known] - origins[n] + _OFFSET), np.eye(last + 1 - first))
+            out[mine, known] = spline(np.log(times[mine] - origins[n] + _OFFSET))
+    return out
