@@ -70,6 +70,15 @@ def test_a_jump_has_the_value_before_it_and_time_zero_the_one_after():
     assert np.isnan(line.interpolate(values, 130.1)).all()
 
 
+def test_a_short_last_step_does_not_turn_its_small_errors_into_a_slope():
+    times = np.append(doubling(0, 40000), 40003.0)
+    line = Timeline.of(times, np.zeros(times.size, int), program((0, 40003, 8, 8)))
+    values = np.log1p(times / 500)
+    values[-2] += 1e-4
+    asked = np.array([22000.0, 28000, 35000, 39000])
+    np.testing.assert_allclose(line.interpolate(values, asked), np.log1p(asked / 500), rtol=5e-4)
+
+
 def test_a_ramp_taken_in_one_step_is_straight():
     line = Timeline.of(np.array([0.0, 5.0]), np.zeros(2, int), program((0, 5, 0, 8)), 0.1)
     asked = np.array([0, 0.1, 2.5, 5])

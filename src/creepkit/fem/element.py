@@ -47,12 +47,12 @@ from creepkit.fem.strain import (
     piola_tangent,
     to_gradient,
 )
-from creepkit.integration.problem import SOLVED, TOO_MANY
+from creepkit.integration.problem import NOT_FINITE, SOLVED, TOO_MANY
 from creepkit.integration.response import INPUTS
 from creepkit.integration.stage import solve_near
 from creepkit.kernels.interface import POINT_SIZE, TEMPERATURE, TIME
 
-BALANCED, INVERTED, POINT_FAILED = range(3)
+BALANCED, INVERTED, POINT_FAILED, RATE_UNDEFINED = range(4)
 """Flags of an assembly."""
 
 
@@ -204,7 +204,7 @@ def assemble(
                         update, theta, axes, problem, base, k, row, out, increments[k], tolerance
                     )
                 if flag != SOLVED:
-                    return POINT_FAILED
+                    return RATE_UNDEFINED if flag == NOT_FINITE else POINT_FAILED
                 for i in range(count):
                     states[k, i] = row[POINT_SIZE + i]
             increments[k], trials[k, 0] = increment, problem.trial

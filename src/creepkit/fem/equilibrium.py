@@ -10,11 +10,12 @@ from numba import njit
 from creepkit.arrays import Floats
 from creepkit.fem.band import factorize, solve_factorized
 from creepkit.fem.body import Body
-from creepkit.fem.element import BALANCED, Forces, Points, assemble
+from creepkit.fem.element import BALANCED, RATE_UNDEFINED, Forces, Points, assemble
 from creepkit.fem.material import PointRoom, Stage
 
-FOUND, NO_STRESS, UNSTABLE, TOO_FAR, TOO_MANY = range(5)
-"""Flags: found; a point had no solution; the tangent is not positive definite; corrections grow; too many of them."""
+FOUND, NO_STRESS, UNSTABLE, TOO_FAR, TOO_MANY, UNDEFINED = range(6)
+"""Flags: found; a point had no solution; the tangent is not positive definite; corrections grow; too many of them; the
+law gave no finite rate."""
 
 _ITERATIONS = 16
 _LOOSE = 0.03
@@ -53,8 +54,9 @@ def balance(
     for iteration in range(_ITERATIONS):
         stiff = iteration == 0 or factor < 1.0 or (iteration > 1 and size > _KEEP * before)
         local = max(tight, _LOOSE) if iteration == 0 else tight
-        if assemble(update, theta, body, stage, displacement, points, room, forces, stiff, local) != BALANCED:
-            return Outcome(NO_STRESS, full, light)
+        flag = assemble(update, theta, body, stage, displacement, points, room, forces, stiff, local)
+        if flag != BALANCED:
+            return Outcome(UNDEFINED if flag == RATE_UNDEFINED else NO_STRESS, full, light)
         if stiff:
             full += 1
             if not factorize(forces.band, body.size, body.width, forces.block):

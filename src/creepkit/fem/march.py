@@ -11,7 +11,7 @@ from creepkit.arrays import Floats
 from creepkit.fem.blocks import clear
 from creepkit.fem.body import Body
 from creepkit.fem.element import Points
-from creepkit.fem.equilibrium import FOUND, UNSTABLE, balance
+from creepkit.fem.equilibrium import FOUND, UNDEFINED, balance
 from creepkit.fem.material import EQUIVALENT, Stage
 from creepkit.fem.record import (
     DEFLECTION_LIMIT,
@@ -19,6 +19,7 @@ from creepkit.fem.record import (
     END_MODULUS,
     END_MOTION,
     END_PRESSURE,
+    LAW_FAILED,
     LIMIT_LOAD,
     LOST_CONVERGENCE,
     MODULUS,
@@ -153,16 +154,17 @@ def _segment(
         if record.counts[0] + record.counts[1] >= settings.max_steps:
             return Ended(ended.records, TOO_MANY_STEPS, ended.time)
         outcome, error = try_step(
-            update, theta, clock, poisson, body, segment, pattern, settings, tableau, rooms, record, first,
-            ended.records, s, h,
+            update, theta, clock, poisson, body, segment, pattern, settings, tableau, rooms, record,
+            first if failures == 0 else ended.records, ended.records, s, h,
         )  # fmt: skip
         if outcome != FOUND or not (error <= 1.0 or told):
             copy(start, u)
             record.counts[1] += 1
             failures += 1
             h *= 0.25 if outcome != FOUND else max(0.2, 0.9 / sqrt(error))
-            if failures > 12 or h < 1e-12:
-                code = LIMIT_LOAD if outcome == UNSTABLE or _rises(segment) else LOST_CONVERGENCE
+            if failures > 12:
+                code = LIMIT_LOAD if _rises(segment) else LOST_CONVERGENCE
+                code = LAW_FAILED if outcome == UNDEFINED else code
                 return Ended(ended.records, code, ended.time)
             continue
         failures = 0

@@ -20,7 +20,8 @@ from creepkit.fem.material import EQUIVALENT, PointRoom
     LIMIT_LOAD,
     LOST_CONVERGENCE,
     TOO_MANY_STEPS,
-) = range(7)
+    LAW_FAILED,
+) = range(8)
 """Codes of an ending; whatever it is, the history so far is kept."""
 
 START, END, PRESSURE, END_PRESSURE, WARMTH, END_WARMTH, MODULUS, END_MODULUS, MOTION, END_MOTION = range(10)

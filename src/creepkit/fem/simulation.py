@@ -16,6 +16,7 @@ from creepkit.fem.element import point_room
 from creepkit.fem.march import march
 from creepkit.fem.record import (
     DEFLECTION_LIMIT,
+    LAW_FAILED,
     LIMIT_LOAD,
     LOST_CONVERGENCE,
     REACHED_END,
@@ -43,6 +44,7 @@ REASONS = {
     LIMIT_LOAD: "no equilibrium with a larger pressure: limit load",
     LOST_CONVERGENCE: "equilibrium was lost while the load was constant",
     TOO_MANY_STEPS: "the cap on steps was reached",
+    LAW_FAILED: "the law gave no finite rate at a point",
 }
 """What each ending means, in words."""
 

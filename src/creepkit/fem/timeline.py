@@ -13,12 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from creepkit.arrays import Floats, Ints
+from creepkit.arrays import Bools, Floats, Ints
 from creepkit.fem.record import PRESSURE, START
 from creepkit.integration.clock import SMALLEST_BETA
 
 OFFSET = 20.0
 """s; twice the first step after a change of load."""
+
+SHORT = 0.2
+"""A last step this much shorter than the one before does not count for the spline."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +66,9 @@ class Timeline:
         for n, (first, last) in enumerate(self.rows):
             mine = (which == n) & (times <= self.times[-1] * (1 + 1e-12))
             if mine.any():
-                known = slice(first, last + 1)
-                before, after = self._variable(n, self.times[known]), self._variable(n, times[mine])
-                out[mine] = _spline(before, values[known], after)
+                before, after = self._variable(n, self.times[first : last + 1]), self._variable(n, times[mine])
+                kept = _kept(before)
+                out[mine] = _spline(before[kept], values[first : last + 1][kept], after)
         return out
 
     def moved(self, times: Floats, starts: Floats) -> Timeline:
@@ -80,6 +83,15 @@ class Timeline:
         if last - first == 1:  # a single step: the few seconds of a ramp, elastic and so straight
             return np.asarray(elapsed)
         return np.asarray(np.log1p((elapsed / OFFSET) ** self.exponents[n]))
+
+
+def _kept(places: Floats) -> Bools:
+    """All knots, less the last but one where a short last step, cut off by the end, would make a slope of its error."""
+    kept = np.ones(places.size, bool)
+    if places.size > 3:
+        before, final = np.diff(places[-3:])
+        kept[-2] = final > SHORT * before
+    return kept
 
 
 def _spline(before: Floats, values: Floats, after: Floats) -> Floats:

@@ -106,4 +106,4 @@ def _geometry(specimen: Bulge, history: History, effects: Mapping[str, float]) -
             f"history '{history.name}' has a geometry of its own ({', '.join(changes)}), which a specimen with a mesh "
             "from files cannot follow; use one without mesh="
         )
-    return replace(specimen.geometry, **changes)
+    return specimen.geometry.replace(**changes)

@@ -242,7 +242,8 @@ def _observed(batch: Batch, amplitude: Floats, exponent: Floats) -> Floats:
     """Amplitude, width and shape: of elastic and of creeping dimples in the proportion of their deflections."""
     place, count = _placed(batch, amplitude), len(EXPONENTS)
     inverse = 1.0 / np.array(EXPONENTS)
-    flexibility = np.clip(1.0 / np.clip(exponent, EXPONENTS[0], EXPONENTS[-1]), inverse[-1], inverse[0])
+    flexibility = _on_the_way(1.0 / np.clip(exponent, EXPONENTS[0], EXPONENTS[-1]), amplitude - batch.elastic)
+    flexibility = np.clip(flexibility, inverse[-1], inverse[0])
     which = np.clip(np.searchsorted(-inverse, -flexibility, side="right") - 1, 0, count - 2)
     share = ((inverse[which] - flexibility) / (inverse[which] - inverse[which + 1]))[..., None]
     rows = batch.tables.shapes.reshape(-1, *batch.tables.shapes.shape[2:])
@@ -251,3 +252,10 @@ def _observed(batch: Batch, amplitude: Floats, exponent: Floats) -> Floats:
     elastic = place.of(batch.tables.elastic_shapes, np.broadcast_to(batch.row, amplitude.shape))
     part = np.clip(batch.elastic / np.maximum(amplitude, _REST), 0.0, 1.0)[..., None]
     return np.concatenate([amplitude[..., None], creeping + part * (elastic - creeping)], axis=-1)
+
+
+def _on_the_way(values: Floats, creep: Floats) -> Floats:
+    """Means of values over the creep deflection so far, node by node: a profile is the sum of what it grew by."""
+    grown = np.maximum(np.diff(creep, axis=0, prepend=0.0), 0.0)
+    so_far = np.cumsum(grown, axis=0)
+    return np.asarray(np.divide(np.cumsum(values * grown, axis=0), so_far, out=values.copy(), where=so_far > _REST))
