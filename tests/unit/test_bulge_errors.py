@@ -225,11 +225,11 @@ def test_whatever_the_rate_nothing_comes_after_the_end(A_now: float) -> None:
     assert (np.abs(run.outputs["amplitude"]) < 3.5).all()
 
 
-def test_a_dimple_that_cannot_carry_its_pressure_says_limit_load() -> None:
+def test_a_rate_beyond_all_numbers_is_no_answer() -> None:
     with pytest.raises(SolveError) as found:
         simulate(values={"A": 1e300, "n": 3.0})
     assert str(found.value) == (
-        f"{WHERE} ended at 0 s, before any of the times asked for: no equilibrium with a larger pressure: limit load; "
+        f"{WHERE} ended at 0 s, before any of the times asked for: the law gave no finite rate at a point; "
         "check values, loading and times"
     )
 

@@ -56,7 +56,7 @@ def balance(
         local = max(tight, _LOOSE) if iteration == 0 else tight
         flag = assemble(update, theta, body, stage, displacement, points, room, forces, stiff, local)
         if flag != BALANCED:
-            return Outcome(UNDEFINED if flag == RATE_UNDEFINED else NO_STRESS, full, light)
+            return Outcome(UNDEFINED if flag == RATE_UNDEFINED and iteration < 2 else NO_STRESS, full, light)
         if stiff:
             full += 1
             if not factorize(forces.band, body.size, body.width, forces.block):

@@ -43,6 +43,9 @@ from creepkit.fem.strain import Three
 from creepkit.integration.clock import Clock, moment, position
 from creepkit.integration.tableau import Tableau
 
+_SMALLEST = 1e-9
+"""Least step, as a share of the position it begins at."""
+
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def march(
@@ -162,7 +165,7 @@ def _segment(
             record.counts[1] += 1
             failures += 1
             h *= 0.25 if outcome != FOUND else max(0.2, 0.9 / sqrt(error))
-            if failures > 12:
+            if failures > 12 or h < _SMALLEST * s:
                 code = LIMIT_LOAD if _rises(segment) else LOST_CONVERGENCE
                 code = LAW_FAILED if outcome == UNDEFINED else code
                 return Ended(ended.records, code, ended.time)

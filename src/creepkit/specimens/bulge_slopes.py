@@ -117,9 +117,9 @@ _COLUMNS = {
 def _by_temperature(made: Setup, history: History) -> Floats:
     """One kelvin more in every temperature, and the modulus that goes with it."""
     course = made.course
-    direction = np.zeros_like(course.segments) + _COLUMNS["temperature"]
+    direction: Floats = np.zeros_like(course.segments) + _COLUMNS["temperature"]
     if history.elastic is None:
-        return direction
+        return np.asarray(direction)
     warmth = course.temperature.values
     stated = [float(history.elastic.at(float(T)).E) for T in warmth]
     factor = course.modulus.values / np.array(stated)
@@ -127,7 +127,8 @@ def _by_temperature(made: Setup, history: History) -> Floats:
         np.array([float(history.elastic.at(float(T) + s).E) for T in warmth]) for s in (MODULUS_STEP, -MODULUS_STEP)
     )
     slope = Program(course.modulus.times, factor * (up - down) / (2.0 * MODULUS_STEP))
-    return np.asarray(direction + replace(course, modulus=slope).segments * _COLUMNS["modulus"])
+    stiffer: Floats = replace(course, modulus=slope).segments * _COLUMNS["modulus"]
+    return np.asarray(direction + stiffer)
 
 
 @lru_cache(maxsize=256)

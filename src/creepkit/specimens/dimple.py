@@ -91,7 +91,17 @@ class DimpleGeometry:
         # an imaginary step is exact, also where a real one would leave the allowed range, as at roof_radial = R
         changed = size._replace(**{field: complex(getattr(self, field), _COMPLEX_STEP)})
         inner, outer = (side.imag / _COMPLEX_STEP for side in sides(changed, layout))
-        return strip_nodes(inner, outer, layout.breaks)
+        return strip_nodes(inner, outer, layout.breaks) + self._layout_velocity(field, refinement)
+
+    def _layout_velocity(self, field: str, refinement: float) -> Floats:
+        """What the layout adds: where columns and layers lie changes with the length, how many there are does not."""
+        size, step = self._dimensions(), 1e-6 * getattr(self, field)
+        lengths = (size._replace(**{field: getattr(self, field) + s}) for s in (step, -step))
+        up, down = (layout_of(each, float(refinement)) for each in lengths)
+        if up.counts != down.counts:
+            return np.zeros(2)
+        ahead, behind = (_nodes(size, layout) for layout in (up, down))
+        return np.asarray((ahead - behind) / (2 * step))
 
     def section(self, points: int = 100) -> Floats:
         """The outline of the half section, (points, 2), from the middle of the roof and closed; for drawing."""
@@ -111,6 +121,12 @@ class DimpleGeometry:
                 "as many elements each way as 1, the mesh for production"
             )
         return layout_of(self._dimensions(), float(refinement))
+
+
+def _nodes(size: Dimensions, layout: Layout) -> Floats:
+    """Nodes of a dimple of that size, laid out so."""
+    inner, outer = (side.real for side in sides(size, layout))
+    return strip_nodes(inner, outer, layout.breaks)
 
 
 def _between(value: object, least: float, most: float) -> bool:

@@ -80,6 +80,11 @@ class Layout(NamedTuple):
     power: float
     breaks: Floats
 
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Its whole numbers."""
+        return self.floor, self.roof, self.wall, self.corner, len(self.breaks)
+
 
 def layout_of(size: Dimensions, refinement: float) -> Layout:
     """The layout of a dimple with `refinement` times as many columns and layers as it needs."""
