@@ -22,6 +22,9 @@ from creepkit.fem.record import (
 from creepkit.fem.steps import clock_of
 from creepkit.integration.clock import moment
 
+LANES = 16
+"""Right-hand sides are kept in multiples of this, the numbers that a processor takes at a time twice over."""
+
 _NUDGE = 1e-4
 """Share of a segment's length by which its ends are moved to difference its clock."""
 
@@ -48,7 +51,7 @@ class ChangeRoom(NamedTuple):
 
     value : (points, V); change : (points, V, C); rates : (stages, points, V, C) changes of the slopes;
     base : (points, V, C); own : (points, R, C) change of D and of the states at fixed strain; follow : (points, R, 4).
-    rows : (size, 2 width + 1) tangent; right : (C, size). element : (4, 8, 8); products : (10, 8);
+    rows : (size, 2 width + 1) tangent; right : (size, C or a little more). element : (4, 8, 8); products : (10, 8);
     local : (2, 8) displacements; force : (2, 8, 3), (2, 8); element_right : (16, C); moved : (16, C).
     inputs : (5, D) change of pressure, time, temperature, ln E and ln weight. side, sides, ends : of a pressed side.
     history : (V,) of a stage; by_strain : (4, 5).
@@ -89,7 +92,7 @@ def change_room(body: Body, states: int, stages: int, columns: int, directions: 
         own=np.zeros((points, 1 + states, columns)),
         follow=np.zeros((points, 1 + states, 4)),
         rows=np.zeros((body.size, 2 * body.width + 1)),
-        right=np.zeros((columns, body.size)),
+        right=np.zeros((body.size, (columns + LANES - 1) // LANES * LANES)),
         element=np.zeros((4, 8, 8)),
         products=np.zeros((10, 8)),
         local=np.zeros((2, 8)),

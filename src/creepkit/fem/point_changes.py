@@ -27,7 +27,7 @@ from creepkit.integration.tableau import Tableau
 from creepkit.kernels.interface import POINT_SIZE, TEMPERATURE, TIME, pointer
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def history_of(
     slopes: Floats, row: int, i: int, k: int, h: float, tableau: Tableau, value: Floats, change: Floats, rates: Floats,
     history: Floats, base: Floats,
@@ -45,7 +45,7 @@ def history_of(
         history[v] = total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def answer(
     sensitivity: Any,
     theta: Floats,
@@ -110,7 +110,7 @@ def answer(
             )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def stress_changes(
     stage: Stage, elastic: Elastic, moduli: tuple[Four, Four, Four, Four], increment: float, base: Floats, own: Floats,
     k: int, dy: Floats,

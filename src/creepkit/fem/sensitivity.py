@@ -74,7 +74,7 @@ def differentiate(
         for k in range(body.top.size):
             equation = body.equations[2 * body.top[k] + 1]
             for c in range(surface.shape[2]):
-                surface[row, k, c] = room.right[c, equation] if equation >= 0 else 0.0
+                surface[row, k, c] = room.right[equation, c] if equation >= 0 else 0.0
     return DONE
 
 

@@ -34,7 +34,7 @@ def follow_displacements(
     by_radius, by_height, over_radius = body.by_radius, body.by_height, body.over_radius
     local, moved, right, dF, by_strain = room.local, room.moved, room.right, room.gradient_change, room.by_strain
     base, own, follow, rates, value, history = room.base, room.own, room.follow, room.rates, room.value, room.history
-    count, size, inverse = right.shape[0], value.shape[1], 1.0 / share
+    count, size, inverse = room.change.shape[2], value.shape[1], 1.0 / share
     first = parameters + columns.directions.shape[0]
     wide = history.reshape(1, history.size)
     for e in range(elements.shape[0]):
@@ -86,8 +86,8 @@ def _gather_changes(elements: Ints, equations: Ints, e: int, right: Floats, move
     for a in range(8):
         for i in range(2):
             row = equations[2 * elements[e, a] + i]
-            for c in range(right.shape[0]):
-                moved[8 * i + a, c] = right[c, row] if row >= 0 else 0.0
+            for c in range(moved.shape[1]):
+                moved[8 * i + a, c] = right[row, c] if row >= 0 else 0.0
 
 
 @njit(cache=True, error_model="numpy")

@@ -48,7 +48,7 @@ def assemble_changes(
         point.tangent,
         room.stress_change,
     )
-    parameters, count = theta.size, right.shape[0]
+    parameters, count = theta.size, room.change.shape[2]
     directions = columns.directions.shape[0]
     wide = history.reshape(1, history.size)
     for e in range(elements.shape[0]):
@@ -154,8 +154,8 @@ def scatter(
             row = equations[2 * elements[e, a] + i]
             if row < 0:
                 continue
-            for c in range(right.shape[0]):
-                right[c, row] += element_right[8 * i + a, c]
+            for c in range(element_right.shape[1]):
+                right[row, c] += element_right[8 * i + a, c]
             for j in range(2):
                 for b in range(8):
                     column = equations[2 * elements[e, b] + j]
@@ -183,12 +183,12 @@ def press_changes(
                 if row < 0:
                     continue
                 for d in range(directions):
-                    room.right[parameters + d, row] += room.inputs[BY_PRESSURE, d] * side[i, a]
+                    room.right[row, parameters + d] += room.inputs[BY_PRESSURE, d] * side[i, a]
                 for b in range(3):
                     for j in range(2):
                         slope = pressure * sides[2 * i + j, a, b]
                         for q in range(columns.velocities.shape[0]):
-                            room.right[parameters + directions + q, row] += (
+                            room.right[row, parameters + directions + q] += (
                                 slope * columns.velocities[q, 2 * nodes[b] + j]
                             )
                         column = body.equations[2 * nodes[b] + j]
