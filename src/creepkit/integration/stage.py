@@ -143,7 +143,7 @@ def solve_near(
 ) -> tuple[float, int]:
     """As `solve`, for a law without states under k > 0, from a good guess: no bracket and half of the logarithms.
 
-    TOO_MANY when the guess was not good enough. A finite element asks ten million times a minute, nearly always
+    TOO_MANY when the guess was not good enough. A finite element asks for little else, nearly always
     from next to the answer.
     """
     increment, log_weight = guess, log(problem.weight)
