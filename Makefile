@@ -1,4 +1,5 @@
 # make test   set up .venv, then check style, types, floors and run all tests, those of plugins/ included
+# make verify-export   exported laws in a CalculiX built from Debian's source, beside our solver: a table
 # make demo   set up .venv, then identify a law from a virtual bulge test and leave plots in demo/
 #
 # TORCH chooses another build of torch: make test TORCH='torch==2.13.0' on a machine with a GPU.
@@ -7,7 +8,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := test
-.PHONY: test demo clean
+.PHONY: test demo verify-export clean
 
 PYTHONS := python3.11 python3.12 python3.13
 BIN := .venv/bin
@@ -34,6 +35,9 @@ test: .venv/.ok
 
 demo: .venv/.ok
 	$(BIN)/creepkit demo --to demo
+
+verify-export: .venv/.ok
+	$(BIN)/python -u tests/benchmarks/verify_export.py
 
 .venv/.ok: pyproject.toml $(PLUGINS:%=%/pyproject.toml)
 	@echo "set-up 1/5: virtual environment .venv"

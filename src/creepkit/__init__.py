@@ -25,11 +25,16 @@ if TYPE_CHECKING:
     from creepkit.language import wachtman as wachtman
     from creepkit.records import History as History
     from creepkit.records import Nuisance as Nuisance
+    from creepkit.records import PointLoading as PointLoading
     from creepkit.records import PressureJump as PressureJump
     from creepkit.records import Program as Program
+    from creepkit.records import StrainSteps as StrainSteps
     from creepkit.records import StressSteps as StressSteps
+    from creepkit.records import Units as Units
+    from creepkit.records import constant_strain as constant_strain
     from creepkit.records import constant_stress as constant_stress
     from creepkit.study import export as export
+    from creepkit.study import exporters as exporters
     from creepkit.study import identify as identify
     from creepkit.study import law as law
     from creepkit.study import laws as laws
@@ -48,8 +53,9 @@ if TYPE_CHECKING:
 _HOMES = {
     "creepkit.kernels": "lower",
     "creepkit.language": "CreepLaw Elastic Param State activated arrhenius exponential inverse linear wachtman",
-    "creepkit.records": "History Nuisance PressureJump Program StressSteps constant_stress",
-    "creepkit.study": "export identify law laws load moduli rank read_histories simulate specimen specimens "
+    "creepkit.records": "History Nuisance PointLoading PressureJump Program StrainSteps StressSteps Units "
+    "constant_strain constant_stress",
+    "creepkit.study": "export exporters identify law laws load moduli rank read_histories simulate specimen specimens "
     "suspects with_suspects_marked",
 }
 _PUBLIC = {name: home for home, names in _HOMES.items() for name in names.split()}

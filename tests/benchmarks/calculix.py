@@ -102,11 +102,15 @@ class Result:
     cpu: float
 
 
-def run(deck: Deck) -> Result:
-    """Run CalculiX on one thread in a folder of its own."""
-    program = shutil.which("ccx")
+def run(deck: Deck, program: str | Path | None = None, preload: Path | None = None) -> Result:
+    """Run CalculiX on one thread in a folder of its own.
+
+    program : by default `ccx` on the PATH. preload : a shared library whose symbols come before those of the program.
+    """
+    program = program or shutil.which("ccx")
     if program is None:
         raise SystemExit("CalculiX is not installed: no 'ccx' on the PATH; on Debian, apt install calculix-ccx")
+    more = {"OMP_NUM_THREADS": "1"} | ({"LD_PRELOAD": str(preload)} if preload else {})
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "job.inp").write_text(deck.text())
@@ -114,7 +118,7 @@ def run(deck: Deck) -> Result:
         done = subprocess.run(
             [program, "job"],
             cwd=folder,
-            env=os.environ | {"OMP_NUM_THREADS": "1"},
+            env=os.environ | more,
             capture_output=True,
             text=True,
             timeout=LONGEST_WAIT,

@@ -37,6 +37,13 @@ class Norton:
     m: float = 0.0
 
 
+@dataclass(frozen=True)
+class UserLaw:
+    """A law of subroutine CREEP, which takes MPa and s. temperature : K, everywhere; CalculiX insists on one."""
+
+    temperature: float = 1000.0
+
+
 @dataclass(frozen=True, eq=False)
 class Deck:
     """A simulation: a mesh of CAX8R, elastic and perhaps creeping, under a pressure that follows the surface.
@@ -50,7 +57,7 @@ class Deck:
     mesh: Mesh
     E: float
     nu: float
-    creep: Norton | None
+    creep: Norton | UserLaw | None
     pressure: Program
     times: Floats
     nodes: Ints
@@ -68,7 +75,7 @@ class Deck:
     @property
     def stress_unit(self) -> float:
         """The unit of stress of the deck, in MPa: a power of ten that lifts A well above 1e-20."""
-        if self.creep is None or self.creep.A >= _SAFE_A:
+        if not isinstance(self.creep, Norton) or self.creep.A >= _SAFE_A:
             return 1.0
         return float(10.0 ** ceil(log10(_SAFE_A / self.creep.A) / self.creep.n))
 
@@ -94,10 +101,14 @@ class Deck:
     def _material(self) -> Iterator[str]:
         unit = self.stress_unit
         yield from ("*MATERIAL, NAME=ALLOY", "*ELASTIC", f"{self.E / unit:.9g}, {self.nu:.9g}")
-        if self.creep is not None:
+        if isinstance(self.creep, Norton):
             A = self.creep.A * unit**self.creep.n
             yield from ("*CREEP, LAW=NORTON", f"{A:.9g}, {self.creep.n:.9g}, {self.creep.m:.9g}")
+        elif isinstance(self.creep, UserLaw):
+            yield "*CREEP, LAW=USER"
         yield "*SOLID SECTION, ELSET=EALL, MATERIAL=ALLOY"
+        if isinstance(self.creep, UserLaw):
+            yield from ("*INITIAL CONDITIONS, TYPE=TEMPERATURE", f"NALL, {self.creep.temperature:.9g}")
 
     def _steps(self) -> Iterator[str]:
         ramps = without_jumps(self.pressure)

@@ -36,7 +36,8 @@ def test_one_table_for_all_tests(tmp_path):
     assert second.times.tolist() == [0.0, 9.0]
     assert first.elastic.E == 149000.0
     assert first.temperature == 1173.15
-    assert (first.labels["state"], "state" in second.labels) == ("Ruptured", False)
+    assert (first.rupture_time, first.labels["assumed"].split(", ")[-1]) == (10.0, "rupture at the last frame")
+    assert (second.rupture_time, second.unruptured, second.ended) == (None, False, False)
     assert first.alloy == "alloy9"
     assert first.source.endswith("curves.csv (a/1)")
 
@@ -50,7 +51,8 @@ def test_one_file_a_test_in_the_order_of_the_index(tmp_path):
     assert first.loading.steps == ((0.0, 230.0),)
     assert first.temperature == pytest.approx(1253.15)
     assert first.labels["measured_temperature_C"] == "982.00"  # (980 + 981 + 982 + 980 + 981 + 988) / 6
-    assert (first.labels["rupture_h"], second.labels["rupture_h"]) == ("78.7", "Not applicable")
+    assert (first.rupture_time, first.unruptured) == (pytest.approx(78.7 * 3600), False)
+    assert (second.rupture_time, second.unruptured) == (None, True)
     assert first.source == str(made / "B_creep.csv")
 
 

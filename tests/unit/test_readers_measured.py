@@ -41,7 +41,17 @@ def test_alloy_617_spot_values(alloy617):
     assert (coldest.times[1], coldest.outputs["strain"][1]) == (8460.0, 0.000261)
     noisy = alloy617["inl_2/AirBase_750_137_b"]
     assert (noisy.times[2], noisy.outputs["strain"][2]) == (111.6, -0.00155)
-    assert alloy617["kaeri_1/AirBase_900_25_a"].labels["state"] == "Ruptured"
+
+
+def test_how_the_tests_of_alloy_617_ended(alloy617):
+    """Its index says of 71 that they ruptured, of one that it was discontinued, and nothing of the first laboratory's."""
+    assert Counter((h.rupture_time is not None, h.unruptured) for h in alloy617.values()) == {
+        (True, False): 71, (False, True): 1, (False, False): 22,
+    }  # fmt: skip
+    assert {h.name.split("/")[0] for h in alloy617.values() if not h.ended} == {"inl_1"}
+    broken = alloy617["kaeri_1/AirBase_900_25_a"]
+    assert broken.rupture_time == broken.times[-1]
+    assert alloy617["inl_2/AirBase_950_19_a"].unruptured
 
 
 def test_alloy_617_readings_of_one_time_are_merged(alloy617):
@@ -71,9 +81,10 @@ def test_cmsx_6():
     first = curves["Vh5205_C-78"]
     np.testing.assert_allclose(first.times[[1, -1]], [0.0013 * 3600, 78.6658 * 3600], rtol=1e-14)
     np.testing.assert_allclose(first.outputs["strain"][[1, -1]], [7.1e-5, 0.276661], rtol=1e-14)
-    assert (first.labels["rupture_h"], first.labels["elastic_ext_pct"]) == ("78.7", "0.274")
+    assert (first.rupture_time, first.labels["elastic_ext_pct"]) == (pytest.approx(78.7 * 3600), "0.274")
     assert first.labels["measured_temperature_C"] == "980.36"
-    assert curves["Vh5205_C-85"].labels["rupture_h"] == "Not applicable"
+    assert curves["Vh5205_C-85"].unruptured
+    assert [h.rupture_time is None for h in curves.values()].count(True) == 3
     assert duplicates(list(curves.values())) == []
 
 

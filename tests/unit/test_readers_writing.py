@@ -36,6 +36,8 @@ HISTORIES = [
     History(
         "e", TIMES, BULGE, RecordedLoading(Program([0, 5], [0, 8.1]), "pressure"), 1075.6, specimen="bulge-of-mine"
     ),
+    History("g", TIMES, {"strain": [0, 1, 2]}, constant_stress(100.0), 900.0, rupture_time=7.1e5 / 1.01),
+    History("h", TIMES, {"strain": [0, 1, 2]}, constant_stress(100.0), 900.0, unruptured=True),
     History("f", TIMES, {"strain": [0, 1, 2]}, RecordedLoading(Program([0, 5], [0, 8]), "stress", "stress"), 900.0),
 ]
 
@@ -43,7 +45,7 @@ HISTORIES = [
 def assert_same(one: History, two: History) -> None:
     for name in ("name", "loading", "temperature", "specimen", "elastic", "strain_measure", "includes_elastic"):
         assert getattr(one, name) == getattr(two, name), name
-    for name in ("geometry", "operator", "alloy", "labels"):
+    for name in ("geometry", "operator", "alloy", "labels", "rupture_time", "unruptured"):
         assert getattr(one, name) == getattr(two, name), name
     np.testing.assert_array_equal(one.times, two.times, strict=True)
     np.testing.assert_array_equal(one.used, two.used, strict=True)

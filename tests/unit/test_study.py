@@ -101,7 +101,7 @@ def test_a_simulation_that_bursts_ends_there() -> None:
 
     assert run.times.tolist() == [1.0, 2.0]
     assert (run.status, run.end_time, run.reason) == (Status.BURST, 3.0, "burst")
-    assert run.labels == {"ended": "burst", "burst_s": "3"}
+    assert (run.labels, run.rupture_time) == ({"ended": "burst"}, 3.0)
     assert str(run) == "simulated: ended at 3 s (burst); 2 frames to 2 s, where strain 0.0002"
 
 

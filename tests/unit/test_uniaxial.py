@@ -117,7 +117,7 @@ def test_a_burst_keeps_the_history_so_far() -> None:
     np.testing.assert_allclose(run.outputs["strain"], -np.log1p(-0.4 * run.times) / 4, rtol=1e-4)
     assert run.times.tolist() == [1.0, 2.0]
     assert run.reason == "creep strain reached the strain limit"
-    assert run.labels == {"ended": run.reason, "burst_s": f"{run.end_time:.6g}"}
+    assert (run.labels, run.rupture_time) == ({"ended": run.reason}, run.end_time)
     result = Uniaxial().predict(NORTON, fast, [history(loading=constant_stress(100.0), times=[1.0, 2.0, 1e3])])
     assert result.status[0, 0] == Status.BURST
     assert np.isfinite(result.of(0)[:2]).all()

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from creepkit.cli import check, demo, identify, laws, new_law, plugins, simulate
+from creepkit.cli import check, demo, export, identify, laws, new_law, plugins, simulate, specimens
 from creepkit.errors import CreepkitError, PluginError
 
 
@@ -54,11 +54,13 @@ app = typer.Typer(
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "laws": laws.command,
+    "specimens": specimens.command,
     "plugins": plugins.command,
     "check": check.command,
     "new-law": new_law.command,
     "simulate": simulate.command,
     "identify": identify.command,
+    "export": export.command,
     "demo": demo.command,
 }
 

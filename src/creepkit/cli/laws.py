@@ -49,11 +49,14 @@ def _record(found: Registered[CreepLaw]) -> dict[str, Any]:
         "fingerprint": law.fingerprint,
         "terms": {label: str(term) for label, term in law.terms.items()},
         "parameters": {
-            name: {"meaning": p.meaning, "unit": p.unit, "bounds": p.bounds, "scale": p.scale, "off": p.off}
+            name: {
+                "meaning": p.meaning, "unit": p.unit, "bounds": p.bounds, "scale": p.scale, "off": p.off,
+                "limits": None if p.limits is None else [x if abs(x) < float("inf") else None for x in p.limits],
+            }
             for name, p in table
         },
         "states": {symbol.name: {"rate": str(s.rate), "initial": s.initial} for symbol, s in law.states.items()},
         "constraints": [str(relation) for relation in law.constraints],
         "references": list(law.references),
         "latex": law.latex(),
-    }
+    }  # fmt: skip

@@ -1,41 +1,22 @@
-"""`creepkit new-law`: a law plugin to start from, in one file."""
+"""`creepkit new-law`: a law plugin to start from, as an installable package or as one file."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
-from string import Template
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-TEMPLATE = Template('''\
-"""$title: say here in one line what the law describes."""
-
-from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress
-
-A, n = parameters("A n")
-
-$constant = CreepLaw(
-    name="$name",
-    title="$title",
-    terms={"power law": A * stress**n},
-    params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0),
-        n: Param("stress exponent", bounds=(1, 8)),
-    },
-    references=("Author (year), journal volume, page",),
-)
+if TYPE_CHECKING:
+    from string import Template
 
 
-@hookimpl
-def creepkit_laws():
-    return [$constant]
-''')
-
-
-def command(name: Annotated[str, typer.Argument(help="Name of the law, such as 'my-law'.")]) -> None:
-    """Write a law plugin of some 20 lines to start from."""
+def command(
+    name: Annotated[str, typer.Argument(help="Name of the law, such as 'my-law'.")],
+    file: Annotated[bool, typer.Option("--file", help="One file, for --plugin and CREEPKIT_PLUGINS.")] = False,
+) -> None:
+    """Write a law of some 20 lines to start from, in a package that pip installs."""
     from creepkit import registry
     from creepkit.errors import LawError
 
@@ -43,21 +24,58 @@ def command(name: Annotated[str, typer.Argument(help="Name of the law, such as '
         raise typer.BadParameter(f"'{name}' is not a law's name: use lower-case words joined by '-', such as my-law")
     if name in registry.default().laws():
         raise LawError(f"there is a law '{name}' already; choose another name, see 'creepkit laws'")
-    path = _write(name)
-    typer.echo(f"wrote {path}; next: edit its terms and params, then run 'creepkit check {path}'")
+    typer.echo(_write_file(name) if file else _write_package(name))
 
 
-def _write(name: str) -> Path:
-    """Write the file, which must not exist."""
-    stem = name.replace("-", "_")
-    path = Path(f"{stem}.py")
+def _write_file(name: str) -> str:
+    """Write the law alone; say what to do next."""
+    from creepkit.cli.new_law_texts import LAW
+
+    path = Path(f"{name.replace('-', '_')}.py")
+    _refuse(path)
+    path.write_text(_filled(LAW, name), encoding="utf-8")
+    return (
+        f"wrote {path}; next: edit its terms and params, then run 'creepkit check {path}', "
+        f"and 'creepkit --plugin {path}' before any other command"
+    )
+
+
+def _write_package(name: str) -> str:
+    """Write a folder with the law, its project file, README and test; say what to do next."""
+    from creepkit.cli.new_law_texts import LAW, PROJECT, README, TEST
+
+    folder, module = Path(name), _module(name)
+    _refuse(folder)
+    (folder / "tests").mkdir(parents=True)
+    texts = {
+        f"{module}.py": LAW,
+        "pyproject.toml": PROJECT,
+        "README.md": README,
+        f"tests/test_{name.replace('-', '_')}.py": TEST,
+    }
+    for path, text in texts.items():
+        (folder / path).write_text(_filled(text, name), encoding="utf-8")
+    law = folder / f"{module}.py"
+    return (
+        f"wrote {folder}/ ({', '.join(texts)})\n"
+        f"next: edit the terms and params in {law}, run 'creepkit check {law}', then 'pip install -e ./{folder}': "
+        f"from then on every command knows the law '{name}'"
+    )
+
+
+def _module(name: str) -> str:
+    return f"creepkit_{name.replace('-', '_')}"
+
+
+def _filled(text: Template, name: str) -> str:
     title = name.replace("-", " ").capitalize()
-    text = TEMPLATE.substitute(name=name, title=title, constant=stem.upper())
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        from creepkit.errors import PluginError
+    constant = name.replace("-", "_").upper()
+    return text.substitute(name=name, title=title, constant=constant, module=_module(name), package=f"creepkit-{name}")
 
-        raise PluginError(f"{path} exists already; it was left as it is, choose another name or move it") from None
-    return path
+
+def _refuse(path: Path) -> None:
+    """What exists is left as it is."""
+    from creepkit.errors import PluginError
+
+    if path.exists():
+        raise PluginError(f"{path} exists already; it was left as it is, choose another name or move it")

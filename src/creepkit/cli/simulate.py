@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit.cli.loads import BULGE, POINT, RELAXATION, UNIAXIAL, loading_of, numbers, refuse_strangers, steps
+
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
     from creepkit.language import CreepLaw
-    from creepkit.records import History, Loading, Program, Specimen
+    from creepkit.records import History, Program, Specimen
 
-BULGE, UNIAXIAL = "bulge", "uniaxial"
-RAMP = 5.0
-"""s, in which each pressure is reached."""
 FRAMES, EVERY = 200, 150.0
 """Frames of a bar; s between those of a dimple, as its cameras take them."""
 
@@ -24,9 +23,16 @@ def command(
     law: Annotated[str, typer.Argument(metavar="LAW", help="Name of a law.")],
     value: Annotated[list[str], typer.Option("--set", metavar="NAME=VALUE", help="A parameter's value.")],
     end_h: Annotated[float, typer.Option(help="End of the test, h.")],
-    specimen: Annotated[str, typer.Option(help="uniaxial or bulge.")] = UNIAXIAL,
+    specimen: Annotated[
+        str, typer.Option(help="uniaxial, relaxation, point, bulge or a plugin's; see 'creepkit specimens'.")
+    ] = UNIAXIAL,
     stress: Annotated[
-        list[str] | None, typer.Option(metavar="[S:]MPA", help="Of a bar, from S seconds on; several are steps.")
+        list[str] | None,
+        typer.Option(metavar="[NN=][S:]MPA", help="Of a bar, from S seconds on; of a point, of component NN (11=80)."),
+    ] = None,
+    strain: Annotated[
+        list[str] | None,
+        typer.Option(metavar="[NN=][S:]STRAIN", help="Total strain of a bar in relaxation, or of a point's component."),
     ] = None,
     pressure: Annotated[
         list[str] | None, typer.Option(metavar="[S:]MPA", help="On a dimple, from S seconds on, after a ramp of 5 s.")
@@ -34,11 +40,14 @@ def command(
     temperature_c: Annotated[
         list[str] | None, typer.Option(metavar="[S:]C", help="Temperature, C; 20 unless the law depends on it.")
     ] = None,
-    modulus_gpa: Annotated[float | None, typer.Option(help="Young's modulus, GPa; a dimple needs it.")] = None,
+    modulus_gpa: Annotated[
+        float | None, typer.Option(help="Young's modulus, GPa; a dimple and a prescribed strain need it.")
+    ] = None,
     geometry: Annotated[
         list[str] | None, typer.Option(metavar="NAME=MM", help="A length of the dimple, such as apex_thickness=0.48.")
     ] = None,
     control: Annotated[str | None, typer.Option(help="Of a bar: load (held in each step) or stress (true).")] = None,
+    ramp: Annotated[float | None, typer.Option(min=0, help="Of a strain: s in which each is reached.")] = None,
     points: Annotated[int | None, typer.Option(min=2, help="Number of frames; 200 of a bar.")] = None,
     every: Annotated[float | None, typer.Option(help="Or s from frame to frame; 150 of a dimple.")] = None,
     to: Annotated[Path | None, typer.Option(help="CSV file to write; by default it is printed.")] = None,
@@ -46,35 +55,31 @@ def command(
         Path | None, typer.Option(help="Picture of the dimple's section at the end, coloured by stress.")
     ] = None,
 ) -> None:
-    """Simulate a creep test of a bar or of a dimple."""
+    """Simulate a creep test: of a bar, of a bar in relaxation, of a material point or of a dimple."""
     from creepkit import study
     from creepkit.errors import SolveError
     from creepkit.language import Elastic
 
-    for_bulge: dict[str, object] = {"--pressure": pressure, "--geometry": geometry, "--picture": picture}
-    for_bars: dict[str, object] = {"--stress": stress, "--control": control}
-    if specimen not in (BULGE, UNIAXIAL):
-        raise SolveError(f"--specimen {specimen} is not known; allowed are {UNIAXIAL} and {BULGE}")
-    _refuse(specimen, for_bars if specimen == BULGE else for_bulge)
+    body = study.specimen(specimen)
+    given = {"--stress": stress, "--strain": strain, "--pressure": pressure, "--control": control, "--ramp": ramp}
+    refuse_strangers(specimen, {**given, "--geometry": geometry, "--picture": picture})
     chosen = study.law(law)
     if not 0 < end_h < 1e9:
         raise SolveError(f"--end-h {end_h:g} is not a time above zero (and below 1e9 h)")
     times = _times(3600.0 * end_h, points, every, specimen)
-    if specimen == BULGE:
-        loading, body = _by_pressure(pressure, times[-1]), _dimple(geometry)
-        if modulus_gpa is None:
-            raise SolveError("a dimple needs a modulus: give --modulus-gpa, such as 150")
-    else:
-        loading, body = _by_stress(stress, control), study.specimen(UNIAXIAL)
+    loading = loading_of(specimen, stress, strain, pressure, control, ramp, float(times[-1]))
+    if modulus_gpa is None and (specimen in (BULGE, RELAXATION) or (specimen == POINT and strain)):
+        what = "a dimple" if specimen == BULGE else "a prescribed strain"
+        raise SolveError(f"{what} needs a modulus: give --modulus-gpa, such as 150")
     run = study.simulate(
         chosen,
-        body,
-        _numbers(value, "--set", "n=5.2"),
+        _with_geometry(body, geometry),
+        numbers(value, "--set", "n=5.2"),
         loading=loading,
         times=times,
         temperature=_temperature(chosen, temperature_c),
         elastic=None if modulus_gpa is None else Elastic(1e3 * modulus_gpa),
-        name=chosen.name,
+        name=chosen.name if to is None else to.stem,
     )
     if run.reason:
         typer.echo(f"the test ended at {run.end_time / 3600:.4g} h: {run.reason}; the history ends there", err=True)
@@ -94,20 +99,8 @@ def _temperature(law: CreepLaw, texts: Sequence[str] | None) -> float | Program 
         if law.uses(temperature):
             raise SolveError(f"law '{law.name}' depends on temperature: give --temperature-c")
         return None
-    steps = [(start, celsius + ZERO_CELSIUS) for start, celsius in _steps(texts, "--temperature-c")]
-    return steps[0][1] if len(steps) == 1 and steps[0][0] == 0.0 else Program.steps(steps)
-
-
-def _refuse(specimen: str, options: dict[str, object]) -> None:
-    """Options of the other specimen would go unheard."""
-    from creepkit.errors import SolveError
-
-    other = UNIAXIAL if specimen == BULGE else BULGE
-    for option, given in options.items():
-        if given not in (None, []):
-            raise SolveError(
-                f"{option} belongs to --specimen {other}, found --specimen {specimen}; leave one of them out"
-            )
+    levels = [(start, celsius + ZERO_CELSIUS) for start, celsius in steps(texts, "--temperature-c")]
+    return levels[0][1] if len(levels) == 1 and levels[0][0] == 0.0 else Program.steps(levels)
 
 
 def _write(run: History, to: Path | None) -> None:
@@ -138,77 +131,15 @@ def _times(end: float, points: int | None, every: float | None, specimen: str) -
     return np.append(inner, end)
 
 
-def _by_stress(texts: Sequence[str] | None, control: str | None) -> Loading:
-    from creepkit.errors import SolveError
-    from creepkit.records import StressSteps
-
-    if not texts:
-        raise SolveError("a bar needs a stress: give --stress, such as 100, or --specimen bulge with --pressure")
-    if control not in (None, "load", "stress"):
-        raise SolveError(f"--control {control} is not known; allowed are load and stress")
-    return StressSteps(tuple(_steps(texts, "--stress")), "stress" if control == "stress" else "load")
-
-
-def _by_pressure(texts: Sequence[str] | None, end: float) -> Loading:
-    """One or two pressures as a PressureJump, more as the program that they are."""
-    import numpy as np
-
-    from creepkit.errors import SolveError
-    from creepkit.records import PressureJump, Program, RecordedLoading
-
-    if not texts:
-        raise SolveError("a dimple needs a pressure: give --pressure, such as 8, or 7200:10 for a later step")
-    starts, pressures = np.array(_steps(texts, "--pressure")).T
-    if starts[0] != 0.0 or (np.diff(starts) < RAMP).any() or pressures.min() < 0.0:
-        raise SolveError(
-            f"--pressure {' '.join(texts)}: the first pressure starts at 0 s, none is negative, and each comes "
-            f"{RAMP:g} s or more after the one before, for the ramp takes that long"
-        )
-    if len(texts) <= 2 and pressures.min() > 0.0 and (len(texts) == 1 or starts[1] > RAMP):
-        change = starts[1] if len(texts) == 2 else max(end, 2 * RAMP)
-        return PressureJump(float(pressures[0]), float(pressures[-1]), float(change), RAMP)
-    times = np.stack([starts, starts + RAMP], axis=1).ravel()
-    values = np.repeat(np.append(0.0, pressures), 2)[1:-1]
-    return RecordedLoading(Program(times, values), "pressure")
-
-
-def _dimple(texts: Sequence[str] | None) -> Specimen:
-    from creepkit import study
+def _with_geometry(body: Specimen, texts: Sequence[str] | None) -> Specimen:
+    """The specimen with its lengths changed."""
     from creepkit.errors import SolveError, nearest
-    from creepkit.specimens.dimple import DimpleGeometry
 
-    lengths = _numbers(texts or (), "--geometry", "apex_thickness=0.48")
+    lengths = numbers(texts or (), "--geometry", "apex_thickness=0.48")
+    if not lengths:
+        return body
+    known = getattr(getattr(body, "geometry", None), "lengths", ())
     for name in lengths:
-        if name not in DimpleGeometry.lengths:
-            raise SolveError(f"--geometry: no length is called '{name}'; {nearest(name, DimpleGeometry.lengths)}")
-    body = study.specimen(BULGE)
-    return body.replace(**lengths) if lengths else body  # type: ignore[attr-defined]
-
-
-def _numbers(texts: Sequence[str], option: str, example: str) -> dict[str, float]:
-    from creepkit.errors import SolveError
-
-    values: dict[str, float] = {}
-    for text in texts:
-        name, _, number = text.partition("=")
-        name = name.strip()
-        if name in values:
-            raise SolveError(f"{option} {text}: {name} is given twice; keep one of them")
-        try:
-            values[name] = float(number)
-        except ValueError:
-            raise SolveError(f"{option} {text}: write NAME=NUMBER, such as {example}") from None
-    return values
-
-
-def _steps(texts: Sequence[str], option: str) -> list[tuple[float, float]]:
-    from creepkit.errors import SolveError
-
-    steps = []
-    for text in texts:
-        start, _, value = text.rpartition(":")
-        try:
-            steps.append((float(start or 0.0), float(value)))
-        except ValueError:
-            raise SolveError(f"{option} {text}: write a number, or SECONDS:NUMBER for a later step") from None
-    return steps
+        if name not in known:
+            raise SolveError(f"--geometry: no length is called '{name}'; {nearest(name, known)}")
+    return body.replace(**lengths)  # type: ignore[attr-defined, no-any-return]

@@ -1,5 +1,5 @@
-"""Laws with their values as text: LaTeX, plain Python, JSON and whatever plugins add."""
+"""Laws with their values as text: for people, for programs, and for the solvers of others."""
 
-from creepkit.export.writing import export_text, write_text
+from creepkit.export.writing import write_text
 
-__all__ = ["export_text", "write_text"]
+__all__ = ["write_text"]

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import ExportError
-from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.language.tree import law_from_json, law_to_json
+from creepkit.records import ValuedLaw
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
 
 FORMAT = "creepkit-valued-law"
 VERSION = 1
@@ -25,27 +28,20 @@ class JsonExporter:
     title: str = "JSON that creepkit reads back"
     suffix: str = ".json"
 
-    def text(self, law: CreepLaw, values: Mapping[str, float], notes: Sequence[str] = ()) -> str:
+    def text(self, source: ValuedLaw) -> str:
         """Return the document as text, indented."""
+        if not source.units.native:
+            raise ExportError(f"law '{source.law.name}': JSON holds a law in MPa and s, as creepkit reads it back")
         document = {
             "format": FORMAT,
             "version": VERSION,
             "units": {"stress": "MPa", "time": "s", "temperature": "K", "energy": "J/mol"},
             "gas_constant": GAS_CONSTANT,
-            "law": law_to_json(law),
-            "values": law.values(values),
-            "notes": list(notes),
+            "law": law_to_json(source.law),
+            "values": dict(source.values),
+            "notes": list(source.notes),
         }
         return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-@dataclass(frozen=True)
-class ValuedLaw:
-    """A law with its values, {parameter: number in its unit}, and notes."""
-
-    law: CreepLaw
-    values: Mapping[str, float]
-    notes: tuple[str, ...]
 
 
 def read_valued_law(text: str, source: str = "exported law") -> ValuedLaw:
@@ -62,7 +58,22 @@ def read_valued_law(text: str, source: str = "exported law") -> ValuedLaw:
     if not isinstance(notes, list) or any(type(note) is not str for note in notes):
         raise ExportError(f"{source}: 'notes' must be a list of texts")
     law = law_from_json(data["law"], source)
-    return ValuedLaw(law, law.values(values), tuple(notes))
+    return ValuedLaw(law, values, tuple(notes))
+
+
+def read_source(path: str | Path) -> Identification | ValuedLaw:
+    """Return what a JSON file holds: an identification that was saved, or a law that was exported."""
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ExportError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or 'not UTF-8 text'})") from None
+    data = _parsed(text, str(path))
+    if isinstance(data, dict) and data.get("format") == FORMAT:
+        return read_valued_law(text, str(path))
+    from creepkit.inverse.files import from_json
+
+    return from_json(data, str(path))
 
 
 def _parsed(text: str, source: str) -> Any:

@@ -3,15 +3,17 @@ r"""LaTeX: the equation, a table of the identified values, and Arrhenius' law in
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mpmath
 import sympy
 
+from creepkit.export.conversion import Converted, converted
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import Activation, LawPrinter, activation_of, equations_of
 from creepkit.language.symbols import GAS_CONSTANT
+from creepkit.records import ValuedLaw
 
 _ESCAPES = {
     "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "%": r"\%", "_": r"\_",
@@ -27,14 +29,15 @@ class LatexExporter:
     title: str = "LaTeX equation and table of values"
     suffix: str = ".tex"
 
-    def text(self, law: CreepLaw, values: Mapping[str, float], notes: Sequence[str] = ()) -> str:
+    def text(self, source: ValuedLaw) -> str:
         """Return an align environment and a tabular; notes become comments."""
-        values, printer = law.values(values), LawPrinter(law)
-        lines = [f"% {part}" for note in (law.title or law.name, *notes) for part in note.splitlines()]
+        law, numbers, printer = source.law, converted(source), LawPrinter(source.law)
+        lines = [f"% {part}" for note in (source.title, *source.notes) for part in note.splitlines()]
         lines += _aligned([row for left, right in equations_of(law, printer) for row in _rows(left, right)])
         lines += [rf"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
-        lines += _table(law, values, printer)
-        lines += _without_reference(law, values, printer)
+        lines += _table(law, numbers, printer)
+        lines += [] if source.units.native else [f"In this table, {escaped(numbers.reference)}."]
+        lines += _without_reference(law, numbers, printer)
         return "\n".join(lines) + "\n"
 
 
@@ -48,9 +51,9 @@ def _aligned(rows: Sequence[str]) -> list[str]:
     return [r"\begin{align*}", " \\\\\n".join(f"  {row}" for row in rows), r"\end{align*}"]
 
 
-def _table(law: CreepLaw, values: Mapping[str, float], printer: LawPrinter) -> list[str]:
+def _table(law: CreepLaw, numbers: Converted, printer: LawPrinter) -> list[str]:
     rows = [
-        (printer.doprint(symbol), param.meaning, values[symbol.name], param.unit)
+        (printer.doprint(symbol), param.meaning, numbers.values[symbol.name], numbers.units[symbol.name])
         for symbol, param in law.params.items()
     ]
     rows += [(f"{printer.doprint(s)}(0)", state.meaning, state.initial, state.unit) for s, state in law.states.items()]
@@ -115,14 +118,14 @@ def _activated(law: CreepLaw, term: sympy.Expr) -> _Activated | None:
     return _Activated(coefficients[0], active, sympy.Mul(*others, sympy.exp(sympy.Add(*remaining))))
 
 
-def _without_reference(law: CreepLaw, values: Mapping[str, float], printer: LawPrinter) -> list[str]:
+def _without_reference(law: CreepLaw, numbers: Converted, printer: LawPrinter) -> list[str]:
     """The law with A_inf exp(-Q/(R T)) in place of A exp[-(Q/R)(1/T - 1/T_ref)], and the value of every A_inf."""
     parts = {term: _activated(law, term) for term in law.terms.values()}
     if not any(parts.values()):
         return []
     right = [_far(part, printer) if part else printer.doprint(term) for term, part in parts.items()]
     rows = _rows(r"\dot{\varepsilon}_{cr}", right)
-    rows += [_far_value(law, part, values, printer) for part in parts.values() if part]
+    rows += [_far_value(law, part, numbers, printer) for part in parts.values() if part]
     return [f"% The same without a reference temperature, R = {GAS_CONSTANT} J/(mol K):", *_aligned(rows)]
 
 
@@ -133,15 +136,15 @@ def _far(part: _Activated, printer: LawPrinter) -> str:
     return f"{_infinite(printer.doprint(part.coefficient))} {rest}{factors}"
 
 
-def _far_value(law: CreepLaw, part: _Activated, values: Mapping[str, float], printer: LawPrinter) -> str:
+def _far_value(law: CreepLaw, part: _Activated, numbers: Converted, printer: LawPrinter) -> str:
     """A_inf = A exp[Q/(R T_ref)] and its number, which may lie far outside double range."""
     name = printer.doprint(part.coefficient)
     fractions = [rf"\frac{{{printer.doprint(f.Q)}}}{{R \cdot {f.T_ref:g}\,\mathrm{{K}}}}" for f in part.factors]
-    size = mpmath.mpf(values[part.coefficient.name])
+    size = mpmath.mpf(numbers.values[part.coefficient.name])
     for factor in part.factors:
-        energy = factor.Q.xreplace({s: sympy.Float(values[s.name]) for s in law.params})
+        energy = factor.Q.xreplace({s: sympy.Float(numbers.values[s.name]) for s in law.params})
         size *= mpmath.exp(mpmath.mpf(float(energy)) / (GAS_CONSTANT * factor.T_ref))
-    told = f"{number(size)} \\; {_upright(law.params[part.coefficient].unit)}"
+    told = f"{number(size)} \\; {_upright(numbers.units[part.coefficient.name])}"
     return rf"{_infinite(name)} &= {name} \exp\!\left[{' + '.join(fractions)}\right] = {told}"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ from numba import njit
 
 from creepkit.arrays import Floats, Ints, frozen
 from creepkit.errors import SolveError
+from creepkit.integration.arrivals import Arrivals
 from creepkit.integration.control import Settings
 from creepkit.integration.endings import (
     DIVERGED,
@@ -51,6 +52,7 @@ class PointTest:
 
     driving : MPa; stress, nominal stress under constant load, or E times the total strain in relaxation.
     temperature : K. times : (times,) s, non-decreasing. stiffness : MPa; 0 unless the strain is prescribed.
+    levels : (levels,) increasing creep strains whose times of arrival are wanted; until : s, integrate so far for them.
     """
 
     driving: Program
@@ -58,6 +60,8 @@ class PointTest:
     times: Floats
     stiffness: float = 0.0
     constant_load: bool = False
+    levels: Floats = field(default_factory=lambda: np.zeros(0))
+    until: float = 0.0
 
     def __post_init__(self) -> None:
         times = frozen(np.atleast_1d(self.times))
@@ -65,12 +69,21 @@ class PointTest:
             raise SolveError("output times must be finite, at or after 0 s, and must not decrease")
         if self.stiffness < 0 or (self.stiffness > 0 and self.constant_load):
             raise SolveError("stiffness must not be negative, and goes with prescribed strain, not with constant load")
+        levels = frozen(np.atleast_1d(self.levels))
+        if not np.isfinite(levels).all() or (np.diff(levels) < 0).any() or (levels <= 0).any():
+            raise SolveError("levels of creep strain must be finite, above 0, and must not decrease")
         object.__setattr__(self, "times", times)
+        object.__setattr__(self, "levels", levels)
 
     @cached_property
     def segments(self) -> Floats:
         """The programs merged, (segments, 6); kept, for a fit asks for them a thousand times."""
-        return segments_of(self.driving, self.temperature, end=float(self.times[-1]) if self.times.size else 0.0)
+        return segments_of(self.driving, self.temperature, end=self.end)
+
+    @property
+    def end(self) -> float:
+        """How far to integrate, s."""
+        return max(float(self.times[-1]) if self.times.size else 0.0, self.until)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +93,10 @@ class Integration:
     strain : (candidates, frames), NaN after an end; starts : (tests + 1,) where each test's frames begin.
     jacobian : (candidates, frames, P) or None, derivatives to the internal parameters.
     endings : (candidates, tests) codes, see REASONS; end_times : s; steps : (candidates, tests, 2) accepted, rejected.
+    end_jacobian : (candidates, tests, P) or None, derivatives of ln(end time) to the internal parameters; NaN unless
+        the test burst.
+    arrivals, arrival_slopes : (candidates, levels) s, and dp/d(ln t) there, NaN for levels that were not reached, tests
+        one behind another; arrival_jacobian : (candidates, levels, P) or None, of ln t.
     """
 
     strain: Floats
@@ -88,6 +105,10 @@ class Integration:
     endings: Ints
     end_times: Floats
     steps: Ints
+    end_jacobian: Floats | None
+    arrivals: Floats
+    arrival_slopes: Floats
+    arrival_jacobian: Floats | None
 
     @property
     def status(self) -> Ints:
@@ -114,6 +135,7 @@ def integrate(
     candidates, parameters = theta.shape
     segments = [t.segments for t in tests]
     starts = np.concatenate([[0], np.cumsum([t.times.size for t in tests], dtype=np.int64)])
+    rungs = np.concatenate([[0], np.cumsum([t.levels.size for t in tests], dtype=np.int64)])
     cuts = np.concatenate([[0], np.cumsum([s.shape[0] for s in segments], dtype=np.int64)])
     frames, rows = int(starts[-1]), candidates if jacobian else 0
     strain = np.full((candidates, frames), np.nan)
@@ -121,6 +143,10 @@ def integrate(
     endings = np.zeros((candidates, len(tests)), dtype=np.int64)
     end_times = np.zeros((candidates, len(tests)))
     steps = np.zeros((candidates, len(tests), 2), dtype=np.int64)
+    end_changes = np.full((rows, len(tests), parameters), np.nan)
+    levels = int(rungs[-1])
+    arrivals, slopes = (np.full((candidates, levels), np.nan) for _ in range(2))
+    arrival_changes = np.full((rows, levels, parameters), np.nan)
     drives = np.array([[t.stiffness, float(t.constant_load)] for t in tests]).reshape(-1, 2)
     integrate_batch(
         law.update,
@@ -142,8 +168,18 @@ def integrate(
         endings,
         end_times,
         steps,
+        end_changes,
+        np.concatenate([*(t.levels for t in tests), np.zeros(0)]),
+        rungs,
+        arrivals,
+        slopes,
+        arrival_changes,
     )
-    return Integration(strain, starts, changes if jacobian else None, endings, end_times, steps)
+    if not jacobian:
+        return Integration(strain, starts, None, endings, end_times, steps, None, arrivals, slopes, None)
+    return Integration(
+        strain, starts, changes, endings, end_times, steps, end_changes, arrivals, slopes, arrival_changes
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -167,16 +203,31 @@ def integrate_batch(
     endings: Ints,
     end_times: Floats,
     steps: Ints,
+    end_jacobian: Floats,
+    levels: Floats,
+    rungs: Ints,
+    arrivals: Floats,
+    arrival_slopes: Floats,
+    arrival_jacobian: Floats,
 ) -> None:
     """Integrate candidates x tests without returning to Python; arrays as in Integration, tests laid end to end."""
     work = room(initial.size, theta.shape[1], tableau.c.size)
-    nothing = np.zeros((0, theta.shape[1]))
+    nothing, unused = np.zeros((0, theta.shape[1])), np.zeros(theta.shape[1])
     for c in range(theta.shape[0]):
         kernel = Kernel(theta[c], beta[c], Limits(settings.strain_limit, initial, limits))
         for k in range(drives.shape[0]):
             drive = Drive(drives[k, 0], drives[k, 1], axes)
             first, last = starts[k], starts[k + 1]
-            changes = jacobian[c, first:last] if jacobian.shape[0] > 0 else nothing
+            low, high = rungs[k], rungs[k + 1]
+            exact = jacobian.shape[0] > 0
+            changes = jacobian[c, first:last] if exact else nothing
+            goal = Arrivals(
+                levels[low:high],
+                arrivals[c, low:high],
+                arrival_slopes[c, low:high],
+                arrival_jacobian[c, low:high] if exact else nothing,
+                end_jacobian[c, k] if exact else unused,
+            )
             ending = integrate_point(
                 update,
                 sensitivity,
@@ -189,6 +240,7 @@ def integrate_batch(
                 work,
                 strain[c, first:last],
                 changes,
+                goal,
             )
             endings[c, k], end_times[c, k] = ending.code, ending.time
             steps[c, k, 0], steps[c, k, 1] = ending.steps, ending.rejected

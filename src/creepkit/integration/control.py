@@ -82,14 +82,16 @@ def strain_error(
 
 @njit(cache=True, error_model="numpy")
 def change_error(tableau: Tableau, work: Room, settings: Settings, h: float, ahead: float) -> float:
-    """Largest local error of the sensitivities of strain over what is allowed."""
-    worst = 0.0
+    """Largest local error of the sensitivities of strain over what is allowed: of ten strains, or of themselves.
+
+    Before a rupture they grow without end, for there strain is vertical over time.
+    """
+    worst, reach = 0.0, _SENSITIVITY_SLACK * (work.new_value[0] * ahead + settings.smallest)
     for p in range(work.change.shape[1]):
         total = 0.0
         for i in range(tableau.c.size):
             total += tableau.error[i] * work.slope_changes[i, 0, p]
-        worst = max(worst, abs(h * total))
-    worst /= _SENSITIVITY_SLACK * settings.rtol * (work.new_value[0] * ahead + settings.smallest)
+        worst = max(worst, abs(h * total) / (settings.rtol * max(reach, abs(work.new_change[0, p]))))
     return worst if isfinite(worst) else inf
 
 

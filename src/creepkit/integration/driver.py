@@ -18,10 +18,7 @@ from creepkit.integration.tableau import SDIRK2, Tableau
 from creepkit.integration.tensor_march import March, segments_along
 from creepkit.integration.tensor_point import EQUIVALENT, TensorPoint
 from creepkit.kernels.interface import CompiledLaw
-from creepkit.records import Program, Status
-
-COMPONENTS = ("11", "22", "33", "12", "23", "13")
-"""Names of the six components, in the order of every vector here."""
+from creepkit.records import COMPONENTS, Program, Status
 
 _BURST = (STRAIN_LIMIT, STATE_LIMIT, DIVERGED)
 

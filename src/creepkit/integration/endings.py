@@ -33,6 +33,15 @@ def _passed(limits: Limits, i: int, value: float) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
+def first_passed(limits: Limits, tableau: Tableau, work: Room, h: float, x: float) -> int:
+    """Which unknown is at its limit at the share `x` of the step: 0 is strain, then the states."""
+    for i in range(limits.states.size):
+        if _passed(limits, i, dense_value(tableau, work, h, x, 1 + i)):
+            return 1 + i
+    return 0
+
+
+@njit(cache=True, error_model="numpy")
 def limit_reached(limits: Limits, work: Room) -> int:
     """STATE_LIMIT or STRAIN_LIMIT when the new value has passed one, else REACHED_END."""
     for i in range(limits.states.size):

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from creepkit.arrays import Floats
+from creepkit.integration.arrivals import Arrivals, arrive, log_time_change
 from creepkit.integration.clock import Clock, moment, position
 from creepkit.integration.control import (
     VIRGIN_CAUTION,
@@ -26,6 +27,7 @@ from creepkit.integration.endings import (
     TOO_MANY_STEPS,
     Limits,
     crossing,
+    first_passed,
     limit_reached,
 )
 from creepkit.integration.pacing import choose_clock, move_clock
@@ -47,9 +49,10 @@ class Kernel(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """done : output times filled; steps, rejected : how many; code, time : how it ended and where, s."""
+    """done, reached : output times filled, levels reached; steps, rejected : how many; code, time : its end, s."""
 
     done: int
+    reached: int
     steps: int
     rejected: int
     code: int
@@ -69,17 +72,30 @@ def integrate_point(
     work: Room,
     strain: Floats,
     jacobian: Floats,
+    arrivals: Arrivals,
 ) -> Progress:
-    """Integrate from time zero and fill `strain` (times,) and `jacobian` (times, P) up to the end that is reached.
+    """Integrate from time zero; fill `strain` (times,), `jacobian` (times, P), `arrivals` up to the end reached.
 
     segments : (segments, 6); times : (times,) s, non-decreasing, none beyond the last segment.
     jacobian : (times, P), or (0, P) to do without.
     """
-    progress = Progress(_start(kernel, times, work, strain, jacobian), 0, 0, REACHED_END, 0.0)
+    progress = Progress(_start(kernel, times, work, strain, jacobian), 0, 0, 0, REACHED_END, 0.0)
     for k in range(segments.shape[0]):
         segment = segment_of(segments[k])
         progress = _integrate_segment(
-            update, sensitivity, kernel, drive, segment, times, settings, tableau, work, strain, jacobian, progress
+            update,
+            sensitivity,
+            kernel,
+            drive,
+            segment,
+            times,
+            settings,
+            tableau,
+            work,
+            strain,
+            jacobian,
+            arrivals,
+            progress,
         )
         if progress.code != REACHED_END:
             break
@@ -115,10 +131,11 @@ def _integrate_segment(
     work: Room,
     strain: Floats,
     jacobian: Floats,
+    arrivals: Arrivals,
     progress: Progress,
 ) -> Progress:
     """March over one segment in the position s of its clock, from 0 to 1."""
-    done, steps, rejected = progress.done, progress.steps, progress.rejected
+    done, reached, steps, rejected = progress.done, progress.reached, progress.steps, progress.rejected
     clock, rate = choose_clock(update, kernel.theta, kernel.beta, drive, segment, work.value, work)
     if jacobian.shape[0] > 0:
         due = min(times[done], segment.end) if done < times.size else segment.end
@@ -129,9 +146,12 @@ def _integrate_segment(
     while s < 1.0:
         h = fitted(s, h, settings.longest)
         if steps + rejected >= settings.max_steps:
-            return Progress(done, steps, rejected, TOO_MANY_STEPS, _time_at(clock, s))
+            return Progress(done, reached, steps, rejected, TOO_MANY_STEPS, _time_at(clock, s))
         if not (h >= _SMALLEST_STEP * s and h >= _SMALLEST_FIRST_STEP):
-            return Progress(done, steps, rejected, _why_small(s, slope, settings), _time_at(clock, s))
+            code = _why_small(s, slope, settings)
+            if code == DIVERGED and jacobian.shape[0] > 0:
+                _diverged(clock, work, s, slope, arrivals)
+            return Progress(done, reached, steps, rejected, code, _time_at(clock, s))
         error = _attempt(
             update, sensitivity, kernel, drive, segment, clock, settings, tableau, work, s, h, slope, first, jacobian
         )
@@ -143,13 +163,17 @@ def _integrate_segment(
         code = limit_reached(kernel.limits, work)
         share = 1.0 if code == REACHED_END else crossing(kernel.limits, tableau, work, h)
         done = _fill(clock, tableau, work, s, h, share, times, done, strain, jacobian)
+        reached = arrive(clock, tableau, work, s, h, share, arrivals, reached)
         if code != REACHED_END:
-            return Progress(done, steps, rejected, code, _time_at(clock, s + share * h))
+            if jacobian.shape[0] > 0:
+                ended = first_passed(kernel.limits, tableau, work, h, share)
+                log_time_change(clock, tableau, work, s, h, share, ended, arrivals.end_change)
+            return Progress(done, reached, steps, rejected, code, _time_at(clock, s + share * h))
         _accept(work)
         slope = work.slopes[tableau.c.size - 1, 0]
         s = 1.0 if h == 1.0 - s else s + h
         h, growing = h * stretch(tableau, error, growing), True
-    return Progress(done, steps, rejected, REACHED_END, segment.end)
+    return Progress(done, reached, steps, rejected, REACHED_END, segment.end)
 
 
 @njit(cache=True, error_model="numpy")
@@ -202,6 +226,15 @@ def _time_at(clock: Clock, s: float) -> float:
 def _why_small(s: float, slope: float, settings: Settings) -> int:
     """A step that shrinks to nothing while the rate would burst the point at once: the rate diverges."""
     return DIVERGED if slope * max(s, 1e-6) > settings.strain_limit else STEP_TOO_SMALL
+
+
+@njit(cache=True, error_model="numpy")
+def _diverged(clock: Clock, work: Room, s: float, slope: float, arrivals: Arrivals) -> None:
+    """The derivative of the end where the rate diverges: there strain is vertical over time."""
+    now = moment(clock, s)
+    pace = slope * now.time / exp(now.log_pace)
+    for p in range(arrivals.end_change.size):
+        arrivals.end_change[p] = -work.change[0, p] / pace
 
 
 @njit(cache=True, error_model="numpy")

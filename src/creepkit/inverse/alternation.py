@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,7 +58,8 @@ def alternate(
         trust = trusts(residuals, working) if robust else before
         residuals = residuals.trusting(trust)
         working = weighting.working(residuals, working)
-        factor = whitener(residuals, working)
+        # A stopped test that says nothing here may say something a step further.
+        factor = whitener(replace(residuals, present=objective.entries.present), working)
         minimum = refine(
             objective, box, factor, x, loss=weighting.settings.loss, steps=effort.steps, tolerance=effort.tolerance
         )

@@ -27,7 +27,7 @@ def check_bounds(objective: Objective, u: Floats) -> None:
     law, coordinates, fences = objective.law, objective.coordinates, Fences(objective)
     theta = coordinates.theta(u)
     limit = PUSH * int(objective.entries.present.sum())
-    for k, beyond in zip(coordinates.rates, fences.outside(theta), strict=True):
+    for k, beyond in zip(coordinates.coefficients, fences.outside(theta), strict=True):
         name, param = law.names[k], law.table[law.names[k]]
         if fences.SLOPE**2 * abs(beyond) > limit:
             low, high = param.bounds

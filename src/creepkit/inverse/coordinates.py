@@ -1,14 +1,15 @@
-"""Well-conditioned coordinates: the log rate of each term at a reference point instead of its coefficient.
+"""Well-conditioned coordinates: the log rate of each term and state at a reference point instead of its coefficient.
 
 A and n are correlated to -0.99999 in raw form; ln of the term's rate at the middle of the measured stresses, and n,
 are nearly independent. With theta the internal parameters, u equals theta but for each term's coefficient ln A_i,
-which becomes u_i = ln f_i(reference; theta). The map is linear in ln A_i, so it inverts at once.
+which becomes u_i = ln f_i(reference; theta). The map is linear in ln A_i, so it inverts at once. The coefficient of an
+internal variable's rate becomes, likewise, the ln of that rate for the virgin material.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,7 +37,7 @@ class Reference:
         """
         levels = [float(np.exp(np.mean(np.log(np.maximum(stresses(h, using), 1e-6))))) for h in histories]
         times = [float(h.times[h.used][-1]) for h in histories]
-        strains = [end_strain(h) for h in histories]
+        strains = [end_strain(h, using) for h in histories]
         warmth = [float(np.mean(h.temperature_program().values)) for h in histories]
         middle = [float(np.exp(np.mean(np.log(v)))) for v in (levels, strains, times)]
         return cls(middle[0], 0.5 * middle[1], 0.5 * middle[2], float(np.median(warmth)))
@@ -54,11 +55,21 @@ class Coordinates:
             k = _coefficient(law, single)
             if k is not None:
                 self._terms.append((k, [law.names.index(n) for n in single.names], lower(single, "numpy")))
+        self.rates = tuple(k for k, _, _ in self._terms)
+        """Positions of the coordinates that are log rates of terms."""
+        for growth in _growths(law):
+            k = _coefficient(law, growth)
+            kernel = lower(growth, "numpy")
+            positions = [law.names.index(n) for n in growth.names]
+            if k is not None and k not in self.rates and self._is_finite(kernel, growth):
+                self._terms.append((k, positions, kernel))
+        self.growths = tuple(k for k, _, _ in self._terms if k not in self.rates)
+        """Positions of the coordinates that are log rates of internal variables."""
 
     @property
-    def rates(self) -> tuple[int, ...]:
-        """Positions of the coordinates that are log rates of terms."""
-        return tuple(k for k, _, _ in self._terms)
+    def coefficients(self) -> tuple[int, ...]:
+        """Positions of all of them."""
+        return self.rates + self.growths
 
     def theta(self, u: Floats) -> Floats:
         """Internal parameters of conditioned coordinates."""
@@ -106,18 +117,32 @@ class Coordinates:
             *(z.initial for z in law.states.values()),
         ]
 
+    def _is_finite(self, kernel: Kernel, growth: CreepLaw) -> bool:
+        """Whether a virgin internal variable grows at all in the middle of the bounds."""
+        middle = [0.5 * (p.to_internal(p.bounds[0]) + p.to_internal(p.bounds[1])) for p in growth.params.values()]
+        return bool(np.isfinite(self._log_rate(kernel, np.array(middle))))
+
     def _log_rate(self, kernel: Kernel, theta: Floats) -> Floats:
         return np.asarray(kernel.internal_log_rate(*self._point(kernel.law), *np.moveaxis(theta, -1, 0)), float)
 
 
+def _growths(law: CreepLaw) -> list[CreepLaw]:
+    """A law for each internal variable whose rate it is."""
+    found, inner = [], {p for state in law.states.values() for p in state.rate.free_symbols}
+    own = {p: param for p, param in law.params.items() if p in inner}
+    for symbol, state in law.states.items():
+        label = f"rate of {symbol}"
+        found.append(replace(law, terms={label: state.rate}, params=own, constraints=()))
+    return found
+
+
 def _coefficient(law: CreepLaw, single: CreepLaw) -> int | None:
-    """Position of the one log-scale parameter that multiplies this term and no other, if there is one."""
+    """Position of the one log-scale parameter that multiplies this rate and stands in no other, if there is one."""
     from creepkit.kernels.logform import log_form
 
     (own,) = log_form(single).coefficients
     names = [single.names[k] for k in own]
-    shared = [
-        sum(symbol in term.free_symbols for term in law.terms.values()) for symbol in (law.symbol(n) for n in names)
-    ]
+    everything = [*law.terms.values(), *(state.rate for state in law.states.values())]
+    shared = [sum(symbol in each.free_symbols for each in everything) for symbol in (law.symbol(n) for n in names)]
     alone = [n for n, count in zip(names, shared, strict=True) if count == 1]
     return law.names.index(alone[0]) if alone else None

@@ -9,8 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from creepkit.records.prediction import Kind
 
 KIND = "creepkit identification"
-VERSION = 2
-"""Version 1 knew one output, strain, and no explicit nuisances."""
+VERSION = 3
+"""Version 1 knew one output, strain, and no explicit nuisances; version 2 did not know how tests ended."""
 
 
 class Strict(BaseModel):
@@ -76,6 +76,16 @@ class OutputPart(Strict):
     noise: float = Field(ge=0)
 
 
+class RupturePart(Strict):
+    """The end of one test."""
+
+    measured: float = Field(gt=0)
+    stopped: bool
+    predicted: float | Literal["inf"]
+    low: float | Literal["inf"]
+    high: float | Literal["inf"]
+
+
 class TestPart(Strict):
     """One test."""
 
@@ -87,6 +97,7 @@ class TestPart(Strict):
     rate_factor: float
     weight: float = Field(gt=0)
     outputs: list[OutputPart]
+    rupture: RupturePart | None
 
 
 class NuisancePart(Strict):
@@ -129,7 +140,7 @@ class Document(Strict):
     """The file."""
 
     kind: Literal["creepkit identification"]
-    version: Literal[2]
+    version: Literal[3]
     law: dict[str, Any]
     estimates: list[EstimatePart]
     u: list[float]

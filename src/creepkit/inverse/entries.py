@@ -1,6 +1,7 @@
 """What a fit compares: for each test the frames of all its outputs end to end, padded to the longest test.
 
-A uniaxial test is its strains; a bulge test its amplitudes, then its widths, then its shapes. Whatever acts on tests
+A uniaxial test is its strains, and its rupture time where that is known (a test that was stopped before says that it
+lasted so long); a bulge test its amplitudes, then its widths, then its shapes. Whatever acts on tests
 (covariance, least squares, intervals) sees one row of entries a test, each of which knows its output and its frame.
 """
 
@@ -13,8 +14,8 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
-from creepkit.inverse.scales import LOGARITHMIC, Scale, noise_of, scale_for, usable
-from creepkit.inverse.together import outputs_of
+from creepkit.inverse.scales import LOGARITHMIC, RUPTURE, Scale, noise_of, scale_for, usable
+from creepkit.inverse.together import lasts, outputs_of
 from creepkit.records import History, Prediction, Predictor
 
 
@@ -29,6 +30,8 @@ class Entries:
     measured, times : in the output's unit, and s.
     noise : typical standard deviation of a frame of each output, (outputs,), in its unit.
     loudness : noise of each entry over that.
+    whole : (tests,) which tests are compared over their whole life.
+    censored : (tests,) which of them were stopped before rupture.
     """
 
     outputs: tuple[str, ...]
@@ -41,25 +44,29 @@ class Entries:
     times: Floats
     noise: Floats
     loudness: Floats
+    whole: Bools
+    censored: Bools
 
     @classmethod
     def of(cls, histories: Sequence[History], using: Predictor, full: Sequence[History] | None = None) -> Entries:
         """The entries of histories; their noise is read off `full`, the same histories before frames were left out."""
         full = histories if full is None else full
-        own = [_outputs(h, using) for h in histories]
+        whole = np.array([h.ended and lasts(using, h) for h in histories])
+        own = [(*_outputs(h, using), *[RUPTURE][: int(w)]) for h, w in zip(histories, whole, strict=True)]
         outputs = tuple(dict.fromkeys(name for names in own for name in names))
         having = {name: [k for k, names in enumerate(own) if name in names] for name in outputs}
         scales = tuple(scale_for([histories[k] for k in having[name]], name) for name in outputs)
         noise, levels = np.zeros(len(outputs)), {}
-        for position, name in enumerate(outputs):
+        for position, name in ((k, n) for k, n in enumerate(outputs) if n != RUPTURE):
             of_tests = [_noise(full[k], histories[k], name) for k in having[name]]
             noise[position] = np.median([np.median(v) for v in of_tests])
             levels.update({(k, name): v for k, v in zip(having[name], of_tests, strict=True)})
-        rows = [[(n, np.flatnonzero(usable(h, n))) for n in names] for h, names in zip(histories, own, strict=True)]
+        rows = [[(n, _frames(h, n)) for n in names] for h, names in zip(histories, own, strict=True)]
         shape = len(histories), max(sum(f.size for _, f in row) for row in rows)
         blank = cls(
             outputs, scales, np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros(shape, bool),
             np.zeros(shape, bool), np.zeros(shape), np.ones(shape), noise, np.ones(shape),
+            whole, whole & np.array([h.unruptured for h in histories]),
         )  # fmt: skip
         for k, (history, row) in enumerate(zip(histories, rows, strict=True)):
             blank._fill(k, history, row, levels)
@@ -73,6 +80,9 @@ class Entries:
             reach, position = slice(start, start + frames.size), self.outputs.index(name)
             self.output[k, reach], self.frame[k, reach], self.present[k, reach] = position, frames, True
             self.leading[k, reach] = place == 0
+            if name == RUPTURE:
+                self.measured[k, reach] = self.times[k, reach] = history.rupture_time or history.times[-1]
+                continue
             self.measured[k, reach], self.times[k, reach] = history.outputs[name][frames], history.times[frames]
             level = levels[k, name][frames]
             if name not in LOGARITHMIC or name in history.standard_deviation:
@@ -101,16 +111,30 @@ class Entries:
         """(outputs,) numbers at each entry, (tests, entries)."""
         return np.asarray(of_outputs, float)[self.output]
 
+    @property
+    def ruptures(self) -> Bools:
+        """(tests, entries) which entries are rupture times, or times lasted."""
+        return np.asarray(self.present & self.spread([float(n == RUPTURE) for n in self.outputs]).astype(bool))
+
     def taken(self, array: Floats, found: Prediction) -> Floats:
-        """The entries out of an array like found.values: (candidates, tests, times, outputs, ...)."""
-        missing = [name for name in self.outputs if name not in found.outputs]
+        """The entries out of an array like found.values: (candidates, tests, times, outputs, ...).
+
+        Those of ruptures hold what stands first in the test: they are not among the outputs.
+        """
+        observed = [name for name in self.outputs if name != RUPTURE]
+        missing = [name for name in observed if name not in found.outputs]
         if missing:
             raise SolveError(
                 f"the predictor gave no output '{missing[0]}', which the histories have; it gave "
                 f"{', '.join(found.outputs)}"
             )
-        columns = np.array([found.outputs.index(name) for name in self.outputs])[self.output]
+        places = [found.outputs.index(name) if name != RUPTURE else 0 for name in self.outputs]
+        columns = np.array(places)[self.output]
         return np.asarray(array[:, np.arange(len(columns))[:, None], self.frame, columns])
+
+    def at_frames(self, array: Floats) -> Floats:
+        """The entries out of an array (candidates, tests, times, ...) that knows no outputs."""
+        return np.asarray(array[:, np.arange(len(self.frame))[:, None], self.frame])
 
     def _scaled(self, y: Floats, method: Callable[[Scale], Callable[[Floats], Floats]]) -> Floats:
         out = np.empty_like(y)
@@ -127,6 +151,10 @@ def _outputs(history: History, using: Predictor) -> tuple[str, ...]:
             f"history '{history.name}' has no output that is predicted; it has {', '.join(history.outputs) or 'none'}"
         )
     return names
+
+
+def _frames(history: History, name: str) -> Ints:
+    return np.zeros(1, np.int64) if name == RUPTURE else np.flatnonzero(usable(history, name))
 
 
 def _noise(full: History, seen: History, name: str) -> Floats:

@@ -24,8 +24,8 @@ class Fences:
     def __init__(self, objective: Objective) -> None:
         self.coordinates, self.unknowns, law = objective.coordinates, objective.unknowns, objective.law
         ends = [(p.to_internal(p.bounds[0]), p.to_internal(p.bounds[1])) for p in law.params.values()]
-        self.low = np.array([ends[k][0] for k in self.coordinates.rates])
-        self.high = np.array([ends[k][1] for k in self.coordinates.rates])
+        self.low = np.array([ends[k][0] for k in self.coordinates.coefficients])
+        self.high = np.array([ends[k][1] for k in self.coordinates.coefficients])
         self._constraints = _margins(law, objective)
 
     def values(self, x: Floats) -> Floats:
@@ -44,7 +44,7 @@ class Fences:
         """(fences, unknowns); constraints by central differences."""
         u, e = self._parts(x)
         theta = self.coordinates.theta(u)
-        rates = list(self.coordinates.rates)
+        rates = list(self.coordinates.coefficients)
         slopes = np.sign(self.outside(theta))[:, None] * self.coordinates.jacobian(u)[rates]
         columns = [np.zeros(0)] * u.size
         if self._constraints(theta).size:
@@ -63,7 +63,7 @@ class Fences:
 
     def outside(self, theta: Floats) -> Floats:
         """How far each coefficient lies beyond its bounds, in ln: above positive, below negative."""
-        own = theta[list(self.coordinates.rates)]
+        own = theta[list(self.coordinates.coefficients)]
         return np.asarray(np.maximum(own - self.high, 0.0) + np.minimum(own - self.low, 0.0))
 
 

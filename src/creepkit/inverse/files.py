@@ -12,8 +12,17 @@ from pydantic import ValidationError
 
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Reference
-from creepkit.inverse.document import KIND, VERSION, Document, ErrorsPart, ScatterPart, SettingsPart, TestPart
-from creepkit.inverse.findings import NuisanceEstimate, OutputMisfit, TestMisfit
+from creepkit.inverse.document import (
+    KIND,
+    VERSION,
+    Document,
+    ErrorsPart,
+    RupturePart,
+    ScatterPart,
+    SettingsPart,
+    TestPart,
+)
+from creepkit.inverse.findings import NuisanceEstimate, OutputMisfit, RuptureMisfit, TestMisfit
 from creepkit.inverse.identification import Identification, Settings
 from creepkit.inverse.measures import Errors
 from creepkit.inverse.scatter import OutputScatter, Scatter
@@ -61,7 +70,8 @@ def _plain(record: Any) -> dict[str, Any]:
 
 
 def _plain_test(m: TestMisfit) -> dict[str, Any]:
-    return {**_plain(m), "outputs": [{**_plain(o), "errors": _plain(o.errors)} for o in m.outputs]}
+    outputs = [{**_plain(o), "errors": _plain(o.errors)} for o in m.outputs]
+    return {**_plain(m), "outputs": outputs, "rupture": None if m.rupture is None else _plain(m.rupture)}
 
 
 def _plain_settings(s: Settings) -> dict[str, Any]:
@@ -100,8 +110,9 @@ def load(path: str | Path) -> Identification:
 
 def from_json(data: Any, source: str = "identification") -> Identification:
     """Rebuild an identification from JSON data, or say in one sentence what is wrong with it."""
-    if isinstance(data, dict) and data.get("kind") == KIND and data.get("version") == 1:
-        raise FitError(f"{source}: written by an earlier creepkit, in version 1 of the format; identify again")
+    if isinstance(data, dict) and data.get("kind") == KIND and data.get("version") in range(1, VERSION):
+        old = data["version"]
+        raise FitError(f"{source}: written by an earlier creepkit, in version {old} of the format; identify again")
     try:
         document = Document.model_validate(data)
     except ValidationError as error:
@@ -157,7 +168,12 @@ def _ends(bounds: tuple[float | None, float | None]) -> tuple[float, float]:
 def _test(t: TestPart) -> TestMisfit:
     rms, bias = (float("nan") if v is None else v for v in (t.rms, t.bias))
     outputs = tuple(OutputMisfit(o.output, _errors(o.errors), o.offset, o.noise) for o in t.outputs)
-    return TestMisfit(t.name, t.condition, t.frames, rms, bias, t.rate_factor, t.weight, outputs)
+    rupture = None if t.rupture is None else _rupture(t.rupture)
+    return TestMisfit(t.name, t.condition, t.frames, rms, bias, t.rate_factor, t.weight, outputs, rupture)
+
+
+def _rupture(r: RupturePart) -> RuptureMisfit:
+    return RuptureMisfit(r.measured, r.stopped, float(r.predicted), float(r.low), float(r.high))
 
 
 def _errors(e: ErrorsPart) -> Errors:

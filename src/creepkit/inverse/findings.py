@@ -24,13 +24,36 @@ class OutputMisfit:
 
 
 @dataclass(frozen=True)
+class RuptureMisfit:
+    """The end of one test.
+
+    measured : s, when it ruptured, or how long it lasted where it was `stopped` before.
+    predicted : s, by the law alone; infinite where the law never breaks it.
+    low, high : 95 % interval for a single test, from the parameters and the scatter between tests.
+    """
+
+    measured: float
+    stopped: bool
+    predicted: float
+    low: float
+    high: float
+
+    @property
+    def ratio(self) -> float:
+        """Predicted over measured."""
+        return self.predicted / self.measured
+
+
+@dataclass(frozen=True)
 class TestMisfit:
     """One test in the fit.
 
     frames : how many entries count (strains above twice the floor of their scale, all frames of other outputs).
     rms, bias : root mean square and mean of ln((predicted + offset) / measured) over its fitted strains, else NaN.
+        For a test compared over its whole life, of its distance in ln strain and ln time (see inverse.distance).
     rate_factor : estimated factor of this test's creep rate on the law's (heat-to-heat scatter).
     weight : of the test in the fit; below one where test_loss="student" found it far from the others.
+    rupture : its end, where that is known and predicted.
     """
 
     __test__ = False  # not a test case, whatever its name says to pytest
@@ -43,6 +66,7 @@ class TestMisfit:
     rate_factor: float = 1.0
     weight: float = 1.0
     outputs: tuple[OutputMisfit, ...] = ()
+    rupture: RuptureMisfit | None = None
 
     def __getitem__(self, output: str) -> OutputMisfit:
         for one in self.outputs:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -100,6 +100,35 @@ class Identification:
         middle, sd = band(lambda u: (up(u) - down(u)) / (2 * np.log(1.0005)), self.u, self.covariance)
         half = self._quantile * sd
         return middle, middle - half, middle + half
+
+    def rupture_time(
+        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, control: Literal["load", "stress"] = "load",
+        scatter: bool = True, using: Predictor | None = None,
+    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+        """When a bar will break, s, with its 95 % interval: (time, low, high), each of the broadcast shape.
+
+        stress MPa (nominal, held as `control` says); temperature K, by default that of the reference point.
+        scatter : whether the interval is that of a single test, which has its own rate, or that of the law alone.
+        Infinite where nothing breaks within some thousand times the longest test.
+        """
+        from creepkit.inverse.rupture import planned
+
+        T = self.reference.temperature if temperature is None else temperature
+        tests, shape = planned(stress, T, self.ranges["time"][1], control)
+        time, low, high = self.rupture_times(tests, scatter=scatter, using=using)
+        return time.reshape(shape), low.reshape(shape), high.reshape(shape)
+
+    def rupture_times(
+        self, histories: Sequence[History] | None = None, *, scatter: bool = True, using: Predictor | None = None
+    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+        """The same for histories (by default those that were fitted), whatever their loading: (tests,) each."""
+        from creepkit.inverse.rupture import rupture_times
+
+        predictor = using or self.using
+        if predictor is None:
+            raise FitError("this identification was loaded from a file: give using=, the specimen it was made with")
+        tests, own = list(histories or self.histories), self.scatter if scatter else None
+        return rupture_times(self.coordinates, self.u, self.covariance, own, self._quantile, tests, predictor)
 
     def predict(
         self, histories: Sequence[History] | None = None, using: Predictor | None = None, *, own: bool = True

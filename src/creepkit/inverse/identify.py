@@ -18,10 +18,12 @@ from creepkit.inverse.entries import Entries
 from creepkit.inverse.findings import NuisanceEstimate
 from creepkit.inverse.frames import thinned
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.life import check_effects
 from creepkit.inverse.misfits import misfits, pooled_errors, pooled_rms
-from creepkit.inverse.nominal import measured_log_rate
+from creepkit.inverse.nominal import measured_log_pace, measured_log_rate
 from creepkit.inverse.objective import Objective
 from creepkit.inverse.provenance import FEW_TESTS, notes, provenance, ranges
+from creepkit.inverse.rupture import rupture_misfits
 from creepkit.inverse.scatter import ASSUMED_RATE, full_guess
 from creepkit.inverse.search import Box, Minimum, Progress, from_single_terms, multistart
 from creepkit.inverse.settings import Settings
@@ -62,7 +64,9 @@ def identify(
     unknowns = Unknowns.of(settings.nuisances, thin, using)
     objective = Objective(law, thin, using, coordinates, entries, unknowns)
     check_growth(objective)
-    box, weighting = Box.of(law, coordinates, measured_log_rate(thin)), Weighting(settings, entries)
+    check_effects([n.kind for n in unknowns.nuisances], entries, thin, using)
+    box = Box.of(law, coordinates, measured_log_rate(thin, using), measured_log_pace(thin))
+    weighting = Weighting(settings, entries)
     stand_in = screening_of(using)
     effort = Effort() if stand_in is None else EXPENSIVE
     screened = 0
@@ -97,13 +101,15 @@ def _answer(
     found = predict(
         objective.using, law, coordinates.values(u), list(histories), effects=best.unknowns.effects(x[size:])
     )
-    tests = misfits(objective, residuals, expected_effects(residuals, scatter), histories, found)
+    inner = posterior[:size, :size]
+    ends = rupture_misfits(coordinates, u, inner, scatter, quantile(freedom), histories, objective.using)
+    tests = misfits(objective, residuals, expected_effects(residuals, scatter), histories, found, ends)
     own = _nuisances(best.unknowns, x[size:], np.sqrt(np.diag(posterior))[size:])
     return Identification(
         law=law,
-        estimates=estimates(law, coordinates, u, posterior[:size, :size], quantile(freedom)),
+        estimates=estimates(law, coordinates, u, inner, quantile(freedom)),
         u=u,
-        covariance=posterior[:size, :size],
+        covariance=inner,
         reference=coordinates.reference,
         scatter=scatter,
         rms=pooled_rms(tests),

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.findings import OutputMisfit, TestMisfit
+from creepkit.inverse.findings import OutputMisfit, RuptureMisfit, TestMisfit
 from creepkit.inverse.measures import Errors, errors
 from creepkit.inverse.objective import Objective
 from creepkit.inverse.residuals import Residuals
@@ -18,11 +18,12 @@ from creepkit.records import History, Prediction
 
 def misfits(
     objective: Objective, residuals: Residuals, effects: tuple[Floats, Floats], full: Sequence[History],
-    found: Prediction,
+    found: Prediction, ruptures: Sequence[RuptureMisfit | None],
 ) -> tuple[TestMisfit, ...]:  # fmt: skip
     """One TestMisfit for each test.
 
-    effects : offsets (tests, outputs) and ln rate factors (tests,); found : the prediction of the `full` histories.
+    effects : offsets (tests, outputs) and ln rate factors (tests,); found : the prediction of the `full` histories;
+    ruptures : how each of them ended.
     """
     offsets, log_factors = effects
     entries = objective.entries
@@ -39,7 +40,11 @@ def misfits(
             for name in outputs_of(objective.using, history) if name in own and usable(history, name).any()
         )  # fmt: skip
         factor, weight = float(np.exp(log_factors[k])), float(residuals.trust[k])
-        answer.append(TestMisfit(history.name, history.condition, r.size + linear, rms, bias, factor, weight, outputs))
+        answer.append(
+            TestMisfit(
+                history.name, history.condition, r.size + linear, rms, bias, factor, weight, outputs, ruptures[k]
+            )
+        )
     return tuple(answer)
 
 
@@ -50,15 +55,20 @@ def _of_output(history: History, name: str, predicted: Floats, offset: float) ->
 
 
 def _log_ratios(objective: Objective, residuals: Residuals, offset: Floats) -> Floats:
-    """ln((predicted + the test's offset) / measured) where the measured strain is above twice the floor, else NaN."""
+    """ln((predicted + the test's offset) / measured) where the measured strain is above twice the floor, else NaN.
+
+    For tests compared over their whole life, the distance instead.
+    """
     entries = objective.entries
     floor = entries.spread([s.floor if n in LOGARITHMIC else np.inf for n, s in zip(entries.outputs, entries.scales,
                                                                                   strict=True)])  # fmt: skip
-    predicted = entries.backward(residuals.values + objective.compared) + offset
+    vertical = np.where(entries.whole[:, None], 0.0, residuals.values)
+    predicted = entries.backward(vertical + objective.compared) + offset
     above = entries.present & (entries.measured > 2 * floor)
     measured = np.where(above, entries.measured, 1.0)
     shown = np.where(above, np.maximum(predicted, floor), 1.0)
-    return np.where(above, np.log(shown / measured), np.nan)
+    near = np.where(entries.whole[:, None], residuals.values + residuals.slopes * offset, np.log(shown / measured))
+    return np.where(above, near, np.nan)
 
 
 def pooled_rms(found: Sequence[TestMisfit]) -> float:

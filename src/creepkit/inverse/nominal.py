@@ -33,18 +33,23 @@ def stresses(history: History, using: Predictor | None = None) -> Floats:
     return STRESS_PER_PRESSURE * np.unique(levels[levels > 0])
 
 
-def end_strain(history: History) -> float:
-    """The largest strain that a test reached, as far as its outputs tell."""
+def end_strain(history: History, using: Predictor | None = None) -> float:
+    """The largest strain that a test reached, as far as its outputs tell; `using` may know what they mean."""
+    offered = None if using is None else getattr(predictor_of(using, history), "reference_strain", None)
+    if offered is not None:
+        return max(float(offered(history)), 1e-7)
     if "strain" in history.outputs:
         return max(float(np.max(history.outputs["strain"][usable(history, "strain")], initial=0.0)), 1e-7)
     return max(_amplitude_growth(history)[0] / AMPLITUDE_PER_STRAIN, 1e-7)
 
 
-def measured_log_rate(histories: Sequence[History]) -> float:
+def measured_log_rate(histories: Sequence[History], using: Predictor | None = None) -> float:
     """Median over tests of the log of strain over time: the scale of rates that the data speak of."""
     logs = []
     for history in histories:
-        if "strain" in history.outputs:
+        if using is not None and hasattr(predictor_of(using, history), "reference_strain"):
+            strain, time = end_strain(history, using), float(history.times[history.used][-1])
+        elif "strain" in history.outputs:
             last = int(np.flatnonzero(usable(history, "strain"))[-1])
             strain, time = float(history.outputs["strain"][last]), float(history.times[last])
         else:
@@ -52,6 +57,11 @@ def measured_log_rate(histories: Sequence[History]) -> float:
             strain = growth / AMPLITUDE_PER_STRAIN
         logs.append(np.log(max(strain, 1e-9) / time))
     return float(np.median(logs))
+
+
+def measured_log_pace(histories: Sequence[History]) -> float:
+    """Median over tests of -ln of how long they lasted, s: the pace of whatever ends them."""
+    return float(-np.median([np.log(h.rupture_time or h.times[-1]) for h in histories]))
 
 
 def _amplitude_growth(history: History) -> tuple[float, float]:

@@ -1,7 +1,8 @@
 """The objective: residuals of all tests on their scales, with exact Jacobians, in conditioned coordinates.
 
 A candidate that bursts before a test ends goes on from the ceiling of its scale and grows with ln(t / t_burst): the
-residual stays finite and keeps growing the earlier it burst, so a search can find its way back.
+residual stays finite and keeps growing the earlier it burst, so a search can find its way back. A test whose end is
+known is compared over its whole life instead: by its distance from the curve (see inverse.distance), and by its rupture.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from creepkit.inverse.effects import Unknowns
 from creepkit.inverse.entries import Entries
 from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.scales import LinearScale
+from creepkit.inverse.life import Compared, offset_slope, over_life, predict_life, time_jacobian
 from creepkit.inverse.together import predict
 from creepkit.language import CreepLaw
 from creepkit.records import History, Prediction, Predictor
@@ -54,12 +56,14 @@ class Objective:
 
     def screen(self, u: Floats) -> Floats:
         """Residuals without derivatives, unknowns of tests at their means: (candidates, parameters) to entries."""
-        effects = replace(self.unknowns, held=True).effects(np.zeros(0))
         values = author_values(self.law, self.coordinates.theta(u))
-        found = predict(self.using, self.law, values, self.histories, effects=effects)
+        if self.entries.whole.any():
+            found = predict_life(self.using, self.law, values, self.histories)
+        else:
+            effects = replace(self.unknowns, held=True).effects(np.zeros(0))
+            found = predict(self.using, self.law, values, self.histories, effects=effects)
         self.evaluations += len(u)
-        predicted = self.entries.taken(found.values, found)
-        return np.where(self.entries.present, self._extended(predicted, found.end_times) - self.compared, 0.0)
+        return np.where(self.entries.present, self._compared(self._predicted(found), found).values, 0.0)
 
     def excess(self, misfit: Floats) -> Floats:
         """(candidates,) by how much rates are too high, in ln: the median over what grows with creep.
@@ -77,9 +81,15 @@ class Objective:
             grown = now - np.take_along_axis(now, np.broadcast_to(first, (*now.shape[:2], 1)), axis=2)
             own = self.compared - np.take_along_axis(self.compared, first, axis=1)
             burst = np.maximum(now - scale.ceiling, 0.0)
-            ratio = np.log(np.maximum(grown, 1e-12) / np.maximum(own, 0.01)) + burst
-            logs = np.where(mine, np.where(own > 0.01, ratio, np.nan), logs)
+            same = np.maximum(grown * np.sign(own), 1e-12)  # a stress that relaxes falls in both
+            ratio = np.log(same / np.maximum(np.abs(own), 0.01)) + burst
+            logs = np.where(mine, np.where(np.abs(own) > 0.01, ratio, np.nan), logs)
         return np.array([np.nanmedian(each) if np.isfinite(each).any() else 0.0 for each in logs[:, entries.present]])
+
+    def early(self, misfit: Floats) -> Floats:
+        """(candidates,) by how much ruptures come too early, in ln: the median; 0 where no test ruptured."""
+        broken = self.entries.ruptures & ~self.entries.censored[:, None]
+        return np.median(misfit[:, broken], axis=1) if broken.any() else np.zeros(len(misfit))
 
     def at(self, x: Floats) -> Residuals:
         """Residuals of one candidate x = (u, e) with exact derivatives; the last few are remembered."""
@@ -92,19 +102,33 @@ class Objective:
     def _computed(self, x: Floats) -> Residuals:
         size, entries = len(self.law.params), self.entries
         u, e = x[:size], x[size:]
-        found = differentiated(
-            self.using, self.law, self.coordinates.theta(u), self.histories, self.unknowns.effects(e)
-        )
+        theta = self.coordinates.theta(u)
+        if entries.whole.any():
+            values = author_values(self.law, theta[None])
+            found = predict_life(self.using, self.law, values, self.histories, jacobian=True)
+        else:
+            found = differentiated(self.using, self.law, theta, self.histories, self.unknowns.effects(e))
         self.evaluations += 1
         assert found.jacobian is not None
-        predicted = entries.taken(found.values, found)[0]
-        values = self._extended(predicted[None], found.end_times)[0] - self.compared
-        alive = np.isfinite(predicted)
-        slopes = entries.slope(np.where(alive, predicted, 1.0))
-        inner = self._inner(found, slopes, alive)
-        effect = self._rate_effect(inner[..., :size], values)
+        predicted = self._predicted(found)
+        now, alive = self._compared(predicted, found), np.isfinite(predicted[0])
+        slopes = entries.slope(np.where(alive, predicted[0], 1.0))
+        inner = now.by_strain[0, ..., None] * self._inner(found, slopes, alive)
+        slopes = now.by_strain[0] * np.where(alive, slopes, 0.0)
+        if found.life is not None:
+            inner += now.by_time[0, ..., None] * time_jacobian(entries, found.life)[0]
+            slopes += now.by_time[0] * offset_slope(entries, found.life)[0]
+        effect = self._rate_effect(inner[..., :size], predicted[0], now)
         to_x = np.concatenate([inner[..., :size] @ self.coordinates.jacobian(u), inner[..., size:]], axis=-1)
-        return self._residuals(values, np.where(alive, slopes, 0.0), to_x, effect)
+        return self._residuals(now.values[0], slopes, to_x, effect, now.heard[0])
+
+    def _predicted(self, found: Prediction) -> Floats:
+        """What is predicted at the entries, (candidates, tests, entries); rupture times are compared on their own."""
+        return np.where(self.entries.ruptures, self.entries.measured, self.entries.taken(found.values, found))
+
+    def _compared(self, predicted: Floats, found: Prediction) -> Compared:
+        vertical = self._extended(predicted, found.end_times) - self.compared
+        return over_life(self.entries, vertical, np.isfinite(predicted), found)
 
     def _inner(self, found: Prediction, slopes: Floats, alive: Bools) -> Floats:
         """Derivatives of what is compared to internal parameters and unknowns of tests."""
@@ -118,30 +142,36 @@ class Objective:
         wide = np.where(np.isfinite(wide), wide, np.nan)
         return _held(wide, alive & self.entries.present, self.entries.output)
 
-    def _residuals(self, values: Floats, slopes: Floats, jacobian: Floats | None, effect: Floats) -> Residuals:
-        entries, mask = self.entries, self.entries.present
+    def _residuals(
+        self, values: Floats, slopes: Floats, jacobian: Floats | None, effect: Floats, heard: Bools | None = None
+    ) -> Residuals:
+        entries = self.entries
+        mask = entries.present if heard is None else entries.present & heard
         return Residuals(
             np.where(mask, values, 0.0), np.where(mask, slopes, 0.0), mask, entries.log_times,
             None if jacobian is None else np.where(mask[..., None], jacobian, 0.0), np.where(mask, effect, 0.0),
             entries.output, entries.loudness, np.ones(len(mask)),
         )  # fmt: skip
 
-    def _rate_effect(self, slopes: Floats, residual: Floats) -> Floats:
+    def _rate_effect(self, slopes: Floats, predicted: Floats, now: Compared) -> Floats:
         """Derivative of the compared quantity to ln of a factor on all rates of a test, (tests, entries).
 
-        The sum over the terms' coefficients; where a term has none of its own, the slope in ln t, which is the same
-        for a law without explicit time at constant stress (strain depends on factor x time alone).
+        The sum over the coefficients of terms and of internal variables; where one has none of its own, the slope in
+        ln t, which is the same for a law without explicit time at constant stress (strain depends on factor x time
+        alone).
         """
-        if len(self.coordinates.rates) == len(self.law.terms):
-            return np.asarray(slopes[..., list(self.coordinates.rates)].sum(axis=-1))
-        compared, entries = residual + self.compared, self.entries
+        coordinates = self.coordinates
+        if len(coordinates.coefficients) == len(self.law.terms) + len(self.law.states):
+            return np.asarray(slopes[..., list(coordinates.coefficients)].sum(axis=-1))
+        alive = np.isfinite(predicted)
+        compared, entries = self.entries.forward(np.where(alive, predicted, self.entries.measured)), self.entries
         effect = np.zeros_like(compared)
         for k, present in enumerate(entries.present):
             for position in np.unique(entries.output[k, present]):
                 row = present & (entries.output[k] == position)
                 if row.sum() > 1:
                     effect[k, row] = np.gradient(compared[k, row], entries.log_times[k, row])
-        return effect
+        return np.asarray(now.by_strain[0] * effect + now.by_time[0])
 
     def _extended(self, predicted: Floats, ends: Floats) -> Floats:
         """g of the prediction, carried on after a burst; (candidates, tests, entries)."""

@@ -12,6 +12,8 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.nominal import stresses
 from creepkit.inverse.plotting_linear import draw_linear
+from creepkit.inverse.plotting_rupture import draw_ruptures
+from creepkit.inverse.rupture import with_ends
 from creepkit.inverse.scales import LOGARITHMIC, usable
 from creepkit.records import ZERO_CELSIUS, History, Prediction
 
@@ -29,7 +31,7 @@ TELLING = 0.02
 
 
 def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
-    """Draw the tests, what is left of them over time, and rate over stress with 95 % bands; two panels an output."""
+    """Draw the tests, what is left of them over time, rate over stress with 95 % bands, and ruptures; two panels an output."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -38,9 +40,14 @@ def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
             "this identification was loaded without its histories: attach them with fit.on(histories, using)"
         )
     shown = list(dict.fromkeys(m.outputs[0].output for m in fit.misfits))
-    figure = Figure(figsize=(4.5 + 9.0 * len(shown), 4.8), layout="constrained")
+    ends = with_ends(fit)
+    ratios = (*(1.25, 1.0) * len(shown), 1.0, *[1.0][: len(ends)])
+    figure = Figure(figsize=(4.5 * len(ratios), 4.8), layout="constrained")
     FigureCanvasAgg(figure)
-    *panels, rates = figure.subplots(1, 2 * len(shown) + 1, width_ratios=(*(1.25, 1.0) * len(shown), 1.0))
+    panels = list(figure.subplots(1, len(ratios), width_ratios=ratios))
+    if ends:
+        draw_ruptures(panels.pop(), fit, _colours(fit.histories))
+    rates = panels.pop()
     found, colours = fit.predict(), _colours(fit.histories)
     for k, output in enumerate(shown):
         draw = _draw_strains if output in LOGARITHMIC else draw_linear
@@ -109,7 +116,8 @@ def _finish_residuals(axes: Axes, fit: Identification) -> None:
     axes.set(xscale="log", ylim=(-reach, reach), xlabel="time, h", ylabel="ln (identified / measured)")
     axes.axhline(0, color="black", lw=0.8)
     axes.grid(alpha=0.25)
-    axes.set_title(f"rms of ln strain {fit.rms:.3g}, loading strains taken off", fontsize=10)
+    what = "distance in ln strain and ln time" if with_ends(fit) else "of ln strain"
+    axes.set_title(f"rms {what} {fit.rms:.3g}, loading strains taken off", fontsize=10)
 
 
 def _draw_rates(axes: Axes, fit: Identification) -> None:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from statistics import median
 from typing import TYPE_CHECKING
 
+from creepkit.inverse.rupture import with_ends
+from creepkit.inverse.scales import RUPTURE
 from creepkit.language.printing import text_of_expression
 
 if TYPE_CHECKING:
-    from creepkit.inverse.findings import NuisanceEstimate
+    from creepkit.inverse.findings import NuisanceEstimate, RuptureMisfit
     from creepkit.inverse.identification import Identification
 
+LISTED = 15
+"""With more tests than this their rupture times are summed up alone."""
 UNITS = {"amplitude": "mm", "width": "mm", "thickness": "mm", "window": "mm", "temperature": "K"}
 
 
@@ -23,6 +29,7 @@ def text_of(fit: Identification) -> str:
         *_reference(fit),
         "",
         *_strains(fit),
+        *_ruptures(fit),
         *_linear_outputs(fit),
         *_table(fit),
     ]
@@ -60,17 +67,51 @@ def _strains(fit: Identification) -> list[str]:
         return []
     s, mine = fit.scatter["strain"], [m for m in fit.misfits if m.outputs and m.outputs[0].output == "strain"]
     return [
-        f"  {_tests(len(mine))}, {sum(m.frames for m in mine)} frames: rms of ln strain {fit.rms:.3g}",
+        f"  {_tests(len(mine))}, {sum(m.frames for m in mine)} frames: {_measure(fit)} {fit.rms:.3g}",
         f"  scatter (one sd): rate between tests {100 * fit.scatter.rate:.0f} %, loading strain {s.offset:.2g}, "
         f"frame noise {s.noise:.2g}, what the law cannot follow {100 * s.drift:.1f} % of strain",
     ]
+
+
+def _measure(fit: Identification) -> str:
+    whole = any(m.rupture is not None for m in fit.misfits)
+    return "rms distance in ln strain and ln time" if whole else "rms of ln strain"
+
+
+def _ruptures(fit: Identification) -> list[str]:
+    """Rupture times, predicted over measured, and each test's where they are few."""
+    ends = with_ends(fit)
+    if not ends:
+        return []
+    ratios, stopped = [r.ratio for _, _, r in ends if not r.stopped], [r for _, _, r in ends if r.stopped]
+    line = f"  rupture: {len(ratios)} of {_tests(len(fit.misfits))} broke"
+    if ratios:
+        inside = sum(r.low <= r.measured <= r.high for _, _, r in ends if not r.stopped)
+        line += (
+            f"; time predicted over measured {min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}; "
+            f"{inside} within the 95 % interval of a single test"
+        )
+    if stopped:
+        early = sum(r.predicted < r.measured for r in stopped)
+        line += f"; {len(stopped)} stopped before, of which {early or 'none'} should have broken"
+    return [line, *(_rupture_table(ends) if len(ends) <= LISTED else [])]
+
+
+def _rupture_table(ends: Sequence[tuple[str, str, RuptureMisfit]]) -> list[str]:
+    width, wide = max(len(name) for name, _, _ in ends), max(len(condition) for _, condition, _ in ends)
+    lines = [f"  {'test':{width}}  {'condition':{wide}} {'lasted, h':>11} {'predicted':>10}  [95 %]"]
+    for name, condition, r in ends:
+        lasted = f"{'> ' if r.stopped else ''}{r.measured / 3600:.4g}"
+        low, time, high = (v / 3600 for v in (r.low, r.predicted, r.high))
+        lines.append(f"  {name:{width}}  {condition:{wide}} {lasted:>11} {time:>10.4g}  [{low:.4g}, {high:.4g}]")
+    return lines
 
 
 def _linear_outputs(fit: Identification) -> list[str]:
     """Errors of outputs that are compared as they are, over all used frames of all tests."""
     lines = []
     for name, e in fit.errors.items():
-        if name == "strain":
+        if name in ("strain", RUPTURE):
             continue
         unit, s = f" {UNITS[name]}" if name in UNITS else "", fit.scatter[name]
         lines.append(

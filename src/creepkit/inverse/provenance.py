@@ -30,7 +30,7 @@ def ranges(objective: Objective) -> dict[str, tuple[float, float]]:
     spread = {
         "stress": [v for h in tests for v in stresses(h, objective.using)],
         "temperature": [v for h in tests for v in h.temperature_program().values],
-        "strain": [0.0, *(end_strain(h) for h in tests)],
+        "strain": [0.0, *(end_strain(h, objective.using) for h in tests)],
         "time": [v for h in tests for v in (float(h.times[0]), float(h.times[-1]))],
     }
     return {name: (float(min(values)), float(max(values))) for name, values in spread.items()}
@@ -82,7 +82,7 @@ def notes(
         found.append("all tests have one stress: the stress dependence is not determined by them")
     if len(histories) < FEW_TESTS and any(n.kind == "rate" and n.sd is None for n in settings.nuisances):
         found.append(f"fewer than {FEW_TESTS} tests: their rates are assumed to scatter by {100 * ASSUMED_RATE:.0f} %")
-    strains = [float(h.outputs["strain"].max()) for h in histories if "strain" in h.outputs]
+    strains = [float(h.outputs["strain"].max()) for h in histories if "strain" in h.outputs and not h.ended]
     if max(strains, default=0.0) > 0.5:
         found.append("strains above 0.5 were fitted: a column in percent must say so, as strain_pct")
     if (Fences(objective).violations(best.minimum.u[: len(law.params)]) > 1e-3).any():

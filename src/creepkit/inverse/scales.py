@@ -15,6 +15,10 @@ LOGARITHMIC = ("strain",)
 """Outputs that span decades."""
 
 
+RUPTURE = "rupture"
+"""The output of tests that were followed to their end: the time of rupture, s. It has no frames of its own."""
+
+
 class Scale(Protocol):
     """A monotone map g from an output to the quantity in which it is compared."""
 
@@ -98,8 +102,30 @@ class LinearScale:
         return np.full(np.shape(y), 1.0 / self.size)
 
 
+@dataclass(frozen=True)
+class LifeScale:
+    """g(t) = -ln t of a rupture time t in s: larger where a test breaks earlier, as strains are where it is faster."""
+
+    floor: float = 0.0
+    ceiling: float = 0.0
+
+    def forward(self, y: Floats) -> Floats:
+        """The compared quantity."""
+        return -np.log(y)
+
+    def backward(self, g: Floats) -> Floats:
+        """The rupture time whose compared quantity is g."""
+        return np.exp(-g)
+
+    def slope(self, y: Floats) -> Floats:
+        """dg/dy."""
+        return -1.0 / y
+
+
 def scale_for(histories: Sequence[History], output: str) -> Scale:
     """The scale of one output of these histories, all of which have it."""
+    if output == RUPTURE:
+        return LifeScale()
     return log_scale_for(histories, output) if output in LOGARITHMIC else linear_scale_for(histories, output)
 
 

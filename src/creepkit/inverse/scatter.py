@@ -10,6 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.inverse.entries import Entries
+from creepkit.inverse.scales import RUPTURE
 from creepkit.records import Nuisance
 
 ASSUMED_RATE = 0.3
@@ -67,9 +68,10 @@ def working_guess(entries: Entries, nuisances: Sequence[Nuisance]) -> Scatter:
 
 
 def full_guess(working: Scatter, nuisances: Sequence[Nuisance]) -> Scatter:
-    """Where the estimate of the whole scatter begins."""
+    """Where the estimate of the whole scatter begins; a test's one rupture cannot drift."""
     outputs = {
-        name: replace(s, misfit=0.3 * s.misfit, drift=0.5 * s.misfit, reach=1.0) for name, s in working.outputs.items()
+        name: s if name == RUPTURE else replace(s, misfit=0.3 * s.misfit, drift=0.5 * s.misfit, reach=1.0)
+        for name, s in working.outputs.items()
     }
     return Scatter(outputs, size_of(nuisances, "rate", ASSUMED_RATE))
 

@@ -22,7 +22,10 @@ from creepkit.inverse.objective import Objective
 from creepkit.language import CreepLaw
 
 RATE_WINDOW = (-12.0, 6.0)
-"""Bounds of a term's log rate about the measured one: at 1e-5 of the data it is absent, at 400 times it is wrong."""
+"""Bounds of a term's or internal variable's log rate about the measured one: at 1e-5 of the data it is absent, at 400 times it is wrong."""
+
+GROWTH_WINDOW = (-4.0, 0.0)
+"""Where the rate of an internal variable is drawn: ln of its rate times the life of a test."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -35,11 +38,16 @@ class Box:
     high: Floats
 
     @classmethod
-    def of(cls, law: CreepLaw, coordinates: Coordinates, log_rate: float) -> Box:
-        """The law's bounds, with term rates within RATE_WINDOW of the measured log rate."""
+    def of(cls, law: CreepLaw, coordinates: Coordinates, log_rate: float, log_pace: float) -> Box:
+        """The law's bounds, with rates within RATE_WINDOW of the measured ones.
+
+        log_rate : of strain; log_pace : ln of one over the life of a test, that of internal variables.
+        """
         low, high = (np.array([p.to_internal(p.bounds[end]) for p in law.params.values()], float) for end in (0, 1))
         for k in coordinates.rates:
             low[k], high[k] = log_rate + RATE_WINDOW[0], log_rate + RATE_WINDOW[1]
+        for k in coordinates.growths:
+            low[k], high[k] = log_pace + RATE_WINDOW[0], log_pace + RATE_WINDOW[1]
         return cls(low, high)
 
     def beside(self, unknowns: Unknowns) -> Box:
@@ -130,7 +138,7 @@ def refine(
             residuals = objective.at(u)
             assert residuals.jacobian is not None
             both = np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1)
-            white = np.linalg.solve(factor, both)[residuals.present]
+            white = np.linalg.solve(factor, both)[objective.entries.present]
             memory[key] = (
                 np.concatenate([white[:, 0], fences.values(u)]),
                 np.concatenate([white[:, 1:], fences.jacobian(u)]),
@@ -168,9 +176,14 @@ def _screened(objective: Objective, box: Box, *, starts: int, draws: int, seed: 
         shares = rng.dirichlet(np.full(len(rates), 0.7), size=len(points))
         shares[0] = _unequal(len(rates))
         points[:, rates] = level + np.log(np.maximum(shares, 1e-4))
-        for _ in range(3):
-            shift = objective.excess(objective.screen(box.clip(points)))
-            points[:, rates] -= np.clip(shift, -6, 6)[:, None]
+        growths = list(objective.coordinates.growths)
+        pace = (0.5 * (box.low + box.high) - 0.5 * sum(RATE_WINDOW))[growths]
+        points[1:, growths] = pace + GROWTH_WINDOW[0] + unit[:, growths] * (GROWTH_WINDOW[1] - GROWTH_WINDOW[0])
+        points[0, growths] = pace + 0.5 * sum(GROWTH_WINDOW)
+        for _ in range(3 + 2 * min(len(growths), 1)):
+            misfit = objective.screen(box.clip(points))
+            points[:, rates] -= np.clip(objective.excess(misfit), -6, 6)[:, None]
+            points[:, growths] -= np.clip(objective.early(misfit), -6, 6)[:, None]
     points = box.clip(points)
     misfit = objective.screen(points)
     score = np.array([np.mean(np.arcsinh(m[objective.entries.present]) ** 2) for m in misfit])

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from creepkit.arrays import ArrayLike
 from creepkit.errors import FitError, SolveError
 from creepkit.language import CreepLaw
-from creepkit.records import Effects, History, Prediction, Predictor, Screened, Status
+from creepkit.records import Effects, History, Life, Prediction, Predictor, Screened, Status, WholeLife
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Together:
     ) -> Prediction:
         """Predict each group of histories with its predictor; outputs that a test does not have are NaN."""
         parts = []
-        for predictor, tests in self._groups(histories):
+        for predictor, tests in self.groups(histories):
             own = {k: v[:, tests] for k, v in (effects or {}).items() if offers(predictor, k)}
             mine = [histories[k] for k in tests]
             found = predict(predictor, law, values, mine, jacobian=jacobian, effects=own)
@@ -52,12 +53,18 @@ class Together:
         for kind in effects or {}:
             if not any(offers(self.of(h), kind) for h in histories):
                 raise SolveError(f"none of the predictors {self.name} knows the nuisance '{kind}'")
-        return _joined(parts, histories)
+        return self.joined(parts, histories)
 
-    def _groups(self, histories: Sequence[History]) -> list[tuple[Predictor, list[int]]]:
+    def groups(self, histories: Sequence[History]) -> list[tuple[Predictor, list[int]]]:
+        """Each predictor with the positions of its histories."""
         chosen = [self.of(h) for h in histories]
         distinct = list({id(p): p for p in chosen}.values())
         return [(one, [k for k, p in enumerate(chosen) if p is one]) for one in distinct]
+
+    @staticmethod
+    def joined(parts: Sequence[tuple[list[int], Prediction]], histories: Sequence[History]) -> Prediction:
+        """The predictions of groups as one."""
+        return _joined(parts, histories)
 
 
 def _joined(parts: Sequence[tuple[list[int], Prediction]], histories: Sequence[History]) -> Prediction:
@@ -83,7 +90,34 @@ def _joined(parts: Sequence[tuple[list[int], Prediction]], histories: Sequence[H
             jacobian[place] = found.jacobian
     lengths = np.array([h.times.size for h in histories], np.int64)
     times = tuple(h.times for h in histories)
-    return Prediction(values, outputs, lengths, status, ends, jacobian, times, slopes)
+    return Prediction(values, outputs, lengths, status, ends, jacobian, times, slopes, _joined_life(parts, shape))
+
+
+def _joined_life(parts: Sequence[tuple[list[int], Prediction]], shape: tuple[int, ...]) -> Life | None:
+    """The lives of groups as one, if they have any; shape : (candidates, tests, times, outputs)."""
+    lives = [(tests, found.life) for tests, found in parts if found.life is not None]
+    if len(lives) < len(parts):
+        return None
+
+    def gathered(name: str, axes: int, fill: float) -> Any:
+        arrays = [getattr(life, name) for _, life in lives]
+        if any(array is None for array in arrays):
+            return None
+        out = np.full((*shape[:axes], *arrays[0].shape[axes:]), fill)
+        for (tests, _), array in zip(lives, arrays, strict=True):
+            if axes == 3:
+                out[:, tests, : array.shape[2]] = array
+            else:
+                out[:, tests] = array
+        return out
+
+    horizon = np.zeros(shape[1])
+    for tests, life in lives:
+        horizon[tests] = life.horizon
+    return Life(
+        gathered("arrivals", 3, np.nan), gathered("slopes", 3, np.inf), gathered("ruptures", 2, np.nan), horizon,
+        gathered("arrival_jacobian", 3, np.nan), gathered("rupture_jacobian", 2, np.nan),
+    )  # fmt: skip
 
 
 def predict(
@@ -99,6 +133,11 @@ def predict(
 def offers(using: Predictor, kind: str) -> bool:
     """Whether a predictor knows an explicit nuisance: it names those it does in `effects`."""
     return kind in getattr(using, "effects", ())
+
+
+def lasts(using: Predictor, history: History) -> bool:
+    """Whether the predictor of a history follows specimens to their rupture."""
+    return isinstance(predictor_of(using, history), WholeLife)
 
 
 def predictor_of(using: Predictor, history: History) -> Predictor:

@@ -1,4 +1,4 @@
-"""How well a law predicts uniaxial tests: time to a strain, its Z factor, and leave-one-condition-out.
+"""How well a law predicts uniaxial tests: time to a strain or to rupture, its Z factor, leave-one-condition-out.
 
 Z = 10^(2.5 s), with s the standard deviation of log10(measured / predicted time): the factor within which almost all
 times fall (Holdsworth et al. (2008), Int. J. Pressure Vessels and Piping 85, 80; below 2 is excellent, to 4 usual).
@@ -14,6 +14,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
+from creepkit.inverse.life import predict_life
 from creepkit.inverse.search import Progress
 from creepkit.language import CreepLaw
 from creepkit.records import EVERY_FRAME, History, Prediction, Predictor, Status
@@ -21,8 +22,9 @@ from creepkit.records import EVERY_FRAME, History, Prediction, Predictor, Status
 
 @dataclass(frozen=True)
 class TimeComparison:
-    """Measured and predicted times to one strain, s, for the tests that reached it.
+    """Measured and predicted times to one strain, or to rupture, s, for the tests that reached it.
 
+    level : the strain; NaN for rupture. A time that is predicted never to come is infinite.
     spread : standard deviation of log10(measured / predicted); z_factor : 10^(2.5 spread) about the mean ratio;
     bias : mean of log10(measured / predicted).
     """
@@ -97,12 +99,27 @@ def times_to_strain(
     )
 
 
+def times_to_rupture(
+    law: CreepLaw, values: Mapping[str, float], histories: Sequence[History], using: Predictor
+) -> TimeComparison:
+    """Compare the rupture times of every history that ruptured."""
+    broke = [h for h in histories if h.rupture_time is not None]
+    measured = np.array([h.rupture_time for h in broke], float)
+    if not broke:
+        return TimeComparison(float("nan"), (), measured, measured)
+    life = predict_life(using, law, values, broke).life
+    assert life is not None
+    predicted = np.where(np.isfinite(life.ruptures[0]), life.ruptures[0], np.inf)
+    return TimeComparison(float("nan"), tuple(h.name for h in broke), measured, predicted)
+
+
 def leave_one_condition_out(
-    fit: Identification, histories: Sequence[History], level: float, full: Sequence[History] | None = None,
+    fit: Identification, histories: Sequence[History], level: float | None, full: Sequence[History] | None = None,
     progress: Progress | None = None,
 ) -> tuple[TimeComparison, list[Identification]]:  # fmt: skip
-    """Predict each condition (temperature and stress) from a fit to all the others; times to `level` of creep strain.
+    """Predict each condition (temperature and stress) from a fit to all the others: times to `level` of creep strain.
 
+    level : creep strain, or None for the times to rupture.
     histories : what the fits see; full : the same tests with all frames, to read measured times from.
     """
     assert fit.using is not None
@@ -114,12 +131,15 @@ def leave_one_condition_out(
         partial = refit(fit, rest)
         fits.append(partial)
         tests = [everything[h.name] for h in held]
-        parts.append(times_to_strain(partial.law, partial.values, tests, fit.using, level, loading_strains(tests)))
+        if level is None:
+            parts.append(times_to_rupture(partial.law, partial.values, tests, fit.using))
+        else:
+            parts.append(times_to_strain(partial.law, partial.values, tests, fit.using, level, loading_strains(tests)))
         if progress is not None:
             progress("condition", len(fits), len(folds))
     names = tuple(n for p in parts for n in p.names)
     joined = [np.concatenate([getattr(p, f) for p in parts]) for f in ("measured", "predicted")]
-    return TimeComparison(level, names, *joined), fits
+    return TimeComparison(float("nan") if level is None else level, names, *joined), fits
 
 
 def _folds(histories: Sequence[History]) -> Iterator[tuple[list[History], list[History]]]:

@@ -30,6 +30,11 @@ class Exact:
             plain = [self._plain(k, v) for k, v in enumerate(_numbers(point, theta))]
             return self._at(plain)[: len(self.law.terms)]
 
+    def parts(self, point: Iterable[float], values: Iterable[float]) -> list[Any]:
+        """Each term, then each state rate, at a point with the author's values of the parameters."""
+        with mpmath.workdps(self.digits):
+            return self._at(_numbers(point, values))
+
     def rows(self, point: Iterable[float], theta: Iterable[float]) -> list[list[Any]]:
         """For the rate and each state rate: value, derivatives to the point and states, then to theta."""
         with mpmath.workdps(self.digits):

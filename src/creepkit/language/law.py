@@ -117,6 +117,9 @@ class CreepLaw:
         for name, value in values.items():
             if not abs(value) < float("inf"):
                 raise LawError(f"law '{self.name}', parameter '{name}': {value} is not a finite number")
+            if not self.table[name].possible(value):
+                told = f"{value:g} is not physical, which is {self.table[name].physical}"
+                raise LawError(f"law '{self.name}', parameter '{name}': {told}")
             if self.table[name].scale == "log" and value < 0:
                 raise LawError(f"law '{self.name}', parameter '{name}': {value:g} is negative; it must be positive")
             if self.table[name].scale == "log" and value == 0 and self.table[name].off != 0:

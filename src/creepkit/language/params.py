@@ -22,6 +22,8 @@ class Param:
     bounds : (low, high) of the fitted range, in `unit`.
     scale : "log" when the search and the kernels should use its logarithm.
     off : a value, usually outside the bounds, that switches the parameter off ({0} of the paper's Table 1).
+    limits : (low, high) of what is physical, such as (0, math.inf) of a modulus or (0, 1) of a fraction; no value
+        outside is ever taken but `off`. The bounds lie within. None where anything goes.
     """
 
     meaning: str
@@ -29,6 +31,7 @@ class Param:
     unit: str = ""
     scale: Scale = "linear"
     off: float | None = None
+    limits: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.scale not in ("linear", "log"):
@@ -56,6 +59,8 @@ class Param:
             if not math.isfinite(self.off):
                 raise LawError(f"parameter '{self.meaning}': off = {self.off} must be a finite number")
             object.__setattr__(self, "off", float(self.off))
+        if self.limits is not None:
+            object.__setattr__(self, "limits", _limits(self.meaning, self.limits, self.bounds))
 
     @property
     def center(self) -> float:
@@ -72,6 +77,20 @@ class Param:
     def from_internal(self, value: float) -> float:
         """Return the author's value of a kernel's parameter."""
         return math.exp(value) if self.scale == "log" else float(value)
+
+    def possible(self, value: float) -> bool:
+        """Say whether `value` is physical: within the limits, if there are any, or the off value."""
+        if self.limits is None or (self.off is not None and value == self.off):
+            return True
+        return self.limits[0] <= value <= self.limits[1]
+
+    @property
+    def physical(self) -> str:
+        """The limits in words."""
+        low, high = self.limits or (-math.inf, math.inf)
+        off = "" if self.off is None else f" (or {self.off:g}, off)"
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"from {low:g} to {high:g}{unit}{off}"
 
     def admits(self, value: float, slack: float = 1e-9) -> bool:
         """Say whether `value` lies within the bounds (to a relative `slack`) or is the off value."""
@@ -111,6 +130,18 @@ class State:
             object.__setattr__(self, "rate", sympy.sympify(self.rate, strict=True))
         except sympy.SympifyError:
             raise LawError(f"state '{self.meaning}': {self.rate!r} is not a sympy expression") from None
+
+
+def _limits(meaning: str, given: tuple[float, float], bounds: tuple[float, float]) -> tuple[float, float]:
+    """Limits as floats, around the bounds."""
+    try:
+        low, high = (float(limit) for limit in given)
+    except (TypeError, ValueError):
+        raise LawError(f"parameter '{meaning}': limits are {given!r}; write two numbers (low, high)") from None
+    if not low <= bounds[0] < bounds[1] <= high:
+        told = f"bounds ({bounds[0]:g}, {bounds[1]:g}) must lie within the limits ({low:g}, {high:g})"
+        raise LawError(f"parameter '{meaning}': {told}")
+    return low, high
 
 
 def _check_text(what: str, meaning: str, unit: str) -> None:

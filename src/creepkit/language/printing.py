@@ -128,7 +128,8 @@ def text_of(law: CreepLaw) -> str:
         off = "" if param.off is None or low <= param.off <= high else f" or {param.off:g}"
         unit = "" if param.unit == "1" else f" {param.unit}"
         scale = ", log scale" if param.scale == "log" else ""
-        lines.append(f"  {name:8} {param.meaning}: {low:g} to {high:g}{off}{unit}{scale}")
+        hard = "" if param.limits is None else f", physical {param.physical}"
+        lines.append(f"  {name:8} {param.meaning}: {low:g} to {high:g}{off}{unit}{scale}{hard}")
     for relation in law.constraints:
         lines.append(f"  with {text_of_expression(relation)}")
     for reference in law.references:

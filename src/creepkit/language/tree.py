@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -46,6 +47,7 @@ class ParamJson(_Strict):
     bounds: Annotated[list[Number], Field(min_length=2, max_length=2)]
     scale: Scale
     off: Number | None
+    limits: Annotated[list[Number | None], Field(min_length=2, max_length=2)] | None = None
 
 
 class StateJson(_Strict):
@@ -94,6 +96,9 @@ def law_to_json(law: CreepLaw) -> dict[str, Any]:
 
 
 def _param_to_json(name: str, param: Param) -> dict[str, Any]:
+    """A parameter; limits only where there are some, and null for an infinite one."""
+    ends = () if param.limits is None else param.limits
+    told = {"limits": [limit if math.isfinite(limit) else None for limit in ends]} if ends else {}
     return {
         "name": name,
         "meaning": param.meaning,
@@ -101,6 +106,7 @@ def _param_to_json(name: str, param: Param) -> dict[str, Any]:
         "bounds": list(param.bounds),
         "scale": param.scale,
         "off": param.off,
+        **told,
     }
 
 
@@ -154,7 +160,11 @@ def _law_of(model: LawJson) -> CreepLaw:
 
 def _param_of(entry: ParamJson) -> Param:
     low, high = entry.bounds
-    return Param(entry.meaning, (low, high), entry.unit, entry.scale, entry.off)
+    if entry.limits is None:
+        return Param(entry.meaning, (low, high), entry.unit, entry.scale, entry.off)
+    least, most = entry.limits
+    limits = -math.inf if least is None else least, math.inf if most is None else most
+    return Param(entry.meaning, (low, high), entry.unit, entry.scale, entry.off, limits)
 
 
 def _state_of(entry: StateJson, symbols: Mapping[str, sympy.Symbol]) -> State:

@@ -9,11 +9,11 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import HistoryError
-from creepkit.readers.conditions import Conditions, placed
+from creepkit.readers.conditions import ENDINGS, Conditions, placed
 from creepkit.readers.frames import Frames, averages, read_frames
 from creepkit.readers.imposed import read_loading, read_temperature
 from creepkit.readers.tables import Entry, Table
-from creepkit.readers.words import Words
+from creepkit.readers.words import OUTPUTS, TELLING, Words
 from creepkit.records import History
 
 if TYPE_CHECKING:
@@ -42,6 +42,8 @@ def assemble(
     logarithmic = conditions.choice("strain_measure", ("engineering", "logarithmic"), needed="strain" in outputs)
     elastic_too = conditions.choice("includes_elastic", ("yes", "no"), needed="strain" in outputs)
     loading = read_loading(conditions, frames)
+    used = _used(conditions, frames)
+    rupture_time, unruptured = _end(conditions, frames, used)
     _refuse_rest(frames, {*outputs, loading.quantity, "temperature"}, columns)
     return History(
         name=conditions.text("name", name),
@@ -54,11 +56,13 @@ def assemble(
         strain_measure="engineering" if logarithmic == "engineering" else "logarithmic",
         includes_elastic=elastic_too == "yes",
         standard_deviation=_spreads(conditions, frames, outputs),
-        used=_used(conditions, frames),
+        used=used,
         geometry=conditions.geometry,
         operator=conditions.text("operator"),
         alloy=conditions.text("alloy"),
         source=source,
+        rupture_time=rupture_time,
+        unruptured=unruptured,
         # Last, for whatever nobody has taken by now is refused.
         labels={**conditions.all_labels(), **averages(table, words), **_merged(frames)},
     )
@@ -71,7 +75,9 @@ def _merged(frames: Frames) -> dict[str, str]:
 def _observed(conditions: Conditions, frames: Frames, words: Words, place: str) -> tuple[str, dict[str, Floats]]:
     """The specimen, as named or as the outputs tell, and its outputs."""
     named = conditions.text("specimen")
-    present = [name for name, outputs in words.outputs.items() if outputs.keys() & frames.values.keys()]
+    telling = {name: outputs for name, outputs in words.outputs.items() if name in TELLING or name not in OUTPUTS}
+    asked = {named: words.outputs[named]} if named in words.outputs and named not in telling else telling
+    present = [name for name, outputs in asked.items() if outputs.keys() & frames.values.keys()]
     if len(present) != 1 or (named in words.outputs and named != present[0]):
         found = f"outputs of {' and '.join(present)}" if present else "no output"
         wanted = f"those of {named}" if named in words.outputs else "those of one specimen"
@@ -127,3 +133,19 @@ def _used(conditions: Conditions, frames: Frames) -> Bools:
     if after.any():
         conditions.labels["frames_after_end"] = str(int(after.sum()))
     return used & ~after
+
+
+def _end(conditions: Conditions, frames: Frames, used: Bools) -> tuple[float | None, bool]:
+    """The rupture time, s, if the test ruptured, and whether it was stopped before; neither where nothing is said.
+
+    A test that is said to have ruptured, without a time, did so when its last frame was taken.
+    """
+    time, ended = conditions.number("rupture"), conditions.choice("ended", ENDINGS, needed=False)
+    if time is not None and ended == "stopped":
+        raise HistoryError(
+            f"{time.place}: the test was stopped, and '{time.key}' says when it ruptured; keep one of them"
+        )
+    if time is not None or ended != "ruptured":
+        return None if time is None else time.value, ended == "stopped"
+    conditions.assume("rupture at the last frame")
+    return float(frames.times[used][-1] if used.any() else frames.times[-1]), False

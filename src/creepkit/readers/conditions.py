@@ -16,6 +16,9 @@ _GROUPS = (
     "give one of stress, stress_steps, stress_program, or stress_1 with stress_2 and jump_time (the same for pressure, "
     "there with ramp)"
 )
+ENDINGS = ("ruptured", "stopped")
+"""How a test may have ended: by rupture, or before it."""
+
 _T = TypeVar("_T")
 Pairs = tuple[tuple[float, float], ...]
 
@@ -38,6 +41,7 @@ class Conditions:
         self.labels: dict[str, str] = {}
         self._words = words
         self._kinds = words.conditions
+        self._endings = {**{word: word for word in ENDINGS}, **words.endings}
         self._numbers: dict[str, Amount] = {}
         self._texts: dict[str, Entry] = {}
         self._assumed: list[str] = []
@@ -78,6 +82,10 @@ class Conditions:
             raise HistoryError(f"{entry.place}: {found}; they must start at 0 and never decrease")
         return pairs
 
+    def assume(self, what: str) -> None:
+        """Record in the label "assumed" what the file leaves unsaid."""
+        self._assumed.append(what)
+
     def where(self, *keys: str) -> str:
         """The place of the first of these numbers and texts that was given, else that of the test."""
         return next((self._places[key] for key in keys if key in self._places), self.place)
@@ -103,6 +111,8 @@ class Conditions:
             _put(self.labels, name.removeprefix("label ").strip(), entry.text, entry.place)
         elif name.startswith("geometry "):
             _put(self.geometry, *_measure(name, entry), entry.place)
+        elif name == "ended" or (found and found[0] == "rupture" and entry.text in self._endings):
+            _put(self._texts, "ended", Entry(self._endings.get(entry.text, entry.text), entry.place), entry.place)
         elif name in TEXTS and (name != "specimen" or SPECIMEN_NAME.fullmatch(entry.text)):
             _put(self._texts, name, entry, entry.place)
             self._places[name] = entry.place
@@ -148,8 +158,10 @@ def _measure(name: str, entry: Entry) -> tuple[str, float]:
 
 def _pair(item: str, key: str, kind: Kind, place: str) -> tuple[float, float]:
     words = item.split()
+    if len(words) == 3 and "" in kind.units:
+        words.append("")
     if len(words) != 4:
-        example = f"0 s 100 {next(iter(kind.units))}"
+        example = f"0 s 100 {next(iter(kind.units))}" if "" not in kind.units else "0 s 0.002, or 0 s 0.2 pct"
         raise HistoryError(f"{place}: {key} holds '{item.strip()}'; write time and value with units, such as {example}")
     time, value = (Entry(word, place).number(key) for word in (words[0], words[2]))
     return TIME.convert(time, words[1], place, key), kind.convert(value, words[3], place, key)

@@ -10,11 +10,24 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
 from creepkit.readers.conditions import Amount, Conditions, Pairs, placed
 from creepkit.readers.frames import Frames
-from creepkit.readers.words import IMPOSED
-from creepkit.records import Loading, PressureJump, Program, RecordedLoading, StressSteps, constant_stress
+from creepkit.readers.units import Kind
+from creepkit.readers.words import COMPONENTS_IMPOSED, IMPOSED, IMPOSED_STRAINS
+from creepkit.records import (
+    Loading,
+    PointLoading,
+    PressureJump,
+    Program,
+    RecordedLoading,
+    StrainSteps,
+    StressSteps,
+    constant_stress,
+)
 
 _FORMS = ("", "_1", "_steps", "_program")
-_LOADS = "write stress_MPa for a uniaxial test, or pressure_1_MPa, pressure_2_MPa and jump_time_h for a bulge test"
+_LOADS = (
+    "write stress_MPa for a uniaxial test, strain_steps for a relaxation test, or pressure_1_MPa, pressure_2_MPa and "
+    "jump_time_h for a bulge test"
+)
 
 
 def read_temperature(conditions: Conditions, frames: Frames) -> float | Program:
@@ -27,11 +40,40 @@ def read_temperature(conditions: Conditions, frames: Frames) -> float | Program:
 
 def read_loading(conditions: Conditions, frames: Frames) -> Loading:
     """The loading: by stress where a stress is given, else by pressure; MPa."""
-    with placed(conditions.where(*(f"{quantity}{form}" for quantity in ("stress", "pressure") for form in _FORMS))):
-        loading = _by_stress(conditions, frames) or _by_pressure(conditions, frames)
+    quantities = ("stress", "pressure", "strain", *COMPONENTS_IMPOSED)
+    with placed(conditions.where(*(f"{quantity}{form}" for quantity in quantities for form in _FORMS))):
+        loading = _by_components(conditions) or _by_strain(conditions)
+        loading = loading or _by_stress(conditions, frames) or _by_pressure(conditions, frames)
     if loading is None:
         raise conditions.missing("loading (neither stress nor pressure)", _LOADS)
     return loading
+
+
+def _by_components(conditions: Conditions) -> Loading | None:
+    """The stresses and strains of a material point."""
+    given: dict[str, dict[str, Program]] = {"stress": {}, "strain": {}}
+    for name, kind in COMPONENTS_IMPOSED.items():
+        found = _pieces(conditions, name, kind)
+        if found is not None:
+            quantity, _, component = name.partition("_")
+            given[quantity][component] = Program.steps(found) if isinstance(found, tuple) else found
+    return PointLoading(**given) if given["stress"] or given["strain"] else None
+
+
+def _by_strain(conditions: Conditions) -> Loading | None:
+    """The total strain of a bar."""
+    found = _pieces(conditions, "strain", IMPOSED_STRAINS["strain"])
+    if found is None:
+        return None
+    return StrainSteps(found) if isinstance(found, tuple) else RecordedLoading(found, "strain")
+
+
+def _pieces(conditions: Conditions, quantity: str, kind: Kind) -> Pairs | Program | None:
+    """Steps or a program that stand in the head."""
+    steps, knots = (conditions.pairs(f"{quantity}_{form}", kind) for form in ("steps", "program"))
+    if steps is not None and knots is not None:
+        raise HistoryError(f"{conditions.place}: {quantity} has both steps and a program; keep one")
+    return steps if knots is None else Program(*np.array(knots).T)
 
 
 def _by_stress(conditions: Conditions, frames: Frames) -> Loading | None:

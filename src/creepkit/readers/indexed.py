@@ -116,7 +116,10 @@ INDEXED_TABLE = IndexedFolder(
     title="a folder with index.csv (one line a test) and curves.csv (the frames of all tests, by `key`)",
     key="key",
     frames="curves.csv",
-    words=Words(rename={"youngs_MPa": "modulus_MPa"}),
+    words=Words(
+        rename={"youngs_MPa": "modulus_MPa", "state": "ended"},
+        endings={"Ruptured": "ruptured", "Discontinued": "stopped"},
+    ),
 )
 """How the creep curves of Alloy 617 in the moga_neml repository are kept (ACME-MG, github.com)."""
 
@@ -127,6 +130,7 @@ INDEXED_FILES = IndexedFolder(
     frames="{key}_creep.csv",
     words=Words(
         rename={"creep_extension_pct": "strain_pct"},
+        endings={"Not applicable": "stopped"},
         averaged={"measured_temperature_C": ("T_top_C", "T_mid_C", "T_bot_C")},
     ),
 )

@@ -78,6 +78,7 @@ STRESS = Kind(
     low=0.0,
     high=1e5,
 )
+SIGNED_STRESS = replace(STRESS, low=-1e5)
 MODULUS = Kind("modulus", {"MPa": Unit(1.0), "GPa": Unit(1e3), "ksi": Unit(6.894757293168361)}, 0.0, 1e8, open=True)
 POISSON = Kind("Poisson's ratio", NUMBER.units, low=-1.0, high=0.5, open=True)
 TEMPERATURE = Kind("temperature", {"K": Unit(1.0), "C": Unit(1.0, ZERO_CELSIUS)}, low=0.0, high=1e4, open=True)

@@ -12,18 +12,29 @@ from creepkit.readers.units import (
     MODULUS,
     NUMBER,
     POISSON,
+    SIGNED_STRESS,
     STRAIN,
     STRESS,
     TEMPERATURE,
     TIME,
     Kind,
 )
+from creepkit.records import COMPONENTS
 
 OUTPUTS: Mapping[str, Mapping[str, Kind]] = {
     "uniaxial": {"strain": STRAIN},
     "bulge": {"amplitude": LENGTH, "width": LENGTH, "shape": NUMBER},
+    "relaxation": {"stress": STRESS},
+    "point": {
+        "strain": STRAIN,
+        **{f"strain_{c}": STRAIN for c in COMPONENTS},
+        **{f"stress_{c}": SIGNED_STRESS for c in COMPONENTS},
+    },
 }
 """What each specimen's outputs are called, and of which kind they are."""
+
+TELLING = ("uniaxial", "bulge")
+"""Specimens that a file need not name: their outputs tell."""
 
 IMPOSED: Mapping[str, Kind] = {"stress": STRESS, "pressure": STRESS, "temperature": TEMPERATURE}
 """What may be imposed on a specimen: a number, `_steps`, a `_program`, or a column."""
@@ -31,15 +42,24 @@ IMPOSED: Mapping[str, Kind] = {"stress": STRESS, "pressure": STRESS, "temperatur
 CONDITIONS: Mapping[str, Kind] = {
     **IMPOSED,
     **{f"{quantity}_{k}": STRESS for quantity in ("stress", "pressure") for k in (1, 2)},
-    **dict.fromkeys(("jump_time", "end_time", "ramp"), TIME),
+    **dict.fromkeys(("jump_time", "end_time", "ramp", "rupture"), TIME),
     "modulus": MODULUS,
     "poisson": POISSON,
 }
 """Numbers that stand once for a whole test."""
 
+IMPOSED_STRAINS: Mapping[str, Kind] = {"strain": STRAIN}
+"""What may be imposed on a bar in relaxation: `_steps` or a `_program` alone, for its number would be an output."""
+
+COMPONENTS_IMPOSED: Mapping[str, Kind] = {
+    **{f"stress_{c}": SIGNED_STRESS for c in COMPONENTS},
+    **{f"strain_{c}": STRAIN for c in COMPONENTS},
+}
+"""What may be imposed on a material point: `_steps` or a `_program`."""
+
 TEXTS = frozenset(
-    [f"{quantity}_{form}" for quantity in IMPOSED for form in ("steps", "program")]
-    + ["name", "alloy", "specimen", "operator", "control", "strain_measure", "includes_elastic"]
+    [f"{q}_{form}" for q in (*IMPOSED, *IMPOSED_STRAINS, *COMPONENTS_IMPOSED) for form in ("steps", "program")]
+    + ["name", "alloy", "specimen", "operator", "control", "strain_measure", "includes_elastic", "ended"]
 )
 """Words that stand once for a whole test; every other key becomes a label."""
 
@@ -58,12 +78,15 @@ class Words:
     assumed : {text: value} for what its files leave unsaid; recorded in the label "assumed".
     averaged : {label: columns} whose mean over the whole test is kept as a label, such as thermocouples.
     outputs : {specimen: {output: kind}}.
+    endings : {its word: "ruptured" or "stopped"} for how a test ended, beside these two themselves; in a column of
+        rupture times such a word may stand in the place of a number.
     """
 
     rename: Mapping[str, str] = field(default_factory=dict)
     assumed: Mapping[str, str] = field(default_factory=lambda: CREEP_MACHINE)
     averaged: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     outputs: Mapping[str, Mapping[str, Kind]] = field(default_factory=lambda: OUTPUTS)
+    endings: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def conditions(self) -> dict[str, Kind]:

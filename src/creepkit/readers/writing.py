@@ -12,7 +12,15 @@ from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
 from creepkit.readers.units import LENGTH, Kind
 from creepkit.readers.words import SPECIMEN_NAME, Words
-from creepkit.records import History, PressureJump, Program, RecordedLoading, StressSteps
+from creepkit.records import (
+    History,
+    PointLoading,
+    PressureJump,
+    Program,
+    RecordedLoading,
+    StrainSteps,
+    StressSteps,
+)
 
 
 def write_history(history: History, path: str | Path) -> Path:
@@ -60,6 +68,10 @@ def _head(history: History) -> Iterator[tuple[str, str]]:
     yield from _elastic(history)
     yield "strain_measure", history.strain_measure
     yield "includes_elastic", "yes" if history.includes_elastic else "no"
+    if history.rupture_time is not None:
+        yield "rupture_s", _digits(history.rupture_time)
+    if history.unruptured:
+        yield "ended", "stopped"
     if history.operator:
         yield "operator", history.operator
     for key, value in history.geometry.items():
@@ -81,6 +93,13 @@ def _loading(history: History) -> Iterator[tuple[str, str]]:
         yield "stress_MPa", _digits(loading.steps[0][1])
     elif isinstance(loading, StressSteps):
         yield "stress_steps", _pairs(loading.steps, "MPa")
+    elif isinstance(loading, PointLoading):
+        yield from ((f"stress_{name}_program", _program(p, "MPa")) for name, p in loading.stress.items())
+        yield from ((f"strain_{name}_program", _program(p, "")) for name, p in loading.strain.items())
+    elif isinstance(loading, StrainSteps) and loading.ramp == 0.0:
+        yield "strain_steps", _pairs(loading.steps, "")
+    elif loading.quantity == "strain":
+        yield "strain_program", _program(loading.program(), "")
     else:
         yield f"{loading.quantity}_program", _program(loading.program(), "MPa")
     if loading.quantity == "stress":
@@ -133,7 +152,7 @@ def _program(program: Program, unit: str) -> str:
 
 
 def _pairs(pairs: Iterator[tuple[float, float]] | tuple[tuple[float, float], ...], unit: str) -> str:
-    return "; ".join(f"{_digits(time)} s {_digits(value)} {unit}" for time, value in pairs)
+    return "; ".join(f"{_digits(time)} s {_digits(value)} {unit}".rstrip() for time, value in pairs)
 
 
 def _line(history: History, text: str) -> str:

@@ -3,35 +3,45 @@
 from creepkit.records.doors import Exporter, Reader
 from creepkit.records.history import EVERY_FRAME, ZERO_CELSIUS, History
 from creepkit.records.loading import (
+    COMPONENTS,
     Loading,
+    PointLoading,
     PressureJump,
     Program,
     RecordedLoading,
+    StrainSteps,
     StressSteps,
+    constant_strain,
     constant_stress,
 )
 from creepkit.records.prediction import (
     ABSOLUTE,
     EXPLICIT,
     Effects,
+    Life,
     Nuisance,
     Prediction,
     Predictor,
     Screened,
     Specimen,
     Status,
+    WholeLife,
 )
+from creepkit.records.valued import Units, ValuedLaw
 
 __all__ = [
     "ABSOLUTE",
+    "COMPONENTS",
     "EVERY_FRAME",
     "EXPLICIT",
     "ZERO_CELSIUS",
     "Effects",
     "Exporter",
     "History",
+    "Life",
     "Loading",
     "Nuisance",
+    "PointLoading",
     "Prediction",
     "Predictor",
     "PressureJump",
@@ -41,6 +51,11 @@ __all__ = [
     "Screened",
     "Specimen",
     "Status",
+    "StrainSteps",
     "StressSteps",
+    "Units",
+    "ValuedLaw",
+    "WholeLife",
+    "constant_strain",
     "constant_stress",
 ]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from creepkit.records.history import History
 
 if TYPE_CHECKING:
-    from creepkit.language.law import CreepLaw
+    from creepkit.records.valued import ValuedLaw
 
 
 @runtime_checkable
@@ -37,7 +36,7 @@ class Reader(Protocol):
 
 @runtime_checkable
 class Exporter(Protocol):
-    """Writes a law and its values as text."""
+    """Writes a law with its values as text: to read, or for another program."""
 
     @property
     def name(self) -> str:
@@ -54,6 +53,9 @@ class Exporter(Protocol):
         """Ending of a file's name, with its dot."""
         ...
 
-    def text(self, law: CreepLaw, values: Mapping[str, float], notes: Sequence[str]) -> str:
-        """Return the text; `notes` (intervals, validity) become comments; ExportError when it cannot."""
+    def text(self, source: ValuedLaw) -> str:
+        """Return the text; notes (intervals, validity) become comments.
+
+        ExportError, with the reason, when the target cannot express the law or its units.
+        """
         ...

@@ -11,12 +11,15 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError
-from creepkit.records.loading import Loading, Program
+from creepkit.records.loading import Loading, Program, in_words
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
 
 ZERO_CELSIUS = 273.15
+
+ROUNDING = 0.01
+"""By how much of a rupture time frames may lie after it: laboratories round it to three digits."""
 
 EVERY_FRAME: Bools = frozen([], dtype=bool)
 """The value of History.used that marks every frame."""
@@ -34,6 +37,9 @@ class History:
     includes_elastic : whether the strain contains the elastic strain on loading.
     used : (frames,) which frames a fit may use; EVERY_FRAME stands for all of them.
     operator : which observation operator, and window, made the outputs (empty: the specimen's default).
+    rupture_time : s, when the specimen broke; None where it did not, or where nobody knows.
+    unruptured : whether the test was stopped, at its last time, before the specimen broke. A test with neither says
+        nothing of how it ended.
     """
 
     name: str
@@ -52,6 +58,8 @@ class History:
     alloy: str = ""
     labels: Mapping[str, str] = field(default_factory=dict)
     source: str = ""
+    rupture_time: float | None = None
+    unruptured: bool = False
 
     def __post_init__(self) -> None:
         where = self.source or f"history '{self.name}'"
@@ -82,10 +90,31 @@ class History:
             raise HistoryError(f"{where}: a temperature of {warmth.min():g} K is not above 0 and below 10000 K")
         if not isinstance(self.temperature, Program):
             freeze(self, "temperature", float(self.temperature))
+        self._check_end(where)
         sd = {n: frozen(np.broadcast_to(np.asarray(v, float), times.shape)) for n, v in self.standard_deviation.items()}
         freeze(self, "standard_deviation", MappingProxyType(sd))
         freeze(self, "geometry", MappingProxyType(dict(self.geometry)))
         freeze(self, "labels", MappingProxyType(dict(self.labels)))
+
+    def _check_end(self, where: str) -> None:
+        """A specimen breaks once, and has no frames afterwards but for the rounding of the rupture time."""
+        if self.rupture_time is None:
+            return
+        time, last = float(self.rupture_time), float(self.times[self.used][-1]) if self.used.any() else 0.0
+        if not (np.isfinite(time) and time > 0):
+            raise HistoryError(f"{where}: a rupture time of {time:g} s is not a finite time above zero")
+        if self.unruptured:
+            raise HistoryError(f"{where}: it ruptured at {time:g} s and was stopped unruptured; keep one of them")
+        if last > (1 + ROUNDING) * time:
+            raise HistoryError(
+                f"{where}: a used frame at {last:g} s lies after the rupture at {time:g} s; correct one or mark the frame"
+            )
+        object.__setattr__(self, "rupture_time", time)
+
+    @property
+    def ended(self) -> bool:
+        """Whether it is known how the test ended: by rupture, or stopped before."""
+        return self.rupture_time is not None or self.unruptured
 
     def replace(self, **changes: Any) -> History:
         """The same history with some fields changed; new times are all used unless `used` is given too."""
@@ -99,12 +128,16 @@ class History:
         return _history, (type(self), plain)
 
     def up_to(self, output: str, limit: float) -> History:
-        """Mark unused every frame from the first used one whose `output` exceeds `limit` on."""
+        """Mark unused every frame from the first used one whose `output` exceeds `limit` on.
+
+        A history that is cut says nothing any more of how the test ended.
+        """
         over = np.flatnonzero((self.outputs[output] > limit) & self.used)
+        if not over.size:
+            return self
         used = np.array(self.used)
-        if over.size:
-            used[over[0] :] = False
-        return self.replace(used=used)
+        used[over[0] :] = False
+        return self.replace(used=used, rupture_time=None, unruptured=False)
 
     def temperature_program(self) -> Program:
         """Temperature over time, K."""
@@ -113,12 +146,9 @@ class History:
     @property
     def condition(self) -> str:
         """The nominal condition in words, '850 C, 43 MPa': what leave-one-condition-out holds out."""
-        load = self.loading.program().values
-        low, high = float(load.min()), float(load.max())
-        driven = f"{high:g}" if low == high or self.loading.quantity == "pressure" else f"{load[0]:g} to {load[-1]:g}"
         T = self.temperature_program().values - ZERO_CELSIUS
         warm = f"{T[0]:.0f}" if np.ptp(T) < 0.5 else f"{T[0]:.0f} to {T[-1]:.0f}"
-        return f"{warm} C, {driven} MPa"
+        return f"{warm} C, {in_words(self.loading)}"
 
 
 def _history(kind: type[History], state: dict[str, Any]) -> History:

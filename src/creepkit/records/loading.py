@@ -1,16 +1,23 @@
-"""What is imposed on a specimen: programs in time, steps of stress, a jump of pressure."""
+"""What is imposed on a specimen: programs in time, steps of stress or strain, a jump of pressure, components."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Literal, Protocol, runtime_checkable
+from types import MappingProxyType
+from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats, frozen
 from creepkit.errors import SolveError
+
+Quantity: TypeAlias = Literal["stress", "pressure", "strain", "components"]
+"""What a loading prescribes."""
+
+COMPONENTS = ("11", "22", "33", "12", "23", "13")
+"""Names of the components of a stress or strain, in the order of every vector of six; shear strains of the tensor."""
 
 
 @dataclass(frozen=True)
@@ -72,12 +79,12 @@ class Loading(Protocol):
     """What drives a specimen: one prescribed quantity as a piecewise linear program."""
 
     @property
-    def quantity(self) -> Literal["stress", "pressure"]:
+    def quantity(self) -> Quantity:
         """What is prescribed."""
         ...
 
     def program(self) -> Program:
-        """The prescribed quantity over time, MPa."""
+        """The prescribed quantity over time: MPa, or a strain."""
         ...
 
 
@@ -91,7 +98,7 @@ class StressSteps:
 
     steps: tuple[tuple[float, float], ...]
     control: Literal["load", "stress"] = "load"
-    quantity: Literal["stress", "pressure"] = field(default="stress", init=False)
+    quantity: Quantity = field(default="stress", init=False)
 
     def __post_init__(self) -> None:
         steps = tuple((float(t), float(s)) for t, s in self.steps)
@@ -114,6 +121,42 @@ def constant_stress(stress: float, control: Literal["load", "stress"] = "load") 
 
 
 @dataclass(frozen=True)
+class StrainSteps:
+    """Total strain of a bar by steps: [(0, 0.002), (3600, 0.003)] holds 0.2 %, then 0.3 % from one hour on.
+
+    steps : (time in s, total strain). ramp : s, in which each strain is reached; 0 is at once.
+    """
+
+    steps: tuple[tuple[float, float], ...]
+    ramp: float = 0.0
+    quantity: Quantity = field(default="strain", init=False)
+
+    def __post_init__(self) -> None:
+        steps = tuple((float(t), float(e)) for t, e in self.steps)
+        if not steps or steps[0][0] != 0.0 or any(b[0] <= a[0] for a, b in pairwise(steps)):
+            raise SolveError("strain steps must start at time 0 and follow one another in time")
+        if any(not 0 <= e <= 1 for _, e in steps):
+            raise SolveError(f"total strain must lie from 0 to 1 in every step, found {[e for _, e in steps]}")
+        apart = min([b[0] - a[0] for a, b in pairwise(steps)], default=np.inf)
+        if not 0 <= self.ramp <= apart or not np.isfinite(self.ramp):
+            raise SolveError(f"ramp is {self.ramp:g} s; it must not be negative nor outlast a step ({apart:g} s)")
+        object.__setattr__(self, "steps", steps)
+
+    def program(self) -> Program:
+        """Total strain over time."""
+        if self.ramp == 0.0:
+            return Program.steps(self.steps)
+        times = [t for start, _ in self.steps for t in (start, start + self.ramp)]
+        before = [0.0, *(e for _, e in self.steps)]
+        return Program(np.array(times), np.array([e for pair in pairwise(before) for e in pair]))
+
+
+def constant_strain(strain: float, ramp: float = 0.0) -> StrainSteps:
+    """One total strain, held from time zero, or from the end of a ramp (s) on."""
+    return StrainSteps(((0.0, strain),), ramp)
+
+
+@dataclass(frozen=True)
 class PressureJump:
     """Gas pressure P1, then P2 from Tj on, each reached by a linear ramp; MPa and s."""
 
@@ -121,7 +164,7 @@ class PressureJump:
     P2: float
     Tj: float
     ramp: float = 5.0
-    quantity: Literal["stress", "pressure"] = field(default="pressure", init=False)
+    quantity: Quantity = field(default="pressure", init=False)
 
     def __post_init__(self) -> None:
         if not (self.P1 > 0 and self.P2 > 0 and self.ramp > 0 and self.Tj > self.ramp):
@@ -135,15 +178,89 @@ class PressureJump:
 
 @dataclass(frozen=True)
 class RecordedLoading:
-    """A loading known as a program over time, MPa: a recorded column, or ramps that no simpler record describes.
+    """A loading known as a program over time: a recorded column, or ramps that no simpler record describes.
 
-    control : as in StressSteps; without meaning for a pressure.
+    quantity : "stress" or "pressure", MPa, or "strain", total.
+    control : as in StressSteps; without meaning for a pressure or a strain.
     """
 
     record: Program
-    quantity: Literal["stress", "pressure"]
+    quantity: Quantity
     control: Literal["load", "stress"] = "load"
 
+    def __post_init__(self) -> None:
+        if self.quantity not in ("stress", "pressure", "strain"):
+            raise SolveError(f"a loading of {self.quantity} is no single program; allowed are stress, pressure, strain")
+
     def program(self) -> Program:
-        """Stress or pressure over time, MPa."""
+        """Stress, pressure or total strain over time."""
         return self.record
+
+
+Imposed: TypeAlias = float | Program | Sequence[tuple[float, float]]
+"""A constant, a program, or steps as (start time, value) pairs."""
+
+
+@dataclass(frozen=True)
+class PointLoading:
+    """Stresses (MPa) and total strains (of the tensor) prescribed at a material point, by component "11" to "13".
+
+    PointLoading(stress={"11": 100, "12": [(0, 0), (3600, 40)]}, strain={"33": 0.0}) is tension, torsion from one hour
+    on, and no strain along 33. What is named in neither is free of stress.
+    """
+
+    stress: Mapping[str, Program] = field(default_factory=dict)
+    strain: Mapping[str, Program] = field(default_factory=dict)
+    quantity: Quantity = field(default="components", init=False)
+
+    def __init__(
+        self, stress: Mapping[str, Imposed] | None = None, strain: Mapping[str, Imposed] | None = None
+    ) -> None:
+        given = {"stress": dict(stress or {}), "strain": dict(strain or {})}
+        for name in (*given["stress"], *given["strain"]):
+            if name not in COMPONENTS:
+                raise SolveError(f"there is no component '{name}' to load; allowed are {', '.join(COMPONENTS)}")
+        for name in given["stress"].keys() & given["strain"].keys():
+            raise SolveError(f"component {name} has both a stress and a strain prescribed; keep one of them")
+        if not (given["stress"] or given["strain"]):
+            raise SolveError(
+                'a material point needs a stress or a strain of some component, such as stress={"11": 100}'
+            )
+        for kind, parts in given.items():
+            ordered = {name: _imposed(parts[name]) for name in COMPONENTS if name in parts}
+            object.__setattr__(self, kind, MappingProxyType(ordered))
+        object.__setattr__(self, "quantity", "components")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return PointLoading, (dict(self.stress), dict(self.strain))
+
+    def __hash__(self) -> int:
+        return hash((tuple(self.stress.items()), tuple(self.strain.items())))
+
+    def program(self) -> Program:
+        """The first prescribed component over time; `stress` and `strain` hold them all."""
+        return next(iter([*self.stress.values(), *self.strain.values()]))
+
+
+def _imposed(given: Imposed) -> Program:
+    if isinstance(given, Program):
+        return given
+    if isinstance(given, Sequence):
+        return Program.steps(given)
+    return Program.constant(given)
+
+
+def in_words(loading: Loading) -> str:
+    """What is imposed, as people say it: '43 MPa', '60 to 95 MPa', 'strain 0.002', '11 100 MPa, 12 40 MPa'."""
+    if isinstance(loading, PointLoading):
+        parts = [f"{name} {_levels(p)} MPa" for name, p in loading.stress.items()]
+        return ", ".join(parts + [f"strain {name} {_levels(p)}" for name, p in loading.strain.items()])
+    program = loading.program()
+    if loading.quantity == "strain":
+        return f"strain {_levels(program)}"
+    return f"{program.values.max():g} MPa" if loading.quantity == "pressure" else f"{_levels(program)} MPa"
+
+
+def _levels(program: Program) -> str:
+    first, last = float(program.values[0]), float(program.values[-1])
+    return f"{last:g}" if float(np.ptp(program.values)) == 0.0 else f"{first:g} to {last:g}"

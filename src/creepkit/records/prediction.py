@@ -31,6 +31,27 @@ class Status(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
+class Life:
+    """When a prediction arrives at what was measured, and when it breaks, for candidates x tests, padded as there.
+
+    arrivals : (candidates, tests, times) s, when the strain measured at each frame is predicted; the rupture where that
+        comes first; 0 where the measured strain is not above zero, NaN where neither comes before the horizon.
+    slopes : (candidates, tests, times) derivative of the predicted output to ln t there, infinite at rupture.
+    ruptures : (candidates, tests) s, NaN where the specimen lasts to the horizon.
+    horizon : (tests,) s, up to which was predicted.
+    arrival_jacobian, rupture_jacobian : (..., parameters) derivatives of the ln of these times with respect to the
+        law's internal parameters, or None.
+    """
+
+    arrivals: Floats
+    slopes: Floats
+    ruptures: Floats
+    horizon: Floats
+    arrival_jacobian: Floats | None = None
+    rupture_jacobian: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Prediction:
     """Predicted outputs for candidates x tests, padded to the longest test.
 
@@ -42,6 +63,7 @@ class Prediction:
         *internal* parameters (the natural logarithm where the scale is log), in the law's order.
     effect_jacobian : {kind: (candidates, tests, times, outputs)}: derivatives with respect to each test's own effect,
         in the unit of that kind (see Nuisance); without the kinds that the predictor cannot differentiate.
+    life : when measured strains are arrived at, and rupture, where that was asked for (see WholeLife).
     """
 
     values: Floats
@@ -52,6 +74,7 @@ class Prediction:
     jacobian: Floats | None = None
     times: tuple[Floats, ...] = ()
     effect_jacobian: Mapping[str, Floats] = field(default_factory=dict)
+    life: Life | None = None
 
     def of(self, test: int, candidate: int = 0) -> Floats:
         """Outputs of one test, (times, outputs)."""
@@ -84,6 +107,17 @@ class Predictor(Protocol):
             kind that the predictor does not know is a SolveError. With `jacobian` the prediction has the derivatives
             to the kinds given in `effect_jacobian`.
         """
+        ...
+
+
+@runtime_checkable
+class WholeLife(Predictor, Protocol):
+    """A predictor that follows a specimen to its rupture, beyond the last time of its history."""
+
+    def predict_life(
+        self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], *, jacobian: bool = False
+    ) -> Prediction:
+        """Predict as predict() does, with `life`: when measured strains are arrived at, and when it breaks."""
         ...
 
 

@@ -19,6 +19,7 @@ from creepkit import hookspecs
 from creepkit.errors import PluginError, nearest
 from creepkit.registry import kinds, sources
 from creepkit.registry.kinds import Kind
+from creepkit.registry.packages import package_of
 from creepkit.registry.sources import Provenance
 
 if TYPE_CHECKING:
@@ -128,8 +129,11 @@ class Registry:
         known = self._all(kind)
         if name in known:
             return known[name].value
+        package = package_of(name) if kind is kinds.LAW else ""
         broken = sum(bool(plugin.problem) for plugin in self.plugins())
         hint = f"; {broken} plugin(s) could not be loaded, see 'creepkit plugins'" if broken else ""
+        if package:
+            raise kind.error(f"there is no law '{name}'; package {package} has it: pip install {package}{hint}")
         raise kind.error(f"there is no {kind.word} '{name}': {nearest(name, known)}{hint}")
 
     # ---- where it comes from ---------------------------------------------------------------------------------------

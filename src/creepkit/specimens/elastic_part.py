@@ -1,10 +1,11 @@
-"""What the instrument of a uniaxial test shows: the measure of strain, and the elastic part."""
+"""Elasticity of bars and points: what the instrument shows of it, and the modulus of a prescribed strain."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.errors import SolveError
 from creepkit.records import History
 
 
@@ -21,3 +22,21 @@ def elastic_strain(history: History) -> Floats:
     temperatures, which = np.unique(history.temperature_program().at(history.times), return_inverse=True)
     moduli = np.array([float(history.elastic.at(float(T)).E) for T in temperatures])
     return np.asarray(history.loading.program().at(history.times) / moduli[which])
+
+
+def one_elasticity(history: History, specimen: str) -> tuple[float, float]:
+    """E, MPa, and nu of a test whose strain is prescribed: they must be the same at all its temperatures."""
+    where = history.source or f"history '{history.name}'"
+    if history.elastic is None:
+        raise SolveError(
+            f"{where}: a {specimen} specimen under prescribed strain needs elastic data; set elastic=Elastic(E=150e3), "
+            "in MPa"
+        )
+    found = [history.elastic.at(float(T)) for T in np.unique(history.temperature_program().values)]
+    moduli = [float(one.E) for one in found]
+    if max(moduli) - min(moduli) > 1e-12 * max(moduli):
+        raise SolveError(
+            f"{where}: the modulus changes from {moduli[0]:g} to {moduli[-1]:g} MPa with the temperature of the test; "
+            "a prescribed strain takes one modulus a test, such as elastic.at(T)"
+        )
+    return moduli[0], float(found[0].nu)

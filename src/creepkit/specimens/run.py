@@ -31,7 +31,7 @@ class Run(History):
     """A simulated test up to where it ended: the times asked for that were reached, and the outputs there.
 
     status : how it ended; end_time : s, where; reason : why, in words (empty when complete).
-    A run that ended early has the label `ended`, with the reason, and `burst_s` if it burst.
+    A run that ended early has the label `ended`, with the reason, and a rupture time if it burst.
     """
 
     status: Status = Status.COMPLETE
@@ -73,8 +73,6 @@ def run_of(
     if status is not Status.COMPLETE:
         reached &= plan.times <= end_time
         labels["ended"] = reason
-    if status is Status.BURST:
-        labels["burst_s"] = f"{end_time:.6g}"
     # at rest, at time zero, there is nothing that an end could spare
     if not (reached & ((plan.times > 0.0) | (plan.times[-1] == 0.0))).any():
         raise SolveError(
@@ -84,4 +82,5 @@ def run_of(
     known = {f.name: getattr(plan, f.name) for f in fields(History)}
     outputs = {name: rows[reached, k] for k, name in enumerate(names)}
     frames = {"times": plan.times[reached], "used": plan.used[reached], "outputs": outputs, "labels": labels}
-    return kind(**{**known, **frames, **more}, status=status, end_time=end_time, reason=reason)
+    ends = {"rupture_time": end_time if status is Status.BURST else None, "unruptured": False}
+    return kind(**{**known, **frames, **ends, **more}, status=status, end_time=end_time, reason=reason)

@@ -1,4 +1,4 @@
-"""What is unknown about a uniaxial test and changes its simulation: its temperature and its modulus."""
+"""What is unknown about a test of a bar or a point and changes its simulation: its temperature and its modulus."""
 
 from __future__ import annotations
 
@@ -11,60 +11,74 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError
 from creepkit.records import Effects, History, Prediction, Program
-from creepkit.specimens.elastic_part import elastic_strain
 
 if TYPE_CHECKING:
     from creepkit.language import Elastic
 
 KINDS = ("temperature", "modulus")
-STEP = 0.1
-"""K, of the central difference in temperature."""
+STEPS = {"temperature": 0.1, "modulus": 1e-3}
+"""Of central differences: K, and relative."""
 
 Plain = Callable[[Mapping[str, ArrayLike], Sequence[History], bool], Prediction]
 """Predict values and histories, with derivatives or without."""
+Softening = Callable[[Prediction, Sequence[History], Floats], Floats | None]
+"""Derivative of the values to the relative change of the modulus; None where it is not known exactly."""
 
 
 def predict_with(
-    plain: Plain, values: Mapping[str, ArrayLike], histories: Sequence[History], effects: Effects, jacobian: bool
+    plain: Plain,
+    values: Mapping[str, ArrayLike],
+    histories: Sequence[History],
+    effects: Effects,
+    jacobian: bool,
+    *,
+    softening: Softening | None = None,
+    specimen: str = "uniaxial",
 ) -> Prediction:
     """Predict with effects, a candidate at a time where they differ from candidate to candidate.
 
-    The derivative to the modulus is exact, that to the temperature a central difference of 0.1 K to each side.
+    Derivatives are central differences, of 0.1 K and of a thousandth of the modulus to each side, but for that to the
+    modulus where `softening` gives it.
     """
     for kind in effects:
         if kind not in KINDS:
-            raise SolveError(f"a uniaxial specimen does not know the nuisance '{kind}'; it knows {' and '.join(KINDS)}")
+            known = " and ".join(KINDS)
+            raise SolveError(f"a {specimen} specimen does not know the nuisance '{kind}'; it knows {known}")
     rows = max(len(v) for v in effects.values())
     if rows == 1:
-        return _of_one(plain, values, histories, {kind: v[0] for kind, v in effects.items()}, jacobian)
+        return _of_one(plain, values, histories, {kind: v[0] for kind, v in effects.items()}, jacobian, softening)
     parts = []
     for row in range(rows):
         own = {n: np.broadcast_to(np.asarray(v, float), (rows,))[row] for n, v in values.items()}
         mine = {kind: np.broadcast_to(v, (rows, len(histories)))[row] for kind, v in effects.items()}
-        parts.append(_of_one(plain, own, histories, mine, jacobian))
+        parts.append(_of_one(plain, own, histories, mine, jacobian, softening))
     return _stacked(parts)
 
 
 def _of_one(
     plain: Plain, values: Mapping[str, ArrayLike], histories: Sequence[History], effects: Mapping[str, Floats],
-    jacobian: bool,
+    jacobian: bool, softening: Softening | None,
 ) -> Prediction:  # fmt: skip
-    nothing = np.zeros(len(histories))
-    warmer, stiffer = effects.get("temperature", nothing), effects.get("modulus", nothing)
-    found = plain(values, _changed(histories, warmer, stiffer), jacobian)
+    found = plain(values, _changed(histories, effects), jacobian)
     if not jacobian:
         return found
     slopes = {}
-    if "temperature" in effects:
-        up, down = (plain(values, _changed(histories, warmer + s, stiffer), False).values for s in (STEP, -STEP))
-        slopes["temperature"] = (up - down) / (2 * STEP)
-    if "modulus" in effects:
-        slopes["modulus"] = _softening(found, _changed(histories, warmer, stiffer), stiffer)
+    for kind in effects:
+        exact = softening if kind == "modulus" else None
+        slope = None if exact is None else exact(found, _changed(histories, effects), effects[kind])
+        if slope is not None:
+            slopes[kind] = slope
+            continue
+        ends = (_changed(histories, {**effects, kind: effects[kind] + s}) for s in (STEPS[kind], -STEPS[kind]))
+        up, down = (plain(values, moved, False).values for moved in ends)
+        slopes[kind] = (up - down) / (2 * STEPS[kind])
     return replace(found, effect_jacobian=slopes)
 
 
-def _changed(histories: Sequence[History], warmer: Floats, stiffer: Floats) -> list[History]:
+def _changed(histories: Sequence[History], effects: Mapping[str, Floats]) -> list[History]:
     """Histories that are so many K warmer, with moduli larger by these shares."""
+    nothing = np.zeros(len(histories))
+    warmer, stiffer = effects.get("temperature", nothing), effects.get("modulus", nothing)
     changed = []
     for history, T, share in zip(histories, warmer, stiffer, strict=True):
         program = history.temperature_program()
@@ -75,15 +89,6 @@ def _changed(histories: Sequence[History], warmer: Floats, stiffer: Floats) -> l
 
 def _stiffened(elastic: Elastic, share: float) -> Elastic:
     return replace(elastic, E=elastic.E * (1.0 + share))
-
-
-def _softening(found: Prediction, histories: Sequence[History], stiffer: Floats) -> Floats:
-    """Derivative of the strain to the relative change of the modulus, shaped as the values."""
-    slope = np.zeros_like(found.values)
-    for k, history in enumerate(histories):
-        if history.includes_elastic:
-            slope[:, k, : history.times.size, 0] = -elastic_strain(history) / (1.0 + stiffer[k])
-    return slope
 
 
 def _stacked(parts: Sequence[Prediction]) -> Prediction:

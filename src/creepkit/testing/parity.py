@@ -130,7 +130,7 @@ def _relative(true: Any, got: float) -> float:
     if not np.isfinite(got):
         return np.inf
     if true == 0:
-        return 0.0 if got == 0 else np.inf
+        return 0.0 if abs(got) < NO_RATE else np.inf
     return float(abs(mpmath.mpf(got) / true - 1))
 
 

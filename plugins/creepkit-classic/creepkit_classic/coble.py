@@ -1,0 +1,46 @@
+"""Coble creep: vacancies flow along grain boundaries, rate = 14 pi D Omega s/(k T d^3), D = delta D_b exp(-Q/(R T)).
+
+D is the diffusivity in the boundary times its width delta, in mm^3/s (1 m^3/s is 1e9 mm^3/s). The number 14 pi = 44 is
+that of Frost and Ashby, for equiaxed grains; Coble's own is 148/pi = 47. D_b, Omega and 1/d^3 multiply each other:
+fix what is known, as in `law.fix(Omega=1.09e-20, d=0.01)`.
+"""
+
+import sympy
+
+from creepkit.language import GAS_CONSTANT, CreepLaw, Param, hookimpl, parameters, stress, temperature
+
+BOLTZMANN = 1.380649e-20
+"""k in N mm/K (1.380649e-23 J/K, exact since 2019)."""
+
+D_b, Q, Omega, d = parameters("D_b Q Omega d")
+diffusivity = D_b * sympy.exp(-Q / (GAS_CONSTANT * temperature))
+
+COBLE = CreepLaw(
+    name="coble",
+    title="Coble creep by diffusion along grain boundaries",
+    terms={"boundary diffusion": 14 * sympy.pi * diffusivity * Omega * stress / (BOLTZMANN * temperature * d**3)},
+    params={
+        D_b: Param(
+            "width times frequency factor of boundary diffusion",
+            unit="mm^3/s",
+            bounds=(1e-12, 1e-1),
+            scale="log",
+            off=0.0,
+        ),
+        Q: Param("activation energy of boundary diffusion", unit="J/mol", bounds=(5e4, 9e5)),
+        Omega: Param("atomic volume", unit="mm^3", bounds=(5e-21, 1e-19), scale="log"),
+        d: Param("grain size", unit="mm", bounds=(1e-5, 10.0), scale="log"),
+    },
+    references=(
+        "Coble (1963), J. Appl. Phys. 34, 1679",
+        "Frost and Ashby (1982), Deformation-Mechanism Maps, Pergamon, Eq. (2.29)",
+    ),
+)
+
+TYPICAL = {"D_b": 3.5e-6, "Q": 115e3, "Omega": 1.09e-20, "d": 0.01}
+"""Nickel of 10 micrometres: Frost and Ashby (1982), Table 4.1."""
+
+
+@hookimpl
+def creepkit_laws() -> list[CreepLaw]:
+    return [COBLE]

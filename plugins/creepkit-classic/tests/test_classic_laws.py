@@ -1,0 +1,35 @@
+"""Each law comes through its entry point, keeps what every law promises, and has values to begin with."""
+
+from importlib import import_module
+
+import pytest
+
+import creepkit as ck
+from creepkit.registry import default
+from creepkit.testing import check_law
+
+LAWS = [
+    *("blackburn", "coble", "dorn", "double-power", "garofalo", "graham-walles", "mpc-omega", "nabarro-herring"),
+    *("norton-bailey-rate", "norton-bailey-strain", "norton-bailey-time", "theta-projection", "threshold-stress"),
+]
+
+
+def test_they_come_through_their_entry_points() -> None:
+    ours = [name for name, law in default().laws().items() if law.provenance.origin.startswith("creepkit-classic ")]
+
+    assert sorted(ours) == LAWS
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_it_keeps_what_every_law_promises(name: str) -> None:
+    report = check_law(ck.law(name))
+
+    assert report.ok, str(report)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_typical_values_are_within_the_bounds(name: str) -> None:
+    law, typical = ck.law(name), import_module(f"creepkit_classic.{name.replace('-', '_')}").TYPICAL
+
+    assert law.values(typical) == typical
+    assert [key for key, value in typical.items() if not law.table[key].admits(value)] == []

@@ -1,0 +1,102 @@
+"""Converted values: the same rates along the same curve, round trips, and values without a counterpart."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from creepkit_classic.conversions import convert, per_second
+
+import creepkit as ck
+from creepkit.errors import LawError
+
+NAMES = ["norton-bailey-time", "norton-bailey-rate", "norton-bailey-strain", "time-hardening", "strain-hardening"]
+TEXTBOOK = {"A": 4e-13, "n": 4.0, "m": 0.4}
+"""strain = A s^n t^m."""
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_rates_are_those_of_the_curve(name: str) -> None:
+    """At constant stress and the strain A s^n t^m every notation's rate is A m s^n t^(m-1)."""
+    stress, time = (grid.ravel() for grid in np.meshgrid([20.0, 90.0, 300.0], np.geomspace(1.0, 1e7, 8)))
+    kernel = ck.lower(ck.law(name), "numpy")
+
+    rate = kernel.rate(
+        convert(TEXTBOOK, "norton-bailey-time", name), stress=stress, time=time, strain=4e-13 * stress**4 * time**0.4
+    )
+
+    np.testing.assert_allclose(rate, 1.6e-13 * stress**4 * time**-0.6, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("given", "wanted"), list(product(NAMES, NAMES)))
+def test_there_and_back(given: str, wanted: str) -> None:
+    values = convert(TEXTBOOK, "norton-bailey-time", given)
+
+    assert convert(convert(values, given, wanted), wanted, given) == pytest.approx(values, rel=1e-12, abs=0)
+
+
+def test_the_numbers_of_each_notation_by_hand() -> None:
+    """strain = 4e-12 s^2 t^(1/2): rate = 2e-12 s^2 t^(-1/2), and with t = (e/(4e-12 s^2))^2, rate = 8e-24 s^4/e."""
+    given = {"A": 4e-12, "n": 2.0, "m": 0.5}
+
+    assert convert(given, "norton-bailey-time", "norton-bailey-rate") == {"A": 2e-12, "n": 2.0, "m": -0.5}
+    assert convert(given, "norton-bailey-time", "norton-bailey-strain") == {"A": 2e-12, "n": 2.0, "m": -0.5}
+    by_strain = convert(given, "norton-bailey-time", "strain-hardening")
+    assert by_strain == pytest.approx({"A": 8e-24, "n": 4.0, "m": -1.0}, rel=1e-12)
+
+
+def test_steady_creep_is_the_same_in_all_of_them() -> None:
+    for name in NAMES:
+        m = 1.0 if name == "norton-bailey-time" else 0.0
+        assert convert({"A": 1e-15, "n": 5.0, "m": 1.0}, "norton-bailey-time", name) == pytest.approx(
+            {"A": 1e-15, "n": 5.0, "m": m}
+        )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_hours_become_seconds(name: str) -> None:
+    """The rate per hour at 1, 10, 100 h with the values for hours is 3600 times that per second."""
+    in_hours = convert(TEXTBOOK, "norton-bailey-time", name)
+    kernel, hours = ck.lower(ck.law(name), "numpy"), np.array([1.0, 10.0, 100.0])
+    per_hour = kernel.rate(in_hours, stress=80.0, time=hours, strain=1e-3)
+
+    rate = kernel.rate(per_second(in_hours, name, "h"), stress=80.0, time=3600 * hours, strain=1e-3)
+
+    np.testing.assert_allclose(3600 * rate, per_hour, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "m", "said"),
+    [
+        ("norton-bailey-time", 0.0, "norton-bailey-time: m = 0 is a strain that does not start .* m above 0"),
+        ("norton-bailey-rate", -1.0, "norton-bailey-rate: m = -1 .* allowed is m above -1"),
+        ("norton-bailey-strain", -1.5, "norton-bailey-strain: m = -1.5 .* allowed is m above -1"),
+        ("time-hardening", -2.0, "time-hardening: m = -2 .* allowed is m above -1"),
+        ("strain-hardening", 1.0, "strain-hardening: m = 1 .* allowed is m below 1"),
+    ],
+)
+def test_values_without_a_counterpart_are_refused(given: str, m: float, said: str) -> None:
+    for wanted in NAMES:
+        with pytest.raises(LawError, match=said):
+            convert({"A": 1e-15, "n": 4.0, "m": m}, given, wanted)
+
+
+@pytest.mark.parametrize(
+    ("values", "given", "said"),
+    [
+        ({"A": 1e-15, "n": 4.0}, "norton-bailey-time", "the values are those of A, n; give A, n and m"),
+        ({**TEXTBOOK, "Q": 3e5}, "norton-bailey-time", "the values are those of A, Q, m, n; give A, n and m"),
+        ({**TEXTBOOK, "A": 0.0}, "norton-bailey-time", "A must be positive and all of them finite"),
+        ({**TEXTBOOK, "n": np.nan}, "norton-bailey-time", "n = nan, m = 0.4; A must be positive and all of them"),
+        (TEXTBOOK, "norton-baily-time", "no notation 'norton-baily-time' .* did you mean 'norton-bailey-time'"),
+    ],
+)
+def test_what_is_no_set_of_values_is_refused(values: dict[str, float], given: str, said: str) -> None:
+    with pytest.raises(LawError, match=said):
+        convert(values, given, "strain-hardening")
+
+
+def test_an_unknown_target_or_unit_is_refused() -> None:
+    with pytest.raises(LawError, match="no notation 'ansys' of Norton-Bailey creep: known: norton-bailey-rate"):
+        convert(TEXTBOOK, "norton-bailey-time", "ansys")
+    with pytest.raises(LawError, match="no unit of time 'hours': known: d, h, min, s"):
+        per_second(TEXTBOOK, "norton-bailey-time", "hours")

@@ -1,0 +1,1 @@
+"""Creep laws with damage, one a file; each imports creepkit.language only."""

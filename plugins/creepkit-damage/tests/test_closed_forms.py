@@ -1,0 +1,143 @@
+"""Damage and strain against closed forms at constant stress, and the rule of life fractions when it steps."""
+
+import numpy as np
+import pytest
+from creepkit_damage.kachanov_rabotnov import TYPICAL
+from scipy.integrate import quad
+
+import creepkit as ck
+from creepkit.records import Status, StressSteps
+
+STRESS, LIFE = 120.0, 2e6
+BAR = ck.specimen("uniaxial").replace(tolerance=1e-9, strain_limit=10.0, max_steps=100_000)
+RATE = 1e-8
+
+POWERS = {"A": RATE / STRESS**4, "n": 4.0, "B": 1 / (LIFE * STRESS**5), "alpha": 0.3}
+KACHANOV = {**POWERS, "chi": 5.0, "phi": 6.0, "m": 0.0}
+LIU = {**POWERS, "p": 5.0, "q_2": 3.0}
+SINH = {
+    **{"A": RATE / np.sinh(STRESS / 40), "s_s": 40.0, "lambda_": 2.0},
+    **{"M": 1 / (LIFE * np.sinh(STRESS / 90) ** 3), "s_t": 90.0, "chi": 3.0, "phi": 4.0, "alpha": 0.3, "beta": 0.2},
+}
+VALUES = {"kachanov-rabotnov": KACHANOV, "liu-murakami": LIU, "sinh-damage": SINH}
+
+
+def exponential(share: np.ndarray | float, growth: float) -> np.ndarray:
+    """Damage of Liu-Murakami and of the sinh law at a share of the life: w = -ln(1 - (1 - exp(-q)) t/t_r)/q."""
+    return -np.log1p(np.expm1(-growth) * share) / growth
+
+
+DAMAGE = {
+    "kachanov-rabotnov": lambda share: 1 - (1 - share) ** (1 / 7),
+    "liu-murakami": lambda share: exponential(share, 3.0),
+    "sinh-damage": lambda share: exponential(share, 4.0),
+}
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_damage_grows_as_its_closed_form(name: str) -> None:
+    """dw/dt of the kernel at w(t) is the derivative of w(t), by 50 Chebyshev points of the share of life."""
+    kernel = ck.lower(ck.law(name), "numpy")
+    share = np.polynomial.Chebyshev.basis(50, domain=[0.0, 0.98]).roots()
+    step = 1e-6
+    slope = (DAMAGE[name](share + step) - DAMAGE[name](share - step)) / (2 * step)
+
+    rate = kernel.state_rates(VALUES[name], stress=STRESS, w=DAMAGE[name](share))["w"]
+
+    np.testing.assert_allclose(rate * LIFE, slope, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_rupture_comes_when_the_damage_reaches_its_limit(name: str) -> None:
+    times = np.linspace(0.05, 1.2, 23) * LIFE
+    run = ck.simulate(name, BAR, VALUES[name], loading=ck.constant_stress(STRESS, "stress"), times=times)
+
+    short = 0.01**7 if name == "kachanov-rabotnov" else 0.0
+    assert run.status is Status.BURST
+    assert run.end_time == pytest.approx(LIFE * (1 - short), rel=1e-6)
+    assert (run.times == times[times < LIFE]).all()
+
+
+@pytest.mark.parametrize("m", [0.0, -0.5])
+def test_strain_of_kachanov_and_rabotnov(m: float) -> None:
+    """With x = (t/t_r)^(1+m): e = A s^n/(B s^chi) (1+phi)/(1+phi-n) [1 - (1-x)^(1-n/(1+phi))]."""
+    values = KACHANOV | {"m": m}
+    life = ((1 + m) * LIFE) ** (1 / (1 + m))
+    x = np.linspace(0.02, 0.999, 40)
+    times = life * x ** (1 / (1 + m))
+    run = ck.simulate("kachanov-rabotnov", BAR, values, loading=ck.constant_stress(STRESS, "stress"), times=times)
+
+    np.testing.assert_allclose(run.outputs["strain"], RATE * LIFE * 7 / 3 * (1 - (1 - x) ** (3 / 7)), rtol=1e-6)
+
+
+def test_strain_at_rupture_is_a_multiple_of_rate_times_life() -> None:
+    """(1+phi)/(1+phi-n) A s^n t_r; the last 1e-8 of the life has 1e-8^(3/7) = 4e-4 of it."""
+    last = LIFE * (1 - 1e-8)
+    run = ck.simulate("kachanov-rabotnov", BAR, KACHANOV, loading=ck.constant_stress(STRESS, "stress"), times=[last])
+
+    assert run.outputs["strain"][-1] == pytest.approx(RATE * LIFE * 7 / 3, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["liu-murakami", "sinh-damage"])
+def test_strain_is_the_integral_over_the_damage(name: str) -> None:
+    """e = r times the integral of exp(c w(t)^1.5), c = 2 (n+1)/(pi sqrt(1 + 3/n)) or lambda, by quadrature."""
+    softening = {"liu-murakami": 10 / (np.pi * np.sqrt(1.75)), "sinh-damage": 2.0}[name]
+    shares = np.array([0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.9999])
+    exact = [quad(lambda x: np.exp(softening * DAMAGE[name](x) ** 1.5), 0, s, epsrel=1e-11)[0] for s in shares]
+    run = ck.simulate(name, BAR, VALUES[name], loading=ck.constant_stress(STRESS, "stress"), times=LIFE * shares)
+
+    np.testing.assert_allclose(run.outputs["strain"], RATE * LIFE * np.array(exact), rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_shares_of_life_add_up_to_one(name: str) -> None:
+    """Robinson's rule: each growth is a function of stress times one of damage."""
+    higher = 1.25 * STRESS
+    by_stress = {"sinh-damage": (np.sinh(higher / 90) / np.sinh(STRESS / 90)) ** 3}.get(name, 1.25**5)
+    loading = StressSteps(((0.0, STRESS), (0.4 * LIFE, higher)), "stress")
+    run = ck.simulate(name, BAR, VALUES[name], loading=loading, times=[1.0, LIFE])
+
+    assert run.end_time == pytest.approx((0.4 + 0.6 / by_stress) * LIFE, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_the_largest_principal_stress_counts_by_its_share(name: str) -> None:
+    """Under shear s_1 = s/sqrt(3) and the mean is 0; under two equal tensions s_1 = s and the mean 2 s/3."""
+    kernel, values = ck.lower(ck.law(name), "numpy"), VALUES[name]
+    growth = {"sinh-damage": lambda s: np.sinh(s / 90) ** 3}.get(name, lambda s: s**5)
+    beta = values.get("beta", 0.0)
+    in_shear = 0.3 / np.sqrt(3) + 1 - 0.3 - beta
+    in_two = 0.3 + 2 * beta + 1 - 0.3 - beta
+
+    for share, largest, mean in ((in_shear, 1 / np.sqrt(3), 0.0), (in_two, 1.0, 2 / 3)):
+        point = dict(stress=STRESS, principal_stress=largest * STRESS, mean_stress=mean * STRESS)
+        rate = kernel.state_rates(values, **point)["w"] / kernel.state_rates(values, stress=STRESS)["w"]
+        assert rate == pytest.approx(growth(share * STRESS) / growth(STRESS), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_compression_does_not_damage(name: str) -> None:
+    kernel = ck.lower(ck.law(name), "numpy")
+    shares = {"alpha": 1.0, "beta": 0.0} if name == "sinh-damage" else {"alpha": 1.0}
+    squeezed = dict(stress=STRESS, principal_stress=-3 * STRESS, mean_stress=-3.4 * STRESS)
+
+    assert kernel.state_rates(VALUES[name] | shares, **squeezed)["w"] < 1e-80 / LIFE
+
+
+def test_rates_at_the_last_moment() -> None:
+    """Liu-Murakami at w = 1: exp(2 (n+1)/(pi sqrt(1+3/n))) times the first rate; the sinh law exp(lambda)."""
+    for name, factor in (("liu-murakami", 10 / (np.pi * np.sqrt(1.75))), ("sinh-damage", 2.0)):
+        kernel = ck.lower(ck.law(name), "numpy")
+        rates = kernel.rate(VALUES[name], stress=STRESS, w=np.array([0.0, 1.0]))
+        assert np.log(rates[1] / rates[0]) == pytest.approx(factor, rel=1e-9)
+
+
+def test_typical_values_say_what_they_claim() -> None:
+    """Type 316 steel at 600 C and 240 MPa: rupture after 3200 h at 27 % strain."""
+    run = ck.simulate(
+        "kachanov-rabotnov", BAR, TYPICAL, loading=ck.constant_stress(240.0, "stress"), times=[3600.0, 4000 * 3600.0]
+    )
+    largest = (1 + TYPICAL["phi"]) / (1 + TYPICAL["phi"] - TYPICAL["n"])
+
+    assert run.end_time / 3600 == pytest.approx(3200, rel=0.02)
+    assert largest * TYPICAL["A"] * 240 ** TYPICAL["n"] * run.end_time == pytest.approx(0.27, abs=0.005)

@@ -1,0 +1,155 @@
+"""What the command line imposes on a specimen: texts such as 100, 3600:120 or 12=3600:40 as a loading."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from creepkit.records import Loading
+
+BULGE, UNIAXIAL, RELAXATION, POINT = "bulge", "uniaxial", "relaxation", "point"
+RAMP = 5.0
+"""s, in which each pressure is reached."""
+
+OWNERS = {
+    "--stress": (UNIAXIAL, POINT),
+    "--strain": (RELAXATION, POINT),
+    "--pressure": (BULGE,),
+    "--control": (UNIAXIAL,),
+    "--ramp": (RELAXATION,),
+    "--geometry": (BULGE,),
+    "--picture": (BULGE,),
+}
+"""Which specimens an option is for."""
+
+
+def refuse_strangers(specimen: str, options: dict[str, object]) -> None:
+    """Options of another specimen would go unheard; what a plugin's specimen takes is its own affair."""
+    from creepkit.errors import SolveError
+
+    if specimen not in {name for owners in OWNERS.values() for name in owners}:
+        return
+    for option, given in options.items():
+        if given not in (None, []) and specimen not in OWNERS[option]:
+            belongs = " or ".join(OWNERS[option])
+            raise SolveError(
+                f"{option} belongs to --specimen {belongs}, found --specimen {specimen}; leave one of them out"
+            )
+
+
+def loading_of(
+    specimen: str,
+    stress: Sequence[str] | None,
+    strain: Sequence[str] | None,
+    pressure: Sequence[str] | None,
+    control: str | None,
+    ramp: float | None,
+    end: float,
+) -> Loading:
+    """The loading of a test that ends at `end`, s."""
+    from creepkit.errors import SolveError
+
+    if specimen == POINT or any("=" in text for text in (*(stress or ()), *(strain or ()))):
+        return _by_components(stress, strain)
+    if specimen == BULGE or pressure:
+        return _by_pressure(pressure, end)
+    if specimen == RELAXATION or strain:
+        if not strain:
+            raise SolveError("a bar in relaxation needs a strain: give --strain, such as 0.002, or 3600:0.003 later on")
+        from creepkit.records import StrainSteps
+
+        return StrainSteps(tuple(steps(strain, "--strain")), ramp or 0.0)
+    return _by_stress(stress, control)
+
+
+def _by_stress(texts: Sequence[str] | None, control: str | None) -> Loading:
+    from creepkit.errors import SolveError
+    from creepkit.records import StressSteps
+
+    if not texts:
+        raise SolveError("a bar needs a stress: give --stress, such as 100, or --specimen bulge with --pressure")
+    if control not in (None, "load", "stress"):
+        raise SolveError(f"--control {control} is not known; allowed are load and stress")
+    return StressSteps(tuple(steps(texts, "--stress")), "stress" if control == "stress" else "load")
+
+
+def _by_components(stress: Sequence[str] | None, strain: Sequence[str] | None) -> Loading:
+    from creepkit.errors import SolveError
+    from creepkit.records import PointLoading
+
+    if not (stress or strain):
+        raise SolveError("a material point needs a component: give --stress 11=100, or --strain 12=0.001")
+    return PointLoading(_components(stress, "--stress"), _components(strain, "--strain"))
+
+
+def _components(texts: Sequence[str] | None, option: str) -> dict[str, list[tuple[float, float]]]:
+    """Steps by component, in the order in which they were given."""
+    from creepkit.errors import SolveError
+
+    found: dict[str, list[tuple[float, float]]] = {}
+    for text in texts or ():
+        name, equals, rest = text.partition("=")
+        if not equals:
+            raise SolveError(f"{option} {text}: name the component of a material point, such as 11={text}")
+        found.setdefault(name.strip(), []).extend(steps([rest], option))
+    for name, pairs in found.items():
+        if pairs[0][0] != 0.0:
+            pairs.insert(0, (0.0, 0.0))  # until its first step a component is at rest
+        if sorted(pairs) != pairs:
+            raise SolveError(f"{option}: the steps of component {name} must follow one another in time")
+    return found
+
+
+def _by_pressure(texts: Sequence[str] | None, end: float) -> Loading:
+    """One or two pressures as a PressureJump, more as the program that they are."""
+    import numpy as np
+
+    from creepkit.errors import SolveError
+    from creepkit.records import PressureJump, Program, RecordedLoading
+
+    if not texts:
+        raise SolveError("a dimple needs a pressure: give --pressure, such as 8, or 7200:10 for a later step")
+    starts, pressures = np.array(steps(texts, "--pressure")).T
+    if starts[0] != 0.0 or (np.diff(starts) < RAMP).any() or pressures.min() < 0.0:
+        raise SolveError(
+            f"--pressure {' '.join(texts)}: the first pressure starts at 0 s, none is negative, and each comes "
+            f"{RAMP:g} s or more after the one before, for the ramp takes that long"
+        )
+    if len(texts) <= 2 and pressures.min() > 0.0 and (len(texts) == 1 or starts[1] > RAMP):
+        change = starts[1] if len(texts) == 2 else max(end, 2 * RAMP)
+        return PressureJump(float(pressures[0]), float(pressures[-1]), float(change), RAMP)
+    times = np.stack([starts, starts + RAMP], axis=1).ravel()
+    values = np.repeat(np.append(0.0, pressures), 2)[1:-1]
+    return RecordedLoading(Program(times, values), "pressure")
+
+
+def steps(texts: Sequence[str], option: str) -> list[tuple[float, float]]:
+    """(start in s, value) pairs from texts such as 100 and 3600:120."""
+    from creepkit.errors import SolveError
+
+    found = []
+    for text in texts:
+        start, _, value = text.rpartition(":")
+        try:
+            found.append((float(start or 0.0), float(value)))
+        except ValueError:
+            raise SolveError(f"{option} {text}: write a number, or SECONDS:NUMBER for a later step") from None
+    return found
+
+
+def numbers(texts: Sequence[str], option: str, example: str) -> dict[str, float]:
+    """{name: value} from texts such as n=5.2."""
+    from creepkit.errors import SolveError
+
+    values: dict[str, float] = {}
+    for text in texts:
+        name, _, number = text.partition("=")
+        name = name.strip()
+        if name in values:
+            raise SolveError(f"{option} {text}: {name} is given twice; keep one of them")
+        try:
+            values[name] = float(number)
+        except ValueError:
+            raise SolveError(f"{option} {text}: write NAME=NUMBER, such as {example}") from None
+    return values

@@ -1,0 +1,67 @@
+"""What the cards of every code share: the comments at the top, numbers within a double's range, moduli."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import sympy
+
+from creepkit.errors import ExportError
+from creepkit.export.conversion import reference_of
+from creepkit.export.heading import comments, heading
+from creepkit.language.symbols import temperature
+from creepkit.records import ValuedLaw
+
+_WIDTH = 110
+
+
+def top(source: ValuedLaw, mark: str, lines: Iterable[str]) -> list[str]:
+    """Comments: the law, its values and notes, the units of the numbers below, then `lines` on the target's form."""
+    units = source.units
+    told = f"Numbers below are in {units.stress} and {units.time}, temperatures in K: {reference_of(units)}."
+    return comments([*heading(source.reduced(), units=told), "", *lines], mark, _WIDTH)
+
+
+def number(logarithm: float, what: str, source: ValuedLaw) -> float:
+    """exp(logarithm); ExportError where that is no double."""
+    if not -700.0 < logarithm < 700.0:
+        raise ExportError(
+            f"law '{source.law.name}': {what} would be 1e{logarithm / math.log(10):.0f}, beyond the range of a double; "
+            "give the temperature of the analysis, export(..., temperature=1073)"
+        )
+    return math.exp(logarithm)
+
+
+def figure(value: float) -> str:
+    """A number of 13 digits: more than the logarithm of a coefficient keeps, and short enough for every code."""
+    return f"{value:.13g}"
+
+
+@dataclass(frozen=True)
+class Moduli:
+    """Young's modulus in the unit of stress of the text, and Poisson's ratio, at a temperature in K."""
+
+    T: float
+    E: float
+    nu: float
+
+
+def moduli(source: ValuedLaw, temperatures: Sequence[float] = ()) -> list[Moduli]:
+    """The moduli at each temperature, or once where they do not depend on it; none where they are not given.
+
+    temperatures : of a table; ExportError where one is needed and these are none.
+    """
+    elastic = source.elastic
+    if elastic is None:
+        return []
+    if not any(isinstance(v, sympy.Expr) and v.has(temperature) for v in (elastic.E, elastic.nu)):
+        temperatures = (0.0,)
+    if not temperatures:
+        raise ExportError(
+            f"law '{source.law.name}': the elastic moduli depend on temperature, and this text takes numbers; "
+            "give elastic.at(1073)"
+        )
+    at = ((T, elastic.at(T or 1.0)) for T in temperatures)
+    return [Moduli(T, float(e.E) / source.units.megapascals, float(e.nu)) for T, e in at]

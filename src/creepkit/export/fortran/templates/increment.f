@@ -1,0 +1,233 @@
+!
+! ---------------------------------------------------------------
+! Creep over one increment at constant stress: the implicit
+! midpoint rule in the clock s = t**beta, in which creep begins as
+! a straight line, so t = 0 and zero strain are no singularities.
+! The strain at the end is solved for here (Newton in ln of the
+! increment); where that fails the increment is halved, and halved
+! again. The very first increment, in which a sum of terms is smooth
+! in no clock, is taken in 16 steps. Derivatives are those of the converged update, by the
+! implicit function theorem.
+!   y     creep strain gained (0 at the start), internal variables
+!   slope derivatives of y at the end: to the stress (MPa), and to
+!         the mean stress (MPa)
+! ---------------------------------------------------------------
+      subroutine ${id}_increment(start, finish, warm, stress, mean,
+     &    strain, y, slope)
+        implicit none
+        integer, parameter :: ny = $ny, most = 4096
+        double precision, intent(in) :: start, finish, warm(2)
+        double precision, intent(in) :: stress, mean, strain
+        double precision, intent(inout) :: y(ny)
+        double precision, intent(out) :: slope(ny, 2)
+        double precision, parameter :: beta = $beta
+        double precision first(ny), low, high, tail, point(6)
+        integer part, parts
+        logical solved
+        first = y
+        low = max(start, 0.0d0)**beta
+        high = max(finish, 0.0d0)**beta
+        point = (/ start, finish - start, warm(1), warm(2), beta,
+     &      strain /)
+        parts = 1
+        if (.not. low > 0.0d0) parts = 16
+        do
+          y = first
+          slope = 0.0d0
+          do part = 1, parts
+            tail = (high - low)/parts
+            call ${id}_step(low + (part - 1)*tail, tail, point, stress,
+     &          mean, parts >= most, y, slope, solved)
+            if (.not. solved) exit
+          enddo
+          if (solved) exit
+          parts = 2*parts
+        enddo
+      end subroutine ${id}_increment
+!
+! One step of the clock, from s to s + ds. The last resort, when
+! even the smallest step has no solution (rupture), holds states at
+! their limits and lets the strain grow by no more than 1.
+!
+      subroutine ${id}_step(s, ds, point, stress, mean, last, y,
+     &    slope, solved)
+        implicit none
+        integer, parameter :: ny = $ny, nx = $nx
+        double precision, intent(in) :: s, ds, point(6), stress, mean
+        logical, intent(in) :: last
+        double precision, intent(inout) :: y(ny), slope(ny, 2)
+        logical, intent(out) :: solved
+        double precision x(nx), out(ny*(1 + nx)), a(ny, ny)
+        double precision r(ny, 3), z(ny), grown, h, middle, time, lnh
+        double precision ends(ny)
+        integer i, pass
+        solved = .true.
+        middle = s + 0.5d0*ds
+        if (.not. ds > 0.0d0) return
+        time = middle**(1.0d0/point(5))
+        h = ds*time/(point(5)*middle)
+        lnh = log(h)
+        x(1) = stress
+        x(3) = time
+        x(4) = point(3)
+        if (point(2) > 0.0d0) x(4) = point(3) + (point(4) - point(3))*
+     &      (time - point(1))/point(2)
+        x(5) = stress
+        x(6) = mean
+        z = y
+        call ${id}_look(x, point(6), y, z, 0.0d0, out)
+        z(1) = min(max(lnh + out(1), -690.0d0), 50.0d0)
+        do pass = 1, 40
+          grown = exp(z(1))
+          call ${id}_look(x, point(6), y, z, grown, out)
+          call ${id}_equations(x, y, z, grown, h, lnh, out, slope, a, r)
+          call ${id}_solve(a, r)
+          z = z + r(:, 1)
+          z(1) = min(max(z(1), -700.0d0), 50.0d0)
+          if (.not. maxval(abs(r(:, 1))) < 1.0d10) exit
+          if (maxval(abs(r(:, 1))/(1.0d-3 + abs(z))) < 1.0d-11) exit
+        enddo
+        solved = maxval(abs(r(:, 1))/(1.0d-3 + abs(z))) < 1.0d-8
+        solved = solved .and. z(1) < 2.0d0
+        if (solved) then
+          grown = exp(z(1))
+          slope(1, :) = slope(1, :) + grown*r(1, 2:3)
+          y(1) = y(1) + grown
+          slope(2:, :) = r(2:, 2:3)
+          y(2:) = z(2:)
+          call ${id}_hold(y, slope)
+        elseif (last) then
+          call ${id}_limits(ends)
+          z = y
+          do i = 2, ny
+            if (abs(ends(i)) < 1.0d300) y(i) = ends(i)
+          enddo
+          z(2:) = y(2:)
+          call ${id}_look(x, point(6), y, z, 0.0d0, out)
+          grown = exp(min(lnh + out(1), 0.0d0))
+          slope = 0.0d0
+          slope(1, 1) = grown*out(2)
+          slope(1, 2) = grown*out(7)
+          y(1) = y(1) + grown
+          solved = .true.
+        endif
+      end subroutine ${id}_step
+!
+! The law halfway between y and its end (y + grown, z); a state at
+! its limit stays there.
+!
+      subroutine ${id}_look(x, strain, y, z, grown, out)
+        implicit none
+        integer, parameter :: ny = $ny, nx = $nx
+        double precision, intent(inout) :: x(nx)
+        double precision, intent(in) :: strain, y(ny), z(ny), grown
+        double precision, intent(out) :: out(ny*(1 + nx))
+        double precision w(ny), slope(ny, 2)
+        slope = 0.0d0
+        x(2) = strain + y(1) + 0.5d0*grown
+        w = 0.5d0*(y + z)
+        call ${id}_hold(w, slope)
+        x(7:) = w(2:)
+        call ${id}_law(x, out)
+      end subroutine ${id}_look
+!
+! Newton's equations: a times the change of (ln of the increment,
+! states) is r(:, 1); r(:, 2:3) are what stress and mean stress do.
+!
+      subroutine ${id}_equations(x, y, z, grown, h, lnh, out, slope,
+     &    a, r)
+        implicit none
+        integer, parameter :: ny = $ny, nx = $nx
+        double precision, intent(in) :: x(nx), y(ny), z(ny), grown
+        double precision, intent(in) :: h, lnh, out(ny*(1 + nx))
+        double precision, intent(in) :: slope(ny, 2)
+        double precision, intent(out) :: a(ny, ny), r(ny, 3)
+        double precision g(ny), d(ny, nx), ends(ny), size
+        integer i, j
+        call ${id}_limits(ends)
+        g = out(1:ny)
+        do i = 1, ny
+          d(i, :) = out(ny + (i - 1)*nx + 1:ny + i*nx)
+        enddo
+        r(1, 1) = max(lnh + g(1), -690.0d0) - z(1)
+        do i = 1, ny
+          size = 1.0d0
+          if (i > 1) size = h
+          a(i, 1) = -0.5d0*size*grown*d(i, 2)
+          if (ny > 1) a(i, 2:) = -0.5d0*size*d(i, 7:)
+          r(i, 2) = size*(d(i, 1) + d(i, 2)*slope(1, 1))
+          r(i, 3) = size*(d(i, 6) + d(i, 2)*slope(1, 2))
+          do j = 2, ny
+            r(i, 2:3) = r(i, 2:3) + 0.5d0*size*d(i, 5 + j)*slope(j, :)
+          enddo
+        enddo
+        a(1, 1) = 1.0d0 + a(1, 1)
+        do i = 2, ny
+          a(i, i) = 1.0d0 + a(i, i)
+          r(i, 1) = y(i) + h*g(i) - z(i)
+          r(i, 2:3) = r(i, 2:3) + slope(i, :)
+          if (y(i) >= ends(i)) then
+            a(i, :) = 0.0d0
+            a(i, i) = 1.0d0
+            r(i, :) = 0.0d0
+          endif
+        enddo
+        if (g(1) + lnh < -690.0d0) then
+          a(1, 2:) = 0.0d0
+          a(1, 1) = 1.0d0
+          r(1, 2:3) = 0.0d0
+        endif
+      end subroutine ${id}_equations
+!
+! Hold states at the values at which the material has failed.
+!
+      subroutine ${id}_hold(y, slope)
+        implicit none
+        integer, parameter :: ny = $ny
+        double precision, intent(inout) :: y(ny), slope(ny, 2)
+        double precision ends(ny)
+        integer i
+        call ${id}_limits(ends)
+        do i = 2, ny
+          if (y(i) >= ends(i)) then
+            y(i) = ends(i)
+            slope(i, :) = 0.0d0
+          endif
+        enddo
+      end subroutine ${id}_hold
+!
+      subroutine ${id}_limits(ends)
+        implicit none
+        double precision, intent(out) :: ends($ny)
+$limits
+      end subroutine ${id}_limits
+!
+! Gaussian elimination with pivots: r becomes a**(-1) r.
+!
+      subroutine ${id}_solve(a, r)
+        implicit none
+        integer, parameter :: ny = $ny
+        double precision, intent(inout) :: a(ny, ny), r(ny, 3)
+        double precision row(ny), right(3), share
+        integer i, k, p
+        do k = 1, ny
+          p = k - 1 + maxloc(abs(a(k:, k)), 1)
+          row = a(k, :)
+          a(k, :) = a(p, :)
+          a(p, :) = row
+          right = r(k, :)
+          r(k, :) = r(p, :)
+          r(p, :) = right
+          do i = k + 1, ny
+            share = a(i, k)/a(k, k)
+            a(i, :) = a(i, :) - share*a(k, :)
+            r(i, :) = r(i, :) - share*r(k, :)
+          enddo
+        enddo
+        do k = ny, 1, -1
+          do i = k + 1, ny
+            r(k, :) = r(k, :) - a(k, i)*r(i, :)
+          enddo
+          r(k, :) = r(k, :)/a(k, k)
+        enddo
+      end subroutine ${id}_solve

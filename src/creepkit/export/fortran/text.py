@@ -1,0 +1,224 @@
+"""Fixed-form Fortran: expressions, statements within 72 columns, and the stable functions of kernels.
+
+Text is Fortran 90 in fixed form (gfortran and ifort take it), all in double precision.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import sympy
+
+from creepkit.kernels.printing import FUNCTIONS, KernelPrinter
+
+WIDTH = 72
+_NUMBER = re.compile(r"(?<![\w.])(\d+\.?\d*)(?:[eE]([+-]?\d+))?(?![\w.])")
+_TOKEN = re.compile(r"\d+\.?\d*(?:d[+-]?\d+)?|\w+|\*\*|[<>=/]=|::|\S|\s+")
+
+_WORDS = """
+abs atanh contains do double else end endif exit function if implicit intent log max merge min none out parameter
+precision pure return subroutine then x
+"""
+RESERVED = frozenset(_WORDS.split()) | {*FUNCTIONS}
+"""Words that no name of a law may be: those of the routine that evaluates it."""
+
+
+class FortranPrinter(KernelPrinter):
+    """Print lowered expressions as Fortran."""
+
+    reserved_words = ()
+
+    def _print_Piecewise(self, e: Any) -> str:
+        text: str = self._print(e.args[-1].expr)
+        for branch, condition in reversed(e.args[:-1]):
+            text = f"merge({self._print(branch)}, {text}, {self._print(condition)})"
+        return text
+
+    def _print_BooleanTrue(self, e: Any) -> str:
+        return ".true."
+
+    def _print_BooleanFalse(self, e: Any) -> str:
+        return ".false."
+
+
+_PRINTER = FortranPrinter({"standard": "python3"})
+
+
+def text_of(expression: sympy.Basic) -> str:
+    """An expression as Fortran, every number in double precision."""
+    return str(_NUMBER.sub(_double, _PRINTER.doprint(expression))).replace("!=", "/=")
+
+
+def number(value: float) -> str:
+    """A number in double precision, all of its digits."""
+    return _NUMBER.sub(_double, repr(float(value)))
+
+
+def _double(match: re.Match[str]) -> str:
+    digits = match[1] if "." in match[1] else f"{match[1]}.0"
+    return f"{digits}d{int(match[2] or 0)}"
+
+
+def statement(text: str, depth: int = 0) -> list[str]:
+    """One statement as lines of at most 72 columns, broken between tokens."""
+    lead, more = " " * (6 + 2 * depth), f"     &{' ' * (2 * depth + 2)}"
+    lines, line = [], lead
+    for token in _TOKEN.findall(text):
+        if len(line) + len(token) > WIDTH:
+            lines.append(line.rstrip())
+            line = more + token.lstrip()
+        else:
+            line += token
+    return [*lines, line.rstrip()]
+
+
+def statements(texts: Iterable[str], depth: int = 0) -> list[str]:
+    """Several statements; indentation of a text adds to the depth, two blanks a level."""
+    lines = []
+    for text in texts:
+        body = text.lstrip(" ")
+        lines += statement(body, depth + (len(text) - len(body)) // 2) if body[:1] != "!" else [body]
+    return lines
+
+
+def fitted(text: str) -> list[str]:
+    """Lines of fixed form, each that is longer than 72 columns broken between tokens."""
+    lines = []
+    for line in text.splitlines():
+        body = line[6:].lstrip(" ")
+        broken = statement(body, (len(line[6:]) - len(body)) // 2) if len(line) > WIDTH and line[:1] != "!" else [line]
+        lines += [line[:6] + broken[0][6:], *broken[1:]]
+    return lines
+
+
+def assignments(steps: Iterable[tuple[sympy.Symbol, sympy.Expr]]) -> list[str]:
+    """Steps as statements."""
+    return [f"{symbol} = {text_of(expression)}" for symbol, expression in steps]
+
+
+def declared(names: Sequence[str]) -> list[str]:
+    """Declarations of double precision variables, some a statement."""
+    return [f"double precision {', '.join(names[k : k + 6])}" for k in range(0, len(names), 6)]
+
+
+# ---- the stable functions ------------------------------------------------------------------------------------------
+
+
+def functions(called: Iterable[str]) -> list[str]:
+    """Internal functions, as statements: those called and those they need in turn."""
+    needed: dict[str, None] = {}
+
+    def need(name: str) -> None:
+        for other in _CALLS.get(name, ()):
+            need(other)
+        needed[name] = None
+
+    for name in sorted(set(called) & _BODIES.keys()):
+        need(name)
+    return [line for name in needed for line in _function(name)]
+
+
+def calls_in(texts: Iterable[str]) -> set[str]:
+    """The names that statements call."""
+    return {name for text in texts for name in re.findall(r"(\w+)\(", text)}
+
+
+def _function(name: str) -> list[str]:
+    arguments, locals_, body = _BODIES[name]
+    logical = name in ("both", "either")
+    kind = "logical" if logical else "double precision"
+    return [
+        f"pure {kind} function {name}({arguments})",
+        f"  {kind}, intent(in) :: {arguments}",
+        *([f"  double precision {locals_}"] if locals_ else []),
+        *(f"  {line}" for line in body),
+        f"end function {name}",
+    ]
+
+
+_BODIES: dict[str, tuple[str, str, tuple[str, ...]]] = {
+    "power": ("a, b", "", ("power = a**b",)),
+    "square": ("a", "", ("square = a*a",)),
+    "both": ("a, b", "", ("both = a .and. b",)),
+    "either": ("a, b", "", ("either = a .or. b",)),
+    "larger": ("a, b", "", ("larger = merge(a, b, a >= b .or. a /= a)",)),
+    "smaller": ("a, b", "", ("smaller = merge(a, b, a <= b .or. a /= a)",)),
+    "heaviside": ("a", "", ("heaviside = merge(1.0d0, 0.0d0, a > 0.0d0)",)),
+    "floored": ("a, least", "", ("floored = merge(least, a, a < least)",)),
+    "log_floor": ("a, least", "", ("log_floor = log(merge(least, a, a < least))",)),
+    "expm1": (
+        "a",
+        "",
+        (
+            "if (abs(a) < 1.0d0) then",
+            "  expm1 = 2.0d0*sinh(0.5d0*a)*exp(0.5d0*a)",
+            "else",
+            "  expm1 = exp(a) - 1.0d0",
+            "endif",
+        ),
+    ),
+    "log1p": (
+        "a",
+        "",
+        (
+            "if (abs(a) < 0.5d0) then",
+            "  log1p = 2.0d0*atanh(a/(2.0d0 + a))",
+            "else",
+            "  log1p = log(1.0d0 + a)",
+            "endif",
+        ),
+    ),
+    "log_sinh": ("a", "b", ("b = max(a, 1.0d-30)", "log_sinh = b + log(-0.5d0*expm1(-2.0d0*b))")),
+    "log_cosh": (
+        "a",
+        "b",
+        (
+            "b = abs(a)",
+            "if (b < 1.0d0) then",
+            "  log_cosh = log1p(2.0d0*sinh(0.5d0*b)**2)",
+            "else",
+            "  log_cosh = b + log1p(exp(-2.0d0*b)) - log(2.0d0)",
+            "endif",
+        ),
+    ),
+    "log_rise": (
+        "a",
+        "b",
+        (
+            "b = max(a, 1.0d-30)",
+            "if (b > log(2.0d0)) then",
+            "  log_rise = log1p(-exp(-b))",
+            "else",
+            "  log_rise = log(-expm1(-b))",
+            "endif",
+        ),
+    ),
+    "log_tanh": ("a", "b", ("b = max(a, 1.0d-30)", "log_tanh = log_rise(2.0d0*b) - log1p(exp(-2.0d0*b))")),
+    "coth": ("a", "", ("coth = 1.0d0/tanh(max(a, 1.0d-30))",)),
+    "exp_difference": (
+        "a, b",
+        "",
+        (
+            "if (a >= b) then",
+            "  exp_difference = -exp(a)*expm1(b - a)",
+            "else",
+            "  exp_difference = exp(b)*expm1(a - b)",
+            "endif",
+        ),
+    ),
+}
+"""{name: (arguments, local variables, statements)}; the formulas are those of kernels.numba_functions.
+
+Fortran has neither log1p nor expm1: 2 artanh(a/(2 + a)) and 2 sinh(a/2) exp(a/2) keep all digits near zero, whatever
+an optimiser does to sums.
+"""
+
+_CALLS = {
+    "log_sinh": ("expm1",),
+    "log_cosh": ("log1p",),
+    "log_rise": ("log1p", "expm1"),
+    "log_tanh": ("log_rise", "log1p"),
+    "exp_difference": ("expm1",),
+}

@@ -1,0 +1,227 @@
+"""A law as a Python module: `rate` and `state_rates` with the values as defaults, for numbers or for arrays.
+
+Formulas are those of the kernels, terms in log form; parameters are the author's wherever no logarithm is needed.
+"""
+
+from __future__ import annotations
+
+import ast
+import keyword
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+import sympy
+
+from creepkit.errors import ExportError, LawError
+from creepkit.export.heading import comments, heading, printable
+from creepkit.export.identifiers import Identifiers
+from creepkit.kernels.logform import FLOOR, TIME_FLOOR, log_form
+from creepkit.kernels.printing import FUNCTIONS, KernelPrinter
+from creepkit.language.symbols import POINT, mean_stress, principal_stress, stress, time
+from creepkit.records import Units, ValuedLaw
+
+STRESSES = (stress, principal_stress, mean_stress)
+"""The variables of a point that are in the units of stress."""
+
+_OWN = ("INITIAL", "LIMIT", "errstate", "inf", "max", "min", "np", "rate", "state_rates")
+
+Logs = Mapping[sympy.Symbol, sympy.Symbol]
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """What sets one kind of module apart.
+
+    printer : of its expressions. helpers : {name: text} of the functions that the module takes along where needed.
+    imports : import statements for the names that a module reads.
+    log : text of a parameter's logarithm, from its name. guard : statement around the body, or nothing.
+    overflow : the sentence on results that no double holds.
+    """
+
+    printer: KernelPrinter
+    helpers: Mapping[str, str]
+    imports: Callable[[set[str]], str]
+    log: Callable[[str], str]
+    guard: str
+    overflow: str
+
+
+def module_text(source: ValuedLaw, dialect: Dialect) -> str:
+    """Return the module of a law; ExportError when it holds what no kernel can evaluate."""
+    source = source.reduced()
+    try:
+        functions = _Functions(source, dialect)
+    except LawError as error:
+        raise ExportError(f"cannot be written as Python: {error}") from None
+    body = functions.text()
+    floors = any(f"{floor!r})" in body for floor in (FLOOR, TIME_FLOOR))
+    lines = [*heading(source, floors=floors), *functions.renamed(), dialect.overflow]
+    head = ['"""A creep law with its values, exported by creepkit."""', "", *comments(lines, "#"), ""]
+    return "\n".join([*head, _with_helpers(body, dialect)]) + "\n"
+
+
+# ---- the functions -------------------------------------------------------------------------------------------------
+
+
+class _Functions:
+    """The code of one law: its log form, with the author's parameters wherever a logarithm is not needed."""
+
+    def __init__(self, source: ValuedLaw, dialect: Dialect) -> None:
+        self.source, self.law, self.dialect = source, source.law, dialect
+        form = log_form(self.law)
+        self._identifiers = Identifiers((*keyword.kwlist, *FUNCTIONS, *dialect.helpers, *_OWN))
+        own = (*POINT, *self.law.states, *self.law.params)
+        self.names = {s: self._symbol(s.name) for s in own}
+        self.logs = {self._symbol(theta.name): self.names[s] for s, theta in form.logs.items()}
+        renamed = self.names | dict(zip(form.logs.values(), self.logs, strict=True))
+        self.terms = [_author_form(e.xreplace(renamed), self.logs) for e in form.terms]
+        self.state_rates = [_author_form(e.xreplace(renamed), self.logs) for e in form.state_rates]
+
+    def renamed(self) -> list[str]:
+        """One line for each name of the author's that had to change."""
+        return self._identifiers.told([s.name for s in (*self.law.states, *self.law.params)])
+
+    def text(self) -> str:
+        """The functions, and where internal variables start and end."""
+        title = f"Rate of equivalent creep strain, 1/{self.source.units.time}."
+        rate = self._function("rate", title, self._sum(), self.terms)
+        if not self.law.states:
+            return rate
+        factor = self._factor(self.source.units.seconds)
+        rates = [f"{factor}({text})" if factor else text for text in map(self._printed, self.state_rates)]
+        lines = [f'    "{s.name}": {text},' for s, text in zip(self.law.states, rates, strict=True)]
+        title = f"Rates of the internal variables, 1/{self.source.units.time}."
+        states = self._function("state_rates", title, ["return {", *lines, "}"], self.state_rates)
+        initial = {symbol.name: state.initial for symbol, state in self.law.states.items()}
+        limits = {symbol.name: state.limit for symbol, state in self.law.states.items()}
+        return f"INITIAL = {initial!r}\nLIMIT = {limits!r}\n\n\n{rate}\n\n\n{states}"
+
+    def _sum(self) -> list[str]:
+        """The return statement, each term under its name."""
+        texts = [self._printed(sympy.exp(term, evaluate=False)) for term in self.terms]
+        labels, factor = [printable(label) for label in self.law.terms], self._factor(self.source.units.seconds)
+        if len(texts) == 1:
+            return [f"# {labels[0]}", f"return {factor}{texts[0]}"]
+        signs = ["", *["+ "] * (len(texts) - 1)]
+        pairs = zip(signs, labels, texts, strict=True)
+        lines = [line for sign, label, text in pairs for line in (f"    # {label}", f"    {sign}{text}")]
+        return [f"return {factor}(", *lines, ")"]
+
+    def _function(self, name: str, title: str, result: list[str], expressions: Sequence[sympy.Expr]) -> str:
+        read = set().union(*(e.free_symbols for e in expressions))
+        logs = [f"{theta} = {self.dialect.log(s.name)}" for theta, s in self.logs.items() if theta in read]
+        body = [*self._converted(read), *logs, *result]
+        if self.dialect.guard:
+            body = [f"{self.dialect.guard}:", *(f"    {line}" for line in body)]
+        head = [f"def {name}(", *self._signature(), "):", f'    """{title}', "", *self._arguments(), '    """']
+        return "\n".join([*head, *(f"    {line}" for line in body)])
+
+    def _converted(self, read: set[sympy.Basic]) -> list[str]:
+        """Stress and time on entry, in the law's own units."""
+        units = self.source.units
+        pairs = [*((s, units.megapascals) for s in STRESSES), (time, units.seconds)]
+        return [f"{s} = {factor!r} * {s}" for s, factor in pairs if factor != 1 and s in read]
+
+    def _signature(self) -> list[str]:
+        """Variables of the point by keyword, needed where the law uses them; then parameters with their values."""
+        needed = [s for s in POINT[1:] if self.law.uses(s)] + list(self.law.states)
+        optional = [s for s in POINT[1:4] if not self.law.uses(s)]
+        return [
+            "    stress,",
+            "    *,",
+            *(f"    {self.names[s]}," for s in needed),
+            *(f"    {self.names[s]}=None," for s in optional),
+            *(f"    {self.names[s]}={self.source.values[s.name]!r}," for s in self.law.params),
+        ]
+
+    def _arguments(self) -> list[str]:
+        meanings = _meanings(self.source.units)
+        lines = [f"    {s.name} : {meanings[s.name]}" for s in POINT if self.law.uses(s)]
+        lines += [f"    {self.names[s]} : {state.meaning}" for s, state in self.law.states.items()]
+        idle = [s.name for s in POINT[:4] if not self.law.uses(s)]
+        return [*lines, f"    {', '.join(idle)} : not used by this law"] if idle else lines
+
+    def _symbol(self, wanted: str) -> sympy.Symbol:
+        return sympy.Symbol(self._identifiers.name(wanted), real=True)
+
+    def _printed(self, expression: sympy.Expr) -> str:
+        return str(self.dialect.printer.doprint(expression))
+
+    @staticmethod
+    def _factor(factor: float) -> str:
+        return "" if factor == 1 else f"{factor!r} * "
+
+
+def _meanings(units: Units) -> dict[str, str]:
+    return {
+        "stress": f"von Mises stress, {units.stress}",
+        "strain": "accumulated equivalent creep strain, logarithmic",
+        "time": f"time since the load was first applied, {units.time}",
+        "temperature": "temperature, K",
+        "principal_stress": f"largest principal stress, {units.stress}",
+        "mean_stress": f"mean stress, {units.stress}",
+    }
+
+
+def _author_form(expression: sympy.Expr, logs: Logs) -> sympy.Expr:
+    """Write exp(ln_B) as B again, free of the rounding of a logarithm."""
+
+    def factored(e: sympy.Expr) -> sympy.Expr:
+        summands = sympy.Add.make_args(e.args[0])
+        found = {a: p for a in summands for t, s in logs.items() for sign, p in ((1, s), (-1, 1 / s)) if a == sign * t}
+        rest = sympy.Add(*(a for a in summands if a not in found))
+        return sympy.Mul(*found.values(), sympy.exp(rest))
+
+    return expression.replace(lambda e: isinstance(e, sympy.exp), factored)
+
+
+# ---- imports and helpers -------------------------------------------------------------------------------------------
+
+
+def _with_helpers(code: str, dialect: Dialect) -> str:
+    """Put the imports and the functions that the code calls before it."""
+    helpers, needed = dialect.helpers, _names(code)
+    for name in reversed([*helpers]):
+        if name in needed:
+            needed |= _names(helpers[name])
+    body = "\n\n\n".join([*(text for name, text in helpers.items() if name in needed), code])
+    return f"{dialect.imports(_names(body))}\n\n\n{body}"
+
+
+def functions_of(file: str) -> dict[str, str]:
+    """{name: text} of the functions that kernels call, from a file of creepkit.kernels, without annotations."""
+    source = resources.files("creepkit.kernels").joinpath(file).read_text(encoding="utf-8")
+    found: dict[str, str] = {}
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.FunctionDef):
+            node.decorator_list, node.returns = [], None
+            for argument in node.args.args:
+                argument.annotation = None
+            found[node.name] = ast.unparse(node)
+        elif isinstance(node, ast.Assign):
+            found |= _assigned(node)
+    return found
+
+
+def _assigned(node: ast.Assign) -> dict[str, str]:
+    """{name: statement} of an assignment to a name, or to several at once."""
+    target, value = node.targets[0], node.value
+    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+        pairs: list[tuple[Any, Any]] = list(zip(target.elts, value.elts, strict=True))
+    else:
+        pairs = [(target, value)]
+    return {t.id: f"{t.id} = {ast.unparse(v)}" for t, v in pairs if t.id != "__all__"}
+
+
+def _names(code: str) -> set[str]:
+    """Every name that top-level functions and statements read from outside themselves."""
+    return set().union(*(_read(node) for node in ast.parse(code).body))
+
+
+def _read(node: ast.stmt) -> set[str]:
+    inner = list(ast.walk(node))
+    own = {n.arg for n in inner if isinstance(n, ast.arg)}
+    own |= {n.id for n in inner if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    return {n.id for n in inner if isinstance(n, ast.Name)} - own

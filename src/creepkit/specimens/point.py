@@ -1,0 +1,251 @@
+"""A material point under prescribed stresses and total strains of its six components, observed by all of them.
+
+Outputs are "strain", the equivalent creep strain, "strain_11" to "strain_13", the components of creep strain (of the
+tensor: half of the engineering shear strain; elastic strain is added where the history says so), and "stress_11" to
+"stress_13", MPa. Small strain, isotropic elasticity, creep along the deviator of stress.
+
+Under stresses that keep the direction of their deviator the derivatives to the parameters are exact; under other
+programmes they are central differences, of a thousandth of an exponent or of ln of a coefficient to each side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+import numpy as np
+
+from creepkit import integration, kernels
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.errors import SolveError
+from creepkit.hookspecs import hookimpl
+from creepkit.records import COMPONENTS, Effects, History, PointLoading, Prediction, Specimen
+from creepkit.specimens.elastic_part import one_elasticity
+from creepkit.specimens.isotropic import compliance, elastic_course
+from creepkit.specimens.uniaxial_effects import KINDS, predict_with
+
+if TYPE_CHECKING:
+    from creepkit.integration.driver import Driven
+    from creepkit.kernels.interface import CompiledLaw
+    from creepkit.language import CreepLaw
+    from creepkit.specimens.point_run import PointRun
+    from creepkit.specimens.proportional import Proportional
+
+OUTPUTS = ("strain", *(f"strain_{c}" for c in COMPONENTS), *(f"stress_{c}" for c in COMPONENTS))
+STEP = 1e-3
+"""Of the central differences in internal parameters, relative where a parameter of linear scale is above one."""
+WITHOUT_ELASTICITY = (150e3, 0.3)
+"""E, MPa, and nu where stresses alone are prescribed and no elastic data are given: creep does not depend on them."""
+
+
+class Rows(NamedTuple):
+    """One history: values (candidates, frames, outputs), status and end times (candidates,), and derivatives."""
+
+    values: Floats
+    status: Floats
+    ends: Floats
+    jacobian: Floats | None
+
+
+@dataclass(frozen=True)
+class Point:
+    """A material point.
+
+    tolerance : relative local error of a step of the integration. strain_limit : equivalent creep strain at which the
+    point has burst. max_steps : cap on the steps of one history.
+    """
+
+    tolerance: float = 1e-5
+    strain_limit: float = 1.0
+    max_steps: int = 2000
+
+    name: ClassVar[str] = "point"
+    title: ClassVar[str] = "Material point under prescribed stresses and strains of any components"
+    outputs: ClassVar[tuple[str, ...]] = OUTPUTS
+    effects: ClassVar[tuple[str, ...]] = KINDS
+    """Kinds of explicit nuisances that predict() understands."""
+
+    def __post_init__(self) -> None:
+        if not (1e-10 <= self.tolerance <= 1e-2 and 0 < self.strain_limit <= 10 and self.max_steps >= 10):
+            raise SolveError(
+                f"point specimen: tolerance {self.tolerance:g}, strain_limit {self.strain_limit:g}, max_steps "
+                f"{self.max_steps}; allowed are 1e-10 to 1e-2, above 0 up to 10, and 10 or more"
+            )
+
+    def replace(self, **changes: float) -> Point:
+        """The same specimen with some fields changed."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+    def predict(
+        self,
+        law: CreepLaw,
+        values: Mapping[str, ArrayLike],
+        histories: Sequence[History],
+        *,
+        jacobian: bool = False,
+        effects: Effects | None = None,
+    ) -> Prediction:
+        """Predict all components of each history at its times, for numbers or (candidates,) values of the parameters.
+
+        effects : "temperature" (K above what the history says) and "modulus" (relative change).
+        """
+
+        def plain(values: Mapping[str, ArrayLike], histories: Sequence[History], jacobian: bool) -> Prediction:
+            return self._predict(law, values, histories, jacobian)
+
+        if effects:
+            return predict_with(plain, values, histories, effects, jacobian, specimen=self.name)
+        return plain(values, histories, jacobian)
+
+    def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> PointRun:
+        """Run one test, keeping all tensors and the states of the law; see PointRun."""
+        from creepkit.specimens.point_run import run
+
+        return run(self, law, values, plan)
+
+    def reference_stress(self, history: History) -> Floats:
+        """The von Mises stresses that are prescribed, or would be if nothing crept, MPa."""
+        return elastic_course(_loading(history), None if history.elastic is None else _elastic(history))
+
+    def reference_strain(self, history: History) -> float:
+        """The largest equivalent creep strain that a test reached, about as far as its outputs tell."""
+        for kind in ("strain", "strain_", "stress_"):
+            found = [v[history.used] for name, v in history.outputs.items() if name.startswith(kind)]
+            if found and kind == "stress_":
+                return max(float(np.ptp(v)) for v in found) / _elastic(history)[0]
+            if found:
+                return max(float(np.max(np.abs(v), initial=0.0)) for v in found)
+        return 0.0
+
+    # ---- one history at a time -------------------------------------------------------------------------------------
+
+    def _predict(
+        self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], jacobian: bool
+    ) -> Prediction:
+        kernel = kernels.lower(law, "numba")
+        theta = np.array(kernel.internal(values), dtype=float, ndmin=2)
+        steps = STEP * np.array([1.0 if p.scale == "log" else np.inf for p in law.params.values()])
+        steps = np.where(np.isinf(steps), STEP * np.maximum(1.0, np.abs(theta)), steps)
+        parts = [self._rows(kernel, theta, history, steps if jacobian else None) for history in histories]
+        lengths = [h.times.size for h in histories]
+        shape = (len(theta), len(histories), max(lengths, default=0), len(OUTPUTS))
+        shown, changes = np.full(shape, np.nan), np.full((*shape, theta.shape[1]), np.nan) if jacobian else None
+        for k, part in enumerate(parts):
+            shown[:, k, : lengths[k]] = part.values
+            if changes is not None and part.jacobian is not None:
+                changes[:, k, : lengths[k]] = part.jacobian
+        empty = np.zeros((len(theta), 0))
+        return Prediction(
+            values=shown,
+            outputs=OUTPUTS,
+            lengths=np.array(lengths, dtype=np.int64),
+            status=np.stack([p.status for p in parts], axis=1).astype(np.int64) if parts else empty.astype(np.int64),
+            end_times=np.stack([p.ends for p in parts], axis=1) if parts else empty,
+            jacobian=changes,
+            times=tuple(h.times for h in histories),
+        )
+
+    def _rows(self, kernel: CompiledLaw, theta: Floats, history: History, steps: Floats | None) -> Rows:
+        """One history; steps : (candidates, P) of the differences, or None to do without derivatives."""
+        path = _path(history)
+        if path is not None:
+            return self._along(path, kernel, theta, history, steps is not None)
+        runs = [self.drive(kernel, candidate, history) for candidate in theta]
+        return Rows(
+            np.array([shown(run, history) for run in runs]),
+            np.array([float(run.status) for run in runs]),
+            np.array([run.end_time for run in runs]),
+            None
+            if steps is None
+            else np.array([self._differences(kernel, *one, history) for one in zip(theta, steps, strict=True)]),
+        )
+
+    def _along(self, path: Proportional, kernel: CompiledLaw, theta: Floats, history: History, jacobian: bool) -> Rows:
+        """One history whose stresses keep their direction."""
+        test = integration.PointTest(path.driving, history.temperature_program(), history.times)
+        found = integration.integrate(
+            kernel, theta, [test], settings=self._settings(), jacobian=jacobian, axes=path.axes
+        )
+        flow = np.concatenate([[1.0], path.flow, np.zeros(6)])
+        values = found.strain[..., None] * flow
+        values[:, :, 7:] = _imposed(history)[None]
+        values[~np.isfinite(found.strain)] = np.nan
+        if history.includes_elastic:
+            values[:, :, 1:7] += _elastic_strains(history, _imposed(history))
+        slopes = None if found.jacobian is None else found.jacobian[:, :, None, :] * flow[:, None]
+        return Rows(values, found.status[:, 0].astype(float), found.end_times[:, 0], slopes)
+
+    def drive(self, kernel: CompiledLaw, theta: Floats, history: History) -> Driven:
+        """March one candidate, theta (P,) in internal form, through one history in six components."""
+        from creepkit.integration.driver import by_strain, by_stress, drive
+        from creepkit.integration.tableau import SDIRK4
+
+        loading = _loading(history)
+        controls = {name: by_stress(p) for name, p in loading.stress.items()}
+        controls |= {name: by_strain(p) for name, p in loading.strain.items()}
+        bare = not loading.strain and not history.includes_elastic
+        elastic = WITHOUT_ELASTICITY if bare and history.elastic is None else _elastic(history)
+        warmth = history.temperature_program()
+        return drive(kernel, theta, elastic, controls, warmth, history.times, settings=self._settings(), tableau=SDIRK4)
+
+    def _differences(self, kernel: CompiledLaw, theta: Floats, steps: Floats, history: History) -> Floats:
+        """Central differences to the internal parameters, (frames, outputs, P); zero where one is switched off."""
+        slopes = np.zeros((history.times.size, len(OUTPUTS), theta.size))
+        for p in np.flatnonzero(np.isfinite(theta)):
+            shift = np.where(np.arange(theta.size) == p, steps, 0.0)
+            up, down = (shown(self.drive(kernel, end, history), history) for end in (theta + shift, theta - shift))
+            slopes[:, :, p] = (up - down) / (2 * steps[p])
+        return slopes
+
+    def _settings(self) -> integration.Settings:
+        return integration.Settings(rtol=self.tolerance, strain_limit=self.strain_limit, max_steps=int(self.max_steps))
+
+
+def _loading(history: History) -> PointLoading:
+    if isinstance(history.loading, PointLoading):
+        return history.loading
+    where = history.source or f"history '{history.name}'"
+    raise SolveError(
+        f"{where}: a material point is loaded by components, found {history.loading.quantity}; "
+        'use PointLoading(stress={"11": 100})'
+    )
+
+
+@lru_cache(maxsize=4096)
+def _path(history: History) -> Proportional | None:
+    from creepkit.specimens.proportional import proportional
+
+    return proportional(_loading(history), float(history.times[-1]))
+
+
+def _elastic(history: History) -> tuple[float, float]:
+    return one_elasticity(history, "point")
+
+
+def _imposed(history: History) -> Floats:
+    """(frames, 6) prescribed stresses, MPa; zero where none is."""
+    stress = _loading(history).stress
+    zero = np.zeros(history.times.size)
+    return np.stack([stress[c].at(history.times) if c in stress else zero for c in COMPONENTS], axis=-1)
+
+
+def _elastic_strains(history: History, stress: Floats) -> Floats:
+    """(frames, 6) elastic strains of the tensor."""
+    return stress @ compliance(_elastic(history)).T
+
+
+def shown(run: Driven, history: History) -> Floats:
+    """The outputs of a driven point, (frames, outputs), NaN after its end."""
+    strains = run.strain if history.includes_elastic else run.creep_strain
+    rows = np.concatenate([run.equivalent[:, None], strains, run.stress], axis=1)
+    shown = np.full((history.times.size, len(OUTPUTS)), np.nan)
+    shown[: len(rows)] = rows
+    return shown
+
+
+@hookimpl
+def creepkit_specimens() -> list[Specimen]:
+    """The material point with its default settings."""
+    return [Point()]

@@ -1,0 +1,103 @@
+"""Relaxation: a bar whose total strain is prescribed (held, in steps or ramps), observed by its stress.
+
+    sigma = E (total strain - creep strain),    so that  d(sigma)/dt = -E f(sigma, ...)  while the strain is held.
+
+The total strain is mechanical, without thermal expansion, and the stress is the true one. An engineering strain
+becomes ln(1 + strain). The stress must not fall below zero: compression after a step down needs the specimen `point`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from creepkit import integration
+from creepkit.arrays import Floats
+from creepkit.errors import SolveError
+from creepkit.hookspecs import hookimpl
+from creepkit.records import History, Program, Specimen
+from creepkit.specimens.bar import Bar
+from creepkit.specimens.elastic_part import one_elasticity
+
+if TYPE_CHECKING:
+    from creepkit.integration import PointTest
+
+SLACK = 1e-3
+"""Of the largest elastic stress: below it nothing is left that could hold a bar in tension."""
+
+
+@dataclass(frozen=True)
+class Relaxation(Bar):
+    """A bar under prescribed total strain; its output is its true stress, MPa. Its histories need elastic data."""
+
+    name: ClassVar[str] = "relaxation"
+    title: ClassVar[str] = "Uniaxial tension under held total strain, or steps and ramps of it"
+    outputs: ClassVar[tuple[str, ...]] = ("stress",)
+
+    def point_test(self, history: History) -> PointTest:
+        """The elastic stress of the total strain, the modulus, and the temperature over time."""
+        return point_test(history)
+
+    def shown(self, history: History, creep: Floats) -> Floats:
+        """The stress, MPa."""
+        test = point_test(history)
+        return np.asarray(test.driving.at(history.times) - test.stiffness * creep)
+
+    def slope(self, history: History, creep: Floats) -> Floats:
+        """Minus the modulus."""
+        return np.full_like(creep, -point_test(history).stiffness)
+
+    def ending(self, history: History, reason: str, output: Floats, end: float) -> str:
+        """Says so where the bar would be compressed: where a fall of strain takes away the stress that is left."""
+        known = np.flatnonzero(np.isfinite(output))
+        if not (reason and known.size):
+            return reason
+        driving = point_test(history).driving
+        left = output[known[-1]] + driving.at(end) - driving.at(history.times[known[-1]])
+        compressed = left < SLACK * float(np.max(driving.values))
+        return (
+            f"{reason}: the stress falls below zero, and a compressed bar needs the specimen point"
+            if compressed
+            else reason
+        )
+
+    def reference_stress(self, history: History) -> Floats:
+        """The elastic stress of each strain and the last stress seen, MPa: what a law is looked at in a test."""
+        levels = np.unique(point_test(history).driving.values)
+        seen = np.abs(history.outputs["stress"][history.used]) if "stress" in history.outputs else levels[levels > 0]
+        return np.array([float(np.min(seen[seen > 0], initial=levels.max())), float(levels.max())])
+
+    def reference_strain(self, history: History) -> float:
+        """The largest creep strain that a test reached, as far as its stress tells."""
+        test = point_test(history)
+        fallen = test.driving.at(history.times) - history.outputs["stress"]
+        return float(np.max(fallen[history.used], initial=0.0)) / test.stiffness
+
+
+@lru_cache(maxsize=4096)
+def point_test(history: History) -> PointTest:
+    """What the material point of a relaxation history goes through."""
+    where = history.source or f"history '{history.name}'"
+    if history.loading.quantity != "strain":
+        raise SolveError(
+            f"{where}: a relaxation specimen is loaded by strain, found {history.loading.quantity}; "
+            "use StrainSteps or constant_strain"
+        )
+    modulus, _ = one_elasticity(history, "relaxation")
+    strain = history.loading.program()
+    logarithmic = np.log1p(strain.values) if history.strain_measure == "engineering" else strain.values
+    return integration.PointTest(
+        driving=Program(strain.times, modulus * logarithmic),
+        temperature=history.temperature_program(),
+        times=history.times,
+        stiffness=modulus,
+    )
+
+
+@hookimpl
+def creepkit_specimens() -> list[Specimen]:
+    """The relaxation specimen with its default settings."""
+    return [Relaxation()]

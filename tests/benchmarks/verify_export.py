@@ -1,0 +1,165 @@
+"""Exported creep laws run by CalculiX, beside creepkit's own solver: the table of the README (`make verify-export`).
+
+    python tests/benchmarks/verify_export.py [LAW ...] [--cetol 1e-4 1e-5] [--keep FOLDER]
+
+Each law is exported with `ck.export(law, "calculix")`, compiled by gfortran and preloaded in front of a CalculiX 2.20
+built from Debian's source, which knows nothing of creepkit. One element in tension follows steps of stress, and the
+true dimple is bulged for twelve hours. CalculiX is backward Euler: two values of cetol give its limit of small
+increments, on the same mesh. Differences are the largest from 10 min on, in percent of the last value (creep strain,
+apex displacement).
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from calculix import TIMES, Result, Stopped, difference, run
+from calculix_deck import Deck, UserLaw, extrapolated
+from calculix_source import built, compiled
+
+import creepkit as ck
+from creepkit.arrays import Floats
+from creepkit.fem.mesh import Mesh
+from creepkit.language import CreepLaw, Elastic
+from creepkit.records import PressureJump, Program, RecordedLoading
+from creepkit.specimens.bulge import Bulge
+
+E, NU = 150e3, 0.3
+KELVIN = 1073.15
+
+LAWS = {
+    "norton": {"A": 2e-12, "n": 3.0},
+    "drifting-exponent": {
+        "A": 5e-13, "n_0": 3.3, "n_inf": 3.1, "C": 0.6, "tau_d": 7800.0, "tau_r": 4700.0, "m": -0.1,
+    },
+    "combined": {
+        "A_1": 1e-8, "n_1": 2.0, "B": 60.0,
+        "A_2": 3e-13, "n_2": 3.0, "m_1": -0.2,
+        "A_3": 1e-11, "n_3": 3.0, "m_2": -0.4,
+    },
+    "logarithmic": {"A": 4e-12, "n": 3.0, "e_0": 0.1},
+    "norton x arrhenius": {"A": 1e-12, "n": 3.0, "Q": 3e5},
+}  # fmt: skip
+"""Values of each law; logarithmic comes from a plugin. The last is evaluated at 1073.15 K, 50 K above its reference."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A law with its values and the shared library of its export."""
+
+    name: str
+    law: CreepLaw
+    values: dict[str, float]
+    library: Path
+
+
+def prepared(name: str, folder: Path) -> Case:
+    """Export and compile one law."""
+    plain, _, warm = name.partition(" x ")
+    law = ck.law(plain).times(ck.arrhenius(T_ref=1023.15)) if warm else ck.law(plain)
+    text = ck.export(law, "calculix", LAWS[name], notes=["for the verification against CalculiX"])
+    return Case(name, law, LAWS[name], compiled(text, folder, name.replace(" ", "_").replace("-", "_")))
+
+
+# ---- the two specimens ---------------------------------------------------------------------------------------------
+
+STRESS = Program(
+    np.array([0.0, 5.0, 14400.0, 14405.0, 28800.0, 28805.0, 43200.0]),
+    np.array([0.0, 60.0, 60.0, 75.0, 75.0, 50.0, 50.0]),
+)
+"""MPa over s: tension in three steps, with ramps of 5 s."""
+
+BULGE = PressureJump(8.0, 10.0, 14400.0)
+
+
+def bar() -> Mesh:
+    """One element of 1 mm x 1 mm about the axis, held below and pulled above."""
+    corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+    middles = [(0.5, 0.0), (1.0, 0.5), (0.5, 1.0), (0.0, 0.5)]
+    nodes = np.array(corners + middles)
+    held = np.zeros((8, 2), bool)
+    held[[0, 1, 4], 1] = True
+    return Mesh(nodes, np.arange(8)[None], held, np.array([[2, 6, 3]]), np.array([3, 6, 2]))
+
+
+def element(case: Case, cetols: list[float], program: Path) -> tuple[Floats, list[tuple[Floats, Result]]]:
+    """Creep strain of a bar, (times,): ours, and CalculiX's for each cetol."""
+    pull = Program(STRESS.times, -STRESS.values)
+    deck = Deck(bar(), E, NU, UserLaw(KELVIN), pull, TIMES, np.array([3]), first=1e-3, large=False)
+    runs = [run(replace(deck, cetol=cetol), program, case.library) for cetol in cetols]
+    loading = RecordedLoading(STRESS, "stress", control="stress")
+    bar_test = ck.specimen("uniaxial").replace(tolerance=1e-9)
+    own = ck.simulate(case.law, bar_test, case.values, loading=loading, times=TIMES, temperature=KELVIN)
+    elastic = STRESS.at(TIMES) / E
+    return own.outputs["strain"], [(r.displacements[:, 0, 1] - elastic, r) for r in runs]
+
+
+def dimple(case: Case, cetols: list[float], program: Path) -> tuple[Floats, list[tuple[Floats, Result]]]:
+    """Apex displacement of the true dimple, (times,) mm: ours, and CalculiX's for each cetol."""
+    specimen = Bulge()
+    mesh = specimen.geometry.mesh(1.0)
+    deck = Deck(mesh, E, NU, UserLaw(KELVIN), BULGE.program(), TIMES, mesh.top[:1])
+    runs = [run(replace(deck, cetol=cetol), program, case.library) for cetol in cetols]
+    own = ck.simulate(
+        case.law, specimen, case.values, loading=BULGE, times=TIMES, temperature=KELVIN, elastic=Elastic(E=E, nu=NU)
+    )
+    return own.displacement(radius=0.0), [(r.displacements[:, 0, 1], r) for r in runs]
+
+
+SPECIMENS = {"one element": element, "dimple": dimple}
+
+
+def row(case: Case, specimen: str, cetols: list[float], program: Path) -> str:
+    """One line of the table."""
+    own, theirs = SPECIMENS[specimen](case, cetols, program)
+    (coarse, few), (fine, many) = theirs[-2:]
+    limit = extrapolated(coarse, fine, (few.increments, many.increments))
+    cells = [
+        case.name,
+        specimen,
+        f"{own[-1]:.6g}",
+        f"{limit[-1]:.6g}",
+        *(f"{difference(found, limit):.3f} ({result.increments})" for found, result in theirs),
+        f"{difference(own, limit):.3f}",
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("laws", nargs="*", default=list(LAWS), help="some of: " + ", ".join(LAWS))
+    parser.add_argument("--cetol", nargs="+", type=float, default=[1e-4, 1e-5])
+    parser.add_argument("--keep", type=Path, help="keep the exported files and libraries in this folder")
+    given = parser.parse_args()
+    unknown = [name for name in given.laws if name not in LAWS]
+    if unknown or len(set(given.cetol)) < 2:
+        parser.error(f"no law is called {', '.join(unknown)}" if unknown else "two values of cetol are needed")
+    cetols = sorted(given.cetol, reverse=True)
+    program = built()
+    head = [
+        "law",
+        "specimen",
+        "creepkit at 12 h",
+        "CalculiX, limit",
+        *(f"cetol {c:.0e}: % (increments)" for c in cetols),
+    ]
+    print(f"| {' | '.join([*head, 'creepkit: %'])} |\n|{'-|' * (len(head) + 1)}", flush=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = given.keep or Path(scratch)
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in given.laws:
+            case = prepared(name, folder)
+            for specimen in SPECIMENS:
+                try:
+                    print(row(case, specimen, cetols, program), flush=True)
+                except Stopped as stopped:
+                    print(f"| {name} | {specimen} | {stopped} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

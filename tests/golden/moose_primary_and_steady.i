@@ -1,0 +1,46 @@
+# norton+time-hardening: Norton power law (PL) + Norton-Bailey time-hardening power law (TPL)
+#
+# rate = A_1*stress**n_1    [power law]
+#      + A_2*stress**n_2*time**m    [time hardening]
+#
+# Numbers below are in MPa and s, temperatures in K: stress is a ratio to 1 MPa, time to 1 s, rates are per s.
+# Parameters, for stress as a ratio to 1 MPa and time to 1 s:
+#   A_1 = 1e-16 1/s, rate coefficient
+#   n_1 = 5.0, stress exponent
+#   A_2 = 1e-12 1/s, rate coefficient
+#   n_2 = 4.0, stress exponent
+#   m = -0.7, time exponent
+# Note: n = 5.2 [5.1, 5.3]
+# Note: valid from 973 to 1123 K
+# Source: Norton (1929), The Creep of Steel at High Temperatures
+# Source: Bailey (1935), Proc. Inst. Mech. Eng. 131, 131
+# Source: Table 1 of Chen et al., Machine Learning-Driven Creep Law Discovery
+#
+# PowerLawCreepStressUpdate: rate = coefficient s^n_exponent exp(-activation_energy/(gas_constant T)) (t -
+#     start_time)^m_exponent, of equivalent stress s; ComputeMultipleInelasticStress adds the models. t is the
+#     analysis time: start_time is when the load begins.
+# 'power law' is called power_law here
+# 'time hardening' is called time_hardening here
+[Materials]
+  [power_law]
+    type = PowerLawCreepStressUpdate
+    coefficient = 1e-16
+    n_exponent = 5
+    m_exponent = 0
+    activation_energy = 0
+    base_name = power_law
+  []
+  [time_hardening]
+    type = PowerLawCreepStressUpdate
+    coefficient = 1e-12
+    n_exponent = 4
+    m_exponent = -0.7
+    activation_energy = 0
+    start_time = 0
+    base_name = time_hardening
+  []
+  [stress]
+    type = ComputeMultipleInelasticStress
+    inelastic_models = 'power_law time_hardening'
+  []
+[]

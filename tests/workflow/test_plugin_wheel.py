@@ -1,0 +1,178 @@
+"""A law from outside: a package made by `new-law`, given another law, built, installed elsewhere, and used by all verbs.
+
+The new environment sees the packages that are installed here, and the wheel besides; nothing is downloaded.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from creepkit.cli.app import COMMANDS, app
+
+LAW = '''
+"""A steel that softens: damage speeds up creep, and both are thermally activated."""
+
+import math
+
+import sympy
+
+from creepkit.language import GAS_CONSTANT, CreepLaw, Param, State, hookimpl, parameters, states, stress, temperature
+
+A, n, C, v, Q = parameters("A n C v Q")
+(damage,) = states("damage")
+warmth = sympy.exp(Q / GAS_CONSTANT * (1 / sympy.Float(1073.15) - 1 / temperature))
+
+SOFT_STEEL = CreepLaw(
+    name="soft-steel",
+    title="Steel that softens",
+    terms={"softening creep": A * (stress / (1 - damage)) ** n * warmth},
+    params={
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-30, 1e-8), scale="log"),
+        n: Param("stress exponent", bounds=(2, 6)),
+        C: Param("damage coefficient", unit="1/s", bounds=(1e-30, 1e-8), scale="log", limits=(0, math.inf)),
+        v: Param("stress exponent of damage", bounds=(2, 6)),
+        Q: Param("activation energy", unit="J/mol", bounds=(1e5, 6e5), limits=(0, math.inf)),
+    },
+    states={damage: State(0.0, C * (stress / (1 - damage)) ** v * warmth, limit=0.9)},
+    references=("nobody (2025), for this test",),
+)
+
+
+@hookimpl
+def creepkit_laws():
+    return [SOFT_STEEL]
+'''
+TRUTH = {"A": 2e-16, "n": 4.5, "C": 3e-14, "v": 4.0, "Q": 3e5}
+
+WALK = """
+import json, sys
+from typer.testing import CliRunner
+from creepkit.cli.app import app
+
+answers = []
+for words in json.load(sys.stdin):
+    result = CliRunner().invoke(app, words)
+    answers.append([result.exit_code, result.stdout, result.stderr])
+json.dump(answers, open("answers.json", "w"))
+"""
+
+SET = [word for name, value in TRUTH.items() for word in ("--set", f"{name}={value}")]
+SIMULATE = ["simulate", "soft-steel", *SET, "--modulus-gpa", "150", "--temperature-c"]
+CURVES = {"80": ("800", "30"), "100": ("800", "12"), "120": ("770", "14"), "90": ("830", "8")}
+"""{MPa: (C, end in h)}, each to near its rupture."""
+
+STEPS = {
+    "laws": [["laws", "soft-steel", "--json"]],
+    "specimens": [["specimens", "--json"]],
+    "plugins": [["plugins", "--json"]],
+    "check": [["check", "soft-steel"]],
+    "new-law": [["new-law", "softer-steel"]],
+    "simulate": [
+        *(
+            ["simulate", "soft-steel", *SET, "--temperature-c", C, "--stress", s, "--control", "stress", "--end-h", end,
+             "--points", "40", "--to", f"curve_{s}.csv"]
+            for s, (C, end) in CURVES.items()
+        ),
+        [*SIMULATE, "800", "--specimen", "relaxation", "--strain", "0.001", "--end-h", "20", "--points", "30"],
+        [*SIMULATE, "800", "--specimen", "point", "--stress", "11=60", "--stress", "12=3600:30", "--end-h", "5",
+         "--points", "10"],
+        [*SIMULATE, "800", "--specimen", "bulge", "--pressure", "6", "--end-h", "1", "--points", "4"],
+    ],
+    "identify": [["identify", *(f"curve_{s}.csv" for s in CURVES), "--law", "soft-steel", "--starts", "2", "--json"]],
+    "export": [["export", "identified/soft-steel.json", "--to", "python"]],
+    "demo": [],  # has a law of its own
+}  # fmt: skip
+
+
+def run(*words: object, cwd: Path, stdin: str = "") -> None:
+    done = subprocess.run([str(w) for w in words], cwd=cwd, input=stdin, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("package")
+    here = os.getcwd()
+    os.chdir(folder)
+    try:
+        made = CliRunner().invoke(app, ["new-law", "soft-steel"])
+    finally:
+        os.chdir(here)
+    assert made.exit_code == 0, made.output
+    (folder / "soft-steel" / "creepkit_soft_steel.py").write_text(LAW.lstrip())
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
+    run(*pip, "wheel", "--no-index", "--no-deps", "--no-build-isolation", "-w", ".", "./soft-steel", cwd=folder)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The interpreter of a new environment with the wheel installed."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    run(sys.executable, "-m", "venv", "--without-pip", folder / "env", cwd=folder)
+    interpreter = folder / "env" / "bin" / "python"
+    site = sysconfig.get_path("purelib", vars={"base": str(folder / "env"), "platbase": str(folder / "env")})
+    here = sysconfig.get_path("purelib")
+    (Path(site) / "here.pth").write_text(f"import site; site.addsitedir({here!r})\n")
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", interpreter)
+    run(*pip, "install", "--no-index", "--no-deps", wheel, cwd=folder)
+    return interpreter
+
+
+@pytest.fixture(scope="module")
+def answers(python: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, list[list]]]:
+    """What every command answered, by command: [exit code, stdout, stderr] of each of its steps."""
+    folder = tmp_path_factory.mktemp("work")
+    walked = {name: steps for name, steps in STEPS.items() if name in COMMANDS}
+    flat = [words for steps in walked.values() for words in steps]
+    run(python, "-c", WALK, cwd=folder, stdin=json.dumps(flat))
+    told = iter(json.loads((folder / "answers.json").read_text()))
+    return folder, {name: [next(told) for _ in steps] for name, steps in walked.items()}
+
+
+def test_every_command_is_walked() -> None:
+    assert not COMMANDS.keys() - STEPS.keys()
+
+
+def test_every_command_works_on_the_law(answers) -> None:
+    _, by_command = answers
+    failed = [(name, told) for name, steps in by_command.items() for told in steps if told[0] != 0]
+    assert not failed
+
+
+def test_the_law_comes_from_the_wheel(answers) -> None:
+    told = json.loads(answers[1]["laws"][0][1])
+    assert told["provenance"] == "plugin 'soft-steel' (creepkit-soft-steel 0.1.0)"
+    assert told["parameters"]["Q"]["limits"] == [0, None]
+    plugins = json.loads(answers[1]["plugins"][0][1])["plugins"]
+    assert {p["name"]: p["status"] for p in plugins}["soft-steel"] == "ok"
+
+
+def test_it_keeps_what_every_law_promises(answers) -> None:
+    assert "soft-steel: conforms" in answers[1]["check"][0][1]
+
+
+def test_the_planted_values_are_identified(answers) -> None:
+    (law,) = json.loads(answers[1]["identify"][0][1])["laws"]
+    for name, value in TRUTH.items():
+        found = law["parameters"][name]
+        assert found["value"] == pytest.approx(value, rel=0.05 if law["parameters"][name]["unit"] != "1/s" else 0.3)
+
+
+def test_the_result_outlives_the_package(answers) -> None:
+    """Where the package is missing the law comes back from the file, as a tree; only its name is not known."""
+    import creepkit as ck
+    from creepkit.errors import LawError
+
+    fit = ck.load(answers[0] / "identified" / "soft-steel.json")
+    assert fit.law.title == "Steel that softens"
+    assert fit.law.table["C"].limits == (0.0, float("inf"))
+    with pytest.raises(LawError, match="there is no law 'soft-steel'"):
+        ck.law("soft-steel")
