@@ -1,6 +1,6 @@
 # norton*arrhenius: Norton power law (PL), arrhenius in temperature
 #
-# rate = A*stress**n*exp(0.000112074132269434*Q*(temperature - 1073.15)/temperature)    [power law]
+# rate = A*stress**n*exp(-Q/R*(1/T - 1/1073.15))    [power law]
 #
 # Numbers below are in Pa and s, temperatures in K: stress is a ratio to 1 Pa, time to 1 s, rates are per s.
 # Parameters, for stress as a ratio to 1 MPa and time to 1 s:

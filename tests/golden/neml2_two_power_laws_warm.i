@@ -1,7 +1,7 @@
 # norton+norton*arrhenius: Norton power law (PL) + Norton power law (PL), arrhenius in temperature
 #
-# rate = A_1*stress**n_1*exp(0.000112074132269434*Q*(temperature - 1073.15)/temperature)    [power law 1]
-#      + A_2*stress**n_2*exp(0.000112074132269434*Q*(temperature - 1073.15)/temperature)    [power law 2]
+# rate = A_1*stress**n_1*exp(-Q/R*(1/T - 1/1073.15))    [power law 1]
+#      + A_2*stress**n_2*exp(-Q/R*(1/T - 1/1073.15))    [power law 2]
 #
 # Numbers below are in MPa and s, temperatures in K: stress is a ratio to 1 MPa, time to 1 s, rates are per s.
 # Parameters, for stress as a ratio to 1 MPa and time to 1 s:

@@ -58,6 +58,7 @@ CASES: dict[str, ValuedLaw] = {
     "time hardening": valued(TIME_HARDENING, A=3e-13, n=4.5, m=-0.6),
     "time hardening, small": valued(TIME_HARDENING, A=3e-30, n=7.5, m=-0.6),
     "time hardening warm": valued(TIME_HARDENING.times(WARM), A=3e-13, n=4.5, m=-0.6, Q=3e5),
+    "time hardening warm, small": valued(TIME_HARDENING.times(WARM), A=3e-30, n=7.5, m=-0.8, Q=3e5),
     "sine": valued(HYPERBOLIC_SINE, A=3e-10, n=3.2, B=40.0),
     "sine warm": valued(HYPERBOLIC_SINE.times(WARM), A=3e-10, n=3.2, B=40.0, Q=4.2e5),
     "garofalo": valued(GAROFALO, A=2e9, n=4.1, W=0.021, Q=3.9e5),
@@ -86,13 +87,15 @@ CASES: dict[str, ValuedLaw] = {
 HAS = {
     "abaqus-cards": {
         *("norton", "norton warm", "strain hardening", "strain hardening, small", "strain hardening warm"),
-        *("time hardening", "time hardening, small", "time hardening warm", "sine", "sine warm", "garofalo"),
+        *("time hardening", "time hardening, small", "time hardening warm", "time hardening warm, small"),
+        *("sine", "sine warm", "garofalo"),
         *("two power laws", "two power laws warm", "stranger", "combined, all but one off"),
         "strain hardening without hardening",
     },
     "ansys": {*CASES},
     "moose": {
         *("norton", "norton warm", "time hardening", "time hardening, small", "time hardening warm"),
+        "time hardening warm, small",
         *("two power laws", "two power laws warm", "primary and steady", "primary and steady warm", "graham"),
         "strain hardening without hardening",
     },

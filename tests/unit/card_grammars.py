@@ -190,7 +190,7 @@ def _reference(models: dict, model: dict[str, str], T: float) -> float:
 
 
 def aster_keywords(text: str) -> dict[str, dict]:
-    """{keyword of DEFI_MATERIAU: {key: number or function of TEMP}}; the file is Python and calls known commands only."""
+    """{keyword of DEFI_MATERIAU: {key: number or function of TEMP}}; the file is Python of known commands."""
     names: dict = {}
     for node in ast.parse("\n".join(lines_without(text, "#"))).body:
         (target,), call = node.targets, node.value

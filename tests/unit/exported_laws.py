@@ -16,11 +16,14 @@ from creepkit.kernels.exact import Exact
 from creepkit.language import (
     CreepLaw,
     Param,
+    State,
     activated,
     arrhenius,
     linear,
     mean_stress,
     parameters,
+    principal_stress,
+    states,
     stress,
     temperature,
     time,
@@ -40,7 +43,8 @@ TOLERANCE = 1e-10
 SETS, POINTS = 2, 8
 """How many sets of parameters a law has, and points each."""
 
-A, n = parameters("A n")
+A, B, n = parameters("A B n")
+(omega,) = states("omega")
 PIECES = CreepLaw(
     name="pieces",
     terms={
@@ -53,10 +57,31 @@ PIECES = CreepLaw(
     params={A: Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", 0.0), n: Param("exponent", (1, 8))},
 )
 
+DIFFERENCES = CreepLaw(
+    name="differences",
+    terms={"cosh": A * sympy.cosh(stress / B) ** n},
+    params={
+        A: Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", 0.0),
+        B: Param("stress", (50, 1000), "MPa"),
+        n: Param("exponent", (1, 8)),
+    },
+    states={omega: State(0.0, A * (sympy.exp(stress / B) - sympy.exp(omega)))},
+)
+
+MULTIAXIAL = CreepLaw(
+    name="multiaxial",
+    terms={"creep": A * stress * (principal_stress / stress) ** 2 * sympy.exp(mean_stress / B) / (1 - omega)},
+    params={A: Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", 0.0), B: Param("stress", (50, 1000), "MPa")},
+    states={omega: State(0.0, A * sympy.exp(mean_stress / B + omega) * (principal_stress + stress), limit=0.99)},
+)
+"""The rate and the growth feel all three stresses about equally."""
+
 LAWS: dict[str, CreepLaw] = {
     **{f"registered {name}": default().law(name) for name in sorted(default().laws())},
     **{f"foreign {name}": law for name, law in EQUATIONS.items()},
     "pieces": PIECES,
+    "multiaxial": MULTIAXIAL,
+    "differences": DIFFERENCES,
     "sum": HYPERBOLIC_SINE + STRAIN_HARDENING,
     "sum with temperature": (HYPERBOLIC_SINE + STRAIN_HARDENING).times(arrhenius()).with_temperature(n_2=linear()),
     "combined with temperature": COMBINED.times(arrhenius()),

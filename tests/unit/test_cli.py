@@ -1,4 +1,4 @@
-"""The commands that need no data: laws, plugins, check, new-law, the global options and the exit codes."""
+"""The commands that need no data: laws, plugins, check, simulate, the global options and the exit codes."""
 
 import json
 import os
@@ -178,30 +178,7 @@ def test_a_plugin_cannot_take_the_place_of_a_command() -> None:
     assert "a plugin adds the command 'laws'" in one_line(creepkit("--plugin", "mine.py", "greet"))
 
 
-# ---- new-law and check ---------------------------------------------------------------------------------------------
-
-
-def test_a_new_law_is_short_and_passes_the_check() -> None:
-    written = creepkit("new-law", "my-law")
-    checked = creepkit("check", "my_law.py")
-
-    assert written.exit_code == 0
-    assert "creepkit check my_law.py" in written.stdout
-    assert len(Path("my_law.py").read_text().splitlines()) <= 25
-    assert checked.exit_code == 0, checked.stdout
-    assert "my-law" in checked.stdout
-
-
-def test_a_new_law_never_overwrites() -> None:
-    Path("my_law.py").write_text("precious")
-
-    assert "my_law.py exists already" in one_line(creepkit("new-law", "my-law"))
-    assert Path("my_law.py").read_text() == "precious"
-
-
-def test_a_new_law_needs_a_new_name() -> None:
-    assert "there is a law 'norton' already" in one_line(creepkit("new-law", "norton"))
-    assert not Path("norton.py").exists()
+# ---- check ---------------------------------------------------------------------------------------------------------
 
 
 def test_a_law_that_breaks_a_promise_fails_the_check() -> None:
@@ -281,10 +258,43 @@ def test_a_bar_with_a_modulus_has_its_elastic_strain() -> None:
     assert run.includes_elastic
 
 
+def test_specimens_are_listed_with_their_outputs() -> None:
+    listed = {one["name"]: one for one in json.loads(creepkit("specimens", "--json").stdout)}
+
+    assert {"uniaxial", "relaxation", "point", "bulge"} <= listed.keys()
+    assert listed["relaxation"]["outputs"] == ["stress"]
+    assert listed["relaxation"]["nuisances"] == ["temperature", "modulus"]
+    assert "strain strain_11" in creepkit("specimens").stdout
+
+
+def test_a_bar_relaxes() -> None:
+    """Norton, n = 3: s^-2 grows by 2 E A t; at first s = 150 MPa."""
+    held = ("--specimen", "relaxation", "--strain", "0.001", "--modulus-gpa", "150", "--points", "3")
+    result = creepkit(*NORTON, *held, "--to", "held.csv")
+
+    assert result.exit_code == 0, result.output
+    (run,) = ck.read_histories("held.csv")
+    assert (run.name, run.specimen, run.loading) == ("held", "relaxation", ck.constant_strain(0.001))
+    expected = [(150.0**-2 + 2 * 150e3 * 5e-13 * t) ** -0.5 for t in (0, 3600, 7200)]
+    assert run.outputs["stress"].tolist() == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_point_is_loaded_by_components() -> None:
+    """Tension, and torsion after an hour: q^2 = s^2 + 3 tau^2."""
+    loads = ("--specimen", "point", "--stress", "11=60", "--stress", "12=3600:40", "--points", "3")
+    result = creepkit(*NORTON, *loads, "--to", "tube.csv")
+
+    assert result.exit_code == 0, result.output
+    (run,) = ck.read_histories("tube.csv")
+    assert run.loading == ck.PointLoading(stress={"11": 60, "12": [(0, 0), (3600, 40)]})
+    later = (60.0**2 + 3 * 40.0**2) ** 1.5
+    assert run.outputs["strain"].tolist() == pytest.approx([0, 5e-13 * 60**3 * 3600, 5e-13 * (60**3 + later) * 3600])
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((*DIMPLE, "--stress", "8"), "--stress belongs to --specimen uniaxial, found --specimen bulge"),
+        ((*DIMPLE, "--stress", "8"), "--stress belongs to --specimen uniaxial or point, found --specimen bulge"),
         (
             (*DIMPLE, "--pressure", "8", "--control", "load"),
             "--control belongs to --specimen uniaxial, found --specimen bulge",
@@ -294,8 +304,20 @@ def test_a_bar_with_a_modulus_has_its_elastic_strain() -> None:
             (*NORTON, "--stress", "8", "--picture", "x.png"),
             "--picture belongs to --specimen bulge, found --specimen uniaxial",
         ),
-        ((*NORTON, "--specimen", "cube"), "--specimen cube is not known; allowed are uniaxial and bulge"),
+        ((*NORTON, "--specimen", "cube"), "there is no specimen 'cube': known: bulge, point, relaxation, uniaxial"),
         (NORTON, "a bar needs a stress: give --stress, such as 100, or --specimen bulge with --pressure"),
+        ((*NORTON, "--specimen", "relaxation"), "a bar in relaxation needs a strain: give --strain, such as 0.002"),
+        ((*NORTON, "--specimen", "relaxation", "--strain", "0.001"), "a prescribed strain needs a modulus"),
+        (
+            (*NORTON, "--stress", "80", "--ramp", "5"),
+            "--ramp belongs to --specimen relaxation, found --specimen uniaxial",
+        ),
+        ((*NORTON, "--specimen", "point"), "a material point needs a component: give --stress 11=100"),
+        ((*NORTON, "--specimen", "point", "--stress", "80"), "--stress 80: name the component of a material point"),
+        (
+            (*NORTON, "--specimen", "point", "--stress", "21=80"),
+            "no component '21' to load; allowed are 11, 22, 33, 12, 23, 13",
+        ),
         (DIMPLE, "a dimple needs a pressure: give --pressure, such as 8, or 7200:10 for a later step"),
         (
             (*NORTON, "--specimen", "bulge", "--pressure", "8"),

@@ -11,6 +11,7 @@ from exported_laws import LAWS, TOLERANCE, case
 
 from creepkit.errors import ExportError
 from creepkit.export.c import CExporter
+from creepkit.export.c_text import HELPERS
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.language.symbols import POINT
 from creepkit.laws.combined import COMBINED
@@ -94,6 +95,12 @@ def test_every_law_agrees_with_50_digits(tmp_path):
     assert not bad, "\n".join(bad)
 
 
+def test_these_laws_call_every_stable_function():
+    texts = [CExporter().text(ValuedLaw(case(name).law, case(name).sets[0])) for name in LAWS]
+    called = {name for text in texts for name in HELPERS if f"static double {name}(" in text}
+    assert called == {*HELPERS}
+
+
 # ---- what the text holds -------------------------------------------------------------------------------------------
 
 
@@ -143,9 +150,9 @@ def test_units_are_converted_on_entry_and_on_exit(tmp_path):
     law = LAWS["foreign Kachanov-Rabotnov"] + TIME_HARDENING
     values = law.center()
     units = Units("Pa", "h")
-    sources = [ValuedLaw(law, values, name="plain"), ValuedLaw(law, values, name="other", units=units)]
+    sources = [ValuedLaw(law, values, name="native"), ValuedLaw(law, values, name="converted", units=units)]
     library = compiled(tmp_path, sources)
-    plain, other = (Compiled(library, name, law) for name in ("plain", "other"))
+    plain, other = (Compiled(library, name, law) for name in ("native", "converted"))
     point = np.array([120.0, 0.01, 7.2e4, 1000.0, 90.0, 40.0, 0.3])
     scales = np.array([1e6, 1.0, 1 / 3600, 1.0, 1e6, 1e6, 1.0])
     rows, log = plain.rows(point)

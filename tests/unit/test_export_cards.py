@@ -1,23 +1,25 @@
 """Cards for other codes: read back by their grammars, the formulas of the codes' manuals give the law's own rate."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import mpmath
 import numpy as np
 import pytest
-from card_cases import CASES, COMBINED, EXPONENTIAL, HAS, STEEL, STRANGER, valued
-from card_grammars import READERS, abaqus, abaqus_cards, ansys_commands, aster_keywords, code_aster, hit, moose
+from card_cases import CASES, COMBINED, EXPONENTIAL, HAS, STEEL, valued
+from card_grammars import READERS, abaqus, abaqus_cards, ansys_commands, aster_keywords, code_aster, hit
 from scipy.integrate import solve_ivp
 from scipy.stats import qmc
 
 import creepkit as ck
-from creepkit.errors import CreepkitError, ExportError
+from creepkit.errors import ExportError
 from creepkit.export.cards.abaqus import AbaqusCards
 from creepkit.export.cards.ansys import AnsysCards
 from creepkit.export.cards.code_aster import CodeAsterMaterial
 from creepkit.export.cards.moose import MooseBlock
 from creepkit.export.cards.neml2 import Neml2Model
+from creepkit.kernels import lower
 from creepkit.kernels.exact import Exact
 from creepkit.language import GAS_CONSTANT, Elastic, arrhenius, linear, wachtman
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
@@ -29,8 +31,9 @@ from creepkit.registry import default
 
 EXPORTERS = {e.name: e for e in (AbaqusCards(), AnsysCards(), MooseBlock(), CodeAsterMaterial(), Neml2Model())}
 GOLDEN = Path(__file__).parents[1] / "golden"
+EXACT = cache(Exact)
 UNITS = [Units(), Units("Pa", "h"), Units("psi", "min")]
-TABLES = {"strain hardening warm", "time hardening warm", "stranger"}
+TABLES = {"strain hardening warm", "time hardening warm", "time hardening warm, small", "stranger"}
 """Cases that Abaqus takes as a table against temperature."""
 
 
@@ -47,7 +50,7 @@ def points(count: int) -> list[list[float]]:
 
 def true_rate(source: ValuedLaw, s: float, e: float, t: float, T: float) -> float:
     """The rate, 1/s, in 50 digits."""
-    return mpmath.fsum(Exact(source.law).parts([s, e, t, T, s, s / 3], source.values.values()))
+    return mpmath.fsum(EXACT(source.law).parts([s, e, t, T, s, s / 3], source.values.values()))
 
 
 # ---- the round trip ------------------------------------------------------------------------------------------------
@@ -66,31 +69,30 @@ def test_the_manuals_formula_gives_the_laws_rate(name, case, units):
 
 @pytest.mark.parametrize("case", sorted(TABLES))
 def test_between_the_rows_of_a_table_abaqus_is_within_a_thousandth(case):
+    """Linear interpolation of a convex function lies above it."""
     rate, source = abaqus(exported("abaqus-cards", case)), CASES[case]
-    errors = [
-        rate(100.0, 0.01, 1e4, T) / float(true_rate(source, 100.0, 0.01, 1e4, T)) - 1 for T in np.arange(880, 1270, 0.7)
-    ]
-    assert 0 <= min(errors)
-    assert 1e-5 < max(errors) < 1.01e-3 * (2 if case == "stranger" else 1) ** 0 * 1.6
+    warmth = np.arange(873.2, 1273.0, 0.3)
+    truth = lower(source.law, "numpy").rate(source.values, stress=100.0, strain=0.01, time=1e4, temperature=warmth)
+    errors = [rate(100.0, 0.01, 1e4, T) / true - 1 for T, true in zip(warmth, truth, strict=True)]
+    assert -1e-11 < min(errors) < 1e-4 < max(errors) < 1e-3
 
 
 @pytest.mark.parametrize(
     ("name", "case"), [(n, c) for n in HAS for c in ("strain hardening", "time hardening") if c in HAS[n]]
 )
 def test_the_same_strain_after_the_same_time_in_pascal_and_hours(name, case):
-    """100 MPa for 100 h from a strain of 1e-4: the card in Pa and h against the law in MPa and s."""
+    """100 MPa from 1 to 100 h, from a strain of 1e-4: the card in Pa and h against the law in MPa and s."""
     source = CASES[case]
-    hourly, native = (READERS[name](exported(name, case, units)) for units in (Units("Pa", "h"), Units()))
-    ends = [
-        solve_ivp(f, (start, end), [1e-4], rtol=1e-11, atol=1e-14, method="LSODA").y[0, -1]
-        for f, start, end in (
-            (lambda t, e: [hourly(1e8, e[0], t, 1000.0)], 1.0, 100.0),
-            (lambda t, e: [native(100.0, e[0], t, 1000.0)], 3600.0, 360_000.0),
-            (lambda t, e: [float(true_rate(source, 100.0, e[0], t, 1000.0))], 3600.0, 360_000.0),
-        )
-    ]
-    assert ends[0] > 2e-4
-    assert ends[:2] == pytest.approx([ends[2]] * 2, rel=1e-8)
+    hourly = READERS[name](exported(name, case, Units("Pa", "h")))
+    kernel = lower(source.law, "numpy")
+
+    def own(t, e):
+        return kernel.rate(source.values, stress=100.0, strain=e[0], time=t)
+
+    in_hours = solve_ivp(lambda t, e: [hourly(1e8, e[0], t, 1000.0)], (1, 100), [1e-4], rtol=1e-10, atol=1e-13)
+    in_seconds = solve_ivp(own, (3600, 360_000), [1e-4], rtol=1e-10, atol=1e-13)
+    assert in_hours.y[0, -1] > 2e-4
+    assert in_hours.y[0, -1] == pytest.approx(in_seconds.y[0, -1], rel=1e-8)
 
 
 @pytest.mark.parametrize(("name", "case"), [(n, c) for n in HAS for c in sorted({*CASES} - HAS[n])])
@@ -228,23 +230,40 @@ def test_moduli_that_depend_on_temperature_are_refused_where_numbers_are_needed(
         EXPORTERS[name].text(CASES["norton"].replace(elastic=WARM_STEEL))
 
 
-@pytest.mark.parametrize(
-    ("name", "source", "message"),
-    [
-        ("abaqus-cards", valued(STRAIN_HARDENING, A=1e-9, n=0.0, m=-0.5), "asks for n > 0 and -1 < m <= 0 .n = 0, m = -0.333333.; export it as 'abaqus'"),
-        ("abaqus-cards", valued(EXPONENTIAL, A=1e-9, B=20), "its exponential of stress does not stand alone there"),
-        ("abaqus-cards", valued(COMBINED, **COMBINED.center()), r"a sum of 3 \(hyperbolic sine \+ strain hardening \+ time hardening\)"),
-        ("ansys", valued(COMBINED, **COMBINED.center()), "none of Ansys' implicit creep laws.*USERCREEP"),
-        ("moose", valued(STRAIN_HARDENING, A=1e-9, n=4, m=-0.5), "no creep model for its power -0.5 of creep strain .its m_exponent is one of time."),
-        ("moose", valued(HYPERBOLIC_SINE, A=1e-9, n=4, B=40), "no creep model for its sinh of stress"),
-        ("code_aster", valued(TIME_HARDENING, A=1e-9, n=4, m=-0.5), "is not code_aster's LEMAITRE: time hardening depends on time"),
-        ("code_aster", valued(HYPERBOLIC_SINE, A=1e-9, n=4, B=40), "hyperbolic sine is a sinh of stress; export it as 'mfront'"),
-        ("neml2", valued(TIME_HARDENING, A=1e-9, n=4, m=-0.5), "steady power laws of stress only.*time exponent -0.5"),
-        ("neml2", valued(NORTON, A=1e-9, n=4), "needs the moduli; give elastic=Elastic"),
-        ("ansys", valued(NORTON.with_temperature(n=linear()), A=1e-9, n=4, n_T=-1e-3), "the exponent '.*temperature.*' of stress is not a number"),
-        ("ansys", valued(NORTON.times(arrhenius(300.0)), A=1e-9, n=4, Q=9e5 * 3), "C1 would be 1e461, beyond the range of a double; give the temperature"),
-    ],
-)  # fmt: skip
+AT = dict(A=1e-9, n=4)
+REFUSED = [
+    (
+        "abaqus-cards",
+        valued(STRAIN_HARDENING, A=1e-9, n=0, m=-0.5),
+        r"asks for n > 0 .* \(n = 0, m = -0.333333\); export",
+    ),
+    ("abaqus-cards", valued(EXPONENTIAL, A=1e-9, B=20), "its exponential of stress does not stand alone there"),
+    (
+        "abaqus-cards",
+        valued(COMBINED, **COMBINED.center()),
+        r"a sum of 3 \(hyperbolic sine \+ strain hardening \+ time",
+    ),
+    ("ansys", valued(COMBINED, **COMBINED.center()), "none of Ansys' implicit creep laws.*USERCREEP"),
+    (
+        "ansys",
+        valued(NORTON.with_temperature(n=linear()), n_T=-1e-3, **AT),
+        "not a number .constants at one temperature may",
+    ),
+    ("ansys", valued(NORTON.times(arrhenius(300.0)), Q=2.7e6, **AT), "C1 would be 1e461, .* give the temperature"),
+    ("moose", valued(STRAIN_HARDENING, m=-0.5, **AT), r"power -0.5 of creep strain \(its m_exponent is one of time\)"),
+    ("moose", valued(HYPERBOLIC_SINE, B=40, **AT), "no creep model for its sinh of stress"),
+    (
+        "code_aster",
+        valued(TIME_HARDENING, m=-0.5, **AT),
+        "is not code_aster's LEMAITRE: time hardening depends on time",
+    ),
+    ("code_aster", valued(HYPERBOLIC_SINE, B=40, **AT), "is a sinh of stress; export it as 'mfront'"),
+    ("neml2", valued(TIME_HARDENING, m=-0.5, **AT), "steady power laws of stress only.*time exponent -0.5"),
+    ("neml2", valued(NORTON, **AT), "needs the moduli; give elastic=Elastic"),
+]
+
+
+@pytest.mark.parametrize(("name", "source", "message"), REFUSED)
 def test_refusals_give_the_reason(name, source, message):
     with pytest.raises(ExportError, match=message) as error:
         EXPORTERS[name].text(source)
@@ -259,18 +278,17 @@ def test_a_temperature_makes_a_card_possible():
 
 
 @pytest.mark.parametrize("law", sorted(default().laws()))
-@pytest.mark.parametrize("name", sorted(e for e in default().exporters()))
+@pytest.mark.parametrize("name", sorted(default().exporters()))
 def test_every_registered_law_is_exported_or_refused_with_a_reason(name, law):
     exporter, source = default().exporters()[name].value, default().law(law)
-    for units in UNITS[:2]:
-        try:
-            text = exporter.text(ValuedLaw(source, source.center(), elastic=STEEL, units=units))
-        except CreepkitError as error:
-            assert isinstance(error, ExportError)
-            assert law in str(error)
-            assert len(str(error)) > 60
-        else:
-            assert text.endswith("\n")
+    try:
+        text = exporter.text(ValuedLaw(source, source.center(), elastic=STEEL, units=Units("Pa", "h")))
+    except ExportError as error:
+        told = str(error)
+        sensible = f"'{law}'" in told and len(told) > 60
+    else:
+        sensible = len(text.splitlines()) > 4
+    assert sensible
 
 
 # ---- golden files --------------------------------------------------------------------------------------------------

@@ -44,7 +44,7 @@ def test_alloy_617_spot_values(alloy617):
 
 
 def test_how_the_tests_of_alloy_617_ended(alloy617):
-    """Its index says of 71 that they ruptured, of one that it was discontinued, and nothing of the first laboratory's."""
+    """Its index says of 71 that they ruptured, of one that it was discontinued, nothing of the first laboratory's."""
     assert Counter((h.rupture_time is not None, h.unruptured) for h in alloy617.values()) == {
         (True, False): 71, (False, True): 1, (False, False): 22,
     }  # fmt: skip

@@ -1,4 +1,4 @@
-"""A law from outside: a package made by `new-law`, given another law, built, installed elsewhere, and used by all verbs.
+"""A law from outside: a package that `new-law` made, given another law, built, installed elsewhere, used by all verbs.
 
 The new environment sees the packages that are installed here, and the wheel besides; nothing is downloaded.
 """

@@ -1,6 +1,8 @@
 """Converted values: the same rates along the same curve, round trips, and values without a counterpart."""
 
+import re
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -100,3 +102,14 @@ def test_an_unknown_target_or_unit_is_refused() -> None:
         convert(TEXTBOOK, "norton-bailey-time", "ansys")
     with pytest.raises(LawError, match="no unit of time 'hours': known: d, h, min, s"):
         per_second(TEXTBOOK, "norton-bailey-time", "hours")
+
+
+def test_the_example_of_the_readme() -> None:
+    """strain = 2.16e-13 s^4 t^0.5 in hours is 3.6e-15 s^4 t^0.5 in seconds; with t eliminated, 6.48e-30 s^8/e."""
+    (block,) = re.findall(r"```python\n(.*?)```", (Path(__file__).parents[1] / "README.md").read_text(), re.DOTALL)
+    found: dict[str, dict[str, float]] = {}
+    exec(block, found)
+
+    assert found["textbook"] == pytest.approx({"A": 3.6e-15, "n": 4.0, "m": 0.5}, rel=1e-12)
+    assert found["abaqus"] == pytest.approx({"A": 1.8e-15, "n": 4.0, "m": -0.5}, rel=1e-12)
+    assert found["ansys"] == pytest.approx({"A": 6.48e-30, "n": 8.0, "m": -1.0}, rel=1e-12)

@@ -27,7 +27,7 @@ LIU_MURAKAMI = CreepLaw(
         B: Param("damage rate coefficient", unit="1/s", bounds=(1e-60, 1e-3), scale="log", off=0.0),
         p: Param("stress exponent of damage", bounds=(1, 20)),
         q_2: Param("exponential growth of damage", bounds=(0.5, 20)),
-        alpha: Param("share of the largest principal stress in the rupture stress", bounds=(0, 1)),
+        alpha: Param("share of the largest principal stress in the rupture stress", bounds=(0, 1), off=0.0),
     },
     states={
         w: State(0.0, B * (1 - sympy.exp(-q_2)) / q_2 * rupture_stress**p * sympy.exp(q_2 * w), "damage", limit=1.0)

@@ -34,7 +34,10 @@ def command(
     poisson: Annotated[float, typer.Option(help="Poisson's ratio, beside the modulus.")] = 0.3,
     name: Annotated[str, typer.Option(help="What the target is to call the law.")] = "",
 ) -> None:
-    """Write a law with its values for a target; intervals and the range of validity travel as comments."""
+    """Write a law with its values as text, or for a solver.
+
+    Intervals and the range of validity travel as comments.
+    """
     from creepkit import study
     from creepkit.language import Elastic
     from creepkit.records import ZERO_CELSIUS

@@ -16,7 +16,7 @@ def command(
     name: Annotated[str, typer.Argument(help="Name of the law, such as 'my-law'.")],
     file: Annotated[bool, typer.Option("--file", help="One file, for --plugin and CREEPKIT_PLUGINS.")] = False,
 ) -> None:
-    """Write a law of some 20 lines to start from, in a package that pip installs."""
+    """Write a law of some 20 lines to start from, as a package."""
     from creepkit import registry
     from creepkit.errors import LawError
 

@@ -55,7 +55,7 @@ def command(
         Path | None, typer.Option(help="Picture of the dimple's section at the end, coloured by stress.")
     ] = None,
 ) -> None:
-    """Simulate a creep test: of a bar, of a bar in relaxation, of a material point or of a dimple."""
+    """Simulate a test of a bar, a material point or a dimple."""
     from creepkit import study
     from creepkit.errors import SolveError
     from creepkit.language import Elastic

@@ -11,6 +11,7 @@ from creepkit.export.fortran.creep import AbaqusCreep, CalculixCreep
 from creepkit.export.latex import LatexExporter
 from creepkit.export.markdown import MarkdownExporter
 from creepkit.export.mathml import MathmlExporter
+from creepkit.export.mfront import MfrontExporter
 from creepkit.export.numpy import NumpyExporter
 from creepkit.export.python import PythonExporter
 from creepkit.hookspecs import hookimpl
@@ -28,6 +29,7 @@ def creepkit_exporters() -> list[Exporter]:
         CalculixCreep(),
         NumpyExporter(),
         CExporter(),
+        MfrontExporter(),
         MarkdownExporter(),
         MathmlExporter(),
         AbaqusCards(),

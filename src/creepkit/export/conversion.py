@@ -18,7 +18,6 @@ import numpy as np
 
 from creepkit.errors import ExportError
 from creepkit.kernels.exact import Exact
-from creepkit.kernels.logform import coefficients_of
 from creepkit.language.law import CreepLaw
 from creepkit.records import Units, ValuedLaw
 
@@ -56,45 +55,69 @@ def reference_of(units: Units) -> str:
 
 def _folded(law: CreepLaw, before: Mapping[str, float], after: Mapping[str, float], units: Units) -> dict[int, float]:
     """{position of a coefficient: what it must be multiplied by}."""
-    ratios = _ratios(law, before, after, units)
+    new = _Rates(law, units)
     found: dict[int, float] = {}
-    expressions = [*law.terms.values(), *(state.rate for state in law.states.values())]
+    rates, wanted = new.at(after), _Rates(law, Units()).at(before)
+    degrees = new.degrees(after)
     labels = [f"term '{k}'" for k in law.terms] + [f"rate of '{s}'" for s in law.states]
-    for expression, label, factors in zip(expressions, labels, ratios, strict=True):
-        steady = all(abs(f - factors[0]) <= _SAME * abs(factors[0]) for f in factors)
-        if steady and abs(factors[0] - 1) < _SAME:
+    for k, label in enumerate(labels):
+        factor = _steady([_ratio(a * units.seconds, b) for a, b in zip(wanted[k], rates[k], strict=True)])
+        if factor is not None and abs(factor - 1) < _SAME:
             continue
-        positions = [k for k, s in enumerate(law.params) if s in coefficients_of(expression)]
-        positions = [k for k in positions if law.table[law.names[k]].scale == "log"]
-        if not (steady and positions):
-            why = "it has no rate coefficient" if steady else "the factor varies with the point"
+        position = next((p for p, degree in degrees.items() if degree[k]), None)
+        if factor is None or position is None:
+            why = "the factor varies with the point" if factor is None else "it has no rate coefficient"
             raise ExportError(
                 f"law '{law.name}', {label}: no constants give it with {reference_of(units)} ({why}); "
                 "export it in MPa and s"
             )
-        factor = float(factors[0])
-        if found.setdefault(positions[0], factor) != factor:
+        share = float(factor ** (1 / degrees[position][k]))
+        if not 0 < share < float("inf"):
             raise ExportError(
-                f"law '{law.name}': {law.names[positions[0]]} would need two values with {reference_of(units)}; "
+                f"law '{law.name}': {law.names[position]} would leave double precision with {reference_of(units)}; "
+                "export it in MPa and s"
+            )
+        if abs(found.setdefault(position, share) / share - 1) > _SAME:
+            raise ExportError(
+                f"law '{law.name}': {law.names[position]} would need two values with {reference_of(units)}; "
                 "export it in MPa and s"
             )
     return found
 
 
-def _ratios(
-    law: CreepLaw, before: Mapping[str, float], after: Mapping[str, float], units: Units
-) -> list[list[mpmath.mpf]]:
-    """For each term and state rate, c rate(k stress, c time) over the rate with new values, at several points."""
-    exact = Exact(law)
-    rows = []
-    for point in _points(law):
-        scaled = np.array(point)
-        scaled[[0, 4, 5]] /= units.megapascals
-        scaled[2] /= units.seconds
-        old, new = (exact.parts(p, [v[n] for n in law.names]) for p, v in ((point, before), (scaled, after)))
-        rows.append([_ratio(a * units.seconds, b) for a, b in zip(old, new, strict=True)])
-    columns = [[r for r in column if r is not None] for column in zip(*rows, strict=True)]
-    return [column or [mpmath.mpf(1)] for column in columns]
+class _Rates:
+    """Each term and state rate of a law at several points, in some units: [rate][point], 50 digits."""
+
+    def __init__(self, law: CreepLaw, units: Units) -> None:
+        self.law, self.exact = law, Exact(law)
+        scaled = np.array(_points(law))
+        scaled[:, [0, 4, 5]] /= units.megapascals
+        scaled[:, 2] /= units.seconds
+        self.points = scaled.tolist()
+
+    def at(self, values: Mapping[str, float]) -> list[list[Any]]:
+        """Rates with these values of the parameters."""
+        rows = [self.exact.parts(point, [values[n] for n in self.law.names]) for point in self.points]
+        return [list(column) for column in zip(*rows, strict=True)]
+
+    def degrees(self, values: Mapping[str, float]) -> dict[int, list[Any]]:
+        """{position of a parameter of log scale: the power in which it multiplies each rate, 0 where it does not}."""
+        plain, found = self.at(values), {}
+        for position, (name, param) in enumerate(self.law.table.items()):
+            if param.scale == "log" and values[name] > 0:
+                doubled = self.at({**values, name: 2 * values[name]})
+                factors = [
+                    _steady([_ratio(b, a) for a, b in zip(*pair, strict=True)])
+                    for pair in zip(plain, doubled, strict=True)
+                ]
+                found[position] = [0 if f is None or f == 1 else mpmath.log(f, 2) for f in factors]
+        return found
+
+
+def _steady(factors: list[Any]) -> Any:
+    """The one value of factors; None where they differ. A rate that is zero everywhere needs no factor."""
+    known = [f for f in factors if f is not None] or [mpmath.mpf(1)]
+    return known[0] if all(abs(f - known[0]) <= _SAME * abs(known[0]) for f in known) else None
 
 
 def _ratio(a: Any, b: Any) -> Any:

@@ -9,6 +9,7 @@ import sympy
 from creepkit.export.conversion import reference_of
 from creepkit.kernels.logform import FLOOR, TIME_FLOOR
 from creepkit.language.law import CreepLaw
+from creepkit.language.printing import text_of_expression
 from creepkit.language.symbols import GAS_CONSTANT, temperature
 from creepkit.records import ValuedLaw
 
@@ -49,10 +50,10 @@ def equations(law: CreepLaw) -> Iterator[str]:
     """The rate, a term a line under its name, and the rates of internal variables."""
     leads = ["rate =", *["     +"] * (len(law.terms) - 1)]
     for lead, (label, term) in zip(leads, law.terms.items(), strict=True):
-        yield f"{lead} {term}    [{label}]"
+        yield f"{lead} {text_of_expression(term)}    [{label}]"
     for symbol, state in law.states.items():
         until = "" if state.limit is None else f" to failure at {state.limit:g}"
-        yield f"d{symbol}/dt = {state.rate}, from {state.initial:g}{until}    [{state.meaning}]"
+        yield f"d{symbol}/dt = {text_of_expression(state.rate)}, from {state.initial:g}{until}    [{state.meaning}]"
 
 
 def table(law: CreepLaw, values: Mapping[str, float]) -> Iterator[str]:

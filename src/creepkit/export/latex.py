@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import mpmath
 import sympy
 
+from creepkit.export import sheet
 from creepkit.export.conversion import Converted, converted
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import Activation, LawPrinter, activation_of, equations_of
@@ -35,7 +36,7 @@ class LatexExporter:
         lines = [f"% {part}" for note in (source.title, *source.notes) for part in note.splitlines()]
         lines += _aligned([row for left, right in equations_of(law, printer) for row in _rows(left, right)])
         lines += [rf"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
-        lines += _table(law, numbers, printer)
+        lines += _table(source, numbers, printer)
         lines += [] if source.units.native else [f"In this table, {escaped(numbers.reference)}."]
         lines += _without_reference(law, numbers, printer)
         return "\n".join(lines) + "\n"
@@ -51,12 +52,11 @@ def _aligned(rows: Sequence[str]) -> list[str]:
     return [r"\begin{align*}", " \\\\\n".join(f"  {row}" for row in rows), r"\end{align*}"]
 
 
-def _table(law: CreepLaw, numbers: Converted, printer: LawPrinter) -> list[str]:
+def _table(source: ValuedLaw, numbers: Converted, printer: LawPrinter) -> list[str]:
     rows = [
-        (printer.doprint(symbol), param.meaning, numbers.values[symbol.name], numbers.units[symbol.name])
-        for symbol, param in law.params.items()
+        (f"{printer.doprint(row.symbol)}{'(0)' if row.start else ''}", row.meaning, row.value, row.unit)
+        for row in sheet.rows(source, numbers)
     ]
-    rows += [(f"{printer.doprint(s)}(0)", state.meaning, state.initial, state.unit) for s, state in law.states.items()]
     return [
         r"\begin{tabular}{llll}",
         r"  \hline",
@@ -74,8 +74,8 @@ def escaped(text: str) -> str:
 
 
 def unit(text: str) -> str:
-    """A unit for the table; nothing for 1."""
-    return "" if text == "1" else f"${_upright(text)}$"
+    """A unit for the table, where there is one."""
+    return "" if not text else f"${_upright(text)}$"
 
 
 def number(value: float | mpmath.mpf, digits: int = 6) -> str:

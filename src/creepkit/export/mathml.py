@@ -17,6 +17,7 @@ from sympy.printing.mathml import MathMLPresentationPrinter
 
 from creepkit.export import sheet
 from creepkit.export.conversion import converted
+from creepkit.export.heading import printable
 from creepkit.export.latex import number
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import Activation, activation_of
@@ -192,4 +193,4 @@ def _section(title: str, items: Sequence[str]) -> list[str]:
 
 def _plain(text: str) -> str:
     """Text for XML, which allows no control characters."""
-    return html.escape("".join(c if c.isprintable() else " " for c in text))
+    return html.escape(printable(text))

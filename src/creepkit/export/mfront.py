@@ -68,7 +68,7 @@ def _head(law: Integrator) -> Iterator[str]:
         f"Stress and Young's modulus are in {units.stress}, time in {units.time}, temperature in K.",
         "The creep strain p flows along the deviator of the stress; damage does not weaken the elasticity.",
         "The midpoint rule (theta = 0.5) is of second order; theta = 1 is of first order and damps more.",
-        "Nothing is singular at the start; where the rate falls steeply there, let the first increments be short.",
+        "Powers of time and strain stay finite at the start; if the rate falls steeply there, keep increments short.",
     ]
     if law.needs_time:
         told.append(f"Time is counted in {law.elapsed} from the first increment on, where the loading begins.")
@@ -129,8 +129,10 @@ def _variables(law: Integrator) -> Iterator[str]:
         yield f"@StateVariable real {symbol}; // {printable(state.meaning)}"
         if state.limit is not None:
             room = state.limit - state.initial
-            interval = f"]*:{room!r}]" if room > 0 else f"[{room!r}:*["
-            yield f"@PhysicalBounds {symbol} in {interval}; // where the material has failed"
+            if room > 0:
+                yield f"@PhysicalBounds {symbol} in ]*:{room!r}]; // where the material has failed"
+            else:
+                yield f"// the material has failed where {symbol} reaches {room!r}"
     if law.needs_time:
         yield f"@AuxiliaryStateVariable real {law.elapsed};"
         yield f'{law.elapsed}.setEntryName("TimeUnderLoad");'

@@ -21,7 +21,7 @@ from creepkit.records import ValuedLaw
 
 Steps = tuple[tuple[sympy.Symbol, sympy.Expr], ...]
 
-_entries = lru_cache(maxsize=64)(entries)
+_entries = lru_cache(maxsize=128)(entries)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import sympy
 
 from creepkit.export.conversion import Converted
+from creepkit.export.heading import printable
 from creepkit.language.symbols import GAS_CONSTANT, temperature
 from creepkit.records import ValuedLaw
 
@@ -44,4 +45,5 @@ def small_print(source: ValuedLaw, numbers: Converted) -> Iterator[str]:
 
 def notes(source: ValuedLaw) -> list[str]:
     """The notes, a line each."""
-    return [line for note in source.notes for line in note.splitlines() if line.strip()]
+    lines = (printable(line).strip() for note in source.notes for line in note.splitlines())
+    return [line for line in lines if line]

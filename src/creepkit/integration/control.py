@@ -104,6 +104,26 @@ def stretch(tableau: Tableau, error: float, growing: bool) -> float:
     return float(min(max(factor, _LEAST), _MOST if growing else 1.0))
 
 
+class Pace(NamedTuple):
+    """The last accepted step: its length (0: none yet), and its error over what was allowed."""
+
+    length: float
+    error: float
+
+
+@njit(cache=True, error_model="numpy")
+def shortened(tableau: Tableau, before: Pace, h: float, error: float) -> float:
+    """Factor, at most one, on the step after one that had to be tried again.
+
+    On the way to a singularity every step must be shorter than the last. That goes on: predictive control, Gustafsson
+    (1994), ACM Trans. Math. Softw. 20, 496.
+    """
+    if not before.length > 0.0:
+        return 1.0
+    ratio = (max(before.error, 1e-12) / max(error, 1e-12)) ** (1.0 / (tableau.error_order + 1))
+    return float(min(max(ratio * h / before.length, _LEAST), 1.0))
+
+
 @njit(cache=True, error_model="numpy")
 def fitted(s: float, h: float, longest: float) -> float:
     """The step, not too long, and ending at 1 rather than just before it."""

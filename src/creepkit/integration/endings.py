@@ -51,6 +51,24 @@ def limit_reached(limits: Limits, work: Room) -> int:
 
 
 @njit(cache=True, error_model="numpy")
+def about_to_pass(limits: Limits, work: Room, pace: float, margin: float) -> int:
+    """Which unknown, growing ever faster, will pass its limit within the share `margin` of the time; -1 is none.
+
+    pace : d(ln t)/ds at the step's end. Where a rate diverges at the limit, the last millionth of a life takes as many
+    steps as the rest of it.
+    """
+    last = work.slopes.shape[0] - 1
+    for v in range(limits.states.size + 1):
+        limit = limits.states[v - 1] if v > 0 else limits.strain
+        slope = work.slopes[last, v]
+        gap = limit - work.new_value[v]
+        faster = slope * gap > 0.0 and abs(slope) > abs(work.slopes[0, v])
+        if isfinite(limit) and faster and abs(gap) * pace < margin * abs(slope):
+            return v
+    return -1
+
+
+@njit(cache=True, error_model="numpy")
 def crossing(limits: Limits, tableau: Tableau, work: Room, h: float) -> float:
     """Share of the step at which the first limit is passed, by bisection of the dense output."""
     low, high = 0.0, 1.0

@@ -12,10 +12,12 @@ from creepkit.integration.arrivals import Arrivals, arrive, log_time_change
 from creepkit.integration.clock import Clock, moment, position
 from creepkit.integration.control import (
     VIRGIN_CAUTION,
+    Pace,
     Settings,
     change_error,
     fitted,
     newton_tolerance,
+    shortened,
     strain_error,
     stretch,
 )
@@ -23,9 +25,11 @@ from creepkit.integration.dense import dense_change, dense_value
 from creepkit.integration.endings import (
     DIVERGED,
     REACHED_END,
+    STATE_LIMIT,
     STEP_TOO_SMALL,
     TOO_MANY_STEPS,
     Limits,
+    about_to_pass,
     crossing,
     first_passed,
     limit_reached,
@@ -38,6 +42,8 @@ from creepkit.integration.tableau import Tableau
 
 _SMALLEST_STEP = 1e-13
 _SMALLEST_FIRST_STEP = 1e-60
+_NEGLIGIBLE = 0.01
+"""Share of the tolerance within which a time need not be known better."""
 
 
 class Kernel(NamedTuple):
@@ -143,6 +149,7 @@ def _integrate_segment(
     first = min(position(clock, times[done]), 1.0) if done < times.size else 1.0
     slope = rate * exp(moment(clock, 1e-12).log_pace) if rate > 0.0 else nan
     s, h, growing = 0.0, min(settings.first, first), True
+    before = Pace(0.0, 1.0)
     while s < 1.0:
         h = fitted(s, h, settings.longest)
         if steps + rejected >= settings.max_steps:
@@ -162,17 +169,26 @@ def _integrate_segment(
         steps += 1
         code = limit_reached(kernel.limits, work)
         share = 1.0 if code == REACHED_END else crossing(kernel.limits, tableau, work, h)
+        ended = first_passed(kernel.limits, tableau, work, h, share) if code != REACHED_END else -1
+        if code == REACHED_END:
+            now = moment(clock, s + h)
+            pace = exp(now.log_pace) / now.time if now.time > 0.0 else inf
+            ended = about_to_pass(kernel.limits, work, pace, _NEGLIGIBLE * settings.rtol)
+            code = REACHED_END if ended < 0 else STATE_LIMIT if ended > 0 else DIVERGED
         done = _fill(clock, tableau, work, s, h, share, times, done, strain, jacobian)
         reached = arrive(clock, tableau, work, s, h, share, arrivals, reached)
         if code != REACHED_END:
             if jacobian.shape[0] > 0:
-                ended = first_passed(kernel.limits, tableau, work, h, share)
                 log_time_change(clock, tableau, work, s, h, share, ended, arrivals.end_change)
             return Progress(done, reached, steps, rejected, code, _time_at(clock, s + share * h))
         _accept(work)
         slope = work.slopes[tableau.c.size - 1, 0]
         s = 1.0 if h == 1.0 - s else s + h
-        h, growing = h * stretch(tableau, error, growing), True
+        longer = stretch(tableau, error, growing)
+        if not growing:
+            longer *= shortened(tableau, before, h, error)
+        before = Pace(h, error)
+        h, growing = h * longer, True
     return Progress(done, reached, steps, rejected, REACHED_END, segment.end)
 
 

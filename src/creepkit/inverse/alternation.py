@@ -15,7 +15,7 @@ from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.scatter import Scatter
 from creepkit.inverse.search import Box, Minimum, Progress, refine
 from creepkit.inverse.uncertainty import curvature, inverse, marginal
-from creepkit.inverse.weighting import Weighting, trusts
+from creepkit.inverse.weighting import Weighting, pulling, trusts
 
 SPREAD_STEPS = 30
 """Steps of the estimate of unknown spreads in each round; they cost no simulation."""
@@ -59,7 +59,8 @@ def alternate(
         residuals = residuals.trusting(trust)
         working = weighting.working(residuals, working)
         # A stopped test that says nothing here may say something a step further.
-        factor = whitener(replace(residuals, present=objective.entries.present), working)
+        everything = replace(residuals, present=objective.entries.present)
+        factor = whitener(everything, pulling(working, objective.entries))
         minimum = refine(
             objective, box, factor, x, loss=weighting.settings.loss, steps=effort.steps, tolerance=effort.tolerance
         )

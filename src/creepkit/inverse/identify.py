@@ -30,7 +30,7 @@ from creepkit.inverse.settings import Settings
 from creepkit.inverse.sizes import estimated
 from creepkit.inverse.together import Together, predict, screening_of
 from creepkit.inverse.uncertainty import estimates, laplace, quantile
-from creepkit.inverse.weighting import Weighting
+from creepkit.inverse.weighting import Weighting, pulling
 from creepkit.language import CreepLaw
 from creepkit.records import History, Nuisance, Predictor
 
@@ -97,7 +97,8 @@ def _answer(
     scatter = estimated(at_means, full_guess(weighting.measured(best.working), known), known)
     given = any(n.kind == "rate" and n.sd is not None for n in known)
     wide = box.beside(best.unknowns)
-    posterior, freedom = laplace(residuals, best.working, scatter, wide, best.unknowns, rate_known=given)
+    pull = pulling(best.working, objective.entries)
+    posterior, freedom = laplace(residuals, pull, scatter, wide, best.unknowns, rate_known=given)
     found = predict(
         objective.using, law, coordinates.values(u), list(histories), effects=best.unknowns.effects(x[size:])
     )
@@ -149,7 +150,8 @@ def _searched(objective: Objective, box: Box, weighting: Weighting, progress: Pr
     The best minima that differ, or for a sum the best one and its best term: a sum must not end worse than its terms.
     Their likelihoods decide, since the covariance is not yet known here.
     """
-    settings, factor = weighting.settings, whitener(objective.before_fit(), weighting.guess())
+    settings, guess = weighting.settings, pulling(weighting.guess(), objective.entries)
+    factor = whitener(objective.before_fit(), guess)
     loss = "soft_l1" if settings.loss == "linear" else settings.loss
     few, half = max(2, settings.starts // 3), settings.draws // 2
     singles = from_single_terms(objective, box, factor, starts=few, draws=half, seed=settings.seed, loss=loss)

@@ -47,7 +47,7 @@ def over_life(entries: Entries, vertical: Floats, alive: Bools, found: Predictio
 
 
 def _with_ruptures(entries: Entries, life: Life, frames: Compared) -> Compared:
-    """The same with ln of the measured over the predicted rupture time; a stopped test counts where it outlasted that."""
+    """The same with ln of measured over predicted rupture time; a stopped test counts where it outlasted that."""
     broke = np.isfinite(life.ruptures)
     last = np.log(np.where(broke, life.ruptures, life.horizon))
     early = np.where(entries.ruptures, entries.log_times - last[..., None], 0.0)
@@ -63,11 +63,12 @@ def _with_ruptures(entries: Entries, life: Life, frames: Compared) -> Compared:
 
 
 def time_jacobian(entries: Entries, life: Life) -> Floats:
-    """Derivatives of -ln(time) of arrivals and ruptures to internal parameters, (candidates, tests, entries, parameters).
+    """Derivatives of -ln(time) of arrivals and ruptures to internal parameters.
 
-    Zero where neither comes.
+    (candidates, tests, entries, parameters); zero where neither comes.
     """
-    assert life.arrival_jacobian is not None and life.rupture_jacobian is not None
+    assert life.arrival_jacobian is not None
+    assert life.rupture_jacobian is not None
     arrivals = entries.at_frames(life.arrival_jacobian)
     found = -np.where(entries.ruptures[..., None], life.rupture_jacobian[:, :, None], arrivals)
     return np.where(np.isfinite(found), found, 0.0)
@@ -119,5 +120,5 @@ def check_effects(explicit: Sequence[str], entries: Entries, histories: Sequence
     name = getattr(predictor_of(using, history), "name", "predictor")
     raise FitError(
         f"nuisance '{explicit[0]}' cannot be fitted beside tests that are followed to their end ('{history.name}', "
-        f"{name}); leave it out, or give histories without their end: history.replace(rupture_time=None, unruptured=False)"
+        f"{name}); leave it out, or forget how they ended: history.replace(rupture_time=None, unruptured=False)"
     )

@@ -2,7 +2,8 @@
 
 A candidate that bursts before a test ends goes on from the ceiling of its scale and grows with ln(t / t_burst): the
 residual stays finite and keeps growing the earlier it burst, so a search can find its way back. A test whose end is
-known is compared over its whole life instead: by its distance from the curve (see inverse.distance), and by its rupture.
+known is compared over its whole life instead: by its distance from the curve (see inverse.distance), and by its
+rupture.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.differences import author_values, differentiated
 from creepkit.inverse.effects import Unknowns
 from creepkit.inverse.entries import Entries
+from creepkit.inverse.life import Compared, offset_slope, over_life, predict_life, time_jacobian
 from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.scales import LinearScale
-from creepkit.inverse.life import Compared, offset_slope, over_life, predict_life, time_jacobian
 from creepkit.inverse.together import predict
 from creepkit.language import CreepLaw
 from creepkit.records import History, Prediction, Predictor

@@ -31,7 +31,7 @@ TELLING = 0.02
 
 
 def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
-    """Draw the tests, what is left of them over time, rate over stress with 95 % bands, and ruptures; two panels an output."""
+    """Draw the tests and what is left of them over time, an output each, rates with 95 % bands, and ruptures."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -61,6 +61,8 @@ def _finish(tests: Axes, left: Axes, fit: Identification, output: str) -> None:
     left.legend(fontsize=7, loc="lower left")
     for axes in (tests, left):
         axes.grid(alpha=0.25)
+        if output.startswith("stress"):
+            axes.set_xscale("log")  # relaxation is over before a linear axis shows it
 
 
 def _units(output: str) -> tuple[str, str, float]:

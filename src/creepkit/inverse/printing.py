@@ -51,8 +51,9 @@ def _reference(fit: Identification) -> list[str]:
     r = fit.reference
     rate, low, high = (float(v) for v in fit.rate(r.stress))
     n, less, more = (float(v) for v in fit.local_exponent(r.stress))
+    fresh = " of virgin material" if fit.law.states else ""
     return [
-        f"  rate at {r.stress:.4g} MPa, {r.temperature:.0f} K, strain {r.strain:.2g}, {r.time:.3g} s: "
+        f"  rate{fresh} at {r.stress:.4g} MPa, {r.temperature:.0f} K, strain {r.strain:.2g}, {r.time:.3g} s: "
         f"{rate:.3g} [{low:.3g}, {high:.3g}] 1/s",
         f"  local stress exponent there: {n:.3g} [{less:.3g}, {more:.3g}]",
     ]

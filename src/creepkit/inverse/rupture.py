@@ -39,7 +39,8 @@ def rupture_times(
                 f"history '{history.name}': {name} follows no test to rupture; give using=, such as uniaxial"
             )
     found = predict_life(using, coordinates.law, coordinates.values(u), histories, jacobian=True)
-    assert found.life is not None and found.life.rupture_jacobian is not None
+    assert found.life is not None
+    assert found.life.rupture_jacobian is not None
     time = found.life.ruptures[0]
     slopes = np.nan_to_num(found.life.rupture_jacobian[0]) @ coordinates.jacobian(u)
     variance = np.einsum("ti,ij,tj->t", slopes, covariance, slopes)

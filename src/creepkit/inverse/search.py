@@ -22,7 +22,8 @@ from creepkit.inverse.objective import Objective
 from creepkit.language import CreepLaw
 
 RATE_WINDOW = (-12.0, 6.0)
-"""Bounds of a term's or internal variable's log rate about the measured one: at 1e-5 of the data it is absent, at 400 times it is wrong."""
+"""Bounds of the log rate of a term, or of an internal variable, about the measured one: at 1e-5 of the data it is
+absent, at 400 times it is wrong."""
 
 GROWTH_WINDOW = (-4.0, 0.0)
 """Where the rate of an internal variable is drawn: ln of its rate times the life of a test."""

@@ -7,7 +7,7 @@ times fall (Holdsworth et al. (2008), Int. J. Pressure Vessels and Piping 85, 80
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from creepkit.inverse.identify import refit
 from creepkit.inverse.life import predict_life
 from creepkit.inverse.search import Progress
 from creepkit.language import CreepLaw
-from creepkit.records import EVERY_FRAME, History, Prediction, Predictor, Status
+from creepkit.records import History, Prediction, Predictor, Status
 
 
 @dataclass(frozen=True)
@@ -82,14 +82,7 @@ def times_to_strain(
     reached = [(h, t) for h, o in zip(histories, own, strict=True) if (t := measured_time(h, level + o)) is not None]
     grids = [t * np.geomspace(1e-4, 1e4, 400) for _, t in reached]
     probes = [
-        replace(
-            h,
-            times=grid,
-            outputs={"strain": np.zeros(grid.size)},
-            used=EVERY_FRAME,
-            standard_deviation={},
-            includes_elastic=False,
-        )
+        h.replace(times=grid, outputs={"strain": np.zeros(grid.size)}, standard_deviation={}, includes_elastic=False)
         for (h, _), grid in zip(reached, grids, strict=True)
     ]
     found = using.predict(law, values, probes)

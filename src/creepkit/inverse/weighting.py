@@ -12,6 +12,7 @@ from creepkit.inverse.covariance import expected_effects, whitener
 from creepkit.inverse.entries import Entries
 from creepkit.inverse.measures import squares_about
 from creepkit.inverse.residuals import Residuals
+from creepkit.inverse.scales import RUPTURE
 from creepkit.inverse.scatter import Scatter, working_guess
 from creepkit.inverse.settings import Settings
 from creepkit.inverse.sizes import estimated
@@ -63,6 +64,17 @@ class Weighting:
             if self.relative is not None:
                 working = working.changed(name, misfit=sizes.misfit)
         return working
+
+
+def pulling(working: Scatter, entries: Entries) -> Scatter:
+    """The working scatter with which values are found: a test's one rupture pulls as hard as its whole curve.
+
+    Frames that follow one another say the same thing many times; a rupture time says it once.
+    """
+    if RUPTURE not in working.outputs:
+        return working
+    frames = int((entries.present & ~entries.ruptures)[entries.whole].sum()) / int(entries.whole.sum())
+    return working.changed(RUPTURE, misfit=working[RUPTURE].misfit / float(np.sqrt(frames)))
 
 
 def _variances(weights: Mapping[str, float], entries: Entries) -> dict[str, float]:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import sympy
 
 from creepkit.kernels.exponentials import paired_everywhere
-from creepkit.kernels.logform import FLOOR, LogForm, log_form
+from creepkit.kernels.logform import FLOOR, log_form
 from creepkit.kernels.naming import Names
 from creepkit.kernels.stable_functions import Floored, LogFloor
 from creepkit.language.law import CreepLaw
@@ -47,49 +48,83 @@ class Entry:
         return set().union(*(e.free_symbols for e in expressions)) & set(self.inputs)
 
 
-@dataclass(frozen=True)
 class Lowered:
-    """A law as entries, ready for a printer; `form` is in the author's symbols, entries are in printable ones."""
+    """A law as entries, ready for a printer, each made when it is first asked for.
 
-    law: CreepLaw
-    form: LogForm
-    names: Names
-    rate: Entry
-    log_rate: Entry
-    update: Entry
-    sensitivity: Entry
-    log_sensitivity: Entry
+    form is in the author's symbols, entries are in printable ones; the layout of `update` and `sensitivity` is that of
+    kernels.interface.
+    """
+
+    def __init__(self, law: CreepLaw) -> None:
+        self.law, self.form = law, log_form(law)
+        self.names = Names(law, self.form)
+        self._terms = {symbol: sympy.exp(ln) for symbol, ln in zip(self.names.terms, self.form.terms, strict=True)}
+        self._log_rate, self._weights, self._shares = _log_sum(self.names, self.form.terms)
+        point = (*POINT, *law.states)
+        self._size, self._variables = len(point), (*point, *self.form.theta)
+
+    @cached_property
+    def rate(self) -> Entry:
+        """Rates: of creep, then of each state."""
+        return _entry("rate", self.names, self._terms, self._rates)
+
+    @cached_property
+    def log_rate(self) -> Entry:
+        """ln of the rate of creep, then rates of states."""
+        return _entry("log_rate", self.names, self._shares, self._log_rates)
+
+    @cached_property
+    def update(self) -> Entry:
+        """The same, then derivatives to the point and the states."""
+        outputs = [*self._log_rates, *self._along(self._weights, 0, self._size)]
+        return _entry("update", self.names, self._shares, outputs)
+
+    @cached_property
+    def sensitivity(self) -> Entry:
+        """Rates, their derivatives to the point and the states, then to theta."""
+        slopes = self._to_everything([*self._terms])
+        return _entry("sensitivity", self.names, self._terms, [*self._rates, *slopes])
+
+    @cached_property
+    def log_sensitivity(self) -> Entry:
+        """The same of ln of the rate."""
+        slopes = self._to_everything(self._weights)
+        return _entry("log_sensitivity", self.names, self._shares, [*self._log_rates, *slopes])
+
+    @property
+    def _rates(self) -> list[sympy.Expr]:
+        return [sympy.Add(*self._terms), *self.form.state_rates]
+
+    @property
+    def _log_rates(self) -> list[sympy.Expr]:
+        return [self._log_rate, *self.form.state_rates]
+
+    def _to_everything(self, weights: Sequence[sympy.Expr]) -> list[sympy.Expr]:
+        size = self._size
+        return [*self._along(weights, 0, size), *self._along(weights, size, len(self._variables))]
+
+    def _along(self, weights: Sequence[sympy.Expr], start: int, stop: int) -> list[sympy.Expr]:
+        """Derivatives to some variables, row by row: those of terms weighted and added, then those of states."""
+        rows = [[self._slope(term, k) for k in range(start, stop)] for term in self.form.terms]
+        first = [
+            sympy.Add(*(w * s for w, s in zip(weights, column, strict=True))) for column in zip(*rows, strict=True)
+        ]
+        return [*first, *(self._slope(rate, k) for rate in self.form.state_rates for k in range(start, stop))]
+
+    def _slope(self, expression: sympy.Expr, k: int) -> sympy.Expr:
+        found = self._slopes.get((expression, k))
+        if found is None:
+            found = self._slopes[expression, k] = paired_everywhere(sympy.diff(expression, self._variables[k]))
+        return found
+
+    @cached_property
+    def _slopes(self) -> dict[tuple[sympy.Expr, int], sympy.Expr]:
+        return {}
 
 
 def entries(law: CreepLaw) -> Lowered:
-    """Lower a law to its entries; the layout of `update` and `sensitivity` is that of kernels.interface."""
-    form = log_form(law)
-    names = Names(law, form)
-    point = (*POINT, *law.states)
-    size, variables = len(point), (*point, *form.theta)
-    slopes = [[paired_everywhere(sympy.diff(term, v)) for v in variables] for term in form.terms]
-    inner = [[paired_everywhere(sympy.diff(rate, v)) for v in variables] for rate in form.state_rates]
-
-    def along(weights: Sequence[sympy.Expr], start: int, stop: int) -> list[sympy.Expr]:
-        columns = range(start, stop)
-        first = [sympy.Add(*(w * row[k] for w, row in zip(weights, slopes, strict=True))) for k in columns]
-        return [*first, *(row[k] for row in inner for k in columns)]
-
-    terms = {symbol: sympy.exp(ln) for symbol, ln in zip(names.terms, form.terms, strict=True)}
-    log_rate, weights, shares = _log_sum(names, form.terms)
-    rates, log_rates = [sympy.Add(*terms), *form.state_rates], [log_rate, *form.state_rates]
-    to_point, to_theta = along([*terms], 0, size), along([*terms], size, len(variables))
-    ln_to_point, ln_to_theta = along(weights, 0, size), along(weights, size, len(variables))
-    return Lowered(
-        law,
-        form,
-        names,
-        rate=_entry("rate", names, terms, rates),
-        log_rate=_entry("log_rate", names, shares, log_rates),
-        update=_entry("update", names, shares, [*log_rates, *ln_to_point]),
-        sensitivity=_entry("sensitivity", names, terms, [*rates, *to_point, *to_theta]),
-        log_sensitivity=_entry("log_sensitivity", names, shares, [*log_rates, *ln_to_point, *ln_to_theta]),
-    )
+    """Lower a law to its entries; LawError, naming the term, where it holds what no kernel can evaluate."""
+    return Lowered(law)
 
 
 def _log_sum(names: Names, logs: Sequence[sympy.Expr]) -> tuple[sympy.Expr, list[sympy.Expr], Steps]:

@@ -93,7 +93,7 @@ def log_form(law: CreepLaw) -> LogForm:
         except LawError as error:
             raise LawError(f"law '{law.name}', term '{label}': {error}") from None
     positions = {symbol: k for k, symbol in enumerate(law.params) if symbol in logs}
-    coefficients = [sorted(positions[s] for s in coefficients_of(t) if s in logs) for t in law.terms.values()]
+    coefficients = [sorted(positions[s] for s in _coefficients(t) if s in logs) for t in law.terms.values()]
     return LogForm(
         terms=tuple(terms),
         state_rates=tuple(paired_everywhere(lowering.linear(state.rate)) for state in law.states.values()),
@@ -126,16 +126,16 @@ def _check(expression: sympy.Expr, where: str) -> None:
             raise LawError(f"{where}: the last branch of {node} must hold in all remaining cases: write (..., True)")
 
 
-def coefficients_of(term: sympy.Expr) -> set[sympy.Symbol]:
+def _coefficients(term: sympy.Expr) -> set[sympy.Symbol]:
     """The symbols whose zero makes the whole term zero."""
     if term.is_Symbol:
         return {term}
     if term.is_Mul:
-        return set().union(*map(coefficients_of, term.args))
+        return set().union(*map(_coefficients, term.args))
     if term.is_Pow and term.exp.is_positive:
-        return coefficients_of(term.base)
+        return _coefficients(term.base)
     if isinstance(term, sympy.Piecewise):
-        branches = [coefficients_of(branch) for branch, _ in term.args if branch != 0]
+        branches = [_coefficients(branch) for branch, _ in term.args if branch != 0]
         return set.intersection(*branches) if branches else set()
     return set()
 

@@ -3,9 +3,7 @@
 from creepkit.records.doors import Exporter, Reader
 from creepkit.records.history import EVERY_FRAME, ZERO_CELSIUS, History
 from creepkit.records.loading import (
-    COMPONENTS,
     Loading,
-    PointLoading,
     PressureJump,
     Program,
     RecordedLoading,
@@ -14,6 +12,7 @@ from creepkit.records.loading import (
     constant_strain,
     constant_stress,
 )
+from creepkit.records.point_loading import COMPONENTS, PointLoading
 from creepkit.records.prediction import (
     ABSOLUTE,
     EXPLICIT,

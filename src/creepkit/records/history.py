@@ -11,7 +11,8 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError
-from creepkit.records.loading import Loading, Program, in_words
+from creepkit.records.loading import Loading, Program
+from creepkit.records.point_loading import in_words
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
@@ -107,7 +108,7 @@ class History:
             raise HistoryError(f"{where}: it ruptured at {time:g} s and was stopped unruptured; keep one of them")
         if last > (1 + ROUNDING) * time:
             raise HistoryError(
-                f"{where}: a used frame at {last:g} s lies after the rupture at {time:g} s; correct one or mark the frame"
+                f"{where}: a used frame at {last:g} s lies after the rupture at {time:g} s; mark it unused"
             )
         object.__setattr__(self, "rupture_time", time)
 
@@ -117,9 +118,12 @@ class History:
         return self.rupture_time is not None or self.unruptured
 
     def replace(self, **changes: Any) -> History:
-        """The same history with some fields changed; new times are all used unless `used` is given too."""
+        """The same history with some fields changed.
+
+        New times are all used, and say nothing of how the test ended, unless that is given too.
+        """
         if "times" in changes:
-            changes = {"used": EVERY_FRAME, **changes}
+            changes = {"used": EVERY_FRAME, "rupture_time": None, "unruptured": False, **changes}
         return replace(self, **changes)
 
     def __reduce__(self) -> tuple[Any, ...]:

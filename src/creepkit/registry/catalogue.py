@@ -7,6 +7,7 @@ only `load_file`, where somebody asked for that very plugin, raises.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -98,6 +99,14 @@ class Registry:
         """Return the law called `name`; LawError with the nearest name when there is none."""
         law: CreepLaw = self._one(kinds.LAW, name)
         return law
+
+    def origin(self, law: CreepLaw) -> str:
+        """Return the distributions, with versions, of the laws that a law's name tells it was made of.
+
+        'creepkit-damage 0.1.0' of 'kachanov-rabotnov*arrhenius'; empty when nobody offers them.
+        """
+        parts = set(re.split(r"[^a-z0-9-]+", law.name))
+        return ", ".join(sorted({one.provenance.origin for name, one in self.laws().items() if name in parts}))
 
     def specimen(self, name: str) -> Specimen:
         """Return the specimen called `name`; SolveError with the nearest name when there is none."""

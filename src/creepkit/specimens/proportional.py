@@ -1,12 +1,14 @@
-"""Stress programmes whose deviator keeps its direction: the tensor problem is then a scalar one, with exact slopes.
+"""Loadings under which stress and creep keep their direction: the problem is then a scalar one, with exact slopes.
 
-With the stress s(t) = g(t) D + mean(t) 1, g not negative and the mean a straight line in g, the equivalent stress is
-q = g q(D), largest principal and mean stress are straight lines in q, and creep flows along D for ever.
+Under stresses s(t) = g(t) D + mean(t) 1, g not negative and the mean a straight line in g, the equivalent stress is
+q = g q(D), largest principal and mean stress are straight lines in q, and creep flows along D for ever. One strain
+that is held or grows, nothing else prescribed, leaves one stress, with q = k (strain's share - p): relaxation, with
+k = E for a normal component and 3G for a shear.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,10 +16,7 @@ from creepkit.arrays import Floats
 from creepkit.integration.problem import Axes
 from creepkit.integration.segments import segments_of
 from creepkit.integration.tensor_point import trial_of
-from creepkit.records import COMPONENTS, Program
-
-if TYPE_CHECKING:
-    from creepkit.records import PointLoading
+from creepkit.records import COMPONENTS, PointLoading, Program
 
 _ALIKE = 1e-9
 """Of the largest stress: what differs by less is the same direction."""
@@ -26,22 +25,25 @@ _UNIT = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
 class Proportional(NamedTuple):
-    """driving : von Mises stress over time, MPa; axes : of the scalar problem; flow : (6,) d(creep)/d(equivalent)."""
+    """A scalar problem.
+
+    driving : von Mises stress if nothing crept, over time, MPa; stiffness : k, MPa; axes : of the scalar problem.
+    flow : (6,) d(creep strain)/d(equivalent); along : (6,) stress by von Mises stress, where a strain is prescribed.
+    """
 
     driving: Program
+    stiffness: float
     axes: Axes
     flow: Floats
+    along: Floats
 
 
-def proportional(loading: PointLoading, end: float) -> Proportional | None:
-    """The scalar problem of a loading by stresses alone up to `end`, s; None where there is none."""
+def proportional(loading: PointLoading, end: float, elastic: tuple[float, float] | None = None) -> Proportional | None:
+    """The scalar problem of a loading up to `end`, s; None where there is none. elastic : E, MPa, and nu."""
     if loading.strain:
-        return None
+        return None if elastic is None else _held(loading, elastic)
     programs = [loading.stress.get(name, Program.constant(0.0)) for name in COMPONENTS]
-    rows = segments_of(*programs, end=end)
-    times = rows[:, :2].reshape(-1) if len(rows) else np.zeros(1)
-    at_ends = np.stack([rows[:, 2::2], rows[:, 3::2]], axis=1).reshape(-1, 6)
-    stresses = at_ends if len(rows) else np.array([[float(p.at(0.0)) for p in programs]])
+    times, stresses = _ends(programs, end)
     means = stresses[:, :3].mean(axis=1)
     deviators = stresses - means[:, None] * _UNIT
     size, room = np.sqrt(1.5 * (deviators**2 @ _TWICE)), _ALIKE * max(float(np.abs(stresses).max()), 1e-300)
@@ -50,9 +52,34 @@ def proportional(loading: PointLoading, end: float) -> Proportional | None:
     line = _line(level, means, room)
     if line is None or np.abs(deviators - level[:, None] * along).max() > room or level.min() < -room:
         return None
-    axes = trial_of(along).axes
-    lines = Axes(line[0], axes.principal_slope + line[1], line[0], line[1])
-    return Proportional(Program(times, np.maximum(level, 0.0)), lines, 1.5 * along)
+    offset, slope = line
+    axes = Axes(offset, trial_of(along).axes.principal_slope + slope, offset, slope)
+    return Proportional(Program(times, np.maximum(level, 0.0)), 0.0, axes, 1.5 * along, np.zeros(6))
+
+
+def _held(loading: PointLoading, elastic: tuple[float, float]) -> Proportional | None:
+    """One strain that never falls, and no stress but its own."""
+    if loading.stress or len(loading.strain) > 1:
+        return None
+    ((name, strain),) = loading.strain.items()
+    if (np.diff(strain.values) < 0.0).any() or strain.values[0] < 0.0:
+        return None
+    (E, nu), shear = elastic, name[0] != name[1]
+    along = np.where(np.arange(6) == COMPONENTS.index(name), 1.0 / np.sqrt(3.0) if shear else 1.0, 0.0)
+    stiffness = 1.5 * E / (1.0 + nu) if shear else E
+    driving = stiffness * strain.values * (2.0 / np.sqrt(3.0) if shear else 1.0)
+    trial = trial_of(along)
+    axes = Axes(0.0, trial.axes.principal_slope + trial.mean, 0.0, trial.mean)
+    return Proportional(Program(strain.times, driving), stiffness, axes, 1.5 * trial.s, along)
+
+
+def _ends(programs: list[Program], end: float) -> tuple[Floats, Floats]:
+    """Times and values (times, programs) at both ends of every segment."""
+    rows = segments_of(*programs, end=end)
+    if not len(rows):
+        return np.zeros(1), np.array([[float(p.at(0.0)) for p in programs]])
+    values = np.stack([rows[:, 2::2], rows[:, 3::2]], axis=1)
+    return rows[:, :2].reshape(-1), values.reshape(-1, len(programs))
 
 
 def _line(x: Floats, y: Floats, room: float) -> tuple[float, float] | None:

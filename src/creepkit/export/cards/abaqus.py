@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from creepkit.errors import ExportError
 from creepkit.export.cards.forms import Form, forms_of
-from creepkit.export.cards.text import figure, moduli, number, top
+from creepkit.export.cards.text import figure, grid, moduli, number, top
 from creepkit.export.identifiers import Identifiers
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import ValuedLaw
@@ -49,8 +49,8 @@ class AbaqusCards:
         names = Identifiers((), ignore_case=True, longest=80)
         wanted = source.name or source.law.name
         label = names.name(wanted)
-        rows = moduli(source, _grid(self.low, self.high, 25.0))
-        elastic = [_data(m.E, m.nu, *([m.T] if len(rows) > 1 else [])) for m in rows]
+        rows = moduli(source, grid(self.low, self.high, 25.0))
+        elastic = [_data(m.E, m.nu, *_listed(m.T)) for m in rows]
         cards = [f"*MATERIAL, NAME={label}", *(["*ELASTIC", *elastic] if elastic else []), *creep.cards]
         about = [*names.told([wanted]), *creep.about]
         return "\n".join([*top(source, "**", about), *cards]) + "\n"
@@ -80,7 +80,7 @@ class AbaqusCards:
         if not form.Q:
             return notation.creep(source, [(form.log_coefficient, None)])
         step = _spacing(form, self.low)
-        rows = [(form.at(T), T) for T in _grid(self.low, self.high, step)]
+        rows = [(form.at(T), T) for T in grid(self.low, self.high, step)]
         told = _TABLE.format(low=self.low, high=self.high, step=step, tolerance=_INTERPOLATION)
         return notation.creep(source, rows, told)
 
@@ -192,13 +192,12 @@ def _hyperbolic(source: ValuedLaw, form: Form) -> _Creep:
 
 
 def _spacing(form: Form, low: float) -> float:
-    """The largest step, in K, over which linear interpolation of exp(-Q/(R T)) is good enough."""
-    return next((step for step in _STEPS if (form.per_kelvin / low**2 * step) ** 2 / 8.0 <= _INTERPOLATION), _STEPS[-1])
+    """The largest step, in K, over which linear interpolation of a rate ~ exp(-Q/(R T)) is good enough.
 
-
-def _grid(low: float, high: float, step: float) -> list[float]:
-    """From low in steps, and high."""
-    return [*(low + step * k for k in range(math.ceil((high - low) / step - 1e-9))), high]
+    The error is k^2 step^2/8 with k = Q/(R T^2); where e0 ~ rate^(1/(1+m)) is interpolated, it is 1/(1+m) times that.
+    """
+    curvature = (form.per_kelvin / low**2) ** 2 / (1.0 + form.time)
+    return next((step for step in _STEPS if curvature * step**2 / 8.0 <= _INTERPOLATION), _STEPS[-1])
 
 
 def _listed(T: float | None) -> list[float]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from creepkit.errors import ExportError
 from creepkit.export.cards.forms import Form, forms_of
-from creepkit.export.cards.text import Moduli, figure, moduli, number, top
+from creepkit.export.cards.text import Moduli, figure, grid, moduli, number, top
 from creepkit.records import ValuedLaw
 
 _INSTEAD = "export it as 'c' or 'abaqus', and call that rate in a USERCREEP subroutine"
@@ -41,15 +41,13 @@ class AnsysCards:
         """Return MP commands where moduli are given, TB,CREEP and TBDATA, of the material number 1."""
         forms = forms_of(source, "Ansys' TB,CREEP", _INSTEAD)
         option, constants = _constants(source, forms)
-        count = max(2, round((self.high - self.low) / 50.0) + 1)
-        grid = [self.low + (self.high - self.low) * k / (count - 1) for k in range(count)]
         about = [f"Implicit creep, TBOPT = {option}: {_LAWS[option]}."]
         if any(form.Q for form in forms):
             about.append("T is absolute: in a model in C, write TOFFST,273.15.")
         if any(form.time for form in forms):
             about.append("t is the analysis time, which must start with the load.")
         about.append(f"Material number 1 is {source.name or source.law.name}.")
-        lines = [*_elastic(moduli(source, grid))]
+        lines = [*_elastic(moduli(source, grid(self.low, self.high, 50.0)))]
         lines += [f"TB,CREEP,1,1,{len(constants)},{option}"]
         lines += [f"TBDATA,{k + 1},{_listed(constants[k : k + 6])}" for k in range(0, len(constants), 6)]
         return "\n".join([*top(source, "!", about), *lines]) + "\n"
@@ -103,17 +101,16 @@ def _graham(source: ValuedLaw, forms: Sequence[Form]) -> tuple[int, list[float]]
 
 
 def _elastic(rows: Sequence[Moduli]) -> Iterator[str]:
-    if len(rows) == 1:
-        yield f"MP,EX,1,{figure(rows[0].E)}"
-        yield f"MP,PRXY,1,{figure(rows[0].nu)}"
-    elif rows:
+    """Young's modulus and Poisson's ratio, six temperatures a command where they depend on it."""
+    warmth = [m.T for m in rows if m.T is not None]
+    labels = {"EX": [m.E for m in rows], "PRXY": [m.nu for m in rows]}
+    if warmth:
         yield "MPTEMP"
-        for k in range(0, len(rows), 6):
-            yield f"MPTEMP,{k + 1},{_listed([m.T for m in rows[k : k + 6]])}"
-        for k in range(0, len(rows), 6):
-            yield f"MPDATA,EX,1,{k + 1},{_listed([m.E for m in rows[k : k + 6]])}"
-        for k in range(0, len(rows), 6):
-            yield f"MPDATA,PRXY,1,{k + 1},{_listed([m.nu for m in rows[k : k + 6]])}"
+        yield from (f"MPTEMP,{k + 1},{_listed(warmth[k : k + 6])}" for k in range(0, len(rows), 6))
+        for label, values in labels.items():
+            yield from (f"MPDATA,{label},1,{k + 1},{_listed(values[k : k + 6])}" for k in range(0, len(rows), 6))
+    elif rows:
+        yield from (f"MP,{label},1,{figure(value)}" for label, (value,) in labels.items())
 
 
 def _listed(values: Sequence[float]) -> str:

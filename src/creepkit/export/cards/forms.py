@@ -17,8 +17,14 @@ from creepkit.language.symbols import GAS_CONSTANT, strain, stress, temperature,
 from creepkit.records import Units, ValuedLaw
 
 _PER_T = sympy.Symbol("per_T", positive=True)
+_ONE, _PER_K, _STRESS = (0, 0), (1, 0), (0, 1)
+"""Monomials of 1/T and stress, as sympy writes them."""
+
 _DIGITS = 30
 """Digits of values while products are taken apart, so that none of a double's are lost."""
+
+
+Shape = Literal["power", "sinh", "exponential"]
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,7 @@ class Form:
     """
 
     label: str
-    shape: Literal["power", "sinh", "exponential"]
+    shape: Shape
     log_coefficient: float
     n: float
     B: float
@@ -93,12 +99,13 @@ class _NotAForm(Exception):
 
 @dataclass
 class _Factors:
-    """What the factors of a product amount to, so far."""
+    """What the factors of a product amount to, so far.
 
-    log_number: float = 0.0
+    powers : of stress, strain and time. exponent : of e, coefficients of 1, of 1/T and of stress. sinh : (1/B, power).
+    """
+
     powers: dict[sympy.Symbol, float] = field(default_factory=lambda: dict.fromkeys((stress, strain, time), 0.0))
-    per_T: float = 0.0
-    per_stress: float = 0.0
+    exponent: dict[tuple[int, int], float] = field(default_factory=lambda: dict.fromkeys((_ONE, _PER_K, _STRESS), 0.0))
     sinh: list[tuple[float, float]] = field(default_factory=list)
 
     def take(self, e: sympy.Expr, power: float) -> None:
@@ -107,7 +114,7 @@ class _Factors:
             for factor in e.args:
                 self.take(factor, power)
         elif not e.free_symbols:
-            self.log_number += power * _log_of(e)
+            self.exponent[_ONE] += power * _log_of(e)
         elif e in self.powers:
             self.powers[e] += power
         elif isinstance(e, sympy.Abs) and e.args[0] == stress:
@@ -129,10 +136,9 @@ class _Factors:
         if line is None:
             raise _NotAForm(_why(sympy.exp(exponent)))
         for powers, coefficient in line.terms():
-            if coefficient.free_symbols or sum(powers) > 1:
+            if coefficient.free_symbols or powers not in self.exponent:
                 raise _NotAForm(_why(sympy.exp(exponent)))
-            name = {(0, 0): "log_number", (1, 0): "per_T", (0, 1): "per_stress"}[powers]
-            setattr(self, name, getattr(self, name) + power * float(coefficient))
+            self.exponent[powers] += power * float(coefficient)
 
 
 def _form(label: str, product: sympy.Expr) -> Form:
@@ -140,17 +146,16 @@ def _form(label: str, product: sympy.Expr) -> Form:
     factors = _Factors()
     factors.take(product, 1.0)
     n, strain_power, time_power = (factors.powers[s] for s in (stress, strain, time))
-    kinds = [n != 0, bool(factors.sinh), factors.per_stress != 0]
+    log_number, per_T, per_stress = factors.exponent.values()
+    kinds = [n != 0, bool(factors.sinh), per_stress != 0]
     if sum(kinds) > 1 or len(factors.sinh) > 1:
         raise _NotAForm(f"stress enters {_shown(product)} in several ways at once")
-    B, shape = math.inf, "power"
+    shape: Shape = "sinh" if factors.sinh else "exponential" if per_stress else "power"
     if factors.sinh:
-        shape, ((slope, n),) = "sinh", factors.sinh
-        B = 1.0 / slope
-    elif factors.per_stress:
-        shape, B = "exponential", 1.0 / factors.per_stress
-    Q = -factors.per_T * GAS_CONSTANT if factors.per_T else 0.0
-    return Form(label, shape, factors.log_number, n, B, strain_power, time_power, Q)  # type: ignore[arg-type]
+        ((per_stress, n),) = factors.sinh
+    B = 1.0 / per_stress if per_stress else math.inf
+    Q = -per_T * GAS_CONSTANT if per_T else 0.0
+    return Form(label, shape, log_number, n, B, strain_power, time_power, Q)
 
 
 def _log_of(number: sympy.Expr) -> float:
@@ -169,10 +174,11 @@ def _slope(argument: sympy.Expr) -> float:
 
 
 def _why(factor: sympy.Expr) -> str:
-    """What a factor is that no form has."""
+    """What a factor is that no form has, and what may help."""
+    remedy = " (constants at one temperature may do: export(..., temperature=1073))" if factor.has(temperature) else ""
     if factor.is_Pow and not factor.base.is_Add:
-        return f"as the exponent {_shown(factor.exp)} of {factor.base} is not a number"
-    return f"which holds {_shown(factor)}"
+        return f"as the exponent {_shown(factor.exp)} of {factor.base} is not a number{remedy}"
+    return f"which holds {_shown(factor)}{remedy}"
 
 
 def _shown(expression: sympy.Expr) -> str:

@@ -11,7 +11,7 @@ import sympy
 from creepkit.errors import ExportError
 from creepkit.export.conversion import reference_of
 from creepkit.export.heading import comments, heading
-from creepkit.language.symbols import temperature
+from creepkit.language.elastic import Elastic
 from creepkit.records import ValuedLaw
 
 _WIDTH = 110
@@ -39,11 +39,16 @@ def figure(value: float) -> str:
     return f"{value:.13g}"
 
 
+def grid(low: float, high: float, step: float) -> list[float]:
+    """From low in steps to high, and high itself."""
+    return [*(low + step * k for k in range(math.ceil((high - low) / step - 1e-9))), high]
+
+
 @dataclass(frozen=True)
 class Moduli:
-    """Young's modulus in the unit of stress of the text, and Poisson's ratio, at a temperature in K."""
+    """Young's modulus in the text's unit of stress, and Poisson's ratio; T in K, None where it does not matter."""
 
-    T: float
+    T: float | None
     E: float
     nu: float
 
@@ -51,17 +56,20 @@ class Moduli:
 def moduli(source: ValuedLaw, temperatures: Sequence[float] = ()) -> list[Moduli]:
     """The moduli at each temperature, or once where they do not depend on it; none where they are not given.
 
-    temperatures : of a table; ExportError where one is needed and these are none.
+    temperatures : of a table; ExportError where one is needed and there are none.
     """
     elastic = source.elastic
     if elastic is None:
         return []
-    if not any(isinstance(v, sympy.Expr) and v.has(temperature) for v in (elastic.E, elastic.nu)):
-        temperatures = (0.0,)
+    if not any(isinstance(value, sympy.Expr) and value.free_symbols for value in (elastic.E, elastic.nu)):
+        return [_moduli(source, elastic, None)]
     if not temperatures:
         raise ExportError(
             f"law '{source.law.name}': the elastic moduli depend on temperature, and this text takes numbers; "
             "give elastic.at(1073)"
         )
-    at = ((T, elastic.at(T or 1.0)) for T in temperatures)
-    return [Moduli(T, float(e.E) / source.units.megapascals, float(e.nu)) for T, e in at]
+    return [_moduli(source, elastic.at(T), T) for T in temperatures]
+
+
+def _moduli(source: ValuedLaw, elastic: Elastic, T: float | None) -> Moduli:
+    return Moduli(T, float(elastic.E) / source.units.megapascals, float(elastic.nu))

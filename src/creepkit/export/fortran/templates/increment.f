@@ -4,10 +4,10 @@
 ! midpoint rule in the clock s = t**beta, in which creep begins as
 ! a straight line, so t = 0 and zero strain are no singularities.
 ! The strain at the end is solved for here (Newton in ln of the
-! increment); where that fails the increment is halved, and halved
-! again. The very first increment, in which a sum of terms is smooth
-! in no clock, is taken in 16 steps. Derivatives are those of the converged update, by the
-! implicit function theorem.
+! increment); where that fails the step is halved, and halved again.
+! The very first increment, in which a sum of terms is smooth in no
+! clock, is taken in 16 steps. Derivatives are those of the
+! converged update, by the implicit function theorem.
 !   y     creep strain gained (0 at the start), internal variables
 !   slope derivatives of y at the end: to the stress (MPa), and to
 !         the mean stress (MPa)
@@ -15,72 +15,62 @@
       subroutine ${id}_increment(start, finish, warm, stress, mean,
      &    strain, y, slope)
         implicit none
-        integer, parameter :: ny = $ny, most = 4096
+        integer, parameter :: ny = $ny
         double precision, intent(in) :: start, finish, warm(2)
         double precision, intent(in) :: stress, mean, strain
         double precision, intent(inout) :: y(ny)
         double precision, intent(out) :: slope(ny, 2)
         double precision, parameter :: beta = $beta
-        double precision first(ny), low, high, tail, point(6)
-        integer part, parts
+        double precision low, high, place, most, size, point(6)
         logical solved
-        first = y
         low = max(start, 0.0d0)**beta
         high = max(finish, 0.0d0)**beta
         point = (/ start, finish - start, warm(1), warm(2), beta,
      &      strain /)
-        parts = 1
-        if (.not. low > 0.0d0) parts = 16
+        slope = 0.0d0
+        most = high - low
+        if (.not. low > 0.0d0) most = most/16
+        place = low
+        size = most
         do
-          y = first
-          slope = 0.0d0
-          do part = 1, parts
-            tail = (high - low)/parts
-            call ${id}_step(low + (part - 1)*tail, tail, point, stress,
-     &          mean, parts >= most, y, slope, solved)
-            if (.not. solved) exit
-          enddo
-          if (solved) exit
-          parts = 2*parts
+          size = min(size, high - place)
+          if (.not. size > 1.0d-12*high) return
+          call ${id}_step(place, size, point, stress, mean, y, slope,
+     &        solved)
+          if (solved) then
+            place = place + size
+            size = min(2*size, most)
+          elseif (size > (high - low)/4096) then
+            size = 0.5d0*size
+          else
+            call ${id}_rupture(place, high - place, point, stress,
+     &          mean, y, slope)
+            return
+          endif
         enddo
       end subroutine ${id}_increment
 !
-! One step of the clock, from s to s + ds. The last resort, when
-! even the smallest step has no solution (rupture), holds states at
-! their limits and lets the strain grow by no more than 1.
+! One step of the clock, from s to s + ds; y and slope stay as they
+! are where it has no solution.
 !
-      subroutine ${id}_step(s, ds, point, stress, mean, last, y,
-     &    slope, solved)
+      subroutine ${id}_step(s, ds, point, stress, mean, y, slope,
+     &    solved)
         implicit none
         integer, parameter :: ny = $ny, nx = $nx
         double precision, intent(in) :: s, ds, point(6), stress, mean
-        logical, intent(in) :: last
         double precision, intent(inout) :: y(ny), slope(ny, 2)
         logical, intent(out) :: solved
         double precision x(nx), out(ny*(1 + nx)), a(ny, ny)
-        double precision r(ny, 3), z(ny), grown, h, middle, time, lnh
-        double precision ends(ny)
-        integer i, pass
-        solved = .true.
-        middle = s + 0.5d0*ds
-        if (.not. ds > 0.0d0) return
-        time = middle**(1.0d0/point(5))
-        h = ds*time/(point(5)*middle)
-        lnh = log(h)
-        x(1) = stress
-        x(3) = time
-        x(4) = point(3)
-        if (point(2) > 0.0d0) x(4) = point(3) + (point(4) - point(3))*
-     &      (time - point(1))/point(2)
-        x(5) = stress
-        x(6) = mean
+        double precision r(ny, 3), z(ny), grown, h
+        integer pass
+        call ${id}_place(s, ds, point, stress, mean, x, h)
         z = y
         call ${id}_look(x, point(6), y, z, 0.0d0, out)
-        z(1) = min(max(lnh + out(1), -690.0d0), 50.0d0)
+        z(1) = min(max(log(h) + out(1), -690.0d0), 50.0d0)
         do pass = 1, 40
           grown = exp(z(1))
           call ${id}_look(x, point(6), y, z, grown, out)
-          call ${id}_equations(x, y, z, grown, h, lnh, out, slope, a, r)
+          call ${id}_equations(y, z, grown, h, out, slope, a, r)
           call ${id}_solve(a, r)
           z = z + r(:, 1)
           z(1) = min(max(z(1), -700.0d0), 50.0d0)
@@ -88,30 +78,59 @@
           if (maxval(abs(r(:, 1))/(1.0d-3 + abs(z))) < 1.0d-11) exit
         enddo
         solved = maxval(abs(r(:, 1))/(1.0d-3 + abs(z))) < 1.0d-8
-        solved = solved .and. z(1) < 2.0d0
-        if (solved) then
-          grown = exp(z(1))
-          slope(1, :) = slope(1, :) + grown*r(1, 2:3)
-          y(1) = y(1) + grown
-          slope(2:, :) = r(2:, 2:3)
-          y(2:) = z(2:)
-          call ${id}_hold(y, slope)
-        elseif (last) then
-          call ${id}_limits(ends)
-          z = y
-          do i = 2, ny
-            if (abs(ends(i)) < 1.0d300) y(i) = ends(i)
-          enddo
-          z(2:) = y(2:)
-          call ${id}_look(x, point(6), y, z, 0.0d0, out)
-          grown = exp(min(lnh + out(1), 0.0d0))
-          slope = 0.0d0
-          slope(1, 1) = grown*out(2)
-          slope(1, 2) = grown*out(7)
-          y(1) = y(1) + grown
-          solved = .true.
-        endif
+        solved = solved .and. z(1) < 0.0d0
+        if (.not. solved) return
+        grown = exp(z(1))
+        slope(1, :) = slope(1, :) + grown*r(1, 2:3)
+        y(1) = y(1) + grown
+        slope(2:, :) = r(2:, 2:3)
+        y(2:) = z(2:)
+        call ${id}_hold(y, slope)
       end subroutine ${id}_step
+!
+! The middle of a step of the clock: point x of the law, and the
+! time h that the step amounts to at the rate there.
+!
+      subroutine ${id}_place(s, ds, point, stress, mean, x, h)
+        implicit none
+        double precision, intent(in) :: s, ds, point(6), stress, mean
+        double precision, intent(out) :: x($nx), h
+        double precision middle, time
+        middle = s + 0.5d0*ds
+        time = middle**(1.0d0/point(5))
+        h = ds*time/(point(5)*middle)
+        x = 0.0d0
+        x(1) = stress
+        x(3) = time
+        x(4) = point(3)
+        if (point(2) > 0.0d0) x(4) = point(3) + (point(4) - point(3))*
+     &      (time - point(1))/point(2)
+        x(5) = stress
+        x(6) = mean
+      end subroutine ${id}_place
+!
+! The last resort, when even the smallest step has no solution: the
+! material ruptures. States go to their limits, and the strain grows
+! at the rate there, by no more than 1.
+!
+      subroutine ${id}_rupture(s, ds, point, stress, mean, y, slope)
+        implicit none
+        integer, parameter :: ny = $ny, nx = $nx
+        double precision, intent(in) :: s, ds, point(6), stress, mean
+        double precision, intent(inout) :: y(ny), slope(ny, 2)
+        double precision x(nx), out(ny*(1 + nx)), grown, h, ends(ny)
+        integer i
+        call ${id}_place(s, ds, point, stress, mean, x, h)
+        call ${id}_limits(ends)
+        do i = 2, ny
+          if (abs(ends(i)) < 1.0d300) y(i) = ends(i)
+        enddo
+        call ${id}_look(x, point(6), y, y, 0.0d0, out)
+        grown = exp(min(log(h) + out(1), 0.0d0))
+        y(1) = y(1) + grown
+        slope = 0.0d0
+        slope(1, :) = grown*(/ out(1 + ny), out(6 + ny) /)
+      end subroutine ${id}_rupture
 !
 ! The law halfway between y and its end (y + grown, z); a state at
 ! its limit stays there.
@@ -134,17 +153,16 @@
 ! Newton's equations: a times the change of (ln of the increment,
 ! states) is r(:, 1); r(:, 2:3) are what stress and mean stress do.
 !
-      subroutine ${id}_equations(x, y, z, grown, h, lnh, out, slope,
-     &    a, r)
+      subroutine ${id}_equations(y, z, grown, h, out, slope, a, r)
         implicit none
         integer, parameter :: ny = $ny, nx = $nx
-        double precision, intent(in) :: x(nx), y(ny), z(ny), grown
-        double precision, intent(in) :: h, lnh, out(ny*(1 + nx))
-        double precision, intent(in) :: slope(ny, 2)
+        double precision, intent(in) :: y(ny), z(ny), grown, h
+        double precision, intent(in) :: out(ny*(1 + nx)), slope(ny, 2)
         double precision, intent(out) :: a(ny, ny), r(ny, 3)
-        double precision g(ny), d(ny, nx), ends(ny), size
+        double precision g(ny), d(ny, nx), ends(ny), size, lnh
         integer i, j
         call ${id}_limits(ends)
+        lnh = log(h)
         g = out(1:ny)
         do i = 1, ny
           d(i, :) = out(ny + (i - 1)*nx + 1:ny + i*nx)

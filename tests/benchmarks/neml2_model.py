@@ -1,0 +1,58 @@
+"""Exported NEML2 models, read by NEML2 itself: its creep rate against the law's, as a table.
+
+Not among the project's dependencies; beside its environment (torch 2.10 or later), in a folder of its own:
+
+    pip install --no-deps --target FOLDER neml2==3.1.0 pyzag==2.0.0 nmhit
+    PYTHONPATH=FOLDER python tests/benchmarks/neml2_model.py
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
+
+import torch
+from card_cases import CASES, HAS, STEEL
+from neml2 import SR2, Model, Scalar
+from neml2.factory import load_model
+
+from creepkit.export.cards.neml2 import Neml2Model
+from creepkit.kernels import lower
+from creepkit.records import ValuedLaw
+
+STEP = 10.0
+"""s, of the backward Euler step whose residual is asked for."""
+
+
+def neml2_rate(model: Model, stress: float, temperature: float) -> float:
+    """The rate of creep strain, 1/s, from the residual of a step at constant strain: 2 G rate STEP, uniaxially."""
+    still, pulled = (SR2.fill(s, 0.0, 0.0, 0.0, 0.0, 0.0) for s in (0.0, stress))
+    inputs = {"stress": pulled, "stress~1": pulled, "E": still, "E~1": still}
+    inputs |= {k: Scalar(torch.tensor(v)) for k, v in {"t": STEP, "t~1": 0.0, "temperature": temperature}.items()}
+    (residual,) = model(*(inputs[name] for name in model.input_spec))
+    return float(residual.data.detach()[..., 0]) / (STEP * STEEL.E / (1 + STEEL.nu))
+
+
+def worst(source: ValuedLaw) -> float:
+    """The largest relative difference over stresses and temperatures."""
+    kernel = lower(source.law, "numpy")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.i"
+        path.write_text(Neml2Model().text(source.replace(elastic=STEEL)))
+        model = load_model(str(path), "implicit_rate")
+        points = [(s, T) for s in (20.0, 80.0, 200.0) for T in (950.0, 1073.15, 1200.0)]
+        pairs = [(neml2_rate(model, s, T), kernel.rate(source.values, stress=s, temperature=T)) for s, T in points]
+    return max(abs(found / float(own) - 1) for found, own in pairs)
+
+
+def main() -> None:
+    """Print one line a case."""
+    torch.set_default_dtype(torch.float64)
+    print(f"{'law':40} largest relative difference of the rate")
+    for case in sorted(HAS["neml2"]):
+        print(f"{case:40} {worst(CASES[case]):.1e}")
+
+
+if __name__ == "__main__":
+    main()
