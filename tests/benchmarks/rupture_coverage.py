@@ -16,7 +16,7 @@ import creepkit as ck
 from creepkit.records import History, constant_stress
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
-from test_inverse_rupture import BAR, OMEGA, SCATTER, campaign  # noqa: E402
+from test_inverse_rupture import BAR, OMEGA, SCATTER, campaign
 
 VALUES = {"A": 1e-16, "n": 4.0, "m": 20.0}
 STRESSES = (60, 70, 80, 95, 110, 60, 80, 110)

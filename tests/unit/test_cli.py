@@ -314,6 +314,11 @@ def test_a_point_is_loaded_by_components() -> None:
         ),
         ((*NORTON, "--specimen", "point"), "a material point needs a component: give --stress 11=100"),
         ((*NORTON, "--specimen", "point", "--stress", "80"), "--stress 80: name the component of a material point"),
+        ((*NORTON, "--stress", "11=80"), "11=80 names a component, which --specimen uniaxial has not; give --specimen"),
+        (
+            (*NORTON, "--stress", "80", "--temperature-c", "1800:500"),
+            "--temperature-c 1800:500: nothing is said of the time before; give the first one from 0 s on",
+        ),
         (
             (*NORTON, "--specimen", "point", "--stress", "21=80"),
             "no component '21' to load; allowed are 11, 22, 33, 12, 23, 13",

@@ -11,12 +11,16 @@ from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.coordinates import Coordinates, Reference
 from creepkit.inverse.effects import Unknowns
 from creepkit.inverse.entries import Entries
+from creepkit.inverse.life import predict_life
 from creepkit.inverse.objective import Objective
 from creepkit.inverse.scales import RUPTURE
 from creepkit.inverse.settings import Settings
+from creepkit.inverse.together import Together
 from creepkit.inverse.validation import leave_one_condition_out, times_to_rupture
+from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
-from creepkit.records import History, Nuisance, constant_stress
+from creepkit.records import History, Nuisance, constant_strain, constant_stress
+from creepkit.specimens.relaxation import Relaxation
 from creepkit.specimens.uniaxial import Uniaxial
 
 BAR = Uniaxial()
@@ -169,6 +173,26 @@ def test_a_coordinate_is_the_log_of_the_rate_of_damage():
     step = 1e-6 * np.eye(5)
     slopes = [(coordinates.theta(u + h) - coordinates.theta(u - h)) / 2e-6 for h in step]
     np.testing.assert_allclose(coordinates.jacobian(u), np.transpose(slopes), atol=1e-6)
+
+
+def test_bars_are_followed_to_rupture_beside_tests_that_are_not():
+    law, values = PLANTED["Kachanov-Rabotnov"]
+    bars = campaign(law, values, [60, 80], 1)
+    held = History(
+        "held", np.array([10.0, 1e6]), {"stress": [100.0, 90.0]}, constant_strain(0.001), 1000.0, "relaxation",
+        Elastic(E=150e3), rupture_time=2e6,
+    )  # fmt: skip
+    both = Together({"uniaxial": BAR, "relaxation": Relaxation()})
+    given = {name: np.array([value]) for name, value in values.items()}
+    found = predict_life(both, law, given, [bars[0], held, bars[1]], jacobian=True).life
+    alone = BAR.predict_life(law, given, bars, jacobian=True).life
+    np.testing.assert_array_equal(found.ruptures[0, [0, 2]], alone.ruptures[0])
+    for name in ("arrivals", "slopes", "arrival_jacobian"):
+        joined, own = (getattr(life, name)[0] for life in (found, alone))
+        np.testing.assert_array_equal(joined[[0, 2], : own.shape[1]], own)
+    assert np.isnan(found.ruptures[0, 1])
+    entries = Entries.of([bars[0], held, bars[1]], both)
+    assert entries.whole.tolist() == [True, False, True]
 
 
 def test_how_a_test_ended_survives_pickling():

@@ -239,6 +239,16 @@ def test_programmes_are_taken_as_they_are():
     assert found["strain"][0] == pytest.approx(1e-14 * 80.0**4 * 100 / 5, rel=1e-7)
 
 
+def test_frames_and_rows_of_programmes_do_not_use_up_the_steps():
+    """Every frame ends a step of a stress that turns: the cap is on what the law needs beside them."""
+    turning = PointLoading(stress={"11": 60.0, "12": [(0.0, 0.0), (5e3, 35.0)]})
+    test = plan(turning, times=np.linspace(0.0, 1e4, 101))
+    found = Point(max_steps=10).predict(NORTON, VALUES, [test])
+    assert found.status[0, 0] == Status.COMPLETE
+    later = (60.0**2 + 3 * 35.0**2) ** 2
+    assert found.of(0)[-1, 0] == pytest.approx(1e-14 * 5e3 * (60.0**4 + later), rel=1e-4)
+
+
 def measured(loading, outputs, rng, noise=2e-6, times=None):
     test = plan(loading, times=np.geomspace(60, 3e4, 25) if times is None else times)
     found = shown(loading, law=KACHANOV, values=BRITTLE, times=test.times)

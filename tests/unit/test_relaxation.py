@@ -115,6 +115,21 @@ def test_a_bar_that_would_be_compressed_ends_and_says_so():
     assert "compress" in run.reason
 
 
+def test_a_ramp_down_that_compresses_says_so_however_far_the_last_frame_is():
+    """All but 13 MPa has relaxed when the strain begins to fall, 1 MPa in 3 s; the last frame is at 1 s."""
+    down = StrainSteps(((0, START / E), (1e7, 0.0)), ramp=3 * START)
+    run = ck.simulate(NORTON, TIGHT, VALUES, loading=down, times=[1.0, 2e7], elastic=ck.Elastic(E))
+    assert "compress" in run.reason
+    assert run.end_time == pytest.approx(1e7 + 3 * relaxed(START, 1e7), abs=0.5)
+
+
+def test_no_frame_shows_a_bar_in_compression():
+    down = StrainSteps(((0, START / E), (1e4, 0.0)))
+    run = ck.simulate(NORTON, TIGHT, VALUES, loading=down, times=[0.0, 1e3, 1e4, 2e4], elastic=ck.Elastic(E))
+    assert "compress" in run.reason
+    assert run.times.tolist() == [0.0, 1e3]
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [

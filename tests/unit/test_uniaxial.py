@@ -98,6 +98,17 @@ def test_temperature_steps_reach_the_law() -> None:
     np.testing.assert_allclose(result.of(0)[:, 0], expected, rtol=1e-9)
 
 
+def test_a_logged_temperature_of_thousands_of_rows_is_integrated() -> None:
+    """A thermocouple's zigzag of +- 3 K: each leg takes the mean of the Arrhenius factor, by Gauss quadrature."""
+    law = NORTON.times(arrhenius(T_ref=1000.0))
+    ends = np.linspace(0.0, 1000.0, 3001)
+    logged = Program(ends, 1000.0 + 3.0 * (-1.0) ** np.arange(ends.size))
+    nodes, weights = np.polynomial.legendre.leggauss(10)
+    factor = 0.5 * (weights @ np.exp(-3e5 / 8.314462618 * (1 / (1000 + 3 * nodes) - 1 / 1000)))
+    result = Uniaxial().predict(law, {**VALUES, "Q": 3e5}, [history(temperature=logged)])
+    assert result.of(0)[-1, 0] == pytest.approx(RATE * 1000 * factor, rel=1e-5)
+
+
 def test_a_heating_ramp_is_integrated() -> None:
     """exp(c (T - T0)) is nearly Arrhenius; the reference is Gauss quadrature of the Arrhenius factor."""
     law = NORTON.times(arrhenius(T_ref=1000.0))

@@ -72,6 +72,12 @@ def test_what_never_comes_is_not_a_number():
     assert life.horizon[0] == 1e5
 
 
+def test_what_breaks_at_once_breaks_at_a_time_that_has_a_logarithm():
+    life = FINE.predict_life(NORTON, {"A": 1e30, "n": 3.0}, [bar(control="load")], jacobian=True).life
+    assert life.ruptures[0, 0] == pytest.approx(1e-12)
+    assert (life.arrivals[0, 0, 1:] <= 1e-12).all()
+
+
 def test_the_rest_is_that_of_predict():
     """Following a bar further changes nothing about its frames, those lost in a burst included."""
     values = {"A": np.array([1e-12, 1e-9]), "n": 3.0, "m": 20.0}

@@ -1,8 +1,8 @@
 """Coble creep: vacancies flow along grain boundaries, rate = 14 pi D Omega s/(k T d^3), D = delta D_b exp(-Q/(R T)).
 
 D is the diffusivity in the boundary times its width delta, in mm^3/s (1 m^3/s is 1e9 mm^3/s). The number 14 pi = 44 is
-that of Frost and Ashby, for equiaxed grains; Coble's own is 148/pi = 47. D_b, Omega and 1/d^3 multiply each other:
-fix what is known, as in `law.fix(Omega=1.09e-20, d=0.01)`.
+that of Frost and Ashby, for equiaxed grains of diameter d; Coble's abstract says about 150, which later texts quote as
+150/pi = 48. D_b, Omega and 1/d^3 multiply each other: fix what is known, as in `law.fix(Omega=1.09e-20, d=0.01)`.
 """
 
 import sympy
@@ -29,7 +29,7 @@ COBLE = CreepLaw(
         ),
         Q: Param("activation energy of boundary diffusion", unit="J/mol", bounds=(5e4, 9e5)),
         Omega: Param("atomic volume", unit="mm^3", bounds=(5e-21, 1e-19), scale="log"),
-        d: Param("grain size", unit="mm", bounds=(1e-5, 10.0), scale="log"),
+        d: Param("grain diameter", unit="mm", bounds=(1e-5, 10.0), scale="log"),
     },
     references=(
         "Coble (1963), J. Appl. Phys. 34, 1679",

@@ -14,7 +14,7 @@ stress only. Stress in MPa and time in s; `per_second` brings values in h, min o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import exp, isfinite, log
+from math import exp, inf, isfinite, log
 
 from creepkit.errors import LawError, nearest
 
@@ -36,8 +36,7 @@ def convert(values: Mapping[str, float], given: str, wanted: str) -> Values:
     rate = to_rate(A, n, m)
     if not rate[2] > -1:
         raise LawError(f"{given}: m = {m:g} is a strain that does not start from zero; {_ALLOWED[given]}")
-    A, n, m = from_rate(*rate)
-    return {"A": A, "n": n, "m": m}
+    return _expressible(*from_rate(*_expressible(*rate, given).values()), wanted)
 
 
 def per_second(values: Mapping[str, float], given: str, unit: str) -> Values:
@@ -46,7 +45,17 @@ def per_second(values: Mapping[str, float], given: str, unit: str) -> Values:
     if unit not in UNITS:
         raise LawError(f"no unit of time '{unit}': {nearest(unit, UNITS)}")
     powers = {"norton-bailey-time": m, "strain-hardening": 1.0}
-    return {"A": A * UNITS[unit] ** -powers.get(given, m + 1), "n": n, "m": m}
+    return _expressible(A * UNITS[unit] ** -powers.get(given, m + 1), n, m, given)
+
+
+def _expressible(A: float, n: float, m: float, notation: str) -> Values:
+    """The values, unless a strain or time exponent far from steady creep has carried A out of double precision."""
+    if not 1e-300 < A < 1e300:
+        raise LawError(
+            f"{notation}: with n = {n:g} and m = {m:g} the number A is not between 1e-300 and 1e300; "
+            "stay in the notation in which the values were given"
+        )
+    return {"A": A, "n": n, "m": m}
 
 
 def _from_time(A: float, n: float, m: float) -> tuple[float, float, float]:
@@ -65,12 +74,16 @@ def _from_product(A: float, n: float, m: float) -> tuple[float, float, float]:
     """Time eliminated: m = m'/(1-m'), n = n'/(1-m'), A = (A' (1-m')^m')^(1/(1-m'))."""
     if m >= 1:
         return A, n, -1.0
-    return exp((log(A) + m * log(1 - m)) / (1 - m)), n / (1 - m), m / (1 - m)
+    return _exp((log(A) + m * log(1 - m)) / (1 - m)), n / (1 - m), m / (1 - m)
 
 
 def _to_product(A: float, n: float, m: float) -> tuple[float, float, float]:
     """Time eliminated: m' = m/(m+1), n' = n/(m+1), A' = (A (m+1)^m)^(1/(m+1))."""
-    return exp((log(A) + m * log(m + 1)) / (m + 1)), n / (m + 1), m / (m + 1)
+    return _exp((log(A) + m * log(m + 1)) / (m + 1)), n / (m + 1), m / (m + 1)
+
+
+def _exp(x: float) -> float:
+    return exp(x) if x < 700 else inf
 
 
 _Rule = Callable[[float, float, float], tuple[float, float, float]]

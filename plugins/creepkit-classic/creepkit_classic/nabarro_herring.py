@@ -1,7 +1,8 @@
 """Nabarro-Herring creep: vacancies flow through the grains, rate = 14 D Omega s/(k T d^2), D = D_0 exp(-Q/(R T)).
 
-In mm, N and s (1 m^2/s is 1e6 mm^2/s). The number 14 is that of Frost and Ashby, for equiaxed grains; Herring's own is
-40/3. D_0, Omega and 1/d^2 multiply each other: fix what is known, as in `law.fix(Omega=1.09e-20, d=0.05)`.
+In mm, N and s (1 m^2/s is 1e6 mm^2/s). The number 14 is that of Frost and Ashby, for equiaxed grains of diameter d;
+Herring's own is 40/3. D_0, Omega and 1/d^2 multiply each other: fix what is known, as in
+`law.fix(Omega=1.09e-20, d=0.05)`.
 """
 
 import sympy
@@ -22,7 +23,7 @@ NABARRO_HERRING = CreepLaw(
         D_0: Param("frequency factor of lattice diffusion", unit="mm^2/s", bounds=(1e-3, 1e6), scale="log", off=0.0),
         Q: Param("activation energy of lattice diffusion", unit="J/mol", bounds=(5e4, 9e5)),
         Omega: Param("atomic volume", unit="mm^3", bounds=(5e-21, 1e-19), scale="log"),
-        d: Param("grain size", unit="mm", bounds=(1e-5, 10.0), scale="log"),
+        d: Param("grain diameter", unit="mm", bounds=(1e-5, 10.0), scale="log"),
     },
     references=(
         "Nabarro (1948), Strength of Solids, The Physical Society, 75",

@@ -97,6 +97,21 @@ def test_what_is_no_set_of_values_is_refused(values: dict[str, float], given: st
         convert(values, given, "strain-hardening")
 
 
+@pytest.mark.parametrize(
+    ("A", "m", "given", "wanted"),
+    [
+        (1e-13, 0.01, "norton-bailey-time", "strain-hardening"),  # 1e-13^100
+        (1e5, 0.001, "norton-bailey-time", "strain-hardening"),
+        (1e-13, 0.99, "strain-hardening", "norton-bailey-time"),
+        (1e5, 0.9999, "strain-hardening", "norton-bailey-time"),
+    ],
+)
+def test_a_coefficient_beyond_double_precision_is_refused(A: float, m: float, given: str, wanted: str) -> None:
+    """A becomes A^(1/m), or A^(1/(1-m)): never a silent zero."""
+    with pytest.raises(LawError, match="A is not between 1e-300 and 1e300; stay in the notation"):
+        convert({"A": A, "n": 4.0, "m": m}, given, wanted)
+
+
 def test_an_unknown_target_or_unit_is_refused() -> None:
     with pytest.raises(LawError, match="no notation 'ansys' of Norton-Bailey creep: known: norton-bailey-rate"):
         convert(TEXTBOOK, "norton-bailey-time", "ansys")

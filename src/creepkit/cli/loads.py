@@ -50,7 +50,10 @@ def loading_of(
     """The loading of a test that ends at `end`, s."""
     from creepkit.errors import SolveError
 
-    if specimen == POINT or any("=" in text for text in (*(stress or ()), *(strain or ()))):
+    named = [text for text in (*(stress or ()), *(strain or ())) if "=" in text]
+    if named and specimen in (UNIAXIAL, RELAXATION):
+        raise SolveError(f"{named[0]} names a component, which --specimen {specimen} has not; give --specimen point")
+    if named or specimen == POINT:
         return _by_components(stress, strain)
     if specimen == BULGE or pressure:
         return _by_pressure(pressure, end)

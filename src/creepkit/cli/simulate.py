@@ -100,7 +100,11 @@ def _temperature(law: CreepLaw, texts: Sequence[str] | None) -> float | Program 
             raise SolveError(f"law '{law.name}' depends on temperature: give --temperature-c")
         return None
     levels = [(start, celsius + ZERO_CELSIUS) for start, celsius in steps(texts, "--temperature-c")]
-    return levels[0][1] if len(levels) == 1 and levels[0][0] == 0.0 else Program.steps(levels)
+    if levels[0][0] != 0.0:
+        raise SolveError(
+            f"--temperature-c {texts[0]}: nothing is said of the time before; give the first one from 0 s on"
+        )
+    return levels[0][1] if len(levels) == 1 else Program.steps(levels)
 
 
 def _write(run: History, to: Path | None) -> None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.errors import LawError
 from creepkit.inverse.nominal import end_strain, stresses
 from creepkit.kernels import Kernel, lower
 from creepkit.language import CreepLaw
@@ -127,13 +128,27 @@ class Coordinates:
 
 
 def _growths(law: CreepLaw) -> list[CreepLaw]:
-    """A law for each internal variable whose rate it is."""
+    """A law for each internal variable, its rate being how fast that one moves; none where that has no logarithm.
+
+    Only the coefficient's coordinate hangs on it: without, the coefficient is a coordinate itself.
+    """
     found, inner = [], {p for state in law.states.values() for p in state.rate.free_symbols}
     own = {p: param for p, param in law.params.items() if p in inner}
     for symbol, state in law.states.items():
         label = f"rate of {symbol}"
-        found.append(replace(law, terms={label: state.rate}, params=own, constraints=()))
+        grown = (replace(law, terms={label: sign * state.rate}, params=own, constraints=()) for sign in (1, -1))
+        found += list(filter(_has_logarithm, grown))[:1]
     return found
+
+
+def _has_logarithm(growth: CreepLaw) -> bool:
+    from creepkit.kernels.logform import log_form
+
+    try:
+        log_form(growth)
+    except LawError:
+        return False
+    return True
 
 
 def _coefficient(law: CreepLaw, single: CreepLaw) -> int | None:

@@ -9,6 +9,7 @@ from importlib.metadata import version
 
 import numpy as np
 
+from creepkit import registry
 from creepkit.inverse.alternation import Fitted
 from creepkit.inverse.fences import Fences
 from creepkit.inverse.findings import NuisanceEstimate, TestMisfit
@@ -45,6 +46,7 @@ def provenance(objective: Objective, settings: Settings, screened: int) -> dict[
     return {
         "creepkit": version("creepkit"),
         "law": law.name,
+        "origin": registry.default().origin(law),
         "fingerprint": law.fingerprint,
         "specimen": getattr(objective.using, "name", type(objective.using).__name__),
         "evaluations": objective.evaluations,

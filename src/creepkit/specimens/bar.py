@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from creepkit.integration import Integration, PointTest
     from creepkit.language import CreepLaw
 
+STEPS_FOR_A_BREAK = 20
+"""Each straight piece of a program takes some 7 steps of its own; a logged temperature has thousands of pieces."""
+
 
 @dataclass(frozen=True)
 class Bar:
@@ -26,7 +29,7 @@ class Bar:
 
     tolerance : relative local error of a step of the integration; the output is then within about ten times of it.
     strain_limit : logarithmic creep strain at which the bar has burst.
-    max_steps : cap on the steps of one history.
+    max_steps : cap on the steps of one history, beside STEPS_FOR_A_BREAK for each row of its programs.
     """
 
     tolerance: float = 1e-5
@@ -141,7 +144,10 @@ class Bar:
         self, law: CreepLaw, values: Mapping[str, ArrayLike], tests: Sequence[PointTest], jacobian: bool
     ) -> Integration:
         kernel = kernels.lower(law, "numba")
+        breaks = max((test.driving.times.size + test.temperature.times.size - 2 for test in tests), default=0)
         settings = integration.Settings(
-            rtol=self.tolerance, strain_limit=self.strain_limit, max_steps=int(self.max_steps)
+            rtol=self.tolerance,
+            strain_limit=self.strain_limit,
+            max_steps=int(self.max_steps) + STEPS_FOR_A_BREAK * breaks,
         )
         return integration.integrate(kernel, kernel.internal(values), tests, settings=settings, jacobian=jacobian)

@@ -23,6 +23,7 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
 from creepkit.records import COMPONENTS, Effects, History, PointLoading, Prediction, Specimen
+from creepkit.specimens.bar import STEPS_FOR_A_BREAK
 from creepkit.specimens.elastic_part import one_elasticity
 from creepkit.specimens.isotropic import compliance, elastic_course
 from creepkit.specimens.uniaxial_effects import KINDS, predict_with
@@ -55,7 +56,8 @@ class Point:
     """A material point.
 
     tolerance : relative local error of a step of the integration. strain_limit : equivalent creep strain at which the
-    point has burst. max_steps : cap on the steps of one history.
+    point has burst. max_steps : cap on the steps of one history, beside those for its frames and each row of its
+    programs.
     """
 
     tolerance: float = 1e-5
@@ -167,7 +169,7 @@ class Point:
         """One history whose stress keeps its direction: what is shown is a straight line in the creep strain."""
         test = integration.PointTest(path.driving, history.temperature_program(), history.times, path.stiffness)
         found = integration.integrate(
-            kernel, theta, [test], settings=self._settings(), jacobian=jacobian, axes=path.axes
+            kernel, theta, [test], settings=self._settings(history), jacobian=jacobian, axes=path.axes
         )
         stress, falling = (
             _imposed(history) + np.outer(path.driving.at(history.times), path.along),
@@ -191,7 +193,8 @@ class Point:
         bare = not loading.strain and not history.includes_elastic
         elastic = WITHOUT_ELASTICITY if bare and history.elastic is None else _elastic(history)
         warmth = history.temperature_program()
-        return drive(kernel, theta, elastic, controls, warmth, history.times, settings=self._settings(), tableau=SDIRK4)
+        settings = self._settings(history)
+        return drive(kernel, theta, elastic, controls, warmth, history.times, settings=settings, tableau=SDIRK4)
 
     def _differences(self, kernel: CompiledLaw, theta: Floats, steps: Floats, history: History) -> Floats:
         """Central differences to the internal parameters, (frames, outputs, P); zero where one is switched off."""
@@ -202,8 +205,12 @@ class Point:
             slopes[:, :, p] = (up - down) / (2 * steps[p])
         return slopes
 
-    def _settings(self) -> integration.Settings:
-        return integration.Settings(rtol=self.tolerance, strain_limit=self.strain_limit, max_steps=int(self.max_steps))
+    def _settings(self, history: History) -> integration.Settings:
+        loading = _loading(history)
+        programs = [*loading.stress.values(), *loading.strain.values(), history.temperature_program()]
+        breaks = sum(program.times.size - 1 for program in programs)
+        most = int(self.max_steps) + history.times.size + STEPS_FOR_A_BREAK * breaks
+        return integration.Settings(rtol=self.tolerance, strain_limit=self.strain_limit, max_steps=most)
 
 
 def _loading(history: History) -> PointLoading:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from creepkit.integration import PointTest
 
 SLACK = 1e-3
-"""Of the largest elastic stress: below it nothing is left that could hold a bar in tension."""
+"""Of the largest elastic stress: a stress below zero by more than this is no rounding."""
 
 
 @dataclass(frozen=True)
@@ -42,27 +42,24 @@ class Relaxation(Bar):
         return point_test(history)
 
     def shown(self, history: History, creep: Floats) -> Floats:
-        """The stress, MPa."""
+        """The stress, MPa; NaN where a step down compresses the bar."""
         test = point_test(history)
-        return np.asarray(test.driving.at(history.times) - test.stiffness * creep)
+        stress = np.asarray(test.driving.at(history.times) - test.stiffness * creep)
+        return np.where(stress < -SLACK * float(np.max(test.driving.values)), np.nan, stress)
 
     def slope(self, history: History, creep: Floats) -> Floats:
         """Minus the modulus."""
         return np.full_like(creep, -point_test(history).stiffness)
 
     def ending(self, history: History, reason: str, output: Floats, end: float) -> str:
-        """Says so where the bar would be compressed: where a fall of strain takes away the stress that is left."""
-        known = np.flatnonzero(np.isfinite(output))
-        if not (reason and known.size):
-            return reason
-        driving = point_test(history).driving
-        left = output[known[-1]] + driving.at(end) - driving.at(history.times[known[-1]])
-        compressed = left < SLACK * float(np.max(driving.values))
-        return (
-            f"{reason}: the stress falls below zero, and a compressed bar needs the specimen point"
-            if compressed
-            else reason
-        )
+        """Says so where the bar would be compressed: steps get stuck where a fall of strain takes away all stress."""
+        from creepkit.integration.endings import STEP_TOO_SMALL
+
+        driving, moment = point_test(history).driving, 1e-9 * max(end, 1e-3)
+        stuck = reason == integration.REASONS[STEP_TOO_SMALL]
+        if stuck and driving.at(end + moment) < driving.at(end - moment):
+            return f"{reason}: the stress falls below zero, and a compressed bar needs the specimen point"
+        return reason
 
     def reference_stress(self, history: History) -> Floats:
         """The elastic stress of each strain and the last stress seen, MPa: what a law is looked at in a test."""

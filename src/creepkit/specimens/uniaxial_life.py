@@ -20,6 +20,8 @@ HORIZON = 100.0
 """How far beyond the last frame, and the measured rupture, a bar is followed, as a factor on time."""
 LEAST = 1e-12
 """Creep strains below this are there from the beginning."""
+SOONEST = 1e-12
+"""s; a bar that breaks at once does so then, for rupture times are compared by their logarithms."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ def life_of(histories: Sequence[History], rungs: Sequence[Rungs], found: Integra
     candidates, longest = found.endings.shape[0], max((h.times.size for h in histories), default=0)
     shape = candidates, len(histories), longest
     broke = found.status == int(Status.BURST)
-    ruptures = np.where(broke, found.end_times, np.nan)
+    ruptures = np.where(broke, np.maximum(found.end_times, SOONEST), np.nan)
     arrivals, slopes = np.repeat(ruptures[..., None], longest, axis=2), np.full(shape, np.inf)
     changes = None
     if found.end_jacobian is not None:

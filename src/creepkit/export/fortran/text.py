@@ -155,7 +155,7 @@ _BODIES: dict[str, tuple[str, str, tuple[str, ...]]] = {
             "if (abs(a) < 1.0d0) then",
             "  expm1 = 2.0d0*sinh(0.5d0*a)*exp(0.5d0*a)",
             "else",
-            "  expm1 = exp(a) - 1.0d0",
+            "  expm1 = exp(min(a, 709.0d0)) - 1.0d0",
             "endif",
         ),
     ),
