@@ -1,44 +1,15 @@
-"""Profiles to D_amp, S_d, S_p and fields of points to the same: planted bulges, other fits, exact derivatives."""
-
-from pathlib import Path
+"""Profiles to D_amp, S_d, S_p: planted bulges, other fits, exact derivatives."""
 
 import mpmath
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
+from bells import FINE, LOOKED_AT, NODES, bell, beside, cross, plates, profile_with_apex, richardson, table
 from scipy.optimize import curve_fit
 
-from creepkit.errors import FitError, SolveError
-from creepkit.specimens.camera_field import fit_field
+from creepkit.errors import SolveError
 from creepkit.specimens.observation import Observation
-from creepkit.specimens.top_profile import interpolation
 
-NODES = np.linspace(0.0, 10.0, 41)
-FINE = np.linspace(0.0, 10.0, 10001)
-LOOKED_AT = np.linspace(0.0, 7.5, 76)
-TABLES = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "benchmarks" / "dabi_ccx"
-beside = pytest.mark.skipif(not TABLES.is_dir(), reason="the tables of CalculiX do not lie beside this checkout")
 FORMS = [Observation(), Observation("field"), Observation("profile", 5.3, 51), Observation("field", 4.7)]
-
-
-def bell(r, D, S, p):
-    return D * np.exp(-((r / S) ** p))
-
-
-def cross(x, y, D, S, p):
-    return D * np.exp(-(np.abs(x / S) ** p) - np.abs(y / S) ** p)
-
-
-def plates(radii, frames=6):
-    """Profiles (frames, nodes) that are no generalised Gaussians, from small to large."""
-    growth = np.arange(1, frames + 1)[:, None]
-    return 0.12 * growth * (1 - (np.minimum(radii, 7.6) / 7.6) ** 2) ** (2.4 - 0.1 * growth)
-
-
-def richardson(function, step):
-    """The derivative of function(h) at 0, error of the fourth power of the step."""
-    near, far = (function(h) - function(-h) for h in (step, 2 * step))
-    return (8 * near - far) / (12 * step)
 
 
 # What is observed
@@ -232,17 +203,6 @@ def test_slopes_to_a_motion_of_the_nodes(operator):
 # Finite elements' profiles: CalculiX on the true dimple, u_z at eight radii and a fit made elsewhere
 
 
-def table(name):
-    """61 radii an eighth of a mm apart, as the deck's nodes are, u_z there (frames, 61), and D, S, p as printed.
-
-    Eight radii are printed, but the fit beside them knew all nodes. In between ln u_z is nearly linear in r^2: a spline
-    of it is within 3.2e-4 mm of the profile that CalculiX 2.20 gives with the deck of the table.
-    """
-    rows = np.loadtxt(TABLES / name, delimiter=",", skiprows=1)
-    radii, nodes = np.array([0, 1, 2, 3, 4, 5, 6, 7.5]), np.linspace(0, 7.5, 61)
-    return nodes, np.exp(CubicSpline(radii**2, np.log(rows[:, 1:9]), axis=1)(nodes**2)), rows[:, 9:12]
-
-
 @beside
 @pytest.mark.parametrize("name", ["dabi_norton_in625_800C_steady.csv", "dabi_timehardening.csv"])
 def test_fits_of_calculix_profiles(name):
@@ -253,11 +213,6 @@ def test_fits_of_calculix_profiles(name):
     # radii .1 mm apart instead: the two ends of the window weigh a little less
     error = np.abs(Observation().observe(nodes, profiles) - fits).max(axis=0)
     assert (error < [2e-4, 8e-4, 2e-3]).all()
-
-
-def profile_with_apex(apex):
-    nodes, profiles, _ = table("dabi_timehardening.csv")
-    return nodes, [[np.interp(apex, profiles[:, 0], column) for column in profiles.T]]
 
 
 @beside
@@ -320,100 +275,3 @@ def test_a_window_beyond_the_surface():
         Observation(window=12.0).observe(NODES, plates(NODES))
     with pytest.raises(SolveError, match=r"shape \(6, 39\); expected \(frames, 41\)"):
         Observation().observe(NODES, plates(NODES)[:, 1:-1])
-
-
-# Displacement at any radius
-
-
-def test_interpolation_is_exact_for_parabolas_and_nodal():
-    nodes = np.concatenate([[0.0], np.cumsum(np.repeat(np.random.default_rng(1).uniform(0.2, 0.9, 8), 2))])
-    wanted = np.linspace(0.0, nodes[-1], 57)
-    parabola = lambda r: 0.3 - 0.2 * r + 0.07 * r**2  # noqa: E731
-    np.testing.assert_allclose(interpolation(nodes, wanted) @ parabola(nodes), parabola(wanted), atol=1e-13)
-    np.testing.assert_allclose(interpolation(nodes, nodes), np.eye(nodes.size), atol=1e-13)
-
-
-def test_interpolation_follows_the_element_where_its_middle_node_is_off():
-    first, middle, last = nodes = np.array([1.0, 1.4, 2.0])
-    for c in (-0.9, -0.3, 0.2, 0.7):
-        shapes = np.array([c * (c - 1) / 2, 1 - c * c, c * (c + 1) / 2])
-        np.testing.assert_allclose(interpolation(nodes, [shapes @ nodes])[0], shapes, atol=1e-13)
-    assert first < middle < last
-
-
-@pytest.mark.parametrize(
-    ("nodes", "wanted", "message"),
-    [
-        ([0, 1, 2], [0.5, 2.5], "no displacement is known at a radius of 2.5 mm; .* from 0 to 2 mm"),
-        ([0, 1, 2], [-0.1], "at a radius of -0.1 mm"),
-        ([0, 1, 2], [np.nan], "at a radius of nan mm"),
-        ([0, 1], [0.5], "corner and middle nodes in turn, an odd number"),
-        ([0, 2, 1], [0.5], "increasing outwards"),
-        ([0, 0.2, 2], [0.5], "node 1 .* at a radius of 0.2 mm, is not in the middle half of its side"),
-    ],
-)
-def test_interpolation_refuses(nodes, wanted, message):
-    with pytest.raises(SolveError, match=message):
-        interpolation(nodes, wanted)
-
-
-# Fields of points
-
-
-def pixels(points=50):
-    side = np.linspace(-8.0, 8.0, points)
-    return np.meshgrid(side, side)
-
-
-@pytest.mark.parametrize("D", [0.35, -0.35])
-def test_planted_field_is_recovered(D):
-    x, y = pixels()
-    fit = fit_field(x, y, cross(x - 0.7, y + 0.4, D, 3.6, 2.3))
-    got = [fit.amplitude, fit.width, fit.shape, fit.x_center, fit.y_center]
-    np.testing.assert_allclose(got, [D, 3.6, 2.3, 0.7, -0.4], rtol=1e-10)
-    assert max(fit.standard_errors) < 1e-10
-    assert fit.points == 2500
-
-
-def test_standard_errors_of_a_field_are_its_scatter():
-    x, y = pixels(30)
-    truth, noise = np.array([0.35, 3.6, 2.3, 0.7, -0.4]), np.random.default_rng(8).normal(size=(150, 30, 30))
-    surface = cross(x - 0.7, y + 0.4, *truth[:3])
-    fits = [fit_field(x, y, surface + 0.02 * some) for some in noise]
-    values = np.array([[f.amplitude, f.width, f.shape, f.x_center, f.y_center] for f in fits])
-    scores = (values - truth) / [f.standard_errors for f in fits]
-    np.testing.assert_allclose(scores.std(axis=0), 1.0, atol=0.2)  # 150 draws know a deviation to 6 %
-    np.testing.assert_allclose([f.scatter for f in fits], 0.02, rtol=0.15)
-
-
-def test_lost_and_wild_points():
-    x, y = pixels()
-    surface = cross(x - 0.7, y + 0.4, 0.35, 3.6, 2.3)
-    surface[3, 4], surface[9:12, 9] = 2.0, np.nan
-    fit = fit_field(x, y, surface)
-    assert fit.points == 2497
-    np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], [0.35, 3.6, 2.3], rtol=0.005)
-
-
-@beside
-def test_field_and_operator_see_the_same():
-    nodes, profile = profile_with_apex(0.81)
-    x, y = pixels(160)
-    inside = np.hypot(x, y) <= 5.0
-    heights = interpolation(nodes, np.hypot(x, y)[inside]) @ profile[0]
-    fit = fit_field(x[inside] + 1.3, y[inside] - 2.0, heights)
-    expected = Observation("field", 5.0).observe(nodes, profile)[0]
-    np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], expected, rtol=2e-4)  # pixels end raggedly
-    np.testing.assert_allclose([fit.x_center, fit.y_center], [1.3, -2.0], atol=1e-6)
-
-
-def test_fields_that_show_no_bulge():
-    x, y = pixels(20)
-    noise = np.random.default_rng(4).normal(size=x.shape)
-    with pytest.raises(FitError, match=r"the field of 400 points shows no bulge of Eq\. \(7\): the best fit has D = "):
-        fit_field(x, y, noise)
-    with pytest.raises(FitError, match=r"found the shapes \(20, 20\), \(20, 20\), \(19, 20\)"):
-        fit_field(x, y, noise[1:])
-    for heights in (np.full_like(x, np.nan), np.zeros_like(x), np.where(x > 7.9, 1.0, np.nan)):
-        with pytest.raises(FitError, match="points cannot be fitted; it needs at least 12"):
-            fit_field(x, y, heights)

@@ -55,7 +55,12 @@ def _record(found: Registered[CreepLaw]) -> dict[str, Any]:
             }
             for name, p in table
         },
-        "states": {symbol.name: {"rate": str(s.rate), "initial": s.initial} for symbol, s in law.states.items()},
+        "states": {
+            symbol.name: {
+                "meaning": s.meaning, "unit": s.unit, "rate": str(s.rate), "initial": s.initial, "limit": s.limit,
+            }
+            for symbol, s in law.states.items()
+        },
         "constraints": [str(relation) for relation in law.constraints],
         "references": list(law.references),
         "latex": law.latex(),

@@ -37,6 +37,6 @@ def one_elasticity(history: History, specimen: str) -> tuple[float, float]:
     if max(moduli) - min(moduli) > 1e-12 * max(moduli):
         raise SolveError(
             f"{where}: the modulus changes from {moduli[0]:g} to {moduli[-1]:g} MPa with the temperature of the test; "
-            "a prescribed strain takes one modulus a test, such as elastic.at(T)"
+            f"a {specimen} specimen takes one modulus a test, such as elastic.at(T)"
         )
     return moduli[0], float(found[0].nu)

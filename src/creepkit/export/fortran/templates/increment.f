@@ -22,7 +22,7 @@
         double precision, intent(out) :: slope(ny, 2)
         double precision, parameter :: beta = $beta
         double precision low, high, place, most, size, point(6)
-        logical shorter, solved
+        logical solved
         low = max(start, 0.0d0)**beta
         high = max(finish, 0.0d0)**beta
         point = (/ start, finish - start, warm(1), warm(2), beta,
@@ -35,13 +35,12 @@
         do
           size = min(size, high - place)
           if (.not. size > 1.0d-12*high) return
-          shorter = size > (high - low)/4096
-          call ${id}_step(place, size, point, stress, mean, shorter, y,
-     &        slope, solved)
+          call ${id}_step(place, size, point, stress, mean, y, slope,
+     &        solved)
           if (solved) then
             place = place + size
             size = min(2*size, most)
-          elseif (shorter) then
+          elseif (size > (high - low)/4096) then
             size = 0.5d0*size
           else
             call ${id}_rupture(place, high - place, point, stress,
@@ -52,30 +51,29 @@
       end subroutine ${id}_increment
 !
 ! One step of the clock, from s to s + ds; y and slope stay as they
-! are where it has no solution. Too long a step for a state that
-! grows with itself has one in which the state runs backwards; where
-! a shorter step may be tried, that one is none.
+! are where it has no solution. One with a diagonal term of Newton's
+! matrix below zero is none: a variable that feeds its own growth
+! runs backwards in it, as the step is too long.
 !
-      subroutine ${id}_step(s, ds, point, stress, mean, shorter, y,
-     &    slope, solved)
+      subroutine ${id}_step(s, ds, point, stress, mean, y, slope,
+     &    solved)
         implicit none
         integer, parameter :: ny = $ny, nx = $nx
         double precision, intent(in) :: s, ds, point(6), stress, mean
-        logical, intent(in) :: shorter
         double precision, intent(inout) :: y(ny), slope(ny, 2)
         logical, intent(out) :: solved
         double precision x(nx), out(ny*(1 + nx)), a(ny, ny)
-        double precision r(ny, 3), z(ny), grown, h, along(ny)
-        integer pass
+        double precision r(ny, 3), z(ny), grown, h, least
+        integer i, pass
         call ${id}_place(s, ds, point, stress, mean, x, h)
         z = y
         call ${id}_look(x, point(6), y, z, 0.0d0, out)
-        along = sign(1.0d0, out(1:ny))
         z(1) = min(max(log(h) + out(1), -690.0d0), 50.0d0)
         do pass = 1, 40
           grown = exp(z(1))
           call ${id}_look(x, point(6), y, z, grown, out)
           call ${id}_equations(y, z, grown, h, out, slope, a, r)
+          least = minval((/ (a(i, i), i = 1, ny) /))
           call ${id}_solve(a, r)
           z = z + r(:, 1)
           z(1) = min(max(z(1), -700.0d0), 50.0d0)
@@ -83,9 +81,7 @@
           if (maxval(abs(r(:, 1))/(1.0d-3 + abs(z))) < 1.0d-11) exit
         enddo
         solved = maxval(abs(r(:, 1))/(1.0d-3 + abs(z))) < 1.0d-8
-        solved = solved .and. z(1) < 0.0d0
-        if (shorter) solved = solved .and.
-     &      all(along(2:)*out(2:ny) >= 0.0d0)
+        solved = solved .and. z(1) < 0.0d0 .and. least > 0.0d0
         if (.not. solved) return
         grown = exp(z(1))
         slope(1, :) = slope(1, :) + grown*r(1, 2:3)

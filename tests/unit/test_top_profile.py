@@ -1,0 +1,39 @@
+"""Displacement at any radius, between the nodes of the top."""
+
+import numpy as np
+import pytest
+
+from creepkit.errors import SolveError
+from creepkit.specimens.top_profile import interpolation
+
+
+def test_interpolation_is_exact_for_parabolas_and_nodal():
+    nodes = np.concatenate([[0.0], np.cumsum(np.repeat(np.random.default_rng(1).uniform(0.2, 0.9, 8), 2))])
+    wanted = np.linspace(0.0, nodes[-1], 57)
+    parabola = lambda r: 0.3 - 0.2 * r + 0.07 * r**2  # noqa: E731
+    np.testing.assert_allclose(interpolation(nodes, wanted) @ parabola(nodes), parabola(wanted), atol=1e-13)
+    np.testing.assert_allclose(interpolation(nodes, nodes), np.eye(nodes.size), atol=1e-13)
+
+
+def test_interpolation_follows_the_element_where_its_middle_node_is_off():
+    first, middle, last = nodes = np.array([1.0, 1.4, 2.0])
+    for c in (-0.9, -0.3, 0.2, 0.7):
+        shapes = np.array([c * (c - 1) / 2, 1 - c * c, c * (c + 1) / 2])
+        np.testing.assert_allclose(interpolation(nodes, [shapes @ nodes])[0], shapes, atol=1e-13)
+    assert first < middle < last
+
+
+@pytest.mark.parametrize(
+    ("nodes", "wanted", "message"),
+    [
+        ([0, 1, 2], [0.5, 2.5], "no displacement is known at a radius of 2.5 mm; .* from 0 to 2 mm"),
+        ([0, 1, 2], [-0.1], "at a radius of -0.1 mm"),
+        ([0, 1, 2], [np.nan], "at a radius of nan mm"),
+        ([0, 1], [0.5], "corner and middle nodes in turn, an odd number"),
+        ([0, 2, 1], [0.5], "increasing outwards"),
+        ([0, 0.2, 2], [0.5], "node 1 .* at a radius of 0.2 mm, is not in the middle half of its side"),
+    ],
+)
+def test_interpolation_refuses(nodes, wanted, message):
+    with pytest.raises(SolveError, match=message):
+        interpolation(nodes, wanted)
