@@ -13,6 +13,7 @@ SHELL := /bin/bash
 PYTHONS := python3.11 python3.12 python3.13
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check
+COMPILED := from creepkit.cli.compiled import compiled_folder; print(compiled_folder())
 PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/pyproject.toml))
 
 TORCH_CPU := torch==2.13.0+cpu
@@ -22,15 +23,13 @@ CPU_WHEELS := https://download.pytorch.org/whl/cpu
 # Two threads of torch on one busy core are far slower than one; pytest runs two workers instead.
 export OMP_NUM_THREADS := 1
 
-# numba looks at the file of a compiled function alone, not at those it calls: one cache for each state of the sources.
-export NUMBA_CACHE_DIR := $(CURDIR)/.venv/numba/$(shell cat src/creepkit/{integration,kernels,fem}/*.py src/creepkit/specimens/gaussian_*.py | cksum | cut -d' ' -f1)
-
 test: .venv/.ok
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
-	@for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q); done
+	@export NUMBA_CACHE_DIR=$$($(BIN)/python -c '$(COMPILED)'); \
+	    for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q); done
 	$(BIN)/pytest -q -n 2
 
 demo: .venv/.ok
@@ -57,7 +56,7 @@ endif
 	@echo "set-up 4/5: plugins"
 	@for plugin in $(PLUGINS); do $(PIP) --no-build-isolation --editable $$plugin; done
 	@echo "set-up 5/5: compile the solver"
-	@$(BIN)/python -c 'from creepkit.cli.demo import prepare; prepare()'
+	@$(BIN)/python -c 'from creepkit.cli.compiled import share_compiled_code as share; share(); from creepkit.cli.demo import prepare; prepare()'
 	@touch $@
 
 clean:

@@ -18,7 +18,7 @@
 #
 # PowerLawCreepStressUpdate: rate = coefficient s^n_exponent exp(-activation_energy/(gas_constant T)) (t -
 #     start_time)^m_exponent, of equivalent stress s; ComputeMultipleInelasticStress adds the models. t is the
-#     analysis time: start_time is when the load begins.
+#     analysis time: start_time is when the load begins. It takes strain = FINITE, or incremental = true.
 # 'power law' is called power_law here
 # 'time hardening' is called time_hardening here
 [Materials]

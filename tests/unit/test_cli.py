@@ -33,6 +33,19 @@ def creepkit_laws():
     return [LAW]
 """
 
+BRITTLE = """
+from creepkit.language import CreepLaw, Param, State, hookimpl, parameters, states, stress
+
+(A,), (w,) = parameters("A"), states("w")
+RATE = A * stress / (1 - w)
+COEFFICIENT = Param("rate coefficient", unit="1/s", bounds=(1e-20, 1e-5), scale="log")
+
+
+@hookimpl
+def creepkit_laws():
+    return [CreepLaw("brittle", {"creep": RATE}, {A: COEFFICIENT}, states={w: State(0, RATE, "damage", limit=0.9)})]
+"""
+
 COMMAND = """
 import typer
 
@@ -139,6 +152,15 @@ def test_a_plugin_file_joins_the_laws() -> None:
 
     assert result.exit_code == 0
     assert f"from plugin 'mine' ({Path('mine.py').resolve()})" in result.stdout
+
+
+def test_a_state_as_json_says_where_the_material_ends() -> None:
+    Path("brittle.py").write_text(BRITTLE)
+
+    law = json.loads(creepkit("--plugin", "brittle.py", "laws", "brittle", "--json").stdout)
+
+    rate = "A*stress/(1 - w)"
+    assert law["states"] == {"w": {"meaning": "damage", "unit": "1", "rate": rate, "initial": 0.0, "limit": 0.9}}
 
 
 def test_a_plugin_file_that_is_asked_for_must_work() -> None:

@@ -119,6 +119,8 @@ def _json(**changes):
         (_json(values={"A": 1e-16, "n": float("inf")}), "not a finite number"),
         (_json(notes="text"), "'notes' must be a list"),
         (_json(law={}), "mine.json: format: field required"),
+        (_json(gas_constant=8.31), "'gas_constant' is 8.31; creepkit reads 8.314462618 alone"),
+        (_json(units={"stress": "Pa", "time": "s", "temperature": "K", "energy": "J/mol"}), "'units' is .*'Pa'"),
     ],
 )
 def test_a_bad_document_is_one_sentence(text, message):
@@ -229,6 +231,19 @@ def test_a_refused_export_leaves_the_old_file(tmp_path):
 def test_a_folder_that_does_not_exist_is_named(tmp_path):
     with pytest.raises(ExportError, match="cannot be written to .*missing.*No such file"):
         write_text(VALUED, JsonExporter(), tmp_path / "missing" / "norton.json")
+
+
+def test_a_file_is_no_folder(tmp_path):
+    (tmp_path / "creep.f").write_text("mine")
+    with pytest.raises(ExportError, match="law 'norton' cannot be written to .*creep.f/norton.json: Not a directory"):
+        write_text(VALUED, JsonExporter(), tmp_path / "creep.f" / "norton.json")
+    assert (tmp_path / "creep.f").read_text() == "mine"
+
+
+def test_latex_tells_references_and_keeps_each_comment_a_comment():
+    text = LatexExporter().text(VALUED.replace(notes=("one\u2028\\input{two}",)))
+    assert f"% Source: {NORTON.references[0]}" in text
+    assert "\n% \\input{two}" in text
 
 
 def test_a_folder_is_no_file(tmp_path):

@@ -8,7 +8,7 @@ import subprocess
 import numpy as np
 import pytest
 from exported_laws import LAWS, TOLERANCE, case
-from fortran_library import compiled, pointer
+from fortran_library import PARAMETERS, compiled, pointer
 
 from creepkit.errors import ExportError
 from creepkit.export.fortran.creep import AbaqusCreep, CalculixCreep
@@ -166,8 +166,34 @@ def test_names_that_clash_without_case_are_renamed_openly():
 
 def test_a_name_is_made_an_identifier_and_short_enough():
     text = AbaqusCreep().text(ValuedLaw(NORTON, NORTON_VALUES, name="2nd law of Würzburg, " + 9 * "long "))
-    assert re.search(r"subroutine x_2nd_law_of_wurzburg\w*_law\(x, out\)", text)
-    assert max(len(name) for name in re.findall(r"subroutine (\w+)", text)) <= 40
+    assert re.search(r"subroutine x_2nd_law_of_wurzbur\w*_law\(x, out\)", text)
+    assert max(len(name) for name in re.findall(r"subroutine (\w+)", text)) <= 31
+
+
+@pytest.mark.parametrize("exporter", [AbaqusCreep(), CalculixCreep()])
+def test_names_that_are_long_or_those_of_routines_compile(exporter, tmp_path):
+    clash, long, longer = parameters(f"foreign_law a_{80 * 'y'} a_{80 * 'y'}z")
+    source = law(clash * stress**long * longer, {clash: RATE, long: POWER, longer: POWER})
+    text = exporter.text(ValuedLaw(source, {clash.name: 1e-16, long.name: 5, longer.name: 2}))
+    assert "! 'foreign_law' is called foreign_law_2 here" in text
+    assert max(len(line) for line in text.splitlines() if line[:1] != "!") <= 72
+    assert not compiled(text, tmp_path, "clash")[1]
+
+
+def test_a_saturating_rate_raises_no_floating_point_exception_at_long_times(tmp_path):
+    text = AbaqusCreep().text(ValuedLaw(LAWS["foreign saturating"], {"A": 1e-20, "r": 1e-3, "n": 4.0}))
+    driver = """
+      program trapped
+        double precision x(6), out(7)
+        x = (/ 60d0, 0d0, 1d7, 1d3, 60d0, 20d0 /)
+        call foreign_law(x, out)
+        if (abs(out(1) - log(1d-20) - 4*log(60d0)) > 1d-9) stop 2
+      end program"""
+    (tmp_path / "ABA_PARAM.INC").write_text(PARAMETERS)
+    (tmp_path / "law.f").write_text(text + driver + "\n")
+    trap = ["gfortran", "-w", "-ffpe-trap=invalid,zero,overflow", "-finit-real=snan", "-o", "law", "law.f"]
+    subprocess.run(trap, cwd=tmp_path, check=True)
+    assert subprocess.run([tmp_path / "law"], check=False).returncode == 0
 
 
 def test_what_creep_is_not_told_is_refused():

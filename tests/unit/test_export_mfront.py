@@ -5,6 +5,7 @@ the whole block runs on the tensors of tfel_stub.hxx, where its Jacobian is that
 """
 
 import ctypes
+import dataclasses
 import re
 
 import numpy as np
@@ -227,8 +228,10 @@ def test_names_that_mfront_keeps_are_renamed_openly():
 
 
 def test_nothing_in_a_note_or_a_title_becomes_code():
-    law = NORTON.rename("norton", 'odd " title \\ } */')
-    text = exported(law, notes=["first\n@Theta 1;", "back\\", "}"])
+    params = {symbol: dataclasses.replace(param, meaning="back\\") for symbol, param in NORTON.params.items()}
+    law = dataclasses.replace(NORTON.rename("norton", 'odd " title \\ } */'), params=params)
+    text = exported(law, notes=["first\n@Theta 1;", "back\\ ", "}"])
+    assert not [line for line in text.splitlines() if line.rstrip().endswith("\\")], "the next line would be a comment"
     assert text.count("\n@Theta") == 1
     rest, _ = outside(text)
     assert all(STATEMENT.fullmatch(line) for line in filter(None, map(str.strip, rest.splitlines())))

@@ -175,6 +175,16 @@ def test_nothing_in_a_note_becomes_code(tmp_path):
     assert module(NORTON, tmp_path, notes=notes).rate(100) > 0
 
 
+@pytest.mark.parametrize("meaning", ["\"\"\"'''", "back\\", "\\x", '"""; raise SystemExit; """'])
+def test_nothing_in_a_meaning_becomes_code(meaning, tmp_path):
+    (omega,) = states("omega")
+    A, n = NORTON.params
+    law = CreepLaw(
+        "odd", {"term": A * stress**n}, NORTON.params, states={omega: State(0.0, A * stress, meaning=meaning)}
+    )
+    assert module(law, tmp_path).rate(100, omega=0) > 0
+
+
 def test_words_of_python_and_math_may_name_parameters(tmp_path):
     names = parameters("exp lambda log max")
     exp, lambda_, log, largest = names

@@ -155,6 +155,16 @@ class TestEnds:
         assert result.end_time == pytest.approx(0.25 / 1e-5, rel=1e-9)
         assert result.times.tolist() == [1e4]
 
+    def test_a_limit_that_is_met_faster_than_any_step(self) -> None:
+        """w = 1 - (1 - t/t_r)^(1/15): past w = 0.9 less is left than doubles tell from t_r."""
+        growth = C * stress**v / (15 * (1 - damage) ** 14)
+        law = CreepLaw("rabotnov", {"creep": A * stress**n}, RATES, states={damage: State(0.0, growth, limit=0.99)})
+        values = {"A": 1e-15, "n": 3.0, "C": 1e-14, "v": 4.0}
+        result = run(law, values, {"11": by_stress(100.0)}, [1.0, 2e6], tableau=SDIRK4)
+        assert result.status == Status.BURST
+        assert result.reason == "an internal variable reached its limit"
+        assert result.end_time == pytest.approx(1e6, rel=1e-4)
+
     def test_the_cap_on_steps(self) -> None:
         settings = Settings(max_steps=5)
         result = run(NORTON, {"A": 1e-10, "n": 4}, {"11": by_strain(1e-3)}, [0.0, 1e6], settings=settings)

@@ -36,6 +36,17 @@ KACHANOV = CreepLaw(
     states={damage: State(0.0, C * (stress / (1 - damage)) ** v, limit=0.9)},
     references=("Kachanov (1958); Rabotnov (1969)",),
 )
+(phi,) = parameters("phi")
+RABOTNOV = CreepLaw(
+    name="rabotnov in damage itself",
+    terms={"creep": A * stress**n},
+    params={
+        **{key: KACHANOV.params[key] for key in (A, n, C, v)},
+        phi: Param("exponent of damage", bounds=(0, 30)),
+    },
+    states={damage: State(0.0, C * stress**v / ((1 + phi) * (1 - damage) ** phi), limit=0.99)},
+    references=("Rabotnov (1969)",),
+)
 ROOM = Program.constant(1000.0)
 SINH, HARDENING = {"A_1": 1e-9, "n_1": 2.0, "B": 80.0}, {"A_2": 1e-17, "n_2": 4.0, "m_1": -0.5}
 VALUES = {**SINH, **HARDENING, "A_3": 1e-12, "n_3": 3.0, "m_2": -0.4}
@@ -101,6 +112,18 @@ def test_damage_ends_at_its_limit_when_the_closed_form_says() -> None:
         for d in (nudge, -nudge)
     )
     np.testing.assert_allclose(result.jacobian[0, :30, 3], (up - down) / (2 * nudge), rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.parametrize(("steepness", "rtol"), [(6.0, 1e-12), (14.0, 1e-9), (30.0, 1e-9)])
+def test_a_limit_that_is_met_faster_than_any_step_is_a_rupture(steepness: float, rtol: float) -> None:
+    """w = 1 - (1 - t/t_r)^(1/(1+phi)), t_r = 1/(C s^v): past w = 0.9 less is left than doubles tell from t_r."""
+    values = {"A": 1e-15, "n": 3.0, "C": 1e-14, "v": 4.0, "phi": steepness}
+    fine = Settings(rtol=rtol, max_steps=100_000)
+    result = run(RABOTNOV, values, Program.constant(100.0), [1.0, 2e6], settings=fine, jacobian=True)
+    assert result.endings[0, 0] == STATE_LIMIT
+    assert result.end_times[0, 0] == pytest.approx(1e6, rel=1e-8)
+    assert result.end_jacobian is not None
+    np.testing.assert_allclose(result.end_jacobian[0, 0], [0, 0, -1, -np.log(100.0), 0], rtol=1e-5, atol=1e-5)
 
 
 def test_strain_hardening_continues_from_its_strain_after_steps_and_holds() -> None:

@@ -110,6 +110,7 @@ def test_a_bad_param_is_explained(case):
     [
         ({"initial": float("nan")}, "initial = nan must be a finite number"),
         ({"limit": float("inf")}, "limit = inf must be a finite number"),
+        ({"initial": 0.5, "limit": 0.5}, "it starts at its limit, 0.5, so the material would never last"),
         ({"rate": "A*stress"}, "not a sympy expression"),
     ],
 )

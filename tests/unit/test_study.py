@@ -10,7 +10,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import ExportError, HistoryError, LawError, SolveError
-from creepkit.records import History, Prediction, Status
+from creepkit.records import History, Prediction, Status, ValuedLaw
 from creepkit.registry import default
 
 READERS = """
@@ -175,6 +175,31 @@ def test_what_cannot_be_read_is_one_sentence(tmp_path: Path) -> None:
         ck.read_histories(tmp_path / "a.one")
     with pytest.raises(HistoryError, match="frist.*first"):
         ck.read_histories(tmp_path / "a.one", reader="frist")
+
+
+def test_values_set_by_hand_are_told_beside_the_notes_that_they_contradict() -> None:
+    found = ValuedLaw(ck.law("norton"), {"A": 1e-16, "n": 5.25}, ("n = 5.25, 95 % interval 5 to 5.5",))
+
+    text = ck.export(found, "c", {"A": 1e-16, "n": 4.0})
+
+    assert "n = 4 was set by hand, in place of 5.25" in text
+    assert "A = 1e-16 was" not in text
+    assert "by hand" not in ck.export(found, "c")
+    with pytest.raises(LawError, match="needs a value for A"):
+        ck.export(found, "c", {"n": 4.0})
+
+
+def test_a_valued_law_keeps_its_own_units_moduli_and_name() -> None:
+    found = ValuedLaw(
+        ck.law("norton"), {"A": 1e-16, "n": 5}, units=ck.Units("Pa", "h"), elastic=ck.Elastic(E=150e3), name="blade"
+    )
+
+    text = ck.export(found, "ansys")
+
+    assert "Numbers below are in Pa and h" in text
+    assert "MP,EX,1,150000000000" in text
+    assert "Material number 1 is blade." in text
+    assert "Numbers below are in MPa and s" in ck.export(found, "ansys", units=ck.Units())
 
 
 def test_export_writes_the_text_it_returns(tmp_path: Path) -> None:

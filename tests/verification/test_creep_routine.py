@@ -132,6 +132,15 @@ def test_the_first_increment_of_strain_hardening_is_the_closed_form_from_zero_st
     assert found[0] == pytest.approx(closed, rel=1e-10)
 
 
+@pytest.mark.parametrize("late", [1.0, 1e4])
+def test_creep_that_begins_late_is_the_same_closed_form(late, routines):
+    """As in a step after a static one, whose time the total time counts."""
+    _, v = CASES["strain hardening"]
+    found, _ = routines("strain hardening").creep(60.0, 0.0, late + 100.0, 100.0)
+    closed = ((1 - v["m"]) * v["A"] * 60.0 ** v["n"] * 100.0) ** (1 / (1 - v["m"]))
+    assert found[0] == pytest.approx(closed, rel=1e-10)
+
+
 def test_damage_follows_its_closed_form_and_stays_at_its_limit(routines):
     _, v = CASES["damage"]
     life = 1 / ((v["r"] + 1) * v["B"] * 60.0 ** v["k"])
@@ -143,6 +152,22 @@ def test_damage_follows_its_closed_form_and_stays_at_its_limit(routines):
     assert inner[0] == 0.9
     assert np.isfinite(found).all()
     assert found[0] > 0
+
+
+@pytest.mark.parametrize("folds", [1.0, 5.0, 40.0, 1e6])
+def test_a_state_that_feeds_its_own_growth_never_runs_backwards(folds, tmp_path):
+    """q' = B (q + c) and rate = q': from q = 0 the strain is c (exp(B t) - 1), at least c B t in any increment."""
+    law = CreepLaw(
+        "growth", {"term": B * (omega + c)}, {B: RATE, c: POWER}, states={omega: State(0.0, B * (omega + c))}
+    )
+    routine, inner = (
+        Routine(AbaqusCreep().text(ValuedLaw(law, {"B": 1e-4, "c": 1e-3})), tmp_path, "growth"),
+        np.zeros(10),
+    )
+    found, _ = routine.creep(60.0, 0.0, folds / 1e-4, folds / 1e-4, states=inner)
+    assert found[0] >= min(1e-3 * folds, 1.0)
+    assert inner[0] >= 0.0
+    assert np.isfinite(found).all()
 
 
 def test_states_start_at_their_initial_value_from_a_fresh_statev(routines):

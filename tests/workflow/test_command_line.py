@@ -54,6 +54,14 @@ def test_identify_leaves_json_plots_latex_and_python(identified):
     assert {p.suffix for p in folder.iterdir()} == {".json", ".png", ".tex", ".py"}
 
 
+def test_identifying_again_replaces_what_was_left(tmp_path):
+    words = ("identify", CURVES[0], "--law", "norton", "--starts", 1, "--to", tmp_path)
+    for _ in range(2):
+        result = creepkit(*words)
+        assert result.exit_code == 0, result.output
+        assert "norton.py" in result.stdout
+
+
 def test_saved_identification_reloads_and_predicts(identified):
     folder, _ = identified
     fit = ck.load(folder / "strain-hardening-arrhenius.json")

@@ -172,7 +172,7 @@ def write(ranking: Ranking, folder: Path) -> list[Path]:
     best = ranking.best
     for language, suffix in (("latex", ".tex"), ("python", ".py")):
         path = folder / f"{slug(best.law.name)}{suffix}"
-        study.export(best, language, to=path)
+        study.export(best, language, to=path, force=True)
         written.append(path)
     return written
 

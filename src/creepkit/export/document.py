@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 FORMAT = "creepkit-valued-law"
 VERSION = 1
 _KEYS = {"format", "version", "units", "gas_constant", "law", "values", "notes"}
+_MEANT = {
+    "units": {"stress": "MPa", "time": "s", "temperature": "K", "energy": "J/mol"},
+    "gas_constant": GAS_CONSTANT,
+}
+"""What the numbers of a document mean: told to other readers, and never anything else."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +40,7 @@ class JsonExporter:
         document = {
             "format": FORMAT,
             "version": VERSION,
-            "units": {"stress": "MPa", "time": "s", "temperature": "K", "energy": "J/mol"},
-            "gas_constant": GAS_CONSTANT,
+            **_MEANT,
             "law": law_to_json(source.law),
             "values": dict(source.values),
             "notes": list(source.notes),
@@ -52,6 +56,9 @@ def read_valued_law(text: str, source: str = "exported law") -> ValuedLaw:
     if set(data) != _KEYS:
         odd = ", ".join(sorted(set(data) ^ _KEYS))
         raise ExportError(f"{source}: the entries {odd} are missing or unknown; allowed are {', '.join(sorted(_KEYS))}")
+    for key, meant in _MEANT.items():
+        if data[key] != meant:
+            raise ExportError(f"{source}: '{key}' is {data[key]!r}; creepkit reads {meant!r} alone, convert the values")
     values, notes = data["values"], data["notes"]
     if not isinstance(values, dict) or any(type(v) not in (int, float) for v in values.values()):
         raise ExportError(f"{source}: 'values' must be numbers by the names of parameters")

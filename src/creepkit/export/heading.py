@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import sympy
 
@@ -63,13 +63,13 @@ def table(law: CreepLaw, values: Mapping[str, float]) -> Iterator[str]:
         yield f"  {name} = {values[name]!r}{unit}, {param.meaning}"
 
 
-def comments(lines: Iterator[str] | list[str], mark: str, width: int = 0) -> list[str]:
-    """Each line after a comment mark; whatever could end a comment is taken out.
+def comments(lines: Iterable[str], mark: str, width: int = 0) -> list[str]:
+    """Each line after a comment mark; whatever could end a comment, or carry it on to the next line, is taken out.
 
     width : 0, or the longest line allowed; longer ones are broken between words.
     """
     parts = [printable(part) for line in lines for part in (line.splitlines() or [""])]
-    return [f"{mark} {piece}".rstrip() for part in parts for piece in _broken(part, width - len(mark) - 1)]
+    return [f"{mark} {piece}".rstrip("\\ ") for part in parts for piece in _broken(part, width - len(mark) - 1)]
 
 
 def printable(text: str) -> str:

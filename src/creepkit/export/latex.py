@@ -11,6 +11,7 @@ import sympy
 
 from creepkit.export import sheet
 from creepkit.export.conversion import Converted, converted
+from creepkit.export.heading import comments
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import Activation, LawPrinter, activation_of, equations_of
 from creepkit.language.symbols import GAS_CONSTANT
@@ -31,9 +32,10 @@ class LatexExporter:
     suffix: str = ".tex"
 
     def text(self, source: ValuedLaw) -> str:
-        """Return an align environment and a tabular; notes become comments."""
+        """Return an align environment and a tabular; notes and references become comments."""
         law, numbers, printer = source.law, converted(source), LawPrinter(source.law)
-        lines = [f"% {part}" for note in (source.title, *source.notes) for part in note.splitlines()]
+        told = (source.title, *source.notes, *(f"Source: {reference}" for reference in law.references))
+        lines = comments(told, "%")
         lines += _aligned([row for left, right in equations_of(law, printer) for row in _rows(left, right)])
         lines += [rf"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
         lines += _table(source, numbers, printer)

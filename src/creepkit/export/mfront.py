@@ -126,7 +126,7 @@ def _variables(law: Integrator) -> Iterator[str]:
     yield "@StateVariable strain p;"
     yield 'p.setGlossaryName("EquivalentViscoplasticStrain");'
     for symbol, state in zip(law.states, law.source.law.states.values(), strict=True):
-        yield f"@StateVariable real {symbol}; // {printable(state.meaning)}"
+        yield from comments([state.meaning], f"@StateVariable real {symbol}; //")
         if state.limit is not None:
             room = state.limit - state.initial
             if room > 0:
@@ -143,7 +143,7 @@ def _parameters(law: Integrator) -> Iterator[str]:
     table = law.source.law.params.values()
     for (symbol, value), param in zip(law.program.parameters.items(), table, strict=True):
         unit = "" if param.unit == "1" else f"{param.unit}, "
-        yield f"@Parameter {symbol} = {value!r}; // {unit}{printable(param.meaning)}"
+        yield from comments([f"{unit}{param.meaning}"], f"@Parameter {symbol} = {value!r}; //")
 
 
 def _integrator(law: Integrator) -> Iterator[str]:

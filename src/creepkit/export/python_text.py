@@ -139,7 +139,7 @@ class _Functions:
     def _arguments(self) -> list[str]:
         meanings = _meanings(self.source.units)
         lines = [f"    {s.name} : {meanings[s.name]}" for s in POINT if self.law.uses(s)]
-        lines += [f"    {self.names[s]} : {state.meaning}" for s, state in self.law.states.items()]
+        lines += [f"    {self.names[s]} : {_quiet(state.meaning)}" for s, state in self.law.states.items()]
         idle = [s.name for s in POINT[:4] if not self.law.uses(s)]
         return [*lines, f"    {', '.join(idle)} : not used by this law"] if idle else lines
 
@@ -152,6 +152,11 @@ class _Functions:
     @staticmethod
     def _factor(factor: float) -> str:
         return "" if factor == 1 else f"{factor!r} * "
+
+
+def _quiet(text: str) -> str:
+    """Text that neither ends a docstring nor escapes in it."""
+    return printable(text).replace("\\", "/").replace('"', "'")
 
 
 def _meanings(units: Units) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from creepkit.errors import ExportError
@@ -24,6 +25,7 @@ def write_text(source: ValuedLaw, exporter: Exporter, to: str | Path, *, force: 
         temporary.write_text(text, encoding="utf-8")
         os.replace(temporary, path)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # the folder may be no folder
+            temporary.unlink(missing_ok=True)
         raise ExportError(f"{what} cannot be written to {path}: {error.strerror or error}") from None
     return path

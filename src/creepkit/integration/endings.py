@@ -16,6 +16,10 @@ REACHED_END, STRAIN_LIMIT, STATE_LIMIT, DIVERGED, STEP_TOO_SMALL, TOO_MANY_STEPS
 """Codes of an ending; whatever it is, the history so far is kept."""
 
 
+UNRESOLVED = 1e-7
+"""Share of the time passed, within which a limit ahead is the end of a march whose steps have shrunk to nothing."""
+
+
 class Limits(NamedTuple):
     """Creep strain at which the point has burst; initial states and the values at which it has failed, (S,)."""
 

@@ -28,6 +28,7 @@ from creepkit.integration.endings import (
     STATE_LIMIT,
     STEP_TOO_SMALL,
     TOO_MANY_STEPS,
+    UNRESOLVED,
     Limits,
     about_to_pass,
     crossing,
@@ -150,14 +151,15 @@ def _integrate_segment(
     slope = rate * exp(moment(clock, 1e-12).log_pace) if rate > 0.0 else nan
     s, h, growing = 0.0, min(settings.first, first), True
     before = Pace(0.0, 1.0)
+    near, steep = -1, slope
     while s < 1.0:
         h = fitted(s, h, settings.longest)
         if steps + rejected >= settings.max_steps:
             return Progress(done, reached, steps, rejected, TOO_MANY_STEPS, _time_at(clock, s))
         if not (h >= _SMALLEST_STEP * s and h >= _SMALLEST_FIRST_STEP):
-            code = _why_small(s, slope, settings)
-            if code == DIVERGED and jacobian.shape[0] > 0:
-                _diverged(clock, work, s, slope, arrivals)
+            code = STATE_LIMIT if near > 0 else _why_small(s, slope, settings)
+            if code != STEP_TOO_SMALL and jacobian.shape[0] > 0:
+                _steep_end(clock, work, s, max(near, 0), steep, arrivals)
             return Progress(done, reached, steps, rejected, code, _time_at(clock, s))
         error = _attempt(
             update, sensitivity, kernel, drive, segment, clock, settings, tableau, work, s, h, slope, first, jacobian
@@ -175,6 +177,8 @@ def _integrate_segment(
             pace = exp(now.log_pace) / now.time if now.time > 0.0 else inf
             ended = about_to_pass(kernel.limits, work, pace, _NEGLIGIBLE * settings.rtol)
             code = REACHED_END if ended < 0 else STATE_LIMIT if ended > 0 else DIVERGED
+            near = about_to_pass(kernel.limits, work, pace, UNRESOLVED)
+            steep = work.slopes[tableau.c.size - 1, max(near, 0)]
         done = _fill(clock, tableau, work, s, h, share, times, done, strain, jacobian)
         reached = arrive(clock, tableau, work, s, h, share, arrivals, reached)
         if code != REACHED_END:
@@ -245,12 +249,12 @@ def _why_small(s: float, slope: float, settings: Settings) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def _diverged(clock: Clock, work: Room, s: float, slope: float, arrivals: Arrivals) -> None:
-    """The derivative of the end where the rate diverges: there strain is vertical over time."""
+def _steep_end(clock: Clock, work: Room, s: float, v: int, slope: float, arrivals: Arrivals) -> None:
+    """The derivative of the end where unknown `v` is vertical over time: a rate that diverges, a limit just ahead."""
     now = moment(clock, s)
     pace = slope * now.time / exp(now.log_pace)
     for p in range(arrivals.end_change.size):
-        arrivals.end_change[p] = -work.change[0, p] / pace
+        arrivals.end_change[p] = -work.change[v, p] / pace
 
 
 @njit(cache=True, error_model="numpy")

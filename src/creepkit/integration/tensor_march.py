@@ -17,6 +17,7 @@ from creepkit.integration.endings import (
     STEP_TOO_SMALL,
     STRAIN_LIMIT,
     TOO_MANY_STEPS,
+    UNRESOLVED,
 )
 from creepkit.integration.segments import segments_of
 from creepkit.integration.tableau import Tableau
@@ -80,7 +81,7 @@ class March:
             if self.tried >= self.settings.max_steps:
                 return TOO_MANY_STEPS
             if not (step >= _SMALLEST_STEP * s and step >= _SMALLEST_FIRST_STEP):
-                return self._why_small(s)
+                return self._why_small(clock, s)
             self.tried += 1
             new, error = self._attempt(segment, clock, s, step)
             if not error <= 1.0:
@@ -161,7 +162,18 @@ class March:
             low, high = (low, middle) if self._limit(between) != REACHED_END else (middle, high)
         return high
 
-    def _why_small(self, s: float) -> int:
-        """A step that shrinks to nothing while the rate would burst the point at once: the rate diverges."""
+    def _why_small(self, clock: Clock, s: float) -> int:
+        """A step that shrinks to nothing: at a limit just ahead, or while the rate would burst the point at once."""
+        if s > 0.0 and self._limit_ahead(clock, s):
+            return STATE_LIMIT
         rate = self.slopes[-1, EQUIVALENT] * max(s, 1e-6)
         return DIVERGED if rate > self.settings.strain_limit else STEP_TOO_SMALL
+
+    def _limit_ahead(self, clock: Clock, s: float) -> bool:
+        """Whether a state that moves ever faster will pass its limit before the time has grown by UNRESOLVED of it."""
+        gap = self.point.law.limits - self.value[EQUIVALENT + 1 :]
+        first, last = self.slopes[[0, -1], EQUIVALENT + 1 :]
+        now = moment(clock, s)
+        reach = UNRESOLVED * np.abs(last) * now.time / exp(now.log_pace)
+        faster = (last * gap > 0.0) & (np.abs(last) > np.abs(first))
+        return bool((faster & (np.abs(gap) < reach)).any())

@@ -126,6 +126,11 @@ class State:
                 raise LawError(f"state '{self.meaning}': {name} = {value!r} must be a finite number")
         object.__setattr__(self, "initial", float(self.initial))
         object.__setattr__(self, "limit", None if self.limit is None else float(self.limit))
+        if self.limit == self.initial:
+            raise LawError(
+                f"state '{self.meaning}': it starts at its limit, {self.limit:g}, so the material would never last; "
+                "write limit=None for a state without one"
+            )
         try:
             object.__setattr__(self, "rate", sympy.sympify(self.rate, strict=True))
         except sympy.SympifyError:

@@ -41,20 +41,16 @@ def export(
     ExportError, with the reason, when the target cannot express the law.
     """
     from creepkit.export.writing import write_text
-    from creepkit.inverse.identification import Identification
 
     exporter = registry.default().exporter(target)
-    if isinstance(source, Identification):
-        from creepkit.inverse.printing import notes_of
-
-        law, values, notes = source.law, source.values if values is None else values, [*notes_of(source), *notes]
-    elif isinstance(source, ValuedLaw):
-        law, values, notes = source.law, source.values if values is None else values, [*source.notes, *notes]
-    else:
-        law, values = law_given(source), values or {}
     if temperature is not None:
         notes = [*notes, f"taken at a temperature of {temperature:g} K"]
-    valued = ValuedLaw(law, values, tuple(notes), _units(units), elastic, name)
+    valued = _valued(source, values, notes)
+    valued = valued.replace(
+        units=valued.units if units is None else _units(units),
+        elastic=elastic or valued.elastic,
+        name=name or valued.name,
+    )
     if temperature is not None:
         valued = valued.at(temperature)
     if to is not None:
@@ -67,9 +63,28 @@ def exporters() -> dict[str, Exporter]:
     return {name: found.value for name, found in registry.default().exporters().items()}
 
 
-def _units(given: Units | Mapping[str, str] | None) -> Units:
-    if given is None or isinstance(given, Units):
-        return given or Units()
+def _valued(
+    source: CreepLaw | Identification | ValuedLaw | str, values: Mapping[str, float] | None, notes: Sequence[str]
+) -> ValuedLaw:
+    """The source with its own values, or those given in their place, which its notes then tell."""
+    from creepkit.inverse.identification import Identification
+
+    if isinstance(source, Identification):
+        from creepkit.inverse.printing import notes_of
+
+        source = ValuedLaw(source.law, source.values, tuple(notes_of(source)))
+    if not isinstance(source, ValuedLaw):
+        return ValuedLaw(law_given(source), values or {}, tuple(notes))
+    own, found = source.values, source if values is None else source.replace(values=values)
+    changed = [
+        f"{k} = {v:.8g} was set by hand, in place of {own[k]:.8g}" for k, v in found.values.items() if v != own[k]
+    ]
+    return found.replace(notes=(*source.notes, *changed, *notes))
+
+
+def _units(given: Units | Mapping[str, str]) -> Units:
+    if isinstance(given, Units):
+        return given
     odd = sorted({*given} - {"stress", "time"})
     if odd:
         raise ExportError(f"units have no '{odd[0]}'; write units={{'stress': 'Pa', 'time': 'h'}}")

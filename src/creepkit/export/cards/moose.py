@@ -22,7 +22,7 @@ _INSTEAD = "export it as 'mfront', whose Abaqus interface AbaqusUMATStress calls
 _FORMULA = (
     "PowerLawCreepStressUpdate: rate = coefficient s^n_exponent exp(-activation_energy/(gas_constant T)) "
     "(t - start_time)^m_exponent, of equivalent stress s; ComputeMultipleInelasticStress adds the models. "
-    "t is the analysis time: start_time is when the load begins."
+    "t is the analysis time: start_time is when the load begins. It takes strain = FINITE, or incremental = true."
 )
 
 _BASES = ("stress", "elasticity")

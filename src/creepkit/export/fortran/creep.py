@@ -22,8 +22,11 @@ from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT, mean_stress, principal_stress, temperature, time
 from creepkit.records import ValuedLaw
 
-_LONGEST_ID = 24
-"""Characters of a routine's stem; with its endings it stays a name by any standard."""
+_LONGEST = 31
+"""Characters of a name by any standard since Fortran 90; a longer one might not fit into a line either."""
+
+_LONGEST_ID = 20
+"""Characters of a routine's stem; with its endings it stays a name."""
 
 
 class CreepRoutine:
@@ -40,8 +43,9 @@ class CreepRoutine:
     def text(self, source: ValuedLaw) -> str:
         """Return the file's text; ExportError where CREEP is not told what the law needs."""
         self._check(source.law)
-        program = Program(source, Identifiers(RESERVED, ignore_case=True))
         stem = Identifiers(("creep",), ignore_case=True, longest=_LONGEST_ID).name(source.name or source.law.name)
+        reserved = RESERVED | {f"{stem}_law"}
+        program = Program(source, Identifiers(reserved, ignore_case=True, longest=_LONGEST))
         given = self._given(program, stem.lower())
         head = [*heading(program.source, floors=True), *program.renamed(), "", *self.usage(program)]
         templates = [f"{self.name}.f", "increment.f"]
@@ -85,6 +89,7 @@ class CreepRoutine:
             "ns": str(len(states)),
             "nx": str(len(POINT) + len(states)),
             "beta": number(program.leading()),
+            "late": "" if law.uses(time) else "        if (.not. strain > 0.0d0) origin = max(start, 0.0d0)\n",
             "mpa": number(units.megapascals),
             "seconds": number(units.seconds),
             "stress": units.stress,

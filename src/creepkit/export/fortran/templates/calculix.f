@@ -18,7 +18,7 @@
       double precision, parameter :: t_first = 0.0d0
       double precision, parameter :: to_kelvin = 0.0d0
 !
-!     $stress in MPa, and $time in s
+!     1 $stress in MPa, and 1 $time in s
       double precision, parameter :: mpa = $mpa
       double precision, parameter :: seconds = $seconds
 !

@@ -3,6 +3,8 @@
 ! Creep over one increment at constant stress: the implicit
 ! midpoint rule in the clock s = t**beta, in which creep begins as
 ! a straight line, so t = 0 and zero strain are no singularities.
+! t is the time of the law or, where that does not matter and there
+! is no creep strain as yet, the time since the increment began.
 ! The strain at the end is solved for here (Newton in ln of the
 ! increment); where that fails the step is halved, and halved again.
 ! The very first increment, in which a sum of terms is smooth in no
@@ -21,12 +23,14 @@
         double precision, intent(inout) :: y(ny)
         double precision, intent(out) :: slope(ny, 2)
         double precision, parameter :: beta = $beta
-        double precision low, high, place, most, size, point(6)
+        double precision low, high, place, most, size, point(7)
+        double precision origin
         logical solved
-        low = max(start, 0.0d0)**beta
-        high = max(finish, 0.0d0)**beta
+        origin = 0.0d0
+$late        low = max(start - origin, 0.0d0)**beta
+        high = max(finish - origin, 0.0d0)**beta
         point = (/ start, finish - start, warm(1), warm(2), beta,
-     &      strain /)
+     &      strain, origin /)
         slope = 0.0d0
         most = high - low
         if (.not. low > 0.0d0) most = most/16
@@ -59,7 +63,7 @@
      &    solved)
         implicit none
         integer, parameter :: ny = $ny, nx = $nx
-        double precision, intent(in) :: s, ds, point(6), stress, mean
+        double precision, intent(in) :: s, ds, point(7), stress, mean
         double precision, intent(inout) :: y(ny), slope(ny, 2)
         logical, intent(out) :: solved
         double precision x(nx), out(ny*(1 + nx)), a(ny, ny)
@@ -96,12 +100,13 @@
 !
       subroutine ${id}_place(s, ds, point, stress, mean, x, h)
         implicit none
-        double precision, intent(in) :: s, ds, point(6), stress, mean
+        double precision, intent(in) :: s, ds, point(7), stress, mean
         double precision, intent(out) :: x($nx), h
-        double precision middle, time
+        double precision middle, time, clock
         middle = s + 0.5d0*ds
-        time = middle**(1.0d0/point(5))
-        h = ds*time/(point(5)*middle)
+        clock = middle**(1.0d0/point(5))
+        time = point(7) + clock
+        h = ds*clock/(point(5)*middle)
         x = 0.0d0
         x(1) = stress
         x(3) = time
@@ -119,7 +124,7 @@
       subroutine ${id}_rupture(s, ds, point, stress, mean, y, slope)
         implicit none
         integer, parameter :: ny = $ny, nx = $nx
-        double precision, intent(in) :: s, ds, point(6), stress, mean
+        double precision, intent(in) :: s, ds, point(7), stress, mean
         double precision, intent(inout) :: y(ny), slope(ny, 2)
         double precision x(nx), out(ny*(1 + nx)), grown, h, ends(ny)
         integer i

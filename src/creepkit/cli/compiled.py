@@ -1,0 +1,45 @@
+"""Where compiled code is kept: a folder of its own for each state of the sources.
+
+numba looks at the file of a compiled function alone, not at those it calls, so code cached beside the sources would
+outlive an edit or an upgrade. The command line, the set-up and the tests share this folder.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import zlib
+from pathlib import Path
+
+_SOURCES = Path(__file__).parents[1]
+_COMPILED = ("integration/*.py", "kernels/*.py", "fem/*.py", "specimens/gaussian_*.py")
+_STATES_KEPT = 3
+
+
+def share_compiled_code() -> None:
+    """Let numba keep its code in that folder unless NUMBA_CACHE_DIR is set; numba must not be imported yet."""
+    if "NUMBA_CACHE_DIR" not in os.environ:
+        folder = compiled_folder()
+        os.environ["NUMBA_CACHE_DIR"] = str(folder)
+        _forget_old(folder)
+
+
+def compiled_folder() -> Path:
+    """The folder for these sources, in CREEPKIT_CACHE or the user's cache folder."""
+    total = 0
+    for pattern in _COMPILED:
+        for path in sorted(_SOURCES.glob(pattern)):
+            total = zlib.crc32(path.read_bytes(), total)
+    chosen = os.environ.get("CREEPKIT_CACHE")
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "creepkit"
+    return Path(chosen or cache) / "compiled" / f"{total:08x}"
+
+
+def _forget_old(folder: Path) -> None:
+    """Remove what the oldest states of the sources have left; another process may be at it too."""
+    if folder.is_dir():
+        os.utime(folder)
+        return
+    others = sorted(folder.parent.glob("*"), key=lambda path: path.stat().st_mtime, reverse=True)
+    for old in others[_STATES_KEPT:]:
+        shutil.rmtree(old, ignore_errors=True)
