@@ -39,8 +39,8 @@ $late        low = max(start - origin, 0.0d0)**beta
         do
           size = min(size, high - place)
           if (.not. size > 1.0d-12*high) return
-          call ${id}_step(place, size, point, stress, mean, y, slope,
-     &        solved)
+          call ${id}_step(place, size, point, stress, mean,
+     &        size <= (high - low)/4096, y, slope, solved)
           if (solved) then
             place = place + size
             size = min(2*size, most)
@@ -57,17 +57,20 @@ $late        low = max(start - origin, 0.0d0)**beta
 ! One step of the clock, from s to s + ds; y and slope stay as they
 ! are where it has no solution. One with a diagonal term of Newton's
 ! matrix below zero is none: a variable that feeds its own growth
-! runs backwards in it, as the step is too long.
+! runs backwards in it, as the step is too long. So is one in whose
+! second half a rate changes by a quarter, unless it is the smallest.
 !
-      subroutine ${id}_step(s, ds, point, stress, mean, y, slope,
-     &    solved)
+      subroutine ${id}_step(s, ds, point, stress, mean, smallest, y,
+     &    slope, solved)
         implicit none
         integer, parameter :: ny = $ny, nx = $nx
         double precision, intent(in) :: s, ds, point(7), stress, mean
+        logical, intent(in) :: smallest
         double precision, intent(inout) :: y(ny), slope(ny, 2)
         logical, intent(out) :: solved
         double precision x(nx), out(ny*(1 + nx)), a(ny, ny)
         double precision r(ny, 3), z(ny), grown, h, least
+        double precision moved(ny), again(ny*(1 + nx)), hend
         integer i, pass
         call ${id}_place(s, ds, point, stress, mean, x, h)
         z = y
@@ -88,6 +91,19 @@ $late        low = max(start - origin, 0.0d0)**beta
         solved = solved .and. z(1) < 0.0d0 .and. least > 0.0d0
         if (.not. solved) return
         grown = exp(z(1))
+        if (.not. smallest) then
+          moved = z
+          moved(1) = y(1) + grown
+          call ${id}_place(s + 0.5d0*ds, ds, point, stress, mean, x,
+     &        hend)
+          call ${id}_look(x, point(6), moved, moved, 0.0d0, again)
+          solved = abs(log(hend/h) + again(1) - out(1)) < 0.25d0 .or.
+     &        max(out(1), again(1)) + log(h) < -600.0d0
+          moved = hend*again(1:ny) - h*out(1:ny)
+          solved = solved .and. all(abs(moved(2:)) <= 1.0d-3 +
+     &        0.25d0*h*abs(out(2:ny)))
+          if (.not. solved) return
+        endif
         slope(1, :) = slope(1, :) + grown*r(1, 2:3)
         y(1) = y(1) + grown
         slope(2:, :) = r(2:, 2:3)
