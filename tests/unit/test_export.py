@@ -86,10 +86,12 @@ def test_what_has_no_limits_writes_every_law_with_its_notes(law, exporter):
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 def test_json_comes_back_equal(law):
     values = {name: value * 1.0000000000000002 for name, value in law.center().items()}
-    back = read_valued_law(text_of(law, values, JsonExporter(), NOTES))
+    covered = {"stress": (20.0, 80.0), "temperature": (1000.0, 1100.0)}
+    back = read_valued_law(JsonExporter().text(ValuedLaw(law, values, NOTES, ranges=covered)))
     assert back.law == law
     assert dict(back.values) == values
     assert back.notes == NOTES
+    assert dict(back.ranges) == covered
 
 
 def test_json_states_units_and_the_gas_constant():
@@ -111,7 +113,8 @@ def _json(**changes):
         ("[" * 100_000, "nested too deep"),
         ('{"format": ' + "9" * 5000 + "}", "integer too long"),
         ("[]", "not a law that creepkit exported"),
-        (_json(version=2), "not a law that creepkit exported"),
+        (_json(version=1), "in version 1 of the format; this one reads version 2: export the law again"),
+        (_json(ranges={"temperature": [1100, 900]}), "'ranges' must be pairs of numbers, the lower first"),
         (_json(script="import os"), "the entries script are missing or unknown"),
         (_json(values=[1]), "'values' must be numbers"),
         (_json(values={"A": True, "n": 1}), "'values' must be numbers"),

@@ -328,3 +328,11 @@ def test_there_are_no_stray_golden_files():
     assert {
         p.name for p in GOLDEN.iterdir() if p.name.split("_")[0] in EXPORTERS or p.name.startswith("code_aster")
     } == {*golden_cases()}
+
+
+def test_a_table_covers_what_the_tests_did():
+    law = STRAIN_HARDENING.times(arrhenius(T_ref=1073.15))
+    values = {"A": 1e-16, "n": 4.0, "m": -0.3, "Q": 3e5}
+    text = AbaqusCards().text(ValuedLaw(law, values, ranges={"temperature": (1023.15, 1073.15)}))
+    kelvin = [float(line.split(",")[-1]) for line in text.splitlines() if line[:1].isdigit()]
+    assert (kelvin[0], kelvin[-1]) == (998.15, 1098.15)

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
 
 FORMAT = "creepkit-valued-law"
-VERSION = 1
-_KEYS = {"format", "version", "units", "gas_constant", "law", "values", "notes"}
+VERSION = 2
+_KEYS = {"format", "version", "units", "gas_constant", "law", "values", "notes", "ranges"}
 _MEANT = {
     "units": {"stress": "MPa", "time": "s", "temperature": "K", "energy": "J/mol"},
     "gas_constant": GAS_CONSTANT,
@@ -44,6 +44,7 @@ class JsonExporter:
             "law": law_to_json(source.law),
             "values": dict(source.values),
             "notes": list(source.notes),
+            "ranges": {name: list(ends) for name, ends in source.ranges.items()},
         }
         return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -51,8 +52,13 @@ class JsonExporter:
 def read_valued_law(text: str, source: str = "exported law") -> ValuedLaw:
     """Return what JsonExporter wrote; ExportError or LawError, naming `source`, when it is anything else."""
     data = _parsed(text, source)
-    if not isinstance(data, dict) or data.get("format") != FORMAT or data.get("version") != VERSION:
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise ExportError(f"{source}: this is not a law that creepkit exported (format '{FORMAT}', version {VERSION})")
+    if data.get("version") != VERSION:
+        raise ExportError(
+            f"{source}: written by another creepkit, in version {data.get('version')!r} of the format; "
+            f"this one reads version {VERSION}: export the law again"
+        )
     if set(data) != _KEYS:
         odd = ", ".join(sorted(set(data) ^ _KEYS))
         raise ExportError(f"{source}: the entries {odd} are missing or unknown; allowed are {', '.join(sorted(_KEYS))}")
@@ -65,7 +71,22 @@ def read_valued_law(text: str, source: str = "exported law") -> ValuedLaw:
     if not isinstance(notes, list) or any(type(note) is not str for note in notes):
         raise ExportError(f"{source}: 'notes' must be a list of texts")
     law = law_from_json(data["law"], source)
-    return ValuedLaw(law, values, tuple(notes))
+    return ValuedLaw(law, values, tuple(notes), ranges=_ranges(data["ranges"], source))
+
+
+def _ranges(found: Any, source: str) -> dict[str, tuple[float, float]]:
+    """What tests covered: two numbers by name, the lower first."""
+    if not isinstance(found, dict) or not all(map(_is_range, found.values())):
+        raise ExportError(
+            f"{source}: 'ranges' must be pairs of numbers, the lower first, by the names of what they are"
+        )
+    return {str(name): (float(low), float(high)) for name, (low, high) in found.items()}
+
+
+def _is_range(pair: Any) -> bool:
+    return (
+        isinstance(pair, list) and [type(v) in (int, float) for v in pair] == [True, True] and bool(pair[0] <= pair[1])
+    )
 
 
 def read_source(path: str | Path) -> Identification | ValuedLaw:

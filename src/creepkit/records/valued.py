@@ -59,6 +59,7 @@ class ValuedLaw:
     notes : lines that become comments: intervals, range of validity, provenance.
     units : of the text wanted. elastic : E in MPa, and nu, for targets that state them.
     name : what the target is to call the law; by default the law's own name, made an identifier.
+    ranges : {"stress": (low, high) MPa, "temperature": K, "strain", "time": s} that the tests covered, where known.
     """
 
     law: CreepLaw
@@ -67,10 +68,12 @@ class ValuedLaw:
     units: Units = field(default_factory=Units)
     elastic: Elastic | None = None
     name: str = ""
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", MappingProxyType(self.law.values(self.values)))
         object.__setattr__(self, "notes", tuple(self.notes))
+        object.__setattr__(self, "ranges", MappingProxyType(dict(self.ranges)))
 
     @property
     def title(self) -> str:

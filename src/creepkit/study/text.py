@@ -72,7 +72,7 @@ def _valued(
     if isinstance(source, Identification):
         from creepkit.inverse.printing import notes_of
 
-        source = ValuedLaw(source.law, source.values, tuple(notes_of(source)))
+        source = ValuedLaw(source.law, source.values, tuple(notes_of(source)), ranges=source.ranges)
     if not isinstance(source, ValuedLaw):
         return ValuedLaw(law_given(source), values or {}, tuple(notes))
     own, found = source.values, source if values is None else source.replace(values=values)

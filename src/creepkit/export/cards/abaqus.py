@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from creepkit.errors import ExportError
 from creepkit.export.cards.forms import Form, forms_of
-from creepkit.export.cards.text import figure, grid, moduli, number, top
+from creepkit.export.cards.text import figure, grid, moduli, number, top, warmth
 from creepkit.export.identifiers import Identifiers
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import ValuedLaw
@@ -34,7 +34,7 @@ _TABLE = (
 
 @dataclass(frozen=True)
 class AbaqusCards:
-    """Material cards with one of Abaqus' own creep laws; low, high : K, of tables against temperature."""
+    """Material cards with one of Abaqus' own creep laws; low, high : K, of tables where no tests are known."""
 
     name: str = "abaqus-cards"
     title: str = "Abaqus material cards with one of its own creep laws (*CREEP)"
@@ -49,10 +49,11 @@ class AbaqusCards:
         names = Identifiers((), ignore_case=True, longest=80)
         wanted = source.name or source.law.name
         label = names.name(wanted)
-        rows = moduli(source, grid(self.low, self.high, 25.0))
+        rows = moduli(source, grid(*warmth(source, self.low, self.high), 25.0))
         elastic = [_data(m.E, m.nu, *_listed(m.T)) for m in rows]
         cards = [f"*MATERIAL, NAME={label}", *(["*ELASTIC", *elastic] if elastic else []), *creep.cards]
-        about = [*names.told([wanted]), *creep.about]
+        missing = [] if elastic else ["*ELASTIC is missing: no modulus was given; write it beside *CREEP."]
+        about = [*names.told([wanted]), *creep.about, *missing]
         return "\n".join([*top(source, "**", about), *cards]) + "\n"
 
     def _creep(self, source: ValuedLaw, forms: Sequence[Form]) -> _Creep:
@@ -79,9 +80,10 @@ class AbaqusCards:
         notation = _time(form, m) if form.time else _strain(form, m)
         if not form.Q:
             return notation.creep(source, [(form.log_coefficient, None)])
-        step = _spacing(form, self.low)
-        rows = [(form.at(T), T) for T in grid(self.low, self.high, step)]
-        told = _TABLE.format(low=self.low, high=self.high, step=step, tolerance=_INTERPOLATION)
+        low, high = warmth(source, self.low, self.high)
+        step = _spacing(form, low)
+        rows = [(form.at(T), T) for T in grid(low, high, step)]
+        told = _TABLE.format(low=low, high=high, step=step, tolerance=_INTERPOLATION)
         return notation.creep(source, rows, told)
 
 

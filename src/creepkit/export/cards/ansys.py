@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from creepkit.errors import ExportError
 from creepkit.export.cards.forms import Form, forms_of
-from creepkit.export.cards.text import Moduli, figure, grid, moduli, number, top
+from creepkit.export.cards.text import Moduli, figure, grid, moduli, number, top, warmth
 from creepkit.records import ValuedLaw
 
 _INSTEAD = "export it as 'c' or 'abaqus', and call that rate in a USERCREEP subroutine"
@@ -47,7 +47,7 @@ class AnsysCards:
         if any(form.time for form in forms):
             about.append("t is the analysis time, which must start with the load.")
         about.append(f"Material number 1 is {source.name or source.law.name}.")
-        lines = [*_elastic(moduli(source, grid(self.low, self.high, 50.0)))]
+        lines = [*_elastic(moduli(source, grid(*warmth(source, self.low, self.high), 50.0)))]
         lines += [f"TB,CREEP,1,1,{len(constants)},{option}"]
         lines += [f"TBDATA,{k + 1},{_listed(constants[k : k + 6])}" for k in range(0, len(constants), 6)]
         return "\n".join([*top(source, "!", about), *lines]) + "\n"

@@ -39,6 +39,12 @@ def figure(value: float) -> str:
     return f"{value:.13g}"
 
 
+def warmth(source: ValuedLaw, low: float, high: float) -> tuple[float, float]:
+    """Ends of tables against temperature, K: what the tests covered and 25 K to each side, else `low` and `high`."""
+    covered = source.ranges.get("temperature")
+    return (low, high) if covered is None else (covered[0] - 25.0, covered[1] + 25.0)
+
+
 def grid(low: float, high: float, step: float) -> list[float]:
     """From low in steps to high, and high itself."""
     return [*(low + step * k for k in range(math.ceil((high - low) / step - 1e-9))), high]
