@@ -106,7 +106,8 @@ def march(batch: Batch, rates: Rates) -> Ended:
     amplitude, exponent = np.zeros(shape), np.ones(shape)
     amplitude[0] = batch.elastic[0]
     for j in range(1, shape[0]):
-        after, exponent[j] = _stepped(batch, rates, clock, j, state)
+        with np.errstate(invalid="ignore"):  # infinities of a row that bursts; _ended looks at what comes of them
+            after, exponent[j] = _stepped(batch, rates, clock, j, state)
         reached = batch.elastic[j] + after.creep
         lost, burst = _ended(batch, after, reached)
         alive = status == Status.COMPLETE
