@@ -1,6 +1,20 @@
 """What unit tests share."""
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 sys.path.insert(0, str(Path(__file__).parent))
+
+
+@pytest.fixture
+def own_registry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A test that is a process of its own: a new registry, and an empty folder to work in."""
+    from creepkit.registry import default
+
+    monkeypatch.chdir(tmp_path)
+    default.cache_clear()
+    yield
+    default.cache_clear()

@@ -2,15 +2,13 @@
 
 import json
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner, Result
+from command_line import creepkit, one_line
 
 import creepkit as ck
-from creepkit.cli.app import COMMANDS, app
-from creepkit.registry import default
+from creepkit.cli.app import COMMANDS
 
 FALLING = """
 from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress
@@ -60,25 +58,7 @@ def creepkit_commands(app: typer.Typer) -> None:
 """
 
 
-@pytest.fixture(autouse=True)
-def _own_registry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Each test is a process of its own: a new registry, and an empty folder to work in."""
-    monkeypatch.chdir(tmp_path)
-    default.cache_clear()
-    yield
-    default.cache_clear()
-
-
-def creepkit(*words: str) -> Result:
-    return CliRunner().invoke(app, words)
-
-
-def one_line(result: Result) -> str:
-    """The message of an error of ours: exit 1, nothing on stdout, one line on stderr."""
-    assert (result.exit_code, result.stdout) == (1, "")
-    assert result.stderr.startswith("creepkit: ")
-    assert result.stderr.count("\n") == 1
-    return result.stderr
+pytestmark = pytest.mark.usefixtures("own_registry")
 
 
 # ---- global --------------------------------------------------------------------------------------------------------

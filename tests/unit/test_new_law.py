@@ -3,14 +3,12 @@
 import json
 import math
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner, Result
+from command_line import creepkit, one_line
 
 import creepkit as ck
-from creepkit.cli.app import app
 from creepkit.errors import LawError
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.language.tree import law_from_json, law_to_json
@@ -21,22 +19,7 @@ ROOT = Path(__file__).parents[2]
 A, n = parameters("A n")
 
 
-@pytest.fixture(autouse=True)
-def _own_registry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.chdir(tmp_path)
-    default.cache_clear()
-    yield
-    default.cache_clear()
-
-
-def creepkit(*words: str) -> Result:
-    return CliRunner().invoke(app, words)
-
-
-def one_line(result: Result) -> str:
-    assert (result.exit_code, result.stdout) == (1, "")
-    assert result.stderr.count("\n") == 1
-    return result.stderr
+pytestmark = pytest.mark.usefixtures("own_registry")
 
 
 # ---- what it writes ------------------------------------------------------------------------------------------------

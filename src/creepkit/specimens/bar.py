@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
@@ -93,15 +94,8 @@ class Bar:
 
         effects : "temperature" (K above what the history says) and "modulus" (relative change).
         """
-
-        def plain(values: Mapping[str, ArrayLike], histories: Sequence[History], jacobian: bool) -> Prediction:
-            return self._predict(law, values, histories, jacobian)
-
-        if effects:
-            return predict_with(
-                plain, values, histories, effects, jacobian, softening=self.softening, specimen=self.name
-            )
-        return plain(values, histories, jacobian)
+        plain = partial(self._predict, law)
+        return predict_with(plain, values, histories, effects, jacobian, softening=self.softening, specimen=self.name)
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> Run:
         """Run one test: what its history would show at its times, and how it ended."""

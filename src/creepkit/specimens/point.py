@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
@@ -94,13 +94,8 @@ class Point:
 
         effects : "temperature" (K above what the history says) and "modulus" (relative change).
         """
-
-        def plain(values: Mapping[str, ArrayLike], histories: Sequence[History], jacobian: bool) -> Prediction:
-            return self._predict(law, values, histories, jacobian)
-
-        if effects:
-            return predict_with(plain, values, histories, effects, jacobian, specimen=self.name)
-        return plain(values, histories, jacobian)
+        plain = partial(self._predict, law)
+        return predict_with(plain, values, histories, effects, jacobian, specimen=self.name)
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> PointRun:
         """Run one test, keeping all tensors and the states of the law; see PointRun."""

@@ -29,17 +29,19 @@ def predict_with(
     plain: Plain,
     values: Mapping[str, ArrayLike],
     histories: Sequence[History],
-    effects: Effects,
+    effects: Effects | None,
     jacobian: bool,
     *,
     softening: Softening | None = None,
     specimen: str = "uniaxial",
 ) -> Prediction:
-    """Predict with effects, a candidate at a time where they differ from candidate to candidate.
+    """Predict with effects, if there are any, a candidate at a time where they differ from candidate to candidate.
 
     Derivatives are central differences, of 0.1 K and of a thousandth of the modulus to each side, but for that to the
     modulus where `softening` gives it.
     """
+    if not effects:
+        return plain(values, histories, jacobian)
     for kind in effects:
         if kind not in KINDS:
             known = " and ".join(KINDS)
