@@ -177,13 +177,22 @@ def test_two_plugins_with_one_name_are_both_named(install: Write, write: Write) 
     registry.load_file(file)
 
     with pytest.raises(PluginError) as caught:
-        registry.laws()
+        registry.law("same")
 
     told = str(caught.value)
     assert "the law 'same' is offered twice" in told
     assert "plugin 'mine' (first-pack 1.2)" in told
     assert f"plugin 'second' ({file.resolve()})" in told
     assert registry.clashes() == (told,)
+
+
+def test_a_clash_takes_no_other_law_down(install: Write, write: Write) -> None:
+    install("first-pack", LAW.format(name="same"))
+    registry = Registry()
+    registry.load_file(write("second", LAW.format(name="same")))
+
+    assert registry.law("norton").name == "norton"
+    assert "same" not in registry.laws()
 
 
 def test_one_plugin_with_a_name_twice_is_broken(write: Write) -> None:

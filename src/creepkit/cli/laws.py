@@ -29,6 +29,8 @@ def command(
     else:
         rows = [(law.name, law.title, " ".join(law.names)) for law in (found.value for found in known.values())]
         print_table(f"{len(rows)} laws", ("name", "title", "parameters"), rows)
+        for sentence in registry.default().clashes():
+            typer.echo(f"left out: {sentence}", err=True)
 
 
 def _show_one(law: CreepLaw, found: Registered[CreepLaw], as_json: bool) -> None:

@@ -73,7 +73,7 @@ class Registry:
 
     def clashes(self) -> tuple[str, ...]:
         """Return one sentence for each name that two plugins offer."""
-        return tuple(clash for kind in kinds.KINDS for clash in _merged(kind, self.plugins())[1])
+        return tuple(clash for kind in kinds.KINDS for clash in _merged(kind, self.plugins())[1].values())
 
     def laws(self) -> dict[str, Registered[CreepLaw]]:
         """Return {name: registered law}."""
@@ -129,15 +129,14 @@ class Registry:
         return form
 
     def _all(self, kind: Kind) -> dict[str, Registered[Any]]:
-        found, clashes = _merged(kind, self.plugins())
-        if clashes:
-            raise PluginError(clashes[0])
-        return found
+        return _merged(kind, self.plugins())[0]
 
     def _one(self, kind: Kind, name: str) -> Any:
-        known = self._all(kind)
+        known, clashes = _merged(kind, self.plugins())
         if name in known:
             return known[name].value
+        if name in clashes:
+            raise PluginError(clashes[name])
         package = package_of(name) if kind is kinds.LAW else ""
         broken = sum(bool(plugin.problem) for plugin in self.plugins())
         hint = f"; {broken} plugin(s) could not be loaded, see 'creepkit plugins'" if broken else ""
@@ -214,15 +213,15 @@ def default() -> Registry:
     return Registry()
 
 
-def _merged(kind: Kind, plugins: Iterable[Plugin]) -> tuple[dict[str, Registered[Any]], list[str]]:
-    """Return {name: registered} over plugins, and one sentence for each name that is offered twice."""
+def _merged(kind: Kind, plugins: Iterable[Plugin]) -> tuple[dict[str, Registered[Any]], dict[str, str]]:
+    """Return {name: registered} over plugins, and {name: a sentence} for each that two offer, which is left out."""
     found: dict[str, Registered[Any]] = {}
-    clashes = []
+    clashes: dict[str, str] = {}
     for plugin in plugins:
         for name, value in plugin.offers.get(kind.word, {}).items():
             if name in found:
                 culprits = f"{found[name].provenance} and by {plugin.provenance}"
-                clashes.append(f"the {kind.word} '{name}' is offered twice, by {culprits}; rename one or uninstall it")
+                clashes[name] = f"the {kind.word} '{name}' is offered twice, by {culprits}; rename one or uninstall it"
             else:
                 found[name] = Registered(value, plugin.provenance)
-    return found, clashes
+    return {name: one for name, one in found.items() if name not in clashes}, clashes
