@@ -100,6 +100,23 @@ def test_rupture_times_scatter_as_planted(planted):
     assert found.z_factor < 2.0
 
 
+@pytest.mark.parametrize("planted", ["Liu-Murakami"], indirect=True)
+def test_what_tension_cannot_tell_costs_the_other_parameters_nothing(planted):
+    """The share of the largest principal stress moves nothing in tension: freeing it says that, and no more."""
+    law, _, tests, fit = planted
+    free = ck.identify(EQUATIONS["Liu-Murakami"], tests, using=BAR, starts=3, frames=20)
+    assert free.converged
+    found = {e.name: e for e in free.estimates}
+    share = found.pop("a")
+    assert (share.low, share.high, share.verdict) == (0.0, 1.0, "not determined")
+    assert free.freedom == pytest.approx(fit.freedom, rel=0.02)
+    assert max(ranked.excess for ranked in ck.rank([fit, free]).laws) < 0.1
+    for e in fit.estimates:
+        inner, free_one = law.table[e.name].to_internal, found[e.name]
+        width = inner(free_one.high) - inner(free_one.low)
+        assert width == pytest.approx(inner(e.high) - inner(e.low), rel=0.05)
+
+
 def test_a_condition_left_out_is_predicted():
     tests = campaign(OMEGA, {"A": 1e-16, "n": 4.0, "m": 20.0}, [60, 80, 100, 120], 3)
     fit = ck.identify(OMEGA, tests, using=BAR, starts=3, frames=16)
@@ -201,6 +218,23 @@ def test_how_a_test_ended_survives_pickling():
         bar = History("bar", np.array([1.0, 10.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0, **end)
         back = pickle.loads(pickle.dumps(bar))
         assert (back.rupture_time, back.unruptured, back.ended) == (bar.rupture_time, bar.unruptured, bool(end))
+
+
+def test_percent_taken_for_strain_shows_in_tests_followed_to_their_end_as_well():
+    tests = campaign(NORTON, {"A": 1e-14, "n": 4.0}, [60, 80, 110], 1)
+    percent = [h.replace(outputs={"strain": 100 * h.outputs["strain"]}) for h in tests]
+    for wrong, given in ((True, percent), (False, tests)):
+        fit = ck.identify(NORTON, given, using=BAR, starts=2, frames=8)
+        assert any("a column in percent must say so" in note for note in fit.notes) == wrong
+
+
+def test_a_plan_is_followed_to_its_rupture_however_short_it_is():
+    """Ends 300 to 10^4 times beyond the last time given, as where a law is far from a test: late, and not never."""
+    values = {"A": 1e-14, "n": 4.0}
+    fit = ck.identify(NORTON, campaign(NORTON, values, [60, 80, 110], 1), using=BAR, starts=2, frames=10)
+    expected = fit.rupture_time(80.0)[0]
+    plans = [History(f"{k}", expected / [k], {}, constant_stress(80.0), 1000.0) for k in (3e2, 1e4)]
+    np.testing.assert_allclose(fit.rupture_times(plans)[0], expected, rtol=1e-3)
 
 
 # ---- bad input ----------------------------------------------------------------------------------------------------

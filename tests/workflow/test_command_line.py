@@ -8,6 +8,7 @@ import runpy
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -186,3 +187,18 @@ def test_demo_of_bars_prints_the_truth_beside_the_answer(tmp_path):
     assert "the truth: strain-hardening" in result.stdout
     assert (tmp_path / "demo" / "strain-hardening-arrhenius.png").stat().st_size > 20_000
     assert "start" in result.stderr or sys.stderr.isatty()
+
+
+def test_a_cut_forgets_how_every_test_ended():
+    """A stopped test that never came to the strain of the cut must not be the only one judged by its end."""
+    from creepkit.cli.identify import _cut
+
+    times = np.linspace(3600, 36000, 5)
+    tests = [
+        ck.History(
+            name=name, times=times, outputs={"strain": np.linspace(0.01, end, 5)}, loading=ck.constant_stress(100),
+            temperature=1000.0, unruptured=True,
+        )
+        for name, end in (("far", 0.2), ("near", 0.03))
+    ]  # fmt: skip
+    assert [(h.rupture_time, h.unruptured) for h in _cut(tests, 0.05)] == [(None, False)] * 2

@@ -87,8 +87,14 @@ def _check_folder(folder: Path) -> None:
 
 
 def _cut(histories: list[History], limit: float) -> list[History]:
-    """Frames up to a strain; a curve that has fewer than two of them is left out, and said."""
-    cut = [h.up_to("strain", limit) if "strain" in h.outputs else h for h in histories]
+    """Frames up to a strain; a curve that has fewer than two of them is left out, and said.
+
+    How a test ended is forgotten, also of those that never came so far: all are compared over the same part of life.
+    """
+    cut = [
+        h.up_to("strain", limit).replace(rupture_time=None, unruptured=False) if "strain" in h.outputs else h
+        for h in histories
+    ]
     kept = [h for h in cut if int((h.used & (h.times > 0)).sum()) >= 2]
     for history in cut:
         if history not in kept:

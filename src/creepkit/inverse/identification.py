@@ -210,6 +210,14 @@ class Identification:
 
 
 def information_criterion(fit: Identification, size: float) -> float:
-    """-2 ln L x size / frames + K ln(size): frames that move together count as one."""
+    """-2 ln L x size / frames + K ln(size): frames that move together count as one, and K what was fitted."""
     frames = sum(m.frames for m in fit.misfits)
-    return -2.0 * fit.log_likelihood * min(size / max(frames, 1), 1.0) + len(fit.law.params) * float(np.log(size))
+    return -2.0 * fit.log_likelihood * min(size / max(frames, 1), 1.0) + _fitted(fit) * float(np.log(size))
+
+
+def _fitted(fit: Identification) -> int:
+    """How many parameters the data touch: the others have the variance of their bounds, by themselves."""
+    ends = [[p.to_internal(b) for b in p.bounds] for p in fit.law.params.values()]
+    own = np.diag(fit.covariance)
+    by_itself = (fit.covariance != 0).sum(axis=1) == 1
+    return int((~(by_itself & np.isclose(own, np.ptp(ends, axis=1) ** 2 / 12.0, rtol=1e-6))).sum())

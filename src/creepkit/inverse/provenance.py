@@ -15,14 +15,19 @@ from creepkit.inverse.fences import Fences
 from creepkit.inverse.findings import NuisanceEstimate, TestMisfit
 from creepkit.inverse.nominal import end_strain, stresses
 from creepkit.inverse.objective import Objective
+from creepkit.inverse.scales import usable
 from creepkit.inverse.scatter import ASSUMED_RATE
 from creepkit.inverse.settings import Settings
 from creepkit.language import temperature
+from creepkit.records import History
 
 FEW_TESTS = 3
 """Below this many tests the scatter between them cannot be seen, and is assumed."""
 DISTRUSTED = 0.5
 """Weight below which a test is named."""
+
+USUAL_STRAIN, RUPTURE_STRAIN = 0.5, 2.0
+"""Strains above these are worth a word: of a test whose end is not known, and of one that was followed to it."""
 
 
 def ranges(objective: Objective) -> dict[str, tuple[float, float]]:
@@ -84,12 +89,19 @@ def notes(
         found.append("all tests have one stress: the stress dependence is not determined by them")
     if len(histories) < FEW_TESTS and any(n.kind == "rate" and n.sd is None for n in settings.nuisances):
         found.append(f"fewer than {FEW_TESTS} tests: their rates are assumed to scatter by {100 * ASSUMED_RATE:.0f} %")
-    strains = [float(h.outputs["strain"].max()) for h in histories if "strain" in h.outputs and not h.ended]
-    if max(strains, default=0.0) > 0.5:
-        found.append("strains above 0.5 were fitted: a column in percent must say so, as strain_pct")
+    found += _of_large_strains(histories)
     if (Fences(objective).violations(best.minimum.u[: len(law.params)]) > 1e-3).any():
         found.append("a constraint of the law does not hold over the tests at these values")
     return (*found, *_of_tests(objective, tests, nuisances))
+
+
+def _of_large_strains(histories: Sequence[History]) -> list[str]:
+    """A column in percent that was taken for plain strain shows in its size."""
+    for known, limit in ((False, USUAL_STRAIN), (True, RUPTURE_STRAIN)):
+        tests = [h for h in histories if "strain" in h.outputs and h.ended == known]
+        if any(h.outputs["strain"][usable(h, "strain")].max(initial=0.0) > limit for h in tests):
+            return [f"strains above {limit:g} were fitted: a column in percent must say so, as strain_pct"]
+    return []
 
 
 def _of_tests(objective: Objective, tests: Sequence[TestMisfit], nuisances: Sequence[NuisanceEstimate]) -> list[str]:

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
 
 BEYOND = 1000.0
-"""How far beyond the longest measured test a new condition is followed, with the predictor's own horizon on top."""
+"""How far beyond the longest measured test, or its own last time, a test is followed to its rupture; the predictor's
+own horizon comes on top."""
 
 
 def rupture_times(
@@ -38,7 +39,8 @@ def rupture_times(
             raise FitError(
                 f"history '{history.name}': {name} follows no test to rupture; give using=, such as uniaxial"
             )
-    found = predict_life(using, coordinates.law, coordinates.values(u), histories, jacobian=True)
+    plans = [_far(history) for history in histories]
+    found = predict_life(using, coordinates.law, coordinates.values(u), plans, jacobian=True)
     assert found.life is not None
     assert found.life.rupture_jacobian is not None
     time = found.life.ruptures[0]
@@ -52,6 +54,12 @@ def rupture_times(
     return tuple(np.where(broke, each, np.inf) for each in (time, time / wide, time * wide))  # type: ignore[return-value]
 
 
+def _far(history: History) -> History:
+    """What is asked of a test is when it breaks, however long after its last frame that may be."""
+    last = max(float(history.times[-1]), history.rupture_time or 0.0)
+    return history.replace(times=np.array([BEYOND * last]), outputs={}, standard_deviation={})
+
+
 def planned(
     stress: ArrayLike, temperature: ArrayLike, longest: float, control: str
 ) -> tuple[list[History], tuple[int, ...]]:
@@ -62,7 +70,7 @@ def planned(
     if not (levels > 0).all():
         raise FitError("a rupture time was asked for at a stress that is not above zero; give tensile stresses, in MPa")
     tests = [
-        History(f"{s:g} MPa, {T:g} K", np.array([BEYOND * longest]), {}, constant_stress(float(s), control), float(T))  # type: ignore[arg-type]
+        History(f"{s:g} MPa, {T:g} K", np.array([longest]), {}, constant_stress(float(s), control), float(T))  # type: ignore[arg-type]
         for s, T in zip(levels.ravel(), warmth.ravel(), strict=True)
     ]
     return tests, levels.shape

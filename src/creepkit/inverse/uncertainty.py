@@ -8,7 +8,8 @@ hold their uncertainty. Intervals are 95 %.
 
 Sizes of scatter come from the same few tests: with T tests and K parameters the part that the scatter between tests
 contributes is scaled by T/(T - K) and has T - K degrees of freedom, the rest those of its independent frames;
-Satterthwaite's formula joins them to the freedom of Student's quantile.
+Satterthwaite's formula joins them to the freedom of Student's quantile. A parameter that moves nothing that was
+measured fits nothing, and does not count.
 """
 
 from __future__ import annotations
@@ -72,13 +73,15 @@ def laplace(
     own = meat(alone)
     within = inner @ (own + prior) @ inner
     between = inner @ (meat(scatter) - own) @ inner
-    free = max(tests - count, 1.0), max(effective_size(residuals, alone) - count, 1.0)
+    touched = (residuals.jacobian[residuals.present][:, :count] != 0).any(axis=0)
+    fitted = max(int(touched.sum()), 1)
+    free = max(tests - fitted, 1.0), max(effective_size(residuals, alone) - fitted, 1.0)
     if rate_known:
         free = (1e9, free[1])
     else:
         between *= tests / free[0]
     share = np.diag(between)[:count] / np.maximum(np.diag(between + within)[:count], 1e-300)
-    part = float(np.mean(share))
+    part = float(share[touched].sum() / fitted)
     return within + between, 1.0 / (part**2 / free[0] + (1 - part) ** 2 / free[1])
 
 
