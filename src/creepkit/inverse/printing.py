@@ -170,7 +170,7 @@ def _unit(kind: str) -> str:
 
 def notes_of(fit: Identification) -> list[str]:
     """Intervals, validity and provenance as lines, to travel as comments with an exported law."""
-    lines = [f"identified with creepkit {fit.provenance.get('creepkit', '')} from {len(fit.misfits)} tests"]
+    lines = [f"identified with creepkit {fit.provenance.get('creepkit', '')} from {_tests(len(fit.misfits))}"]
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"
         lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {e.low:.4g} to {e.high:.4g}, {e.verdict}")
