@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kachanov import A, C, damage, kachanov, n, v
 
 from creepkit.errors import SolveError
 from creepkit.integration import PointTest, Settings, integrate
@@ -16,26 +17,13 @@ from creepkit.integration.endings import (
 )
 from creepkit.integration.tableau import SDIRK2
 from creepkit.kernels import lower
-from creepkit.language import CreepLaw, Param, State, parameters, states, stress
+from creepkit.language import CreepLaw, Param, State, parameters, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import Program, Status
 
-A, n, C, v = parameters("A n C v")
-(damage,) = states("damage")
-KACHANOV = CreepLaw(
-    name="kachanov-rabotnov",
-    terms={"creep": A * (stress / (1 - damage)) ** n},
-    params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log"),
-        n: Param("stress exponent", bounds=(1, 8)),
-        C: Param("damage coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log"),
-        v: Param("damage exponent", bounds=(1, 8)),
-    },
-    states={damage: State(0.0, C * (stress / (1 - damage)) ** v, limit=0.9)},
-    references=("Kachanov (1958); Rabotnov (1969)",),
-)
+KACHANOV = kachanov(stress, 0.9)
 (phi,) = parameters("phi")
 RABOTNOV = CreepLaw(
     name="rabotnov in damage itself",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kachanov import kachanov
 from numba import njit
 from scipy.stats import qmc
 
@@ -23,23 +24,13 @@ from creepkit.integration.response import (
 from creepkit.integration.stage import solve
 from creepkit.kernels import lower
 from creepkit.kernels.interface import MEAN, PRINCIPAL, STRAIN, STRESS, TIME, pointer
-from creepkit.language import CreepLaw, Param, State, mean_stress, parameters, principal_stress, states, stress
+from creepkit.language import Param, mean_stress, parameters, principal_stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 
-A, n, a, C, v = parameters("A n a C v")
-(damage,) = states("damage")
-MULTIAXIAL_DAMAGE = CreepLaw(
-    name="damage",
-    terms={"creep": A * (stress / (1 - damage)) ** n},
-    params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log"),
-        n: Param("stress exponent", bounds=(1, 8)),
-        C: Param("damage coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log"),
-        v: Param("damage exponent", bounds=(1, 8)),
-        a: Param("weight of the principal stress", bounds=(0, 1)),
-    },
-    states={damage: State(0.0, C * ((a * principal_stress + (1 - a) * mean_stress) / (1 - damage)) ** v, limit=0.9)},
+(a,) = parameters("a")
+MULTIAXIAL_DAMAGE = kachanov(
+    a * principal_stress + (1 - a) * mean_stress, 0.9, {a: Param("weight of the principal stress", bounds=(0, 1))}
 )
 
 

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from kachanov import A, kachanov, n
 
 import creepkit as ck
 from creepkit.errors import SolveError
 from creepkit.inverse.identification import Settings
 from creepkit.inverse.identify import identify
-from creepkit.language import CreepLaw, Param, State, mean_stress, parameters, principal_stress, states, stress
+from creepkit.language import CreepLaw, mean_stress, principal_stress, stress
 from creepkit.laws.norton import NORTON
 from creepkit.readers.writing import write_history
 from creepkit.records import History, PointLoading, Program, Specimen, Status
@@ -21,19 +22,7 @@ VALUES = {"A": 1e-14, "n": 4.0}
 TIMES = np.array([0.0, 10.0, 1e3, 1e4])
 FINE = Point(tolerance=1e-8)
 
-A, n, C, v = parameters("A n C v")
-(damage,) = states("damage")
-KACHANOV = CreepLaw(
-    name="kachanov of the largest principal stress",
-    terms={"creep": A * (stress / (1 - damage)) ** n},
-    params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log"),
-        n: Param("stress exponent", bounds=(1, 8)),
-        C: Param("damage coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log"),
-        v: Param("damage exponent", bounds=(1, 8)),
-    },
-    states={damage: State(0.0, C * (principal_stress / (1 - damage)) ** v, limit=0.99)},
-)
+KACHANOV = kachanov(principal_stress, 0.99)
 BRITTLE = {"A": 1e-16, "n": 4.0, "C": 1e-13, "v": 4.0}
 
 

@@ -36,9 +36,6 @@ CREEP_COMPONENTS = 3
 EQUIVALENT = 3
 """Place of the equivalent creep strain in a point's history: three components, this, then the states."""
 
-WEIGHTS = (1.0, 1.0 / 3.0, 1.0 / 3.0)
-"""Metric of w."""
-
 
 class Stage(NamedTuple):
     """What all points of a stage share.

@@ -10,8 +10,6 @@ from numba import njit
 from creepkit.arrays import Floats
 from creepkit.records import Program
 
-SEGMENT_SIZE = 6
-
 
 class Segment(NamedTuple):
     """start and end, s; driving stress, MPa, and temperature, K, at both."""
