@@ -35,18 +35,26 @@ if TYPE_CHECKING:
     from creepkit.records import constant_stress as constant_stress
     from creepkit.study import export as export
     from creepkit.study import exporters as exporters
+    from creepkit.study import generate as generate
     from creepkit.study import identify as identify
     from creepkit.study import law as law
     from creepkit.study import laws as laws
     from creepkit.study import load as load
     from creepkit.study import moduli as moduli
     from creepkit.study import rank as rank
+    from creepkit.study import rate_family as rate_family
+    from creepkit.study import read_dataset as read_dataset
     from creepkit.study import read_histories as read_histories
     from creepkit.study import simulate as simulate
     from creepkit.study import specimen as specimen
     from creepkit.study import specimens as specimens
+    from creepkit.study import surrogate as surrogate
     from creepkit.study import suspects as suspects
+    from creepkit.study import train as train
     from creepkit.study import with_suspects_marked as with_suspects_marked
+    from creepkit.surrogate.parameter_gru import ParameterGru as ParameterGru
+    from creepkit.surrogate.rate_net import RateNet as RateNet
+    from creepkit.surrogate.recipe import Training as Training
 
     __version__: str
 
@@ -55,8 +63,11 @@ _HOMES = {
     "creepkit.language": "CreepLaw Elastic Param State activated arrhenius exponential inverse linear wachtman",
     "creepkit.records": "History Nuisance PointLoading PressureJump Program StrainSteps StressSteps Units "
     "constant_strain constant_stress",
-    "creepkit.study": "export exporters identify law laws load moduli rank read_histories simulate specimen specimens "
-    "suspects with_suspects_marked",
+    "creepkit.study": "export exporters generate identify law laws load moduli rank rate_family read_dataset "
+    "read_histories simulate specimen specimens surrogate suspects train with_suspects_marked",
+    "creepkit.surrogate.parameter_gru": "ParameterGru",
+    "creepkit.surrogate.rate_net": "RateNet",
+    "creepkit.surrogate.recipe": "Training",
 }
 _PUBLIC = {name: home for home, names in _HOMES.items() for name in names.split()}
 

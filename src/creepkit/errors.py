@@ -30,6 +30,10 @@ class DatasetError(CreepkitError):
     """A data set or one of its shards is damaged or does not belong here."""
 
 
+class SurrogateError(CreepkitError):
+    """A surrogate, its file or its training was asked for something that it cannot do."""
+
+
 class FitError(CreepkitError):
     """An identification was asked for something that it cannot do."""
 

@@ -12,7 +12,22 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from creepkit.cli import check, demo, export, identify, laws, new_law, plugins, simulate, specimens
+from creepkit.cli import (
+    base,
+    check,
+    data,
+    demo,
+    export,
+    generate,
+    identify,
+    laws,
+    new_law,
+    plugins,
+    simulate,
+    specimens,
+    sweep,
+    train,
+)
 from creepkit.errors import CreepkitError, PluginError
 
 
@@ -59,6 +74,11 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "check": check.command,
     "new-law": new_law.command,
     "simulate": simulate.command,
+    "base": base.command,
+    "train": train.command,
+    "sweep": sweep.command,
+    "generate": generate.command,
+    "data": data.command,
     "identify": identify.command,
     "export": export.command,
     "demo": demo.command,

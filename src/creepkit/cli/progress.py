@@ -9,7 +9,7 @@ from typing import Any
 
 
 class Progress:
-    """Use as a context; call `tick(task, done, total)` from the work. Writes to stderr."""
+    """Use as a context; call `tick(task, done, total)`, maybe with a note, from the work. Writes to stderr."""
 
     QUIET = 2.0
 
@@ -24,7 +24,13 @@ class Progress:
             from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
             from rich.progress import Progress as Bar
 
-            columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+            columns = (
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TimeRemainingColumn(),
+                TextColumn("{task.fields[note]}"),
+            )
             self._bar = Bar(*columns, console=Console(stderr=True))
             self._bar.start()
         return self
@@ -35,12 +41,12 @@ class Progress:
         if self._bar is not None:
             self._bar.stop()
 
-    def tick(self, task: str, done: int, total: int) -> None:
-        """Report that `done` of `total` parts of a task are finished."""
+    def tick(self, task: str, done: int, total: int, note: str = "") -> None:
+        """Report that `done` of `total` parts of a task are finished; note : what else there is to say."""
         if self._bar is not None:
             if task not in self._tasks:
-                self._tasks[task] = self._bar.add_task(task, total=total)
-            self._bar.update(self._tasks[task], completed=done, total=total)
+                self._tasks[task] = self._bar.add_task(task, total=total, note=note)
+            self._bar.update(self._tasks[task], completed=done, total=total, note=note)
         elif done == total or time.monotonic() - self._told > self.QUIET:
             self._told = time.monotonic()
-            print(f"{task}: {done} of {total}", file=sys.stderr, flush=True)
+            print(f"{task}: {done} of {total}{note and f' ({note})'}", file=sys.stderr, flush=True)

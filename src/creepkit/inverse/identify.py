@@ -22,7 +22,7 @@ from creepkit.inverse.life import check_effects
 from creepkit.inverse.misfits import misfits, pooled_errors, pooled_rms
 from creepkit.inverse.nominal import measured_log_pace, measured_log_rate
 from creepkit.inverse.objective import Objective
-from creepkit.inverse.provenance import FEW_TESTS, notes, provenance, ranges
+from creepkit.inverse.provenance import FEW_TESTS, notes, of_domain, provenance, ranges
 from creepkit.inverse.rupture import rupture_misfits
 from creepkit.inverse.scatter import ASSUMED_RATE, full_guess
 from creepkit.inverse.search import Box, Minimum, Progress, from_single_terms, multistart
@@ -124,7 +124,7 @@ def _answer(
         errors=pooled_errors(histories, found, tests),
         nuisances=own,
         converged=best.minimum.converged,
-        notes=notes(objective, best, settings, tests, own),
+        notes=(*notes(objective, best, settings, tests, own), *of_domain(found, histories)),
         histories=tuple(histories),
         using=objective.using,
     )

@@ -19,7 +19,7 @@ from creepkit.inverse.scales import usable
 from creepkit.inverse.scatter import ASSUMED_RATE
 from creepkit.inverse.settings import Settings
 from creepkit.language import temperature
-from creepkit.records import History
+from creepkit.records import History, Prediction, Status
 
 FEW_TESTS = 3
 """Below this many tests the scatter between them cannot be seen, and is assumed."""
@@ -93,6 +93,16 @@ def notes(
     if (Fences(objective).violations(best.minimum.u[: len(law.params)]) > 1e-3).any():
         found.append("a constraint of the law does not hold over the tests at these values")
     return (*found, *_of_tests(objective, tests, nuisances))
+
+
+def of_domain(found: Prediction, histories: Sequence[History]) -> tuple[str, ...]:
+    """The tests for which a surrogate speaks of what it was not trained on, in one sentence."""
+    outside = [h.name for h, s in zip(histories, found.status[0], strict=True) if s == Status.OUTSIDE_DOMAIN]
+    if not outside:
+        return ()
+    shown = f"'{outside[0]}'" + (f" and {len(outside) - 1} more" if len(outside) > 1 else "")
+    told = "the answer lies outside the domain that the surrogate was trained in"
+    return (f"{told}, in test {shown}: simulate it with the specimen itself",)
 
 
 def _of_large_strains(histories: Sequence[History]) -> list[str]:

@@ -17,7 +17,7 @@ from creepkit.specimens.bulge_course import Setup, setup
 if TYPE_CHECKING:
     from creepkit.specimens.bulge import Bulge
 
-FIRST, GROWTH, SHARE = 2.5, 0.7, 1.0 / 16.0
+FIRST, GROWTH, SHARE = 2.5, 1.0, 1.0 / 12.0
 """Steps: the first after a change of load, s; later ones over the time since; the longest over the test."""
 RAMP_STEPS = 4
 """Steps of a ramp from zero to the largest pressure."""

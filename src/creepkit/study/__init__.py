@@ -2,22 +2,29 @@
 
 from creepkit.study.files import load, read_histories, suspects, with_suspects_marked
 from creepkit.study.models import identify, moduli, rank, simulate
+from creepkit.study.networks import surrogate, train
 from creepkit.study.nouns import law, laws, specimen, specimens
+from creepkit.study.sets import generate, rate_family, read_dataset
 from creepkit.study.text import export, exporters
 
 __all__ = [
     "export",
     "exporters",
+    "generate",
     "identify",
     "law",
     "laws",
     "load",
     "moduli",
     "rank",
+    "rate_family",
+    "read_dataset",
     "read_histories",
     "simulate",
     "specimen",
     "specimens",
+    "surrogate",
     "suspects",
+    "train",
     "with_suspects_marked",
 ]

@@ -56,7 +56,7 @@ def simulate(
         outputs={},
         loading=loading,
         temperature=ROOM_TEMPERATURE if temperature is None else temperature,
-        specimen=getattr(using, "name", "uniaxial"),
+        specimen=getattr(getattr(using, "specimen", using), "name", "uniaxial"),
         elastic=elastic,
         includes_elastic=elastic is not None and loading.quantity == "stress",
         source=f"simulation of law '{law.name}'",

@@ -1,0 +1,121 @@
+"""`creepkit generate`: a data set of simulated tests, made on all cores, on a cluster, or by an array of jobs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from creepkit.cli.loads import BULGE
+from creepkit.cli.printing import print_json
+from creepkit.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+    from creepkit.dataset.design import Design
+    from creepkit.records import Specimen
+
+FAMILY = "rate-family"
+"""What is asked for in the place of a law, to have rate functions of many laws."""
+
+
+def command(
+    law: Annotated[str, typer.Argument(metavar="LAW", help=f"Name of a law; or {FAMILY}, rates of many kinds.")],
+    to: Annotated[Path | None, typer.Option(help="HDF5 file to write; its shards lie in FILE.parts.")] = None,
+    samples: Annotated[int | None, typer.Option(min=1, help="Accepted samples wanted.")] = None,
+    draws: Annotated[int | None, typer.Option(min=1, help="Or draws, whatever becomes of them.")] = None,
+    specimen: Annotated[str, typer.Option(help="bulge or uniaxial; see 'creepkit specimens'.")] = BULGE,
+    box: Annotated[
+        str | None, typer.Option(help="conditioned (the default; most samples creep visibly) or paper.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the Sobol sequence.")] = 0,
+    interval: Annotated[float | None, typer.Option(help="s from frame to frame; 150 by default.")] = None,
+    end_h: Annotated[float | None, typer.Option(help="End of the tests, h; 12 by default.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
+    cluster: Annotated[str | None, typer.Option(metavar="URL", help="A dask scheduler, tcp://host:port.")] = None,
+    part: Annotated[
+        str | None, typer.Option(metavar="K/N", help="Simulate every N-th shard only, from the K-th on; do not merge.")
+    ] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Tell what would be drawn; simulate nothing.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
+) -> None:
+    """Simulate a data set to learn from.
+
+    Interrupted, it goes on where it was when it is started again in the same way.
+    """
+    from creepkit import study
+    from creepkit.errors import DatasetError
+
+    body = study.specimen(specimen)
+    design = design_named(law, body, box, interval, end_h)
+    if dry_run:
+        tell_acceptance(design, seed, to, as_json)
+        return
+    if to is None:
+        raise DatasetError("--to FILE is missing: name the HDF5 file to write, such as --to combined.h5")
+    with Progress() as progress:
+        data = study.generate(
+            design, body, samples, draws=draws, seed=seed, to=to, workers=workers, cluster=cluster,
+            part=part_of(part), progress=progress.tick,
+        )  # fmt: skip
+    tell(data, to, part, as_json)
+
+
+def design_named(law: str, body: Specimen, box: str | None, interval: float | None, end_h: float | None) -> Design:
+    """The design that these options name."""
+    from creepkit import study
+    from creepkit.dataset.rate_family import ENDS
+    from creepkit.dataset.time_grid import TimeGrid
+    from creepkit.errors import DatasetError
+    from creepkit.study.sets import design_given
+
+    changes: dict[str, Any] = {} if end_h is None else {"end_time": 3600.0 * end_h}
+    if law != FAMILY:
+        return design_given(law, body, box, changes if interval is None else {**changes, "every": interval})
+    if box is not None:
+        raise DatasetError(f"--box {box}: {FAMILY} has a box of its own; leave --box out")
+    if interval is not None:
+        changes["grid"] = TimeGrid.every(interval, changes.get("end_time", ENDS[1]))
+    return study.rate_family(body, **changes)
+
+
+def part_of(text: str | None) -> tuple[int, int] | None:
+    """K/N as two numbers."""
+    from creepkit.errors import DatasetError
+
+    if text is None:
+        return None
+    k, _, n = text.partition("/")
+    if not (k.isdecimal() and n.isdecimal() and 1 <= int(k) <= int(n)):
+        raise DatasetError(f"--part {text} is not K/N with K from 1 to N, such as 3/16")
+    return int(k), int(n)
+
+
+def tell_acceptance(design: Design, seed: int, to: Path | None, as_json: bool) -> None:
+    """Print what the design would draw, and draw the rates of its samples."""
+    from creepkit.dataset.acceptance import acceptance
+
+    found = acceptance(design, seed=seed)  # type: ignore[arg-type]
+    picture = Path("rates.png") if to is None else to.with_suffix(".rates.png")
+    found.figure(picture)
+    if as_json:
+        met = {name: float(passed.mean()) for name, passed in found.met.items()}
+        shares = {"simulated": float(found.kept.mean()), "useful": float(found.useful.mean())}
+        print_json({"draws": len(found.draws), "met": met, **shares, "picture": str(picture)})
+    else:
+        typer.echo(f"{found}\nwrote {picture}; nothing was simulated")
+
+
+def tell(data: Dataset, to: Path, part: str | None, as_json: bool) -> None:
+    """Print what was made, and where it lies."""
+    if as_json:
+        from creepkit.dataset.describe import summary
+
+        print_json({**summary(data), "file": str(to), "part": part})
+        return
+    typer.echo(f"{data}\n")
+    if part is None:
+        typer.echo(f"wrote {to}: {to.stat().st_size / 1e6:.1f} MB; remove {to}.parts when no more samples are wanted")
+    else:
+        typer.echo(f"part {part} is done in {to}.parts; the same command without --part merges all parts into {to}")

@@ -1,0 +1,69 @@
+"""`creepkit sweep`: networks of several sizes on the same data, as a table and a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from creepkit.cli.printing import print_json, print_table
+from creepkit.cli.progress import Progress
+
+
+def command(
+    data: Annotated[Path, typer.Argument(metavar="DATA", help="Data set that creepkit generate wrote.")],
+    to: Annotated[Path, typer.Option(help="Folder; a file for each training, those that are there are not redone.")],
+    layers: Annotated[str, typer.Option(help="Numbers of layers, such as 1,2,3.")] = "1,2,3",
+    hidden: Annotated[str, typer.Option(help="Widths, such as 64,128.")] = "64,128",
+    cell: Annotated[str, typer.Option(help="gru, lstm or both: gru,lstm.")] = "gru",
+    samples: Annotated[str | None, typer.Option(help="Numbers of samples, such as 1000,2000; all by default.")] = None,
+    parameters: Annotated[str, typer.Option(help="values or rates; see creepkit train.")] = "values",
+    target: Annotated[str, typer.Option(help="value or log; see creepkit train.")] = "value",
+    epochs: Annotated[int, typer.Option(min=1, help="Passes over the training rows.")] = 100,
+    rate: Annotated[float, typer.Option(help="Rate of Adam at the beginning.")] = 1e-3,
+    schedule: Annotated[str, typer.Option(help="Of the rate: plateau, cosine or constant.")] = "plateau",
+    seed: Annotated[int, typer.Option(help="Of the split, the first weights and the order of rows.")] = 0,
+    device: Annotated[str, typer.Option(help="auto (a GPU where there is one), cpu or cuda.")] = "auto",
+    threads: Annotated[int | None, typer.Option(min=1, help="Of torch; one is quickest on a busy machine.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
+) -> None:
+    """Train the paper's network in several sizes and compare their losses.
+
+    Interrupted at any moment, the same command goes on where it was.
+    """
+    import torch
+
+    from creepkit.cli.train import recipe_given
+    from creepkit.dataset.store import read
+    from creepkit.surrogate.sweep import figure, rows_of, sweep
+
+    if threads is not None:
+        torch.set_num_threads(threads)
+    how = {"epochs": epochs, "rate": rate, "schedule": schedule}
+    recipe = recipe_given("parameter-gru", {"parameters": parameters, "target": target}, how)
+    with Progress() as progress:
+        entries = sweep(
+            read(data, accepted_only=True), recipe, to=to, layers=whole(layers, "--layers"),  # type: ignore[arg-type]
+            hidden=whole(hidden, "--hidden"), cells=tuple(cell.split(",")),  # type: ignore[arg-type]
+            samples=whole(samples, "--samples") if samples else (), seed=seed, device=device, progress=progress.tick,
+        )  # fmt: skip
+    figure(entries, to / "sweep.png")
+    if as_json:
+        print_json({"trainings": [vars(e) for e in entries], "picture": str(to / "sweep.png")})
+        return
+    print_table("", *rows_of(entries))
+    typer.echo(f"wrote {to / 'sweep.png'}")
+
+
+def whole(text: str, option: str) -> tuple[int, ...]:
+    """Whole numbers above zero, from text such as 1,2,3."""
+    from creepkit.errors import SurrogateError
+
+    try:
+        numbers = tuple(int(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if not numbers or min(numbers) < 1:
+        raise SurrogateError(f"{option} {text} is not understood; write whole numbers above zero, such as 1,2,3")
+    return numbers

@@ -1,0 +1,107 @@
+"""`creepkit train`: a data set becomes a surrogate, with a table of its errors and pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from creepkit.cli.printing import print_json
+from creepkit.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+    from creepkit.surrogate.recipe import Recipe
+    from creepkit.surrogate.surrogate import Surrogate
+
+RECIPES = ("parameter-gru", "rate-net")
+
+
+def command(
+    data: Annotated[Path, typer.Argument(metavar="DATA", help="Data set that creepkit generate wrote.")],
+    to: Annotated[Path, typer.Option(help="File of the surrogate; a checkpoint lies beside it meanwhile.")],
+    recipe: Annotated[
+        str, typer.Option(help="parameter-gru, the paper's network of one law; or rate-net, for any law.")
+    ] = "parameter-gru",
+    hidden: Annotated[int | None, typer.Option(min=1, help="Width of a layer.")] = None,
+    layers: Annotated[int | None, typer.Option(min=1, help="Layers.")] = None,
+    cell: Annotated[str | None, typer.Option(help="gru or lstm.")] = None,
+    inputs: Annotated[
+        str | None, typer.Option(help="Seen at each frame: load,mean_load,time,step; by default what the grid needs.")
+    ] = None,
+    parameters: Annotated[
+        str | None, typer.Option(help="values: log10 of coefficients; rates: log10 of each term's rate.")
+    ] = None,
+    target: Annotated[str | None, typer.Option(help="value, or log, of the output that grows with creep.")] = None,
+    base: Annotated[str | None, typer.Option(help="none; or one-dof: correct what the quick stand-in says.")] = None,
+    epochs: Annotated[int | None, typer.Option(min=1, help="Passes over the training rows.")] = None,
+    batch: Annotated[int | None, typer.Option(min=1, help="Histories in a step.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Rate of Adam at the beginning.")] = None,
+    schedule: Annotated[str | None, typer.Option(help="Of the rate: plateau, cosine or constant.")] = None,
+    early_stop: Annotated[int | None, typer.Option(min=1, help="Stop after so many epochs without gain.")] = None,
+    clip: Annotated[float | None, typer.Option(help="Largest norm of the gradient.")] = None,
+    seed: Annotated[int, typer.Option(help="Of the split, the first weights and the order of rows.")] = 0,
+    device: Annotated[str, typer.Option(help="auto (a GPU where there is one), cpu or cuda.")] = "auto",
+    threads: Annotated[int | None, typer.Option(min=1, help="Of torch; one is quickest on a busy machine.")] = None,
+    plots: Annotated[Path | None, typer.Option(help="Folder for pictures; by default beside the file.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the errors as JSON.")] = False,
+) -> None:
+    """Train a surrogate on a data set.
+
+    Interrupted at any moment, the same command goes on where it was. Curves of the training, predicted against true
+    outputs, and the worst samples are drawn.
+    """
+    import torch
+
+    from creepkit import study
+    from creepkit.dataset.store import read
+
+    if threads is not None:
+        torch.set_num_threads(threads)
+    sizes = {"hidden": hidden, "layers": layers, "cell": cell, "parameters": parameters, "target": target, "base": base,
+             "inputs": None if inputs is None else tuple(inputs.split(","))}  # fmt: skip
+    how = {"epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule, "early_stop": early_stop, "clip": clip}
+    chosen, samples = recipe_given(recipe, sizes, how), read(data, accepted_only=True)
+    with Progress() as progress:
+        model = study.train(samples, chosen, to=to, seed=seed, device=device, progress=progress.tick)
+    drawn = draw(model, samples, plots or to.parent, to.stem)
+    if as_json:
+        print_json({"file": str(to), "metrics": model.told.metrics, "pictures": [str(path) for path in drawn]})
+        return
+    typer.echo(f"{model}\n")
+    for path in (to, *drawn):
+        typer.echo(f"wrote {path}")
+
+
+def recipe_given(kind: str, sizes: dict[str, Any], how: dict[str, Any]) -> Recipe:
+    """The recipe of this kind with what was given of its fields; SurrogateError for a field that it has not."""
+    from dataclasses import fields, replace
+
+    import creepkit as ck
+    from creepkit.errors import SurrogateError, nearest
+
+    if kind not in RECIPES:
+        raise SurrogateError(f"--recipe {kind} is not known; {nearest(kind, RECIPES)}")
+    made: Any = ck.ParameterGru() if kind == "parameter-gru" else ck.RateNet()
+    known = {f.name for f in fields(made) if f.init}
+    given = {name: value for name, value in sizes.items() if value is not None}
+    for name in given.keys() - known:
+        raise SurrogateError(f"--{name} means nothing to {kind}; it has {', '.join(sorted(known - {'training'}))}")
+    training = replace(made.training, **{name: value for name, value in how.items() if value is not None})
+    recipe: Recipe = replace(made, **given, training=training)
+    return recipe
+
+
+def draw(model: Surrogate, data: Dataset, folder: Path, name: str) -> list[Path]:
+    """Draw the curves, the parity plot and the worst samples; returns their paths."""
+    from creepkit.surrogate import plotting
+    from creepkit.surrogate.evaluation import evaluate
+
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / f"{name}-{what}.png" for what in ("curves", "parity", "worst")]
+    judged = evaluate(model, data)
+    plotting.curves(model.told, paths[0])
+    plotting.parity(judged.found, judged.times, paths[1])
+    plotting.worst_samples(judged.found, paths[2])
+    return paths

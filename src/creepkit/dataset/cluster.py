@@ -1,0 +1,92 @@
+"""Shards simulated by a dask cluster; the folder of the shards must be one that all its workers see."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from types import TracebackType
+from typing import Any
+
+from creepkit.dataset.shards import Answer, Campaign
+from creepkit.dataset.worker import attempt, one_threaded
+from creepkit.errors import DatasetError
+
+WAIT = 30
+"""s, in which a scheduler answers."""
+FEWEST = 8
+"""Shards handed over while a cluster has few workers or none: an adaptive one grows by what waits."""
+LOST = ("KilledWorker", "FutureCancelledError", "CancelledError")
+"""What dask says of a task whose workers died."""
+
+
+class ClusterWorkers:
+    """The workers of a dask scheduler, at most `size` of their threads at once (None: all); a context."""
+
+    def __init__(self, campaign: Campaign, address: str, size: int | None = None) -> None:
+        self._campaign = one_threaded(campaign)
+        self._address = address
+        self._size = size
+        self._client: Any = None
+        self._futures: dict[Any, int] = {}
+
+    def __enter__(self) -> ClusterWorkers:
+        try:
+            from distributed import Client
+        except ImportError:
+            raise DatasetError("--cluster needs dask; install it with: pip install 'creepkit[cluster]'") from None
+        try:
+            self._client = Client(  # type: ignore[no-untyped-call]
+                self._address, timeout=WAIT, set_as_default=False
+            )
+        except (OSError, ValueError) as error:
+            raise DatasetError(f"no dask scheduler answers at {self._address}: {_one_line(error)}") from None
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._client.cancel(list(self._futures))
+        self._client.close()
+
+    @property
+    def free(self) -> int:
+        """How many more shards can be handed over: two for each thread, so that none waits for us."""
+        size = self._size or max(FEWEST, 2 * sum(self._client.nthreads().values()))
+        return max(size - len(self._futures), 0)
+
+    def submit(self, number: int) -> None:
+        """Hand a shard to the scheduler."""
+        self._futures[self._client.submit(attempt, self._campaign, number, pure=False)] = number
+
+    def answers(self, timeout: float) -> list[Answer]:
+        """Wait for answers, at most so many s."""
+        from distributed import wait
+
+        if not self._futures:
+            time.sleep(timeout)
+            return []
+        with suppress(TimeoutError), self._client.as_current():
+            wait(list(self._futures), timeout, "FIRST_COMPLETED")  # type: ignore[no-untyped-call]
+        ended = [future for future in self._futures if future.done()]
+        return [self._answer(future, self._futures.pop(future)) for future in ended]
+
+    def _answer(self, future: Any, number: int) -> Answer:
+        """What a task returned; a worker that died in it often enough is an answer too."""
+        error = future.exception()
+        if error is None:
+            answer: Answer = future.result()
+            return self._seen(answer)
+        if type(error).__name__ in LOST:
+            return Answer(number, "died", text=type(error).__name__)
+        return Answer(number, "error", text=f"a dask worker could not run its shard: {_one_line(error)}")
+
+    def _seen(self, answer: Answer) -> Answer:
+        """The answer, unless what was done there cannot be seen here."""
+        if answer.kind == "done" and not self._campaign.path(answer.number).exists():
+            text = f"a dask worker wrote {self._campaign.path(answer.number)}, which is not there on this machine"
+            return Answer(answer.number, "error", text=f"{text}; name a file in a folder that all machines share")
+        return answer
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())

@@ -1,0 +1,184 @@
+"""What a sample must meet to be kept: named predicates, of what is drawn or of what was simulated.
+
+The paper's criteria 1 to 5 stand in its Materials and Methods, "Data generation and preparation". Its criterion 4 reads
+"the total apex displacement (i.e., fitted D_amp) after initial pressure (P1) applied until Tj and second pressure (P2)
+applied until the end of simulation (T_end = 12 h) needs to be higher than 0.01 mm", and the aim is given as removing
+samples "having no creep deformation". The elastic deflection of its dimple alone is .01 to .2 mm, so an amplitude would
+be no criterion: here it is how much the amplitude grows by creep within each of the two holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal, TypeAlias
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats
+from creepkit.dataset.conditions import ROOM
+from creepkit.dataset.constraints import constraints_hold
+from creepkit.dataset.design import Draws
+from creepkit.dataset.term_rates import Point, log10_rate
+from creepkit.language import CreepLaw
+from creepkit.records import Status
+
+FIRST_HOLD, BEFORE_JUMP, AFTER_JUMP, END = range(4)
+"""Rows of an outcome's marks: a hold is from the first to the second, and from the third to the fourth."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """One simulated sample.
+
+    times : (frames,) s. outputs : (frames, outputs), first the one that grows with creep; NaN after the end.
+    marks : (4, outputs) at the end of the first ramp, just before the jump, at the end of the second ramp, at the end
+        of the test; NaN where the simulation did not get. end_time : s, up to which it got.
+    """
+
+    times: Floats
+    outputs: Floats
+    marks: Floats
+    status: Status
+    end_time: float
+    conditions: Mapping[str, float]
+
+    @property
+    def last(self) -> float:
+        """The first output in the last frame that has one; NaN without any."""
+        seen = self.outputs[np.isfinite(self.outputs[:, 0]), 0]
+        return float(seen[-1]) if seen.size else float("nan")
+
+    @property
+    def growths(self) -> tuple[float, float]:
+        """Growth of the first output in each hold, elastic jumps left out.
+
+        Of a hold that a burst cut short up to the last frame; NaN of one that never began.
+        """
+        begin, before, after, end = self.marks[:, 0]
+        first = (self.last if np.isnan(before) else before) - begin
+        return float(first), float((self.last if np.isnan(end) else end) - after)
+
+
+@dataclass(frozen=True)
+class RateLimit:
+    """The law's rate at one point lies within limits, both None where there is none: criteria 1 and 2.
+
+    stress : MPa. least, most : log10 of the rate, 1/s: as logarithms rates do not underflow.
+    """
+
+    name: str
+    text: str
+    stress: float
+    least: float | None = None
+    most: float | None = None
+    strain: float = 0.01
+    time: float = 1e4
+    stage: ClassVar[Literal["before"]] = "before"
+
+    def passes(self, law: CreepLaw, draws: Draws) -> Bools:
+        """Which draws meet it, (rows,)."""
+        point = Point(self.stress, self.strain, self.time, draws.condition("temperature", ROOM))
+        found = log10_rate(law, draws.parameters, point)
+        low, high = (limit if limit is not None else found for limit in (self.least, self.most))
+        return np.asarray((found >= low) & (found <= high))
+
+
+@dataclass(frozen=True)
+class WithinBounds:
+    """Every parameter lies within the law's bounds, or is off."""
+
+    name: str
+    text: str
+    stage: ClassVar[Literal["before"]] = "before"
+
+    def passes(self, law: CreepLaw, draws: Draws) -> Bools:
+        """Which draws meet it, (rows,)."""
+        low, high = np.array([param.bounds for param in law.params.values()]).reshape(-1, 2).T
+        off = np.array([np.nan if param.off is None else param.off for param in law.params.values()])
+        found, slack = draws.parameters, 1e-9 * np.abs([low, high])
+        return np.asarray((((found >= low - slack[0]) & (found <= high + slack[1])) | (found == off)).all(axis=1))
+
+
+@dataclass(frozen=True)
+class ConstraintsHold:
+    """The relations that the law declares hold throughout the test; end : s, of tests whose end is not drawn."""
+
+    name: str
+    text: str
+    end: float
+    stage: ClassVar[Literal["before"]] = "before"
+
+    def passes(self, law: CreepLaw, draws: Draws) -> Bools:
+        """Which draws meet it, (rows,)."""
+        return constraints_hold(law, draws, draws.condition("end_time", self.end))
+
+
+@dataclass(frozen=True)
+class Lasts:
+    """The simulation converged and went on for `seconds`, or to the end of a shorter test: criterion 3.
+
+    None stands for the whole test. A burst is no failure of the simulation: with a number of seconds, one after them
+    is admitted.
+    """
+
+    name: str
+    text: str
+    seconds: float | None = None
+    stage: ClassVar[Literal["after"]] = "after"
+
+    def passes(self, outcome: Outcome) -> bool:
+        """Whether the outcome meets it."""
+        if outcome.status == Status.COMPLETE:
+            return True
+        return self.seconds is not None and outcome.status == Status.BURST and outcome.end_time >= self.seconds
+
+
+@dataclass(frozen=True)
+class GrowsInEachHold:
+    """Creep above `least` in either hold, elastic jumps left out: criterion 4.
+
+    A hold that a burst cut short counts up to its last frame; a second hold that was never reached is no growth.
+    """
+
+    name: str
+    text: str
+    least: float
+    stage: ClassVar[Literal["after"]] = "after"
+
+    def passes(self, outcome: Outcome) -> bool:
+        """Whether the outcome meets it."""
+        return all(growth > self.least for growth in outcome.growths)
+
+
+@dataclass(frozen=True)
+class Creeps:
+    """Creep of `least` or more in both holds together, elastic jumps left out."""
+
+    name: str
+    text: str
+    least: float
+    stage: ClassVar[Literal["after"]] = "after"
+
+    def passes(self, outcome: Outcome) -> bool:
+        """Whether the outcome meets it."""
+        return float(np.nansum(outcome.growths)) >= self.least
+
+
+@dataclass(frozen=True)
+class EndsAbove:
+    """The first output is above `least` at the end: criterion 5. After a burst, in the last frame before it."""
+
+    name: str
+    text: str
+    least: float
+    stage: ClassVar[Literal["after"]] = "after"
+
+    def passes(self, outcome: Outcome) -> bool:
+        """Whether the outcome meets it."""
+        return outcome.last > self.least
+
+
+Before: TypeAlias = RateLimit | WithinBounds | ConstraintsHold
+After: TypeAlias = Lasts | GrowsInEachHold | Creeps | EndsAbove
+Criterion: TypeAlias = Before | After

@@ -1,0 +1,101 @@
+"""The rate family: diverse rate functions rather than named laws, for surrogates that are fed with rates.
+
+One law of three terms A stress^n strain^m time^k, of which one, two or three are there. Two slopes bend log rate over
+log stress as sinh does; exponents of strain and time decay or, one in ten, grow, as sigmoidal creep and damage do. No
+sinh and no n(t) are among them, so that these remain laws never seen. A network trained on single power laws, for which
+features of the rate are collinear, has many times the error on them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats
+from creepkit.dataset.conditioned_box import ConditionedBox
+from creepkit.dataset.conditions import BULGE, kind_of
+from creepkit.dataset.criteria_of_boxes import informative
+from creepkit.dataset.paper_box import within_bounds
+from creepkit.dataset.ranges import PAPER, Range, conditions
+from creepkit.dataset.reference import reference_of
+from creepkit.dataset.time_grid import SHARES, TimeGrid
+from creepkit.language import CreepLaw, Param, parameters, strain, stress, time
+from creepkit.records import Specimen
+from creepkit.specimens.bulge import Bulge
+
+STEEPEST = (14.0, 14.0, 8.0)
+"""Largest stress exponent of each term: two slopes and a milder one."""
+
+DECAY, RISE = -0.7, 0.5
+"""Ends of the exponents of strain and time."""
+
+HOW_MANY = (0.25, 0.45, 0.3)
+"""Shares of rows with one, two and three terms: a rate with one slope in stress teaches a network little."""
+
+OFF, DECAYING = 0.5, 0.4
+"""Shares of the exponents that are 0, and below it; the rest are above."""
+
+THICKNESS_SHARES = (0.88, 1.2)
+"""Of the specimen's own apex thickness: .44 to .60 mm of the paper's dimple."""
+
+ENDS, JUMP_SHARES = (1200.0, 86400.0), (0.15, 0.85)
+"""s, from 20 min to 24 h; shares of the end at which the load jumps."""
+
+
+def _law() -> CreepLaw:
+    terms, params = {}, {}
+    for number, steepest in enumerate(STEEPEST, start=1):
+        A, n, m, k = parameters(f"A_{number} n_{number} m_{number} k_{number}")
+        terms[f"slope {number}"] = A * stress**n * strain**m * time**k
+        params[A] = Param("rate coefficient", unit="1/s", bounds=(1e-60, 1e2), scale="log", off=0.0)
+        params[n] = Param("stress exponent", bounds=(1.0, steepest))
+        params[m] = Param("strain exponent", bounds=(DECAY, RISE), off=0.0)
+        params[k] = Param("time exponent", bounds=(DECAY, RISE), off=0.0)
+    return CreepLaw("rate-family", terms, params, title="Three power laws of stress, strain and time")
+
+
+LAW = _law()
+
+
+@dataclass(frozen=True)
+class RateFamily(ConditionedBox):
+    """Rate functions with their mean rate over the test drawn."""
+
+    name: str = field(default="rate-family", init=False)
+
+    def exponents(self, unit: Floats, there: Bools) -> Floats:
+        """Internal parameters before coefficients: n uniform, m and k off, decaying or rising.
+
+        A term that is alone does not rise with strain: it would have no strain to begin with.
+        """
+        theta = within_bounds(self.law, unit)
+        for number in range(len(STEEPEST)):
+            m, k = 4 * number + 2, 4 * number + 3
+            theta[:, [m, k]] = _decaying_or_rising(unit[:, [m, k]])
+            alone = there.sum(axis=1) == 1
+            theta[alone, m] = -np.abs(theta[alone, m])
+        return theta
+
+
+def rate_family(specimen: Specimen | None = None, *, grid: TimeGrid | None = None, **given: Any) -> RateFamily:
+    """Return the rate family for a specimen, by default the paper's dimple, whose apex thickness is drawn too.
+
+    grid : other times than shares of the end (see time_grid.SHARES). given : other ranges of conditions, see design_of.
+    """
+    specimen = specimen or Bulge()
+    kind = kind_of(specimen)
+    grid = grid or TimeGrid(np.array(SHARES), relative=True)
+    reference = reference_of(specimen)
+    own: dict[str, Any] = {"end_time": Range(*ENDS, scale="log"), "Tj": Range(*JUMP_SHARES, share_of="end_time")}
+    if kind == BULGE:
+        own["apex_thickness"] = tuple(share * reference.thickness for share in THICKNESS_SHARES)
+    space = conditions(kind, grid, given, {**PAPER[kind], **own}, warm=False)
+    return RateFamily(LAW, space, grid, informative(LAW, kind, space.end), reference, HOW_MANY)
+
+
+def _decaying_or_rising(unit: Floats) -> Floats:
+    decaying = DECAY * (unit - OFF) / DECAYING
+    rising = RISE * (unit - OFF - DECAYING) / (1.0 - OFF - DECAYING)
+    return np.asarray(np.select([unit < OFF, unit < OFF + DECAYING], [0.0, decaying], rising))

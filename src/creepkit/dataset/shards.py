@@ -1,0 +1,232 @@
+"""Shards: blocks of rows of a design, each simulated once and kept in a file of its own until all are merged.
+
+A shard is done when its file is there, belongs to this campaign and is whole. It is written under another name and then
+renamed, by whoever holds its claim.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import secrets
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from creepkit import registry
+from creepkit.dataset import store
+from creepkit.dataset.claims import Claim
+from creepkit.dataset.columns import COLUMNS
+from creepkit.dataset.dataset import Dataset
+from creepkit.dataset.joining import first_difference
+from creepkit.dataset.layout import LAYOUT
+from creepkit.dataset.simulating import SampleFailed, header_of, simulate
+from creepkit.dataset.specimen_document import specimen_document
+from creepkit.errors import DatasetError
+from creepkit.language.tree import law_to_json
+
+if TYPE_CHECKING:
+    from creepkit.dataset.design import Design
+    from creepkit.records import Specimen
+
+ROWS = 256
+"""Rows of a shard: some seconds of a dimple, so that little is lost when a process dies."""
+DEADLY = 2
+"""How often a sample may kill its process before it counts as failed."""
+
+_log = logging.getLogger("creepkit.dataset")
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What is simulated, and in which folder its shards lie.
+
+    rows : of a shard. Worker processes are sent this record.
+    """
+
+    design: Design
+    specimen: Specimen
+    seed: int
+    folder: Path
+    rows: int = ROWS
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """Everything that decides what the shards hold."""
+        told = {
+            "design": self.design.document(),
+            "law": law_to_json(self.design.law),
+            "specimen": specimen_document(self.specimen),
+            "seed": self.seed,
+            "rows": self.rows,
+            "layout": LAYOUT,
+            "creepkit": version("creepkit"),
+        }
+        return dict(json.loads(json.dumps(told)))
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Of the document."""
+        return hashlib.sha256(json.dumps(self.document, sort_keys=True).encode()).hexdigest()[:24]
+
+    @cached_property
+    def header(self) -> Dataset:
+        """The data set, with no samples in it yet."""
+        provenance = {
+            "creepkit": version("creepkit"),
+            "numpy": np.__version__,
+            "h5py": h5py.__version__,
+            "law": self.design.law.name,
+            "law_fingerprint": self.design.law.fingerprint,
+            "origin": registry.default().origin(self.design.law),
+            "specimen": self.specimen.name,
+            "design": self.design.name,
+            "seed": self.seed,
+            "fingerprint": self.fingerprint,
+            "when": datetime.now(UTC).isoformat(timespec="seconds"),
+        }
+        return header_of(self.design, self.specimen, provenance)
+
+    def path(self, number: int) -> Path:
+        """The file of a shard."""
+        return self.folder / f"{number:05d}.h5"
+
+    def open_folder(self) -> None:
+        """Make the folder, or check that the one that is there belongs to this campaign."""
+        told = self.folder / "campaign.json"
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            if not told.exists():
+                _write_once(told, json.dumps(self.document, indent=1))
+            found = json.loads(told.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise DatasetError(f"{self.folder}: no shards can be written there ({error.strerror})") from None
+        except ValueError:
+            raise DatasetError(f"{told}: damaged; remove it if the shards beside it are of this campaign") from None
+        if found != self.document:
+            where = first_difference(found, self.document, "campaign")
+            raise DatasetError(
+                f"{self.folder}: holds shards of another campaign ({where}); choose another name, or remove the folder"
+            )
+
+
+def _write_once(path: Path, text: str) -> None:
+    """Write a file that is whole or absent, and that the first of several writers decides."""
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        try:
+            os.link(temporary, path)
+        except FileExistsError:
+            pass  # another campaign was faster; what it wrote is compared
+        except OSError:  # a file system without links
+            os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+# ---- one shard -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What became of a shard that was asked for.
+
+    kind : "done"; "taken", by another process; "died", its own process did; "error", as text says.
+    """
+
+    number: int
+    kind: str
+    accepted: int = 0
+    text: str = ""
+
+
+def run(campaign: Campaign, number: int) -> Answer:
+    """Simulate a shard and write its file, unless it is done or another process is at it."""
+    path = campaign.path(number)
+    with Claim(path.with_suffix(".claim")) as claim:
+        if not claim.held:
+            return Answer(number, "taken")
+        accepted = count(campaign, number, quiet=True)
+        if accepted is None:
+            store.remove_left(path)
+            first, rows = number * campaign.rows, campaign.rows
+            samples = simulate(campaign.design, campaign.header, campaign.seed, first, rows, _spared(claim))
+            write(campaign, number, samples)
+            accepted = int((samples.reasons == 0).sum())
+        claim.remove()
+    return Answer(number, "done", accepted)
+
+
+def _spared(claim: Claim) -> Callable[[int], None]:
+    """Note each sample before it is simulated; those that killed their process too often are not."""
+
+    def starting(row: int) -> None:
+        if claim.deaths[row] >= DEADLY:
+            raise SampleFailed(f"its process died {claim.deaths[row]} times while it was simulated")
+        claim.starting(row)
+
+    return starting
+
+
+def write(campaign: Campaign, number: int, samples: Dataset) -> None:
+    """Write the file of a shard."""
+    with store.replacing(campaign.path(number)) as temporary, store.created(temporary) as file:
+        store.write_header(file, samples)
+        store.append(file, samples)
+        file.attrs.update({"campaign": campaign.fingerprint, "shard": number, "checksum": checksum(samples)})
+
+
+def checksum(samples: Dataset) -> str:
+    """Of all that a data set holds of its samples."""
+    digest = hashlib.sha256(repr(sorted(samples.failures.items())).encode())
+    for name, column in COLUMNS.items():
+        digest.update(np.ascontiguousarray(getattr(samples, name), dtype=column.stored).tobytes())
+    return digest.hexdigest()
+
+
+def read(campaign: Campaign, number: int) -> Dataset:
+    """The samples of a shard; DatasetError when it is not whole, or of another campaign."""
+    path = campaign.path(number)
+    with store.opened(path) as file:
+        if file.attrs.get("campaign") != campaign.fingerprint or file.attrs.get("shard") != number:
+            raise DatasetError(f"{path}: a shard of another campaign")
+        samples = store.read_samples(file, campaign.header)
+        told = file.attrs["checksum"]
+    if checksum(samples) != told:
+        raise DatasetError(f"{path}: damaged, its checksum is not that of what it holds")
+    return samples
+
+
+def count(campaign: Campaign, number: int, *, quiet: bool = False) -> int | None:
+    """How many samples of a shard were accepted; None when it has to be simulated, or again, which is logged."""
+    path = campaign.path(number)
+    if not path.exists():
+        return None
+    try:
+        return int((read(campaign, number).reasons == 0).sum())
+    except DatasetError as error:
+        if not quiet:
+            _log.warning("%s; it is simulated again", error)
+        return None
+
+
+def together(campaign: Campaign, numbers: Sequence[int]) -> Dataset:
+    """The samples of several shards."""
+    parts = [read(campaign, number) for number in numbers] or [campaign.header]
+    columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
+    failures: dict[int, str] = {}
+    before = 0
+    for one in parts:
+        failures.update({before + row: text for row, text in one.failures.items()})
+        before += len(one)
+    return replace(campaign.header, **columns, failures=failures)

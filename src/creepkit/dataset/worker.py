@@ -1,0 +1,69 @@
+"""A worker process, `python -m creepkit.dataset.worker`: is told a campaign, then numbers of shards, until all is done.
+
+What it is told is pickled by the process that started it, as multiprocessing does; nobody else can tell it anything.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import signal
+import struct
+import sys
+from dataclasses import asdict, replace
+from typing import IO, TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from creepkit.dataset.shards import Campaign
+
+
+def main() -> None:
+    """Answer each number with what became of its shard, a line of JSON."""
+    signal.signal(signal.SIGTERM, _end)
+    told, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
+    os.dup2(2, 1)  # whatever else is printed belongs on stderr
+    sys.path[:] = _part(told)
+    campaign = one_threaded(_part(told))
+    _say(answers, {"ready": True})
+    for line in told:
+        _say(answers, asdict(attempt(campaign, int(line))))
+
+
+def _end(*_: object) -> None:
+    """End as after an error: a sample that is given up on request has not killed its process."""
+    raise SystemExit(0)
+
+
+def _part(told: IO[bytes]) -> Any:
+    (size,) = struct.unpack("!Q", told.read(8))
+    return pickle.loads(told.read(size))
+
+
+def _say(answers: IO[bytes], what: dict[str, Any]) -> None:
+    try:
+        answers.write(json.dumps(what).encode() + b"\n")
+    except BrokenPipeError:
+        raise SystemExit(0) from None  # who asked is gone; the shard is done all the same
+
+
+def one_threaded(campaign: Campaign) -> Campaign:
+    """The campaign with a specimen that simulates on one thread."""
+    if getattr(campaign.specimen, "threads", 1) == 1:
+        return campaign
+    return replace(campaign, specimen=campaign.specimen.replace(threads=1))  # type: ignore[attr-defined]
+
+
+def attempt(campaign: Campaign, number: int) -> Any:
+    """Run a shard; an error that we can explain is an answer too."""
+    from creepkit.dataset.shards import Answer, run
+    from creepkit.errors import CreepkitError
+
+    try:
+        return run(campaign, number)
+    except (CreepkitError, OSError, MemoryError) as error:
+        return Answer(number, "error", text=" ".join(str(error).split()) or type(error).__name__)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,249 @@
+"""What the one-degree-of-freedom bulge goes through, node by node: many candidates in many tests, compiled.
+
+    found = courses(specimen, law, theta, histories, effects={}, factors=NO_FEATURES, exact=False, threads=1)
+
+One row of `found.values` is one node of one test for one candidate; its columns are COLUMNS, then the features. Node
+values are carried to the history's times by `found.frames(k, values)`: plans[k].frames @ values[..., :nodes, :].
+
+    0 elastic         mm   elastic deflection at the node's load
+    1 creep           mm   creep deflection so far
+    2 amplitude       mm   D = elastic + creep
+    3 width  4 shape       S_d, mm, and S_p
+    5 strain               creep strain eps* of the reference point so far
+    6 stress          MPa  sigma* = k(D, h) P
+    7 age                  lambda = E eps*/sigma*, the creep strain in elastic strains
+    8 fast   9 slow        shares of the elastic stress field that are still there: 1 at first loading, 0 when steady
+    10 pressure  11 modulus  12 temperature  13 time    MPa, MPa, K, s
+  of the step that ends at the node (at node 0 and where a load jumps, those of the step after or before it):
+    14 middle              strain in its middle
+    15 log_rate            log10 of d eps*/dt there, 1/s
+    16 log_multiplier      ln of the growth of D over the steady one of the point, kappa d eps*/dt
+    17 exponent            local exponent of stress, by a secant from sigma* to 1.2 sigma*
+    18 hardening           local exponent of strain, d ln rate/d ln strain
+    19 ...  features       for each factor on strain, for each factor on stress: log10 of the rate at those times the
+                           middle's strain and stress, less log_rate; bent smoothly to stay within 5
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.arrays import Floats, Ints
+from creepkit.errors import SolveError
+from creepkit.records import History
+from creepkit.specimens.bulge_course import MODULUS_STEP
+from creepkit.specimens.reduced_batch import march_all
+from creepkit.specimens.reduced_march import EFFECTS, Factors
+from creepkit.specimens.reduced_observed import COLUMNS
+from creepkit.specimens.reduced_schedule import Schedule, schedule
+from creepkit.specimens.reduced_tables import Tables, tables
+
+if TYPE_CHECKING:
+    from creepkit.kernels.interface import CompiledLaw
+    from creepkit.language import Elastic
+    from creepkit.specimens.bulge import Bulge
+
+NO_FEATURES = Factors(np.zeros(0), np.zeros(0))
+
+_TOLERANCE, _EXACT_TOLERANCE = 1e-5, 1e-11
+"""Of ln of increments."""
+_BETA = (0.05, 1.0)
+"""Exponents of the clock; plain time where strain begins faster than time."""
+_BETA_STEP = 1e-5
+_NO_LOAD = 1e-15
+"""P/E of a dimple at rest: its deflection is a million times below the least one measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Courses:
+    """Courses of candidates in tests, padded to the longest test with its last node.
+
+    values : (candidates, tests, nodes, columns). changes : the same with a last axis of P + 3 derivatives, to the law's
+    internal parameters and to EFFECTS (apex thickness mm, relative modulus, temperature K), or None.
+    plans : of each test, with nodes and `frames`. status, end_times : (candidates, tests) Status, and s.
+    """
+
+    values: Floats
+    changes: Floats | None
+    plans: tuple[Schedule, ...]
+    status: Ints
+    end_times: Floats
+
+    def frames(self, test: int, values: Floats) -> Floats:
+        """Values (candidates, nodes, ...) of the nodes of a test at its history's times, (candidates, times, ...)."""
+        weights = self.plans[test].frames
+        return np.asarray(np.moveaxis(np.tensordot(weights, values[:, : weights.shape[1]], axes=(1, 1)), 0, 1))
+
+
+def courses(
+    specimen: Bulge,
+    law: CompiledLaw,
+    theta: Floats,
+    histories: Sequence[History],
+    *,
+    effects: Mapping[str, Floats] | None = None,
+    factors: Factors = NO_FEATURES,
+    exact: bool = False,
+    threads: int = 1,
+    known: Tables | None = None,
+) -> Courses:
+    """March candidates, theta (candidates, P) internal, through all tests.
+
+    effects : {kind: (candidates or 1, tests)}, see records.Predictor; "window" too. factors : of the features.
+    exact : with derivatives. Results are the same for any number of threads. known : tables to go by, in place of those
+    of the specimen; a test of another dimple than theirs (but for its apex thickness), or window, is a SolveError.
+    """
+    theta = np.array(theta, dtype=float, order="C", ndmin=2)
+    assumed = {kind: np.atleast_2d(value) for kind, value in (effects or {}).items()}
+    plans = tuple(schedule(specimen, history) for history in histories)
+    counts = np.array([plan.times.size for plan in plans], dtype=np.int64)
+    rows = max([len(v) for v in assumed.values()], default=1)
+    loads = np.array([[_padded(p.times, counts), _padded(p.pressure, counts)] for p in plans])
+    dimples = _dimples(specimen, histories, plans, assumed, rows, known)
+    own, stiffer = _own(histories, plans, assumed, dimples, counts, rows)
+    shape = (len(theta), len(plans), int(counts.max()), len(COLUMNS) + factors.stress.size * factors.strain.size)
+    out = np.zeros(shape)
+    changes = np.zeros((*shape, theta.shape[1] + len(EFFECTS)) if exact else (0, *shape[1:], 1))
+    status, end_times = np.zeros(shape[:2], dtype=np.int64), np.zeros(shape[:2])
+    beta, beta_slopes = _beta(law, theta)
+
+    def part(first: int, last: int) -> None:
+        march_all(
+            law.update, law.sensitivity, law.rate, first, last, theta, beta, beta_slopes, stiffer, counts, loads, own,
+            *dimples.arrays, dimples.row, dimples.grid, np.array(law.initial), np.array(law.limits),
+            (specimen.deflection_limit, specimen.strain_limit), factors, _EXACT_TOLERANCE if exact else _TOLERANCE,
+            out, changes, status, end_times,
+        )  # fmt: skip
+
+    _shared(part, len(theta), threads)
+    return Courses(out, changes if exact else None, plans, status, end_times)
+
+
+def _shared(part: Callable[[int, int], None], count: int, threads: int) -> None:
+    """Let threads do parts of the candidates."""
+    cuts = np.linspace(0, count, min(threads, count) + 1).astype(int)
+    if cuts.size == 2:
+        part(0, count)
+        return
+    with ThreadPoolExecutor(cuts.size - 1) as pool:
+        list(pool.map(part, map(int, cuts[:-1]), map(int, cuts[1:])))
+
+
+@dataclass(frozen=True, eq=False)
+class _Dimples:
+    """Different dimples: their tables, thicknesses, and stacked arrays; row (candidates or 1, tests) which is whose."""
+
+    tables: list[Tables]
+    thickness: Floats
+    arrays: tuple[Floats, Floats, Floats]
+    row: Ints
+    grid: tuple[float, float]
+
+
+def _dimples(
+    specimen: Bulge, histories: Sequence[History], plans: Sequence[Schedule], effects: Mapping[str, Floats], rows: int,
+    given: Tables | None,
+) -> _Dimples:  # fmt: skip
+    """Every different dimple, and which one each candidate has in each test."""
+    own = np.array([(k, p.made.observation.window, p.made.geometry.apex_thickness) for k, p in enumerate(plans)])
+    keys = np.broadcast_to(own, (rows, len(plans), 3)).copy()
+    for column, kind in ((1, "window"), (2, "thickness")):
+        if kind in effects:
+            keys[..., column] = effects[kind]
+    different, row = np.unique(keys.reshape(-1, 3), axis=0, return_inverse=True)
+    if given is None:
+        known = [_tables(specimen, plans[int(k)], float(window)) for k, window, _ in different]
+    else:
+        for k, window, _ in different:
+            _refuse_another(given, histories[int(k)], plans[int(k)], float(window))
+        known = [given] * len(different)
+    found = [t.dimple(float(h)) for t, h in zip(known, different[:, 2], strict=True)]
+    arrays = tuple(np.array([getattr(d, name) for d in found]) for name in ("curves", "slopes", "redistribution"))
+    grid = (found[0].offset, found[0].step)
+    return _Dimples(known, different[:, 2], arrays, row.reshape(rows, len(plans)), grid)  # type: ignore[arg-type]
+
+
+def _refuse_another(known: Tables, history: History, plan: Schedule, window: float) -> None:
+    """A test of another dimple than that of the tables."""
+    where, tested = history.source or f"history '{history.name}'", plan.made.geometry
+    pairs = [(name, getattr(tested, name), getattr(known.geometry, name)) for name in tested.lengths[1:]]
+    for name, found, allowed in [*pairs, ("window", window, known.window)]:
+        if abs(found - allowed) > 1e-6 * allowed:
+            raise SolveError(
+                f"{where}: {name} is {found:g} mm, but the tables of the one-degree-of-freedom model are for "
+                f"{allowed:g} mm; make others with 'creepkit base'"
+            )
+
+
+def _tables(specimen: Bulge, plan: Schedule, window: float) -> Tables:
+    """The tables of the dimple of a test, for all its thicknesses."""
+    made, nominal = plan.made, specimen.geometry.apex_thickness
+    room = made.geometry.plate_thickness - made.geometry.roof_axial
+    geometry = made.geometry.replace(apex_thickness=min(nominal, room))
+    return tables(specimen, geometry, made.observation.replace(window=window))
+
+
+def _own(
+    histories: Sequence[History], plans: Sequence[Schedule], effects: Mapping[str, Floats], dimples: _Dimples,
+    counts: Ints, rows: int,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Temperature, modulus and its slope to temperature, elastic deflection with its derivatives to thickness and to
+    ln of the modulus, (candidates or 1, tests, 6, nodes), and the relative changes of the modulus.
+    """
+    shape = (rows, len(plans))
+    out = np.zeros((*shape, 6, int(counts.max())))
+    stiffer = np.broadcast_to(effects.get("modulus", np.zeros((1, 1))), shape).astype(float)
+    warmer = np.broadcast_to(effects.get("temperature", np.zeros((1, 1))), shape)
+    for c, k in np.ndindex(shape):
+        plan, elastic, row = plans[k], histories[k].elastic, dimples.row[c, k]
+        assert elastic is not None  # the schedule has complained
+        temperature = plan.temperature + warmer[c, k]
+        warm, which = np.unique(temperature, return_inverse=True)
+        factor = 1.0 + stiffer[c, k]
+        modulus = factor * np.array([_modulus(elastic, float(T)) for T in warm])[which]
+        softening = factor * np.array([_softening(elastic, float(T)) for T in warm])[which]
+        _refuse_soft(histories[k], modulus)
+        load = np.maximum(plan.pressure / modulus, _NO_LOAD)
+        deflection, thicker, loaded = dimples.tables[row].elastic_deflection(load, float(dimples.thickness[row]))
+        for i, values in enumerate((temperature, modulus, softening, deflection, thicker, -loaded)):
+            out[c, k, i] = _padded(values, counts)
+    return out, stiffer
+
+
+def _padded(values: Floats, counts: Ints) -> Floats:
+    return np.asarray(np.pad(values, (0, int(counts.max()) - values.size), mode="edge"))
+
+
+@lru_cache(maxsize=65536)
+def _modulus(elastic: Elastic, temperature: float) -> float:
+    return float(elastic.at(temperature).E)
+
+
+@lru_cache(maxsize=65536)
+def _softening(elastic: Elastic, temperature: float) -> float:
+    """dE/dT, MPa/K."""
+    above, below = (_modulus(elastic, temperature + step) for step in (MODULUS_STEP, -MODULUS_STEP))
+    return (above - below) / (2 * MODULUS_STEP)
+
+
+def _refuse_soft(history: History, modulus: Floats) -> None:
+    if not modulus.min() > 0:
+        where = history.source or f"history '{history.name}'"
+        raise SolveError(f"{where}: the modulus is {modulus.min():g} MPa; it must be above zero")
+
+
+def _beta(law: CompiledLaw, theta: Floats) -> tuple[Floats, Floats]:
+    """Exponents of the clock, (candidates,), and their derivatives (candidates, P)."""
+
+    def leading(at: Floats) -> Floats:
+        return np.asarray(np.clip(np.broadcast_to(np.asarray(law.leading(at), float), len(at)), *_BETA))
+
+    steps = _BETA_STEP * np.eye(theta.shape[1])
+    slopes = [(leading(theta + step) - leading(theta - step)) / (2 * _BETA_STEP) for step in steps]
+    return leading(theta).copy(), np.array(slopes).T.reshape(theta.shape)

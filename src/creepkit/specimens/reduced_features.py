@@ -1,0 +1,72 @@
+"""What a law says near the reference point of a step: how its rate changes with stress and strain, for a network."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from creepkit.arrays import Floats
+from creepkit.kernels.interface import MEAN, PRINCIPAL, STRAIN, STRESS, pointer
+
+_LARGEST = 5.0
+"""Decades; features are bent towards it smoothly."""
+_LOG_10 = float(np.log(10.0))
+
+
+@njit(cache=True, error_model="numpy")
+def features(
+    rate: Any, theta: Floats, point: Floats, log_rate: float, stress_factors: Floats, strain_factors: Floats,
+    rows: Floats, said: Floats, out: Floats,
+) -> None:  # fmt: skip
+    """log10 of the rate at (strain factors) x (stress factors) of a point over the rate there; log_rate : ln of that.
+
+    rows (features, 6 + S), said : room for the law.
+    """
+    _around(point, stress_factors, strain_factors, rows)
+    rate(rows.shape[0], pointer(rows), pointer(theta), pointer(said))
+    columns = point.size - 5  # the rate, then each state's
+    for k in range(rows.shape[0]):
+        value = (np.log(max(said[k * columns], 1e-300)) - log_rate) / _LOG_10
+        out[k] = value / (1.0 + (value / _LARGEST) ** 4) ** 0.25
+
+
+@njit(cache=True, error_model="numpy")
+def _around(point: Floats, stress_factors: Floats, strain_factors: Floats, rows: Floats) -> None:
+    k = 0
+    for c in strain_factors:
+        for s in stress_factors:
+            rows[k] = point
+            for i in (STRESS, PRINCIPAL, MEAN):
+                rows[k, i] *= s
+            rows[k, STRAIN] *= c
+            k += 1
+
+
+@njit(cache=True, error_model="numpy")
+def feature_changes(
+    sensitivity: Any, theta: Floats, point: Floats, log_rate: float, changes: Floats, log_rate_changes: Floats,
+    stress_factors: Floats, strain_factors: Floats, rows: Floats, said: Floats, out: Floats,
+) -> None:  # fmt: skip
+    """Derivatives of the features, (features, directions), the parameters first.
+
+    changes : (directions, 6 + S) of the point; log_rate_changes : (directions,) of ln of the rate there.
+    """
+    _around(point, stress_factors, strain_factors, rows)
+    sensitivity(rows.shape[0], pointer(rows), pointer(theta), pointer(said))
+    width, parameters = point.size, theta.size
+    outputs = width - 5
+    columns = outputs * (1 + width + parameters)
+    for k in range(rows.shape[0]):
+        d = said[k * columns : (k + 1) * columns]
+        s, c = stress_factors[k % stress_factors.size], strain_factors[k // stress_factors.size]
+        rate = max(d[0], 1e-300)
+        value = (np.log(rate) - log_rate) / _LOG_10
+        bend = (1.0 + (value / _LARGEST) ** 4) ** -1.25
+        for p in range(changes.shape[0]):
+            total = d[outputs * (1 + width) + p] if p < parameters else 0.0
+            for i in range(width):
+                factor = s if i in (STRESS, PRINCIPAL, MEAN) else (c if i == STRAIN else 1.0)
+                total += d[outputs + i] * factor * changes[p, i]
+            out[k, p] = bend * (total / rate - log_rate_changes[p]) / _LOG_10

@@ -1,0 +1,72 @@
+"""One step of the one-degree-of-freedom march, solved by Newton's method."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from creepkit.arrays import Floats
+from creepkit.integration.elimination import eliminate
+from creepkit.kernels.interface import MEAN, POINT_SIZE, PRINCIPAL, STRAIN, STRESS, pointer
+from creepkit.specimens.reduced_curves import Dimple
+from creepkit.specimens.reduced_problem import Room
+from creepkit.specimens.reduced_step import MEAN_STRESS, PROBES, Middle, Node, Pace, ask, pace, residual
+
+_ITERATIONS, _STEP = 25, 4.0
+"""Most Newton iterations of a step, and the largest change in one of them."""
+_OVER = 100.0
+"""Strain, or mm, of an increment; a dimple has burst long before."""
+
+
+@njit(cache=True, error_model="numpy")
+def solve(
+    update: Any, theta: Floats, node: Node, state: Floats, unknown: Floats, dimple: Dimple, tolerance: float, work: Room
+) -> Pace:
+    """Newton's method for the unknowns, in place, and the pace then."""
+    rows, said = work.rows, work.said
+    size = unknown.size
+    logs, rates, right, matrix = work.logs, work.rates, work.right, work.matrix
+    for iteration in range(_ITERATIONS):
+        middle = ask(node, state, unknown, dimple, 0.0, rows)
+        update(PROBES, pointer(rows), pointer(theta), pointer(said))
+        for k in range(PROBES):
+            logs[k] = said[k, 0]
+        for v in range(rates.size):
+            rates[v] = said[0, 1 + v]
+        now = pace(node, state, unknown, dimple, 0.0, middle, logs)
+        residual(node, state, unknown, middle, now, logs, rates, right[:, 0])
+        largest = np.abs(right).max()
+        if not np.isfinite(largest) or largest < tolerance or iteration == _ITERATIONS - 1:
+            break
+        _jacobian(node, unknown, rows, said, middle, now, matrix)
+        if not eliminate(matrix, right):
+            break
+        factor = min(1.0, _STEP / np.abs(right).max())
+        for k in range(size):
+            unknown[k] -= factor * right[k, 0]
+        unknown[0], unknown[1] = min(unknown[0], np.log(_OVER)), min(unknown[1], np.log(_OVER))
+    return now
+
+
+@njit(cache=True, error_model="numpy")
+def _jacobian(
+    node: Node, unknown: Floats, rows: Floats, said: Floats, middle: Middle, now: Pace, matrix: Floats
+) -> None:
+    """Derivatives of the residuals to the unknowns; those of local exponents, which hardly change, are left out."""
+    size, width, half_strain, half = unknown.size, rows.shape[1], 0.5 * np.exp(unknown[0]), 0.5 * np.exp(unknown[1])
+    softer = rows[0, STRESS] * middle.log_stress_slope * half
+    weight = 0.5 * np.exp(node.log_weight)
+    for v in range(-1, unknown.size - 2):
+        start = size - 1 + (1 + v) * width
+        d = said[0, start : start + width]
+        factor, row = (1.0, 0) if v < 0 else (weight, 2 + v)
+        matrix[row, 0] = factor * d[STRAIN] * half_strain
+        matrix[row, 1] = factor * (d[STRESS] + d[PRINCIPAL] + MEAN_STRESS * d[MEAN]) * softer
+        for u in range(unknown.size - 2):
+            matrix[row, 2 + u] = factor * d[POINT_SIZE + u]
+        matrix[row, row] -= 1.0
+    matrix[1, :] = 0.0
+    matrix[1, 0] = 1.0 + now.bend
+    matrix[1, 1] = (middle.log_growth_slope - now.bend * middle.log_stress_slope) * half - 1.0

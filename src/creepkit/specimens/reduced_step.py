@@ -1,0 +1,213 @@
+"""One step of the one-degree-of-freedom bulge: what the law is asked, and what must be zero.
+
+    sigma* = k(D, h) P,  d eps*/dt = f(sigma*, eps*, t, T),  dD_cr/dt = kappa(D, h) M d eps*/dt,  D = D_el(P/E) + D_cr
+
+by the implicit midpoint rule in t^beta, in which strain begins as a straight line. The multiplier M tells how much
+faster the dimple creeps while stresses are not yet those of steady creep. Of the elastic stress field shares phi are
+still there; they decay with the creep strain in elastic strains, lambda = E eps*/sigma*, and a load that changes from
+P1 to P2 adds to them:
+
+    M = exp(steady(n', D)) (1 + [m_slow(n', D) phi_slow + m_fast(n', D) phi_fast] / 1.5)^1.5,
+    phi -> phi P1/P2 + 1 - P1/P2 where the load changes,    dphi/dlambda = -rho(n') phi
+
+with n' = n/(1 - m) of the local exponents n of stress and m of strain. The functions take floats, or complex numbers
+whose imaginary parts are derivatives times a tiny number: so derivatives are exact without a line for them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from creepkit.kernels.interface import MEAN, POINT_SIZE, PRINCIPAL, STRAIN, STRESS, TEMPERATURE, TIME
+from creepkit.specimens.reduced_curves import (
+    AMPLITUDE,
+    LOG_GROWTH,
+    LOG_STRESS,
+    RESIDUAL,
+    Dimple,
+    curve,
+    over_exponents,
+    place,
+    slope,
+)
+
+MEAN_STRESS = 2.0 / 3.0
+"""Over the von Mises stress, in equibiaxial tension, as in the middle of the roof."""
+PROBES = 3
+"""Rows the law is asked at: the reference point, there with more stress, there with more strain."""
+PUSH = 1.2
+"""Factor on stress, and on strain, that shows their local exponents; elastic stresses lie above sigma*."""
+
+_LOG_PUSH = float(np.log(PUSH))
+
+CREEP, STRAINED, PLACE, FAST, SLOW, STATES = range(6)
+"""Of a state: creep deflection mm, strain, creep times mean n'/(n' + 2), elastic pressures phi P (MPa), the law's."""
+SLOW_SIZE, SLOW_SPEED, FAST_SIZE, FAST_OFFSET, FAST_SPEED, CEILING = range(6)
+"""Of redistribution: m_slow = . ln n, rho_slow, m_fast = . (n - 1)^2 / (n + .), rho_fast = . n; n at most."""
+
+_NODES = np.array([0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262])
+_WEIGHTS = np.array([0.17392742256872692, 0.3260725774312731, 0.3260725774312731, 0.17392742256872692])
+"""Gauss and Legendre's of four points in (0, 1)."""
+_FLOOR = 1e-6
+"""MPa; pressure of a dimple at rest."""
+POWER = 1.5
+_RELIEF = 0.3
+"""Redistribution after unloading over that after loading, of small changes."""
+_ROUNDING = 0.02
+
+
+class Node(NamedTuple):
+    """A step: pressures, temperatures, moduli, elastic deflections at its ends; of its middle the share of time before
+    it, its time and ln of dt/ds times the step, s.
+    """
+
+    pressure0: Any
+    pressure: Any
+    temperature0: Any
+    temperature: Any
+    modulus0: Any
+    modulus: Any
+    elastic0: Any
+    elastic: Any
+    share: Any
+    time: Any
+    log_weight: Any
+
+
+class Middle(NamedTuple):
+    """What is known of the middle of a step, beside the law's rows."""
+
+    log_growth: Any
+    log_stress_slope: Any
+    log_growth_slope: Any
+    size: Any
+    at: Any
+    stiffness: Any
+
+
+@njit(cache=True, error_model="numpy")
+def within(x: Any, low: float, high: float, rounding: float) -> Any:
+    """x kept between two limits, with corners rounded."""
+    x = low + 0.5 * (x - low + np.sqrt((x - low) ** 2 + rounding**2))
+    return high - 0.5 * (high - x + np.sqrt((high - x) ** 2 + rounding**2))
+
+
+@njit(cache=True, error_model="numpy")
+def ask(node: Node, state: Any, unknown: Any, dimple: Dimple, thicker: Any, rows: Any) -> Middle:
+    """Write the rows that the law is asked at, (PROBES, 6 + S); unknown : ln of the increments of strain and of creep
+    deflection (mm), then the states in the middle.
+    """
+    elastic = 0.5 * (node.elastic0 + node.elastic)
+    deflection = elastic + state[CREEP] + 0.5 * np.exp(unknown[1])
+    at = place(deflection, dimple)
+    pressure = node.pressure0 + node.share * (node.pressure - node.pressure0) + _FLOOR
+    stress = np.exp(curve(LOG_STRESS, at, dimple, thicker)) * pressure
+    strain = state[STRAINED] + 0.5 * np.exp(unknown[0])
+    modulus = node.modulus0 + node.share * (node.modulus - node.modulus0)
+    for k in range(PROBES):
+        pushed = stress * (PUSH if k == 1 else 1.0)
+        rows[k, STRESS], rows[k, PRINCIPAL], rows[k, MEAN] = pushed, pushed, MEAN_STRESS * pushed
+        rows[k, STRAIN] = strain * (PUSH if k == 2 else 1.0)
+        rows[k, TIME] = node.time
+        rows[k, TEMPERATURE] = node.temperature0 + node.share * (node.temperature - node.temperature0)
+        for v in range(unknown.size - 2):
+            rows[k, POINT_SIZE + v] = unknown[2 + v]
+    return Middle(
+        curve(LOG_GROWTH, at, dimple, thicker),
+        slope(LOG_STRESS, at, dimple, deflection),
+        slope(LOG_GROWTH, at, dimple, deflection),
+        curve(AMPLITUDE, at, dimple, thicker),
+        at,
+        modulus / stress,
+    )
+
+
+class Pace(NamedTuple):
+    """Local exponents of stress and strain, n'/(n' + 2) of proportional creep, what is left of the shares after a step
+    (times pressure, MPa), ln of the mean multiplier, and how fast that changes with ln of the strain increment.
+    """
+
+    exponent: Any
+    hardening: Any
+    place: Any
+    fast: Any
+    slow: Any
+    log_multiplier: Any
+    bend: Any
+
+
+@njit(cache=True, error_model="numpy")
+def _left(share: Any, added: Any, x: Any) -> Any:
+    """A share that decays by exp(-x) while `added` comes in evenly."""
+    if abs(x) < 1e-4:
+        return share * (1.0 - x) + added * (1.0 - 0.5 * x)
+    decay = np.exp(-x)
+    return share * decay + added * (1.0 - decay) / x
+
+
+@njit(cache=True, error_model="numpy")
+def _felt(share: Any) -> Any:
+    """A share as growth feels it: less after unloading, and never much less than none."""
+    root = np.sqrt(share * share + _ROUNDING**2)
+    fallen = 0.5 * _RELIEF * (root - share)
+    return 0.5 * (share + root) - fallen / (1.0 + fallen) - 0.5 * (1.0 - _RELIEF) * _ROUNDING
+
+
+@njit(cache=True, error_model="numpy")
+def _multiplied(excess: Any) -> Any:
+    """Growth over steady growth by how much redistribution adds to it; a power law in between a line and exp."""
+    root = np.sqrt(1.0 + excess / POWER)
+    return root * root * root
+
+
+@njit(cache=True, error_model="numpy")
+def pace(node: Node, state: Any, unknown: Any, dimple: Dimple, thicker: Any, middle: Middle, logs: Any) -> Pace:
+    """How the dimple creeps in a step, by ln of the rates at the PROBES."""
+    n, m = (logs[1] - logs[0]) / _LOG_PUSH, (logs[2] - logs[0]) / _LOG_PUSH
+    proportional = n / (1.0 - within(m, -20.0, 0.8, 0.05))
+    power = within(proportional, 0.4, 14.0, 0.1)
+    place_of_power = power / (power + 2.0)
+    steady = over_exponents(RESIDUAL, place_of_power, middle.at, dimple, thicker)
+    numbers = dimple.redistribution
+    redistributing = within(proportional, 0.4, numbers[CEILING], 0.2)
+    slow_size = middle.size * numbers[SLOW_SIZE] * np.log(redistributing)
+    fast_size = middle.size * numbers[FAST_SIZE] * (redistributing - 1.0) ** 2 / (redistributing + numbers[FAST_OFFSET])
+    strains = np.exp(unknown[0]) * middle.stiffness
+    slow_x, fast_x = numbers[SLOW_SPEED] * strains, numbers[FAST_SPEED] * redistributing * strains
+    end = node.pressure + _FLOOR
+    added = (node.pressure - node.pressure0) / end
+    slow, fast = state[SLOW] / end, state[FAST] / end
+    mean = 0.0 * strains
+    for g in range(_NODES.size):
+        y = _NODES[g] ** 2
+        now = slow_size * _felt(_left(slow, added * y, slow_x * y)) + fast_size * _felt(
+            _left(fast, added * y, fast_x * y)
+        )
+        mean += 2.0 * _NODES[g] * _WEIGHTS[g] * _multiplied(now)
+    slow, fast = _left(slow, added, slow_x), _left(fast, added, fast_x)
+    last = _multiplied(slow_size * _felt(slow) + fast_size * _felt(fast))
+    return Pace(n, m, place_of_power, fast * end, slow * end, steady + np.log(mean), (last / mean).real - 1.0)
+
+
+@njit(cache=True, error_model="numpy")
+def residual(node: Node, state: Any, unknown: Any, middle: Middle, now: Pace, logs: Any, rates: Any, out: Any) -> None:
+    """What must be zero of each unknown; logs (PROBES,) ln of strain rates, rates (S,) of the law's states."""
+    out[0] = logs[0] + node.log_weight - unknown[0]
+    out[1] = middle.log_growth + unknown[0] + now.log_multiplier - unknown[1]
+    for v in range(rates.size):
+        out[2 + v] = state[STATES + v] + 0.5 * np.exp(node.log_weight) * rates[v] - unknown[2 + v]
+
+
+@njit(cache=True, error_model="numpy")
+def advance(state: Any, unknown: Any, now: Pace) -> None:
+    """The state after a step, in place."""
+    grown = np.exp(unknown[1])
+    state[CREEP] += grown
+    state[STRAINED] += np.exp(unknown[0])
+    state[PLACE] += grown * now.place
+    state[FAST], state[SLOW] = now.fast, now.slow
+    for v in range(unknown.size - 2):
+        state[STATES + v] = 2.0 * unknown[2 + v] - state[STATES + v]

@@ -1,0 +1,80 @@
+"""Whether a history is one that a surrogate can speak of, and at which frames it is to be asked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.dataset.conditions import kind_of
+from creepkit.dataset.time_grid import TimeGrid
+from creepkit.errors import SurrogateError
+from creepkit.records import History, Specimen
+from creepkit.surrogate.recipe import Told
+
+QUANTITY = {"bulge": "pressure", "uniaxial": "stress"}
+"""What drives the tests of each kind of specimen."""
+SAME = 1e-6
+
+
+def check(told: Told, history: History) -> None:
+    """SurrogateError where a history is of another kind of test than those of the training."""
+    where, specimen = history.source or f"history '{history.name}'", told.specimen
+    wanted = QUANTITY[kind_of(specimen)]
+    if history.loading.quantity != wanted:
+        raise SurrogateError(f"{where}: its {history.loading.quantity} is prescribed; the surrogate knows {wanted}")
+    control = getattr(history.loading, "control", None)
+    if control not in (None, "load") and wanted == "stress" and told.provenance.get("control", "load") != control:
+        raise SurrogateError(f"{where}: true stress is held, and the surrogate was trained under held loads")
+    last = float(history.times[-1])
+    if not told.grid.relative and last > told.grid.end * (1 + SAME):
+        raise SurrogateError(
+            f"{where}: it lasts {last:g} s, and the surrogate was trained up to {told.grid.end:g} s; leave later "
+            "frames out or train on longer tests"
+        )
+    observation = getattr(specimen, "observation", None)
+    if observation is not None and history.operator and history.operator != str(observation):
+        raise SurrogateError(f"{where}: observed by '{history.operator}'; the surrogate was trained on '{observation}'")
+    _check_lengths(where, history, getattr(specimen, "geometry", None))
+
+
+def _check_lengths(where: str, history: History, geometry: Any) -> None:
+    """Lengths but the apex thickness, which the domain guard watches, must be those of the specimen."""
+    for name, value in history.geometry.items():
+        known = getattr(geometry, name, None)
+        if name != "apex_thickness" and known is not None and abs(float(known) - value) > SAME * abs(float(known)):
+            raise SurrogateError(f"{where}: {name} is {value:g} mm; the surrogate was trained on {float(known):g} mm")
+
+
+def frames_of(grid: TimeGrid, histories: Sequence[History]) -> list[Floats]:
+    """The frames, s, at which the network is asked for each history: as many for all, as far as the longest needs."""
+    if grid.relative:
+        return [grid.times(float(h.times[-1])) for h in histories]
+    last = max(float(h.times[-1]) for h in histories)
+    count = min(int(np.searchsorted(grid.values, last * (1 - SAME))) + 1, grid.values.size)
+    return [grid.values[:count]] * len(histories)
+
+
+def weights_between(frames: Floats, times: Floats) -> Floats:
+    """(times, frames): linear in time between frames, constant before the first and beyond the last."""
+    place = np.interp(times, frames, np.arange(frames.size, dtype=float))
+    below = np.minimum(place.astype(int), frames.size - 1)
+    share, rows = place - below, np.arange(times.size)
+    weights = np.zeros((times.size, frames.size))
+    weights[rows, below] = 1.0 - share
+    weights[rows, np.minimum(below + 1, frames.size - 1)] += share
+    return weights
+
+
+def seen(specimen: Specimen, history: History, values: Floats) -> Floats:
+    """What a history's instrument shows, (candidates, times, outputs): of a bar's creep strain, its own measure."""
+    shown: Any = getattr(specimen, "shown", None)
+    return values if shown is None else np.asarray(shown(history, values[..., 0]))[..., None]
+
+
+def seen_slope(specimen: Specimen, history: History, values: Floats) -> Floats:
+    """Derivative of what is shown to what the network gives, (candidates, times, outputs)."""
+    slope: Any = getattr(specimen, "slope", None)
+    return np.ones_like(values) if slope is None else np.asarray(slope(history, values[..., 0]))[..., None]

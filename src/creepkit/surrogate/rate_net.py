@@ -1,0 +1,157 @@
+"""RateNet: a surrogate of the bulge test that is fed with creep rates, so that it serves laws it has never seen.
+
+The one-degree-of-freedom model of the dimple (see specimens.reduced_courses) follows a law along a reference path. What
+the network is told at each node of that path is how the law's rate changes around it (features), how far stresses have
+redistributed, and means of both over the creep so far; what it says is by how much the model is wrong. It is trained on
+a family of rate functions (see dataset.rate_family), not on named laws.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from creepkit import kernels
+from creepkit.errors import DatasetError, SurrogateError
+from creepkit.specimens.bulge import Bulge
+from creepkit.specimens.reduced_courses import Courses, Factors, courses
+from creepkit.specimens.reduced_observed import COLUMNS
+from creepkit.surrogate.domain import Domain
+from creepkit.surrogate.rate_inputs import inputs, local, names
+from creepkit.surrogate.rate_module import BASE, RateModule
+from creepkit.surrogate.recipe import Module, Progress, Samples, Told, Training
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+    from creepkit.surrogate.surrogate import Surrogate
+
+GUARDED_NODES = 4
+"""Nodes of each history that the domain is made of, spread over it: neighbours say the same."""
+
+
+@dataclass(frozen=True)
+class RateNet:
+    """What is asked of a law around the reference path, and the network that hears it.
+
+    hidden, layers : of the network. stress_factors, strain_factors : where the rate is asked for, as shares of the
+    reference stress and strain.
+    """
+
+    hidden: int = 128
+    layers: int = 3
+    stress_factors: tuple[float, ...] = (0.33, 0.6, 0.8, 1.0, 1.25, 1.6, 2.1)
+    strain_factors: tuple[float, ...] = (0.2, 1.0, 5.0)
+    training: Training = field(
+        default_factory=lambda: Training(epochs=300, rate=3e-3, schedule="cosine", clip=1.0, validation=0.1)
+    )
+
+    kind: ClassVar[str] = "rate-net"
+
+    def __post_init__(self) -> None:
+        for name, most in (("hidden", 4096), ("layers", 32)):
+            value = getattr(self, name)
+            if value != int(value) or not 1 <= value <= most:
+                raise SurrogateError(f"RateNet: {name} is {value}; allowed are whole numbers from 1 to {most}")
+        for name in ("stress_factors", "strain_factors"):
+            values = tuple(float(v) for v in getattr(self, name))
+            if not values or not all(0 < v < 100 for v in values):
+                raise SurrogateError(f"RateNet: {name} are {values}; allowed are numbers above 0 and below 100")
+            object.__setattr__(self, name, values)
+
+    @property
+    def factors(self) -> Factors:
+        """Where the features are taken."""
+        return Factors(np.array(self.stress_factors), np.array(self.strain_factors))
+
+    # ---- what the trainer asks -------------------------------------------------------------------------------------
+
+    def samples(self, data: Dataset, progress: Progress | None = None) -> Samples:
+        """Tensors of a data set: inputs and base at nodes, weights of frames, targets and masks."""
+        specimen = bulge_of(data)
+        law = kernels.lower(data.law, "numba")
+        theta = law.internal(dict(zip(data.parameter_names, data.parameters.T, strict=True)))
+        found = []
+        for row in range(len(data)):
+            found.append(courses(specimen, law, theta[row : row + 1], [data.plan(row)], factors=self.factors))
+            if progress is not None:
+                progress("features", row + 1, len(data))
+        nodes = max(one.values.shape[2] for one in found)
+        course = np.stack([_padded(one.values[0, 0], nodes) for one in found])
+        thickness = torch.tensor([one.plans[0].made.geometry.apex_thickness for one in found], dtype=torch.float64)
+        counts = torch.tensor([one.values.shape[2] for one in found])
+        values = torch.from_numpy(course)
+        mask = np.isfinite(data.values).all(axis=-1)
+        made = {
+            "inputs": inputs(values, thickness),
+            "base": base_of(values),
+            "frames": torch.from_numpy(np.stack([_frames(one, data.grid.frames, nodes) for one in found])),
+            "targets": torch.from_numpy(np.where(mask[..., None], data.values, 0.0)),
+        }
+        single = {name: tensor.to(torch.float32) for name, tensor in made.items()}
+        guarded = local(values, thickness)[:, _spread(nodes)].to(torch.float32)
+        there = torch.arange(nodes) < counts[:, None]
+        return {**single, "mask": torch.from_numpy(mask), "nodes": there, "domain": guarded}
+
+    def module(self, data: Dataset, samples: Samples, train: Tensor) -> Module:
+        """A fresh network with the scales of the training rows."""
+        return RateModule(samples["inputs"].shape[-1], self.hidden, self.layers).fitted(samples, train)
+
+    def told(self, data: Dataset, samples: Samples, train: Tensor) -> Told:
+        """Scales and domain."""
+        module = self.module(data, samples, train)
+        assert isinstance(module, RateModule)
+        known = names(self._features)
+        scaling = {
+            "inputs": {n: [float(m), float(d)] for n, m, d in zip(known, module.mean, module.deviation, strict=True)}
+        }
+        rows = samples["domain"][train].numpy()
+        own = known[: rows.shape[-1]]
+        return Told.of(data, scaling=scaling, domain=Domain.of(own, rows.reshape(-1, rows.shape[-1])))
+
+    def blank(self, told: Told) -> Module:
+        """A network for the weights of a file."""
+        return RateModule(len(names(self._features)), self.hidden, self.layers)
+
+    def surrogate(self, module: Module, told: Told) -> Surrogate:
+        """The network as a predictor."""
+        from creepkit.surrogate.rate_surrogate import RateSurrogate
+
+        return RateSurrogate(self, module, told)
+
+    @property
+    def _features(self) -> int:
+        return len(self.stress_factors) * len(self.strain_factors)
+
+
+def bulge_of(data: Dataset) -> Bulge:
+    """The specimen of a data set; DatasetError unless it is a dimple."""
+    if not isinstance(data.specimen, Bulge):
+        raise DatasetError(
+            f"RateNet corrects the one-degree-of-freedom model of a dimple, and these are tests of a "
+            f"{data.specimen.name} specimen; train a ParameterGru, or simulate them: a bar needs no surrogate"
+        )
+    return data.specimen
+
+
+def base_of(course: Any) -> Any:
+    """(..., nodes, 4) what the network corrects, from courses (..., nodes, columns)."""
+    return course[..., [COLUMNS.index(name) for name in BASE]]
+
+
+def _padded(values: Any, nodes: int) -> Any:
+    """The last node repeated."""
+    return np.pad(values, ((0, nodes - len(values)), (0, 0)), mode="edge")
+
+
+def _frames(found: Courses, frames: int, nodes: int) -> Any:
+    """(frames, nodes) weights of the nodes at the frames of the grid; nothing for frames and nodes that are not there."""
+    weights = found.plans[0].frames
+    return np.pad(weights, ((0, frames - weights.shape[0]), (0, nodes - weights.shape[1])))
+
+
+def _spread(nodes: int) -> list[int]:
+    return [round(k * (nodes - 1) / (GUARDED_NODES - 1)) for k in range(GUARDED_NODES)]

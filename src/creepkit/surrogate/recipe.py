@@ -1,0 +1,144 @@
+"""What is trained, and how: recipes, their modules, and the settings of a training."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol, TypeAlias
+
+from torch import Tensor, nn
+
+from creepkit.errors import SurrogateError
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+    from creepkit.dataset.time_grid import TimeGrid
+    from creepkit.language import CreepLaw
+    from creepkit.records import Specimen
+    from creepkit.surrogate.domain import Domain
+    from creepkit.surrogate.surrogate import Surrogate
+
+Samples: TypeAlias = dict[str, Tensor]
+"""Tensors whose leading axis is the sample. Always there: "targets" (n, frames, outputs), physical, float32, zero where
+there is none; "mask" (n, frames), which frames are data. The rest is the recipe's own: what its module eats."""
+
+Progress: TypeAlias = Callable[[str, int, int, str], None]
+"""Called with (task, parts done, parts in all, what else there is to say)."""
+
+
+@dataclass(frozen=True)
+class Training:
+    """How a network is trained: with Adam, on batches of whole histories.
+
+    epochs : passes over the training rows. batch : histories in a step. rate : Adam's, at the beginning.
+    schedule : of the rate: "constant"; "cosine", down to zero at the last epoch; "plateau", a tenth of it whenever the
+        validation loss has not fallen by a ten-thousandth for `patience` epochs, as the paper has it.
+    early_stop : stop when the validation loss has not fallen for so many epochs; None goes to the end.
+    clip : largest norm of the gradient; None leaves it alone.
+    validation : share of the rows that are set aside, drawn by the seed.
+    """
+
+    epochs: int = 500
+    batch: int = 64
+    rate: float = 1e-3
+    schedule: Literal["plateau", "cosine", "constant"] = "plateau"
+    patience: int = 15
+    early_stop: int | None = None
+    clip: float | None = None
+    validation: float = 0.2
+
+    def __post_init__(self) -> None:
+        whole = {"epochs": self.epochs, "batch": self.batch, "patience": self.patience, "early_stop": self.early_stop}
+        for name, value in whole.items():
+            if value is not None and (value != int(value) or value < 1):
+                raise SurrogateError(f"training: {name} is {value}; allowed are whole numbers above zero")
+        if self.schedule not in ("plateau", "cosine", "constant"):
+            raise SurrogateError(f"training: schedule is '{self.schedule}'; allowed are plateau, cosine and constant")
+        if not 0 < self.rate <= 1 or not (self.clip is None or self.clip > 0):
+            raise SurrogateError(f"training: rate {self.rate} and clip {self.clip} must be above zero, rate at most 1")
+        if not 0 < self.validation < 1:
+            raise SurrogateError(f"training: validation is {self.validation}; allowed are shares between 0 and 1")
+
+
+class Module(nn.Module, ABC):
+    """A network with its scales: from samples to outputs in physical units. Its buffers are saved with its weights."""
+
+    @abstractmethod
+    def forward(self, batch: Samples) -> Tensor:
+        """(rows, frames, outputs) in physical units at the times of the data."""
+
+    @abstractmethod
+    def loss(self, batch: Samples) -> Tensor:
+        """What training makes small: a number, the mean over the rows of the batch."""
+
+    def judged(self, batch: Samples) -> tuple[Tensor, Tensor]:
+        """The loss and the outputs at once; a module may spare itself the second pass."""
+        return self.loss(batch), self(batch)
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What a surrogate knows beside its weights; all of it stands in the header of its file.
+
+    law, specimen, outputs, grid : of the data set; a surrogate of one law answers for that law.
+    parameters, conditions : names of the data set's columns.
+    scaling : {input: (mean, standard deviation)}, and of outputs, for people to read; the module holds its own.
+    domain : where the training rows lie, in the inputs that the recipe names.
+    metrics : of the validation rows (see surrogate.metrics). curves : {name: one number an epoch}.
+    provenance : versions, seed, fingerprints, counts, when.
+    notes : what to be wary of, a sentence each.
+    """
+
+    law: CreepLaw
+    specimen: Specimen
+    outputs: tuple[str, ...]
+    grid: TimeGrid
+    parameters: tuple[str, ...]
+    conditions: tuple[str, ...]
+    scaling: Mapping[str, Any] = field(default_factory=dict)
+    domain: Domain | None = None
+    metrics: Mapping[str, Any] = field(default_factory=dict)
+    curves: Mapping[str, list[float]] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, data: Dataset, **more: Any) -> Told:
+        """What a data set says; more : the other fields."""
+        return cls(
+            law=data.law, specimen=data.specimen, outputs=data.outputs, grid=data.grid,
+            parameters=data.parameter_names, conditions=data.condition_names, **more,
+        )  # fmt: skip
+
+
+class Recipe(Protocol):
+    """A frozen record of what is trained: its fields are plain numbers and words, and make the recipe again."""
+
+    kind: ClassVar[str]
+    """The word for it in files; surrogate.surrogate.KINDS says where the class is."""
+
+    @property
+    def training(self) -> Training:
+        """How it is trained, unless train() is told otherwise; a field."""
+        ...
+
+    def samples(self, data: Dataset, progress: Progress | None = None) -> Samples:
+        """The tensors of a data set; DatasetError where it cannot be learnt from."""
+        ...
+
+    def module(self, data: Dataset, samples: Samples, train: Tensor) -> Module:
+        """A fresh network for these data; scales are those of the training rows, positions (rows,), alone."""
+        ...
+
+    def told(self, data: Dataset, samples: Samples, train: Tensor) -> Told:
+        """What the data say of a surrogate before its training: scaling, domain and notes among it."""
+        ...
+
+    def blank(self, told: Told) -> Module:
+        """A network of the right shapes, into which the weights and scales of a file are put."""
+        ...
+
+    def surrogate(self, module: Module, told: Told) -> Surrogate:
+        """The trained network as a predictor."""
+        ...

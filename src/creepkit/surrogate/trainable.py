@@ -1,0 +1,68 @@
+"""What of a data set can be learnt from, and which rows are set aside."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from creepkit.arrays import Bools
+from creepkit.dataset.conditions import UNITS
+from creepkit.errors import DatasetError
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+
+FEWEST = 10
+"""Samples below which nothing can be learnt and nothing be said of it."""
+SENSIBLE = {
+    "modulus": (1e3, 2e6),
+    "P1": (1e-4, 1e4),
+    "P2": (1e-4, 1e4),
+    "stress_1": (1e-3, 1e5),
+    "stress_2": (1e-3, 1e5),
+    "apex_thickness": (1e-3, 1e3),
+    "temperature": (50.0, 4000.0),
+}
+"""Where conditions lie that are in MPa, mm and K; a modulus in GPa does not."""
+
+
+def trainable(data: Dataset) -> Dataset:
+    """The samples to learn from: accepted ones, each with a history; DatasetError where there are too few."""
+    kept = data.accepted
+    if len(kept) < FEWEST:
+        raise DatasetError(
+            f"a data set with {len(kept)} accepted samples of {len(data)} teaches nothing; {FEWEST} are the least, "
+            "generate more"
+        )
+    _check_units(kept)
+    whole: Bools = np.asarray(np.isfinite(kept.values).all(axis=-1))
+    empty = ~whole.any(axis=1)
+    if empty.any():
+        first = int(kept.index[int(np.argmax(empty))])
+        raise DatasetError(
+            f"sample {first} of the data set is accepted, but no frame of its history is a number (so it is with "
+            f"{int(empty.sum())} in all); the file is damaged, generate it again"
+        )
+    return kept
+
+
+def _check_units(data: Dataset) -> None:
+    for name, column in zip(data.condition_names, data.conditions.T, strict=True):
+        low, high = SENSIBLE.get(name, (0.0, np.inf))
+        if not ((column >= low) & (column <= high)).all():
+            raise DatasetError(
+                f"condition '{name}' of the data set goes from {column.min():g} to {column.max():g}, which is not in "
+                f"{UNITS.get(name, 'its unit')}; it was written in another unit or is damaged"
+            )
+    if not np.isfinite(data.parameters).all():
+        raise DatasetError("some parameter of the data set is not a number; the file is damaged, generate it again")
+
+
+def split(count: int, validation: float, seed: int) -> tuple[Tensor, Tensor]:
+    """Positions of training and validation rows, in the order of the data, drawn by the seed."""
+    order = np.random.default_rng(seed).permutation(count)
+    aside = min(max(round(validation * count), 1), count - 1)
+    return torch.from_numpy(np.sort(order[aside:])), torch.from_numpy(np.sort(order[:aside]))

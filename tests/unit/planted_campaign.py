@@ -1,0 +1,128 @@
+"""A design cheap enough for tests: bars that creep by Norton's law, with a closed form; and criteria that misbehave."""
+
+import os
+import signal
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+import creepkit as ck
+from creepkit.dataset.conditions import plan
+from creepkit.dataset.design import Draws
+from creepkit.dataset.sobol import sobol
+from creepkit.dataset.time_grid import TimeGrid
+
+NORTON = ck.law("norton")
+BAR = ck.specimen("uniaxial")
+GRID = TimeGrid(np.array([0.0, 100.0, 1000.0, 3600.0]))
+
+
+@dataclass(frozen=True)
+class Strong:
+    """Bars of at most 120 MPa."""
+
+    name: str = "strong"
+    text: str = "first stress of 120 MPa or less"
+    stage: str = "before"
+
+    def passes(self, law, draws):
+        return draws.condition("stress_1") <= 120.0
+
+
+@dataclass(frozen=True)
+class Visible:
+    """Some creep; `log` gets a byte for each sample that was looked at."""
+
+    name: str = "visible"
+    text: str = "strain above 1e-5"
+    log: str = ""
+    seconds: float = 0.0
+    stage: str = "after"
+
+    def passes(self, outcome):
+        if self.log:
+            with Path(self.log).open("ab") as file:
+                file.write(b".")
+        time.sleep(self.seconds)
+        return outcome.last > 1e-5
+
+
+@dataclass(frozen=True)
+class Deadly:
+    """Kills its process for bars of one stress; `once` names a file that says that it has done so."""
+
+    stress: float
+    once: str = ""
+    name: str = "deadly"
+    text: str = "survives"
+    stage: str = "after"
+
+    def passes(self, outcome):
+        if outcome.conditions["stress_1"] == self.stress and not (self.once and Path(self.once).exists()):
+            if self.once:
+                Path(self.once).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return True
+
+
+@dataclass(frozen=True)
+class Raising:
+    """A criterion of a plugin that was not thought through; of one stress, or of all of them."""
+
+    stress: float | None = None
+    name: str = "raising"
+    text: str = "is defined"
+    stage: str = "after"
+
+    def passes(self, outcome):
+        if self.stress in (None, outcome.conditions["stress_1"]):
+            raise ZeroDivisionError("stress of\nno use")
+        return True
+
+
+@dataclass(frozen=True)
+class Planted:
+    """A of 1e-12 to 1e-10 1/s, n of 1 to 3, stresses of 50 to 150 MPa and a jump at 2000 s."""
+
+    criteria: tuple = (Strong(), Visible())
+    name: str = field(default="planted", init=False)
+    specimen: str = field(default="uniaxial", init=False)
+    law: object = field(default=NORTON, init=False)
+    grid: TimeGrid = GRID
+    low: float = 50.0
+
+    condition_names = ("stress_1", "stress_2", "Tj")
+
+    def draw(self, first, count, seed):
+        unit = sobol(4, first, count, seed)
+        parameters = np.stack([10.0 ** (-12.0 + 2.0 * unit[:, 0]), 1.0 + 2.0 * unit[:, 1]], axis=1)
+        stresses = self.low + (150.0 - self.low) * unit[:, 2:]
+        return Draws(parameters, np.column_stack([stresses, np.full(count, 2000.0)]), self.condition_names)
+
+    def document(self):
+        return {
+            "name": self.name,
+            "low": self.low,
+            "grid": self.grid.document(),
+            "criteria": [{"name": c.name, "text": c.text} for c in self.criteria],
+        }
+
+
+def strain(values, conditions, times):
+    """Logarithmic strain under constant load: each hold grows by d(e) = A s^n exp(n e) dt, s the nominal stress."""
+    A, n = values["A"], values["n"]
+    held = np.minimum(times, conditions["Tj"])
+    grown = A * (conditions["stress_1"] ** n * held + conditions["stress_2"] ** n * (times - held))
+    return -np.log1p(-n * grown) / n
+
+
+def stress_of(row, seed=0, design=None):
+    """The first stress of one row of the sequence."""
+    return float((design or Planted()).draw(row, 1, seed).condition("stress_1")[0])
+
+
+def planned(data, row):
+    """The test of a row, made anew."""
+    return plan(BAR, data.conditions_of(row), GRID)

@@ -1,0 +1,230 @@
+"""Designs of experiments: the sequence, the times, the tests that conditions describe, the paper's box."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import warnings
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+import creepkit as ck
+from creepkit.dataset.conditions import mark_times, plan
+from creepkit.dataset.design import Design, Draws, design_of
+from creepkit.dataset.sobol import sobol
+from creepkit.dataset.time_grid import TimeGrid
+from creepkit.errors import DatasetError
+from creepkit.records import PressureJump
+
+DIMPLE, BAR = ck.specimen("bulge"), ck.specimen("uniaxial")
+GRID = TimeGrid.every()
+TEST = {"modulus": 150e3, "P1": 8.0, "P2": 10.0, "Tj": 14400.0}
+
+
+# ---- the sequence ---------------------------------------------------------------------------------------------------
+
+
+def test_rows_are_those_of_scipy_whatever_the_block():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        whole = qmc.Sobol(5, scramble=True, seed=3).random(40)
+    for first, count in ((0, 40), (0, 1), (1, 39), (7, 5), (39, 1)):
+        np.testing.assert_array_equal(sobol(5, first, count, 3), whole[first : first + count])
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [((0, 0, 1), "ask for at least one"), ((2**30, 1, 1), "change the seed"), ((0, 1, -1), "seed -1")],
+)
+def test_what_a_sequence_does_not_have(asked, told):
+    with pytest.raises(DatasetError, match=told):
+        sobol(2, *asked)
+
+
+# ---- times ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_papers_grid_has_289_frames():
+    assert GRID.frames == 289
+    assert GRID.end == 43200.0
+    assert GRID.times(1.0)[1] == 150.0
+
+
+def test_a_relative_grid_follows_the_end():
+    grid = TimeGrid(np.array([0.0, 0.5, 1.0]), relative=True)
+    np.testing.assert_array_equal(grid.times(1200.0), [0.0, 600.0, 1200.0])
+    with pytest.raises(DatasetError, match="give the condition end_time"):
+        _ = grid.end
+
+
+@pytest.mark.parametrize(
+    ("values", "relative", "told"),
+    [([0.0], False, "two or more"), ([0.0, 5.0, 5.0], False, "increase"), ([0.0, 2.0], True, "from 0 to 1")],
+)
+def test_what_is_no_grid(values, relative, told):
+    with pytest.raises(DatasetError, match=told):
+        TimeGrid(np.array(values), relative)
+
+
+def test_an_interval_longer_than_the_test():
+    with pytest.raises(DatasetError, match="every 100 s until 50 s"):
+        TimeGrid.every(100.0, 50.0)
+
+
+# ---- tests ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_test_of_a_dimple():
+    made = plan(DIMPLE, {**TEST, "apex_thickness": 0.48, "end_time": 20000.0}, GRID)
+    assert made.loading == PressureJump(8.0, 10.0, 14400.0)
+    assert made.elastic == ck.Elastic(150e3)
+    assert made.geometry == {"apex_thickness": 0.48}
+    assert made.times[-1] == 19950.0
+    assert made.specimen == "bulge"
+    assert made.temperature == 293.15
+    np.testing.assert_array_equal(mark_times(made), [5.0, 14400.0, 14405.0, 19950.0])
+
+
+def test_the_test_of_a_bar():
+    made = plan(BAR, {"stress_1": 100.0, "stress_2": 120.0, "Tj": 3600.0, "temperature": 1000.0}, GRID)
+    np.testing.assert_array_equal(made.loading.program().at([0.0, 3599.0, 3600.0]), [100.0, 100.0, 120.0])
+    np.testing.assert_array_equal(mark_times(made), [0.0, 3600.0, 3600.0, 43200.0])
+    assert made.temperature == 1000.0
+
+
+def test_without_a_jump_the_level_stays():
+    made = plan(DIMPLE, {"modulus": 150e3, "P1": 8.0}, GRID)
+    np.testing.assert_array_equal(made.loading.program().at([10.0, 43200.0]), [8.0, 8.0])
+
+
+@pytest.mark.parametrize(
+    ("conditions", "told"),
+    [
+        ({"P1": 8.0}, "needs the condition 'modulus'"),
+        ({**TEST, "stress": 3.0}, "no condition 'stress'"),
+        ({"modulus": 150e3, "P1": 8.0, "P2": 9.0}, "both P2 and Tj"),
+    ],
+)
+def test_what_describes_no_test(conditions, told):
+    with pytest.raises(DatasetError, match=told):
+        plan(DIMPLE, conditions, GRID)
+
+
+def test_a_specimen_that_no_design_loads():
+    with pytest.raises(DatasetError, match="'relaxation'"):
+        plan(ck.specimen("relaxation"), TEST, GRID)
+
+
+# ---- the paper's box ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "inputs"), [("combined", 13), ("drifting-exponent", 11)])
+def test_the_papers_box_has_the_papers_inputs(name, inputs):
+    design = design_of(ck.law(name), DIMPLE, "paper")
+    draws = design.draw(0, 4096, seed=1)
+    assert draws.parameters.shape[1] + draws.conditions.shape[1] == inputs
+    for column, param in zip(draws.parameters.T, design.law.params.values(), strict=True):
+        place = np.log10(column) if param.scale == "log" else column
+        ends = np.log10(param.bounds) if param.scale == "log" else np.array(param.bounds)
+        share = (place - ends[0]) / np.ptp(ends)
+        assert -1e-9 <= share.min() < 0.01
+        assert 0.99 < share.max() <= 1 + 1e-9
+        assert abs(np.mean(share) - 1 / 2) < 2e-3
+        assert abs(np.var(share) - 1 / 12) < 2e-3
+
+
+def test_pressures_are_uniform_where_the_second_is_not_below_the_first():
+    draws = design_of(ck.law("norton"), DIMPLE, "paper").draw(0, 4096, seed=1)
+    P1, P2 = ((draws.condition(name) - 3) / 22 for name in ("P1", "P2"))
+    assert (P1 <= P2).all()
+    # Moments of the triangle 0 <= x <= y <= 1: 1/3, 2/3 and E[xy] = 1/4.
+    np.testing.assert_allclose([P1.mean(), P2.mean(), (P1 * P2).mean()], [1 / 3, 2 / 3, 1 / 4], atol=3e-3)
+
+
+def test_the_papers_ranges_of_modulus_and_jump():
+    draws = design_of(ck.law("norton"), DIMPLE, "paper").draw(0, 1024, seed=1)
+    for name, low, high in (("modulus", 50e3, 300e3), ("Tj", 2 * 3600, 10 * 3600)):
+        found = draws.condition(name)
+        assert low <= found.min() < low + 0.02 * (high - low)
+        assert high - 0.02 * (high - low) < found.max() <= high
+
+
+def test_other_ranges_times_and_numbers():
+    changes = {"P1": (5, 10), "P2": 12, "apex_thickness": (0.44, 0.6), "end_time": (7200, 14400), "every": 300}
+    design = design_of(ck.law("norton"), DIMPLE, "paper", **changes)
+    assert design.grid == TimeGrid.every(300.0, 14400.0)
+    draws = design.draw(0, 256, seed=1)
+    assert (draws.condition("P2") == 12).all()
+    assert draws.condition("P1").max() <= 10
+    assert (draws.condition("Tj") < draws.condition("end_time")).all()
+    assert 0.44 <= draws.condition("apex_thickness").min()
+
+
+def test_a_bar_has_two_stresses_and_no_modulus():
+    design = design_of(ck.law("combined"), BAR, "paper")
+    assert design.condition_names == ("stress_1", "stress_2", "Tj")
+
+
+@pytest.mark.parametrize("box", ["paper", "conditioned"])
+def test_a_design_travels_and_says_what_decides_it(box):
+    design = design_of(ck.law("combined"), DIMPLE, box)
+    assert isinstance(design, Design)
+    again = pickle.loads(pickle.dumps(design))
+    assert again == design
+    text = json.dumps(design.document(), allow_nan=False)
+    assert text == json.dumps(again.document(), allow_nan=False)
+    other = design_of(ck.law("combined"), DIMPLE, box, P1=(3, 20))
+    assert text != json.dumps(other.document(), allow_nan=False)
+
+
+@pytest.mark.parametrize("box", ["paper", "conditioned"])
+def test_a_row_is_the_same_in_every_block(box):
+    design = design_of(ck.law("combined"), DIMPLE, box)
+    whole = design.draw(0, 64, seed=5)
+    for first, count in ((0, 1), (1, 7), (60, 4)):
+        part = design.draw(first, count, seed=5)
+        np.testing.assert_array_equal(part.parameters, whole.parameters[first : first + count])
+        np.testing.assert_array_equal(part.conditions, whole.conditions[first : first + count])
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"box": "Paper box"}, "there is no box 'Paper box'"),
+        ({"P3": (1, 2)}, "a bulge test has no condition 'P3'"),
+        ({"P1": (20, 3)}, r"the range \(20, 3\) is reversed; write \(3, 20\)"),
+        ({"P1": "low"}, "condition 'P1' is 'low'"),
+        ({"P1": (1, 2, 3)}, "give a number or"),
+        ({"modulus": (0, 3e5)}, "finite and above zero"),
+        ({"P1": (10, 20)}, "P2 from 3 to 25 MPa reaches below P1"),
+        ({"Tj": (7200, 90000)}, "Tj reaches 90000 s, and tests may end at 43200 s"),
+        ({"grid": TimeGrid(np.array([0.0, 1.0]), relative=True)}, "give end_time"),
+        ({"every": -5}, "frames every -5 s"),
+    ],
+)
+def test_what_is_no_design(changes, told):
+    with pytest.raises(DatasetError, match=told):
+        design_of(ck.law("norton"), DIMPLE, **changes)
+
+
+def test_zero_samples():
+    with pytest.raises(DatasetError, match="0 samples"):
+        design_of(ck.law("norton"), DIMPLE, "paper").draw(0, 0, seed=1)
+
+
+def test_a_law_of_temperature_needs_its_range():
+    law = ck.law("norton").times(ck.arrhenius(T_ref=1073))
+    with pytest.raises(DatasetError, match="depends on temperature"):
+        design_of(law, DIMPLE)
+    assert "temperature" in design_of(law, DIMPLE, temperature=(1000, 1100)).condition_names
+
+
+def test_draws_whose_columns_do_not_fit():
+    with pytest.raises(DatasetError, match="a row of parameters and of conditions each"):
+        Draws(np.zeros((3, 2)), np.zeros((2, 1)), ("P1",))
+    with pytest.raises(DatasetError, match="1 conditions and 2 names"):
+        Draws(np.zeros((2, 2)), np.zeros((2, 1)), ("P1", "P2"))
+    with pytest.raises(DatasetError, match="no condition 'P2'"):
+        Draws(np.zeros((2, 2)), np.zeros((2, 1)), ("P1",)).condition("P2")

@@ -1,0 +1,217 @@
+"""The conditioned box and the rate family: rates in closed form, shares, stress scales, every registered law."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit import registry
+from creepkit.dataset.coefficients import parts_of
+from creepkit.dataset.conditions import mark_times, plan
+from creepkit.dataset.criteria import Outcome
+from creepkit.dataset.design import design_of
+from creepkit.dataset.rate_family import LAW, rate_family
+from creepkit.errors import DatasetError
+from creepkit.language import temperature
+from creepkit.records import Status
+
+DIMPLE, BAR = ck.specimen("bulge"), ck.specimen("uniaxial")
+HOURS_12 = 43200.0
+K, KAPPA = 14.69, 42.3
+"""sigma*/P and mm of amplitude per unit of strain of the paper's dimple at small deflection."""
+
+
+def columns(draws, law):
+    return dict(zip(law.names, draws.parameters.T, strict=True))
+
+
+def reference(draws):
+    return K * np.sqrt(draws.condition("P1") * draws.condition("P2"))
+
+
+# ---- rates ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_rate_of_nortons_law_lies_where_creep_is_visible_and_the_test_lasts():
+    draws = design_of(ck.law("norton"), DIMPLE).draw(0, 2048, seed=2)
+    p = columns(draws, ck.law("norton"))
+    strain = np.log10(p["A"] * reference(draws) ** p["n"] * HOURS_12)
+    low, high = np.log10(0.5 * 0.02 / KAPPA), np.log10(0.2)
+    assert low < strain.min() < low + 0.01
+    assert high - 0.01 < strain.max() < high
+    assert abs(strain.mean() - (low + high) / 2) < 2e-3  # uniform in the logarithm
+
+
+def test_a_thinner_dimple_and_a_shorter_test_shift_the_window():
+    changes = {"apex_thickness": 0.45, "end_time": 3600.0}
+    draws = design_of(ck.law("norton"), DIMPLE, **changes).draw(0, 1024, seed=2)
+    p = columns(draws, ck.law("norton"))
+    stress = reference(draws) * 0.9**-1.17
+    strain = np.log10(p["A"] * stress ** p["n"] * 3600.0)
+    np.testing.assert_allclose(strain.min(), np.log10(0.5 * 0.02 / (KAPPA * 0.9**-0.486)), atol=0.01)
+    np.testing.assert_allclose(strain.max(), np.log10(0.2), atol=0.01)
+
+
+def test_mixtures_have_the_shares_and_the_total_that_were_drawn():
+    """Rates of Eq. (2) by hand, averaged over the test where time enters: mean of t^m is T^m/(1+m)."""
+    law = ck.law("combined")
+    draws = design_of(law, DIMPLE).draw(0, 2048, seed=2)
+    p, stress = columns(draws, law), reference(draws)
+    time = (np.arange(12) + 0.5) / 12 * HOURS_12
+    terms = np.stack(
+        [
+            p["A_1"] * np.sinh(stress / p["B"]) ** p["n_1"],
+            p["A_2"] * stress ** p["n_2"] * 0.01 ** p["m_1"],
+            p["A_3"] * stress ** p["n_3"] * (time ** p["m_2"][:, None]).mean(axis=1),
+        ]
+    )
+    total = np.log10(terms.sum(axis=0) * HOURS_12)
+    assert total.min() > np.log10(0.5 * 0.02 / KAPPA) - 1e-9
+    assert total.max() < np.log10(0.2) + 1e-9
+    there = (terms > 0).sum(axis=0)
+    np.testing.assert_allclose([np.mean(there == k) for k in (1, 2, 3)], [0.6, 0.3, 0.1], atol=0.005)
+    alone = terms[:, there == 1] > 0
+    np.testing.assert_allclose(alone.mean(axis=1), np.full(3, 1 / 3), atol=0.01)
+    # Two shares of a symmetric Dirichlet distribution of .7: mean 1/2, variance 1/(4 (2 x .7 + 1)).
+    pairs = terms[:2, (there == 2) & (terms[2] == 0)]
+    share = pairs[0] / pairs.sum(axis=0)
+    np.testing.assert_allclose([share.mean(), share.var()], [0.5, 1 / (4 * 2.4)], atol=0.02)
+
+
+def test_stress_scales_are_drawn_by_their_ratio_and_no_law_is_nearly_plastic():
+    law = ck.law("hyperbolic-sine")
+    draws = design_of(law, DIMPLE).draw(0, 2048, seed=2)
+    p = columns(draws, law)
+    x = reference(draws) / p["B"]
+    assert x.min() >= 0.05 * (1 - 1e-9)
+    assert 3.9 < x.max() <= 4 * (1 + 1e-9)
+    # d ln sinh^n(x) / d ln x = n x coth x; the cells of the search are 1/32 of the range wide.
+    assert (p["n"] * x / np.tanh(x)).max() < 12 + 8 * 4 / 32
+
+
+def test_a_threshold_stress_lies_below_the_reference_stress():
+    law = ck.law("threshold-stress")
+    draws = design_of(law, DIMPLE).draw(0, 512, seed=2)
+    threshold = next(k for k, param in enumerate(law.params.values()) if param.unit == "MPa")
+    assert (draws.parameters[:, threshold] < reference(draws)).all()
+
+
+def test_a_law_of_temperature_has_its_rate_at_the_temperature_of_the_test():
+    law = ck.law("norton").times(ck.arrhenius(T_ref=1073))
+    draws = design_of(law, DIMPLE, temperature=(1000.0, 1150.0)).draw(0, 512, seed=2)
+    p, T = columns(draws, law), draws.condition("temperature")
+    warm = np.exp(-p["Q"] / 8.314462618 * (1 / T - 1 / 1073.0))
+    strain = np.log10(p["A"] * reference(draws) ** p["n"] * warm * HOURS_12)
+    assert np.log10(0.5 * 0.02 / KAPPA) - 1e-9 < strain.min()
+    assert strain.max() < np.log10(0.2) + 1e-9
+
+
+@pytest.mark.parametrize(("name", "exponent"), [("kachanov-rabotnov", "chi"), ("liu-murakami", "p")])
+def test_a_test_takes_a_share_of_the_life_of_a_law_with_damage(name, exponent):
+    """Rupture after 1/(B s^p) at constant stress by Liu and Murakami; v = B s^chi t^(1+m)/(1+m) by Kachanov."""
+    law = ck.law(name)
+    draws = design_of(law, BAR, stress_1=100.0, stress_2=100.0).draw(0, 512, seed=2)
+    p = columns(draws, law)
+    spent = p["B"] * 100.0 ** p[exponent] * HOURS_12
+    if "m" in p:
+        spent *= (((np.arange(12) + 0.5) / 12 * HOURS_12) ** p["m"][:, None]).mean(axis=1)
+    assert 0.03 * 0.97 < spent.min() < 0.031
+    assert 0.67 < spent.max() < 0.7 * 1.03
+
+
+# ---- every law ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", sorted(registry.default().laws()))
+def test_every_registered_law_has_a_box_or_says_why_not(name):
+    """Coble's rates, in its bounds, hardly reach the highest ones wanted."""
+    law = ck.law(name)
+    warm = {"temperature": (1000.0, 1100.0)} if law.uses(temperature) else {}
+    if name == "norton-bailey-strain":
+        with pytest.raises(DatasetError, match="no linear rate coefficient .* use box='paper'"):
+            design_of(law, DIMPLE, **warm)
+        return
+    design = design_of(law, DIMPLE, **warm)
+    draws = design.draw(0, 64, seed=1)
+    assert np.isfinite(draws.parameters).all()
+    met = [c.passes(law, draws) for c in design.criteria if c.stage == "before"]
+    assert np.all(met, axis=0).mean() >= (0.65 if name == "coble" else 0.85)
+
+
+def test_terms_that_share_a_coefficient_are_one_part():
+    """Blackburn's A multiplies all three terms, beside the combined law's own three."""
+    parts = parts_of(ck.law("combined") + ck.law("blackburn"))
+    assert [len(part.law.terms) for part in parts] == [1, 1, 1, 3]
+
+
+def test_a_law_without_a_coefficient():
+    with pytest.raises(DatasetError, match="term 'power law' has no linear rate coefficient"):
+        design_of(ck.law("norton").fix(A=1e-15), DIMPLE)
+
+
+# ---- what they give -------------------------------------------------------------------------------------------------
+
+
+def informative_share(design, specimen, samples):
+    """Share of the first samples that meet every criterion, simulated."""
+    draws, good = design.draw(0, samples, seed=1), 0
+    for row in range(samples):
+        test = plan(specimen, draws.conditions_of(row), design.grid)
+        at = mark_times(test)
+        times = np.union1d(test.times[::24], at)
+        values = dict(zip(design.law.names, draws.parameters[row].tolist(), strict=True))
+        found = specimen.predict(design.law, values, [test.replace(times=times)])
+        seen = found.of(0)
+        end = Outcome(times, seen, seen[np.searchsorted(times, at)], Status(int(found.status[0, 0])), 0.0, {})
+        good += all(c.passes(end) for c in design.criteria if c.stage == "after")
+    return good / samples
+
+
+def test_at_least_80_percent_of_bars_creep_visibly_and_last():
+    assert informative_share(design_of(ck.law("combined"), BAR), BAR, 60) >= 0.8
+    assert informative_share(rate_family(BAR), BAR, 60) >= 0.8
+
+
+def test_at_least_80_percent_of_dimples_do():
+    assert informative_share(design_of(ck.law("norton"), DIMPLE), DIMPLE, 16) >= 0.8
+    assert informative_share(rate_family(), DIMPLE, 16) >= 0.8
+
+
+# ---- the rate family ------------------------------------------------------------------------------------------------
+
+
+def test_the_conditions_of_the_rate_family():
+    draws = rate_family().draw(0, 2048, seed=3)
+    h, end = draws.condition("apex_thickness"), draws.condition("end_time")
+    np.testing.assert_allclose([h.min(), h.max()], [0.44, 0.60], atol=1e-3)
+    np.testing.assert_allclose([end.min(), end.max()], [1200, 86400], rtol=0.01)
+    np.testing.assert_allclose(np.median(end), np.sqrt(1200 * 86400), rtol=0.01)
+    jump = draws.condition("Tj") / end
+    np.testing.assert_allclose([jump.min(), jump.max()], [0.15, 0.85], atol=0.01)
+    assert rate_family().grid.times(86400.0)[[1, 3, -1]].tolist() == [120.0, 1800.0, 86400.0]
+
+
+def test_exponents_are_off_half_of_the_time_and_grow_in_one_of_ten():
+    p = columns(rate_family().draw(0, 2048, seed=3), LAW)
+    for name in ("k_1", "k_2", "k_3"):
+        shares = [np.mean(p[name] == 0), np.mean(p[name] < 0), np.mean(p[name] > 0)]
+        np.testing.assert_allclose(shares, [0.5, 0.4, 0.1], atol=0.005)
+        assert -0.7 <= p[name].min() < -0.69
+        assert 0.49 < p[name].max() <= 0.5
+
+
+def test_a_term_alone_does_not_grow_with_strain():
+    p = columns(rate_family().draw(0, 2048, seed=3), LAW)
+    there = np.stack([p[f"A_{k}"] > 0 for k in (1, 2, 3)])
+    exponents = np.stack([p[f"m_{k}"] for k in (1, 2, 3)])
+    alone = there.sum(axis=0) == 1
+    np.testing.assert_allclose([np.mean(there.sum(axis=0) == k) for k in (1, 2, 3)], [0.25, 0.45, 0.3], atol=0.005)
+    assert (exponents[:, alone] <= 0).all()
+    assert (exponents[:, ~alone] > 0).any()
+
+
+def test_the_rate_family_of_a_bar_has_no_thickness():
+    design = rate_family(BAR, stress_1=(50, 80), stress_2=(50, 80))
+    assert design.condition_names == ("stress_1", "stress_2", "Tj", "end_time")
+    assert design.draw(0, 16, seed=0).condition("stress_2").max() <= 80

@@ -1,0 +1,80 @@
+"""The domain guard: its leave-one-out distances, boxes, combinations that never occurred, and its document."""
+
+import json
+
+import numpy as np
+import pytest
+
+from creepkit.errors import SurrogateError
+from creepkit.surrogate.domain import Domain
+
+
+def mahalanobis(row: np.ndarray, others: np.ndarray) -> float:
+    apart = row - others.mean(axis=0)
+    return float(np.sqrt(apart @ np.linalg.solve(np.cov(others, rowvar=False), apart)))
+
+
+def test_the_limit_is_the_largest_distance_of_a_row_from_all_others() -> None:
+    rows = np.random.default_rng(0).normal(size=(30, 3)) * [1.0, 100.0, 1e-3]
+    brute = max(mahalanobis(row, np.delete(rows, k, axis=0)) for k, row in enumerate(rows))
+    assert Domain.of("abc", rows).limit == pytest.approx(brute, rel=1e-9)
+
+
+def test_training_rows_are_inside() -> None:
+    rows = np.random.default_rng(1).uniform(size=(200, 6))
+    assert not Domain.of("abcdef", rows).outside(rows).any()
+
+
+def test_one_input_beyond_its_range_is_outside_and_named() -> None:
+    domain = Domain.of(("log10 A", "n"), np.random.default_rng(2).uniform(size=(100, 2)) * [10, 1] + [-20, 3])
+    assert domain.outside(np.array([-15.0, 4.2]))
+    assert domain.reason(np.array([-15.0, 4.2])).startswith("n = 4.2 (trained on 3.0")
+    assert domain.reason(np.array([-15.0, 3.5])) == ""
+
+
+def test_a_combination_that_never_occurred_is_outside_though_each_input_is_within_its_range() -> None:
+    n = np.linspace(2.0, 8.0, 60)
+    rows = np.stack([-7.0 - 2.0 * n + 0.3 * np.random.default_rng(3).normal(size=60), n], axis=1)
+    domain = Domain.of(("log10 A", "n"), rows)
+    odd = np.array([-11.0, 7.5])
+    assert (domain.low < odd).all()
+    assert (odd < domain.high).all()
+    assert domain.outside(odd)
+    assert "combination" in domain.reason(odd)
+    assert not domain.outside(np.array([-7.0 - 2.0 * 5.0, 5.0]))
+
+
+def test_what_never_varied_may_not_vary() -> None:
+    rows = np.stack([np.full(50, 0.5), np.linspace(0, 1, 50)], axis=1)
+    domain = Domain.of(("apex_thickness", "x"), rows)
+    assert not domain.outside(np.array([0.5, 0.3]))
+    assert domain.outside(np.array([0.51, 0.3]))
+
+
+def test_inputs_that_are_not_there_are_not_far() -> None:
+    rows = np.random.default_rng(4).uniform(size=(50, 2))
+    rows[::3, 0] = np.nan
+    domain = Domain.of("ab", rows)
+    assert not domain.outside(np.array([np.nan, 0.5]))
+    assert domain.outside(np.array([np.nan, 5.0]))
+
+
+def test_few_rows_leave_the_box_alone() -> None:
+    domain = Domain.of("abc", np.array([[0.0, 0, 0], [1.0, 1, 0], [0.0, 1, 1]]))
+    assert domain.limit == np.inf
+    assert not domain.outside(np.array([0.5, 0.5, 0.5]))
+    assert domain.outside(np.array([1.5, 0.5, 0.5]))
+
+
+def test_the_document_is_json_and_gives_the_same_distances() -> None:
+    rows = np.random.default_rng(5).normal(size=(40, 4))
+    domain = Domain.of("abcd", rows)
+    again = Domain.from_document(json.loads(json.dumps(domain.document())))
+    assert np.array_equal(again.distance(rows), domain.distance(rows))
+
+
+def test_a_damaged_document_says_so() -> None:
+    document = Domain.of("ab", np.random.default_rng(6).normal(size=(9, 2))).document()
+    for changes in ({"low": [0.0]}, {"mean": "x"}, {"names": None}, {"whitening": [[1.0, 0.0]]}):
+        with pytest.raises(SurrogateError, match="the domain in the header of this surrogate is damaged"):
+            Domain.from_document({**document, **changes})

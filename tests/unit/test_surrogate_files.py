@@ -1,0 +1,83 @@
+"""Files of weights: round trips, and one sentence for each that is damaged, foreign or newer."""
+
+import json
+from pathlib import Path
+
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from creepkit.errors import SurrogateError
+from creepkit.surrogate import files
+from creepkit.surrogate.shipped import surrogate
+from creepkit.surrogate.surrogate import load
+
+HEADER = {"kind": "parameter-gru"}
+WEIGHTS = {"a": torch.arange(6.0).reshape(2, 3), "b": torch.tensor(3, dtype=torch.int64)}
+
+
+def test_tensors_and_header_come_back(tmp_path: Path) -> None:
+    path = files.write(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "curves": {"loss": [1.0, 0.5]}})
+    tensors, header = files.read(path)
+    assert all(
+        torch.equal(tensors[name], WEIGHTS[name]) and tensors[name].dtype == WEIGHTS[name].dtype for name in WEIGHTS
+    )
+    assert header["curves"] == {"loss": [1.0, 0.5]}
+    assert [p.name for p in tmp_path.iterdir()] == ["m.safetensors"]
+
+
+def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
+    path = files.write(tmp_path / "m.safetensors", WEIGHTS, HEADER)
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match="JSON"):
+        files.write(path, WEIGHTS, {**HEADER, "loss": float("nan")})
+    assert path.read_bytes() == before
+    with pytest.raises(SurrogateError, match="cannot be written"):
+        files.write(tmp_path / "nowhere" / "m.safetensors", WEIGHTS, HEADER)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "told"),
+    [
+        (lambda raw: raw[: len(raw) - 7], "damaged, or not a safetensors file"),
+        (lambda raw: b"", "damaged, or not a safetensors file"),
+        (lambda raw: b"PK\x03\x04" + raw, "damaged, or not a safetensors file"),
+        (lambda raw: raw.replace(b'\\"version\\": 1', b'\\"version\\": 9'), "written by a newer creepkit"),
+        (lambda raw: raw.replace(b'\\"version\\": 1', b'\\"version\\":-1'), "of an unknown version"),
+        (lambda raw: raw.replace(b"creepkit-surrogate", b"creepkit-something"), "its header is damaged"),
+        (lambda raw: raw.replace(b"parameter-gru", b"hyper-network"), "kind 'hyper-network' is unknown here"),
+    ],
+)  # fmt: skip
+def test_a_file_that_is_not_a_surrogate_says_why(tmp_path: Path, spoil, told: str) -> None:
+    path = files.write(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "config": {}})
+    path.write_bytes(spoil(path.read_bytes()))
+    with pytest.raises(SurrogateError, match=told) as caught:
+        load(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_weights_of_another_program_are_told_apart(tmp_path: Path) -> None:
+    save_file(WEIGHTS, tmp_path / "other.safetensors")
+    with pytest.raises(SurrogateError, match="weights of another program"):
+        load(tmp_path / "other.safetensors")
+
+
+def test_a_header_without_its_parts_says_so(tmp_path: Path) -> None:
+    path = files.write(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "config": {"training": {}}})
+    with pytest.raises(SurrogateError, match="its header and its weights do not belong together"):
+        load(path)
+
+
+def test_names_that_nobody_knows(tmp_path: Path) -> None:
+    with pytest.raises(SurrogateError, match="no surrogate is called 'dimpel'"):
+        surrogate("dimpel")
+    with pytest.raises(SurrogateError, match="there is no such file"):
+        surrogate(tmp_path / "none.safetensors")
+
+
+def test_the_header_is_plain_json(tmp_path: Path) -> None:
+    raw = files.write(tmp_path / "m.safetensors", WEIGHTS, HEADER).read_bytes()
+    size = int.from_bytes(raw[:8], "little")
+    told = json.loads(raw[8 : 8 + size])["__metadata__"]["creepkit"]
+    assert json.loads(told) == {"format": "creepkit-surrogate", "version": 1, "kind": "parameter-gru"}

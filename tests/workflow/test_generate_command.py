@@ -1,0 +1,118 @@
+"""`creepkit generate` and `creepkit data`: from a law to a file of samples, and what such a file holds."""
+
+import json
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import creepkit as ck
+from creepkit.cli.app import app
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "cluster"
+BARS = ("norton", "--specimen", "uniaxial", "--interval", "3600", "--seed", "1")
+
+
+def creepkit(*words):
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def sentence(result):
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert result.stderr.startswith("creepkit: ")
+    assert result.stderr.count("\n") == 1
+    return result.stderr
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    to = tmp_path_factory.mktemp("made") / "bars.h5"
+    result = creepkit("generate", *BARS, "--draws", 300, "--to", to, "--workers", 1)
+    assert result.exit_code == 0, result.output
+    return to, result
+
+
+def test_generate_tells_what_it_made_and_how_far_it_was(made):
+    to, result = made
+    assert re.search(r"^300 samples of norton on uniaxial: \d+ accepted", result.stdout)
+    assert f"wrote {to}" in result.stdout
+    assert re.search(r"draws: 512 of 512 \(.*/s, 0 s left, \d+ % accepted\)", result.stderr)
+
+
+def test_data_describes_the_file(made):
+    to, _ = made
+    told, data = json.loads(creepkit("data", to, "--json").stdout), ck.read_dataset(to)
+    assert (told["samples"], told["accepted"]) == (300, len(data.accepted))
+    rejected = {entry["criterion"]: entry["rejected"] for entry in told["reasons"]}
+    assert sum(rejected.values()) + told["accepted"] + told["failed"] == 300
+    good = data.accepted
+    n = good.parameters[:, good.parameter_names.index("n")]
+    assert told["ranges"]["n"] == {"least": n.min(), "median": np.median(n), "most": n.max()}
+    assert (told["units"]["A"], told["units"]["stress_1"], told["units"]["Tj"]) == ("1/s", "MPa", "s")
+    assert told["provenance"]["seed"] == 1
+    assert told["design"] == "conditioned"
+    text = creepkit("data", to).stdout
+    assert "seed 1" in text
+    assert re.search(r"n +1 +\d", text)
+
+
+def test_data_draws_inputs_and_histories(made, tmp_path):
+    to, _ = made
+    assert creepkit("data", to, "--plots", tmp_path / "plots").exit_code == 0
+    pictures = sorted(path.name for path in (tmp_path / "plots").iterdir())
+    assert pictures == ["histories.png", "inputs.png"]
+    assert all((tmp_path / "plots" / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
+
+
+def test_the_verbs_of_a_notebook_make_the_same_file(made, tmp_path):
+    data = ck.generate("norton", "uniaxial", seed=1, draws=300, to=tmp_path / "a.h5", every=3600.0, workers=1)
+    np.testing.assert_array_equal(data.values, ck.read_dataset(made[0]).values)
+    assert repr(data).startswith("<Dataset: 300 samples of norton on uniaxial")
+
+
+def test_a_dry_run_simulates_nothing(tmp_path):
+    result = creepkit("generate", "combined", "--box", "paper", "--dry-run", "--to", tmp_path / "a.h5")
+    assert result.exit_code == 0, result.output
+    assert "criterion" in result.stdout
+    assert os.listdir(tmp_path) == ["a.rates.png"]
+    family = creepkit("generate", "rate-family", "--dry-run", "--json", "--to", tmp_path / "r.h5")
+    assert json.loads(family.stdout)["simulated"] > 0.8
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("generate", "norton"), "--to FILE is missing"),
+        (("generate", "norton", "--to", "a.h5"), "say either how many accepted samples"),
+        (("generate", "norton", "--to", "a.h5", "--samples", 9, "--part", "0/4"), "--part 0/4 is not K/N"),
+        (("generate", "norton", "--to", "a.h5", "--samples", 9, "--box", "pandora"), "there is no box 'pandora'"),
+        (("generate", "rate-family", "--box", "paper", "--to", "a.h5"), "rate-family has a box of its own"),
+        (("generate", "nortn", "--to", "a.h5", "--samples", 9), "did you mean 'norton'"),
+        (("generate", "norton", "--specimen", "relaxation", "--to", "a.h5", "--samples", 9), "relaxation"),
+        (("data", "nowhere.h5"), "nowhere.h5: there is no such file"),
+        (("data", "."), "is a folder"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_sentence(tmp_path, monkeypatch, words, message):
+    monkeypatch.chdir(tmp_path)
+    assert message in sentence(creepkit(*words))
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_job_array_without_slurm_is_one_job(tmp_path):
+    env = {**os.environ, "SAMPLES": "1", "FILE": str(tmp_path / "a.h5"), "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    fake = tmp_path / "creepkit"
+    fake.write_text('#!/bin/sh\necho "$@"\n')
+    fake.chmod(0o755)
+    env |= {"SLURM_ARRAY_TASK_ID": "3", "SLURM_ARRAY_TASK_COUNT": "16", "SLURM_CPUS_PER_TASK": "4"}
+    done = subprocess.run(["bash", EXAMPLES / "job_array.sh"], env=env, capture_output=True, text=True, check=True)
+    words = "--box conditioned --samples 1 --seed 1 --to"
+    assert done.stdout == f"generate combined --specimen bulge {words} {tmp_path}/a.h5 --workers 4 --part 3/16\n"
+
+
+def test_the_dask_example_is_python():
+    compile((EXAMPLES / "dask_slurm.py").read_text(), "dask_slurm.py", "exec")
