@@ -125,7 +125,9 @@ def main():
     models |= {name: ck.surrogate(name) for name in given.models}
     for title, model in models.items():
         print(f"\n{title}\n")
-        print("| held-out | samples | rel. % | at 12 h % | RSE D 1e-4 | S_d | S_p | largest um | 95 % | outside | fine % |")
+        print(
+            "| held-out | samples | rel. % | at 12 h % | RSE D 1e-4 | S_d | S_p | largest um | 95 % | outside | fine % |"
+        )
         print("|" + "-|" * 11)
         for name, data in sets.items():
             print(row(name, model, data), flush=True)

