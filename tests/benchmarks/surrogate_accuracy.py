@@ -32,7 +32,6 @@ SETS = {
     "n(t), Eq. 1": "drifting-exponent",
     "mixtures, Eq. 2": "combined",
     "graham-walles": "graham-walles",
-    "theta projection": "theta-projection",
 }
 FIRST_FRAME = 1
 """Frames before it (the ramp itself) say nothing."""
@@ -126,7 +125,7 @@ def main():
     for title, model in models.items():
         print(f"\n{title}\n")
         print(
-            "| held-out | samples | rel. % | at 12 h % | RSE D 1e-4 | S_d | S_p | largest um | 95 % | outside | fine % |"
+            "| held-out | samples | rel. % | 12 h % | RSE D 1e-4 | S_d | S_p | largest um | 95 % | outside | fine % |"
         )
         print("|" + "-|" * 11)
         for name, data in sets.items():

@@ -1,4 +1,7 @@
-"""Small data sets whose histories are known: Norton bars under held loads in closed form, and a few dimples."""
+"""Small data sets whose histories are known: Norton bars under held loads in closed form, and a few dimples.
+
+And dimples of the rate family, simulated or only drawn.
+"""
 
 from collections.abc import Mapping
 
@@ -6,6 +9,8 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.dataset.dataset import Dataset
+from creepkit.dataset.rate_family import rate_family
+from creepkit.dataset.simulating import header_of, simulate
 from creepkit.dataset.time_grid import TimeGrid
 from creepkit.records import History
 
@@ -57,6 +62,22 @@ def dimples(count: int = 24) -> Dataset:
     return data_set("bulge", empty.law, grid, parameters, columns, np.array(found))
 
 
+def rates(draws: int = 40) -> Dataset:
+    """Dimples of the rate family by finite elements: those of some draws that are accepted."""
+    family, specimen = rate_family(), ck.specimen("bulge")
+    header = header_of(family, specimen, {"seed": 1})
+    return simulate(family, header, 1, 0, draws, lambda row: None).accepted
+
+
+def unsimulated_rates(count: int) -> Dataset:
+    """Draws of the rate family with nothing for histories, which is all that a domain is made of."""
+    family = rate_family()
+    drawn = family.draw(0, count, 1)
+    columns = dict(zip(family.condition_names, drawn.conditions.T, strict=True))
+    return data_set("bulge", family.law, family.grid, drawn.parameters, columns,
+                    np.zeros((count, family.grid.frames, 3)))  # fmt: skip
+
+
 def data_set(
     specimen: str, law: ck.CreepLaw, grid: TimeGrid, parameters: np.ndarray, columns: Mapping[str, np.ndarray],
     values: np.ndarray,
@@ -69,7 +90,8 @@ def data_set(
         parameter_names=law.names, condition_names=tuple(columns), parameters=np.array(parameters, float),
         conditions=np.stack([*columns.values()], axis=1), values=np.array(values, np.float32),
         marks=np.full((count, 4, len(outputs)), np.nan, np.float32), status=np.zeros(count, np.int64),
-        end_times=np.array(ends, float), reasons=np.zeros(count, np.int64), reason_names=("accepted",),
+        end_times=np.array(ends, float), reasons=np.zeros(count, np.int64),
+        reason_names=("accepted",), reason_texts=("all criteria are met",),
         index=np.arange(count), provenance={"seed": 1},
     )  # fmt: skip
 

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -286,3 +287,77 @@ def test_a_specimen_that_a_file_cannot_hold_is_refused(data, tmp_path):
     mesh = odd.geometry.mesh(0.5)
     with pytest.raises(DatasetError, match="bulge.mesh is a Mesh, which a data set cannot hold"):
         store.write(replace(data, specimen=odd.replace(mesh=mesh)), tmp_path / "a.h5")
+
+
+# ---- files that mean harm ------------------------------------------------------------------------------------------
+
+
+def changed(data, path, change):
+    """A file of the data set that `change` has had in its hands."""
+    store.write(data, path)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    return path
+
+
+def replaced(name, values, **how):
+    """A change of one array."""
+
+    def change(file):
+        kept = dict(file[name].attrs)
+        del file[name]
+        file.create_dataset(name, data=values, **how).attrs.update(kept)
+
+    return change
+
+
+def enormous(file):
+    """Every array promises a million million samples; of none is anything there."""
+    for name in COLUMNS:
+        file[name].resize(10**12, axis=0)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (enormous, "says to be .*, and is not all there"),
+        (replaced("reasons", np.zeros(32)), r"the array 'reasons' is float64 \(32,\), which does not fit"),
+        (replaced("parameters", np.zeros((32, 2), complex)), "'parameters' is complex128"),
+        (replaced("parameters", np.full((32, 2), b"1e-12")), "'parameters' is |S5"),
+        (replaced("time_grid", np.array([0.0, np.nan, 1000.0, 3600.0])), "a time grid needs two or more finite times"),
+        (replaced("time_grid", np.array([0.0, 100.0, 100.0, 3600.0])), "must start at or after 0 and increase"),
+        (replaced("time_grid", np.zeros((4, 4))), "a time grid needs"),
+        (replaced("time_grid", np.array([b"0", b"1", b"2", b"3"])), "its time grid is |S1"),
+        (lambda file: file["time_grid"].attrs.__delitem__("relative"), "cannot be read, it seems damaged"),
+        (lambda file: file.__delitem__("time_grid"), "cannot be read, it seems damaged"),
+        (lambda file: file.__delitem__("failures"), "cannot be read, it seems damaged"),
+        (replaced("failures/rows", np.array([1, 2, 3])), "cannot be read, it seems damaged"),
+        (lambda file: file.attrs.__setitem__("provenance", "[]"), "the attribute 'provenance' is no record"),
+        (lambda file: file.attrs.__setitem__("design", "3"), "the attribute 'design' is no record"),
+        (lambda file: file.attrs.__setitem__("law", "[" * 100_000), "cannot be read, it seems damaged"),
+        (lambda file: file.attrs.__setitem__("outputs", 3.0), "cannot be read, it seems damaged"),
+        (lambda file: file.attrs.__setitem__("parameter_names", ["n", "A"]), "its parameters are n, A, those of its"),
+        (lambda file: file.attrs.__setitem__("reason_texts", ["met"]), "not a text for each reason"),
+    ],
+)
+def test_what_a_file_promises_is_checked(data, tmp_path, change, message):
+    with pytest.raises(DatasetError, match=message):
+        store.read(changed(data, tmp_path / "a.h5", change))
+    sentence(tmp_path / "a.h5")
+
+
+def test_an_accepted_sample_needs_a_history(data, tmp_path):
+    row = np.flatnonzero(data.reasons == 0)[0]
+    values = np.array(data.values)
+    values[row] = np.nan
+    path = store.write(replace(data, values=values), tmp_path / "a.h5")
+    assert f"sample {row} was accepted and has no history" in sentence(path)
+
+
+def test_nothing_from_a_file_is_unpickled():
+    """Pickles travel between a campaign and its workers, through pipes; none is read from a file."""
+    folder = Path(store.__file__).parent
+    assert {path.name for path in folder.glob("*.py") if "import pickle" in path.read_text()} == {
+        "worker.py", "workers.py"
+    }  # fmt: skip
+    assert "allow_pickle" not in "".join(path.read_text() for path in folder.glob("*.py"))

@@ -248,6 +248,25 @@ def test_effects_are_changed_histories(kind, value, change):
     assert (np.abs(REDUCED.predict(law, values, [JUMP]).of(0)[1:] / changed[1:] - 1) > 1e-4).any()
 
 
+def test_effects_of_candidates_do_not_mix():
+    rng, kinds = np.random.default_rng(5), {"thickness": (0.45, 0.55), "modulus": (-0.1, 0.1), "temperature": (-20, 20)}
+    effects = {kind: rng.uniform(*limits, (4, 2)) for kind, limits in kinds.items()}
+    tests = [JUMP, held(6.0, 7 * HOURS, frames=9, elastic=Elastic(1.2e5))]
+    together = REDUCED.predict(NORTON, SLOW, tests, effects=effects)
+    for c, k in np.ndindex(4, 2):
+        alone = REDUCED.predict(
+            NORTON, SLOW, [tests[k]], effects={n: v[c : c + 1, k : k + 1] for n, v in effects.items()}
+        )
+        np.testing.assert_allclose(together.of(k, c), alone.of(0), rtol=1e-12)
+
+
+def test_a_mark_asked_for_alone_is_the_same_among_others():
+    """Ends of segments are nodes, and no spline is needed there."""
+    marks = JUMP.times[[12, 24]]
+    alone = REDUCED.predict(NORTON, SLOW, [JUMP.replace(times=marks)]).of(0)
+    np.testing.assert_allclose(alone, REDUCED.predict(NORTON, SLOW, [JUMP]).of(0)[[12, 24]], rtol=1e-12)
+
+
 def test_a_modulus_that_depends_on_temperature():
     from creepkit.language import symbols
 

@@ -11,6 +11,8 @@ from planted_sets import bars
 import creepkit as ck
 from creepkit.dataset.store import write
 from creepkit.surrogate import sweep as sweeping
+from creepkit.surrogate.evaluation import evaluate
+from creepkit.surrogate.trainable import split
 
 PNG = b"\x89PNG"
 
@@ -30,7 +32,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_train_writes_a_surrogate_and_its_pictures(file: Path, tmp_path: Path) -> None:
     words = ("train", str(file), "--to", str(tmp_path / "m.safetensors"), "--hidden", "6", "--layers", "1")
-    shown = creepkit(*words, "--epochs", "3", "--parameters", "rates")
+    shown = creepkit(*words, "--epochs", "3", "--target", "log")
     assert shown.exit_code == 0, shown.output
     assert "validation loss (Eq. 4, outputs together)" in shown.stdout
     assert "48 samples for training, 12 for validation" in shown.stdout
@@ -38,7 +40,7 @@ def test_train_writes_a_surrogate_and_its_pictures(file: Path, tmp_path: Path) -
     assert pictures == ["m-curves.png", "m-parity.png", "m-worst.png"]
     assert all((tmp_path / name).read_bytes().startswith(PNG) for name in pictures)
     model = ck.surrogate(tmp_path / "m.safetensors")
-    assert model.recipe == ck.ParameterGru(6, 1, parameters="rates", training=ck.Training(epochs=3))
+    assert model.recipe == ck.ParameterGru(6, 1, target="log", training=ck.Training(epochs=3))
 
 
 def test_train_tells_its_errors_as_json(file: Path, tmp_path: Path) -> None:
@@ -51,21 +53,33 @@ def test_train_tells_its_errors_as_json(file: Path, tmp_path: Path) -> None:
 
 def test_a_sweep_is_a_table_and_a_picture_and_is_not_redone(file: Path, tmp_path: Path) -> None:
     words = ("sweep", str(file), "--to", str(tmp_path), "--layers", "1", "--hidden", "4,6", "--cell", "gru,lstm")
-    first = creepkit(*words, "--samples", "30,60", "--epochs", "2", "--json")
+    first = creepkit(*words, "--samples", "20,48", "--epochs", "2", "--json")
     assert first.exit_code == 0, first.output
     found = json.loads(first.stdout)["trainings"]
     sizes = {(e["cell"], e["hidden"], e["layers"], e["samples"]) for e in found}
-    assert sizes == {(c, h, 1, n) for c in ("gru", "lstm") for h in (4, 6) for n in (30, 60)}
+    assert sizes == {(c, h, 1, n) for c in ("gru", "lstm") for h in (4, 6) for n in (20, 48)}
     gru = next(e for e in found if (e["cell"], e["hidden"]) == ("gru", 4))
     # 3 gates of (4 + 4 + 2) x 4 numbers for log10 A, n, off and the load, and a head of 4 + 1
     assert gru["weights"] == 3 * 4 * (4 + 4 + 2) + 5
     assert (tmp_path / "sweep.png").read_bytes().startswith(PNG)
     stamps = {p: p.stat().st_mtime_ns for p in tmp_path.glob("*.safetensors")}
     assert len(stamps) == 8
-    (tmp_path / "gru-4x1-30.safetensors").unlink()
-    again = creepkit(*words, "--samples", "30,60", "--epochs", "2", "--json")
+    (tmp_path / "gru-4x1-20.safetensors").unlink()
+    again = creepkit(*words, "--samples", "20,48", "--epochs", "2", "--json")
     assert json.loads(again.stdout)["trainings"] == found
     assert sum(p.stat().st_mtime_ns == stamp for p, stamp in stamps.items()) == 7
+
+
+def test_a_sweep_judges_every_number_of_samples_by_the_same_rows(tmp_path: Path) -> None:
+    data, recipe = bars(60), ck.ParameterGru(4, 1, training=ck.Training(epochs=2))
+    entries = sweeping.sweep(data, recipe, to=tmp_path, samples=(10, 20, 48))
+    judged = [evaluate(ck.surrogate(tmp_path / e.file), data) for e in entries]
+    for entry, one in zip(entries, judged, strict=True):
+        assert one.found.index.tolist() == judged[0].found.index.tolist()
+        assert entry.loss == one.metrics["loss"]
+        learnt = split(len(data), ck.Training(samples=entry.samples), 0)[0].tolist()
+        assert (len(learnt), set(learnt) & set(one.found.index)) == (entry.samples, set())
+    assert len({e.loss for e in entries}) == 3
 
 
 def test_the_best_of_a_sweep_stands_on_top(file: Path, tmp_path: Path) -> None:
@@ -87,7 +101,10 @@ def test_the_best_of_a_sweep_stands_on_top(file: Path, tmp_path: Path) -> None:
         ),
         (("train", "{to}", "--to", "{to}"), "no such"),
         (("sweep", "{set}", "--to", "{to}", "--hidden", "64;128"), "--hidden 64;128 is not understood"),
-        (("sweep", "{set}", "--to", "{to}", "--samples", "900"), "a sweep over 900 samples needs as many"),
+        (
+            ("sweep", "{set}", "--to", "{to}", "--samples", "900"),
+            "there are not 900 samples to learn from: the data set has 60 accepted ones, of which 12",
+        ),
     ],
 )
 def test_what_cannot_be_is_one_line(file: Path, tmp_path: Path, words: tuple[str, ...], told: str) -> None:

@@ -1,6 +1,7 @@
 """The domain guard: its leave-one-out distances, boxes, combinations that never occurred, and its document."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,6 +50,22 @@ def test_what_never_varied_may_not_vary() -> None:
     domain = Domain.of(("apex_thickness", "x"), rows)
     assert not domain.outside(np.array([0.5, 0.3]))
     assert domain.outside(np.array([0.51, 0.3]))
+
+
+def test_each_input_is_forgiven_what_it_is_told() -> None:
+    rows = np.random.default_rng(7).uniform(size=(400, 2)) * [1, 10]
+    domain = replace(Domain.of(("thickness", "exponent"), rows, [0.05, 0.5]), limit=np.inf)
+    assert domain.outside(np.array([[1.04, 5.0], [1.06, 5.0], [0.5, 14.5], [0.5, 15.5]])).tolist() == [0, 1, 0, 1]
+    assert domain.reason(np.array([1.06, 14.5])).startswith("thickness = 1.06 (trained on 0.00")
+    assert "exponent" not in domain.reason(np.array([1.06, 14.5]))
+
+
+def test_documents_that_say_nothing_of_it_forgive_one_percent() -> None:
+    rows = np.stack([np.linspace(0.0, 1.0, 50), np.random.default_rng(8).normal(size=50)], axis=1)
+    document = {**Domain.of("ab", rows, 0.5).document(), "limit": None}
+    del document["forgiven"]
+    edges = np.array([[1.009, 0.5], [1.02, 0.5]])
+    assert Domain.from_document(document).outside(edges).tolist() == [False, True]
 
 
 def test_inputs_that_are_not_there_are_not_far() -> None:

@@ -141,10 +141,10 @@ def test_the_cosine_ends_at_zero() -> None:
 
 
 def test_rows_set_aside_are_a_fifth_and_none_is_lost() -> None:
-    aside, kept = split(101, 0.2, seed=0)[::-1]
+    aside, kept = split(101, Training(), seed=0)[::-1]
     assert len(aside) == 20
     assert sorted([*aside.tolist(), *kept.tolist()]) == list(range(101))
-    assert split(101, 0.2, seed=1)[1].tolist() != aside.tolist()
+    assert split(101, Training(), seed=1)[1].tolist() != aside.tolist()
 
 
 def test_frames_that_are_not_numbers_teach_nothing(data: Dataset) -> None:

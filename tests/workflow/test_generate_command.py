@@ -12,6 +12,8 @@ from typer.testing import CliRunner
 
 import creepkit as ck
 from creepkit.cli.app import app
+from creepkit.cli.generate import changes_given, design_named
+from creepkit.errors import DatasetError
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "cluster"
 BARS = ("norton", "--specimen", "uniaxial", "--interval", "3600", "--seed", "1")
@@ -68,9 +70,14 @@ def test_data_draws_inputs_and_histories(made, tmp_path):
     assert all((tmp_path / "plots" / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
 
 
-def test_the_verbs_of_a_notebook_make_the_same_file(made, tmp_path):
-    data = ck.generate("norton", "uniaxial", seed=1, draws=300, to=tmp_path / "a.h5", every=3600.0, workers=1)
-    np.testing.assert_array_equal(data.values, ck.read_dataset(made[0]).values)
+def test_the_verbs_of_a_notebook_ask_for_the_same_file(made):
+    """The file is the answer as it is: of any other campaign it would be refused, as it is to another seed."""
+    to, _ = made
+    before = to.stat().st_mtime_ns
+    data = ck.generate("norton", "uniaxial", seed=1, draws=300, to=to, every=3600.0)
+    assert to.stat().st_mtime_ns == before
+    with pytest.raises(DatasetError, match="there and here seed is 1 and 2"):
+        ck.generate("norton", "uniaxial", seed=2, draws=300, to=to, every=3600.0)
     assert repr(data).startswith("<Dataset: 300 samples of norton on uniaxial")
 
 
@@ -83,6 +90,17 @@ def test_a_dry_run_simulates_nothing(tmp_path):
     assert json.loads(family.stdout)["simulated"] > 0.8
 
 
+def test_ranges_of_conditions_and_what_is_left_out_can_be_said():
+    ranges = changes_given(["temperature=1000:1150", "modulus=150e3"], None, None, False)
+    design = design_named("dorn", ck.specimen("bulge"), None, ranges, None)
+    draws = design.draw(0, 64, seed=0)
+    assert (draws.condition("modulus") == 150e3).all()
+    assert 1000 <= draws.condition("temperature").min() < draws.condition("temperature").max() <= 1150
+    unscreened = design_named("norton", ck.specimen("bulge"), "paper", changes_given([], 6.0, "paper", True), None)
+    assert not unscreened.screened
+    assert unscreened.grid.end == 6 * 3600
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -93,6 +111,15 @@ def test_a_dry_run_simulates_nothing(tmp_path):
         (("generate", "rate-family", "--box", "paper", "--to", "a.h5"), "rate-family has a box of its own"),
         (("generate", "nortn", "--to", "a.h5", "--samples", 9), "did you mean 'norton'"),
         (("generate", "norton", "--specimen", "relaxation", "--to", "a.h5", "--samples", 9), "relaxation"),
+        (("generate", "norton", "--to", "", "--samples", 9), "'.' is no name of a file"),
+        (("generate", "norton", "--to", "a.h5", "--samples", 9, "--end-h", "1e9"), "at most 100000 are simulated"),
+        (("generate", "norton", "--to", "a.h5", "--samples", 9, "--range", "P1"), "--range P1: write NAME=LOW:HIGH"),
+        (("generate", "norton", "--to", "a.h5", "--range", "P9=1:2"), "a bulge test has no condition 'P9'"),
+        (("generate", "norton", "--to", "a.h5", "--range", "P1=9:2"), "the range (9, 2) is reversed"),
+        (("generate", "norton", "--to", "a.h5", "--range", "P1=5", "--range", "P1=6"), "a condition is given twice"),
+        (("generate", "norton", "--range", "end_time=9", "--end-h", 3), "both say when tests end"),
+        (("generate", "norton", "--to", "a.h5", "--unscreened"), "--unscreened belongs to --box paper"),
+        (("generate", "dorn", "--to", "a.h5", "--samples", 9), "or --range temperature=1000:1100"),
         (("data", "nowhere.h5"), "nowhere.h5: there is no such file"),
         (("data", "."), "is a folder"),
     ],

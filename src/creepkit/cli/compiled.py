@@ -12,7 +12,7 @@ import zlib
 from pathlib import Path
 
 _SOURCES = Path(__file__).parents[1]
-_COMPILED = ("integration/*.py", "kernels/*.py", "fem/*.py", "specimens/gaussian_*.py")
+_COMPILED = ("integration/*.py", "kernels/*.py", "fem/*.py", "specimens/gaussian_*.py", "specimens/reduced_*.py")
 _STATES_KEPT = 3
 
 

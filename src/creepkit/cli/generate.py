@@ -32,6 +32,17 @@ def command(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the Sobol sequence.")] = 0,
     interval: Annotated[float | None, typer.Option(help="s from frame to frame; 150 by default.")] = None,
     end_h: Annotated[float | None, typer.Option(help="End of the tests, h; 12 by default.")] = None,
+    ranges: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--range",
+            metavar="NAME=LOW:HIGH",
+            help="Of a condition, in MPa, s, mm, K: P1=5:20, modulus=150e3, temperature=1000:1100 ...; once for each.",
+        ),
+    ] = None,
+    unscreened: Annotated[
+        bool, typer.Option("--unscreened", help="Simulate what bursts far too early by a cheap stand-in, too (paper).")
+    ] = False,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
     cluster: Annotated[str | None, typer.Option(metavar="URL", help="A dask scheduler, tcp://host:port.")] = None,
     part: Annotated[
@@ -48,7 +59,7 @@ def command(
     from creepkit.errors import DatasetError
 
     body = study.specimen(specimen)
-    design = design_named(law, body, box, interval, end_h)
+    design = design_named(law, body, box, changes_given(ranges or [], end_h, box, unscreened), interval)
     if dry_run:
         tell_acceptance(design, seed, to, as_json)
         return
@@ -62,21 +73,52 @@ def command(
     tell(data, to, part, as_json)
 
 
-def design_named(law: str, body: Specimen, box: str | None, interval: float | None, end_h: float | None) -> Design:
-    """The design that these options name."""
+def changes_given(ranges: list[str], end_h: float | None, box: str | None, unscreened: bool) -> dict[str, Any]:
+    """What options change in a design."""
+    from creepkit.errors import DatasetError
+
+    changes: dict[str, Any] = dict(range_given(text) for text in ranges)
+    if len(changes) < len(ranges):
+        raise DatasetError(f"--range {' '.join(ranges)}: a condition is given twice; keep one of them")
+    if end_h is not None:
+        if "end_time" in changes:
+            raise DatasetError("--end-h and --range end_time both say when tests end; leave one of them out")
+        changes["end_time"] = 3600.0 * end_h
+    if unscreened:
+        if box != "paper":
+            raise DatasetError("--unscreened belongs to --box paper; nothing else leaves samples out")
+        changes["screened"] = False
+    return changes
+
+
+def range_given(text: str) -> tuple[str, tuple[float, float]]:
+    """(condition, (low, high)) from NAME=LOW:HIGH, or from NAME=NUMBER."""
+    from creepkit.errors import DatasetError
+
+    name, _, ends = text.partition("=")
+    try:
+        low, high = (float(end) for end in (ends if ":" in ends else f"{ends}:{ends}").split(":"))
+    except ValueError:
+        raise DatasetError(f"--range {text}: write NAME=LOW:HIGH or NAME=NUMBER, such as P1=5:20") from None
+    return name.strip(), (low, high)
+
+
+def design_named(law: str, body: Specimen, box: str | None, changes: dict[str, Any], interval: float | None) -> Design:
+    """The design that these options name; interval : s between frames."""
+    import numpy as np
+
     from creepkit import study
     from creepkit.dataset.rate_family import ENDS
     from creepkit.dataset.time_grid import TimeGrid
     from creepkit.errors import DatasetError
     from creepkit.study.sets import design_given
 
-    changes: dict[str, Any] = {} if end_h is None else {"end_time": 3600.0 * end_h}
     if law != FAMILY:
         return design_given(law, body, box, changes if interval is None else {**changes, "every": interval})
     if box is not None:
         raise DatasetError(f"--box {box}: {FAMILY} has a box of its own; leave --box out")
     if interval is not None:
-        changes["grid"] = TimeGrid.every(interval, changes.get("end_time", ENDS[1]))
+        changes["grid"] = TimeGrid.every(interval, np.max(changes.get("end_time", ENDS[1])))
     return study.rate_family(body, **changes)
 
 

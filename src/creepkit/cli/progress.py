@@ -11,12 +11,13 @@ from typing import Any
 class Progress:
     """Use as a context; call `tick(task, done, total)`, maybe with a note, from the work. Writes to stderr."""
 
-    QUIET = 2.0
+    QUIET, SHARE = 2.0, 0.01
+    """s between plain lines, and the share of the time so far: nobody reads five thousand lines of three hours."""
 
     def __init__(self) -> None:
         self._bar: Any = None
         self._tasks: dict[str, Any] = {}
-        self._told = time.monotonic()
+        self._start = self._told = time.monotonic()
 
     def __enter__(self) -> Progress:
         if sys.stderr.isatty():
@@ -47,6 +48,10 @@ class Progress:
             if task not in self._tasks:
                 self._tasks[task] = self._bar.add_task(task, total=total, note=note)
             self._bar.update(self._tasks[task], completed=done, total=total, note=note)
-        elif done == total or time.monotonic() - self._told > self.QUIET:
+        elif done == total or self._is_due():
             self._told = time.monotonic()
             print(f"{task}: {done} of {total}{note and f' ({note})'}", file=sys.stderr, flush=True)
+
+    def _is_due(self) -> bool:
+        now = time.monotonic()
+        return now - self._told > max(self.QUIET, self.SHARE * (now - self._start))

@@ -17,13 +17,14 @@ def command(
     layers: Annotated[str, typer.Option(help="Numbers of layers, such as 1,2,3.")] = "1,2,3",
     hidden: Annotated[str, typer.Option(help="Widths, such as 64,128.")] = "64,128",
     cell: Annotated[str, typer.Option(help="gru, lstm or both: gru,lstm.")] = "gru",
-    samples: Annotated[str | None, typer.Option(help="Numbers of samples, such as 1000,2000; all by default.")] = None,
-    parameters: Annotated[str, typer.Option(help="values or rates; see creepkit train.")] = "values",
+    samples: Annotated[
+        str | None, typer.Option(help="Numbers to learn from, such as 1000,2000; all by default.")
+    ] = None,
     target: Annotated[str, typer.Option(help="value or log; see creepkit train.")] = "value",
     epochs: Annotated[int, typer.Option(min=1, help="Passes over the training rows.")] = 100,
     rate: Annotated[float, typer.Option(help="Rate of Adam at the beginning.")] = 1e-3,
     schedule: Annotated[str, typer.Option(help="Of the rate: plateau, cosine or constant.")] = "plateau",
-    seed: Annotated[int, typer.Option(help="Of the split, the first weights and the order of rows.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the split, the first weights and the order of rows.")] = 0,
     device: Annotated[str, typer.Option(help="auto (a GPU where there is one), cpu or cuda.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="Of torch; one is quickest on a busy machine.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
@@ -41,7 +42,7 @@ def command(
     if threads is not None:
         torch.set_num_threads(threads)
     how = {"epochs": epochs, "rate": rate, "schedule": schedule}
-    recipe = recipe_given("parameter-gru", {"parameters": parameters, "target": target}, how)
+    recipe = recipe_given("parameter-gru", {"target": target}, how)
     with Progress() as progress:
         entries = sweep(
             read(data, accepted_only=True), recipe, to=to, layers=whole(layers, "--layers"),  # type: ignore[arg-type]

@@ -30,9 +30,6 @@ def command(
     inputs: Annotated[
         str | None, typer.Option(help="Seen at each frame: load,mean_load,time,step; by default what the grid needs.")
     ] = None,
-    parameters: Annotated[
-        str | None, typer.Option(help="values: log10 of coefficients; rates: log10 of each term's rate.")
-    ] = None,
     target: Annotated[str | None, typer.Option(help="value, or log, of the output that grows with creep.")] = None,
     base: Annotated[str | None, typer.Option(help="none; or one-dof: correct what the quick stand-in says.")] = None,
     epochs: Annotated[int | None, typer.Option(min=1, help="Passes over the training rows.")] = None,
@@ -41,7 +38,7 @@ def command(
     schedule: Annotated[str | None, typer.Option(help="Of the rate: plateau, cosine or constant.")] = None,
     early_stop: Annotated[int | None, typer.Option(min=1, help="Stop after so many epochs without gain.")] = None,
     clip: Annotated[float | None, typer.Option(help="Largest norm of the gradient.")] = None,
-    seed: Annotated[int, typer.Option(help="Of the split, the first weights and the order of rows.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the split, the first weights and the order of rows.")] = 0,
     device: Annotated[str, typer.Option(help="auto (a GPU where there is one), cpu or cuda.")] = "auto",
     threads: Annotated[int | None, typer.Option(min=1, help="Of torch; one is quickest on a busy machine.")] = None,
     plots: Annotated[Path | None, typer.Option(help="Folder for pictures; by default beside the file.")] = None,
@@ -59,7 +56,7 @@ def command(
 
     if threads is not None:
         torch.set_num_threads(threads)
-    sizes = {"hidden": hidden, "layers": layers, "cell": cell, "parameters": parameters, "target": target, "base": base,
+    sizes = {"hidden": hidden, "layers": layers, "cell": cell, "target": target, "base": base,
              "inputs": None if inputs is None else tuple(inputs.split(","))}  # fmt: skip
     how = {"epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule, "early_stop": early_stop, "clip": clip}
     chosen, samples = recipe_given(recipe, sizes, how), read(data, accepted_only=True)

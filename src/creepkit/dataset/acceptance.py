@@ -96,8 +96,11 @@ class Acceptance:
 
     def _last(self) -> str:
         simulated, useful = _percent(self.kept), _percent(self.useful)
+        some = (
+            " but for those that burst far too early by a cheap stand-in" if getattr(self.design, "screened", 0) else ""
+        )
         what = "a rate at which creep is visible and the test lasts (others may, too)"
-        return f"{simulated} of the draws would be simulated; {useful} of all have {what}"
+        return f"{simulated} of the draws would be simulated{some}; {useful} of all have {what}"
 
 
 def acceptance(design: Referenced, draws: int = SAMPLE, seed: int = 0) -> Acceptance:

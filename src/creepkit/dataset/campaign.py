@@ -13,6 +13,8 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from creepkit.dataset import shards, store
 from creepkit.dataset.ledger import Ledger
 from creepkit.dataset.merging import AGAIN, is_enough, merge
@@ -56,7 +58,9 @@ def generate(
     progress : called as progress(task, done, total, note). rows : of a shard.
     """
     path = Path(to)
-    campaign = Campaign(design, specimen, int(seed), path.with_name(f"{path.name}.parts"), rows)
+    if not path.name:
+        raise DatasetError(f"'{to}' is no name of a file; name the HDF5 file to write, such as combined.h5")
+    campaign = Campaign(design, specimen, _whole("seed", seed), path.with_name(f"{path.name}.parts"), rows)
     ledger = Ledger(campaign, samples, draws, part)
     if part is None and is_enough(campaign, ledger, path):
         return store.read(path)
@@ -68,6 +72,13 @@ def generate(
         return shards.together(campaign, sorted(ledger.done))
     merge(campaign, ledger, path, progress)
     return store.read(path)
+
+
+def _whole(what: str, number: object) -> int:
+    """A number from zero on, which must be whole: 1.5 does not become 1."""
+    if not isinstance(number, int | np.integer) or isinstance(number, bool) or number < 0:
+        raise DatasetError(f"{what} is {number!r}; allowed are whole numbers from zero on")
+    return int(number)
 
 
 def fill(ledger: Ledger, crew: Workers, progress: Progress | None) -> None:

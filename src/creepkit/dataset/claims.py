@@ -17,6 +17,9 @@ from types import TracebackType
 NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
 """What file systems without locks answer."""
 
+MOST_DIGITS = 19
+"""Of the number of a sample; what has more is none."""
+
 
 class Claim:
     """The claim on a shard; a context, `held` in it when nobody else has it.
@@ -36,7 +39,7 @@ class Claim:
         self.held = _locked(self._file)
         if self.held:
             lines = os.pread(self._file, 1 << 20, 0).split()
-            self.deaths = Counter(int(line) for line in lines if line.isdigit())
+            self.deaths = Counter(int(line) for line in lines if line.isdigit() and len(line) < MOST_DIGITS)
             self._known = b"".join(b"%d\n" % row for row in self.deaths.elements())
         return self
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from contextlib import suppress
 from types import TracebackType
@@ -11,6 +12,7 @@ from creepkit.dataset.shards import Answer, Campaign
 from creepkit.dataset.worker import attempt, one_threaded
 from creepkit.errors import DatasetError
 
+ADDRESS = re.compile(r"inproc://.+|[a-z]+://.+:[0-9]+/?")
 WAIT = 30
 """s, in which a scheduler answers."""
 FEWEST = 8
@@ -34,6 +36,8 @@ class ClusterWorkers:
             from distributed import Client
         except ImportError:
             raise DatasetError("--cluster needs dask; install it with: pip install 'creepkit[cluster]'") from None
+        if not ADDRESS.fullmatch(self._address):  # a client of such an address takes a minute to go
+            raise DatasetError(f"'{self._address}' is no address of a dask scheduler; write tcp://host:port")
         try:
             self._client = Client(  # type: ignore[no-untyped-call]
                 self._address, timeout=WAIT, set_as_default=False

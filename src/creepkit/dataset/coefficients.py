@@ -57,7 +57,7 @@ def parts_of(law: CreepLaw) -> tuple[Part, ...]:
             told = "', '".join(list(law.terms)[k] for k in group)
             raise DatasetError(
                 f"law '{law.name}': term '{told}' has no linear rate coefficient (of log scale, with off=0) to set "
-                "its rate with; use box='paper'"
+                "its rate with; use the paper's box"
             )
         only = law.only(*(list(law.terms)[k] for k in group))
         positions = tuple(law.names.index(name) for name in only.names)

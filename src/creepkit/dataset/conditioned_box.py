@@ -88,7 +88,7 @@ class ConditionedBox:
 
     def _solved(self, unit: Floats, there: Bools, rates: Floats, looks: Looks) -> Floats:
         parts = parts_of(self.law)
-        theta = self.exponents(unit, there)
+        theta = self.exponents(unit, there, looks)
         theta = draw_scales(self.law, parts, theta, unit[:, list(scales_of(self.law))], rates, looks)
         theta = solve(parts, theta, rates, looks)
         return authors(self.law, solve_growths(self.law, theta, unit, looks))
@@ -97,7 +97,7 @@ class ConditionedBox:
         met = [c.passes(self.law, draws) for c in self.criteria if c.stage == "before"]
         return np.asarray(np.all(met, axis=0))
 
-    def exponents(self, unit: Floats, there: Bools) -> Floats:
+    def exponents(self, unit: Floats, there: Bools, looks: Looks) -> Floats:
         """Internal parameters within their bounds, before coefficients and stress scales; there : which parts are."""
         return within_bounds(self.law, unit)
 

@@ -26,9 +26,8 @@ from creepkit.records import Status
 FIRST_HOLD, BEFORE_JUMP, AFTER_JUMP, END = range(4)
 """Rows of an outcome's marks: a hold is from the first to the second, and from the third to the fourth."""
 
-
-LATER, MORE = 2.0, 3.0
-"""Margins on what a stand-in predicts: it bursts this many times too early, or creeps this many times too little."""
+LATER = 2.0
+"""How many times too early a stand-in must burst before it is believed; the dimple's is within 1.6 as a rule."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,10 +159,12 @@ class GrowsInEachHold:
         return all(growth > self.least for growth in outcome.growths)
 
     def rules_out(self, sketch: Outcome) -> bool:
-        """Whether a stand-in's prediction leaves no hope: it bursts long before the second hold, or hardly creeps."""
-        if sketch.status == Status.BURST:
-            return bool(LATER * sketch.end_time < sketch.times[-2])
-        return sketch.status == Status.COMPLETE and MORE * min(sketch.growths) < self.least
+        """Whether a stand-in's prediction leaves no hope: it bursts long before the second hold begins.
+
+        Little growth is no reason. Under a nearly plastic law a dimple creeps at its clamped edge, where the stress is
+        high: the stand-in, which knows one stress, has called a growth of .02 mm one of 1e-5.
+        """
+        return sketch.status == Status.BURST and LATER * sketch.end_time < sketch.times[-2]
 
 
 @dataclass(frozen=True)

@@ -53,10 +53,16 @@ def design_name(data: Dataset) -> str:
 
 
 def reasons(data: Dataset) -> list[dict[str, Any]]:
-    """How many samples each criterion rejected, those that others had not rejected before."""
+    """How many samples each criterion rejected, those that others had not; and how many of them without simulation."""
     pairs = list(zip(data.reason_names, data.reason_texts or data.reason_names, strict=True))[1:]
+    unseen = data.status < 0
     return [
-        {"criterion": name, "text": text, "rejected": int((data.reasons == k).sum())}
+        {
+            "criterion": name,
+            "text": text,
+            "rejected": int((data.reasons == k).sum()),
+            "not_simulated": int((unseen & (data.reasons == k)).sum()),
+        }
         for k, (name, text) in enumerate(pairs, start=1)
     ]
 
@@ -113,7 +119,10 @@ def _heading(told: dict[str, Any]) -> Iterator[str]:
 
 def _counts(told: dict[str, Any]) -> Iterator[str]:
     for entry in told["reasons"]:
-        yield f"{entry['rejected']:>9} rejected: criterion {entry['criterion']}, {entry['text']}"
+        unseen = entry["not_simulated"]
+        some = "" if unseen == entry["rejected"] else f"{unseen} of them "
+        how = f"; {some}not simulated" if unseen else ""
+        yield f"{entry['rejected']:>9} rejected: criterion {entry['criterion']}, {entry['text']}{how}"
     if told["failed"]:
         yield f"{told['failed']:>9} failed"
     for words, times in told["failures"].items():

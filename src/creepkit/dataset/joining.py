@@ -66,12 +66,16 @@ def _refuse_twins(one: Dataset, other: Dataset) -> None:
 
 
 def first_difference(one: Any, other: Any, place: str) -> str:
-    """Where two documents first differ: 'specimen.tolerance is 0.01 and 0.02'; '' when they do not."""
+    """Where two documents first differ: 'specimen.tolerance is 0.01 and 0.02'; '' when they do not.
+
+    place : what both are called; "" when only what is within has a name.
+    """
     if isinstance(one, dict) and isinstance(other, dict):
         for key in sorted({*one, *other}):
+            name = f"{place}.{key}" if place else key
             if key not in one or key not in other:
-                return f"{place}.{key} is only in one of them"
-            if found := first_difference(one[key], other[key], f"{place}.{key}"):
+                return f"{name} is only in one of them"
+            if found := first_difference(one[key], other[key], name):
                 return found
         return ""
     if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):

@@ -17,6 +17,8 @@ FORMAT = "creepkit-dataset"
 LAYOUT = 1
 UNITS = "MPa, mm, s, K"
 WORDS = ("outputs", "parameter_names", "condition_names", "reason_names", "reason_texts")
+DENSEST = 1032
+"""Bytes that one of gzip's may stand for, at most."""
 
 
 def refuse_strangers(file: h5py.File, source: str) -> None:
@@ -39,15 +41,28 @@ def refuse_strangers(file: h5py.File, source: str) -> None:
 def check_shapes(file: h5py.File, expected: dict[str, Any], source: str) -> None:
     """DatasetError when an array is missing, or does not fit the words of the file."""
     for name, empty in expected.items():
-        if not isinstance(file.get(name), h5py.Dataset):
+        own = file.get(name)
+        if not isinstance(own, h5py.Dataset):
             raise DatasetError(f"{source}: the array '{name}' is missing; the file is damaged")
-        if file[name].shape != (len(file["index"]), *empty.shape[1:]) or file[name].dtype.kind not in "fi":
-            found = f"{file[name].dtype} {file[name].shape}"
+        kind = np.dtype(COLUMNS[name].stored).kind
+        if own.shape != (len(file["index"]), *empty.shape[1:]) or own.dtype.kind != kind:
+            found = f"{own.dtype} {own.shape}"
             raise DatasetError(f"{source}: the array '{name}' is {found}, which does not fit the others")
+        if own.nbytes > DENSEST * own.id.get_storage_size():
+            raise DatasetError(f"{source}: the array '{name}' says to be {own.shape}, and is not all there")
+
+
+def check_words(told: dict[str, Any], source: str) -> None:
+    """DatasetError when the words of a file do not fit each other; told : attributes by name, documents parsed."""
+    for name in ("design", "provenance"):
+        if not isinstance(told[name], dict):
+            raise DatasetError(f"{source}: the attribute '{name}' is no record; the file is damaged")
+    if not told["outputs"] or len(told["reason_names"]) != len(told["reason_texts"]):
+        raise DatasetError(f"{source}: names no output, or not a text for each reason; the file is damaged")
 
 
 def check_numbers(own: dict[str, Any], header: Dataset, source: str) -> None:
-    """DatasetError when what was drawn is not finite, or a reason is none."""
+    """DatasetError when what was drawn is not finite, a reason is none, or an accepted sample has no history."""
     for name in ("parameters", "conditions"):
         odd = np.argwhere(~np.isfinite(own[name]))
         if odd.size:
@@ -59,3 +74,8 @@ def check_numbers(own: dict[str, Any], header: Dataset, source: str) -> None:
             f"{source}: the reason of sample {strange[0]} is {own['reasons'][strange[0]]}; allowed are -1 to "
             f"{len(header.reason_names) - 1}; the file is damaged"
         )
+    good = own["reasons"] == 0
+    seen = np.isfinite(own["values"][good, :, 0]).any(axis=1) & np.isfinite(own["end_times"][good])
+    if not seen.all():
+        row = np.flatnonzero(good)[~seen][0]
+        raise DatasetError(f"{source}: sample {row} was accepted and has no history; the file is damaged")

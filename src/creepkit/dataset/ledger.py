@@ -6,6 +6,8 @@ import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from creepkit.dataset.shards import Campaign, count
 from creepkit.errors import DatasetError
 
@@ -31,8 +33,8 @@ class Ledger:
 
     def __post_init__(self) -> None:
         for what, wanted in (("samples", self.samples), ("draws", self.draws)):
-            if wanted is not None and wanted < 1:
-                raise DatasetError(f"{what} is {wanted}; ask for at least one")
+            if wanted is not None and (not isinstance(wanted, int | np.integer) or wanted < 1):
+                raise DatasetError(f"{what} is {wanted!r}; ask for a whole number, at least one")
         if (self.samples is None) == (self.draws is None):
             raise DatasetError("say either how many accepted samples are wanted (samples), or how many draws (draws)")
         if self.part is not None and not 1 <= self.part[0] <= self.part[1]:

@@ -34,8 +34,9 @@ def is_enough(campaign: Campaign, ledger: Ledger, path: Path) -> bool:
     with store.opened(path) as file:
         header = store.read_header(file, str(path))
         if header.provenance.get("fingerprint") != campaign.fingerprint:
-            where = first_difference(_told(header), _told(campaign.header), "it")
-            raise DatasetError(f"{path}: holds another data set ({where or 'of other shards'}); choose another name")
+            where = first_difference(_told(header), _told(campaign.header), "")
+            how = f"there and here {where}" if where else "of shards of another size"
+            raise DatasetError(f"{path}: holds another data set ({how}); choose another name")
         reasons = file["reasons"][:]
     if ledger.samples is None:
         return len(reasons) >= (ledger.draws or 0)

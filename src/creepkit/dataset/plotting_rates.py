@@ -45,7 +45,9 @@ def figure_of(found: Acceptance, path: str | Path | None = None) -> Figure:
     if path is not None:
         try:
             figure.savefig(path, dpi=130)
-        except (OSError, ValueError) as error:
+        except OSError as error:
+            raise DatasetError(f"{path}: the plot cannot be written ({error.strerror})") from None
+        except ValueError as error:
             told = str(error).splitlines()[0]
             raise DatasetError(f"{path}: the plot cannot be written ({told}); name a .png, .svg or .pdf file") from None
     return figure

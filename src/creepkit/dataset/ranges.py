@@ -83,7 +83,10 @@ def conditions(
     """
     check_names(kind, given)
     if warm and "temperature" not in {**defaults, **given}:
-        raise DatasetError("the law depends on temperature: give its range in K, such as temperature=(1000, 1100)")
+        raise DatasetError(
+            "the law depends on temperature: give its range in K, such as temperature=(1000, 1100), or --range "
+            "temperature=1000:1100"
+        )
     made = {name: range_of(name, value) for name, value in {**defaults, **given}.items()}
     if "end_time" not in made and grid.relative:
         raise DatasetError("a relative grid needs the end of tests: give end_time in s, a number or (low, high)")

@@ -113,9 +113,10 @@ class Campaign:
         except ValueError:
             raise DatasetError(f"{told}: damaged; remove it if the shards beside it are of this campaign") from None
         if found != self.document:
-            where = first_difference(found, self.document, "campaign")
+            where = first_difference(found, self.document, "")
             raise DatasetError(
-                f"{self.folder}: holds shards of another campaign ({where}); choose another name, or remove the folder"
+                f"{self.folder}: holds shards of another campaign (there and here {where}); choose another name, or "
+                "remove the folder"
             )
 
 

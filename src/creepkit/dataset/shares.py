@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import gamma
+from scipy.special import gammaincinv
 
 from creepkit.arrays import Bools, Floats
 
@@ -34,6 +34,6 @@ def present(unit: Floats, parts: int, how_many: tuple[float, ...] = HOW_MANY) ->
 
 def ln_shares(unit: Floats, there: Bools) -> Floats:
     """ln of the share of each part, (rows, parts), -inf where it is not there; Dirichlet by gamma quantiles."""
-    sizes = np.where(there, gamma.ppf(np.clip(unit, 1e-9, 1 - 1e-9), CONCENTRATION), 0.0)
+    sizes = np.where(there, gammaincinv(CONCENTRATION, np.clip(unit, 1e-9, 1 - 1e-9)), 0.0)
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(sizes / sizes.sum(axis=1, keepdims=True)))

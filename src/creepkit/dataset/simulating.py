@@ -76,7 +76,7 @@ def simulate(
             raise
         except Exception as error:  # a failed sample is data, whatever a law or a specimen of a plugin raises
             samples.reasons[row] = FAILED
-            failures[row] = _words(error)
+            failures[row] = words(error)
             if len(failures) == tried == TOO_MANY_FAILURES:
                 raise DatasetError(f"the first {tried} simulations all failed: {failures[row]}") from error
     rejected = samples.reasons != 0
@@ -147,7 +147,9 @@ def _reason_after(design: Design, outcome: Outcome) -> int:
     return 0
 
 
-def _words(error: Exception) -> str:
-    """One line on what happened."""
+def words(error: Exception) -> str:
+    """One line on what happened; errors that are not ours are named."""
     text = " ".join(str(error).split())
-    return text if isinstance(error, CreepkitError | SampleFailed) else f"{type(error).__name__}: {text}"
+    if isinstance(error, CreepkitError | SampleFailed):
+        return text
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -6,7 +6,6 @@ Sobol (1967), USSR Comput. Math. Math. Phys. 7, 86; Owen's scrambling as in scip
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import qmc
 
 from creepkit.arrays import Floats
 from creepkit.errors import DatasetError
@@ -17,6 +16,8 @@ LONGEST = 2**30
 
 def sobol(dimensions: int, first: int, count: int, seed: int) -> Floats:
     """Return rows `first` to `first + count` of the sequence of `seed`, (count, dimensions), each from 0 to below 1."""
+    from scipy.stats import qmc  # takes a second, which only those who draw should wait
+
     if count < 1 or first < 0:
         raise DatasetError(f"{count} samples from row {first} on were asked for; ask for at least one, from row 0 on")
     if first + count > LONGEST:

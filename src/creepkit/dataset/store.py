@@ -44,11 +44,21 @@ from numpy.typing import NDArray
 from creepkit.arrays import Bools
 from creepkit.dataset.columns import COLUMNS, MARKS, nothing
 from creepkit.dataset.dataset import Dataset
-from creepkit.dataset.layout import FORMAT, LAYOUT, UNITS, WORDS, check_numbers, check_shapes, refuse_strangers
+from creepkit.dataset.layout import (
+    FORMAT,
+    LAYOUT,
+    UNITS,
+    WORDS,
+    check_numbers,
+    check_shapes,
+    check_words,
+    refuse_strangers,
+)
 from creepkit.dataset.quiet_file import QuietFile
 from creepkit.dataset.specimen_document import specimen_document, specimen_of
-from creepkit.dataset.time_grid import TimeGrid
+from creepkit.dataset.time_grid import MOST, TimeGrid
 from creepkit.errors import DatasetError, LawError
+from creepkit.language import CreepLaw
 from creepkit.language.tree import law_from_json, law_to_json
 
 COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
@@ -153,8 +163,7 @@ def read(path: str | Path, *, accepted_only: bool = False) -> Dataset:
 
     accepted_only : leave rejected and failed samples in the file, which spares their memory.
     """
-    path = Path(path)
-    with opened(path) as file:
+    with opened(Path(path)) as file:
         return read_samples(file, read_header(file, str(path)), accepted_only)
 
 
@@ -166,6 +175,8 @@ def opened(path: Path) -> Iterator[h5py.File]:
             yield file
     except FileNotFoundError:
         raise DatasetError(f"{path}: there is no such file") from None
+    except MemoryError:
+        raise DatasetError(f"{path}: holds more than there is memory for") from None
     except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
         if path.is_dir():
             raise DatasetError(f"{path}: is a folder; give a data set that creepkit generated") from None
@@ -179,22 +190,39 @@ def read_header(file: h5py.File, source: str) -> Dataset:
     refuse_strangers(file, source)
     words: dict[str, Any] = {name: tuple(str(word) for word in file.attrs[name]) for name in WORDS}
     documents = {name: json.loads(file.attrs[name]) for name in ("law", "specimen", "design", "provenance")}
+    check_words({**words, **documents}, source)
     sizes = {**{name: len(told) for name, told in words.items()}, "marks": MARKS, "frames": len(file["time_grid"])}
     empty = nothing(sizes)
     check_shapes(file, empty, source)
-    try:
-        law = law_from_json(documents["law"], source)
-    except LawError as error:
-        raise DatasetError(str(error)) from None
     return Dataset(
-        law=law,
+        law=_law(documents["law"], words["parameter_names"], source),
         specimen=specimen_of(documents["specimen"], source),
         design_document=documents["design"],
-        grid=TimeGrid(file["time_grid"][:], bool(file["time_grid"].attrs["relative"])),
+        grid=_grid(file["time_grid"], source),
         provenance=documents["provenance"],
         **words,
         **empty,
     )
+
+
+def _law(document: Any, names: tuple[str, ...], source: str) -> CreepLaw:
+    try:
+        law = law_from_json(document, source)
+    except LawError as error:
+        raise DatasetError(str(error)) from None
+    if tuple(law.names) != names:
+        found = f"its parameters are {', '.join(names)}, those of its law {', '.join(law.names)}"
+        raise DatasetError(f"{source}: {found}; the file is damaged")
+    return law
+
+
+def _grid(array: h5py.Dataset, source: str) -> TimeGrid:
+    if array.size > MOST or array.dtype.kind != "f":
+        raise DatasetError(f"{source}: its time grid is {array.dtype} {array.shape}; the file is damaged")
+    try:
+        return TimeGrid(array[:], bool(array.attrs["relative"]))
+    except DatasetError as error:
+        raise DatasetError(f"{source}: {error}") from None
 
 
 def read_samples(file: h5py.File, header: Dataset, accepted_only: bool = False) -> Dataset:

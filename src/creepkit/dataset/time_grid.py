@@ -13,6 +13,9 @@ from creepkit.errors import DatasetError
 PAPER_INTERVAL, PAPER_END = 150.0, 43200.0
 """s; Materials and Methods of the paper: 289 frames from 0 to 12 h."""
 
+MOST = 100_000
+"""Frames of a sample: a typing error should not ask for all the memory."""
+
 SHARES = (0.0, 60 / 43200, 240 / 43200, *(k / 48 for k in range(1, 49)))
 """Of the end of a test: 51 frames, two of them in the fast start; 900 s apart in 12 h."""
 
@@ -30,7 +33,7 @@ class TimeGrid:
     def __post_init__(self) -> None:
         values = frozen(self.values)
         if values.ndim != 1 or values.size < 2 or not np.isfinite(values).all():
-            raise DatasetError(f"a time grid needs two or more finite times, found {np.asarray(self.values).tolist()}")
+            raise DatasetError(f"a time grid needs two or more finite times, found {values.tolist()[:3]}")
         if values[0] < 0 or (np.diff(values) <= 0).any():
             raise DatasetError("the times of a grid must start at or after 0 and increase")
         if self.relative and values[-1] > 1:
@@ -42,6 +45,10 @@ class TimeGrid:
         """Frames `interval` s apart from 0 to `end` s."""
         if not (0 < interval <= end < np.inf):
             raise DatasetError(f"frames every {interval:g} s until {end:g} s: the interval must lie from 0 to the end")
+        if end / interval > MOST:
+            raise DatasetError(
+                f"frames every {interval:g} s until {end:g} s are {end / interval:.0f}; at most {MOST} are simulated"
+            )
         frames = int(np.floor(end / interval * (1 + 1e-12)))
         return cls(interval * np.arange(frames + 1, dtype=float))
 

@@ -55,14 +55,17 @@ def one_threaded(campaign: Campaign) -> Campaign:
 
 
 def attempt(campaign: Campaign, number: int) -> Any:
-    """Run a shard; an error that we can explain is an answer too."""
+    """Run a shard; an error is an answer too, whatever a design or a criterion of somebody raises."""
     from creepkit.dataset.shards import Answer, run
+    from creepkit.dataset.simulating import words
     from creepkit.errors import CreepkitError
 
     try:
         return run(campaign, number)
-    except (CreepkitError, OSError, MemoryError) as error:
-        return Answer(number, "error", text=" ".join(str(error).split()) or type(error).__name__)
+    except CreepkitError as error:
+        return Answer(number, "error", text=words(error))
+    except Exception as error:
+        return Answer(number, "error", text=f"shard {number} cannot be simulated: {words(error)}")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import sys
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -28,7 +28,7 @@ _POINT = (100.0, 0.0, 0.0, 1000.0, 100.0, 100.0 / 3.0)
 
 def compiled(law: CreepLaw) -> CompiledLaw:
     """Return the law's compiled entries, from memory, from the disk cache or made now."""
-    key = _key(structure_of(law))
+    key = _key(law)
     module = disk_cache.load(key, partial(_text, law))
     initial = frozen([state.initial for state in law.states.values()])
     return CompiledLaw(
@@ -52,8 +52,10 @@ def _text(law: CreepLaw) -> str:
     return module_text(entries(law))
 
 
-def _key(structure: str) -> str:
-    return hashlib.sha256(f"{_maker()}\n{structure}".encode()).hexdigest()[:24]
+@lru_cache(maxsize=1024)
+def _key(law: CreepLaw) -> str:
+    """Kept, for printing a law takes a millisecond and a fit asks a thousand times."""
+    return hashlib.sha256(f"{_maker()}\n{structure_of(law)}".encode()).hexdigest()[:24]
 
 
 @cache

@@ -9,33 +9,34 @@ from numba import njit
 
 from creepkit.arrays import Floats, Ints
 from creepkit.specimens.reduced_curves import Dimple
-from creepkit.specimens.reduced_march import EFFECTS, Candidate, Factors, Test, march, room
+from creepkit.specimens.reduced_march import EFFECTS, Candidate, Factors, march, room, slopes_room
+from creepkit.specimens.reduced_observed import COLUMNS
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def march_all(
     update: Any, sensitivity: Any, rate: Any, first: int, last: int, theta: Floats, beta: Floats, beta_slopes: Floats,
-    stiffer: Floats, counts: Ints, loads: Floats, own: Floats, curves: Floats, slopes: Floats, redistribution: Floats,
+    stiffer: Floats, counts: Ints, tests: Floats, curves: Floats, slopes: Floats, redistribution: Floats,
     row: Ints, grid: tuple[float, float], initial: Floats, limits: Floats, ends: tuple[float, float], factors: Factors,
     tolerance: float, out: Floats, changes: Floats, status: Ints, end_times: Floats,
 ) -> None:  # fmt: skip
     """March the candidates from `first` to before `last` through all tests; arrays as in `reduced_courses`.
 
-    loads : (tests, 2, nodes) time and pressure; own : (candidates or 1, tests, 6, nodes) what effects change.
+    tests : (candidates or 1, tests, 8, nodes) as in `reduced_problem`.
     """
     exact = changes.shape[0] > 0
     directions = theta.shape[1] + len(EFFECTS) if exact else 0
-    work = room(initial.size, theta.shape[1], factors.stress.size * factors.strain.size, directions)
+    count = factors.stress.size * factors.strain.size
+    work = room(initial.size, count)
+    slopes_work = slopes_room(initial.size, theta.shape[1], count, directions, len(COLUMNS))
     nothing = np.zeros((0, out.shape[3], directions))
     for c in range(first, last):
-        e = c if own.shape[0] > 1 else 0
+        e = c if tests.shape[0] > 1 else 0
         for k in range(counts.size):
-            o = own[e, k]
-            test = Test(loads[k, 0], loads[k, 1], o[0], o[1], o[2], o[3], o[4], o[5])
             candidate = Candidate(theta[c], beta[c], beta_slopes[c], stiffer[e, k], initial, limits, ends[0], ends[1])
             r = row[e, k]
             dimple = Dimple(curves[r], slopes[r], redistribution[r], grid[0], grid[1])
             status[c, k], end_times[c, k] = march(
-                update, sensitivity, rate, test, counts[k], candidate, dimple, factors, tolerance, work, out[c, k],
-                changes[c, k] if exact else nothing,
+                update, sensitivity, rate, tests[e, k], counts[k], candidate, dimple, factors, tolerance, work,
+                slopes_work, out[c, k], changes[c, k] if exact else nothing,
             )  # fmt: skip

@@ -104,18 +104,17 @@ def courses(
     plans = tuple(schedule(specimen, history) for history in histories)
     counts = np.array([plan.times.size for plan in plans], dtype=np.int64)
     rows = max([len(v) for v in assumed.values()], default=1)
-    loads = np.array([[_padded(p.times, counts), _padded(p.pressure, counts)] for p in plans])
     dimples = _dimples(specimen, histories, plans, assumed, rows, known)
-    own, stiffer = _own(histories, plans, assumed, dimples, counts, rows)
+    tests, stiffer = _tests(histories, plans, assumed, dimples, counts, rows)
     shape = (len(theta), len(plans), int(counts.max()), len(COLUMNS) + factors.stress.size * factors.strain.size)
     out = np.zeros(shape)
     changes = np.zeros((*shape, theta.shape[1] + len(EFFECTS)) if exact else (0, *shape[1:], 1))
     status, end_times = np.zeros(shape[:2], dtype=np.int64), np.zeros(shape[:2])
-    beta, beta_slopes = _beta(law, theta)
+    beta, beta_slopes = _beta(law, theta, exact)
 
     def part(first: int, last: int) -> None:
         march_all(
-            law.update, law.sensitivity, law.rate, first, last, theta, beta, beta_slopes, stiffer, counts, loads, own,
+            law.update, law.sensitivity, law.rate, first, last, theta, beta, beta_slopes, stiffer, counts, tests,
             *dimples.arrays, dimples.row, dimples.grid, np.array(law.initial), np.array(law.limits),
             (specimen.deflection_limit, specimen.strain_limit), factors, _EXACT_TOLERANCE if exact else _TOLERANCE,
             out, changes, status, end_times,
@@ -189,35 +188,40 @@ def _tables(specimen: Bulge, plan: Schedule, window: float) -> Tables:
     return tables(specimen, geometry, made.observation.replace(window=window))
 
 
-def _own(
+def _tests(
     histories: Sequence[History], plans: Sequence[Schedule], effects: Mapping[str, Floats], dimples: _Dimples,
     counts: Ints, rows: int,
 ) -> tuple[Floats, Floats]:  # fmt: skip
-    """Temperature, modulus and its slope to temperature, elastic deflection with its derivatives to thickness and to
-    ln of the modulus, (candidates or 1, tests, 6, nodes), and the relative changes of the modulus.
-    """
+    """Each test as in `reduced_problem`, (candidates or 1, tests, 8, nodes), and relative changes of the modulus."""
     shape = (rows, len(plans))
-    out = np.zeros((*shape, 6, int(counts.max())))
+    out = np.zeros((*shape, 8, int(counts.max())))
     stiffer = np.broadcast_to(effects.get("modulus", np.zeros((1, 1))), shape).astype(float)
     warmer = np.broadcast_to(effects.get("temperature", np.zeros((1, 1))), shape)
-    for c, k in np.ndindex(shape):
-        plan, elastic, row = plans[k], histories[k].elastic, dimples.row[c, k]
-        assert elastic is not None  # the schedule has complained
-        temperature = plan.temperature + warmer[c, k]
+    for k, (plan, history) in enumerate(zip(plans, histories, strict=True)):
+        assert history.elastic is not None  # the schedule has complained
+        temperature, factor = plan.temperature + warmer[:, k, None], 1.0 + stiffer[:, k, None]
         warm, which = np.unique(temperature, return_inverse=True)
-        factor = 1.0 + stiffer[c, k]
-        modulus = factor * np.array([_modulus(elastic, float(T)) for T in warm])[which]
-        softening = factor * np.array([_softening(elastic, float(T)) for T in warm])[which]
-        _refuse_soft(histories[k], modulus)
-        load = np.maximum(plan.pressure / modulus, _NO_LOAD)
-        deflection, thicker, loaded = dimples.tables[row].elastic_deflection(load, float(dimples.thickness[row]))
-        for i, values in enumerate((temperature, modulus, softening, deflection, thicker, -loaded)):
-            out[c, k, i] = _padded(values, counts)
+        modulus, softening = (
+            factor * np.array([f(history.elastic, float(T)) for T in warm])[which.reshape(temperature.shape)]
+            for f in (_modulus, _softening)
+        )
+        _refuse_soft(history, modulus)
+        lifted = _lifted(dimples, dimples.row[:, k], np.maximum(plan.pressure / modulus, _NO_LOAD))
+        for i, values in enumerate((plan.times, plan.pressure, temperature, modulus, softening, *lifted)):
+            out[:, k, i, : counts[k]] = values
+        out[:, k, :, counts[k] :] = out[:, k, :, counts[k] - 1, None]
     return out, stiffer
 
 
-def _padded(values: Floats, counts: Ints) -> Floats:
-    return np.asarray(np.pad(values, (0, int(counts.max()) - values.size), mode="edge"))
+def _lifted(dimples: _Dimples, row: Ints, load: Floats) -> Floats:
+    """Elastic deflections at P/E (rows, nodes), and their derivatives to the thickness and to ln of the modulus."""
+    out = np.empty((3, *load.shape))
+    own = [dimples.tables[r] for r in row]
+    for known in set(own):
+        mine = np.array([one is known for one in own])
+        out[:, mine] = known.elastic_deflection(load[mine], dimples.thickness[row[mine]])
+    out[2] *= -1.0
+    return out
 
 
 @lru_cache(maxsize=65536)
@@ -238,12 +242,13 @@ def _refuse_soft(history: History, modulus: Floats) -> None:
         raise SolveError(f"{where}: the modulus is {modulus.min():g} MPa; it must be above zero")
 
 
-def _beta(law: CompiledLaw, theta: Floats) -> tuple[Floats, Floats]:
-    """Exponents of the clock, (candidates,), and their derivatives (candidates, P)."""
-
-    def leading(at: Floats) -> Floats:
-        return np.asarray(np.clip(np.broadcast_to(np.asarray(law.leading(at), float), len(at)), *_BETA))
-
-    steps = _BETA_STEP * np.eye(theta.shape[1])
-    slopes = [(leading(theta + step) - leading(theta - step)) / (2 * _BETA_STEP) for step in steps]
-    return leading(theta).copy(), np.array(slopes).T.reshape(theta.shape)
+def _beta(law: CompiledLaw, theta: Floats, exact: bool) -> tuple[Floats, Floats]:
+    """Exponents of the clock, (candidates,), and their derivatives (candidates, P) where wanted."""
+    parameters = theta.shape[1]
+    steps = np.concatenate([np.zeros((1, parameters)), *(_BETA_STEP * s * np.eye(parameters) for s in (1, -1))])
+    points = theta + steps[: None if exact else 1, None]
+    found = np.clip(np.broadcast_to(np.asarray(law.leading(points), float), points.shape[:2]), *_BETA)
+    slopes = np.zeros(theta.shape)
+    if exact:
+        slopes[:] = (found[1 : 1 + parameters] - found[1 + parameters :]).T / (2 * _BETA_STEP)
+    return found[0].copy(), slopes

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats
+from creepkit.specimens.reduced_dual import log
 
 EXPONENTS = (0.5, 1.0, 3.0, 5.0, 8.0, 13.0)
 """Of the Norton runs: those of creep laws of metals, and what hardening and hyperbolic sines make of them."""
@@ -24,7 +25,7 @@ CURVES = ELASTIC_SHAPE + 1
 
 
 class Dimple(NamedTuple):
-    """Curves (CURVES, grid + 2) of one dimple with their derivatives to the thickness, and the numbers of
+    """Curves (grid + 2, CURVES) of one dimple with their derivatives to the thickness, and the numbers of
     redistribution; D = (exp(x) - 1) offset on the grid, which is uniform in x with `step`.
     """
 
@@ -51,8 +52,8 @@ class Place(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def place(deflection: Any, dimple: Dimple) -> Place:
     """Where a deflection, mm, lies; weights are of cubics that go on smoothly from one interval to the next."""
-    position = np.log(1.0 + deflection / dimple.offset) / dimple.step
-    last = dimple.curves.shape[1] - 3
+    position = log(1.0 + deflection * (1.0 / dimple.offset)) * (1.0 / dimple.step)
+    last = dimple.curves.shape[0] - 3
     index = min(max(int(position.real), 0), last - 1)
     s = position - index
     if not position.real > 0.0:
@@ -66,49 +67,48 @@ def place(deflection: Any, dimple: Dimple) -> Place:
 @njit(cache=True, error_model="numpy")
 def curve(which: int, at: Place, dimple: Dimple, thicker: Any) -> Any:
     """A curve there; thicker : mm."""
-    c, i = dimple.curves, at.index
-    value = at.w0 * c[which, i] + at.w1 * c[which, i + 1] + at.w2 * c[which, i + 2] + at.w3 * c[which, i + 3]
+    value = _blended(dimple.curves, which, at)
+    return value if thicker == 0.0 else value + thicker * _blended(dimple.slopes, which, at)
+
+
+@njit(cache=True, error_model="numpy")
+def _blended(c: Floats, k: int, at: Place) -> Any:
+    i = at.index
+    return at.w0 * c[i, k] + at.w1 * c[i + 1, k] + at.w2 * c[i + 2, k] + at.w3 * c[i + 3, k]
+
+
+@njit(cache=True, error_model="numpy")
+def write_curves(first: int, last: int, at: Place, dimple: Dimple, thicker: Any, values: Any) -> None:
+    """Write the curves from `first` to before `last` there into values (CURVES,); thicker : mm.
+
+    Many at once: numba counts references to arrays at each call, which costs more than a curve.
+    """
+    i, w0, w1, w2, w3 = at.index, at.w0, at.w1, at.w2, at.w3
+    c = dimple.curves
+    for k in range(first, last):
+        values[k] = w0 * c[i, k] + w1 * c[i + 1, k] + w2 * c[i + 2, k] + w3 * c[i + 3, k]
     if thicker != 0.0:
         c = dimple.slopes
-        more = at.w0 * c[which, i] + at.w1 * c[which, i + 1] + at.w2 * c[which, i + 2] + at.w3 * c[which, i + 3]
-        value += thicker * more
-    return value
+        for k in range(first, last):
+            values[k] += thicker * (w0 * c[i, k] + w1 * c[i + 1, k] + w2 * c[i + 2, k] + w3 * c[i + 3, k])
 
 
 @njit(cache=True, error_model="numpy")
-def slope(which: int, at: Place, dimple: Dimple, deflection: Any) -> Any:
-    """Its derivative to D, 1/mm, real."""
-    s, c, i = at.share.real, dimple.curves, at.index
-    rise = 0.5 * (s * (4.0 - 3.0 * s) - 1.0) * c[which, i] + 0.5 * s * (9.0 * s - 10.0) * c[which, i + 1]
-    rise += 0.5 * (s * (8.0 - 9.0 * s) + 1.0) * c[which, i + 2] + 0.5 * s * (3.0 * s - 2.0) * c[which, i + 3]
-    return rise / (dimple.step * (dimple.offset + deflection.real))
+def slope(which: int, at: Place, dimple: Dimple, deflection: float) -> Any:
+    """Its derivative to D, 1/mm."""
+    s, c, i = at.share, dimple.curves, at.index
+    rise = 0.5 * (s * (4.0 - 3.0 * s) - 1.0) * c[i, which] + 0.5 * s * (9.0 * s - 10.0) * c[i + 1, which]
+    rise += 0.5 * (s * (8.0 - 9.0 * s) + 1.0) * c[i + 2, which] + 0.5 * s * (3.0 * s - 2.0) * c[i + 3, which]
+    return rise / (dimple.step * (dimple.offset + deflection))
 
 
 @njit(cache=True, error_model="numpy")
-def over_exponents(first: int, power: Any, at: Place, dimple: Dimple, thicker: Any) -> Any:
-    """What the curves of the six exponents say of another one, power = n/(n + 2): the polynomial through them."""
+def over_exponents(first: int, power: Any, values: Any) -> Any:
+    """What the six exponents' values, from `first` on, say of another one, power = n/(n + 2): the polynomial."""
     d0, d1, d2 = power - _PLACES[0], power - _PLACES[1], power - _PLACES[2]
     d3, d4, d5 = power - _PLACES[3], power - _PLACES[4], power - _PLACES[5]
     early, middle, late = d0 * d1, d2 * d3, d4 * d5
-    total = (
-        (_SCALES[0] * d1 * curve(first, at, dimple, thicker) + _SCALES[1] * d0 * curve(first + 1, at, dimple, thicker))
-        * middle
-        * late
-    )
-    total += (
-        (
-            _SCALES[2] * d3 * curve(first + 2, at, dimple, thicker)
-            + _SCALES[3] * d2 * curve(first + 3, at, dimple, thicker)
-        )
-        * early
-        * late
-    )
-    total += (
-        (
-            _SCALES[4] * d5 * curve(first + 4, at, dimple, thicker)
-            + _SCALES[5] * d4 * curve(first + 5, at, dimple, thicker)
-        )
-        * early
-        * middle
-    )
-    return total
+    v = values[first : first + len(EXPONENTS)]
+    total = (_SCALES[0] * d1 * v[0] + _SCALES[1] * d0 * v[1]) * middle * late
+    total += (_SCALES[2] * d3 * v[2] + _SCALES[3] * d2 * v[3]) * early * late
+    return total + (_SCALES[4] * d5 * v[4] + _SCALES[5] * d4 * v[5]) * early * middle

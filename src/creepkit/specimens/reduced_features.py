@@ -28,16 +28,26 @@ def features(
     rate(rows.shape[0], pointer(rows), pointer(theta), pointer(said))
     columns = point.size - 5  # the rate, then each state's
     for k in range(rows.shape[0]):
-        value = (np.log(max(said[k * columns], 1e-300)) - log_rate) / _LOG_10
-        out[k] = value / (1.0 + (value / _LARGEST) ** 4) ** 0.25
+        out[k] = (np.log(max(said[k * columns], 1e-300)) - log_rate) / _LOG_10
+    for k in range(rows.shape[0]):
+        out[k] /= _bent(out[k])
+
+
+@njit(cache=True, error_model="numpy")
+def _bent(value: float) -> float:
+    """(1 + (value / largest)^4)^(1/4)."""
+    square = (value / _LARGEST) * (value / _LARGEST)
+    return float(np.sqrt(np.sqrt(1.0 + square * square)))
 
 
 @njit(cache=True, error_model="numpy")
 def _around(point: Floats, stress_factors: Floats, strain_factors: Floats, rows: Floats) -> None:
+    """Write the point (6 + S,) for all factors, (features, 6 + S)."""
     k = 0
     for c in strain_factors:
         for s in stress_factors:
-            rows[k] = point
+            for i in range(point.size):
+                rows[k, i] = point[i]
             for i in (STRESS, PRINCIPAL, MEAN):
                 rows[k, i] *= s
             rows[k, STRAIN] *= c
@@ -59,14 +69,16 @@ def feature_changes(
     outputs = width - 5
     columns = outputs * (1 + width + parameters)
     for k in range(rows.shape[0]):
-        d = said[k * columns : (k + 1) * columns]
-        s, c = stress_factors[k % stress_factors.size], strain_factors[k // stress_factors.size]
-        rate = max(d[0], 1e-300)
+        first = k * columns
+        rate = max(said[first], 1e-300)
         value = (np.log(rate) - log_rate) / _LOG_10
-        bend = (1.0 + (value / _LARGEST) ** 4) ** -1.25
+        bend = _bent(value)
+        scale = 1.0 / (bend * bend * bend * bend * bend * _LOG_10)
+        s, c = stress_factors[k % stress_factors.size], strain_factors[k // stress_factors.size]
+        for i in range(width):
+            said[first + outputs + i] *= s if i in (STRESS, PRINCIPAL, MEAN) else (c if i == STRAIN else 1.0)
         for p in range(changes.shape[0]):
-            total = d[outputs * (1 + width) + p] if p < parameters else 0.0
+            total = said[first + outputs * (1 + width) + p] if p < parameters else 0.0
             for i in range(width):
-                factor = s if i in (STRESS, PRINCIPAL, MEAN) else (c if i == STRAIN else 1.0)
-                total += d[outputs + i] * factor * changes[p, i]
-            out[k, p] = bend * (total / rate - log_rate_changes[p]) / _LOG_10
+                total += said[first + outputs + i] * changes[p, i]
+            out[k, p] = scale * (total / rate - log_rate_changes[p])

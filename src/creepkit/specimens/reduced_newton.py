@@ -10,69 +10,81 @@ from numba import njit
 from creepkit.arrays import Floats
 from creepkit.integration.elimination import eliminate
 from creepkit.kernels.interface import MEAN, POINT_SIZE, PRINCIPAL, STRAIN, STRESS, pointer
-from creepkit.specimens.reduced_curves import Dimple
+from creepkit.specimens.reduced_curves import LOG_GROWTH, LOG_STRESS, Dimple, slope
 from creepkit.specimens.reduced_problem import Room
-from creepkit.specimens.reduced_step import MEAN_STRESS, PROBES, Middle, Node, Pace, ask, pace, residual
+from creepkit.specimens.reduced_step import FAST, MEAN_STRESS, PROBES, SLOW, Middle, Node, Pace, ask, pace, residual
 
 _ITERATIONS, _STEP = 25, 4.0
 """Most Newton iterations of a step, and the largest change in one of them."""
 _STILL = -600.0
 """ln of a rate that is none."""
-_OVER = 100.0
-"""Strain, or mm, of an increment; a dimple has burst long before."""
+_LOG_OVER = float(np.log(100.0))
+"""Of strain, or mm, of an increment; a dimple has burst long before."""
 
 
 @njit(cache=True, error_model="numpy")
 def solve(
     update: Any, theta: Floats, node: Node, state: Floats, unknown: Floats, dimple: Dimple, tolerance: float, work: Room
-) -> Pace:
-    """Newton's method for the unknowns, in place, and the pace then."""
-    rows, said = work.rows, work.said
-    size = unknown.size
+) -> tuple[Middle, Pace]:
+    """Newton's method for the unknowns, in place; the middle of the step and the pace then."""
+    rows, said, values = work.rows, work.said, work.values
     logs, rates, right, matrix = work.logs, work.rates, work.right, work.matrix
     for iteration in range(_ITERATIONS):
-        middle = ask(node, state, unknown, dimple, 0.0, rows)
+        middle = ask(node, state, unknown, dimple, 0.0, rows, values)
         update(PROBES, pointer(rows), pointer(theta), pointer(said))
         for k in range(PROBES):
             logs[k] = max(said[k, 0], _STILL) if said[k, 0] < 0.0 else said[k, 0]
         for v in range(rates.size):
             rates[v] = said[0, 1 + v]
-        now = pace(node, state, unknown, dimple, 0.0, middle, logs)
-        residual(node, state, unknown, middle, now, logs, rates, right[:, 0])
-        largest = np.abs(right).max()
+        now = pace(node, state[FAST], state[SLOW], values, dimple.redistribution, middle, logs)
+        residual(node, state, unknown, values[LOG_GROWTH], now, logs[0], rates, right[:, 0])
+        largest = _largest(right)
         if not np.isfinite(largest) or largest < tolerance or iteration == _ITERATIONS - 1:
             break
-        _jacobian(node, unknown, rows, said, middle, now, matrix)
+        _jacobian(node, unknown, rows, said, dimple, middle, now, matrix)
         if not eliminate(matrix, right):
             break
-        factor = min(1.0, _STEP / np.abs(right).max())
-        for k in range(size):
+        factor = min(1.0, _STEP / _largest(right))
+        for k in range(unknown.size):
             unknown[k] -= factor * right[k, 0]
-        unknown[0], unknown[1] = min(unknown[0], np.log(_OVER)), min(unknown[1], np.log(_OVER))
+        unknown[0], unknown[1] = min(unknown[0], _LOG_OVER), min(unknown[1], _LOG_OVER)
     _damp(node, rows.shape[1], said, work.gains)
-    return now
+    return middle, now
+
+
+@njit(cache=True, error_model="numpy")
+def _largest(right: Floats) -> float:
+    """Largest magnitude; NaN if any is."""
+    found = 0.0
+    for k in range(right.shape[0]):
+        size = abs(right[k, 0])
+        found = size if size > found or size != size else found
+    return found
 
 
 @njit(cache=True, error_model="numpy")
 def _jacobian(
-    node: Node, unknown: Floats, rows: Floats, said: Floats, middle: Middle, now: Pace, matrix: Floats
+    node: Node, unknown: Floats, rows: Floats, said: Floats, dimple: Dimple, middle: Middle, now: Pace, matrix: Floats
 ) -> None:
     """Derivatives of the residuals to the unknowns; those of local exponents, which hardly change, are left out."""
-    size, width, half_strain, half = unknown.size, rows.shape[1], 0.5 * np.exp(unknown[0]), 0.5 * np.exp(unknown[1])
-    softer = rows[0, STRESS] * middle.log_stress_slope * half
-    weight = 0.5 * np.exp(node.log_weight)
-    for v in range(-1, unknown.size - 2):
+    size, width, half_strain, half = unknown.size, rows.shape[1], 0.5 * middle.strained, 0.5 * middle.grown
+    stress_slope = slope(LOG_STRESS, middle.at, dimple, middle.deflection)
+    growth_slope = slope(LOG_GROWTH, middle.at, dimple, middle.deflection)
+    softer = rows[0, STRESS] * stress_slope * half
+    weight = 0.5 * np.exp(node.log_weight) if size > 2 else 0.0
+    for v in range(-1, size - 2):
         start = size - 1 + (1 + v) * width
-        d = said[0, start : start + width]
         factor, row = (1.0, 0) if v < 0 else (weight, 2 + v)
-        matrix[row, 0] = factor * d[STRAIN] * half_strain
-        matrix[row, 1] = factor * (d[STRESS] + d[PRINCIPAL] + MEAN_STRESS * d[MEAN]) * softer
-        for u in range(unknown.size - 2):
-            matrix[row, 2 + u] = factor * d[POINT_SIZE + u]
+        stiffer = said[0, start + STRESS] + said[0, start + PRINCIPAL] + MEAN_STRESS * said[0, start + MEAN]
+        matrix[row, 0] = factor * said[0, start + STRAIN] * half_strain
+        matrix[row, 1] = factor * stiffer * softer
+        for u in range(size - 2):
+            matrix[row, 2 + u] = factor * said[0, start + POINT_SIZE + u]
         matrix[row, row] -= 1.0
-    matrix[1, :] = 0.0
+    for u in range(size - 2):
+        matrix[1, 2 + u] = 0.0
     matrix[1, 0] = 1.0 + now.bend
-    matrix[1, 1] = (middle.log_growth_slope - now.bend * middle.log_stress_slope) * half - 1.0
+    matrix[1, 1] = (growth_slope - now.bend * stress_slope) * half - 1.0
 
 
 @njit(cache=True, error_model="numpy")

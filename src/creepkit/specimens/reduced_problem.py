@@ -9,27 +9,20 @@ from numba import njit
 
 from creepkit.arrays import Floats
 from creepkit.kernels.interface import POINT_SIZE
+from creepkit.specimens.reduced_curves import CURVES
+from creepkit.specimens.reduced_dual import exp, log
 from creepkit.specimens.reduced_step import FAST, PROBES, SLOW, STATES, Node
 
 EFFECTS = ("thickness", "modulus", "temperature")
 """Directions of derivatives after the law's parameters: mm, relative, K."""
-TINY = 1e-30
-"""Scale of imaginary parts."""
+TINY = 2.0**-100
+"""Scale of imaginary parts; to divide by a power of two is to multiply."""
 
 
-class Test(NamedTuple):
-    """Of each node: time s, pressure MPa, temperature K, modulus MPa and its slope to temperature, elastic deflection
-    mm with its derivatives to thickness and to ln of the modulus, (nodes,) each.
-    """
-
-    times: Floats
-    pressure: Floats
-    temperature: Floats
-    modulus: Floats
-    softening: Floats
-    elastic: Floats
-    elastic_thickness: Floats
-    elastic_modulus: Floats
+TIMES, PRESSURE, TEMPERATURES, MODULUS, SOFTENING, ELASTIC, ELASTIC_THICKNESS, ELASTIC_MODULUS = range(8)
+"""Rows of a test, (8, nodes): time s, pressure MPa, temperature K, modulus MPa and its slope to temperature, elastic
+deflection mm with its derivatives to thickness and to ln of the modulus. One array, for each costs at every call.
+"""
 
 
 class Candidate(NamedTuple):
@@ -55,21 +48,16 @@ class Factors(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Working arrays: for the law at the probes and at the features, and of the derivatives.
+    """Working arrays: for the law at the probes and at the features, for curves and Newton's method.
 
-    rows (PROBES, 6 + S), said (PROBES, .) of `update`, full of `sensitivity`; wide, wide_said, wide_full at features.
-    tangents : (directions, state). along : (directions, 6 + S) of the point in the middle.
+    rows (PROBES, 6 + S), said (PROBES, .) of `update`; wide, wide_said at features; values (CURVES,).
     """
 
     rows: Floats
     said: Floats
-    full: Floats
     wide: Floats
     wide_said: Floats
-    wide_full: Floats
-    tangents: Floats
-    along: Floats
-    bent: Floats
+    values: Floats
     logs: Floats
     rates: Floats
     gains: Floats
@@ -77,94 +65,123 @@ class Room(NamedTuple):
     matrix: Floats
 
 
+class Slopes(NamedTuple):
+    """Working arrays of derivatives: complex ones of a step; what the law says of all its derivatives at the probes and
+    at the features; and of each direction those of the state (directions, state), of the point in the middle and ln of
+    the rate there, and of n'/(n' + 2).
+
+    ends : (unknowns and directions, .) of what a step leaves to each.
+    """
+
+    rows: Any
+    values: Any
+    logs: Any
+    rates: Any
+    left: Any
+    state: Any
+    unknown: Any
+    told: Any
+    full: Floats
+    wide_full: Floats
+    matrix: Floats
+    right: Floats
+    ends: Floats
+    tangents: Floats
+    along: Floats
+    bent: Floats
+    turned: Floats
+
+
 @njit(cache=True, error_model="numpy")
-def room(states: int, parameters: int, count: int, directions: int) -> Room:
-    """Allocate for `count` features and some directions of derivatives (none: 0)."""
+def room(states: int, count: int) -> Room:
+    """Allocate for `count` features."""
     width, size = POINT_SIZE + states, 1 + states
-    some = 1 if directions > 0 else 0
     return Room(
-        np.zeros((PROBES, width)), np.zeros((PROBES, size * (1 + width))),
-        np.zeros((some * PROBES, size * (1 + width + parameters))), np.zeros((count, width)),
-        np.zeros(count * size), np.zeros(some * count * size * (1 + width + parameters)),
-        np.zeros((directions, STATES + states)), np.zeros((directions, width)), np.zeros(directions),
-        np.zeros(PROBES), np.zeros(states), np.ones(states),
+        np.zeros((PROBES, width)), np.zeros((PROBES, size * (1 + width))), np.zeros((count, width)),
+        np.zeros(count * size), np.zeros(CURVES), np.zeros(PROBES), np.zeros(states), np.ones(states),
         np.zeros((2 + states, 1)), np.zeros((2 + states, 2 + states)),
     )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")
-def virgin(test: Test, candidate: Candidate) -> Floats:
+def slopes_room(states: int, parameters: int, count: int, directions: int, columns: int) -> Slopes:
+    """Allocate for `count` features and some directions of derivatives (none: 0) of as many columns of a course."""
+    width, size, some = POINT_SIZE + states, 2 + states, 1 if directions > 0 else 0
+    said = (1 + states) * (1 + width + parameters)
+    kind = np.complex128
+    return Slopes(
+        np.zeros((PROBES, width), kind), np.zeros(CURVES, kind), np.zeros(PROBES, kind), np.zeros(states, kind),
+        np.zeros(size, kind), np.zeros(STATES + states, kind), np.zeros(size, kind), np.zeros(columns, kind),
+        np.zeros((PROBES, said)), np.zeros(some * count * said), np.zeros((size, size)), np.zeros((size, directions)),
+        np.zeros((size + directions, STATES + states + width + columns)), np.zeros((directions, STATES + states)),
+        np.zeros((directions, width)), np.zeros(directions), np.zeros(directions),
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def virgin(test: Floats, initial: Floats) -> Floats:
     """The state at node 0; a load that is there already is all elastic."""
-    state = np.zeros(STATES + candidate.initial.size)
-    state[FAST] = state[SLOW] = test.pressure[0]
-    state[STATES:] = candidate.initial
+    state = np.zeros(STATES + initial.size)
+    state[FAST] = state[SLOW] = test[PRESSURE, 0]
+    state[STATES:] = initial
     return state
 
 
 @njit(cache=True, error_model="numpy")
 def clock(before: float, after: float, beta: Any) -> Any:
     """Of the middle in t^beta: the share of time before it, its time s, and ln of dt/ds times the step."""
-    low = np.exp(beta * np.log(before)) if before > 0.0 else 0.0 * beta
-    high = np.exp(beta * np.log(after))
-    middle = np.exp(np.log(0.5 * (low + high)) / beta)
-    weight = np.log((high - low) / beta) + (1.0 - beta) * np.log(middle)
+    low = exp(beta * np.log(before)) if before > 0.0 else 0.0 * beta
+    high = exp(beta * np.log(after))
+    middle = exp(log(0.5 * (low + high)) / beta)
+    weight = log((high - low) / beta) + (1.0 - beta) * log(middle)
     return (middle - before) / (after - before), middle, weight
 
 
 @njit(cache=True, error_model="numpy")
-def real_node(test: Test, j: int, beta: float) -> Node:
+def real_node(test: Floats, j: int, beta: float) -> Node:
     """The step that ends at node j."""
-    share, time, weight = clock(test.times[j - 1], test.times[j], beta)
-    return Node(
-        test.pressure[j - 1], test.pressure[j], test.temperature[j - 1], test.temperature[j], test.modulus[j - 1],
-        test.modulus[j], test.elastic[j - 1], test.elastic[j], share, time, weight,
-    )  # fmt: skip
-
-
-@njit(cache=True, error_model="numpy")
-def end_of(test: Test, j: int) -> Node:
-    """Node j by itself."""
-    return Node(
-        test.pressure[j], test.pressure[j], test.temperature[j], test.temperature[j], test.modulus[j], test.modulus[j],
-        test.elastic[j], test.elastic[j], 0.5, test.times[j], 0.0,
-    )  # fmt: skip
-
-
-@njit(cache=True, error_model="numpy")
-def complex_node(test: Test, j: int, candidate: Candidate, direction: int) -> Node:
-    """The same along one direction."""
-    effect = direction - candidate.theta.size
-    step = TINY * 1j
-    beta = candidate.beta + (step * candidate.beta_slopes[direction] if effect < 0 else 0j)
-    warm = step if effect == 2 else 0j
     i = j - 1
-    share, time, weight = (0.5 + 0j, 0j, 0j)
-    if test.times[j] > test.times[i]:
-        share, time, weight = clock(test.times[i], test.times[j], beta)
+    share, time, weight = clock(test[TIMES, i], test[TIMES, j], beta)
     return Node(
-        test.pressure[i] + 0j, test.pressure[j] + 0j, test.temperature[i] + warm, test.temperature[j] + warm,
-        _stiffness(test, i, candidate, effect), _stiffness(test, j, candidate, effect),
-        _elastic(test, i, candidate, effect), _elastic(test, j, candidate, effect), share, time, weight,
+        test[PRESSURE, i], test[PRESSURE, j], test[TEMPERATURES, i], test[TEMPERATURES, j], test[MODULUS, i],
+        test[MODULUS, j], test[ELASTIC, i], test[ELASTIC, j], share, time, weight,
     )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")
-def _stiffness(test: Test, j: int, candidate: Candidate, effect: int) -> complex:
-    """Modulus along an effect."""
-    change = 0.0
-    if effect == 1:
-        change = test.modulus[j] / (1.0 + candidate.stiffer)
-    elif effect == 2:
-        change = test.softening[j]
-    return test.modulus[j] + TINY * 1j * change  # type: ignore[no-any-return]
+def end_of(test: Floats, j: int) -> Node:
+    """Node j by itself."""
+    P, T, E, D = test[PRESSURE, j], test[TEMPERATURES, j], test[MODULUS, j], test[ELASTIC, j]
+    return Node(P, P, T, T, E, E, D, D, 0.5, test[TIMES, j], 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def _elastic(test: Test, j: int, candidate: Candidate, effect: int) -> complex:
-    """Elastic deflection along an effect."""
-    change = 0.0
+def complex_node(test: Floats, i: int, j: int, effect: int, stiffer: float, share: Any, time: Any, weight: Any) -> Node:
+    """What lies between nodes i and j along one of the EFFECTS (none: less than 0).
+
+    stiffer : relative change of the modulus; share, time, weight : of the clock, with derivatives.
+    """
+    warm = TINY * 1j if effect == 2 else 0j
+    first, last = _change(test, i, effect, stiffer), _change(test, j, effect, stiffer)
+    return Node(
+        test[PRESSURE, i], test[PRESSURE, j], test[TEMPERATURES, i] + warm, test[TEMPERATURES, j] + warm,
+        test[MODULUS, i] + TINY * 1j * first, test[MODULUS, j] + TINY * 1j * last,
+        test[ELASTIC, i] + TINY * 1j * _lifted(test, i, effect, first),
+        test[ELASTIC, j] + TINY * 1j * _lifted(test, j, effect, last), share, time, weight,
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _change(test: Floats, j: int, effect: int, stiffer: float) -> float:
+    """Derivative of the modulus to an effect."""
+    if effect == 1:
+        return test[MODULUS, j] / (1.0 + stiffer)  # type: ignore[no-any-return]
+    return test[SOFTENING, j] if effect == 2 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _lifted(test: Floats, j: int, effect: int, change: float) -> float:
+    """Derivative of the elastic deflection to an effect that changes the modulus so."""
     if effect == 0:
-        change = test.elastic_thickness[j]
-    elif effect > 0:
-        change = test.elastic_modulus[j] * _stiffness(test, j, candidate, effect).imag / (TINY * test.modulus[j])
-    return test.elastic[j] + TINY * 1j * change  # type: ignore[no-any-return]
+        return test[ELASTIC_THICKNESS, j]  # type: ignore[no-any-return]
+    return test[ELASTIC_MODULUS, j] * change / test[MODULUS, j]  # type: ignore[no-any-return]

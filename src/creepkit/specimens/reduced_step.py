@@ -25,15 +25,16 @@ from creepkit.arrays import Floats
 from creepkit.kernels.interface import MEAN, POINT_SIZE, PRINCIPAL, STRAIN, STRESS, TEMPERATURE, TIME
 from creepkit.specimens.reduced_curves import (
     AMPLITUDE,
-    LOG_GROWTH,
     LOG_STRESS,
     RESIDUAL,
+    WIDTH,
     Dimple,
-    curve,
+    Place,
     over_exponents,
     place,
-    slope,
+    write_curves,
 )
+from creepkit.specimens.reduced_dual import exp, log, sqrt
 
 MEAN_STRESS = 2.0 / 3.0
 """Over the von Mises stress, in equibiaxial tension, as in the middle of the roof."""
@@ -42,7 +43,7 @@ PROBES = 3
 PUSH = 1.2
 """Factor on stress, and on strain, that shows their local exponents; elastic stresses lie above sigma*."""
 
-_LOG_PUSH = float(np.log(PUSH))
+_PER_PUSH = float(1.0 / np.log(PUSH))
 
 CREEP, STRAINED, PLACE, FAST, SLOW, STATES = range(6)
 """Of a state: creep deflection mm, strain, creep times mean n'/(n' + 2), elastic pressures phi P (MPa), the law's."""
@@ -79,51 +80,48 @@ class Node(NamedTuple):
 
 
 class Middle(NamedTuple):
-    """What is known of the middle of a step, beside the law's rows."""
+    """What is known of the middle of a step, beside the law's rows and the dimple's curves: the deflection (mm) and
+    where it lies, the modulus over the stress, and the increments of strain and of creep deflection (mm).
+    """
 
-    log_growth: Any
-    log_stress_slope: Any
-    log_growth_slope: Any
-    size: Any
-    at: Any
+    deflection: Any
+    at: Place
     stiffness: Any
+    strained: Any
+    grown: Any
 
 
 @njit(cache=True, error_model="numpy")
 def within(x: Any, low: float, high: float, rounding: float) -> Any:
     """x kept between two limits, with corners rounded."""
-    x = low + 0.5 * (x - low + np.sqrt((x - low) ** 2 + rounding**2))
-    return high - 0.5 * (high - x + np.sqrt((high - x) ** 2 + rounding**2))
+    above = x - low
+    below = high - low - 0.5 * (above + sqrt(above * above + rounding * rounding))
+    return high - 0.5 * (below + sqrt(below * below + rounding * rounding))
 
 
 @njit(cache=True, error_model="numpy")
-def ask(node: Node, state: Any, unknown: Any, dimple: Dimple, thicker: Any, rows: Any) -> Middle:
-    """Write the rows that the law is asked at, (PROBES, 6 + S); unknown : ln of the increments of strain and of creep
-    deflection (mm), then the states in the middle.
+def ask(node: Node, state: Any, unknown: Any, dimple: Dimple, thicker: Any, rows: Any, values: Any) -> Middle:
+    """Write the rows that the law is asked at, (PROBES, 6 + S), and the curves up to WIDTH into values (CURVES,).
+
+    unknown : ln of the increments of strain and of creep deflection (mm), then the states in the middle.
     """
-    elastic = 0.5 * (node.elastic0 + node.elastic)
-    deflection = elastic + state[CREEP] + 0.5 * np.exp(unknown[1])
+    strained, grown = exp(unknown[0]), exp(unknown[1])
+    deflection = 0.5 * (node.elastic0 + node.elastic) + state[CREEP] + 0.5 * grown
     at = place(deflection, dimple)
+    write_curves(LOG_STRESS, WIDTH, at, dimple, thicker, values)
     pressure = node.pressure0 + node.share * (node.pressure - node.pressure0) + _FLOOR
-    stress = np.exp(curve(LOG_STRESS, at, dimple, thicker)) * pressure
-    strain = state[STRAINED] + 0.5 * np.exp(unknown[0])
+    stress = exp(values[LOG_STRESS]) * pressure
+    strain = state[STRAINED] + 0.5 * strained
+    temperature = node.temperature0 + node.share * (node.temperature - node.temperature0)
     modulus = node.modulus0 + node.share * (node.modulus - node.modulus0)
     for k in range(PROBES):
         pushed = stress * (PUSH if k == 1 else 1.0)
         rows[k, STRESS], rows[k, PRINCIPAL], rows[k, MEAN] = pushed, pushed, MEAN_STRESS * pushed
         rows[k, STRAIN] = strain * (PUSH if k == 2 else 1.0)
-        rows[k, TIME] = node.time
-        rows[k, TEMPERATURE] = node.temperature0 + node.share * (node.temperature - node.temperature0)
+        rows[k, TIME], rows[k, TEMPERATURE] = node.time, temperature
         for v in range(unknown.size - 2):
             rows[k, POINT_SIZE + v] = unknown[2 + v]
-    return Middle(
-        curve(LOG_GROWTH, at, dimple, thicker),
-        slope(LOG_STRESS, at, dimple, deflection),
-        slope(LOG_GROWTH, at, dimple, deflection),
-        curve(AMPLITUDE, at, dimple, thicker),
-        at,
-        modulus / stress,
-    )
+    return Middle(deflection, at, modulus / stress, strained, grown)
 
 
 class Pace(NamedTuple):
@@ -143,16 +141,18 @@ class Pace(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def _left(share: Any, added: Any, x: Any) -> Any:
     """A share that decays by exp(-x) while `added` comes in evenly."""
-    if abs(x) < 1e-4:
+    if added == 0.0:
+        return share * exp(-x)
+    if abs(x.real) < 1e-4:
         return share * (1.0 - x) + added * (1.0 - 0.5 * x)
-    decay = np.exp(-x)
+    decay = exp(-x)
     return share * decay + added * (1.0 - decay) / x
 
 
 @njit(cache=True, error_model="numpy")
 def _felt(share: Any) -> Any:
     """A share as growth feels it: less after unloading, and never much less than none."""
-    root = np.sqrt(share * share + _ROUNDING**2)
+    root = sqrt(share * share + _ROUNDING**2)
     fallen = 0.5 * _RELIEF * (root - share)
     return 0.5 * (share + root) - fallen / (1.0 + fallen) - 0.5 * (1.0 - _RELIEF) * _ROUNDING
 
@@ -160,27 +160,30 @@ def _felt(share: Any) -> Any:
 @njit(cache=True, error_model="numpy")
 def _multiplied(excess: Any) -> Any:
     """Growth over steady growth by how much redistribution adds to it; a power law in between a line and exp."""
-    root = np.sqrt(1.0 + excess / POWER)
+    root = sqrt(1.0 + excess * (1.0 / POWER))
     return root * root * root
 
 
 @njit(cache=True, error_model="numpy")
-def pace(node: Node, state: Any, unknown: Any, dimple: Dimple, thicker: Any, middle: Middle, logs: Any) -> Pace:
-    """How the dimple creeps in a step, by ln of the rates at the PROBES."""
-    n, m = (logs[1] - logs[0]) / _LOG_PUSH, (logs[2] - logs[0]) / _LOG_PUSH
+def pace(node: Node, fast: Any, slow: Any, values: Any, numbers: Floats, middle: Middle, logs: Any) -> Pace:
+    """How the dimple creeps in a step, by ln of the rates at the PROBES.
+
+    fast, slow : shares times pressure before, MPa; values : of the curves; numbers : of redistribution.
+    """
+    n, m = (logs[1] - logs[0]) * _PER_PUSH, (logs[2] - logs[0]) * _PER_PUSH
     proportional = n / (1.0 - within(m, -20.0, 0.8, 0.05))
     power = within(proportional, 0.4, 14.0, 0.1)
     place_of_power = power / (power + 2.0)
-    steady = over_exponents(RESIDUAL, place_of_power, middle.at, dimple, thicker)
-    numbers = dimple.redistribution
+    steady = over_exponents(RESIDUAL, place_of_power, values)
     redistributing = within(proportional, 0.4, numbers[CEILING], 0.2)
-    slow_size = middle.size * numbers[SLOW_SIZE] * np.log(redistributing)
-    fast_size = middle.size * numbers[FAST_SIZE] * (redistributing - 1.0) ** 2 / (redistributing + numbers[FAST_OFFSET])
-    strains = np.exp(unknown[0]) * middle.stiffness
+    beyond, size = redistributing - 1.0, values[AMPLITUDE]
+    slow_size = size * numbers[SLOW_SIZE] * log(redistributing)
+    fast_size = size * numbers[FAST_SIZE] * beyond * beyond / (redistributing + numbers[FAST_OFFSET])
+    strains = middle.strained * middle.stiffness
     slow_x, fast_x = numbers[SLOW_SPEED] * strains, numbers[FAST_SPEED] * redistributing * strains
     end = node.pressure + _FLOOR
     added = (node.pressure - node.pressure0) / end
-    slow, fast = state[SLOW] / end, state[FAST] / end
+    slow, fast = slow * (1.0 / end), fast * (1.0 / end)
     mean = 0.0 * strains
     for g in range(_NODES.size):
         y = _NODES[g] ** 2
@@ -190,25 +193,26 @@ def pace(node: Node, state: Any, unknown: Any, dimple: Dimple, thicker: Any, mid
         mean += 2.0 * _NODES[g] * _WEIGHTS[g] * _multiplied(now)
     slow, fast = _left(slow, added, slow_x), _left(fast, added, fast_x)
     last = _multiplied(slow_size * _felt(slow) + fast_size * _felt(fast))
-    return Pace(n, m, place_of_power, fast * end, slow * end, steady + np.log(mean), (last / mean).real - 1.0)
+    return Pace(n, m, place_of_power, fast * end, slow * end, steady + log(mean), (last / mean).real - 1.0)
 
 
 @njit(cache=True, error_model="numpy")
-def residual(node: Node, state: Any, unknown: Any, middle: Middle, now: Pace, logs: Any, rates: Any, out: Any) -> None:
-    """What must be zero of each unknown; logs (PROBES,) ln of strain rates, rates (S,) of the law's states."""
-    out[0] = logs[0] + node.log_weight - unknown[0]
-    out[1] = middle.log_growth + unknown[0] + now.log_multiplier - unknown[1]
+def residual(
+    node: Node, state: Any, unknown: Any, log_growth: Any, now: Pace, log_rate: Any, rates: Any, out: Any
+) -> None:
+    """What must be zero of each unknown; log_rate : ln of the strain rate, rates (S,) of the law's states."""
+    out[0] = log_rate + node.log_weight - unknown[0]
+    out[1] = log_growth + unknown[0] + now.log_multiplier - unknown[1]
     for v in range(rates.size):
-        out[2 + v] = state[STATES + v] + 0.5 * np.exp(node.log_weight) * rates[v] - unknown[2 + v]
+        out[2 + v] = state[STATES + v] + 0.5 * exp(node.log_weight) * rates[v] - unknown[2 + v]
 
 
 @njit(cache=True, error_model="numpy")
-def advance(state: Any, unknown: Any, now: Pace, gains: Floats) -> None:
+def advance(state: Any, unknown: Any, middle: Middle, now: Pace, gains: Floats) -> None:
     """The state after a step, in place; gains (S,) : what the law's states do after the middle over that before it."""
-    grown = np.exp(unknown[1])
-    state[CREEP] += grown
-    state[STRAINED] += np.exp(unknown[0])
-    state[PLACE] += grown * now.place
+    state[CREEP] += middle.grown
+    state[STRAINED] += middle.strained
+    state[PLACE] += middle.grown * now.place
     state[FAST], state[SLOW] = now.fast, now.slow
     for v in range(unknown.size - 2):
         state[STATES + v] = unknown[2 + v] + gains[v] * (unknown[2 + v] - state[STATES + v])

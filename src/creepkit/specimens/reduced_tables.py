@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -69,8 +70,6 @@ class Grid(NamedTuple):
 
 LOADS = Grid.to(LOAD_RANGE[1], 1e-6, _LOADS)
 """P/E of the elastic tables."""
-
-
 _FORMAT = "creepkit-one-degree-of-freedom-1"
 _ARRAYS = ("thicknesses", "curves", "elastic", "redistribution")
 
@@ -123,27 +122,37 @@ class Tables:
         curves, changes = (_extended(np.tensordot(w, self.curves, 1)) for w in (weights, slopes))
         return Dimple(curves, changes, self.redistribution, self.grid.offset, self.grid.step)
 
-    def elastic_deflection(self, load: Floats, thickness: float) -> tuple[Floats, Floats, Floats]:
-        """Elastic deflection, mm, at P/E, with its derivatives to the thickness and to ln(P/E)."""
-        index = np.arange(LOADS.length)
+    def elastic_deflection(self, load: Floats, thickness: float | Floats) -> tuple[Floats, Floats, Floats]:
+        """Elastic deflection, mm, at P/E (..., loads), with its derivatives to the thickness (...) and to ln(P/E)."""
         position = np.minimum(np.log1p(load / LOADS.offset) / LOADS.step, LOADS.length - 1.0)
-        value, change = (CubicSpline(index, w @ self.elastic) for w in self._weights(thickness))
-        deflection = load * np.exp(value(position))
-        bend = value(position, 1) * load / (LOADS.step * (LOADS.offset + load))
-        return deflection, deflection * change(position), deflection * (1.0 + bend)
+        weights, changes = (np.expand_dims(np.moveaxis(w, 0, -1), -2) for w in self._weights(thickness))
+        rows = self._elastic_rows(position)
+        deflection = load * np.exp((rows * weights).sum(axis=-1))
+        steeper = (self._elastic_rows(position, 1) * weights).sum(axis=-1)
+        bend = steeper * load / (LOADS.step * (LOADS.offset + load))
+        return deflection, deflection * (rows * changes).sum(axis=-1), deflection * (1.0 + bend)
 
-    def _weights(self, thickness: float) -> tuple[Floats, Floats]:
-        """Weights (rows,) of the polynomial in ln h through all rows, and their derivatives to h, 1/mm."""
+    @cached_property
+    def _elastic_rows(self) -> CubicSpline:
+        """Splines of the elastic rows over places in LOADS, (..., rows)."""
+        return CubicSpline(np.arange(LOADS.length), self.elastic.T)
+
+    def _weights(self, thickness: float | Floats) -> tuple[Floats, Floats]:
+        """Weights (rows, ...) of the polynomial in ln h through all rows, and their derivatives to h, 1/mm."""
         known, x = np.log(self.thicknesses), np.log(thickness)
-        basis = [np.poly1d(np.atleast_1d(np.polyfit(known, unit, known.size - 1))) for unit in np.eye(known.size)]
-        values = np.array([b(x) for b in basis])
-        return values, np.array([b.deriv()(x) for b in basis]) / thickness
+        values, slopes = np.ones((known.size, *np.shape(x))), np.zeros((known.size, *np.shape(x)))
+        for i, j in product(range(known.size), repeat=2):  # the product rule, factor by factor
+            if i != j:
+                apart = known[i] - known[j]
+                slopes[i] = (slopes[i] * (x - known[j]) + values[i]) / apart
+                values[i] *= (x - known[j]) / apart
+        return values, slopes / thickness
 
 
 def _extended(curves: Floats) -> Floats:
-    """(CURVES, points + 2)."""
+    """(points + 2, CURVES)."""
     first, last = 2 * curves[:, :1] - curves[:, 1:2], 2 * curves[:, -1:] - curves[:, -2:-1]
-    return np.ascontiguousarray(np.concatenate([first, curves, last], axis=1))
+    return np.ascontiguousarray(np.concatenate([first, curves, last], axis=1).T)
 
 
 def deflection_grid(specimen: Bulge) -> Grid:

@@ -8,111 +8,164 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats
 from creepkit.integration.elimination import eliminate
 from creepkit.kernels.interface import STRAIN, pointer
-from creepkit.specimens.reduced_curves import Dimple
+from creepkit.specimens.reduced_curves import LOG_GROWTH, Dimple
 from creepkit.specimens.reduced_observed import COLUMNS, OF_STEP, observe, observe_step
-from creepkit.specimens.reduced_problem import EFFECTS, TINY, Candidate, Room, Test, complex_node, virgin
+from creepkit.specimens.reduced_problem import (
+    TIMES,
+    TINY,
+    Candidate,
+    Room,
+    Slopes,
+    clock,
+    complex_node,
+    virgin,
+)
 from creepkit.specimens.reduced_step import FAST, PROBES, SLOW, Node, advance, ask, pace, residual
 
 
 @njit(cache=True, error_model="numpy")
-def consult(update: Any, sensitivity: Any, theta: Floats, work: Room) -> None:
+def consult(update: Any, sensitivity: Any, theta: Floats, work: Room, full: Floats) -> None:
     """What the law says at the solution."""
     update(PROBES, pointer(work.rows), pointer(theta), pointer(work.said))
-    sensitivity(PROBES, pointer(work.rows), pointer(theta), pointer(work.full))
-
-
-@njit(cache=True, error_model="numpy")
-def _law_along(work: Room, rows: Any, direction: int, parameters: int, logs: Any, rates: Any) -> None:
-    """ln of rates and the rates of states along a direction, in which the rows have imaginary parts."""
-    width, outputs = rows.shape[1], 1 + rates.size
-    for k in range(PROBES):
-        total = 0.0
-        for i in range(width):
-            total += work.said[k, outputs + i] * rows[k, i].imag
-        if direction < parameters and work.full[k, 0] > 0.0:
-            total += TINY * work.full[k, outputs * (1 + width) + direction] / work.full[k, 0]
-        logs[k] = work.logs[k] + 1j * total
-    for v in range(rates.size):
-        total = 0.0
-        for i in range(width):
-            total += work.said[0, outputs + (1 + v) * width + i] * rows[0, i].imag
-        if direction < parameters:
-            total += TINY * work.full[0, outputs * (1 + width) + (1 + v) * parameters + direction]
-        rates[v] = work.said[0, 1 + v] + 1j * total
+    sensitivity(PROBES, pointer(work.rows), pointer(theta), pointer(full))
 
 
 @njit(cache=True, error_model="numpy")
 def differentiate(
-    test: Test, j: int, instant: bool, candidate: Candidate, dimple: Dimple, before: Floats, unknown: Floats,
-    toughness: float, work: Room, out: Floats, changes: Floats,
+    test: Floats, j: int, candidate: Candidate, dimple: Dimple, before: Floats, state: Floats, unknown: Floats,
+    toughness: float, work: Room, slopes: Slopes, changes: Floats,
 ) -> None:  # fmt: skip
     """Derivatives of what is told of node j along all directions, and of the state there."""
-    parameters, size = candidate.theta.size, unknown.size
-    directions = parameters + len(EFFECTS)
-    rows = np.zeros((PROBES, work.rows.shape[1]), dtype=np.complex128)
-    logs, rates = np.zeros(PROBES, dtype=np.complex128), np.zeros(size - 2, dtype=np.complex128)
-    left, told = np.zeros(size, dtype=np.complex128), np.zeros(len(COLUMNS), dtype=np.complex128)
-    moved, state = unknown + 0j, before + 0j
-    matrix, right = np.zeros((size, size)), np.zeros((size, directions))
-    if not instant:
-        node = complex_node(test, j, candidate, directions)
-        for k in range(size):
-            moved[k] += TINY * 1j
-            middle = ask(node, state, moved, dimple, 0j, rows)
-            _law_along(work, rows, parameters, parameters, logs, rates)
-            now = pace(node, state, moved, dimple, 0j, middle, logs)
-            residual(node, state, moved, middle, now, logs, rates, left)
-            matrix[:, k] = left.imag / TINY
-            moved[k] = unknown[k] + 0j
-        for d in range(directions):
-            node, thicker = complex_node(test, j, candidate, d), _thicker(d, parameters)
-            state[:] = before + TINY * 1j * work.tangents[d]
-            middle = ask(node, state, moved, dimple, thicker, rows)
-            _law_along(work, rows, d, parameters, logs, rates)
-            now = pace(node, state, moved, dimple, thicker, middle, logs)
-            residual(node, state, moved, middle, now, logs, rates, left)
-            right[:, d] = -left.imag / TINY
-        eliminate(matrix, right)
-    for d in range(directions):
-        node, thicker = complex_node(test, j, candidate, d), _thicker(d, parameters)
-        state[:] = before + TINY * 1j * work.tangents[d]
-        told[:] = 0.0
-        if instant:
-            for c in range(OF_STEP, changes.shape[1]):
-                changes[j, c, d] = changes[j - 1, c, d]
-            state[FAST] += test.pressure[j] - test.pressure[j - 1]
-            state[SLOW] += test.pressure[j] - test.pressure[j - 1]
-            turned = toughness + 0j
-        else:
-            moved[:] = unknown + TINY * 1j * right[:, d]
-            middle = ask(node, state, moved, dimple, thicker, rows)
-            _law_along(work, rows, d, parameters, logs, rates)
-            now = pace(node, state, moved, dimple, thicker, middle, logs)
-            advance(state, moved, now, work.gains)
-            observe_step(rows[0, STRAIN], now, logs[0], told)
+    if test[TIMES, j] > test[TIMES, j - 1]:
+        _differentiate_step(test, j, candidate, dimple, before, unknown, work, slopes)
+        first = slopes.ends.shape[1] - len(COLUMNS)
+        for d in range(changes.shape[2]):
             for c in range(OF_STEP, len(COLUMNS)):
-                changes[j, c, d] = told[c].imag / TINY
-            work.along[d] = rows[0].imag / TINY
-            work.bent[d] = logs[0].imag / TINY
-            turned = now.place
-        observe(node, state, turned, dimple, thicker, test.times[j], told)
+                changes[j, c, d] = slopes.ends[unknown.size + d, first + c]
+    else:
+        changes[j, OF_STEP:] = changes[j - 1, OF_STEP:]
+        slopes.turned[:] = 0.0
+    _differentiate_node(test, j, candidate, dimple, state, toughness, slopes, changes)
+    if j == 1:
+        tangents = slopes.tangents.copy()
+        slopes.tangents[:] = 0.0
+        _differentiate_node(test, 0, candidate, dimple, virgin(test, candidate.initial), toughness, slopes, changes)
+        slopes.tangents[:] = tangents
+
+
+@njit(cache=True, error_model="numpy")
+def _differentiate_node(
+    test: Floats, j: int, candidate: Candidate, dimple: Dimple, state: Floats, toughness: float, slopes: Slopes,
+    changes: Floats,
+) -> None:  # fmt: skip
+    """Of what is told of node j itself."""
+    parameters, moved, told, values = candidate.theta.size, slopes.state, slopes.told, slopes.values
+    for d in range(changes.shape[2]):
+        for i in range(state.size):
+            moved[i] = complex(state[i], TINY * slopes.tangents[d, i])
+        node = complex_node(test, j, j, d - parameters, candidate.stiffer, 0.5 + 0j, 0j, 0j)
+        turned = complex(toughness, TINY * slopes.turned[d])
+        observe(node, moved, turned, dimple, _thicker(d, parameters), test[TIMES, j], values, told)
         for c in range(OF_STEP):
             changes[j, c, d] = told[c].imag / TINY
-        work.tangents[d] = state.imag / TINY
-        if j == 1:
-            start = Node(
-                node.pressure0, node.pressure0, node.temperature0, node.temperature0, node.modulus0, node.modulus0,
-                node.elastic0, node.elastic0, node.share, node.time, node.log_weight,
-            )  # fmt: skip
-            observe(start, virgin(test, candidate) + 0j, turned, dimple, thicker, test.times[0], told)
-            for c in range(OF_STEP):
-                changes[0, c, d] = told[c].imag / TINY
+
+
+@njit(cache=True, error_model="numpy")
+def _differentiate_step(
+    test: Floats, j: int, candidate: Candidate, dimple: Dimple, before: Floats, unknown: Floats, work: Room,
+    slopes: Slopes,
+) -> None:  # fmt: skip
+    """Of the state after a step and what is told of the step: along each unknown, along each direction, then both."""
+    parameters, size, ends = candidate.theta.size, unknown.size, slopes.ends
+    share, time, weight = clock(test[TIMES, j - 1], test[TIMES, j], candidate.beta + TINY * 1j)
+    for k in range(ends.shape[0]):
+        d = k - size
+        for i in range(before.size):
+            slopes.state[i] = complex(before[i], TINY * slopes.tangents[d, i] if d >= 0 else 0.0)
+        for i in range(size):
+            slopes.unknown[i] = complex(unknown[i], TINY if i == k else 0.0)
+        slower = candidate.beta_slopes[d] if 0 <= d < parameters else 0.0
+        node = complex_node(
+            test, j - 1, j, d - parameters, candidate.stiffer, complex(share.real, slower * share.imag),
+            complex(time.real, slower * time.imag), complex(weight.real, slower * weight.imag),
+        )  # fmt: skip
+        _along(node, d, parameters, dimple, work, slopes, ends[k])
+        for i in range(size):
+            if d < 0:
+                slopes.matrix[i, k] = slopes.left[i].imag / TINY
+            else:
+                slopes.right[i, d] = -slopes.left[i].imag / TINY
+    eliminate(slopes.matrix, slopes.right)
+    _combine(size, before.size, slopes)
+
+
+@njit(cache=True, error_model="numpy")
+def _along(
+    node: Node, direction: int, parameters: int, dimple: Dimple, work: Room, slopes: Slopes, ends: Floats
+) -> None:
+    """One direction: what must be zero, into `left`; the state after, the middle's point and what is told, to ends."""
+    rows, values, state, told = slopes.rows, slopes.values, slopes.state, slopes.told
+    fast, slow = state[FAST], state[SLOW]
+    middle = ask(node, state, slopes.unknown, dimple, _thicker(direction, parameters), rows, values)
+    _law_along(work.said, slopes.full, work.logs, rows, direction, parameters, slopes.logs, slopes.rates)
+    now = pace(node, fast, slow, values, dimple.redistribution, middle, slopes.logs)
+    residual(node, state, slopes.unknown, values[LOG_GROWTH], now, slopes.logs[0], slopes.rates, slopes.left)
+    advance(state, slopes.unknown, middle, now, work.gains)
+    observe_step(rows[0, STRAIN], now, slopes.logs[0], told)
+    told[0], told[1] = now.place, slopes.logs[0]  # columns of nodes are free here
+    point, first = state.size, state.size + rows.shape[1]
+    for i in range(point):
+        ends[i] = state[i].imag / TINY
+    for i in range(rows.shape[1]):
+        ends[point + i] = rows[0, i].imag / TINY
+    for c in range(told.size):
+        ends[first + c] = told[c].imag / TINY
+
+
+@njit(cache=True, error_model="numpy")
+def _combine(size: int, states: int, slopes: Slopes) -> None:
+    """Add to each direction what the unknowns do, and hand it on."""
+    ends, right, width = slopes.ends, slopes.right, slopes.along.shape[1]
+    for d in range(right.shape[1]):
+        for k in range(size):
+            for i in range(ends.shape[1]):
+                ends[size + d, i] += right[k, d] * ends[k, i]
+        for i in range(states):
+            slopes.tangents[d, i] = ends[size + d, i]
+        for i in range(width):
+            slopes.along[d, i] = ends[size + d, states + i]
+        slopes.turned[d], slopes.bent[d] = ends[size + d, states + width], ends[size + d, states + width + 1]
+
+
+@njit(cache=True, error_model="numpy")
+def _law_along(
+    said: Floats, full: Floats, known: Floats, rows: Any, direction: int, parameters: int, logs: Any, rates: Any
+) -> None:
+    """ln of rates and the rates of states along a direction, in which the rows have imaginary parts.
+
+    said, full : of `update` and `sensitivity`; known : (PROBES,) ln of rates.
+    """
+    width, outputs = rows.shape[1], 1 + rates.size
+    own = 0 <= direction < parameters
+    for k in range(PROBES):
+        total = 0.0
+        for i in range(width):
+            total += said[k, outputs + i] * rows[k, i].imag
+        if own and full[k, 0] > 0.0:
+            total += TINY * full[k, outputs * (1 + width) + direction] / full[k, 0]
+        logs[k] = complex(known[k], total)
+    for v in range(rates.size):
+        total = 0.0
+        for i in range(width):
+            total += said[0, outputs + (1 + v) * width + i] * rows[0, i].imag
+        if own:
+            total += TINY * full[0, outputs * (1 + width) + (1 + v) * parameters + direction]
+        rates[v] = complex(said[0, 1 + v], total)
 
 
 @njit(cache=True, error_model="numpy")

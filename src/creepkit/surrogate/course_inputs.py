@@ -71,11 +71,6 @@ class CourseInputs:
         program = history.loading.program()
         return np.stack([_COLUMNS[name](program, times) for name in self.series], axis=1)
 
-    def level(self, history: History, times: Floats) -> float:
-        """The load, MPa, that stands for a test: the geometric mean of the first and the last over these frames."""
-        load = _loaded(history, times)
-        return float(np.sqrt(load[0] * load[-1]))
-
     def domain(self, history: History, times: Floats) -> Floats:
         """What the domain guard sees of a test, named by `domain_names`.
 

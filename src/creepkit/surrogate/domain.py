@@ -1,6 +1,6 @@
 """The domain of a surrogate: how far inputs lie from those it was trained on.
 
-A row of inputs is inside when each stands within the range of the training rows (a little beyond is forgiven) and the
+A row of inputs is inside when each stands within the range of the training rows (some way beyond is forgiven) and the
 row lies no farther from their middle than the farthest training row as the others see it: Mahalanobis distance, whose
 leave-one-out value has a closed form. The range catches one input that leaves its box, the distance a combination that
 never occurred (a coefficient and an exponent that between them make no creep). What never varied in training may not
@@ -15,35 +15,38 @@ from typing import Any
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats
+from creepkit.arrays import ArrayLike, Bools, Floats
 from creepkit.errors import SurrogateError
 
 BEYOND = 0.01
-"""Share of an input's range by which it may leave it."""
+"""Share of an input's range by which it may leave it, unless more is forgiven."""
 FLAT = 1e-9
 """Variance of a standardised direction below which it never varied."""
 WORDS = 3
 """Inputs named when a row is outside."""
+ARRAYS = ("low", "high", "forgiven", "mean", "scale", "whitening")
 
 
 @dataclass(frozen=True, eq=False)
 class Domain:
     """Where training rows lie.
 
-    names : of the inputs. low, high : their ranges; mean, scale : their middle and deviation, (inputs,) each.
-    whitening : (inputs, directions), standardised inputs to independent ones; limit : largest distance inside.
+    names : of the inputs. low, high : their ranges; forgiven : share of it by which each may leave it; mean, scale :
+    their middle and deviation, (inputs,) each. whitening : (inputs, directions), standardised inputs to independent
+    ones; limit : largest distance inside.
     """
 
     names: tuple[str, ...]
     low: Floats
     high: Floats
+    forgiven: Floats
     mean: Floats
     scale: Floats
     whitening: Floats
     limit: float
 
     @classmethod
-    def of(cls, names: Sequence[str], rows: Floats) -> Domain:
+    def of(cls, names: Sequence[str], rows: Floats, forgiven: ArrayLike = BEYOND) -> Domain:
         """The domain of training rows, (n, inputs); NaN, an input that is not there, counts nowhere."""
         rows = np.array(rows, float)
         known = np.isfinite(rows)
@@ -56,13 +59,15 @@ class Domain:
         variance, axes = np.linalg.eigh(np.cov(standard, rowvar=False, ddof=1).reshape(len(names), len(names)))
         whitening = axes / np.sqrt(np.maximum(variance, FLAT))
         square = ((standard @ whitening) ** 2).sum(axis=1)
-        return cls(tuple(names), low, high, mean, scale, whitening, float(np.sqrt(_left_out(square, len(rows)).max())))
+        limit = float(np.sqrt(_left_out(square, len(rows)).max()))
+        room = np.broadcast_to(np.asarray(forgiven, float), low.shape).copy()
+        return cls(tuple(names), low, high, room, mean, scale, whitening, limit)
 
     def distance(self, rows: Floats) -> Floats:
         """How far rows (..., inputs) lie out, (...): up to 1 is inside; NaN, an input that is not there, is not far."""
         rows = np.where(np.isnan(rows), self.mean, rows)
         whole = np.sqrt((((rows - self.mean) / self.scale @ self.whitening) ** 2).sum(axis=-1)) / self.limit
-        return np.asarray(np.maximum(whole, 1.0 + self.beyond(rows).max(axis=-1, initial=-1.0) - BEYOND))
+        return np.asarray(np.maximum(whole, 1.0 + self._too_far(rows).max(axis=-1, initial=-1.0)))
 
     def outside(self, rows: Floats) -> Bools:
         """Which rows (..., inputs) lie outside, (...)."""
@@ -73,27 +78,31 @@ class Domain:
         width = np.where(self.high > self.low, self.high - self.low, 1e-6 * self.scale)
         return np.asarray(np.maximum(self.low - rows, rows - self.high) / width)
 
+    def _too_far(self, rows: Floats) -> Floats:
+        return self.beyond(rows) - self.forgiven
+
     def reason(self, row: Floats) -> str:
         """Why one row is outside, in words; "" inside."""
         row = np.asarray(row, float)
         if not self.outside(row):
             return ""
-        over = self.beyond(row)
-        far = [k for k in np.argsort(-over) if over[k] > BEYOND][:WORDS]
+        over = self._too_far(row)
+        far = [k for k in np.argsort(-over) if over[k] > 0][:WORDS]
         told = [f"{self.names[k]} = {row[k]:.4g} (trained on {self.low[k]:.4g} to {self.high[k]:.4g})" for k in far]
         return ", ".join(told) or "a combination of inputs far from those of the training"
 
     def document(self) -> dict[str, Any]:
         """The domain as JSON-able data."""
-        arrays = {name: getattr(self, name).tolist() for name in ("low", "high", "mean", "scale", "whitening")}
+        arrays = {name: getattr(self, name).tolist() for name in ARRAYS}
         return {"names": list(self.names), "limit": self.limit if np.isfinite(self.limit) else None, **arrays}
 
     @classmethod
     def from_document(cls, data: Mapping[str, Any]) -> Domain:
         """The domain that `document` wrote."""
         try:
-            arrays = {name: np.array(data[name], float) for name in ("low", "high", "mean", "scale", "whitening")}
             names, limit = tuple(str(n) for n in data["names"]), data["limit"]
+            known = {"forgiven": [BEYOND] * len(names), **data}
+            arrays = {name: np.array(known[name], float) for name in ARRAYS}
             made = cls(names, **arrays, limit=np.inf if limit is None else float(limit))
         except (KeyError, TypeError, ValueError):
             raise SurrogateError("the domain in the header of this surrogate is damaged; train it again") from None

@@ -43,7 +43,7 @@ def evaluate(surrogate: Surrogate, data: Dataset) -> Evaluation:
     everything = torch.arange(len(data))
     rows, scale = everything, deviation(samples, everything)
     if known.get("data") == fingerprint(data):
-        train, rows = split(len(data), surrogate.recipe.training.validation, int(known["seed"]))
+        train, rows = split(len(data), surrogate.recipe.training, int(known["seed"]))
         scale = deviation(samples, train)
     found = compared(surrogate.module, samples, data, rows, scale)
     times = chosen_times(data.grid, float(np.median(found.times[:, -1])))

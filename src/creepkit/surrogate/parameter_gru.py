@@ -14,18 +14,13 @@ from creepkit.errors import DatasetError, SurrogateError, nearest
 from creepkit.records import Screened
 from creepkit.surrogate.course_inputs import CONSTANTS, SERIES, CourseInputs
 from creepkit.surrogate.domain import Domain
-from creepkit.surrogate.law_inputs import Form, LawInputs, Point
+from creepkit.surrogate.law_inputs import LawInputs
 from creepkit.surrogate.parameter_module import Cell, ParameterModule
 from creepkit.surrogate.recipe import Module, Progress, Samples, Told, Training
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
     from creepkit.surrogate.surrogate import Surrogate
-
-REFERENCE_STRAIN = 0.01
-"""Where the rates of terms are taken: the strain of the paper's criteria."""
-LOOKED_AT = 512
-"""Rows whose reference stresses are asked for."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +31,6 @@ class ParameterGru:
     inputs : what is seen at each frame, of "load" (at the frame, all that the paper's sees), "mean_load" (since the
         frame before: it tells when between two frames the load jumped), "time" and "step". () is "load" alone, and for
         grids that stretch with the test "load", "mean_load", "time" and "step".
-    parameters : "values" (log10 of coefficients, the rest as it is), or "rates" (log10 of each term's rate at the
-        stress of the test in the place of its coefficient).
     target : "value" of the first output, or its "log".
     base : "none"; or "one-dof": the specimen's cheap stand-in predicts the first output, and the network corrects the
         logarithm of it. Derivatives are then left to differences.
@@ -47,7 +40,6 @@ class ParameterGru:
     layers: int = 3
     cell: Cell = "gru"
     inputs: tuple[str, ...] = ()
-    parameters: Form = "values"
     target: Literal["value", "log"] = "value"
     base: Literal["none", "one-dof"] = "none"
     training: Training = field(default_factory=Training)
@@ -60,8 +52,7 @@ class ParameterGru:
             value = getattr(self, name)
             if value != int(value) or not 1 <= value <= most:
                 raise SurrogateError(f"ParameterGru: {name} is {value}; allowed are whole numbers from 1 to {most}")
-        words = {"cell": ("gru", "lstm"), "parameters": ("values", "rates"), "target": ("value", "log"),
-                 "base": ("none", "one-dof")}  # fmt: skip
+        words = {"cell": ("gru", "lstm"), "target": ("value", "log"), "base": ("none", "one-dof")}
         for name, known in words.items():
             if getattr(self, name) not in known:
                 raise SurrogateError(f"ParameterGru: {name} is '{getattr(self, name)}'; allowed are {', '.join(known)}")
@@ -73,10 +64,10 @@ class ParameterGru:
 
     def samples(self, data: Dataset, progress: Progress | None = None) -> Samples:
         """Tensors of a data set: constants, series, targets, mask, base, and "domain" for the guard."""
-        law, tests = LawInputs(data.law, self.parameters, reference_of(data)), self._tests(data)
+        law, tests = LawInputs(data.law), self._tests(data)
         mask = np.asarray(np.isfinite(data.values).all(axis=-1))
-        constants, series, summary, levels = _of_tests(data, tests, progress)
-        rows = law.rows(law.of_table(data.parameters), levels)
+        constants, series, summary = _of_tests(data, tests, progress)
+        rows = law.rows(law.of_table(data.parameters))
         made = {
             "constants": np.concatenate([rows, constants], axis=1),
             "series": series,
@@ -95,14 +86,12 @@ class ParameterGru:
 
     def told(self, data: Dataset, samples: Samples, train: Tensor) -> Told:
         """Scales by name, the domain, and what was constant."""
-        tests, point = self._tests(data), reference_of(data)
-        law = LawInputs(data.law, self.parameters, point)
+        tests, law = self._tests(data), LawInputs(data.law)
         names = (*law.names, *tests.constants)
         module = self.module(data, samples, train)
         assert isinstance(module, ParameterModule)
         series = (*tests.series, *(["ln base"] if self.base != "none" else []))
         scaling = {
-            "reference": vars(point),
             "inputs": _pairs(names, module.constants),
             "series": _pairs(series, module.series),
             "outputs": _pairs(data.outputs, module.targets),
@@ -144,21 +133,6 @@ def tests_of(recipe: ParameterGru, specimen: Any, conditions: tuple[str, ...], r
     return CourseInputs(specimen, tuple(n for n in CONSTANTS if n in conditions), recipe.series(relative), relative)
 
 
-def reference_of(data: Dataset) -> Point:
-    """Reference stress over load, end and temperature of the tests, their medians."""
-    rows = range(0, len(data), max(1, len(data) // LOOKED_AT))
-    plans = [data.plan(k) for k in rows]
-    offered = getattr(data.specimen, "reference_stress", None)
-    largest = [float(h.loading.program().values.max()) for h in plans]
-    stresses = largest if offered is None else [float(np.max(offered(h))) for h in plans]
-    return Point(
-        per_load=float(f"{np.median(np.divide(stresses, largest)):.4g}"),
-        strain=REFERENCE_STRAIN,
-        time=float(f"{np.median([h.times[-1] for h in plans]):.4g}"),
-        temperature=float(f"{np.median([h.temperature_program().values.mean() for h in plans]):.5g}"),
-    )
-
-
 def base_of(data: Dataset, progress: Progress | None = None) -> Floats:
     """(n, frames) what the specimen's stand-in predicts of the first output; its last value after its end."""
     stand_in = stand_in_of(data.specimen)
@@ -187,18 +161,17 @@ def held(values: Floats) -> Floats:
 
 
 def _of_tests(data: Dataset, tests: CourseInputs, progress: Progress | None) -> tuple[Floats, ...]:
-    """Constants (n, C), series (n, frames, S), what the guard sees (n, ...) and the load (n,) of all tests."""
+    """Constants (n, C), series (n, frames, S) and what the guard sees (n, ...) of all tests."""
     parts = []
     for k in range(len(data)):
         plan, times = data.plan(k), data.times(k)
-        course = tests.over_time(plan, times), tests.domain(plan, times), np.array(tests.level(plan, times))
-        parts.append((tests.numbers(plan), *course))
+        parts.append((tests.numbers(plan), tests.over_time(plan, times), tests.domain(plan, times)))
         if progress is not None and (k + 1) % 1000 == 0:
             progress("inputs", k + 1, len(data), "")
-    constants, series, summary, levels = (np.stack(part) for part in zip(*parts, strict=True))
+    constants, series, summary = (np.stack(part) for part in zip(*parts, strict=True))
     if not np.isfinite(series).all():
         raise DatasetError("the load of some sample of this data set is not a number; the file is damaged")
-    return constants, series, summary, levels
+    return constants, series, summary
 
 
 def _pairs(names: tuple[str, ...], scale: Any) -> dict[str, list[float]]:

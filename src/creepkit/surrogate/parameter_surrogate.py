@@ -15,7 +15,7 @@ from creepkit.arrays import ArrayLike, Floats, Ints
 from creepkit.errors import SurrogateError
 from creepkit.records import Effects, History, Prediction, Status
 from creepkit.surrogate.course_inputs import CourseInputs
-from creepkit.surrogate.law_inputs import LawInputs, Point
+from creepkit.surrogate.law_inputs import LawInputs
 from creepkit.surrogate.matching import check, frames_of, seen, seen_slope, weights_between
 from creepkit.surrogate.parameter_gru import ParameterGru, held, stand_in_of, tests_of
 from creepkit.surrogate.parameter_module import ParameterModule
@@ -37,14 +37,12 @@ AT_ONCE = 2**24
 class Asked:
     """What is asked of the network: candidates x tests.
 
-    theta : (candidates, parameters) internal. levels : (tests,) their loads, MPa.
-    rows : (candidates, tests, columns) of the law, as the network sees them.
+    theta : (candidates, parameters) internal. rows : (candidates, columns) of the law, as the network sees them.
     numbers : (candidates, tests, constants). series : (tests, frames, series). base : (candidates, tests, frames).
     slopes : {effect: (candidates, tests, constants)} derivatives of the numbers.
     """
 
     theta: Floats
-    levels: Floats
     rows: Floats
     numbers: Floats
     series: Floats
@@ -55,8 +53,9 @@ class Asked:
         """Some candidates, each with every test: what the module eats, a row for each pair."""
         numbers = self.numbers[part]
         count, tests = numbers.shape[:2]
+        rows = np.repeat(self.rows[part], tests, axis=0)
         made = {
-            "constants": np.concatenate([self.rows[part], numbers], axis=2).reshape(count * tests, -1),
+            "constants": np.concatenate([rows, numbers.reshape(count * tests, -1)], axis=1),
             "series": np.tile(self.series, (count, 1, 1)),
         }
         if self.base is not None:
@@ -107,7 +106,7 @@ class ParameterSurrogate(Surrogate):
 
     @cached_property
     def _law(self) -> LawInputs:
-        return LawInputs(self.told.law, self.recipe.parameters, Point(**self.told.scaling["reference"]))
+        return LawInputs(self.told.law)
 
     @cached_property
     def _middle(self) -> dict[str, float]:
@@ -131,12 +130,9 @@ class ParameterSurrogate(Surrogate):
         moved = [
             self._tests.moved(h, {kind: v[:, k] for kind, v in assumed.items()}, count) for k, h in enumerate(histories)
         ]
-        levels = np.array([self._tests.level(h, t) for h, t in zip(histories, frames, strict=True)])
-        rows = self._law.rows(*_pairs(theta, levels))
         return Asked(
             theta=theta,
-            levels=levels,
-            rows=rows.reshape(count, len(levels), -1),
+            rows=self._law.rows(theta),
             numbers=np.stack([numbers for numbers, _ in moved], axis=1),
             series=np.stack([self._tests.over_time(h, t) for h, t in zip(histories, frames, strict=True)]),
             base=self._base(values, histories, frames, effects, count) if self.recipe.base != "none" else None,
@@ -172,9 +168,9 @@ class ParameterSurrogate(Surrogate):
     def _slopes_of(self, asked: Asked, part: slice, own: Sequence[int]) -> Floats:
         net = self._double
         inputs = net.inputs(asked.batch(part))
-        columns = asked.rows.shape[2]
+        columns, tests = asked.rows.shape[1], asked.numbers.shape[1]
         moving = np.zeros((len(inputs), len(own) + len(asked.slopes), inputs.shape[2]))
-        law = self._law.slopes(*_pairs(asked.theta[part], asked.levels))[:, :, list(own)]
+        law = np.repeat(self._law.slopes(asked.theta[part])[:, :, list(own)], tests, axis=0)
         moving[:, : len(own), :columns] = np.swapaxes(law, 1, 2)
         reach = slice(columns, columns + asked.numbers.shape[2])
         for k, slopes in enumerate(asked.slopes.values()):
@@ -222,12 +218,8 @@ class ParameterSurrogate(Surrogate):
         count, tests, constants = asked.numbers.shape
         of_tests = np.stack([self._tests.domain(h, t) for h, t in zip(histories, frames, strict=True)])
         rest = np.broadcast_to(of_tests[None, :, constants:], (count, tests, of_tests.shape[1] - constants))
-        return np.concatenate([asked.rows, asked.numbers, rest], axis=2)
-
-
-def _pairs(theta: Floats, levels: Floats) -> tuple[Floats, Floats]:
-    """Every candidate with every test, the test running fastest."""
-    return np.repeat(theta, len(levels), axis=0), np.tile(levels, len(theta))
+        rows = np.broadcast_to(asked.rows[:, None], (count, tests, asked.rows.shape[1]))
+        return np.concatenate([rows, asked.numbers, rest], axis=2)
 
 
 def _parts(asked: Asked, wide: int) -> list[slice]:

@@ -1,8 +1,7 @@
-"""RateNet in torch: outputs whose gradients flow back to a law's parameters, through the compiled model's derivatives."""
+"""RateNet in torch: gradients flow back to a law's parameters, through the derivatives of the compiled model."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import torch
@@ -12,6 +11,7 @@ from creepkit import kernels
 from creepkit.records import History
 from creepkit.specimens.bulge import Bulge
 from creepkit.specimens.reduced_courses import courses
+from creepkit.surrogate.matching import check
 from creepkit.surrogate.rate_surrogate import RateSurrogate
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def outputs(surrogate: RateSurrogate, law: CreepLaw, theta: Tensor, history: His
     Internal means the natural logarithm where the scale of a parameter is logarithmic. Gradients are exact; they do not
     go through the integration in torch.
     """
+    check(surrogate.told, history)
     compiled, specimen = kernels.lower(law, "numba"), surrogate.specimen
     assert isinstance(specimen, Bulge)
     found = courses(specimen, compiled, theta.detach().numpy(), [history], factors=surrogate.recipe.factors, exact=True)

@@ -36,7 +36,11 @@ def names(features: int) -> tuple[str, ...]:
 
 def inputs(course: Tensor, thickness: Tensor) -> Tensor:
     """(rows, nodes, inputs) from courses (rows, nodes, columns) and apex thicknesses (rows,) mm."""
-    own = local(course, thickness)
+    return remembering(course, local(course, thickness))
+
+
+def remembering(course: Tensor, own: Tensor) -> Tensor:
+    """The same from what is known at each node alone, (rows, nodes, features + LOCAL)."""
     features = course.shape[-1] - FEATURES
     grown = torch.diff(_column(course, "creep"), dim=1, prepend=torch.zeros_like(course[:, :1, 0])).clamp(min=_TINY)
     mean = (own * grown[..., None]).cumsum(dim=1) / grown.cumsum(dim=1)[..., None]
@@ -77,9 +81,16 @@ def _bent(x: Tensor, largest: float) -> Tensor:
 
 
 def _fading(features: Tensor, age: Tensor) -> Tensor:
-    """Means of features that forget over an elastic strain of creep."""
+    """Means of features that forget over an elastic strain of creep: m_k = l_k m_{k-1} + (1 - l_k) f_k.
+
+    Spans of 1, 2, 4 ... steps are joined until each reaches back to the first node.
+    """
     left = torch.exp(-torch.diff(age, dim=1).clamp(min=0.0) / FADING)[..., None]
-    means = [features[:, 0]]
-    for k in range(1, features.shape[1]):
-        means.append(left[:, k - 1] * means[-1] + (1.0 - left[:, k - 1]) * features[:, k])
-    return torch.stack(means, dim=1)
+    left = torch.cat([torch.zeros_like(left[:, :1]), left], dim=1)
+    means, span = (1.0 - left) * features, 1
+    while span < features.shape[1]:
+        joined = torch.addcmul(means[:, span:], left[:, span:], means[:, :-span])
+        means = torch.cat([means[:, :span], joined], dim=1)
+        left = torch.cat([left[:, :span], left[:, span:] * left[:, :-span]], dim=1)
+        span *= 2
+    return means

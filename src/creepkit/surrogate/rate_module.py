@@ -47,11 +47,29 @@ class RateModule(Module):
 
     def at_nodes(self, inputs: Tensor, base: Tensor) -> Tensor:
         """Amplitude, width and shape, (rows, nodes, 3), from inputs and what is corrected (rows, nodes, 4)."""
-        seen = ((inputs - self.mean) / self.deviation).clamp(-_FARTHEST, _FARTHEST)
-        said = self.last(self.layers(seen.to(self.last.weight.dtype)))
+        inputs = inputs.to(self.last.weight.dtype)
+        said = self.last(self.layers(((inputs - self.mean) / self.deviation).clamp(-_FARTHEST, _FARTHEST)))
         elastic, creep, width, shape = base.unbind(dim=-1)
         amplitude = elastic + creep * torch.exp(GROWTH * said[..., 0])
         return torch.stack([amplitude, width + SHAPE * said[..., 1], shape + SHAPE * said[..., 2]], dim=-1)
+
+    def slopes(self, inputs: Tensor, base: Tensor, moved: Tensor, base_moved: Tensor) -> Tensor:
+        """Derivatives of `at_nodes`, (directions, rows, nodes, 3), along those of what it is given."""
+        kind = self.last.weight.dtype
+        seen = (inputs.to(kind) - self.mean) / self.deviation
+        along = moved.to(kind) * ((seen.abs() < _FARTHEST) / self.deviation)
+        seen = seen.clamp(-_FARTHEST, _FARTHEST)
+        for layer in self.layers:
+            if isinstance(layer, nn.Linear):
+                seen, along = layer(seen), along @ layer.weight.T
+            else:
+                bent = torch.sigmoid(seen)
+                seen, along = seen * bent, along * (bent * (1.0 + seen * (1.0 - bent)))
+        said, along = self.last(seen), along @ self.last.weight.T
+        growth = torch.exp(GROWTH * said[..., 0])
+        elastic, creep, width, shape = base_moved.unbind(dim=-1)
+        amplitude = elastic + growth * (creep + base[..., 1] * GROWTH * along[..., 0])
+        return torch.stack([amplitude, width + SHAPE * along[..., 1], shape + SHAPE * along[..., 2]], dim=-1)
 
     def forward(self, batch: Samples) -> Tensor:
         """(rows, frames, 3) at the times of the data."""

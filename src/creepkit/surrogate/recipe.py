@@ -36,7 +36,8 @@ class Training:
         validation loss has not fallen by a ten-thousandth for `patience` epochs, as the paper has it.
     early_stop : stop when the validation loss has not fallen for so many epochs; None goes to the end.
     clip : largest norm of the gradient; None leaves it alone.
-    validation : share of the rows that are set aside, drawn by the seed.
+    validation : share of the rows that are set aside, drawn by the seed. samples : rows of the others that are learnt
+    from, the first so many; None takes them all. The rows set aside are the same for every number of samples.
     """
 
     epochs: int = 500
@@ -47,9 +48,11 @@ class Training:
     early_stop: int | None = None
     clip: float | None = None
     validation: float = 0.2
+    samples: int | None = None
 
     def __post_init__(self) -> None:
-        whole = {"epochs": self.epochs, "batch": self.batch, "patience": self.patience, "early_stop": self.early_stop}
+        names = ("epochs", "batch", "patience", "early_stop", "samples")
+        whole = {name: getattr(self, name) for name in names}
         for name, value in whole.items():
             if value is not None and (value != int(value) or value < 1):
                 raise SurrogateError(f"training: {name} is {value}; allowed are whole numbers above zero")

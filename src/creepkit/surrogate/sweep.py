@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from creepkit.errors import SurrogateError
 from creepkit.surrogate.parameter_gru import ParameterGru
 from creepkit.surrogate.parameter_module import Cell
 from creepkit.surrogate.plotting import figure_of, written
 from creepkit.surrogate.recipe import Progress
 from creepkit.surrogate.surrogate import Surrogate
 from creepkit.surrogate.train import train
-from creepkit.surrogate.trainable import trainable
+from creepkit.surrogate.trainable import split, trainable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 class Entry:
     """One training of a sweep.
 
-    cell, hidden, layers, samples : what was varied; samples are those of training and validation together.
+    cell, hidden, layers, samples : what was varied; samples are those learnt from.
     weights : numbers that were fitted. loss : Eq. (4) of the validation rows at the best epoch; training : the loss of
         the training rows in that epoch. outputs : {output: its RSE}. losses : Eq. (4) of each epoch.
     """
@@ -60,24 +59,22 @@ def sweep(
 ) -> list[Entry]:  # fmt: skip
     """Train every combination, each to a file of its own in the folder `to`; those that are there already are read.
 
-    What is not given stays as the recipe has it; samples are the first so many that were accepted. Each training is
-    judged by its own validation rows.
+    What is not given stays as the recipe has it; samples are numbers to learn from. Every training is judged by the
+    same rows, a share of the whole data set that none of them learns from.
     """
     data, folder = trainable(data), Path(to)
-    counts = [*samples] or [len(data)]
-    short = [count for count in counts if count > len(data)]
-    if short:
-        raise SurrogateError(
-            f"a sweep over {short[0]} samples needs as many; the data set has {len(data)} accepted ones"
-        )
+    whole = len(split(len(data), recipe.training, seed)[0])
+    counts = [*samples] or [whole]
+    split(len(data), replace(recipe.training, samples=max(counts)), seed)  # complains now, not after hours of training
     folder.mkdir(parents=True, exist_ok=True)
     varied = list(product(cells or [recipe.cell], layers or [recipe.layers], hidden or [recipe.hidden], counts))
     entries = []
     for k, (cell, depth, width, count) in enumerate(varied):
-        one = replace(recipe, cell=cell, layers=depth, hidden=width)
+        how = replace(recipe.training, samples=count)
+        one = replace(recipe, cell=cell, layers=depth, hidden=width, training=how)
         path = folder / f"{cell}-{width}x{depth}-{count}.safetensors"
         named = _named(progress, f"{k + 1} of {len(varied)}, {path.stem}")
-        model = train(data.rows(slice(count)), one, to=path, seed=seed, device=device, progress=named)
+        model = train(data, one, to=path, seed=seed, device=device, progress=named)
         entries.append(_entry(model, one, count, path))
     return entries
 

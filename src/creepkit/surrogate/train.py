@@ -50,7 +50,7 @@ def train(
     if path is not None and path.exists():
         return _finished(path, call)
     samples = recipe.samples(data, progress)
-    rows = split(len(data), recipe.training.validation, seed)
+    rows = split(len(data), recipe.training, seed)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         module, told = recipe.module(data, samples, rows[0]), recipe.told(data, samples, rows[0])

@@ -11,6 +11,7 @@ from torch import Tensor
 from creepkit.arrays import Bools
 from creepkit.dataset.conditions import UNITS
 from creepkit.errors import DatasetError
+from creepkit.surrogate.recipe import Training
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
@@ -61,8 +62,14 @@ def _check_units(data: Dataset) -> None:
         raise DatasetError("some parameter of the data set is not a number; the file is damaged, generate it again")
 
 
-def split(count: int, validation: float, seed: int) -> tuple[Tensor, Tensor]:
-    """Positions of training and validation rows, in the order of the data, drawn by the seed."""
+def split(count: int, training: Training, seed: int) -> tuple[Tensor, Tensor]:
+    """Positions of training and validation rows, in the order of the data; the seed draws those set aside."""
     order = np.random.default_rng(seed).permutation(count)
-    aside = min(max(round(validation * count), 1), count - 1)
-    return torch.from_numpy(np.sort(order[aside:])), torch.from_numpy(np.sort(order[:aside]))
+    aside = min(max(round(training.validation * count), 1), count - 1)
+    left = np.sort(order[aside:])
+    if training.samples is not None and training.samples > len(left):
+        raise DatasetError(
+            f"there are not {training.samples} samples to learn from: the data set has {count} accepted ones, of which "
+            f"{aside} are set aside; ask for {len(left)} at most or generate more"
+        )
+    return torch.from_numpy(left[: training.samples]), torch.from_numpy(np.sort(order[:aside]))
