@@ -49,7 +49,8 @@ def schedule(specimen: Bulge, history: History) -> Schedule:
     for start, end, P, P_end, T, T_end in segments[:, :6]:
         moving = P_end != P
         origin = start if moving or before[0] != P else origin
-        inner = _ramp(start, end, abs(P_end - P) / largest) if moving else _hold(start, end, origin, segments[-1, 1])
+        whole = segments[-1, 1]
+        inner = _ramp(start, end, abs(P_end - P) / largest, whole) if moving else _hold(start, end, origin, whole)
         # where nothing jumps the node that ends a segment begins the next one
         old = int((before == (P, T)).all())
         share = ((inner - start) / (end - start))[old:, None]
@@ -64,9 +65,10 @@ def schedule(specimen: Bulge, history: History) -> Schedule:
     return Schedule(made, times, columns[:, 0], columns[:, 1], frames)
 
 
-def _ramp(start: float, end: float, share: float) -> Floats:
-    """Nodes of a segment in which the pressure changes by a share of the largest one."""
-    return np.linspace(start, end, max(1, int(np.ceil(RAMP_STEPS * share))) + 1)
+def _ramp(start: float, end: float, share: float, whole: float) -> Floats:
+    """Nodes of a segment in which the pressure changes by a share of the largest one; whole : s, length of the test."""
+    steps = max(RAMP_STEPS * share, (end - start) / max(SHARE * whole, FIRST))
+    return np.linspace(start, end, max(1, int(np.ceil(steps))) + 1)
 
 
 def _hold(start: float, end: float, origin: float, whole: float) -> Floats:
