@@ -33,7 +33,7 @@ SOFT_STEEL = CreepLaw(
     title="Steel that softens",
     terms={"softening creep": A * (stress / (1 - damage)) ** n * warmth},
     params={
-        A: Param("rate coefficient", unit="1/s", bounds=(1e-30, 1e-8), scale="log"),
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-30, 1e-8), scale="log", off=0.0),
         n: Param("stress exponent", bounds=(2, 6)),
         C: Param("damage coefficient", unit="1/s", bounds=(1e-30, 1e-8), scale="log", limits=(0, math.inf)),
         v: Param("stress exponent of damage", bounds=(2, 6)),
@@ -86,6 +86,12 @@ STEPS = {
     ],
     "identify": [["identify", *(f"curve_{s}.csv" for s in CURVES), "--law", "soft-steel", "--starts", "2", "--json"]],
     "export": [["export", "identified/soft-steel.json", "--to", "python"]],
+    "generate": [["generate", "soft-steel", "--specimen", "uniaxial", "--draws", "48", "--range", "temperature=1050:1100",
+                  "--interval", "2400", "--seed", "1", "--workers", "1", "--to", "set.h5"]],
+    "data": [["data", "set.h5", "--json"]],
+    "train": [["train", "set.h5", "--hidden", "4", "--layers", "1", "--epochs", "2", "--to", "net.safetensors"]],
+    "sweep": [["sweep", "set.h5", "--hidden", "4", "--layers", "1", "--epochs", "1", "--to", "sweep"]],
+    "base": [],  # has no law
     "demo": [],  # has a law of its own
 }  # fmt: skip
 

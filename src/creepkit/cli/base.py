@@ -18,7 +18,10 @@ def command(
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Picture of k, kappa and redistribution to write.")] = None,
 ) -> None:
-    """Tabulate k(D, h), kappa(D, h), elastic deflection and shapes of a dimple; some seconds."""
+    """Tabulate the cheap stand-in of a dimple.
+
+    k(D, h), kappa(D, h), redistribution, elastic deflection and shapes; some seconds.
+    """
     from creepkit import study
     from creepkit.errors import SolveError
     from creepkit.specimens.bulge import Bulge

@@ -18,7 +18,7 @@ def command(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Which handful.")] = 0,
 ) -> None:
-    """Describe a data set: counts, reasons, ranges, units, where it comes from."""
+    """Describe a data set: counts, reasons, ranges."""
     from creepkit import study
     from creepkit.dataset.describe import summary
 

@@ -51,7 +51,7 @@ def command(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Tell what would be drawn; simulate nothing.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
 ) -> None:
-    """Simulate a data set to learn from.
+    """Simulate a data set for training.
 
     Interrupted, it goes on where it was when it is started again in the same way.
     """

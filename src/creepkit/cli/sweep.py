@@ -29,7 +29,7 @@ def command(
     threads: Annotated[int | None, typer.Option(min=1, help="Of torch; one is quickest on a busy machine.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
 ) -> None:
-    """Train the paper's network in several sizes and compare their losses.
+    """Train networks of several sizes.
 
     Interrupted at any moment, the same command goes on where it was.
     """
