@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,16 @@ from creepkit.surrogate.recipe import Told
 QUANTITY = {"bulge": "pressure", "uniaxial": "stress"}
 """What drives the tests of each kind of specimen."""
 SAME = 1e-6
+
+
+def check_asked(told: Told, histories: Sequence[History], effects: Iterable[str], known: Sequence[str]) -> None:
+    """SurrogateError where a history, or an explicit nuisance, is none that the surrogate knows."""
+    for history in histories:
+        check(told, history)
+    for kind in effects:
+        if kind not in known:
+            words = ", ".join(known) or "none"
+            raise SurrogateError(f"this surrogate does not know the nuisance '{kind}'; it knows {words}")
 
 
 def check(told: Told, history: History) -> None:

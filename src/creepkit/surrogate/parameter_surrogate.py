@@ -12,11 +12,10 @@ import numpy as np
 import torch
 
 from creepkit.arrays import ArrayLike, Floats, Ints
-from creepkit.errors import SurrogateError
 from creepkit.records import Effects, History, Prediction, Status
 from creepkit.surrogate.course_inputs import CourseInputs
 from creepkit.surrogate.law_inputs import LawInputs
-from creepkit.surrogate.matching import check, frames_of, seen, seen_slope, weights_between
+from creepkit.surrogate.matching import check_asked, frames_of, seen, seen_slope, weights_between
 from creepkit.surrogate.parameter_gru import ParameterGru, held, stand_in_of, tests_of
 from creepkit.surrogate.parameter_module import ParameterModule
 from creepkit.surrogate.recipe import Samples
@@ -84,12 +83,7 @@ class ParameterSurrogate(Surrogate):
     ) -> Prediction:
         """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
         effects = effects or {}
-        for history in histories:
-            check(self.told, history)
-        for kind in effects:
-            if kind not in self.effects:
-                known = ", ".join(self.effects) or "none"
-                raise SurrogateError(f"this surrogate does not know the nuisance '{kind}'; it knows {known}")
+        check_asked(self.told, histories, effects, self.effects)
         whole = completed(self.told.law, law, values, self._middle)
         frames = frames_of(self.told.grid, histories)
         asked = self._asked(whole, histories, frames, effects)

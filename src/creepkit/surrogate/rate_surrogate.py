@@ -13,12 +13,11 @@ from torch import Tensor
 
 from creepkit import kernels
 from creepkit.arrays import ArrayLike, Bools, Floats
-from creepkit.errors import SurrogateError
 from creepkit.records import Effects, History, Prediction, Status
 from creepkit.specimens.bulge import Bulge
 from creepkit.specimens.reduced_courses import Courses, courses
 from creepkit.specimens.reduced_march import EFFECTS
-from creepkit.surrogate.matching import check
+from creepkit.surrogate.matching import check_asked
 from creepkit.surrogate.rate_inputs import inputs, local, remembering
 from creepkit.surrogate.rate_module import RateModule
 from creepkit.surrogate.rate_net import RateNet, base_of
@@ -65,12 +64,7 @@ class RateSurrogate(Surrogate):
     ) -> Prediction:
         """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
         effects = effects or {}
-        for history in histories:
-            check(self.told, history)
-        for kind in effects:
-            if kind not in self.effects:
-                known = ", ".join(self.effects)
-                raise SurrogateError(f"this surrogate does not know the nuisance '{kind}'; it knows {known}")
+        check_asked(self.told, histories, effects, self.effects)
         specimen, compiled = self.specimen, kernels.lower(law, "numba")
         assert isinstance(specimen, Bulge)
         theta = compiled.internal(values)
