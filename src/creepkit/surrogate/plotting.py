@@ -83,7 +83,7 @@ def parity(found: Compared, times: Sequence[float], path: str | Path | None = No
         axes.set_xlabel("simulated")
     for axes in panels[:, 0]:
         axes.set_ylabel("predicted")
-    figure.suptitle(f"{len(found.true)} samples that the network has not seen", fontsize=10)
+    figure.suptitle(f"{len(found.true)} samples, predicted against simulated", fontsize=10)
     return written(figure, path)
 
 
