@@ -35,7 +35,7 @@ from creepkit.surrogate.rate_module import RateModule
 from creepkit.surrogate.rate_net import RateNet
 from creepkit.surrogate.rate_surrogate import RateSurrogate
 from creepkit.surrogate.recipe import Told
-from creepkit.surrogate.surrogate import Surrogate, load
+from creepkit.surrogate.surrogate import load
 
 LAWS = {
     "norton": {"A": 3e-15, "n": 3.5},
@@ -79,7 +79,7 @@ def row(name: str, count: int, simulated: int, file: str | None) -> str:
     """CPU times of one law."""
     law, surrogate, exact = ck.law(name), rate_surrogate(file, threads=1), Bulge(threads=1)
     compiled, many, few = kernels.lower(law, "numba"), scattered(name, count), scattered(name, simulated)
-    theta, factors = compiled.internal(many), surrogate.recipe.factors  # type: ignore[attr-defined]
+    theta, factors = compiled.internal(many), surrogate.recipe.factors
     thickness = {"thickness": np.full((1, 1), exact.geometry.apex_thickness)}
     some = {n: v[: max(1, count // 10)] for n, v in many.items()}
     spent = in_turns(
@@ -102,7 +102,7 @@ def walls(name: str, count: int, file: str | None) -> str:
     """Wall times of one law on all cores."""
     law, surrogate, cores = ck.law(name), rate_surrogate(file), len(os.sched_getaffinity(0))
     compiled, many = kernels.lower(law, "numba"), scattered(name, count)
-    theta, factors = compiled.internal(many), surrogate.recipe.factors  # type: ignore[attr-defined]
+    theta, factors = compiled.internal(many), surrogate.recipe.factors
     spent = in_turns(
         (lambda: surrogate.predict(law, many, [TEST]), 1),
         (lambda: courses(Bulge(), compiled, theta, [TEST], factors=factors, threads=cores), 1),
@@ -135,12 +135,14 @@ def scattered(name: str, count: int) -> dict[str, np.ndarray]:
     }
 
 
-def rate_surrogate(file: str | None, threads: int | None = None) -> Surrogate:
+def rate_surrogate(file: str | None, threads: int | None = None) -> RateSurrogate:
     """A RateNet with some domain, of random weights unless there is a file."""
     specimen = Bulge() if threads is None else Bulge(threads=threads)
     if file is not None:
-        known = load(file)
-        return RateSurrogate(known.recipe, known.module, known.told)
+        found = load(file)
+        if not isinstance(found, RateSurrogate):
+            raise SystemExit(f"{file} holds a {found.recipe.kind}; give a rate-net")
+        return found
     recipe = RateNet()
     known = names(recipe.factors.stress.size * recipe.factors.strain.size)
     own = [n for n in known if not n.startswith(("mean", "fading"))]
