@@ -1,10 +1,11 @@
 """The rate family: diverse rate functions rather than named laws, for surrogates that are fed with rates.
 
 One law of three terms A stress^n strain^m time^k exp(-q time), of which one, two or three are there. Two slopes bend
-log rate over log stress as sinh does; terms that decay with strain or time, fade, or rise, each with a slope of its own,
-change over time what the stress does, as sigmoidal creep and damage do. No sinh and no n(t) are among them, so that
-these remain laws never seen. A network trained on single power laws, for which features of the rate are collinear, has
-many times the error on them; one trained without fading and steeply rising terms has it on laws that change over time.
+log rate over log stress as sinh does; terms that decay with strain or time, fade, or rise, each with a slope of its
+own, change over time what the stress does, as sigmoidal creep and damage do. No sinh and no n(t) are among them, so
+that these remain laws never seen. A network trained on single power laws, for which features of the rate are
+collinear, has many times the error on them; one trained without fading and steeply rising terms has it on laws that
+change over time.
 """
 
 from __future__ import annotations
