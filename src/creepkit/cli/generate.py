@@ -137,8 +137,10 @@ def part_of(text: str | None) -> tuple[int, int] | None:
 def tell_acceptance(design: Design, seed: int, to: Path | None, as_json: bool) -> None:
     """Print what the design would draw, and draw the rates of its samples."""
     from creepkit.dataset.acceptance import acceptance
+    from creepkit.dataset.box import Box
 
-    found = acceptance(design, seed=seed)  # type: ignore[arg-type]
+    assert isinstance(design, Box)  # the command line knows no others
+    found = acceptance(design, seed=seed)
     picture = Path("rates.png") if to is None else to.with_suffix(".rates.png")
     found.figure(picture)
     if as_json:

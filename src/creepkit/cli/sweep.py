@@ -37,16 +37,18 @@ def command(
 
     from creepkit.cli.train import recipe_given
     from creepkit.dataset.store import read
+    from creepkit.surrogate.parameter_gru import ParameterGru
     from creepkit.surrogate.sweep import figure, rows_of, sweep
 
     if threads is not None:
         torch.set_num_threads(threads)
     how = {"epochs": epochs, "rate": rate, "schedule": schedule}
     recipe = recipe_given("parameter-gru", {"target": target}, how)
+    assert isinstance(recipe, ParameterGru)
     with Progress() as progress:
         entries = sweep(
-            read(data, accepted_only=True), recipe, to=to, layers=whole(layers, "--layers"),  # type: ignore[arg-type]
-            hidden=whole(hidden, "--hidden"), cells=tuple(cell.split(",")),  # type: ignore[arg-type]
+            read(data, accepted_only=True), recipe, to=to, layers=whole(layers, "--layers"),
+            hidden=whole(hidden, "--hidden"), cells=tuple(cell.split(",")),  # type: ignore[arg-type]  # words; ParameterGru says which it knows
             samples=whole(samples, "--samples") if samples else (), seed=seed, device=device, progress=progress.tick,
         )  # fmt: skip
     figure(entries, to / "sweep.png")

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.dataset.design import Design, Draws
+from creepkit.dataset.box import Box
+from creepkit.dataset.design import Draws
 from creepkit.dataset.looks import mean_ln_rate
-from creepkit.dataset.ranges import Conditions
-from creepkit.dataset.reference import Reference
 from creepkit.dataset.term_rates import internal
 
 if TYPE_CHECKING:
@@ -21,20 +20,6 @@ if TYPE_CHECKING:
 
 SAMPLE = 4096
 """Rows drawn."""
-
-
-class Referenced(Design, Protocol):
-    """A design that knows which rates are useful."""
-
-    @property
-    def conditions(self) -> Conditions:
-        """What is drawn of each test."""
-        ...
-
-    @property
-    def reference(self) -> Reference:
-        """What stands for a test where the rate of its material is wanted."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +31,7 @@ class Acceptance:
     window : (rows, 2) log10 of the strains between which creep is visible and the test lasts, as a rule.
     """
 
-    design: Referenced
+    design: Box
     seed: int
     draws: Draws
     met: Mapping[str, Bools]
@@ -103,7 +88,7 @@ class Acceptance:
         return f"{simulated} of the draws would be simulated{some}; {useful} of all have {what}"
 
 
-def acceptance(design: Referenced, draws: int = SAMPLE, seed: int = 0) -> Acceptance:
+def acceptance(design: Box, draws: int = SAMPLE, seed: int = 0) -> Acceptance:
     """Return what a design's criteria reject before simulation, and how its rates lie; nothing is simulated.
 
     draws : how many rows; a rejection counts for the first criterion that is not met.

@@ -8,22 +8,21 @@ scales are drawn by their ratio (see stress_scales), damage by the share of life
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
+from creepkit.dataset.box import Box, grid_for, within_bounds
 from creepkit.dataset.coefficients import parts_of, solve
 from creepkit.dataset.conditions import kind_of
-from creepkit.dataset.criteria import Criterion
 from creepkit.dataset.criteria_of_boxes import informative
 from creepkit.dataset.design import Draws
 from creepkit.dataset.growths import solve_growths
 from creepkit.dataset.looks import Looks
-from creepkit.dataset.paper_box import document, grid_for, within_bounds
-from creepkit.dataset.ranges import PAPER, Conditions, conditions
-from creepkit.dataset.reference import Reference, reference_of
+from creepkit.dataset.ranges import PAPER, conditions
+from creepkit.dataset.reference import reference_of
 from creepkit.dataset.shares import DIMENSIONS, HOW_MANY, ln_shares, present
 from creepkit.dataset.sobol import sobol, spread_step
 from creepkit.dataset.stress_scales import draw_scales, scales_of
@@ -37,26 +36,12 @@ TURNS = 32
 
 
 @dataclass(frozen=True)
-class ConditionedBox:
+class ConditionedBox(Box):
     """Uniform in the log of the mean rate at the reference stress; how_many : shares of rows with 1, 2, 3 parts."""
 
-    law: CreepLaw
-    conditions: Conditions
-    grid: TimeGrid
-    criteria: tuple[Criterion, ...]
-    reference: Reference
     how_many: tuple[float, ...] = HOW_MANY
-    name: str = field(default="conditioned", init=False)
 
-    @property
-    def condition_names(self) -> tuple[str, ...]:
-        """What is drawn of a test."""
-        return self.conditions.names
-
-    @property
-    def specimen(self) -> str:
-        """The kind of test."""
-        return self.conditions.kind
+    name: ClassVar[str] = "conditioned"
 
     def draw(self, first: int, count: int, seed: int) -> Draws:
         """Return rows of the sequence: total rate, choice of parts, their shares, parameters, then conditions."""
@@ -103,7 +88,7 @@ class ConditionedBox:
 
     def document(self) -> dict[str, Any]:
         """Everything that decides the draws, as JSON-able data."""
-        return {**document(self, self.conditions), "reference": vars(self.reference), "how_many": self.how_many}
+        return {**super().document(), "reference": vars(self.reference), "how_many": self.how_many}
 
 
 def conditioned_box(

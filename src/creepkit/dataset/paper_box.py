@@ -6,51 +6,32 @@ m is one. Log10 of parameters of log scale is uniform (A and B there). {0} of Ta
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
-import numpy as np
-
-from creepkit.arrays import Floats
+from creepkit.dataset.box import Box, grid_for, within_bounds
 from creepkit.dataset.conditions import kind_of
-from creepkit.dataset.criteria import Criterion
 from creepkit.dataset.criteria_of_boxes import paper_criteria
-from creepkit.dataset.design import Design, Draws
-from creepkit.dataset.ranges import PAPER, Conditions, conditions, range_of
-from creepkit.dataset.reference import Reference, reference_of
+from creepkit.dataset.design import Draws
+from creepkit.dataset.ranges import PAPER, conditions
+from creepkit.dataset.reference import reference_of
 from creepkit.dataset.sobol import sobol
 from creepkit.dataset.term_rates import authors
-from creepkit.dataset.time_grid import PAPER_END, PAPER_INTERVAL, TimeGrid
+from creepkit.dataset.time_grid import PAPER_INTERVAL, TimeGrid
 from creepkit.language import CreepLaw, temperature
-from creepkit.language.tree import law_to_json
 from creepkit.records import Specimen
 
 
 @dataclass(frozen=True)
-class PaperBox:
+class PaperBox(Box):
     """Uniform in the bounds of a law and the ranges of conditions.
 
     screened : leave out simulations that are hopeless by the specimen's stand-in; see dataset.sketching.
     """
 
-    law: CreepLaw
-    conditions: Conditions
-    grid: TimeGrid
-    criteria: tuple[Criterion, ...]
-    reference: Reference
     screened: bool = True
-    name: str = field(default="paper", init=False)
 
-    @property
-    def condition_names(self) -> tuple[str, ...]:
-        """What is drawn of a test."""
-        return self.conditions.names
-
-    @property
-    def specimen(self) -> str:
-        """The kind of test."""
-        return self.conditions.kind
+    name: ClassVar[str] = "paper"
 
     def draw(self, first: int, count: int, seed: int) -> Draws:
         """Return rows of the sequence: parameters first, then conditions."""
@@ -61,7 +42,7 @@ class PaperBox:
 
     def document(self) -> dict[str, Any]:
         """Everything that decides the draws, as JSON-able data."""
-        return {**document(self, self.conditions), "screened": self.screened}
+        return {**super().document(), "screened": self.screened}
 
 
 def paper_box(
@@ -77,26 +58,3 @@ def paper_box(
     grid = grid or grid_for(every, given)
     space = conditions(kind, grid, given, PAPER[kind], warm=law.uses(temperature))
     return PaperBox(law, space, grid, paper_criteria(kind), reference_of(specimen), screened)
-
-
-def within_bounds(law: CreepLaw, unit: Floats) -> Floats:
-    """Internal parameters at coordinates (rows, parameters) from 0 to 1, each uniform on its own scale."""
-    low, high = np.array([[p.to_internal(b) for b in p.bounds] for p in law.params.values()]).reshape(-1, 2).T
-    return np.asarray(low + unit * (high - low))
-
-
-def grid_for(every: float, given: Mapping[str, Any]) -> TimeGrid:
-    """Frames up to the end of the longest test."""
-    return TimeGrid.every(every, range_of("end_time", given.get("end_time", PAPER_END)).high)
-
-
-def document(design: Design, conditions: Conditions) -> dict[str, Any]:
-    """What every box says of itself."""
-    return {
-        "box": design.name,
-        "version": 1,
-        "law": law_to_json(design.law),
-        "conditions": conditions.document(),
-        "grid": design.grid.document(),
-        "criteria": [{"criterion": type(c).__name__, **vars(c)} for c in design.criteria],
-    }

@@ -10,18 +10,18 @@ change over time.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import sympy
 
 from creepkit.arrays import Bools, Floats
+from creepkit.dataset.box import within_bounds
 from creepkit.dataset.conditioned_box import ConditionedBox
 from creepkit.dataset.conditions import BULGE, kind_of
 from creepkit.dataset.criteria_of_boxes import informative
 from creepkit.dataset.looks import Looks
-from creepkit.dataset.paper_box import within_bounds
 from creepkit.dataset.ranges import PAPER, Range, conditions
 from creepkit.dataset.reference import reference_of
 from creepkit.dataset.time_grid import SHARES, TimeGrid
@@ -72,7 +72,7 @@ PER_TERM = len(LAW.params) // len(STEEPEST)
 class RateFamily(ConditionedBox):
     """Rate functions with their mean rate over the test drawn."""
 
-    name: str = field(default="rate-family", init=False)
+    name: ClassVar[str] = "rate-family"
 
     def exponents(self, unit: Floats, there: Bools, looks: Looks) -> Floats:
         """Internal parameters before coefficients: n uniform; m and k off, decaying or rising; q off or fading.
