@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from creepkit.study import rate_family as rate_family
     from creepkit.study import read_dataset as read_dataset
     from creepkit.study import read_histories as read_histories
+    from creepkit.study import select as select
     from creepkit.study import simulate as simulate
     from creepkit.study import specimen as specimen
     from creepkit.study import specimens as specimens
@@ -64,7 +65,7 @@ _HOMES = {
     "creepkit.records": "History Nuisance PointLoading PressureJump Program StrainSteps StressSteps Units "
     "constant_strain constant_stress",
     "creepkit.study": "export exporters generate identify law laws load moduli rank rate_family read_dataset "
-    "read_histories simulate specimen specimens surrogate suspects train with_suspects_marked",
+    "read_histories select simulate specimen specimens surrogate suspects train with_suspects_marked",
     "creepkit.surrogate.parameter_gru": "ParameterGru",
     "creepkit.surrogate.rate_net": "RateNet",
     "creepkit.surrogate.recipe": "Training",

@@ -78,21 +78,23 @@ class OneDegree:
         return Prediction(found, self.outputs, lengths, status, ends, slopes, effect_jacobian=changes)
 
     def _slopes(self, law, theta, histories, effects):
-        """Central differences of one candidate, in one batch: (parameters), then (kinds)."""
-        size, step = theta.shape[1], 1e-4
+        """Central differences of all candidates, in one batch: (parameters), then (kinds)."""
+        (candidates, size), step = theta.shape, 1e-4
         count = size + len(effects)
-        points = np.repeat(theta, 2 * count, axis=0)
-        moved = {kind: np.repeat(v, 2 * count, axis=0) for kind, v in effects.items()}
+        points = np.repeat(theta[None], 2 * count, axis=0)
+        moved = {kind: np.repeat(v[None], 2 * count, axis=0) for kind, v in effects.items()}
         for k in range(count):
             for row, sign in ((k, 1), (count + k, -1)):
                 if k < size:
-                    points[row, k] += sign * step
+                    points[row, :, k] += sign * step
                 else:
                     moved[list(effects)[k - size]][row] += sign * step
-        found = self._run(law, points, histories, moved)[0]
-        slope = (found[:count] - found[count:]) / (2 * step)
-        own = {kind: slope[size + k][None] for k, kind in enumerate(effects)}
-        return np.moveaxis(slope[:size], 0, -1)[None], own
+        flat = {kind: v.reshape(-1, v.shape[-1]) for kind, v in moved.items()}
+        found = self._run(law, points.reshape(-1, size), histories, flat)[0]
+        up, down = np.split(found.reshape(2 * count, candidates, *found.shape[1:]), 2)
+        slope = (up - down) / (2 * step)
+        own = {kind: slope[size + k] for k, kind in enumerate(effects)}
+        return np.moveaxis(slope[:size], 0, -1), own
 
     def _run(self, law, theta, histories, effects):
         shape = len(theta), len(histories)

@@ -120,7 +120,7 @@ def by_hand(residuals, scatter, test):
             a, b = (list(scatter.outputs.values())[r.output[test, k]] for k in (i, j))
             c[i, j] = scatter.rate**2 * r.rate_effect[test, i] * r.rate_effect[test, j]
             if a is b:
-                lag = abs(r.log_times[test, i] - r.log_times[test, j])
+                lag = abs(r.clock[test, i] - r.clock[test, j])
                 c[i, j] += a.drift**2 * np.exp(-lag / a.reach) + a.offset**2 * r.slopes[test, i] * r.slopes[test, j]
             if i == j:
                 c[i, j] += (a.noise * r.slopes[test, i]) ** 2 + a.misfit**2

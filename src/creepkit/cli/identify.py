@@ -56,7 +56,7 @@ def command(
         raise FitError(f"--temperature {temperature} is not known; allowed are auto and none")
     if up_to is not None and not up_to > 0:
         raise FitError(f"--up-to {up_to:g} is not a strain above zero; write 0.05 for 5 %")
-    _check_folder(to)
+    check_folder(to)
     named = [study.law(name) for name in dict.fromkeys(law)]
     histories = study.read_histories(files, reader)
     if up_to is not None:
@@ -75,7 +75,7 @@ def command(
         tell(ranking, written, histories)
 
 
-def _check_folder(folder: Path) -> None:
+def check_folder(folder: Path) -> None:
     """Say now, not after all the work, that results cannot be written there."""
     from creepkit.errors import FitError
 

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any
 
 from creepkit.dataset.shards import Answer, Campaign
-from creepkit.dataset.worker import attempt, one_threaded
+from creepkit.dataset.worker import attempt
 from creepkit.errors import DatasetError
 
 ADDRESS = re.compile(r"inproc://.+|[a-z]+://.+:[0-9]+/?")
@@ -25,7 +25,7 @@ class ClusterWorkers:
     """The workers of a dask scheduler, at most `size` of their threads at once (None: all); a context."""
 
     def __init__(self, campaign: Campaign, address: str, size: int | None = None) -> None:
-        self._campaign = one_threaded(campaign)
+        self._campaign = campaign.on_one_thread()
         self._address = address
         self._size = size
         self._client: Any = None

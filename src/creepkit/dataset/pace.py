@@ -38,10 +38,11 @@ class Pace:
         if rate <= 0:
             return accepted
         left = max(self._ledger.target - done, 0) / rate
-        return f"{rate:.3g}/s, {_duration(left)} left, {accepted}"
+        return f"{rate:.3g}/s, {duration(left)} left, {accepted}"
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """A time in words, such as 12 min."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

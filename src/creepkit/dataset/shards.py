@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import h5py
 import numpy as np
@@ -58,6 +58,17 @@ class Campaign:
     seed: int
     folder: Path
     rows: int = ROWS
+    part: ClassVar[str] = "shard"
+
+    def on_one_thread(self) -> Campaign:
+        """The campaign with a specimen that simulates on one thread."""
+        if getattr(self.specimen, "threads", 1) == 1:
+            return self
+        return replace(self, specimen=self.specimen.replace(threads=1))  # type: ignore[attr-defined]
+
+    def run(self, number: int) -> Answer:
+        """Simulate a shard; see run() below."""
+        return run(self, number)
 
     @cached_property
     def document(self) -> dict[str, Any]:

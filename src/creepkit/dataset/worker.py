@@ -1,4 +1,4 @@
-"""A worker process, `python -m creepkit.dataset.worker`: is told a campaign, then numbers of shards, until all is done.
+"""A worker process, `python -m creepkit.dataset.worker`: is told its work, then numbers of parts, until all is done.
 
 What it is told is pickled by the process that started it, as multiprocessing does; nobody else can tell it anything.
 """
@@ -11,11 +11,11 @@ import pickle
 import signal
 import struct
 import sys
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import IO, TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from creepkit.dataset.shards import Campaign
+    from creepkit.dataset.workers import Work
 
 
 def main() -> None:
@@ -24,10 +24,10 @@ def main() -> None:
     told, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # whatever else is printed belongs on stderr
     sys.path[:] = _part(told)
-    campaign = one_threaded(_part(told))
+    work = _part(told).on_one_thread()
     _say(answers, {"ready": True})
     for line in told:
-        _say(answers, asdict(attempt(campaign, int(line))))
+        _say(answers, asdict(attempt(work, int(line))))
 
 
 def _end(*_: object) -> None:
@@ -47,25 +47,18 @@ def _say(answers: IO[bytes], what: dict[str, Any]) -> None:
         raise SystemExit(0) from None  # who asked is gone; the shard is done all the same
 
 
-def one_threaded(campaign: Campaign) -> Campaign:
-    """The campaign with a specimen that simulates on one thread."""
-    if getattr(campaign.specimen, "threads", 1) == 1:
-        return campaign
-    return replace(campaign, specimen=campaign.specimen.replace(threads=1))  # type: ignore[attr-defined]
-
-
-def attempt(campaign: Campaign, number: int) -> Any:
-    """Run a shard; an error is an answer too, whatever a design or a criterion of somebody raises."""
-    from creepkit.dataset.shards import Answer, run
+def attempt(work: Work, number: int) -> Any:
+    """Run a part; an error is an answer too, whatever a design or a criterion of somebody raises."""
+    from creepkit.dataset.shards import Answer
     from creepkit.dataset.simulating import words
     from creepkit.errors import CreepkitError
 
     try:
-        return run(campaign, number)
+        return work.run(number)
     except CreepkitError as error:
         return Answer(number, "error", text=words(error))
     except Exception as error:
-        return Answer(number, "error", text=f"shard {number} cannot be simulated: {words(error)}")
+        return Answer(number, "error", text=f"{work.part} {number} cannot be simulated: {words(error)}")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
-"""Who simulates shards: processes of this machine, one thread each.
+"""Who does the parts of some work, such as the shards of a campaign: processes of this machine, one thread each.
 
-A worker is an interpreter of its own that is told numbers of shards on its standard input and answers on its standard
+A worker is an interpreter of its own that is told numbers of parts on its standard input and answers on its standard
 output. It inherits nothing of the caller: neither threads nor locks, which a fork would copy in whatever state they
 are (numba and torch have some), nor its script, which multiprocessing's other ways run again, so that a study would
-need an `if __name__ == "__main__"`. When one dies, only its own shard is concerned.
+need an `if __name__ == "__main__"`. When one dies, only its own part is concerned.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import IO, Protocol
 
-from creepkit.dataset.shards import Answer, Campaign
+from creepkit.dataset.shards import Answer
 from creepkit.errors import DatasetError
 
 LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMBA")
@@ -31,16 +31,33 @@ LAST_WORDS = 5
 """s, in which a worker that is asked to end does so."""
 
 
+class Work(Protocol):
+    """What worker processes are sent, pickled, to do parts of."""
+
+    @property
+    def part(self) -> str:
+        """What a part is called, such as "shard"."""
+        ...
+
+    def on_one_thread(self) -> Work:
+        """The same work, to be done on one thread."""
+        ...
+
+    def run(self, number: int) -> Answer:
+        """Do one part and leave what came of it in a file."""
+        ...
+
+
 class Workers(Protocol):
-    """Whoever simulates shards."""
+    """Whoever does parts of some work."""
 
     @property
     def free(self) -> int:
-        """How many more shards can be worked on at once."""
+        """How many more parts can be worked on at once."""
         ...
 
     def submit(self, number: int) -> None:
-        """Have a shard simulated."""
+        """Have a part done."""
         ...
 
     def answers(self, timeout: float) -> list[Answer]:
@@ -50,7 +67,7 @@ class Workers(Protocol):
 
 @dataclass
 class Process:
-    """A worker process. shard : it is at, None when it is idle. ready : whether it has started."""
+    """A worker process. shard : the part it is at, None when it is idle. ready : whether it has started."""
 
     popen: subprocess.Popen[bytes]
     shard: int | None = None
@@ -61,20 +78,20 @@ class Process:
 class ProcessWorkers:
     """Worker processes of this machine; a context."""
 
-    def __init__(self, campaign: Campaign, size: int) -> None:
+    def __init__(self, work: Work, size: int) -> None:
         paths = pickle.dumps(sys.path)
-        self._greeting = b"".join(struct.pack("!Q", len(part)) + part for part in (paths, pickle.dumps(campaign)))
+        self._greeting = b"".join(struct.pack("!Q", len(part)) + part for part in (paths, pickle.dumps(work)))
         self._size = size
         self._processes: list[Process] = []
         self._selector = selectors.DefaultSelector()
 
     @property
     def free(self) -> int:
-        """How many more shards can be worked on at once."""
+        """How many more parts can be worked on at once."""
         return self._size - sum(process.shard is not None for process in self._processes)
 
     def submit(self, number: int) -> None:
-        """Give a shard to an idle worker, or to a new one."""
+        """Give a part to an idle worker, or to a new one."""
         idle = [process for process in self._processes if process.shard is None]
         process = idle[0] if idle else self._started()
         process.shard = number
@@ -112,7 +129,7 @@ class ProcessWorkers:
         return process
 
     def _heard(self, process: Process) -> list[Answer]:
-        """What a process says: that it is ready, what became of its shard, or, by silence, that it is dead."""
+        """What a process says: that it is ready, what became of its part, or, by silence, that it is dead."""
         read = _pipe(process.popen.stdout).read(1 << 16)
         if not read:
             return self._died(process)

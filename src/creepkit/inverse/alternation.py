@@ -12,13 +12,18 @@ from creepkit.inverse.covariance import log_likelihood, whitener
 from creepkit.inverse.effects import Unknowns
 from creepkit.inverse.objective import Objective
 from creepkit.inverse.residuals import Residuals
+from creepkit.inverse.restricted import AT_BOUND, Linear, inverse, inverses_of, restricted_log_likelihood
 from creepkit.inverse.scatter import Scatter
-from creepkit.inverse.search import Box, Minimum, Progress, refine
-from creepkit.inverse.uncertainty import curvature, inverse, marginal
+from creepkit.inverse.search.box import Box
+from creepkit.inverse.search.refining import Minimum, Progress, refine
+from creepkit.inverse.uncertainty import curvature, marginal
 from creepkit.inverse.weighting import Weighting, pulling, trusts
 
 SPREAD_STEPS = 30
 """Steps of the estimate of unknown spreads in each round; they cost no simulation."""
+RESTRICTED = 1e-5
+"""Relative change of a chi-square that ends a refinement by likelihood: some thousandth of one, well inside an interval
+and above what the steps of a solver leave."""
 SETTLED = 0.02
 """Gain of the log-likelihood, and change of a test's weight, that ends the rounds."""
 
@@ -32,6 +37,8 @@ class Effort:
     tolerance: float = 1e-8
 
 
+SKETCH = Effort(rounds=3, steps=15, tolerance=1e-4)
+"""For a predictor on the way to another."""
 EXPENSIVE = Effort(rounds=5, steps=25, tolerance=1e-6)
 """For predictors with a stand-in: solvers are smooth to about that."""
 
@@ -45,28 +52,33 @@ class Fitted:
     working: Scatter
     unknowns: Unknowns
     likelihood: float
+    linear: Linear | None = None
 
 
 def alternate(
-    objective: Objective, box: Box, x: Floats, weighting: Weighting, effort: Effort, progress: Progress | None
-) -> Fitted:
-    """Refine from x = (u, e); the best round."""
-    robust = weighting.settings.test_loss == "student"
-    residuals, working, best = objective.at(x), weighting.guess(), None
+    objective: Objective, box: Box, x: Floats, weighting: Weighting, effort: Effort, progress: Progress | None,
+    working: Scatter | None = None,
+) -> Fitted:  # fmt: skip
+    """Refine from x = (u, e); the best round. working : where the scatter begins, if it is known already."""
+    robust, best = weighting.settings.test_loss == "student", None
+    residuals, working = objective.at(x), working or weighting.start(len(objective.histories))
     for k in range(effort.rounds):
         before = residuals.trust
         trust = trusts(residuals, working) if robust else before
         residuals = residuals.trusting(trust)
-        working = weighting.working(residuals, working)
+        working = weighting.working(residuals, working, linearised(objective, box, x, residuals))
         # A stopped test that says nothing here may say something a step further.
         everything = replace(residuals, present=objective.entries.present)
+        if best is not None and weighting.likelihood and _gain(objective, box, x, residuals, working) < SETTLED:
+            break
         factor = whitener(everything, pulling(working, objective.entries))
+        tolerance = max(effort.tolerance, RESTRICTED) if weighting.likelihood else effort.tolerance
         minimum = refine(
-            objective, box, factor, x, loss=weighting.settings.loss, steps=effort.steps, tolerance=effort.tolerance
+            objective, box, factor, x, loss=weighting.settings.loss, steps=effort.steps, tolerance=tolerance
         )
         x = minimum.u
         residuals = objective.at(x).trusting(trust)
-        now = _fitted(objective, minimum, residuals, working)
+        now = _fitted(objective, box, minimum, residuals, working, weighting.likelihood)
         objective.unknowns = now.unknowns
         if progress is not None:
             progress("round", k + 1, effort.rounds)
@@ -79,15 +91,48 @@ def alternate(
     return best
 
 
-def _fitted(objective: Objective, minimum: Minimum, residuals: Residuals, working: Scatter) -> Fitted:
+def _gain(objective: Objective, box: Box, x: Floats, residuals: Residuals, working: Scatter) -> float:
+    """By how much the log-likelihood of values would grow, to first order, if they moved to where the scatter asks."""
+    linear = linearised(objective, box, x, residuals)
+    inverses, _ = inverses_of(residuals, working)
+    now = np.einsum("te,tef,tf->", residuals.values, inverses, residuals.values)
+    now += (linear.precision * linear.distance**2).sum()
+    return 0.5 * float(now - linear.solved(inverses).chi_square)
+
+
+def linearised(objective: Objective, box: Box, x: Floats, residuals: Residuals) -> Linear:
+    """The problem made linear at x = (u, e): weak priors of the bounds on u, their own on e."""
+    own = x.size - objective.unknowns.size
+    precision = np.concatenate([12.0 / box.width[:own] ** 2, objective.unknowns.precision])
+    distance = np.concatenate([np.zeros(own), x[own:] - objective.unknowns.mean[: x.size - own]])
+    room = AT_BOUND * box.width
+    free = (x > box.low + room) & (x < box.high - room)
+    return Linear(residuals, precision, distance, free, np.stack([box.low - x, box.high - x]))
+
+
+def _fitted(
+    objective: Objective, box: Box, minimum: Minimum, residuals: Residuals, working: Scatter, restricted: bool
+) -> Fitted:
     """The round's end, with the spreads of unknowns that its residuals show."""
+    if restricted:
+        objective.unknowns = _shown(objective.unknowns, residuals, working, minimum.u)
+        linear = linearised(objective, box, minimum.u, residuals)
+        likelihood = restricted_log_likelihood(linear, working)
+        return Fitted(minimum, residuals, working, objective.unknowns, likelihood, linear)
     unknowns, likelihood = objective.unknowns, log_likelihood(residuals, working)
     if not unknowns.size:
         return Fitted(minimum, residuals, working, unknowns, likelihood)
     curve = curvature(residuals, working)
-    unknowns = _with_spreads(unknowns, curve, minimum.u)
+    unknowns = _shown(unknowns, residuals, working, minimum.u)
     e = minimum.u[-unknowns.size :]
     return Fitted(minimum, residuals, working, unknowns, marginal(likelihood, curve, e, unknowns))
+
+
+def _shown(unknowns: Unknowns, residuals: Residuals, working: Scatter, x: Floats) -> Unknowns:
+    """The unknowns with those of their spreads estimated that are to be."""
+    if all(n.sd is not None for n in unknowns.nuisances):
+        return unknowns
+    return _with_spreads(unknowns, curvature(residuals, working), x)
 
 
 def _with_spreads(unknowns: Unknowns, curve: Floats, x: Floats) -> Unknowns:
@@ -96,8 +141,6 @@ def _with_spreads(unknowns: Unknowns, curve: Floats, x: Floats) -> Unknowns:
     At the optimum the pull of the data is that of the prior, P (x - mean); with another P the linear problem moves x
     to where both agree again.
     """
-    if all(n.sd is not None for n in unknowns.nuisances):
-        return unknowns
     own = unknowns.size
     pull = np.zeros(x.size)
     pull[-own:] = unknowns.precision * (x[-own:] - unknowns.mean)

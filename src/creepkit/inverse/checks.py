@@ -18,18 +18,24 @@ from creepkit.records import History, Predictor
 
 PUSH = 1.0
 """Force of the data against the bounds of a coefficient, in units of misfit per frame and ln, that is an error."""
+FAR = 0.1
+"""In ln beyond the bounds of a coefficient: no wall gives way so far unless the search never came back inside."""
 VISIBLE = 5.0
 """Growth of an output, in units of its noise, that is creep."""
 
 
-def check_bounds(objective: Objective, u: Floats) -> None:
-    """A coefficient that the data push hard against its bounds is an error: the answer would be the bound's."""
+def check_bounds(objective: Objective, u: Floats, force: Floats) -> None:
+    """A coefficient that the data push hard against its bounds is an error: the answer would be the bound's.
+
+    force : (parameters,) derivative of half the chi-square of the data to u.
+    """
     law, coordinates, fences = objective.law, objective.coordinates, Fences(objective)
     theta = coordinates.theta(u)
     limit = PUSH * int(objective.entries.present.sum())
-    for k, beyond in zip(coordinates.coefficients, fences.outside(theta), strict=True):
+    for k, beyond in zip(coordinates.walled, fences.outside(theta), strict=True):
         name, param = law.names[k], law.table[law.names[k]]
-        if fences.SLOPE**2 * abs(beyond) > limit:
+        pushed = fences.SLOPE**2 * abs(beyond) > limit and (abs(force[k]) > limit or abs(beyond) > FAR)
+        if k in coordinates.coefficients and pushed:
             low, high = param.bounds
             side = "below" if beyond < 0 else "above"
             raise FitError(

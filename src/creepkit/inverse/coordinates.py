@@ -3,7 +3,9 @@
 A and n are correlated to -0.99999 in raw form; ln of the term's rate at the middle of the measured stresses, and n,
 are nearly independent. With theta the internal parameters, u equals theta but for each term's coefficient ln A_i,
 which becomes u_i = ln f_i(reference; theta). The map is linear in ln A_i, so it inverts at once. The coefficient of an
-internal variable's rate becomes, likewise, the ln of that rate for the virgin material.
+internal variable's rate becomes, likewise, the ln of that rate for the virgin material. Where a term's stress exponent
+is not a parameter itself, as that of sinh, the local exponent at the reference takes the place of one (see
+inverse.local_exponents).
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import LawError
+from creepkit.inverse.local_exponents import local_exponents
 from creepkit.inverse.nominal import end_strain, stresses
 from creepkit.kernels import Kernel, lower
 from creepkit.language import CreepLaw
@@ -56,6 +59,8 @@ class Coordinates:
             k = _coefficient(law, single)
             if k is not None:
                 self._terms.append((k, [law.names.index(n) for n in single.names], lower(single, "numpy")))
+        self.exponents = local_exponents(law)
+        """Parameters whose place the local exponent of their term takes."""
         self.rates = tuple(k for k, _, _ in self._terms)
         """Positions of the coordinates that are log rates of terms."""
         for growth in _growths(law):
@@ -68,6 +73,11 @@ class Coordinates:
         """Positions of the coordinates that are log rates of internal variables."""
 
     @property
+    def walled(self) -> tuple[int, ...]:
+        """Positions of the parameters that are no coordinates themselves, so that walls must hold their bounds."""
+        return (*self.coefficients, *(local.p for local in self.exponents))
+
+    @property
     def coefficients(self) -> tuple[int, ...]:
         """Positions of all of them."""
         return self.rates + self.growths
@@ -75,8 +85,12 @@ class Coordinates:
     def theta(self, u: Floats) -> Floats:
         """Internal parameters of conditioned coordinates."""
         theta = np.array(u, float)
+        for local in self.exponents:
+            a, b, _, _ = local.at(self._point(self.law), theta)
+            theta[..., local.p] = (theta[..., local.p] - a) / b
+        inner = theta.copy()
         for k, positions, kernel in self._terms:
-            part = np.array(u, float)
+            part = inner.copy()
             part[..., k] = 0.0
             theta[..., k] = u[..., k] - self._log_rate(kernel, part[..., positions])
         return theta
@@ -91,19 +105,33 @@ class Coordinates:
     def u(self, theta: Floats) -> Floats:
         """Conditioned coordinates of internal parameters."""
         u = np.array(theta, float)
+        for local in self.exponents:
+            a, b, _, _ = local.at(self._point(self.law), u)
+            u[..., local.p] = a + b * u[..., local.p]
         for k, positions, kernel in self._terms:
             u[..., k] = self._log_rate(kernel, theta[..., positions])
         return u
 
     def jacobian(self, u: Floats) -> Floats:
-        """d theta / d u at one u, (parameters, parameters)."""
+        """d theta / d u at u (..., parameters): (..., parameters, parameters)."""
         theta = self.theta(u)
-        matrix = np.eye(theta.size)
+        matrix = np.zeros((*theta.shape, theta.shape[-1])) + np.eye(theta.shape[-1])
         for k, positions, kernel in self._terms:
-            found = kernel.internal_derivatives(*self._point(kernel.law), *theta[positions])
+            own = np.moveaxis(theta[..., positions], -1, 0)
+            found = kernel.internal_derivatives(*self._point(kernel.law), *own)
             for name, position in zip(kernel.law.names, positions, strict=True):
                 if position != k:
-                    matrix[k, position] = -float(found.params[name]) / float(found.rate)
+                    matrix[..., k, position] = -np.asarray(found.params[name]) / np.asarray(found.rate)
+        return matrix @ self._exponents_jacobian(theta) if self.exponents else matrix
+
+    def _exponents_jacobian(self, theta: Floats) -> Floats:
+        """Derivatives of the parameters that local exponents stand for, (..., parameters, parameters)."""
+        matrix = np.zeros((*theta.shape, theta.shape[-1])) + np.eye(theta.shape[-1])
+        for local in self.exponents:
+            _, b, da, db = local.at(self._point(self.law), theta)
+            matrix[..., local.p, local.p] = 1.0 / b
+            for k, position in enumerate(local.others):
+                matrix[..., local.p, position] = -(da[..., k] + db[..., k] * theta[..., local.p]) / b
         return matrix
 
     def _point(self, law: CreepLaw) -> list[float]:

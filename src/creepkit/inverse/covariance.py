@@ -3,11 +3,12 @@
 Residuals are not independent: one test creeps twice as fast as its twin and stays so, a model that bends wrongly is
 wrong for decades of time on end. The covariance of one test's residuals, all outputs of it together, is
 
-    C = noise^2 S S + misfit^2 I + offset^2 s s' + rate^2 d d' + drift^2 exp(-|ln t - ln t'| / reach)
+    C = noise^2 S S + misfit^2 I + offset^2 s s' + rate^2 d d' + drift^2 exp(-|c - c'| / reach)
 
 with s = dg/dy (S its diagonal): `noise` of each frame (in the output's unit), `misfit` of each frame on the scale,
 `offset` of the whole curve (loading strain), `rate` scatter between tests (d = derivative to ln of a factor on the
-creep rate: heat-to-heat scatter) and `drift`, an Ornstein-Uhlenbeck process in ln t for what the law cannot follow.
+creep rate: heat-to-heat scatter) and `drift`, an Ornstein-Uhlenbeck process for what the law cannot follow and what
+the instrument wanders, on the clock c: ln t for strains that span decades, time itself for other outputs.
 Each output has sizes of its own and shares none of them with another; the rate of a test moves all its outputs.
 
 Values are estimated with `working` scatter alone (noise, misfit, offset): every frame pulls with the same weight, so
@@ -46,8 +47,8 @@ def covariance(residuals: Residuals, scatter: Scatter) -> Floats:
 
 
 def lags(residuals: Residuals) -> Floats:
-    """(tests, entries, entries) distances in ln t."""
-    t = residuals.log_times
+    """(tests, entries, entries) distances on the clock."""
+    t = residuals.clock
     return np.abs(t[:, :, None] - t[:, None, :])
 
 

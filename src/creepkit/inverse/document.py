@@ -132,7 +132,7 @@ class SettingsPart(Strict):
     seed: int
     loss: str
     nuisances: list[NuisancePart]
-    weights: Literal["noise"] | dict[str, float]
+    weights: Literal["noise", "likelihood", "equal"] | dict[str, float]
     test_loss: str
 
 

@@ -66,10 +66,11 @@ class Unknowns:
                     f"nuisance '{nuisance.kind}': a spread cannot be estimated from a single unknown; give its sd="
                 )
             owners += [(nuisance, member) for member in mine]
-        kinds = [n for n, _ in owners]
-        ends = [_limits(n) for n in kinds]
+        kinds, by_name = [n for n, _ in owners], {h.name: h for h in histories}
+        means = [prior_mean(n, by_name.get(member), using) for n, member in owners]
+        ends = [_limits(n, mean) for n, mean in zip(kinds, means, strict=True)]
         return cls(
-            tuple(kinds), tuple(m for _, m in owners), place, np.array([n.mean for n in kinds], float),
+            tuple(kinds), tuple(m for _, m in owners), place, np.array(means, float),
             np.array([SPREAD[n.kind] if n.sd is None else n.sd for n in kinds], float),
             np.array([low for low, _ in ends], float), np.array([high for _, high in ends], float),
         )  # fmt: skip
@@ -127,8 +128,24 @@ def member_of(nuisance: Nuisance, history: History) -> str:
     return {"test": history.name, "alloy": history.alloy, "all": "all"}[nuisance.scope]
 
 
-def _limits(nuisance: Nuisance) -> tuple[float, float]:
+def prior_mean(nuisance: Nuisance, history: History | None, using: Predictor) -> float:
+    """The prior mean of a test's unknown; a thickness without one of its own is about what the test is stated to have.
+
+    mm for lengths; the geometry of the history takes precedence over that of the specimen.
+    """
+    if nuisance.kind != "thickness" or nuisance.mean > 0 or history is None:
+        return nuisance.mean
+    made = predictor_of(using, history)
+    geometry = getattr(getattr(made, "specimen", made), "geometry", None)
+    stated = history.geometry.get("apex_thickness", getattr(geometry, "apex_thickness", None))
+    if stated is None:
+        told = f"nuisance 'thickness' has no mean, and test '{history.name}' states no apex_thickness"
+        raise FitError(f"{told}; give mean=")
+    return float(stated)
+
+
+def _limits(nuisance: Nuisance, mean: float) -> tuple[float, float]:
     low, high = LIMITS[nuisance.kind]
     if nuisance.kind in ABSOLUTE:
-        low, high = low * nuisance.mean, high * nuisance.mean
+        low, high = low * mean, high * mean
     return max(low, nuisance.bounds[0]), min(high, nuisance.bounds[1])

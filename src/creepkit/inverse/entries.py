@@ -18,6 +18,9 @@ from creepkit.inverse.scales import LOGARITHMIC, RUPTURE, Scale, noise_of, scale
 from creepkit.inverse.together import lasts, outputs_of
 from creepkit.records import History, Prediction, Predictor
 
+WHOLE = 5.0
+"""Length of a test on the clock of outputs that are compared as they are, about that of a decade and a half of ln t."""
+
 
 @dataclass(frozen=True, eq=False)
 class Entries:
@@ -94,6 +97,13 @@ class Entries:
     def log_times(self) -> Floats:
         """(tests, entries) ln of time."""
         return np.log(self.times)
+
+    @property
+    def clock(self) -> Floats:
+        """(tests, entries) ln of time where an output is compared by its logarithm, else WHOLE t / its last time."""
+        last = np.where(self.present, self.times, 0.0).max(axis=1, keepdims=True)
+        logarithmic = self.spread([float(name in (*LOGARITHMIC, RUPTURE)) for name in self.outputs]) > 0
+        return np.where(logarithmic, self.log_times, WHOLE * self.times / np.maximum(last, 1e-300))
 
     def forward(self, y: Floats) -> Floats:
         """What is compared, of outputs (..., tests, entries)."""

@@ -13,7 +13,7 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
 from creepkit.inverse.measures import Errors, errors
 from creepkit.inverse.scales import noise_of, usable
-from creepkit.inverse.search import Progress
+from creepkit.inverse.search.refining import Progress
 from creepkit.inverse.together import outputs_of
 from creepkit.records import History, Prediction
 

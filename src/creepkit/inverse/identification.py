@@ -12,7 +12,7 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates, Reference
-from creepkit.inverse.effects import member_of
+from creepkit.inverse.effects import member_of, prior_mean
 from creepkit.inverse.findings import NuisanceEstimate, OutputMisfit, TestMisfit
 from creepkit.inverse.measures import Errors
 from creepkit.inverse.scatter import Scatter
@@ -20,10 +20,14 @@ from creepkit.inverse.settings import Settings
 from creepkit.inverse.together import predict
 from creepkit.inverse.uncertainty import Estimate, band, quantile
 from creepkit.language import CreepLaw
-from creepkit.records import EXPLICIT, History, Prediction, Predictor
+from creepkit.records import EXPLICIT, History, Nuisance, Prediction, Predictor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from creepkit.inverse.restricted import Linear
+    from creepkit.inverse.search.trace import Trace
+    from creepkit.inverse.sparsity.record import Sparsity
 
 
 __all__ = ["Identification", "NuisanceEstimate", "OutputMisfit", "Settings", "TestMisfit", "information_criterion"]
@@ -44,6 +48,9 @@ class Identification:
     log_likelihood : of the fitted frames as if they were independent (working scatter), with explicit nuisances
         integrated out.
     freedom : degrees of freedom of the intervals (see inverse.uncertainty).
+    trace : how its global search went; linear : the problem about its optimum, of identifications by likelihood
+        (neither is saved).
+    sparsity : how a penalty reduced the sum that this law was part of, if one did.
     size : number of effectively independent frames (about one a test when tests differ from one another).
     """
 
@@ -67,6 +74,9 @@ class Identification:
     notes: tuple[str, ...] = ()
     histories: tuple[History, ...] = ()
     using: Predictor | None = None
+    trace: Trace | None = field(default=None, repr=False)
+    linear: Linear | None = field(default=None, repr=False)
+    sparsity: Sparsity | None = field(default=None, repr=False)
 
     @property
     def values(self) -> dict[str, float]:
@@ -142,18 +152,26 @@ class Identification:
         if predictor is None:
             raise FitError("this identification was loaded from a file: give using=, the specimen it was made with")
         tests = list(histories or self.histories)
-        found = predict(predictor, self.law, self.values, tests, effects=self.effects(tests, own=own))
+        found = predict(predictor, self.law, self.values, tests, effects=self.effects(tests, own=own, using=predictor))
         by_name = {m.name: m for m in self.misfits} if own else {}
         for k, history in enumerate(tests):
             for one in by_name[history.name].outputs if history.name in by_name else ():
                 found.values[:, k, :, found.outputs.index(one.output)] += one.offset
         return found
 
-    def effects(self, histories: Sequence[History], *, own: bool = True) -> dict[str, Floats]:
+    def effects(
+        self, histories: Sequence[History], *, own: bool = True, using: Predictor | None = None
+    ) -> dict[str, Floats]:
         """{kind: (1, tests)} explicit nuisances of histories, as predictors take them."""
         found = {(n.kind, n.member): n.value for n in self.nuisances if own or n.scope != "test"}
+        using = using or self.using
+
+        def of(n: Nuisance, history: History) -> float:
+            known = found.get((n.kind, member_of(n, history)))
+            return known if known is not None else n.mean if using is None else prior_mean(n, history, using)
+
         return {
-            n.kind: np.array([[found.get((n.kind, member_of(n, h)), n.mean) for h in histories]])
+            n.kind: np.array([[of(n, h) for h in histories]])
             for n in self.settings.nuisances
             if n.kind in EXPLICIT
         }
@@ -212,10 +230,11 @@ class Identification:
 def information_criterion(fit: Identification, size: float) -> float:
     """-2 ln L x size / frames + K ln(size): frames that move together count as one, and K what was fitted."""
     frames = sum(m.frames for m in fit.misfits)
-    return -2.0 * fit.log_likelihood * min(size / max(frames, 1), 1.0) + _fitted(fit) * float(np.log(size))
+    price = parameters_touched(fit) * float(np.log(size))
+    return -2.0 * fit.log_likelihood * min(size / max(frames, 1), 1.0) + price
 
 
-def _fitted(fit: Identification) -> int:
+def parameters_touched(fit: Identification) -> int:
     """How many parameters the data touch: the others have the variance of their bounds, by themselves."""
     ends = [[p.to_internal(b) for b in p.bounds] for p in fit.law.params.values()]
     own = np.diag(fit.covariance)

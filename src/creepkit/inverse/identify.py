@@ -4,35 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.alternation import EXPENSIVE, Effort, Fitted, alternate, free
-from creepkit.inverse.checks import check_bounds, check_growth, check_histories
-from creepkit.inverse.coordinates import Coordinates, Reference
+from creepkit.inverse.alternation import EXPENSIVE, SKETCH, Effort, Fitted, alternate, free
+from creepkit.inverse.checks import check_bounds
+from creepkit.inverse.coordinates import Reference
 from creepkit.inverse.covariance import effective_size, expected_effects, whitener
 from creepkit.inverse.effects import Unknowns
-from creepkit.inverse.entries import Entries
 from creepkit.inverse.findings import NuisanceEstimate
-from creepkit.inverse.frames import thinned
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.life import check_effects
 from creepkit.inverse.misfits import misfits, pooled_errors, pooled_rms
-from creepkit.inverse.nominal import measured_log_pace, measured_log_rate
-from creepkit.inverse.objective import Objective
+from creepkit.inverse.problem import Problem
 from creepkit.inverse.provenance import FEW_TESTS, notes, of_domain, provenance, ranges
 from creepkit.inverse.rupture import rupture_misfits
-from creepkit.inverse.scatter import ASSUMED_RATE, full_guess
-from creepkit.inverse.search import Box, Minimum, Progress, from_single_terms, multistart
+from creepkit.inverse.satterthwaite import restricted_laplace
+from creepkit.inverse.scatter import ASSUMED_RATE, Scatter, full_guess
+from creepkit.inverse.search.landscape import Search
+from creepkit.inverse.search.multistart import MultiStart, distinct
+from creepkit.inverse.search.refining import Progress
 from creepkit.inverse.settings import Settings
 from creepkit.inverse.sizes import estimated
-from creepkit.inverse.together import Together, predict, screening_of
+from creepkit.inverse.threads import single_threaded_algebra
+from creepkit.inverse.together import predict, screening_of
 from creepkit.inverse.uncertainty import estimates, laplace, quantile
-from creepkit.inverse.weighting import Weighting, pulling
+from creepkit.inverse.weighting import pulling
 from creepkit.language import CreepLaw
 from creepkit.records import History, Nuisance, Predictor
+
+if TYPE_CHECKING:
+    from creepkit.inverse.search.trace import Trace
 
 REFIT_ROUNDS = 2
 
@@ -43,62 +47,94 @@ def identify(
     using: Predictor | Mapping[str, Predictor],
     *,
     settings: Settings | None = None,
+    search: Search | None = None,
+    through: Predictor | None = None,
     start: Floats | None = None,
     known: Sequence[NuisanceEstimate] = (),
     reference: Reference | None = None,
     progress: Progress | None = None,
 ) -> Identification:
-    """Identify the parameters of `law` from `histories` by multi-start least squares, then by their likelihood.
+    """Identify the parameters of `law` from `histories` by a global search, then by their likelihood.
 
     using : predictor, such as the specimen that study.specimen("uniaxial") returns, or {specimen: predictor} where
         histories are of several. One that offers screening() is searched with that stand-in and then refined.
+    search : how to begin; by default least squares from several screened starts (MultiStart).
+    through : a cheaper predictor, such as a surrogate, in which the search's minima are refined before `using` is
+        asked: values and intervals are those of `using`.
     start : conditioned coordinates to begin from instead of a global search; a refit takes two rounds at most.
     known : explicit nuisances as they were found before, to begin from.
     """
     settings = settings or Settings()
-    if isinstance(using, Mapping):
-        using = Together(dict(using))
-    check_histories(law, histories, using)
-    thin = [thinned(h, settings.frames) for h in histories]
-    coordinates, entries = Coordinates(law, reference or Reference.of(thin, using)), Entries.of(thin, using, histories)
-    unknowns = Unknowns.of(settings.nuisances, thin, using)
-    objective = Objective(law, thin, using, coordinates, entries, unknowns)
-    check_growth(objective)
-    check_effects([n.kind for n in unknowns.nuisances], entries, thin, using)
-    box = Box.of(law, coordinates, measured_log_rate(thin, using), measured_log_pace(thin))
-    weighting = Weighting(settings, entries)
-    stand_in = screening_of(using)
-    effort = Effort() if stand_in is None else EXPENSIVE
-    screened = 0
-    if start is None:
-        search = objective.asking(stand_in or using, law, coordinates)
-        starts = _searched(search, box, weighting, progress)
-        screened = search.evaluations
-    else:
-        starts, effort = [box.clip(np.asarray(start, float))], replace(effort, rounds=REFIT_ROUNDS)
-    wide, before, ends = box.beside(unknowns), {(n.kind, n.member): n.value for n in known}, []
-    for u in starts:
+    with single_threaded_algebra():
+        problem = Problem.of(law, histories, using, settings, reference)
+        if start is not None:
+            begun = Begun([problem.box.clip(np.asarray(start, float))], 0, None)
+        else:
+            begun = _searched(problem, through, search or MultiStart(), progress)
+        before = {(n.kind, n.member): n.value for n in known}
+        ends = _refined(problem, begun, through, before, start is not None, progress)
+        best = max(ends, key=lambda end: end.likelihood)
+        problem.objective.unknowns = best.unknowns
+        check_bounds(problem.objective, best.minimum.u[: len(law.params)], _force(best)[: len(law.params)])
+        return _answer(problem, best, begun)
+
+
+def _force(best: Fitted) -> Floats:
+    """(unknowns,) derivative of half the chi-square of the data to x."""
+    factor, r = whitener(best.residuals, best.working), best.residuals
+    assert r.jacobian is not None
+    white = np.linalg.solve(factor, np.concatenate([r.values[..., None], r.jacobian], axis=-1))
+    return np.asarray(np.einsum("te,tep->p", white[..., 0], white[..., 1:]))
+
+
+class Begun(NamedTuple):
+    """Where a search left off: starts, candidates it asked for, and its trace."""
+
+    starts: list[Floats]
+    evaluations: int
+    trace: Trace | None
+
+
+def _searched(problem: Problem, through: Predictor | None, search: Search, progress: Progress | None) -> Begun:
+    """The best minima that differ, or for a sum the best one and its best term: a sum must not end worse than it."""
+    first = through or problem.objective.using
+    landscape = problem.landscape(screening_of(first) or first)
+    found = search.minima(landscape, progress)
+    kept = distinct(found.minima, problem.box)
+    return Begun([m.u for m in kept], landscape.objective.evaluations, found.trace)
+
+
+def _refined(
+    problem: Problem, begun: Begun, through: Predictor | None, before: Mapping[tuple[str, str], float], again: bool,
+    progress: Progress | None,
+) -> list[Fitted]:  # fmt: skip
+    """Where the starts lead, through the cheaper predictor first if there is one; its best end goes on."""
+    objective, weighting, wide = problem.objective, problem.weighting, problem.wide
+    dear = screening_of(objective.using) is not None
+    xs, effort, working = [free(objective.unknowns, u, before) for u in begun.starts], Effort(), None
+    if through is not None and not again:
+        cheap = problem.of_predictor(through)
+        ends = [alternate(cheap, wide, x, weighting, SKETCH, progress) for x in xs]
+        best = max(ends, key=lambda end: end.likelihood)
+        xs, working = [best.minimum.u], best.working
+    if dear:
+        effort = EXPENSIVE
+    if again:
+        effort = replace(effort, rounds=REFIT_ROUNDS)
+    ends, unknowns = [], objective.unknowns
+    for x in xs:
         objective.unknowns = unknowns
-        ends.append(alternate(objective, wide, free(unknowns, u, before), weighting, effort, progress))
-    best = max(ends, key=lambda end: end.likelihood)
-    objective.unknowns = best.unknowns
-    check_bounds(objective, best.minimum.u[: len(law.params)])
-    return _answer(objective, box, best, weighting, histories, screened)
+        ends.append(alternate(objective, wide, x, weighting, effort, progress, working))
+    return ends
 
 
-def _answer(
-    objective: Objective, box: Box, best: Fitted, weighting: Weighting, histories: Sequence[History], screened: int
-) -> Identification:
+def _answer(problem: Problem, best: Fitted, begun: Begun) -> Identification:
     """Scatter, intervals and misfits at the optimum."""
-    law, coordinates, residuals, settings = objective.law, objective.coordinates, best.residuals, weighting.settings
-    size, x, known = len(law.params), best.minimum.u, _with_known_rate(settings.nuisances, len(histories))
+    objective, settings, histories = problem.objective, problem.settings, problem.histories
+    law, coordinates, residuals = objective.law, objective.coordinates, best.residuals
+    size, x = len(law.params), best.minimum.u
     u = x[:size]
-    at_means = best.unknowns.integrated(residuals, x[size:])
-    scatter = estimated(at_means, full_guess(weighting.measured(best.working), known), known)
-    given = any(n.kind == "rate" and n.sd is not None for n in known)
-    wide = box.beside(best.unknowns)
-    pull = pulling(best.working, objective.entries)
-    posterior, freedom = laplace(residuals, pull, scatter, wide, best.unknowns, rate_known=given)
+    scatter, posterior, freedom = _uncertainty(problem, best)
     found = predict(
         objective.using, law, coordinates.values(u), list(histories), effects=best.unknowns.effects(x[size:])
     )
@@ -120,20 +156,38 @@ def _answer(
         misfits=tests,
         ranges=ranges(objective),
         settings=settings,
-        provenance=provenance(objective, settings, screened),
+        provenance=provenance(objective, settings, begun.evaluations),
         errors=pooled_errors(histories, found, tests),
         nuisances=own,
         converged=best.minimum.converged,
         notes=(*notes(objective, best, settings, tests, own), *of_domain(found, histories)),
-        histories=tuple(histories),
+        histories=histories,
         using=objective.using,
+        trace=begun.trace,
+        linear=best.linear,
     )
+
+
+def _uncertainty(problem: Problem, best: Fitted) -> tuple[Scatter, Floats, float]:
+    """The whole scatter, the posterior covariance of x = (u, e), and its degrees of freedom."""
+    settings, weighting = problem.settings, problem.weighting
+    if best.linear is not None:
+        return best.working, *restricted_laplace(best.linear, best.working, settings.nuisances)
+    size, known = len(problem.objective.law.params), _with_known_rate(settings.nuisances, len(problem.histories))
+    at_means = best.unknowns.integrated(best.residuals, best.minimum.u[size:])
+    scatter = estimated(at_means, full_guess(weighting.measured(best.working), known), known)
+    given = any(n.kind == "rate" and n.sd is not None for n in known)
+    wide = problem.box.beside(best.unknowns)
+    pull = pulling(best.working, problem.objective.entries)
+    return scatter, *laplace(best.residuals, pull, scatter, wide, best.unknowns, rate_known=given)
 
 
 def _nuisances(unknowns: Unknowns, e: Floats, sd: Floats) -> tuple[NuisanceEstimate, ...]:
     return tuple(
-        NuisanceEstimate(n.kind, n.scope, member, float(value), float(s), n.mean, float(spread))
-        for n, member, value, s, spread in zip(unknowns.nuisances, unknowns.members, e, sd, unknowns.sd, strict=True)
+        NuisanceEstimate(n.kind, n.scope, member, float(value), float(s), float(mean), float(spread))
+        for n, member, value, s, mean, spread in zip(
+            unknowns.nuisances, unknowns.members, e, sd, unknowns.mean, unknowns.sd, strict=True
+        )
     )
 
 
@@ -142,33 +196,6 @@ def _with_known_rate(nuisances: Sequence[Nuisance], tests: int) -> tuple[Nuisanc
     if tests >= FEW_TESTS:
         return tuple(nuisances)
     return tuple(replace(n, sd=ASSUMED_RATE) if n.kind == "rate" and n.sd is None else n for n in nuisances)
-
-
-def _searched(objective: Objective, box: Box, weighting: Weighting, progress: Progress | None) -> list[Floats]:
-    """Global search with a covariance that is broad and fixed, and a loss that no single curve can capture.
-
-    The best minima that differ, or for a sum the best one and its best term: a sum must not end worse than its terms.
-    Their likelihoods decide, since the covariance is not yet known here.
-    """
-    settings, guess = weighting.settings, pulling(weighting.guess(), objective.entries)
-    factor = whitener(objective.before_fit(), guess)
-    loss = "soft_l1" if settings.loss == "linear" else settings.loss
-    few, half = max(2, settings.starts // 3), settings.draws // 2
-    singles = from_single_terms(objective, box, factor, starts=few, draws=half, seed=settings.seed, loss=loss)
-    minima = multistart(
-        objective, box, factor, starts=settings.starts, draws=settings.draws, seed=settings.seed, loss=loss,
-        progress=progress, extra=singles,
-    )  # fmt: skip
-    return [minima[0].u, singles[0]] if singles else _distinct(minima, box)
-
-
-def _distinct(minima: Sequence[Minimum], box: Box, most: int = 2, near: float = 0.02) -> list[Floats]:
-    """The best minima, at most two, that differ by more than 2 % of the box in some coordinate."""
-    kept: list[Floats] = []
-    for minimum in minima:
-        if all((np.abs(minimum.u - u) > near * box.width).any() for u in kept):
-            kept.append(minimum.u)
-    return kept[:most]
 
 
 def refit(fit: Identification, histories: Sequence[History]) -> Identification:

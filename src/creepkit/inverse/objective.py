@@ -55,13 +55,13 @@ class Objective:
         slopes = np.where(self.entries.present, self.entries.slope(measured), 0.0)
         return self._residuals(np.zeros_like(slopes), slopes, None, slopes * np.maximum(measured, 0.0))
 
-    def screen(self, u: Floats) -> Floats:
-        """Residuals without derivatives, unknowns of tests at their means: (candidates, parameters) to entries."""
+    def screen(self, u: Floats, e: Floats | None = None) -> Floats:
+        """Residuals without derivatives: (candidates, parameters) to entries; unknowns of tests at e or their means."""
         values = author_values(self.law, self.coordinates.theta(u))
         if self.entries.whole.any():
             found = predict_life(self.using, self.law, values, self.histories)
         else:
-            effects = replace(self.unknowns, held=True).effects(np.zeros(0))
+            effects = replace(self.unknowns, held=e is None).effects(np.zeros(0) if e is None else e)
             found = predict(self.using, self.law, values, self.histories, effects=effects)
         self.evaluations += len(u)
         return np.where(self.entries.present, self._compared(self._predicted(found), found).values, 0.0)
@@ -99,6 +99,33 @@ class Objective:
             self._seen = dict([*self._seen.items()][1 - REMEMBERED :])
             self._seen[key] = self._computed(x)
         return self._seen[key]
+
+    def side_by_side(self, u: Floats) -> tuple[Floats, Floats]:
+        """Residuals (candidates, tests, entries) of u (candidates, parameters), and their derivatives to u.
+
+        The unknowns of tests stay at their means; one prediction, where the predictor differentiates itself.
+        """
+        theta, effects = self.coordinates.theta(u), replace(self.unknowns, held=True).effects(np.zeros(0))
+        found = predict(
+            self.using, self.law, author_values(self.law, theta), self.histories, jacobian=True, effects=effects
+        )
+        if found.jacobian is None or self.entries.whole.any():
+            alone = self.asking(self.using, self.law, self.coordinates)
+            each = [alone.at(one) for one in u]
+            self.evaluations += alone.evaluations
+            return np.stack([r.values for r in each]), np.stack([_known(r.jacobian) for r in each])
+        self.evaluations += len(u)
+        entries, predicted = self.entries, self._predicted(found)
+        alive = np.isfinite(predicted)
+        slopes = entries.slope(np.where(alive, predicted, 1.0))
+        with np.errstate(invalid="ignore"):
+            wide = slopes[..., None] * entries.taken(found.jacobian, found)
+        wide = np.where(np.isfinite(wide), wide, np.nan)
+        lives = alive & entries.present
+        held = np.stack([_held(one, living, entries.output) for one, living in zip(wide, lives, strict=True)])
+        to_u = np.einsum("ctep,cpq->cteq", held, self.coordinates.jacobian(u))
+        values = np.where(entries.present, self._compared(predicted, found).values, 0.0)
+        return values, np.where(entries.present[..., None], to_u, 0.0)
 
     def _computed(self, x: Floats) -> Residuals:
         size, entries = len(self.law.params), self.entries
@@ -149,7 +176,7 @@ class Objective:
         entries = self.entries
         mask = entries.present if heard is None else entries.present & heard
         return Residuals(
-            np.where(mask, values, 0.0), np.where(mask, slopes, 0.0), mask, entries.log_times,
+            np.where(mask, values, 0.0), np.where(mask, slopes, 0.0), mask, entries.clock,
             None if jacobian is None else np.where(mask[..., None], jacobian, 0.0), np.where(mask, effect, 0.0),
             entries.output, entries.loudness, np.ones(len(mask)),
         )  # fmt: skip
@@ -184,6 +211,11 @@ class Objective:
             late = np.log(np.maximum(self.entries.times / np.maximum(ends[..., None], 1e-12), 1.0))
             compared = np.where(lost, top + BURST_SLOPE * late, compared)
         return compared
+
+
+def _known(jacobian: Floats | None) -> Floats:
+    assert jacobian is not None
+    return jacobian
 
 
 def _held(jacobian: Floats, alive: Bools, output: Ints) -> Floats:

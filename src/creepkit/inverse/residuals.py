@@ -13,7 +13,7 @@ class Residuals:
 
     values, slopes : (tests, entries) residual, and dg/dy at the prediction (what one unit of offset changes).
     present : (tests, entries) which entries are data; the others are zero.
-    log_times : (tests, entries) ln of time.
+    clock : (tests, entries) that in which what the law cannot follow wanders (see Entries.clock).
     jacobian : (tests, entries, unknowns) with respect to x = (u, e), or None.
     rate_effect : (tests, entries) derivative with respect to ln of a factor on this test's creep rate.
     output : (tests, entries) position of the entry's output; loudness : its noise over that of its output.
@@ -24,7 +24,7 @@ class Residuals:
     values: Floats
     slopes: Floats
     present: Bools
-    log_times: Floats
+    clock: Floats
     jacobian: Floats | None
     rate_effect: Floats
     output: Ints

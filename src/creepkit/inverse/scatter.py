@@ -22,7 +22,7 @@ class OutputScatter:
     """Standard deviations of one output.
 
     noise, offset : in the output's unit; misfit, drift : on its scale (ln strain; for a linear scale the spread of
-    what was measured is one); reach : in ln t.
+    what was measured is one); reach : on the clock of the output (see Entries.clock).
     """
 
     noise: float

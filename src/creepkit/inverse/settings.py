@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -13,6 +14,10 @@ from creepkit.records import ABSOLUTE, EXPLICIT, Nuisance
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
 TEST_LOSSES = ("gaussian", "student")
+WEIGHTS = ("noise", "likelihood", "equal")
+Weights = Literal["noise", "likelihood", "equal"] | Mapping[str, float]
+PAPER_WEIGHTS = MappingProxyType({"amplitude": 0.99, "width": 0.005, "shape": 0.005})
+"""The paper's weighted loss for measured histories, Eq. (S3): .99 on D_amp; how the rest is split is not said."""
 
 
 @dataclass(frozen=True)
@@ -23,8 +28,11 @@ class Settings:
         their outputs.
     loss : of frames, and of values only; intervals and scatter are Gaussian and see outliers as scatter.
     test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its pull.
-    weights : "noise", the likelihood with the scatter that the data show, or {output: weight}: then values minimise
-        the sum of weight times relative squared error (see inverse.measures), as the paper's loss does.
+    weights : "noise": values by least squares of frames of equal weight, intervals from all the scatter that the data
+        show. "likelihood": values, intervals and ranking by one likelihood, white noise and autocorrelation of every
+        output estimated with it (see inverse.restricted). "equal": Eq. (4) of the paper, every output's relative
+        squared error. {output: weight}: the sum of weight times relative squared error (see inverse.measures), such
+        as PAPER_WEIGHTS, its Eq. (S3).
     nuisances : what differs between tests; unless told otherwise an offset of each output and test-to-test scatter
         of the rate, both estimated.
     """
@@ -35,7 +43,7 @@ class Settings:
     seed: int = 0
     loss: str = "linear"
     nuisances: tuple[Nuisance, ...] = (Nuisance("offset"), Nuisance("rate"))
-    weights: Literal["noise"] | Mapping[str, float] = "noise"
+    weights: Weights = "noise"
     test_loss: str = "gaussian"
 
     def __post_init__(self) -> None:
@@ -56,10 +64,12 @@ class Settings:
                 raise FitError(f"nuisance '{kind}' is given twice; give one, with the scope that matters most")
 
 
-def _check_weights(weights: Literal["noise"] | Mapping[str, float]) -> None:
+def _check_weights(weights: Weights) -> None:
     if isinstance(weights, str):
-        if weights != "noise":
-            raise FitError(f'weights is "{weights}"; allowed are "noise" and a mapping such as {{"amplitude": 0.99}}')
+        if weights not in WEIGHTS:
+            raise FitError(
+                f'weights is "{weights}"; allowed are {", ".join(WEIGHTS)} and a mapping such as {{"amplitude": 0.99}}'
+            )
         return
     bad = [f"{name}: {value!r}" for name, value in weights.items() if not (np.isfinite(value) and value > 0)]
     if bad or not weights:
@@ -77,6 +87,8 @@ def _check_nuisance(nuisance: Nuisance) -> None:
                 f"nuisance {n} is not known to this identification: Nuisance('offset') and Nuisance('rate') are one "
                 "for each test, about zero, with sd= a finite number or None to estimate it"
             )
+        return
+    if n.kind == "thickness" and n.mean == 0 and n.scope == "test":
         return
     if n.kind in ABSOLUTE and not (np.isfinite(n.mean) and n.mean > 0):
         raise FitError(

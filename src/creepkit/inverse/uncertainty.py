@@ -25,8 +25,9 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.covariance import covariance, effective_size, whitener
 from creepkit.inverse.effects import Unknowns
 from creepkit.inverse.residuals import Residuals
+from creepkit.inverse.restricted import inverse
 from creepkit.inverse.scatter import Scatter
-from creepkit.inverse.search import Box
+from creepkit.inverse.search.box import Box
 from creepkit.language import CreepLaw
 
 
@@ -103,12 +104,6 @@ def marginal(likelihood: float, curve: Floats, e: Floats, unknowns: Unknowns) ->
     own = curve[-unknowns.size :, -unknowns.size :] * np.outer(sd, sd) + np.eye(unknowns.size)
     distance = (e - unknowns.mean) * np.sqrt(unknowns.precision)
     return float(likelihood - 0.5 * (distance**2).sum() - 0.5 * np.linalg.slogdet(own)[1])
-
-
-def inverse(matrix: Floats) -> Floats:
-    """Inverse of a positive matrix whose rows differ by orders of magnitude."""
-    scale = np.sqrt(np.diag(matrix))
-    return np.asarray(np.linalg.inv(matrix / np.outer(scale, scale)) / np.outer(scale, scale))
 
 
 def estimates(

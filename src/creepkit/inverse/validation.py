@@ -15,7 +15,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
 from creepkit.inverse.life import predict_life
-from creepkit.inverse.search import Progress
+from creepkit.inverse.search.refining import Progress
 from creepkit.language import CreepLaw
 from creepkit.records import History, Prediction, Predictor, Status
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.stats import chi2
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
@@ -12,13 +13,23 @@ from creepkit.inverse.covariance import expected_effects, whitener
 from creepkit.inverse.entries import Entries
 from creepkit.inverse.measures import squares_about
 from creepkit.inverse.residuals import Residuals
-from creepkit.inverse.scales import RUPTURE
-from creepkit.inverse.scatter import Scatter, working_guess
+from creepkit.inverse.restricted import Linear, restricted_log_likelihood
+from creepkit.inverse.scales import LOGARITHMIC, RUPTURE
+from creepkit.inverse.scatter import ASSUMED_RATE, OutputScatter, Scatter, size_of, working_guess
 from creepkit.inverse.settings import Settings
 from creepkit.inverse.sizes import estimated
 
 FREEDOM = 4.0
 """Degrees of freedom of Student's t for whole tests; the usual choice where tails are unknown (Lange et al. 1989)."""
+LEAST = 1e-2
+"""Noise of a likelihood at least, over the floor of the output's scale: simulated histories have none of their own."""
+ASKED_FOR = 0.95
+"""Residuals are autocorrelated where the likelihood gains more by it than by chance in so many cases; each output that
+drifts has two sizes more, how far and for how long."""
+ABSENT = 1e-3
+"""A drift below this, on its scale, is none."""
+SEVERAL = 3
+"""Tests from which on their scatter about the law can be seen."""
 UNWEIGHTED = 1e-6
 """Share of the pull that an output keeps which the weights do not name."""
 
@@ -28,8 +39,11 @@ class Weighting:
 
     def __init__(self, settings: Settings, entries: Entries) -> None:
         self.settings, self.entries = settings, entries
+        self.likelihood = settings.weights == "likelihood"
         self.relative: Mapping[str, float] | None = None
-        if not isinstance(settings.weights, str):
+        if settings.weights == "equal":
+            self.relative = _variances(dict.fromkeys(entries.outputs, 1.0), entries)
+        elif not isinstance(settings.weights, str):
             self.relative = _variances(settings.weights, entries)
 
     def guess(self) -> Scatter:
@@ -37,9 +51,12 @@ class Weighting:
         start = working_guess(self.entries, self.settings.nuisances)
         return start if self.relative is None else self._scaled(start, 0.3 / min(self.relative.values()))
 
-    def working(self, residuals: Residuals, last: Scatter) -> Scatter:
-        """The working scatter, given residuals."""
+    def working(self, residuals: Residuals, last: Scatter, linear: Linear | None = None) -> Scatter:
+        """The working scatter, given residuals; for a likelihood also made linear."""
         nuisances = self.settings.nuisances
+        if self.likelihood:
+            assert linear is not None
+            return self._shown(linear, last)
         if self.relative is None:
             return estimated(residuals, last, nuisances)
         own = expected_effects(residuals, last)[0]
@@ -48,6 +65,39 @@ class Weighting:
         white = (left / sizes)[residuals.present] ** 2 * _each(residuals)[residuals.present]
         scaled = self._scaled(last, float(np.sqrt(np.mean(white))))
         return estimated(residuals, scaled, nuisances, fixed=("misfit",))
+
+    def start(self, tests: int) -> Scatter:
+        """Where the alternation begins: the guess, or for a likelihood all sources of scatter at a tenth."""
+        if not self.likelihood:
+            return self.guess()
+        nuisances, found = self.settings.nuisances, {}
+        for name, scale, noise in zip(self.entries.outputs, self.entries.scales, self.entries.noise, strict=True):
+            offset = size_of(nuisances, "offset", scale.floor, name)
+            misfit = 0.03 if name in LOGARITHMIC else 0.0
+            found[name] = OutputScatter(max(float(noise), LEAST * scale.floor), misfit, offset, drift=0.1)
+        known = [n for n in nuisances if n.kind == "rate" and (n.sd is not None or tests >= SEVERAL)]
+        return Scatter(found, size_of(known, "rate", ASSUMED_RATE))
+
+    def _shown(self, linear: Linear, last: Scatter) -> Scatter:
+        """The scatter of largest restricted likelihood; drift only where the residuals ask for it.
+
+        A drift is a variance at the edge of what it may be: estimated always, it is above zero half of the time where
+        there is none, and widens every interval.
+        """
+        nuisances, r = self.settings.nuisances, linear.residuals
+        white = estimated(r, self._begun(last, 0.0), nuisances, fixed=(), linear=linear)
+        whole = estimated(r, self._begun(last, 0.01), nuisances, fixed=(), linear=linear)
+        gain = 2.0 * (restricted_log_likelihood(linear, whole) - restricted_log_likelihood(linear, white))
+        wandering = sum(sizes.drift > ABSENT for sizes in whole.outputs.values())
+        return whole if wandering and gain > chi2.ppf(ASKED_FOR, 2 * wandering) else white
+
+    def _begun(self, scatter: Scatter, drift: float) -> Scatter:
+        """The same with a drift to begin from, or none, and the noise that was measured."""
+        for name, noise, scale in zip(self.entries.outputs, self.entries.noise, self.entries.scales, strict=True):
+            begun = max(scatter[name].drift, drift) if drift > 0 else 0.0
+            size = max(float(noise), LEAST * scale.floor)
+            scatter = scatter.changed(name, noise=size, drift=begun, reach=1.0)
+        return scatter
 
     def _scaled(self, scatter: Scatter, size: float) -> Scatter:
         """Misfits in the ratio that the weights ask for, without noise of their own."""

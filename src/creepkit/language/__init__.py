@@ -25,6 +25,14 @@ from creepkit.language.thermal import (
     linear,
     wachtman,
 )
+from creepkit.language.thermal_shapes import (
+    boltzmann,
+    curved,
+    logarithmic,
+    modified_arrhenius,
+    t_log_t,
+    wachtman_like,
+)
 
 __all__ = [
     "GAS_CONSTANT",
@@ -36,17 +44,23 @@ __all__ = [
     "TemperatureForm",
     "activated",
     "arrhenius",
+    "boltzmann",
+    "curved",
     "exponential",
     "hookimpl",
     "inverse",
     "linear",
+    "logarithmic",
     "mean_stress",
+    "modified_arrhenius",
     "parameters",
     "principal_stress",
     "states",
     "strain",
     "stress",
+    "t_log_t",
     "temperature",
     "time",
     "wachtman",
+    "wachtman_like",
 ]

@@ -49,7 +49,7 @@ class TemperatureForm:
 
 def arrhenius(T_ref: float = 1073.15, Q: float | None = None) -> Factor:
     """The Arrhenius factor exp[-(Q/R)(1/T - 1/T_ref)] of Eq. (5); T_ref in K, Q in J/mol (a parameter unless given)."""
-    _check_reference(T_ref)
+    check_reference(T_ref)
     symbol = sympy.Symbol("Q", real=True)
     energy = symbol if Q is None else sympy.Float(Q)
     expression = sympy.exp(energy * _inverse_fall(T_ref) / GAS_CONSTANT)
@@ -59,7 +59,7 @@ def arrhenius(T_ref: float = 1073.15, Q: float | None = None) -> Factor:
 
 def linear(T_ref: float = 1073.15, slope: tuple[float, float] | None = None) -> TemperatureForm:
     """p(T) = p + p_T (T - T_ref); the slope p_T, per K, lies by default within half the range of p in 100 K."""
-    _check_reference(T_ref)
+    check_reference(T_ref)
 
     def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
         if param.scale == "log":
@@ -76,7 +76,7 @@ def linear(T_ref: float = 1073.15, slope: tuple[float, float] | None = None) -> 
 
 def inverse(T_ref: float = 1073.15, slope: tuple[float, float] | None = None) -> TemperatureForm:
     """p(T) = p + p_I (1000/T - 1000/T_ref); default bounds of p_I: the range of p over 0.5."""
-    _check_reference(T_ref)
+    check_reference(T_ref)
 
     def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
         if param.scale == "log":
@@ -93,7 +93,7 @@ def inverse(T_ref: float = 1073.15, slope: tuple[float, float] | None = None) ->
 
 def activated(T_ref: float = 1073.15, Q: tuple[float, float] = (-9e5, 9e5)) -> TemperatureForm:
     """p(T) = p exp[-(Q_p/R)(1/T - 1/T_ref)] for a positive parameter; Q_p in J/mol, of either sign."""
-    _check_reference(T_ref)
+    check_reference(T_ref)
 
     def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
         energy = sympy.Symbol(f"Q_{symbol.name}", real=True)
@@ -105,7 +105,7 @@ def activated(T_ref: float = 1073.15, Q: tuple[float, float] = (-9e5, 9e5)) -> T
 
 def exponential(T_ref: float = 1073.15, slope: tuple[float, float] = (-0.1, 0.1)) -> TemperatureForm:
     """p(T) = p exp[p_T (T - T_ref)] for a positive parameter; p_T in 1/K."""
-    _check_reference(T_ref)
+    check_reference(T_ref)
 
     def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
         rate = sympy.Symbol(f"{symbol.name}_T", real=True)
@@ -128,6 +128,7 @@ def _inverse_fall(T_ref: float) -> sympy.Expr:
     return (temperature - sympy.Float(T_ref)) / (sympy.Float(T_ref) * temperature)
 
 
-def _check_reference(T_ref: float) -> None:
+def check_reference(T_ref: float) -> None:
+    """A reference temperature is one in K."""
     if not 0 < float(T_ref) < 1e4:
         raise LawError(f"T_ref = {T_ref!r} is not a temperature in K (allowed: above 0, below 10000)")

@@ -3,7 +3,20 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from creepkit.language import activated, arrhenius, exponential, hookimpl, inverse, linear
+from creepkit.language import (
+    activated,
+    arrhenius,
+    boltzmann,
+    curved,
+    exponential,
+    hookimpl,
+    inverse,
+    linear,
+    logarithmic,
+    modified_arrhenius,
+    t_log_t,
+    wachtman_like,
+)
 
 
 @hookimpl
@@ -11,7 +24,13 @@ def creepkit_temperature_forms() -> Mapping[str, Callable[..., Any]]:
     return {
         "activated": activated,
         "arrhenius": arrhenius,
+        "boltzmann": boltzmann,
+        "curved": curved,
         "exponential": exponential,
         "inverse": inverse,
         "linear": linear,
+        "logarithmic": logarithmic,
+        "modified-arrhenius": modified_arrhenius,
+        "t-log-t": t_log_t,
+        "wachtman": wachtman_like,
     }

@@ -170,7 +170,8 @@ class Nuisance:
     output : to which output an offset belongs; "" stands for each output having its own.
     mean, sd : Gaussian prior, in the unit of the kind; sd = inf leaves it free, sd = None lets the fit estimate the
         spread. A thickness and a window are lengths, and so is their mean: `Nuisance("thickness", mean=0.4935,
-        sd=0.027)` says what was measured on such plates and replaces what histories and specimen say.
+        sd=0.027)` says what was measured on such plates and replaces what histories and specimen say; without a mean
+        a test's thickness is about what its history (or the specimen) says.
     bounds : hard limits, in the same unit.
     """
 

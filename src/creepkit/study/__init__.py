@@ -1,7 +1,7 @@
 """The verbs of a study, as typed in a notebook; each finds its nouns in the registry and hands over the work."""
 
 from creepkit.study.files import load, read_histories, suspects, with_suspects_marked
-from creepkit.study.models import identify, moduli, rank, simulate
+from creepkit.study.models import identify, moduli, rank, select, simulate
 from creepkit.study.networks import surrogate, train
 from creepkit.study.nouns import law, laws, specimen, specimens
 from creepkit.study.sets import generate, rate_family, read_dataset
@@ -20,6 +20,7 @@ __all__ = [
     "rate_family",
     "read_dataset",
     "read_histories",
+    "select",
     "simulate",
     "specimen",
     "specimens",

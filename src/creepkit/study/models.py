@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from creepkit.arrays import ArrayLike
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.moduli import Moduli
+    from creepkit.inverse.search.landscape import Search
     from creepkit.inverse.selection import Ranking
+    from creepkit.inverse.settings import Weights
     from creepkit.language import CreepLaw, Elastic
 
 ROOM_TEMPERATURE = 293.15
@@ -75,7 +77,9 @@ def identify(
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     *,
     nuisances: Sequence[Nuisance] | None = None,
-    weights: Literal["noise"] | Mapping[str, float] = "noise",
+    weights: Weights = "noise",
+    search: Search | None = None,
+    through: Predictor | Literal["auto"] | None = "auto",
     starts: int = 8,
     frames: int = 40,
     seed: int = 0,
@@ -88,8 +92,12 @@ def identify(
     law : a law or its name; using : a specimen (or its name) or any predictor, or {specimen: predictor}; by default
         what the histories name.
     nuisances : what differs between tests; by default an offset of each output and test-to-test scatter of the rate.
-    weights : "noise", or {output: weight} of relative squared errors, such as {"amplitude": 0.99, "width": 0.005,
-        "shape": 0.005} of the paper's loss.
+    weights : what is minimised. "noise": least squares of frames, intervals from all the scatter found; "likelihood":
+        noise and autocorrelation of every output in values, intervals and ranking alike; "equal": Eq. (4) of the
+        paper; or {output: weight} of relative squared errors, such as ck.PAPER_WEIGHTS, its Eq. (S3).
+    search : how to begin: by default least squares from screened starts; ParticleSwarm() as in the paper, CmaEs().
+    through : a surrogate in which the search's minima are refined before `using` (finite elements) has its last word;
+        "auto" takes the one that comes with creepkit where it is of this specimen.
     starts, seed : of the search, which includes the centre of the bounds; frames : looked at in each history.
     loss : of frames: "linear", or a robust loss of scipy's least_squares such as "soft_l1" (for the values; intervals
         stay Gaussian); test_loss : of whole tests: "gaussian", or "student", with which a test far from the others
@@ -105,7 +113,15 @@ def identify(
     if nuisances is not None:
         settings = replace(settings, nuisances=tuple(nuisances))
     chosen = specimens_of(histories) if using is None else predictors_given(using)
-    return run(law_given(law), histories, chosen, settings=settings, progress=progress)
+    return run(
+        law_given(law),
+        histories,
+        chosen,
+        settings=settings,
+        search=search,
+        through=_through(through, chosen, histories),
+        progress=progress,
+    )
 
 
 def moduli(
@@ -125,6 +141,47 @@ def moduli(
     return run(law_given(law), histories, chosen, frames=frames)
 
 
+def select(
+    laws: Sequence[CreepLaw | str],
+    histories: Sequence[History],
+    using: Predictor | str | Mapping[str, Predictor | str] | None = None,
+    *,
+    nuisances: Sequence[Nuisance] | None = None,
+    through: Predictor | Literal["auto"] | None = "auto",
+    sums: bool | None = False,
+    by: Literal["bic", "aicc", "hold-out"] = "bic",
+    starts: int = 8,
+    frames: int = 60,
+    seed: int = 0,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Ranking:
+    """Identify several laws from the same histories by likelihood, and say which of them the histories speak for.
+
+    laws : candidates; sums : also sums of two of them (None: where no single law goes down to the noise).
+    by : the criterion; the answer is a set of laws with weights, "decisive" only above .95.
+    nuisances, through, starts, frames, seed : as for identify().
+    """
+    from creepkit.inverse.identification import Settings
+    from creepkit.inverse.selection.select import select as run
+
+    histories = histories_given(histories)
+    settings = Settings(starts=starts, draws=_draws(starts), frames=frames, seed=seed)
+    if nuisances is not None:
+        settings = replace(settings, nuisances=tuple(nuisances))
+    chosen = specimens_of(histories) if using is None else predictors_given(using)
+    candidates = [law_given(law) for law in laws]
+    return run(
+        candidates,
+        histories,
+        chosen,
+        settings=settings,
+        through=_through(through, chosen, histories),
+        sums=sums,
+        by=by,
+        progress=progress,
+    )
+
+
 def rank(fits: Sequence[Identification]) -> Ranking:
     """Rank identifications of the same histories by BIC, with weights and a verdict."""
     from creepkit.inverse.identification import Identification
@@ -133,6 +190,20 @@ def rank(fits: Sequence[Identification]) -> Ranking:
     if isinstance(fits, Identification):
         raise FitError("rank() takes a list of identifications, found a single one")
     return run(list(fits))
+
+
+def _through(
+    asked: Predictor | Literal["auto"] | None, using: Predictor | Mapping[str, Predictor], histories: Sequence[History]
+) -> Predictor | None:
+    """What was asked for; or the shipped surrogate, where it stands for this very specimen and these histories."""
+    if not isinstance(asked, str):
+        return asked
+    if isinstance(using, Mapping) or getattr(using, "name", "") != "bulge":
+        return None
+    from creepkit.study.networks import surrogate
+
+    model = surrogate("dimple")
+    return model if model.stands_for(using, histories) else None
 
 
 def _draws(starts: int) -> int:

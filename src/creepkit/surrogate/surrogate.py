@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,9 +16,12 @@ from creepkit.dataset.specimen_document import specimen_document, specimen_of
 from creepkit.dataset.time_grid import TimeGrid
 from creepkit.errors import CreepkitError, SurrogateError
 from creepkit.language.tree import law_from_json, law_to_json
-from creepkit.records import Effects, History, Prediction
+from creepkit.records import Effects, History, Prediction, Predictor
+from creepkit.specimens.bulge import Bulge
+from creepkit.specimens.dimple import DimpleGeometry
 from creepkit.surrogate import files
 from creepkit.surrogate.domain import Domain
+from creepkit.surrogate.matching import check_asked
 from creepkit.surrogate.recipe import Module, Recipe, Told, Training
 from creepkit.surrogate.table import table
 
@@ -80,6 +83,21 @@ class Surrogate(ABC):
         A row outside the domain of the training has its values all the same, and Status.OUTSIDE_DOMAIN.
         """
 
+    def screening(self) -> Predictor:
+        """A stand-in for searches: that of the specimen, if it has one, else the network itself."""
+        offered = getattr(self.specimen, "screening", None)
+        return self if offered is None else offered()
+
+    def stands_for(self, specimen: object, histories: Sequence[History]) -> bool:
+        """Whether it was trained on this specimen, but for its apex thickness and threads, and knows such histories."""
+        if _told_apart(specimen) != _told_apart(self.specimen):
+            return False
+        try:
+            check_asked(self.told, histories, (), self.effects)
+        except SurrogateError:
+            return False
+        return True
+
     def reference_stress(self, history: History) -> Floats:
         """The von Mises stresses, MPa, that stand for the test: the specimen's, or those that are prescribed."""
         offered = getattr(self.specimen, "reference_stress", None)
@@ -118,6 +136,13 @@ class Surrogate(ABC):
 
     def __repr__(self) -> str:
         return f"<Surrogate: {self.title}>"
+
+
+def _told_apart(specimen: object) -> object:
+    """A specimen without what a surrogate is free of."""
+    if isinstance(specimen, Bulge):
+        return specimen.replace(threads=None, apex_thickness=DimpleGeometry().apex_thickness)
+    return specimen
 
 
 def load(path: str | Path) -> Surrogate:

@@ -1,0 +1,129 @@
+"""`creepkit screen`: the laws of all alloys of a plate, from a folder of their tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from creepkit.cli.identify import nuisances_of
+from creepkit.cli.printing import print_json, print_table
+from creepkit.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from creepkit.inverse.sparsity.penalties import Penalty, Subsets
+    from creepkit.plates.plate import Plate
+    from creepkit.records import Predictor
+
+CONFIRM = {"when-in-doubt": "when in doubt", "always": True, "never": False}
+
+
+def command(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of history files, their alloys in them.")],
+    law: Annotated[
+        list[str] | None, typer.Option("--law", metavar="NAME", help="A candidate; the four of Table 1 by default.")
+    ] = None,
+    compositions: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Table alloy,Fe,Ni,... below a line '# unit: wt.%'.")
+    ] = None,
+    to: Annotated[Path, typer.Option(help="Folder for answers; what it holds already is not done again.")] = Path(
+        "screened"
+    ),
+    surrogate: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Identify through a surrogate alone, such as dimple.")
+    ] = None,
+    through: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Search through a surrogate, end with finite elements.")
+    ] = None,
+    dense: Annotated[
+        str, typer.Option(metavar="NAME", help="Law to be had without sparsity, to compare with; or none.")
+    ] = "combined",
+    penalty: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Reduce that law by a penalty: sqrt, group-l2, l2 or subsets.")
+    ] = None,
+    confirm: Annotated[
+        str, typer.Option(help="Simulate the best law by finite elements: when-in-doubt, always or never.")
+    ] = "when-in-doubt",
+    nuisance: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KIND[=MEAN[:SD]]", help="What differs between tests, such as thickness=0.4935:0.027."),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the search.")] = 0,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
+) -> None:
+    """Identify the laws of all alloys of a plate.
+
+    Interrupted, it goes on where it was when it is started again in the same way.
+    """
+    from creepkit.inverse.selection.select import FRAMES
+    from creepkit.inverse.settings import Settings
+    from creepkit.plates.screening import screen
+
+    with Progress() as progress:
+        plate = screen(
+            folder, law, _surrogate(surrogate), compositions=compositions, to=to, nuisances=nuisances_of(nuisance),
+            settings=Settings(seed=seed, frames=FRAMES), through=_surrogate(through),
+            dense=None if dense == "none" else dense, penalty=_penalty(penalty), confirm=_choice(confirm),
+            workers=workers, progress=progress.tick,
+        )  # fmt: skip
+    written = [plate.to_csv(to / "plate.csv"), plate.to_hdf5(to / "plate.h5")]
+    if plate.identified:
+        written += plate.plot(to / "pictures")
+    tell(plate, written, as_json)
+
+
+def tell(plate: Plate, written: list[Path], as_json: bool) -> None:
+    """Print the table, what it sums up to, and what was written."""
+    from creepkit.plates.table import COLUMNS, rows_of, summary
+
+    if as_json:
+        print_json(_answer(plate, written))
+        return
+    print_table(f"{len(plate.answers)} alloys", COLUMNS, rows_of(plate))
+    for line in (*summary(plate), *(f"wrote {path}" for path in written)):
+        typer.echo(line)
+
+
+def _answer(plate: Plate, written: list[Path]) -> dict[str, Any]:
+    from creepkit.plates.table import record_of
+
+    return {
+        "alloys": [record_of(plate, answer) for answer in plate.answers],
+        "shares": plate.shares(),
+        "failed": plate.failed,
+        "notes": list(plate.notes),
+        "files": [str(path) for path in written],
+    }
+
+
+def _surrogate(name: str | None) -> Predictor | None:
+    if name is None:
+        return None
+    from creepkit import study
+
+    return study.surrogate(name)
+
+
+def _penalty(name: str | None) -> Penalty | Subsets | None:
+    from creepkit.errors import FitError
+    from creepkit.inverse.sparsity.penalties import L2, GroupL2, Sqrt, Subsets
+
+    if name is None:
+        return None
+    known: dict[str, Callable[[], Penalty | Subsets]] = {}
+    known |= {"sqrt": Sqrt, "group-l2": GroupL2, "l2": L2, "subsets": Subsets}
+    if name not in known:
+        raise FitError(f"--penalty {name} is not known; allowed are {', '.join(known)}")
+    return known[name]()
+
+
+def _choice(text: str) -> bool | Literal["when in doubt"]:
+    from creepkit.errors import FitError
+
+    if text not in CONFIRM:
+        raise FitError(f"--confirm {text} is not known; allowed are {', '.join(CONFIRM)}")
+    return CONFIRM[text]  # type: ignore[return-value]

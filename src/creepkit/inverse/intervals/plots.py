@@ -1,0 +1,160 @@
+"""Plots of intervals: a profile, pairs of samples, a correlation, bands of rates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import FitError
+from creepkit.records import ZERO_CELSIUS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from creepkit.inverse.intervals.correlation import Correlation
+    from creepkit.inverse.intervals.profile import Profile
+    from creepkit.inverse.intervals.sampling import Samples
+    from creepkit.inverse.intervals.temperature_band import RateBand
+
+SHOWN = 2000
+"""Draws in a panel of pairs; more are a blot."""
+WIDE = 30.0
+"""Ratio of largest to smallest value beyond which an axis is logarithmic."""
+
+
+def profile_figure(found: Profile, path: str | Path | None = None) -> Figure:
+    """The rise of chi-square over the quantity, its limit, and the parabola of Laplace's approximation."""
+    figure, axes = _figure(5.2, 4.2)
+    logarithmic = bool((found.values > 0).all()) and float(found.values.max() / found.values.min()) > WIDE
+    axes.plot(found.values, found.chi_square, "o-", ms=4, color="C0", label="profile")
+    low, high = found.laplace
+    scale = np.log if low > 0 and logarithmic else np.asarray
+    grid = np.geomspace(low, high, 80) if low > 0 and logarithmic else np.linspace(low, high, 80)
+    middle, half = 0.5 * (scale(low) + scale(high)), 0.5 * (scale(high) - scale(low))
+    axes.plot(grid, found.limit * ((scale(grid) - middle) / half) ** 2, "--", color="C1", label="Laplace")
+    axes.axhline(found.limit, color="black", lw=0.8, label=f"{100 * found.level:g} %")
+    for end in (found.low, found.high):
+        if end is not None:
+            axes.axvline(end, color="black", lw=0.8, ls=":")
+    unit = "" if found.unit == "1" else f", {found.unit}"
+    axes.set_xlim(*_with_margin(found.values, logarithmic))
+    axes.set(xlabel=f"{found.name}{unit}", ylabel="rise of chi-square", ylim=(0.0, 1.6 * found.limit))
+    if logarithmic:
+        axes.set_xscale("log")
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.25)
+    return _written(figure, path)
+
+
+def _with_margin(values: Floats, logarithmic: bool) -> tuple[float, float]:
+    ends = np.log(values[[0, -1]]) if logarithmic else values[[0, -1]]
+    room = 0.08 * float(np.ptp(ends)) + 1e-12
+    low, high = float(ends[0]) - room, float(ends[1]) + room
+    return (float(np.exp(low)), float(np.exp(high))) if logarithmic else (low, high)
+
+
+def pairs_figure(samples: Samples, path: str | Path | None = None) -> Figure:
+    """Histograms of every parameter and clouds of every pair, in the author's units, coefficients as log10."""
+    from matplotlib.figure import Figure
+
+    columns = _columns(samples)
+    count = len(columns)
+    figure = Figure(figsize=(1.2 + 2.0 * count, 1.0 + 2.0 * count), layout="constrained")
+    panels = np.atleast_2d(np.asarray(figure.subplots(count, count, squeeze=False)))
+    names = list(columns)
+    for row, first in enumerate(names):
+        for column, second in enumerate(names):
+            _pair(panels[row, column], columns, (first, second), (row, column), count)
+    figure.suptitle(f"{samples.coordinates.law.title or samples.coordinates.law.name}: posterior", fontsize=11)
+    return _written(figure, path)
+
+
+def _columns(samples: Samples) -> dict[str, Floats]:
+    """{label: (draws,)}, at most SHOWN draws."""
+    table = samples.coordinates.law.table
+    every = max(len(samples.u) // SHOWN, 1)
+    return {
+        f"log10 {name}" if table[name].scale == "log" else name: (
+            np.log10(values[::every]) if table[name].scale == "log" else values[::every]
+        )
+        for name, values in samples.values.items()
+    }
+
+
+def _pair(axes: Axes, columns: dict[str, Floats], names: tuple[str, str], place: tuple[int, int], count: int) -> None:
+    (first, second), (row, column) = names, place
+    if column > row:
+        axes.set_visible(False)
+        return
+    if row == column:
+        axes.hist(columns[first], bins=40, color="C0", alpha=0.7)
+        for share in np.quantile(columns[first], (0.025, 0.5, 0.975)):
+            axes.axvline(float(share), color="black", lw=0.8, ls=":")
+        axes.set_yticks([])
+    else:
+        axes.plot(columns[second], columns[first], ".", ms=1.5, color="C0", alpha=0.3, rasterized=True)
+    if row == count - 1:
+        axes.set_xlabel(second)
+    if column == 0 and row > 0:
+        axes.set_ylabel(first)
+    axes.tick_params(labelsize=7)
+
+
+def correlation_figure(found: Correlation, path: str | Path | None = None) -> Figure:
+    """The matrix in colours from -1 to 1, with its numbers."""
+    count = len(found.names)
+    figure, axes = _figure(2.0 + 0.8 * count, 1.6 + 0.8 * count)
+    image = axes.imshow(found.matrix, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
+    for row in range(count):
+        for column in range(count):
+            value = found.matrix[row, column]
+            axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8,
+                      color="white" if abs(value) > 0.6 else "black")  # fmt: skip
+    axes.set_xticks(range(count), found.names, rotation=45, ha="right")
+    axes.set_yticks(range(count), found.names)
+    axes.set_title(found.title, fontsize=10)
+    figure.colorbar(image, ax=axes, shrink=0.8, label="correlation")
+    return _written(figure, path)
+
+
+def bands_figure(bands: Sequence[RateBand], path: str | Path | None = None) -> Figure:
+    """Rates over stress with their bands: lighter with the temperature's uncertainty, darker without."""
+    if not bands:
+        raise FitError("there are no bands to draw")
+    figure, axes = _figure(5.6, 4.6)
+    for k, band in enumerate(bands):
+        colour = f"C{k % 10}"
+        label = f"{band.temperature - ZERO_CELSIUS:.0f} $\\pm$ {band.plus_minus:g} °C"
+        axes.fill_between(band.stress, band.low, band.high, color=colour, alpha=0.2, lw=0)
+        axes.fill_between(band.stress, *band.inner, color=colour, alpha=0.35, lw=0)
+        axes.plot(band.stress, band.rate, color=colour, lw=1.4, label=label)
+    axes.set(xscale="log", yscale="log", xlabel="stress, MPa", ylabel="creep rate, 1/s")
+    axes.grid(alpha=0.25, which="both")
+    axes.legend(fontsize=8, title="95 %: law and temperature (dark: law alone)", title_fontsize=7)
+    axes.set_title("\n".join(dict.fromkeys(band.name for band in bands)), fontsize=9)
+    return _written(figure, path)
+
+
+def _figure(width: float, height: float) -> tuple[Figure, Any]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots()
+
+
+def _written(figure: Figure, path: str | Path | None) -> Figure:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    FigureCanvasAgg(figure)
+    if path is not None:
+        try:
+            figure.savefig(path, dpi=130)
+        except (OSError, ValueError) as error:
+            told = str(error).splitlines()[0]
+            raise FitError(f"{path}: the plot cannot be written ({told}); name a .png, .svg or .pdf file") from None
+    return figure

@@ -1,0 +1,1 @@
+"""Where identifications begin: global searches over a landscape, each polished by least squares."""

@@ -1,0 +1,19 @@
+"""A ranking as text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from creepkit.inverse.selection.ranking import Ranking
+
+_NAMES = {"bic": "BIC", "aicc": "AICc", "hold-out": "hold-out"}
+
+
+def text_of(ranking: Ranking) -> str:
+    """The verdict, then a line for each law."""
+    width = max(len(r.fit.law.name) for r in ranking.laws)
+    head = f"{'law':{width}}   weight  {_NAMES[ranking.by]} - best  chi-square"
+    rows = [f"{r.fit.law.name:{width}}   {r.weight:6.3f}  {r.excess:10.1f}  {r.chi_square:10.1f}" for r in ranking.laws]
+    lost = [f"{name}: {reason}" for name, reason in ranking.failed.items()]
+    return "\n".join([ranking.verdict, "", head, *rows, *lost])

@@ -1,0 +1,170 @@
+"""A planted plate: alloys mixed from four base alloys, with laws that are known, tested by finite elements.
+
+The base alloys are those that Chen et al. mixed, in nominal compositions (their own are in a table we have not seen);
+laws and values are drawn around the three of their Fig. 7a, noise and thickness are as measured on real dimples. Which
+law an alloy obeys depends on its class, as in Fig. 7c: sinh in iron, both power laws in cobalt, any of them elsewhere.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from creepkit import kernels, registry
+from creepkit.arrays import Floats
+from creepkit.language import Elastic
+from creepkit.plates.compositions import Compositions, atomic_percent
+from creepkit.plates.table import write_text
+from creepkit.readers.writing import write_history
+from creepkit.records import History, PressureJump, Status
+
+BASE = {
+    # Eiselstein and Tillack (1991), The invention and definition of alloy 625, table I, typical; nickel is the balance
+    "IN625": {"Ni": 63.05, "Cr": 21.5, "Mo": 9.0, "Nb": 3.6, "Fe": 2.0, "Mn": 0.2, "Si": 0.2, "Al": 0.2, "Ti": 0.2,
+              "C": 0.05},
+    # UNS R30605 (ASTM F90): the middle of each range, two thirds of the iron allowed; cobalt is the balance
+    "Haynes 25": {"Co": 51.4, "Cr": 20.0, "W": 15.0, "Ni": 10.0, "Fe": 2.0, "Mn": 1.5, "C": 0.1},
+    # UNS S31603 (ASTM A240): the middle of each range, usual manganese, silicon and carbon; iron is the balance
+    "316L": {"Fe": 66.48, "Cr": 17.0, "Ni": 12.0, "Mo": 2.5, "Mn": 1.5, "Si": 0.5, "C": 0.02},
+    # the usual NiCoCrAlY for thermal spraying, Ni-23Co-17Cr-12Al-0.5Y
+    "MCrAlY": {"Ni": 47.5, "Co": 23.0, "Cr": 17.0, "Al": 12.0, "Y": 0.5},
+}  # fmt: skip
+"""{base alloy: {element: wt.%}}."""
+MIXING = 0.6
+"""Concentration of the Dirichlet distribution of mixtures: below one, most have one or two bases in the main."""
+
+FIGURE_7A = {
+    "hyperbolic-sine": {"A": 3.16e-7, "n": 4.15, "B": 87.16},
+    "strain-hardening": {"A": 5.5e-14, "n": 3.28, "m": -0.32},
+    "norton": {"A": 1.2e-16, "n": 5.2},
+}
+"""{law: values}, 1/s, MPa: Fe-rich, Ni-rich and Co-rich in the caption of Fig. 7."""
+SPREAD = {"n": 0.3, "m": 0.05, "B": 8.0}
+"""Standard deviations about these."""
+SLOWER = (0.16, 1.0)
+"""Factor on the rate at 100 MPa and a strain of .01, drawn on a logarithmic scale."""
+BY_CLASS = {"Fe-rich": (0.8, 0.1, 0.1), "Co-rich": (0.0, 0.5, 0.5)}
+"""{class: share of each law of FIGURE_7A}; in other classes all are alike."""
+
+THICKNESS, THINNEST = (0.4935, 0.027), 0.44
+"""mm: mean and standard deviation of the apex of 25 measured dimples; thinner than the last burst in such a test."""
+NOISE = {"amplitude": 0.0015, "width": 0.02, "shape": 0.02}
+"""mm, mm, 1: standard deviations measured on real dimples."""
+LOADING, TIMES = PressureJump(P1=8, P2=10, Tj=7200), np.arange(60.0, 4 * 3600 + 1, 60.0)
+TEMPERATURE, ELASTIC = 1073.15, Elastic(E=150e3)
+DRAWS = 20
+"""How often values are drawn for an alloy whose dimple would burst."""
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What an alloy was planted with: its law, values, apex thickness (mm), and shares of the base alloys."""
+
+    law: str
+    values: Mapping[str, float]
+    thickness: float
+    shares: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class PlantedPlate:
+    """A plate of virtual tests, and the truth about each alloy."""
+
+    histories: tuple[History, ...]
+    compositions: Compositions
+    truth: Mapping[str, Truth]
+
+    def write(self, folder: Path) -> tuple[Path, Path]:
+        """Write tests/*.csv, compositions.csv and truth.csv; the folder of the tests and the compositions."""
+        tests = folder / "tests"
+        tests.mkdir(parents=True, exist_ok=True)
+        for history in self.histories:
+            write_history(history, tests / f"{history.name}.csv")
+        table = folder / "compositions.csv"
+        contents = [{"alloy": a, **{e: f"{x:.4f}" for e, x in c.items()}} for a, c in self.compositions.atomic.items()]
+        write_text("# unit: at.%\n" + _csv(contents), table)
+        told = [{"alloy": a, "law": t.law, **t.values, "thickness_mm": t.thickness, **t.shares}
+                for a, t in self.truth.items()]  # fmt: skip
+        write_text(_csv(told), folder / "truth.csv")
+        return tests, table
+
+
+def planted_plate(alloys: int = 47, seed: int = 7, *, thickness_known: bool = True) -> PlantedPlate:
+    """Simulate the tests of so many alloys, one dimple each; the first alloys are the same however many there are.
+
+    thickness_known : whether each test states the apex thickness of its dimple, to a micrometre.
+    """
+    histories, atomic, truth = [], {}, {}
+    for number in range(1, alloys + 1):
+        name, rng = f"A{number:02d}", np.random.default_rng([seed, number])
+        shares = dict(zip(BASE, rng.dirichlet([MIXING] * len(BASE)), strict=True))
+        atomic[name] = mixture(shares)
+        law = _law(Compositions({name: atomic[name]}).class_of(name), rng)
+        truth[name], history = _test(name, law, shares, rng)
+        histories.append(history if thickness_known else history.replace(geometry={}))
+    return PlantedPlate(tuple(histories), Compositions(atomic), truth)
+
+
+def mixture(shares: Mapping[str, float]) -> dict[str, float]:
+    """{element: at.%} of base alloys mixed by weight."""
+    weights: dict[str, float] = {}
+    for base, share in shares.items():
+        for element, weight in BASE[base].items():
+            weights[element] = weights.get(element, 0.0) + share * weight
+    return atomic_percent(weights)
+
+
+def _law(kind: str, rng: np.random.Generator) -> str:
+    return str(rng.choice(list(FIGURE_7A), p=BY_CLASS.get(kind, (1 / 3, 1 / 3, 1 / 3))))
+
+
+def _test(name: str, law: str, shares: Mapping[str, float], rng: np.random.Generator) -> tuple[Truth, History]:
+    """One dimple of an alloy that lasts to the end of the test, simulated on a finer mesh than identifications use."""
+    fine: Any = registry.default().specimen("bulge")
+    for _ in range(DRAWS):
+        thickness = round(max(rng.normal(*THICKNESS), THINNEST), 3)
+        values = _values(law, rng)
+        plan = History(name, TIMES, {}, LOADING, TEMPERATURE, "bulge", ELASTIC, alloy=name,
+                       geometry={"apex_thickness": thickness})  # fmt: skip
+        specimen = fine.replace(refinement=2.0, tolerance=1e-3)
+        found = specimen.predict(registry.default().law(law), values, [plan])
+        if found.status[0, 0] == Status.COMPLETE:
+            return Truth(law, values, thickness, shares), _measured(plan, found.outputs, found.of(0), rng)
+    raise RuntimeError(f"alloy {name} burst in {DRAWS} draws")
+
+
+def _values(law: str, rng: np.random.Generator) -> dict[str, float]:
+    """Values about those of Fig. 7a, with the rate at 100 MPa at most theirs."""
+    about = FIGURE_7A[law]
+    values = {name: v + SPREAD[name] * rng.normal() if name in SPREAD else v for name, v in about.items()}
+    slower = math.exp(rng.uniform(*np.log(SLOWER)))
+    rate, drawn = (_rate(law, v) for v in (about, values))
+    return {name: float(f"{v * (slower * rate / drawn if name == 'A' else 1.0):.6g}") for name, v in values.items()}
+
+
+def _rate(law: str, values: Mapping[str, float]) -> float:
+    """Creep rate at 100 MPa and a strain of .01, 1/s."""
+    kernel = kernels.lower(registry.default().law(law), "numpy")
+    return float(kernel.rate(values, stress=100.0, strain=0.01, time=3600.0, temperature=TEMPERATURE))
+
+
+def _measured(plan: History, names: Sequence[str], clean: Floats, rng: np.random.Generator) -> History:
+    """The plan with noisy outputs."""
+    outputs = {name: clean[:, k] + rng.normal(0.0, NOISE[name], len(clean)) for k, name in enumerate(names)}
+    return replace(plan, outputs={name: np.round(row, 6) for name, row in outputs.items()})
+
+
+def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    text = io.StringIO()
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()

@@ -1,0 +1,106 @@
+"""Pictures of a plate's laws after Chen et al.: what sparsity costs (Fig. 7b), which law each class obeys (7c)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.plates.answer import AlloyAnswer, chi_square, loss
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from creepkit.plates.plate import Plate
+
+MEASURES = (("loss of Eq. (4), mean over outputs", loss), ("chi-square, mean over outputs", chi_square))
+TICKS, NARROW = (1.0, 2.0, 5.0), 5.0
+"""Of logarithmic axes: where ticks are, and the ratio of their ends below which they are linear instead."""
+
+
+class Labels:
+    """Labels for a legend, each given out once."""
+
+    def __init__(self) -> None:
+        self._given: set[str] = set()
+
+    def once(self, name: str) -> str | None:
+        """The name the first time, None from then on."""
+        if name in self._given:
+            return None
+        self._given.add(name)
+        return name
+
+
+def colours_of(plate: Plate) -> Mapping[str, str]:
+    """{class: colour}."""
+    return {name: f"C{k % 10}" for k, name in enumerate(plate.classes())}
+
+
+def blank(width: float, height: float) -> Figure:
+    """A figure without panels, inches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def misfit_figure(plate: Plate, answers: list[AlloyAnswer]) -> Figure:
+    """Misfit of the reduced law against that of the dense one (Fig. 7b): Eq. (4), and in units of noise."""
+    figure = blank(8.6, 4.6)
+    colours, labels = colours_of(plate), Labels()
+    for axes, (title, measure) in zip(figure.subplots(1, 2), MEASURES, strict=True):
+        points = [(measure(a.dense), measure(a.reduced)) for a in answers if a.dense is not None]
+        for (x, y), answer in zip(points, answers, strict=True):
+            name = plate.class_of(answer.alloy)
+            axes.plot(x, y, "o", ms=5, color=colours[name], alpha=0.75, label=labels.once(name))
+        values = np.array(points)[np.isfinite(points).all(axis=1)]
+        _finish_misfit(axes, (values.min() / 1.2, values.max() * 1.2) if values.size else (0.1, 10.0))
+        axes.set_title(title, fontsize=10)
+    figure.legend(loc="outside lower center", ncols=6, fontsize=8)
+    return figure
+
+
+def _finish_misfit(axes: Axes, ends: tuple[float, float]) -> None:
+    """Equal axes, logarithmic where they span much."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axes.plot(ends, ends, "k-", lw=0.7, alpha=0.6)
+    axes.set(xlim=ends, ylim=ends, xlabel="law without sparsity", ylabel="reduced law")
+    axes.grid(alpha=0.25)
+    if ends[1] < NARROW * ends[0]:
+        return
+    axes.set(xscale="log", yscale="log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=TICKS))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
+
+
+def shares_figure(plate: Plate) -> Figure:
+    """Share of each law by class (Fig. 7c): full colour where decisive, hatched what is shared out between laws."""
+    figure = blank(7.2, 4.4)
+    axes: Axes = figure.subplots()
+    classes = plate.classes()
+    bottom, places = np.zeros(len(classes)), range(len(classes))
+    for k, law in enumerate(sorted({w.fit.law.name for a in plate.identified for w in a.laws})):
+        sure, unsure = (np.array([_share(m, law, d) for m in classes.values()]) for d in (True, False))
+        axes.bar(places, sure, bottom=bottom, color=f"C{k}", label=law, width=0.6)
+        axes.bar(places, unsure, bottom=bottom + sure, color=f"C{k}", alpha=0.45, hatch="///", width=0.6,
+                 edgecolor="white", linewidth=0)  # fmt: skip
+        bottom += sure + unsure
+    axes.set_xticks(places, [f"{name}\n{len(m)} alloy{'s'[: len(m) > 1]}" for name, m in classes.items()])
+    axes.set(ylim=(0, 1), xlim=(-0.6, max(len(classes), 3) - 0.4), ylabel="share of alloys")
+    axes.set_title("identified laws by class; hatched: shared out by weight where not decisive", fontsize=10)
+    figure.legend(loc="outside lower center", ncols=4, fontsize=8)
+    return figure
+
+
+def _share(members: tuple[AlloyAnswer, ...], law: str, decisive: bool) -> float:
+    """Mean weight of a law over the members that are decisive, or over those that are not, as a share of all."""
+    weights = [w.weight for m in members if m.decisive is decisive for w in m.laws if w.fit.law.name == law]
+    return sum(weights) / len(members)

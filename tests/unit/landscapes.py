@@ -1,0 +1,77 @@
+"""Landscapes with known minima, for searches: a cost function of u on a box, refined by scipy."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from creepkit.inverse.search.box import Box
+from creepkit.inverse.search.refining import Minimum
+from creepkit.inverse.settings import Settings
+from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+
+SUM = (NORTON + STRAIN_HARDENING).rename("two terms")
+"""Parameters A_1 n_1 A_2 n_2 m; rates at 0 and 2."""
+TRIPLE = SUM + HYPERBOLIC_SINE
+
+
+@dataclass
+class Known:
+    """A landscape whose cost is a function of u, (candidates, parameters) to (candidates,); calls counts candidates."""
+
+    of: Callable[[np.ndarray], np.ndarray]
+    box: Box
+    settings: Settings = field(default_factory=Settings)
+    law: object = NORTON
+    rates: tuple[int, ...] = (0,)
+    calls: list[int] = field(default_factory=list)
+    seen: list[np.ndarray] = field(default_factory=list)
+
+    @property
+    def objective(self):
+        return SimpleNamespace(law=self.law, coordinates=SimpleNamespace(rates=self.rates))
+
+    def cost(self, u):
+        self.calls.append(len(u))
+        self.seen.append(u)
+        return self.of(u)
+
+    def refine(self, u: np.ndarray, held: Mapping[int, float] | None = None) -> Minimum:
+        free = np.setdiff1d(np.arange(u.size), list(held or {}))
+        whole = np.array(u, float)
+        whole[list(held or {})] = list((held or {}).values())
+
+        def cost(part):
+            moved = whole.copy()
+            moved[free] = part
+            return float(self.of(moved[None])[0])
+
+        bounds = list(zip(self.box.low[free], self.box.high[free], strict=True))
+        found = minimize(cost, whole[free], bounds=bounds, method="L-BFGS-B")
+        whole[free] = found.x
+        return Minimum(whole, float(found.fun), bool(found.success), int(found.nfev))
+
+
+def cube(size: int, reach: float = 5.0) -> Box:
+    """All coordinates from -reach to reach."""
+    return Box(np.full(size, -reach), np.full(size, reach))
+
+
+def quadratic(u):
+    """Minimum 0 at (1, 2, ..), 100 times steeper in each further coordinate of three."""
+    k = np.arange(u.shape[1])
+    return (100.0**k * (u - (k + 1)) ** 2).sum(axis=1)
+
+
+def rosenbrock(u):
+    """Minimum 0 at (1, 1, ..), at the end of a curved valley (Rosenbrock 1960)."""
+    return (100.0 * (u[:, 1:] - u[:, :-1] ** 2) ** 2 + (1.0 - u[:, :-1]) ** 2).sum(axis=1)
+
+
+def rastrigin(u):
+    """Minimum 0 at the origin among one minimum for each whole number in each coordinate (Rastrigin 1974)."""
+    return (u**2 - 10.0 * np.cos(2.0 * np.pi * u) + 10.0).sum(axis=1)

@@ -1,0 +1,97 @@
+"""Problems with closed forms: a predictor whose output is the ln of the creep rate, linear in ln A and in n."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.identify import identify
+from creepkit.inverse.scatter import OutputScatter, Scatter
+from creepkit.inverse.settings import Settings
+from creepkit.kernels import lower
+from creepkit.language import CreepLaw
+from creepkit.records import History, Nuisance, Prediction, constant_stress
+
+END = 1e5
+"""s."""
+
+
+class LogRates:
+    """Predictor: amplitude = ln(rate at the test's stress) + time / END, in mm, whatever that would be.
+
+    effects : "thickness" adds its distance from `nominal` times `by`.
+    """
+
+    name = "log rates"
+    outputs = ("amplitude",)
+
+    def __init__(self, nominal: float = 0.5, by: float = 0.0) -> None:
+        self.nominal, self.by = nominal, by
+        self.effects = ("thickness",) if by else ()
+
+    def reference_strain(self, history: History) -> float:
+        """That of a rate of exp(-15) 1/s."""
+        return float(np.exp(-15.0) * END)
+
+    def predict(
+        self, law: CreepLaw, values: Mapping[str, Any], histories: Sequence[History], *, jacobian: bool = False,
+        effects: Mapping[str, Any] | None = None,
+    ) -> Prediction:  # fmt: skip
+        columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[n], float)) for n in law.names))
+        theta = [np.log(c) if p.scale == "log" else c for c, p in zip(columns, law.table.values(), strict=True)]
+        count, longest = columns[0].size, max(h.times.size for h in histories)
+        kernel, found = lower(law, "numpy"), np.full((count, len(histories), longest, 1), np.nan)
+        for k, h in enumerate(histories):
+            s = h.loading.program().values[0]
+            log = np.broadcast_to(kernel.internal_log_rate(s, 1.0, 1.0, h.temperature, s, s / 3, *theta), (count,))
+            found[:, k, : h.times.size, 0] = log[:, None] + h.times / END
+        shift = 0.0 if not effects else self.by * (np.asarray(effects["thickness"]) - self.nominal)
+        found += np.broadcast_to(shift, found.shape[:2])[..., None, None]
+        ends, status = np.full(found.shape[:2], np.inf), np.zeros(found.shape[:2], np.int64)
+        slopes = {"thickness": np.full(found.shape, self.by)} if jacobian and effects else {}
+        lengths = np.array([h.times.size for h in histories])
+        return Prediction(found, self.outputs, lengths, status, ends, effect_jacobian=slopes)
+
+
+def measured(
+    law: CreepLaw, values: Mapping[str, float], stresses: Sequence[float], *, sd: float, seed: int = 0,
+    frames: int = 10, using: LogRates | None = None,
+) -> list[History]:  # fmt: skip
+    """Tests at these stresses with white noise."""
+    rng, times = np.random.default_rng(seed), np.linspace(0.1, 1.0, frames) * END
+    blank = [
+        History(f"{k}: {s:g} MPa", times, {"amplitude": 0 * times}, constant_stress(s, "stress"), 1000.0)
+        for k, s in enumerate(stresses)
+    ]
+    found = (using or LogRates()).predict(law, values, blank)
+    return [
+        h.replace(
+            outputs={"amplitude": found.values[0, k, :, 0] + rng.normal(size=frames) * sd},
+            standard_deviation={"amplitude": np.full(frames, sd)},
+        )
+        for k, h in enumerate(blank)
+    ]
+
+
+def known_scatter(
+    law: CreepLaw, tests: Sequence[History], sd: float, *, using: LogRates | None = None,
+    nuisances: tuple[Nuisance, ...] = (),
+) -> Identification:  # fmt: skip
+    """The identification of these tests with white noise of a known size and nothing else.
+
+    Its covariance is that of least squares with the predictor's derivatives, taken by differences.
+    """
+    settings = Settings(starts=2, draws=8, nuisances=nuisances)
+    fit = identify(law, tests, using or LogRates(), settings=settings)
+    return replace(fit, scatter=Scatter({"amplitude": OutputScatter(noise=sd)}), freedom=1e9)
+
+
+def least_squares(tests: Sequence[History], sd: float) -> tuple[np.ndarray, np.ndarray]:
+    """(ln A, n) of a power law by linear regression of ln rate on ln stress, and their covariance: textbook algebra."""
+    rows = [(1.0, float(np.log(h.loading.program().values[0]))) for h in tests for _ in h.times]
+    y = np.concatenate([h.outputs["amplitude"] - h.times / END for h in tests])
+    X = np.array(rows)
+    covariance = sd**2 * np.linalg.inv(X.T @ X)
+    return covariance @ X.T @ y / sd**2, covariance

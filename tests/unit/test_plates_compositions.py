@@ -1,0 +1,75 @@
+"""Tables of compositions: atomic per cent, classes, and what is wrong with a table."""
+
+import numpy as np
+import pytest
+
+from creepkit.errors import HistoryError
+from creepkit.plates.compositions import Compositions, atomic_percent, read_compositions
+from creepkit.plates.elements import MASSES
+
+
+def written(folder, text):
+    path = folder / "compositions.csv"
+    path.write_text(text)
+    return path
+
+
+def test_weight_becomes_atomic_per_cent_as_in_a_textbook():
+    """TiAl alloy of 64.0 wt.% Ti: Ti50Al50 by the masses 47.867 and 26.982 (50 at.% = 63.95 wt.%)."""
+    found = atomic_percent({"Ti": 100 * 47.867 / (47.867 + 26.982), "Al": 100 * 26.982 / (47.867 + 26.982)})
+    np.testing.assert_allclose([found["Ti"], found["Al"]], 50.0, rtol=1e-12)
+
+
+def test_atomic_per_cent_of_316l_against_hand_arithmetic():
+    """Fe 68, Cr 17, Ni 12, Mo 3 wt.%: moles 1.21766, .32695, .20445, .03127, in all 1.78033."""
+    found = atomic_percent({"Fe": 68.0, "Cr": 17.0, "Ni": 12.0, "Mo": 3.0})
+    expected = {"Fe": 68.395, "Cr": 18.365, "Ni": 11.484, "Mo": 1.756}
+    assert found == pytest.approx(expected, abs=2e-3)
+
+
+def test_masses_are_those_of_iupac():
+    """A few of the standard atomic weights of 2021, as printed there to five digits."""
+    told = {"Fe": 55.845, "Ni": 58.693, "Co": 58.933, "Cr": 51.996, "Mo": 95.95, "W": 183.84, "Al": 26.982, "Y": 88.906}
+    assert {name: MASSES[name] for name in told} == told
+
+
+def test_classes_follow_the_principal_element_unless_the_second_is_near():
+    table = Compositions({"a": {"Fe": 70.0, "Cr": 30.0}, "b": {"Co": 40.0, "Ni": 35.1, "Cr": 24.9}, "c": {"Ni": 100.0}})
+    assert [table.class_of(name) for name in "abcd"] == ["Fe-rich", "near-equimolar", "Ni-rich", "unknown"]
+
+
+def test_five_atomic_per_cent_apart_is_not_near():
+    assert Compositions({"a": {"Co": 40.0, "Ni": 35.0}}).class_of("a") == "Co-rich"
+
+
+def test_a_table_is_read_in_its_unit(tmp_path):
+    weights = read_compositions(written(tmp_path, "# unit: wt.%\nalloy,Ti,Al\nX,63.951,36.049\n"))
+    assert weights.atomic["X"] == pytest.approx({"Ti": 50.0, "Al": 50.0}, abs=1e-2)
+    shares = read_compositions(written(tmp_path, "# unit: at.%\nalloy,Ti,Al,Nb\nX,50,50,\n"))
+    assert shares.atomic["X"] == {"Ti": 50.0, "Al": 50.0}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("alloy,Fe,Ni\nX,50,50\n", "no line '# unit: ...'; write '# unit: wt.%' or '# unit: at.%' above the columns"),
+        ("# unit: percent\nalloy,Fe\nX,100\n", ":1: unit 'percent'; write '# unit: wt.%'"),
+        ("# unit: wt.%\nname,Fe\nX,100\n", ":2: missing column 'alloy'; found: name, Fe"),
+        ("# unit: wt.%\nalloy,Fe,Nickel\nX,50,50\n", "column 'Nickel' is no element that is known"),
+        ("# unit: wt.%\nalloy,Fe,Ni\nX,50,20\n", ":3: the elements of alloy 'X' add up to 70 %; they must make 100"),
+        ("# unit: wt.%\nalloy,Fe,Ni\nX,150,-50\n", ":3: alloy 'X' has a negative content"),
+        ("# unit: wt.%\nalloy,Fe,Ni\nX,60,40\nX,50,50\n", ":4: alloy 'X' stands there twice or has no name"),
+        ("# unit: wt.%\nalloy,Fe,Ni\nX,60,much\n", ":3: 'Ni' is 'much'; write a finite number"),
+    ],
+)
+def test_what_is_wrong_with_a_table_is_said_with_its_line(tmp_path, text, message):
+    with pytest.raises(HistoryError) as caught:
+        read_compositions(written(tmp_path, text))
+    assert message in str(caught.value)
+
+
+def test_an_alloy_that_the_table_lacks_is_named():
+    told = Compositions({"alloy 1": {"Fe": 100.0}}, "table.csv").lacking(["alloy 1", "aloy 1"])
+    assert told == (
+        "table.csv: no alloy 'aloy 1', whose class stays unknown; did you mean 'alloy 1'? (known: alloy 1)",
+    )

@@ -1,0 +1,164 @@
+"""A sum reduced to the terms that planted bulge tests need: single laws, two-term laws, paths and draws."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from one_degree import OneDegree, Plan, planted
+
+from creepkit.errors import FitError
+from creepkit.inverse.settings import Settings
+from creepkit.inverse.sparsity.choosing import Choice, chosen
+from creepkit.inverse.sparsity.path import path_of
+from creepkit.inverse.sparsity.penalised import Penalised
+from creepkit.inverse.sparsity.penalties import L2, Sqrt, Subsets
+from creepkit.inverse.sparsity.record import Sparsity
+from creepkit.inverse.sparsity.reduction import kept_of
+from creepkit.inverse.sparsity.resampling import binomial, drawn_weights, frequencies
+from creepkit.inverse.sparsity.sparse import confirmed, opened, reduced_by, sparse
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.laws.time_hardening import TIME_HARDENING
+
+EXACT = OneDegree(exact=True)
+QUICK = Settings(starts=1, draws=4, frames=24, nuisances=())
+SINE, STRAIN, TIME = COMBINED.terms
+TRUTH = {"A": 3e-14, "n": 3.5, "m": -0.4}
+
+
+@pytest.fixture(scope="module")
+def hardening():
+    """Eq. (2) opened on one test of a dimple that hardens with strain."""
+    tests = planted(STRAIN_HARDENING, TRUTH, [Plan(760, 8, 10)], seed=5, frames=24)
+    return opened(COMBINED, tests, EXACT, None, QUICK, None)
+
+
+@pytest.fixture(scope="module")
+def reduced(hardening):
+    return reduced_by(Sqrt(), *hardening)
+
+
+def test_a_planted_single_law_is_found(reduced):
+    assert reduced.sparsity.kept == (STRAIN,)
+    assert set(reduced.law.terms) == {STRAIN}
+    for name, truth in (("n_2", 3.5), ("m_1", -0.4)):
+        estimate = next(e for e in reduced.estimates if e.name == name)
+        assert estimate.value == pytest.approx(truth, abs=4 * (estimate.high - estimate.low) / 3.92)
+    assert reduced.sparsity.excess < 0
+    assert reduced.sparsity.p_value > 0.01
+
+
+def test_subsets_find_it_too(hardening):
+    choice = chosen(hardening[1], Subsets())
+    assert choice.kept == (STRAIN,)
+    assert choice.shares[STRAIN] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_squared_l2_shares_the_rate_out(hardening):
+    """What one term gives alone is given by several: the penalty is smallest at equal shares."""
+    stage = hardening[1].stage
+    x = stage.minimise(stage.start, Penalised.of(stage.objective, L2(240.0))).u
+    shares = stage.shares(x)
+    assert max(shares.values()) < max(stage.shares(stage.start).values())
+    assert len(kept_of(shares)) > 1
+
+
+def test_memory_that_is_not_there_is_switched_off():
+    """Planted Norton creep ends as strain hardening, or time hardening, of exponent zero, if not as a sinh."""
+    tests = planted(NORTON, {"A": 2e-13, "n": 3.5}, [Plan(760, 8, 10)], seed=6, frames=24)
+    fit = sparse(STRAIN_HARDENING + TIME_HARDENING, tests, EXACT, penalty=Sqrt(), settings=QUICK)
+    assert len(fit.law.terms) == 1
+    assert len(fit.law.params) == 2
+    assert fit.sparsity.off in (("m_1",), ("m_2",))
+    assert next(v for k, v in fit.values.items() if k.startswith("n")) == pytest.approx(3.5, abs=0.2)
+
+
+def test_two_terms_are_kept_where_three_pressures_need_them():
+    law = NORTON + TIME_HARDENING
+    values = {"A_1": 1.5e-20, "n_1": 6.5, "A_2": 3.3e-9, "n_2": 2.0, "m": -0.6}
+    plans = [Plan(760, P, 1.15 * P) for P in (6, 8, 10.5)]
+    tests = planted(law, values, plans, seed=7, frames=24)
+    fit = sparse(law + STRAIN_HARDENING, tests, EXACT, penalty=Sqrt(), settings=QUICK)
+    assert fit.sparsity.kept == ("power law", "time hardening")
+    assert fit.values["n_1"] == pytest.approx(6.5, abs=0.3)
+
+
+# ---- the path, and draws -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def path(hardening):
+    return path_of(hardening[1], Sqrt("auto"), strengths=(10.0, 100.0))
+
+
+def test_along_the_path_terms_go_and_misfit_grows(path):
+    assert path.strengths[0] == 0
+    assert path.kept[-1] == (STRAIN,)
+    assert (np.diff(path.chi_square) > -0.1).all()
+    assert path.kept[path.chosen] == (STRAIN,)
+    assert path.criterion[path.chosen] == 0
+    assert "<- chosen" in str(path)
+
+
+def test_the_path_is_drawn(path, tmp_path):
+    assert path.plot(tmp_path / "path.png").axes[0].get_xlabel() == "strength of the penalty"
+    assert (tmp_path / "path.png").stat().st_size > 10_000
+    with pytest.raises(FitError, match="cannot be written"):
+        path.plot(tmp_path / "path.unknown")
+
+
+def test_draws_of_frames_keep_what_the_whole_test_keeps(hardening):
+    _, reductions = hardening
+    optimum = reductions.stage.placed(reductions.of([STRAIN]).law, reductions.of([STRAIN]).x)
+    found = frequencies(reductions, Sqrt(), 24.0, optimum, repeats=2, seed=1)
+    assert found.drawn == "blocks of frames"
+    assert found.counts == {SINE: 0, STRAIN: 2, TIME: 0}
+    assert found.sets == {(STRAIN,): 2}
+    assert "kept 2 times" in str(found)
+
+
+def test_draws_weigh_all_frames_alike(hardening):
+    """Blocks that go round the end: each frame is drawn once on average."""
+    stage = hardening[1].stage
+    weights = np.mean(list(drawn_weights(stage, 2000, np.random.default_rng(0))), axis=0)
+    present = stage.objective.entries.present
+    np.testing.assert_allclose(weights[present], 1.0, atol=0.1)
+
+
+def test_intervals_of_frequencies_are_exact():
+    """Clopper and Pearson: none of n gives 1 - (.025)^(1/n)."""
+    assert binomial(0, 20) == pytest.approx((0.0, 1 - 0.025 ** (1 / 20)))
+    assert binomial(20, 20) == pytest.approx((0.025 ** (1 / 20), 1.0))
+    low, high = binomial(10, 20)
+    assert low == pytest.approx(1 - high)
+
+
+# ---- confirmation and the record -----------------------------------------------------------------------------------
+
+
+def test_a_term_that_is_needed_comes_back(hardening):
+    _, reductions = hardening
+    wrong = Choice((SINE,), {SINE: 0.6, STRAIN: 0.3, TIME: 0.1}, reductions.stage.start)
+    assert STRAIN in confirmed(reductions, wrong).kept
+
+
+def test_the_record_says_what_was_dropped_and_survives_a_file(reduced):
+    told = reduced.sparsity
+    assert "without 'hyperbolic sine' and 'time hardening' of 'combined' chi-square rises by" in told.verdict
+    assert "'strain hardening' suffices" in told.verdict
+    assert Sparsity.from_dict(json.loads(json.dumps(told.to_dict()))) == told
+    back = replace(told, proposed=())
+    assert "The penalty had dropped 'strain hardening' too" in back.verdict
+
+
+def test_one_term_is_nothing_to_choose_from():
+    tests = planted(NORTON, {"A": 2e-13, "n": 3.5}, [Plan(760)], frames=8)
+    with pytest.raises(FitError, match="law 'norton' has one term, 'power law', and a penalty chooses among terms"):
+        sparse(NORTON, tests, EXACT, penalty=Sqrt())
+
+
+def test_the_largest_term_stays_whatever_the_least_share():
+    assert kept_of({"a": 0.6, "b": 0.04}) == ("a",)
+    assert kept_of({"a": 0.03, "b": 0.04}) == ("b",)
