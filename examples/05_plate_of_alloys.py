@@ -60,7 +60,7 @@ print("\nplanted (down), identified (across)\n" + " " * 18 + "".join(f"{law:>18}
 for law in laws:
     print(f"{law:18}" + "".join(f"{confusion[law, found]:18d}" for found in laws))
 right = sum(planted.truth[name].law == answer.best.law.name for name, answer in told.items())
-inside = sum(planted.truth[name].law in answer.set for name, answer in told.items())
+inside = sum(planted.truth[name].law in answer.remaining for name, answer in told.items())
 sure = [name for name, answer in told.items() if answer.decisive]
 wrong = sum(planted.truth[name].law != told[name].best.law.name for name in sure)
 print(

@@ -12,6 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from creepkit import errors as errors
+    from creepkit.inverse.search.evolution import CmaEs as CmaEs
+    from creepkit.inverse.search.multistart import MultiStart as MultiStart
+    from creepkit.inverse.search.swarm import ParticleSwarm as ParticleSwarm
+    from creepkit.inverse.settings import PAPER_WEIGHTS as PAPER_WEIGHTS
+    from creepkit.inverse.sparsity.penalties import L2 as L2
+    from creepkit.inverse.sparsity.penalties import GroupL2 as GroupL2
+    from creepkit.inverse.sparsity.penalties import Sqrt as Sqrt
+    from creepkit.inverse.sparsity.penalties import Subsets as Subsets
     from creepkit.kernels import lower as lower
     from creepkit.language import CreepLaw as CreepLaw
     from creepkit.language import Elastic as Elastic
@@ -33,6 +41,8 @@ if TYPE_CHECKING:
     from creepkit.records import Units as Units
     from creepkit.records import constant_strain as constant_strain
     from creepkit.records import constant_stress as constant_stress
+    from creepkit.study import confirm as confirm
+    from creepkit.study import discover as discover
     from creepkit.study import export as export
     from creepkit.study import exporters as exporters
     from creepkit.study import generate as generate
@@ -45,12 +55,14 @@ if TYPE_CHECKING:
     from creepkit.study import rate_family as rate_family
     from creepkit.study import read_dataset as read_dataset
     from creepkit.study import read_histories as read_histories
+    from creepkit.study import screen as screen
     from creepkit.study import select as select
     from creepkit.study import simulate as simulate
     from creepkit.study import specimen as specimen
     from creepkit.study import specimens as specimens
     from creepkit.study import surrogate as surrogate
     from creepkit.study import suspects as suspects
+    from creepkit.study import temperature_study as temperature_study
     from creepkit.study import train as train
     from creepkit.study import with_suspects_marked as with_suspects_marked
     from creepkit.surrogate.parameter_gru import ParameterGru as ParameterGru
@@ -60,12 +72,18 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOMES = {
+    "creepkit.inverse.search.evolution": "CmaEs",
+    "creepkit.inverse.search.multistart": "MultiStart",
+    "creepkit.inverse.search.swarm": "ParticleSwarm",
+    "creepkit.inverse.settings": "PAPER_WEIGHTS",
+    "creepkit.inverse.sparsity.penalties": "GroupL2 L2 Sqrt Subsets",
     "creepkit.kernels": "lower",
     "creepkit.language": "CreepLaw Elastic Param State activated arrhenius exponential inverse linear wachtman",
     "creepkit.records": "History Nuisance PointLoading PressureJump Program StrainSteps StressSteps Units "
     "constant_strain constant_stress",
-    "creepkit.study": "export exporters generate identify law laws load moduli rank rate_family read_dataset "
-    "read_histories select simulate specimen specimens surrogate suspects train with_suspects_marked",
+    "creepkit.study": "confirm discover export exporters generate identify law laws load moduli rank rate_family "
+    "read_dataset read_histories screen select simulate specimen specimens surrogate suspects temperature_study train "
+    "with_suspects_marked",
     "creepkit.surrogate.parameter_gru": "ParameterGru",
     "creepkit.surrogate.rate_net": "RateNet",
     "creepkit.surrogate.recipe": "Training",

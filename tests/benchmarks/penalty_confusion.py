@@ -20,6 +20,7 @@ identification. What rows share, the fits of the whole sum and of each term alon
 """
 
 import argparse
+import sys
 import time
 
 import numpy as np
@@ -145,6 +146,7 @@ def main():
             test = specimen(name, k)
             for label, row in rows_of(test, law, model, settings, given.penalties):
                 found[label].append((name, *row))
+                print(f"{test.name}, {label}: {row[0]}, terms left {row[1]}", file=sys.stderr, flush=True)
     for label, rows in found.items():
         penalty, search = PENALTIES[label]
         strength = f", strength {penalty.strength}" if hasattr(penalty, "strength") else ""

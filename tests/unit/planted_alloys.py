@@ -1,10 +1,13 @@
 """Small planted alloys whose tests cost next to nothing: bars at several stresses, and made-up bulge histories."""
 
+import os
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from creepkit import study
 from creepkit.language import Elastic
-from creepkit.records import History, PressureJump, constant_stress
+from creepkit.records import History, PressureJump, Status, constant_stress
 
 TIMES = np.geomspace(60.0, 2e5, 40)
 NORTON = {"A": 2e-16, "n": 4.6}
@@ -20,6 +23,35 @@ def _bar(name, alloy, stress, values, rng):
     run = study.simulate("norton", "uniaxial", values, loading=constant_stress(stress, control="stress"), times=TIMES)
     noisy = run.outputs["strain"] * (1.0 + 0.02 * rng.standard_normal(TIMES.size))
     return History(name, TIMES, {"strain": noisy}, run.loading, run.temperature, "uniaxial", alloy=alloy)
+
+
+@dataclass(frozen=True)
+class Deadly:
+    """A predictor that takes its process with it."""
+
+    name: str = "deadly"
+    outputs: tuple[str, ...] = ("strain",)
+
+    def predict(self, law, values, histories, *, jacobian=False, effects=None):
+        os._exit(3)
+
+
+@dataclass(frozen=True)
+class Doubting:
+    """A stand-in for bars that creeps a little too much and doubts whatever it says."""
+
+    excess: float = 0.0
+    name: str = "doubting"
+    outputs: tuple[str, ...] = ("strain",)
+
+    @property
+    def specimen(self):
+        return study.specimen("uniaxial")
+
+    def predict(self, law, values, histories, *, jacobian=False, effects=None):
+        found = self.specimen.predict(law, values, histories, jacobian=jacobian, effects=effects)
+        outside = np.full_like(found.status, int(Status.OUTSIDE_DOMAIN))
+        return replace(found, values=(1.0 + self.excess) * found.values, status=outside)
 
 
 def bulge(name="dimple", alloy="", rise=0.2, noise=0.0015, outputs=("amplitude", "width", "shape"), seed=0):

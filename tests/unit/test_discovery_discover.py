@@ -6,12 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from steady import Steady, planted
+from typer.testing import CliRunner
 
 from creepkit import study
+from creepkit.cli.app import app
 from creepkit.discovery.discover import discover
 from creepkit.discovery.refitting import refit
 from creepkit.discovery.temperature_study import grouped, temperature_study
 from creepkit.errors import FitError
+from creepkit.inverse.coordinates import Coordinates, Reference
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import Settings
 from creepkit.kernels import lower
@@ -123,6 +126,48 @@ def test_a_study_groups_tests_and_finds_the_same(tests, trend):
     assert "Norton power law (PL), arrhenius in temperature" in str(found)
 
 
+def test_a_form_is_where_it_should_be_at_its_reference_temperature():
+    coordinates = Coordinates(TRUE, Reference(100.0, 0.01, 7e3, T_REF))
+    theta = np.array([np.log(1.5e-16), 4.6, -8e-3, 4.2e5])
+    assert np.allclose(coordinates.theta(coordinates.u(theta)), theta, rtol=1e-12)
+    assert np.isfinite(coordinates.jacobian(coordinates.u(theta))).all()
+
+
+# ---- the command ---------------------------------------------------------------------------------------------------
+
+
+def test_the_command_on_saved_identifications(alone, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for k, fit in enumerate(alone):
+        fit.save(tmp_path / f"{k}.json")
+    files = [f"{k}.json" for k in range(len(alone))]
+    forms = ["--form", "A=arrhenius", "--form", "n=constant,linear", "--prior", "n:linear=2"]
+    told = CliRunner().invoke(app, ["discover", *files, *forms, "--json", "--to", "out"])
+    assert told.exit_code == 0, told.output
+    answer = json.loads(told.stdout)
+    assert answer["forms"] == {"A": "arrhenius", "n": "linear"}
+    assert answer["judged_by"] == "points"
+    names = {"temperature.json", "temperature.png", "law.tex", "law.py"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == names
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["--form", "n"], "--form n is not known; write n=constant,linear"),
+        (["--form", "q=linear"], "has no parameter 'q'"),
+        (["--prior", "A:arrhenius=much"], "write A:arrhenius=10"),
+    ],
+)
+def test_the_command_says_what_is_wrong(alone, tmp_path, monkeypatch, given, said):
+    monkeypatch.chdir(tmp_path)
+    for k, fit in enumerate(alone):
+        fit.save(tmp_path / f"{k}.json")
+    told = CliRunner().invoke(app, ["discover", *(f"{k}.json" for k in range(len(alone))), *given])
+    assert told.exit_code == 1
+    assert said in told.stderr
+
+
 # ---- what cannot be known ------------------------------------------------------------------------------------------
 
 
@@ -180,13 +225,13 @@ def test_a_dimple_at_three_temperatures_through_the_surrogate():
     tests = []
     for T in (973.15, 1033.15, 1083.15):
         run = study.simulate(
-            law, model, truth, loading=PressureJump(8.0, 10.0, 7200.0), times=np.arange(900.0, 14401.0, 900.0),
+            law, model, truth, loading=PressureJump(8.0, 10.0, 7200.0), times=np.arange(1200.0, 14401.0, 1200.0),
             temperature=T, elastic=Elastic(E=100e3), name=f"{T:.0f} K",
         )  # fmt: skip
         noisy = {name: value + sd[name] * rng.normal(size=value.size) for name, value in run.outputs.items()}
         known = {name: np.full(run.times.size, s) for name, s in sd.items()}
         tests.append(run.replace(outputs=noisy, standard_deviation=known))
-    settings = Settings(starts=1, draws=16, frames=12, nuisances=())
+    settings = Settings(starts=1, draws=8, frames=12, nuisances=())
     fits = [identify(NORTON, [test], model, settings=settings) for test in tests]
     trend = discover(fits, forms={"A": ("arrhenius",), "n": ("constant", "linear")}, histories=tests, settings=settings)
     assert trend.forms == {"A": "arrhenius", "n": "constant"}

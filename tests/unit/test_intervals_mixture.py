@@ -1,6 +1,7 @@
 """Mixtures over laws, and bands over an uncertain temperature, against closed forms."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -67,6 +68,17 @@ def test_two_laws_that_disagree_widen_the_interval(fit):
     r = fit.reference.stress
     assert mixture.rate(r) == pytest.approx(np.array(fit.rate(r)), rel=1e-6)
     assert "norton (0.5), norton (0.5)" in str(mixture)
+
+
+def test_a_ranking_is_a_mixture_of_its_laws(fit):
+    other = replace(fit, u=fit.u + np.array([0.0, 3.0]))
+    weighed = [SimpleNamespace(fit=fit, weight=0.75), SimpleNamespace(fit=other, weight=0.25)]
+    ranking = SimpleNamespace(laws=[*weighed, SimpleNamespace(fit=None, weight=0.0)])
+    found = Mixture.of(ranking)
+    assert found.weights == (0.75, 0.25)
+    sd = float(np.sqrt(fit.covariance[1, 1]))
+    assert float(found.local_exponent(60.0)[1]) == pytest.approx(fit.u[1] + sd * norm.ppf(0.025 / 0.75), abs=1e-4)
+    assert rate_band(ranking, [60.0], 1000.0, plus_minus=0.0).low == pytest.approx(found.rate([60.0])[1])
 
 
 def test_weights_must_make_sense(fit):

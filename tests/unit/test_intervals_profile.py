@@ -11,10 +11,12 @@ from steady import Steady, planted
 
 from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
+from creepkit.inverse.intervals.opening import opened
 from creepkit.inverse.intervals.profile import profile
 from creepkit.inverse.intervals.quantities import Quantity, exponent_at, rate_at
 from creepkit.inverse.settings import Settings
 from creepkit.laws.norton import NORTON
+from creepkit.records import Nuisance
 
 TRUTH = {"A": float(np.exp(-15.0 - 4.0 * np.log(50.0))), "n": 4.0}
 SD = 0.2
@@ -93,6 +95,18 @@ def test_ends_at_the_laws_bounds_are_said_to_be_open():
     assert "not bounded below within the law's bounds" in str(found)
     closed = profile(fit, rate_at(50.0))
     assert closed.low < 1e-16 * 50**5.2 < closed.high
+
+
+def test_scatter_between_few_tests_counts_as_in_laplaces_intervals():
+    """Five tests and two parameters: the variance of their rates is 5/3 of what maximum likelihood says."""
+    conditions = [(s, 1000.0) for s in (30.0, 50.0, 80.0, 40.0, 60.0)]
+    tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, conditions, seed=5, rate=0.2, noise=1e-5)
+    fit = identify(NORTON, tests, Steady(), settings=Settings(starts=3, draws=16, frames=20))
+    assert opened(fit).scatter.rate == pytest.approx(fit.scatter.rate * np.sqrt(5 / 3))
+    found = profile(fit, "n")
+    assert found.high - found.low == pytest.approx(found.laplace[1] - found.laplace[0], rel=0.2)
+    known = replace(fit, settings=replace(fit.settings, nuisances=(Nuisance("offset"), Nuisance("rate", sd=0.2))))
+    assert opened(known).scatter.rate == fit.scatter.rate
 
 
 def test_an_interval_cut_by_a_bound_is_open_on_that_side(tests):

@@ -8,12 +8,15 @@ import pytest
 from log_rates import LogRates, known_scatter, least_squares, measured
 from scipy.stats import norm
 from scipy.stats import t as student
+from steady import Steady, planted
 
 from creepkit.errors import FitError
+from creepkit.inverse.identify import identify
 from creepkit.inverse.intervals.posterior import Posterior
 from creepkit.inverse.intervals.quantities import exponent_at, rate_at
 from creepkit.inverse.intervals.sampling import sample
 from creepkit.inverse.problem import reopened
+from creepkit.inverse.settings import Settings
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance
 
@@ -67,6 +70,21 @@ def test_poorly_known_scatter_widens_them(fit, tests):
     found = sample(replace(fit, freedom=4.0), walkers=32, steps=500, seed=4)
     half = student.ppf(0.975, 4.0) * np.sqrt(covariance[1, 1])
     assert found.interval("n") == pytest.approx((best[1], best[1] - half, best[1] + half), abs=0.15 * half)
+
+
+def test_rates_that_scatter_between_tests_count_once_a_test():
+    """ln rate of 12 tests on ln stress is a regression: the slope's standard error is sd / sqrt(sum of squares)."""
+    stresses = np.geomspace(30.0, 80.0, 12)
+    tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(s, 1000.0) for s in stresses], seed=5, rate=0.2, noise=1e-5)
+    fit = identify(NORTON, tests, Steady(), settings=Settings(starts=3, draws=16, frames=12))
+    x = np.log(stresses)
+    y = np.array([np.log(h.outputs["strain"][-1] / h.times[-1]) for h in tests])
+    slope, level = np.polyfit(x, y, 1)
+    sd = np.sqrt(((y - level - slope * x) ** 2).sum() / 10)
+    half = student.ppf(0.975, 10) * sd / np.sqrt(((x - x.mean()) ** 2).sum())
+    assert sample(fit, walkers=16, steps=400, seed=1).interval("n") == pytest.approx(
+        (slope, slope - half, slope + half), abs=0.2 * half
+    )
 
 
 def test_a_bound_cuts_the_posterior(tests):

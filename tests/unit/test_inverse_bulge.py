@@ -273,7 +273,7 @@ def test_the_plot_has_amplitudes_residuals_and_rates(fit, tmp_path):
 
 def test_what_means_nothing_is_refused_in_one_sentence(tests):
     with pytest.raises(FitError, match="'thickness' is a length in mm and needs its prior mean, such as mean=0.4935"):
-        Settings(nuisances=(Nuisance("thickness", sd=0.02),))
+        Settings(nuisances=(Nuisance("thickness", sd=0.02, scope="all"),))
     with pytest.raises(FitError, match="its mean 0.5 lies outside its bounds"):
         Settings(nuisances=(Nuisance("thickness", mean=0.5, bounds=(0.6, 0.7)),))
     with pytest.raises(FitError, match="nuisance 'offset' is given twice"):

@@ -6,7 +6,7 @@ import dataclasses
 import h5py
 import numpy as np
 import pytest
-from planted_alloys import NORTON, bars, bulge
+from planted_alloys import NORTON, Deadly, Doubting, bars, bulge
 
 from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.settings import Settings
@@ -14,6 +14,7 @@ from creepkit.plates import files
 from creepkit.plates.compositions import Compositions
 from creepkit.plates.screening import screen
 from creepkit.readers.writing import write_history
+from creepkit.study import specimen
 
 QUICK = Settings(starts=2, draws=16)
 COMPOSITIONS = Compositions({"X": {"Fe": 70.0, "Cr": 30.0}, "Y": {"Ni": 40.0, "Co": 38.0, "Cr": 22.0}})
@@ -68,12 +69,41 @@ def test_the_numbers_file_holds_tests_and_covariances(plate, tmp_path):
 
 def test_pictures_are_drawn_of_what_there_is(plate, tmp_path):
     assert [path.name for path in plate.plot(tmp_path / "pictures")] == ["laws.png", "misfit.png"]
+    plate["X"].best.plot(tmp_path / "X.png")
+    assert (tmp_path / "X.png").stat().st_size > 10_000
 
 
 def test_text_says_shares_and_failures(plate):
     told = str(plate)
     assert "2 of 2 alloys identified" in told
     assert "near-equimolar (1): norton" in told
+
+
+def test_a_confirmation_that_fails_is_a_note_and_no_failure(monkeypatch):
+    def fail(fit, tests, using):
+        raise FitError("the mesh is torn")
+
+    monkeypatch.setattr("creepkit.plates.one_alloy.confirm", fail)
+    found = screened(TWO[:3], confirm=True)["X"]
+    assert found.identified
+    assert "not confirmed: the mesh is torn" in found.notes
+
+
+def test_confirmed_by_the_specimen_itself():
+    found = screened(TWO[:3], confirm=True)["X"]
+    assert found.confirmation.holds
+    assert found.confirmation.distance == 0.0
+    assert screened(TWO[:3])["X"].confirmation is None
+
+
+@pytest.mark.parametrize(("excess", "holds"), [(0.0, True), (0.5, False)])
+def test_where_a_guard_doubts_the_specimen_is_asked(excess, holds):
+    """A stand-in that is off by half of every strain is found out, one that is right is confirmed."""
+    found = screened(TWO[:3], using=Doubting(excess))
+    assert found["X"].confirmation.holds is holds
+    assert found["X"].confirmation.using == "uniaxial"
+    assert ("X: not confirmed: uniaxial differs from the fit by" in str(found)) is not holds
+    assert screened(TWO[:3], using=Doubting(excess), confirm=False)["X"].confirmation is None
 
 
 # ---- kept, and done again ------------------------------------------------------------------------------------------
@@ -126,15 +156,18 @@ def test_a_damaged_answer_is_worked_out_again(tmp_path, caplog):
 
 def test_names_that_are_no_file_names_still_have_their_own_files(tmp_path):
     screened([*bars("a/b"), *bars("a:b")], to=tmp_path)
-    names = sorted(path.name for path in tmp_path.iterdir())
+    names = sorted(path.name for path in tmp_path.glob("*.json"))
     assert len(names) == 2
     assert all(name.startswith("a-b_") for name in names)
 
 
-def test_worker_processes_find_what_this_one_finds(tmp_path):
-    apart, here = screened(TWO, workers=2), screened(TWO)
-    for alloy in ("X", "Y"):
-        assert apart[alloy].best.values == here[alloy].best.values
+def test_workers_find_what_this_process_finds_and_one_that_dies_costs_one_alloy():
+    deadly = [h.replace(specimen="deadly") for h in bars("D")]
+    apart = screened([*deadly, *TWO[:3]], using={"uniaxial": specimen("uniaxial"), "deadly": Deadly()}, workers=2)
+    assert apart.failed == {
+        "D": "its worker process died 2 times, the last time by exit code 3; is there memory enough?"
+    }
+    assert apart["X"].best.values == screened(TWO[:3])["X"].best.values
 
 
 # ---- bad input -----------------------------------------------------------------------------------------------------

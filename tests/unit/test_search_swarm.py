@@ -187,6 +187,16 @@ def test_minima_are_the_best_of_each_subset_and_more_terms_fit_no_worse():
     assert costs[()] < min(costs[(HARDENING,)], costs[(POWER,)])
 
 
+def test_of_subsets_that_fit_alike_the_simplest_comes_first():
+    """Data without waves of a single term: the sum of both is not better by more than its bottom allows."""
+    flat = Known(
+        lambda u: 0.5 * np.exp(u[:, 2]) + (u[:, 0] - 1) ** 2 + 0.01 * (u[:, 1] - 3) ** 2, BOX, law=SUM, rates=(0, 2)
+    )
+    found = CAREFUL.minima(flat).minima
+    assert found[0].off == (HARDENING,)
+    assert found[0].cost == pytest.approx(0.0, abs=1e-4)
+
+
 def test_what_is_off_rests_at_the_bottom_of_its_rate():
     found = CAREFUL.minima(planted(POWER)).minima[0]
     assert found.off == (HARDENING,)

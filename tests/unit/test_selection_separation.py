@@ -7,16 +7,19 @@ from planted_bars import BAR, SPL, bars
 
 from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
+from creepkit.inverse.selection import rank
 from creepkit.inverse.selection.designs import designs
-from creepkit.inverse.selection.separation import what_separates
+from creepkit.inverse.selection.separation import further_tests, what_separates
 from creepkit.inverse.settings import Settings
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import PressureJump, StressSteps, constant_strain, constant_stress
+from creepkit.specimens.bulge import Bulge
 
 TRUTH = {"A": float(np.exp(-15.0 - 5.0 * np.log(50.0))), "n": 5.0}
 SD = 0.2
+APEX = Bulge().geometry.apex_thickness
 LIKELY = Settings(starts=4, draws=32, weights="likelihood", nuisances=())
 
 
@@ -69,6 +72,13 @@ def test_a_change_of_stress_separates_hardening_by_strain_from_hardening_by_time
     assert str(found).startswith("if strain-hardening holds, time-hardening is worse by an expected chi-square of")
 
 
+def test_the_best_law_of_a_ranking_is_set_against_the_others_that_remain(hardening):
+    found = further_tests(rank(hardening))
+    assert len(found) == 1
+    assert {found[0].true, found[0].other} == {"strain-hardening", "time-hardening"}
+    assert found[0].tests[0].chi_square > 1000
+
+
 def test_what_bursts_at_once_is_left_out(hardening):
     far = constant_stress(4000.0, "stress")
     plan = hardening[0].histories[0].replace(loading=far, name="far too much")
@@ -105,6 +115,9 @@ def test_variations_of_bulge_tests_change_pressure_and_thickness():
     assert any("a constant 14 MPa" in t for t in told)
     assert any("8 MPa, from" in t and "on 14 MPa" in t for t in told)
     assert {d.history.geometry["apex_thickness"] for d in found} == {0.5, 0.45, 0.55}
+    bare = bulge.replace(geometry={})
+    assert len(designs([bare])) == len(found) - 2
+    assert {d.history.geometry["apex_thickness"] for d in designs([bare], using=Bulge())} >= {0.9 * APEX, 1.1 * APEX}
 
 
 def test_variations_of_relaxation_change_the_strain_and_others_are_asked_for():

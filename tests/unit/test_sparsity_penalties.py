@@ -1,5 +1,7 @@
 """Penalties on contributions: where they are smallest, and that least squares sees what they are."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -8,7 +10,7 @@ from test_sparsity_contributions import bar, contributions, internal
 
 from creepkit.errors import FitError
 from creepkit.inverse.sparsity.penalised import Penalised, exponents_of
-from creepkit.inverse.sparsity.penalties import L2, GroupL2, Sqrt
+from creepkit.inverse.sparsity.penalties import L2, GroupL2, Sqrt, Subsets, check_penalty
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 
@@ -122,3 +124,13 @@ def test_a_strength_is_a_number_or_auto(strength, told):
     with pytest.raises(FitError, match=told):
         L2(strength)
     assert Sqrt("auto").strength == "auto"
+
+
+@pytest.mark.parametrize(
+    ("penalty", "told"), [(L2, "penalty is L2; write L2()"), ("L2", "penalty is 'L2'"), (3.0, "3.0")]
+)
+def test_a_penalty_is_a_record(penalty, told):
+    with pytest.raises(FitError, match=re.escape(told)):
+        check_penalty(penalty)
+    for good in (*EVERY, Subsets()):
+        check_penalty(good)

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from creepkit.inverse.sparsity.penalised import Penalised
 from creepkit.inverse.sparsity.penalties import L2, Sqrt, Subsets
 from creepkit.inverse.sparsity.record import Sparsity
 from creepkit.inverse.sparsity.reduction import kept_of
-from creepkit.inverse.sparsity.resampling import binomial, drawn_weights, frequencies
+from creepkit.inverse.sparsity.resampling import binomial, drawn_weights, frequencies, weighted
 from creepkit.inverse.sparsity.sparse import confirmed, opened, reduced_by, sparse
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
@@ -79,8 +80,8 @@ def test_two_terms_are_kept_where_three_pressures_need_them():
     law = NORTON + TIME_HARDENING
     values = {"A_1": 1.5e-20, "n_1": 6.5, "A_2": 3.3e-9, "n_2": 2.0, "m": -0.6}
     plans = [Plan(760, P, 1.15 * P) for P in (6, 8, 10.5)]
-    tests = planted(law, values, plans, seed=7, frames=24)
-    fit = sparse(law + STRAIN_HARDENING, tests, EXACT, penalty=Sqrt(), settings=QUICK)
+    tests = planted(law, values, plans, seed=7, frames=12)
+    fit = sparse(law, tests, EXACT, penalty=Sqrt(), settings=QUICK)
     assert fit.sparsity.kept == ("power law", "time hardening")
     assert fit.values["n_1"] == pytest.approx(6.5, abs=0.3)
 
@@ -125,6 +126,22 @@ def test_draws_weigh_all_frames_alike(hardening):
     weights = np.mean(list(drawn_weights(stage, 2000, np.random.default_rng(0))), axis=0)
     present = stage.objective.entries.present
     np.testing.assert_allclose(weights[present], 1.0, atol=0.1)
+
+
+def test_of_several_tests_whole_ones_are_drawn():
+    """As many as there are, each as likely as another; all entries of a test together."""
+    entries = SimpleNamespace(present=np.ones((5, 7), bool), frame=np.tile(np.arange(7), (5, 1)))
+    stage = SimpleNamespace(objective=SimpleNamespace(entries=entries))
+    drawn = np.array(list(drawn_weights(stage, 2000, np.random.default_rng(0))))
+    assert (drawn == drawn[:, :, :1]).all()
+    np.testing.assert_array_equal(drawn[:, :, 0].sum(axis=1), 5)
+    np.testing.assert_allclose(drawn.mean(axis=0), 1.0, atol=0.1)
+
+
+def test_frames_drawn_twice_count_twice(hardening):
+    stage = hardening[1].stage
+    twice = weighted(stage, np.full(stage.objective.entries.present.shape, 2.0))
+    assert twice.misfit(stage.start) == pytest.approx(2 * stage.misfit(stage.start))
 
 
 def test_intervals_of_frequencies_are_exact():

@@ -57,7 +57,7 @@ def test_everything_is_written(plate):
     folder, alloy, _ = plate
     written = {str(path.relative_to(folder / "screened")) for path in (folder / "screened").rglob("*.*")}
     pictures = {f"pictures/{name}.png" for name in ("histories", "laws", "parity")}
-    assert written == {f"{alloy}.json", "Flat.json", "plate.csv", "plate.h5", *pictures}
+    assert written == {f"{alloy}.json", "Flat.json", f"fits/{alloy}.json", "plate.csv", "plate.h5", *pictures}
 
 
 def test_what_is_done_is_not_done_again(plate):

@@ -112,13 +112,15 @@ def _penalty(name: str | None) -> Penalty | Subsets | None:
     from creepkit.errors import FitError
     from creepkit.inverse.sparsity.penalties import L2, GroupL2, Sqrt, Subsets
 
-    if name is None:
-        return None
-    known: dict[str, Callable[[], Penalty | Subsets]] = {}
-    known |= {"sqrt": Sqrt, "group-l2": GroupL2, "l2": L2, "subsets": Subsets}
-    if name not in known:
+    known: dict[str, Callable[[], Penalty | Subsets]] = {
+        "sqrt": Sqrt,
+        "group-l2": GroupL2,
+        "l2": L2,
+        "subsets": Subsets,
+    }
+    if name is not None and name not in known:
         raise FitError(f"--penalty {name} is not known; allowed are {', '.join(known)}")
-    return known[name]()
+    return None if name is None else known[name]()
 
 
 def _choice(text: str) -> bool | Literal["when in doubt"]:

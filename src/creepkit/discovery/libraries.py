@@ -104,6 +104,10 @@ def candidates(
     kept = [one for one in found if one.name in wanted]
     if not kept:
         raise FitError(f"none of the forms {', '.join(wanted)} suits parameter '{parameter}' of law '{law.name}'")
+    for name in prior or {}:
+        if name not in {one.name for one in kept}:
+            told = nearest(name, [one.name for one in kept])
+            raise FitError(f"prior odds are given for '{name}', no form that parameter '{parameter}' may take: {told}")
     return _with_odds(kept, rate, prior or {})
 
 

@@ -25,6 +25,10 @@ from creepkit.records import EXPLICIT, History, Nuisance, Prediction, Predictor
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from creepkit.inverse.intervals.correlation import Correlation
+    from creepkit.inverse.intervals.profile import Profile
+    from creepkit.inverse.intervals.quantities import Quantity
+    from creepkit.inverse.intervals.sampling import Samples
     from creepkit.inverse.restricted import Linear
     from creepkit.inverse.search.trace import Trace
     from creepkit.inverse.sparsity.record import Sparsity
@@ -171,9 +175,7 @@ class Identification:
             return known if known is not None else n.mean if using is None else prior_mean(n, history, using)
 
         return {
-            n.kind: np.array([[of(n, h) for h in histories]])
-            for n in self.settings.nuisances
-            if n.kind in EXPLICIT
+            n.kind: np.array([[of(n, h) for h in histories]]) for n in self.settings.nuisances if n.kind in EXPLICIT
         }
 
     def on(self, histories: Sequence[History], using: Predictor) -> Identification:
@@ -183,6 +185,30 @@ class Identification:
         if missing:
             raise FitError(f"this identification was made from '{missing[0]}', which is not among the histories given")
         return replace(self, histories=tuple(by_name[m.name] for m in self.misfits), using=using)
+
+    def profile(self, of: str | Quantity, *, level: float = 0.95) -> Profile:
+        """Profile likelihood of a parameter, or of another quantity (see inverse.intervals.quantities)."""
+        from creepkit.inverse.intervals.profile import profile
+
+        return profile(self, of, level=level)
+
+    def sample(self, *, walkers: int = 32, steps: int = 1000, seed: int = 0, using: Predictor | None = None) -> Samples:
+        """Draw from the posterior by Markov chains (emcee, an optional dependency); `using` may be a surrogate."""
+        from creepkit.inverse.intervals.sampling import sample
+
+        return sample(self, walkers=walkers, steps=steps, seed=seed, using=using)
+
+    def correlation(self, frame: Literal["author", "conditioned"] = "author") -> Correlation:
+        """How estimates hang together, of the author's parameters or of the conditioned coordinates."""
+        from creepkit.inverse.intervals.correlation import correlation
+
+        return correlation(self, frame)
+
+    def undetermined(self) -> tuple[str, ...]:
+        """What these tests do not determine, and which combination they do, one sentence each."""
+        from creepkit.inverse.intervals.correlation import undetermined
+
+        return undetermined(self)
 
     def save(self, path: str | Path) -> Path:
         """Write the identification as JSON (to a temporary name, then renamed)."""

@@ -71,6 +71,8 @@ def identify(
             begun = Begun([problem.box.clip(np.asarray(start, float))], 0, None)
         else:
             begun = _searched(problem, through, search or MultiStart(), progress)
+        if begun.off:
+            return _without_terms(problem, begun, progress)
         before = {(n.kind, n.member): n.value for n in known}
         ends = _refined(problem, begun, through, before, start is not None, progress)
         best = max(ends, key=lambda end: end.likelihood)
@@ -88,11 +90,25 @@ def _force(best: Fitted) -> Floats:
 
 
 class Begun(NamedTuple):
-    """Where a search left off: starts, candidates it asked for, and its trace."""
+    """Where a search left off: starts, candidates asked for, its trace, and terms that its best minimum is without."""
 
     starts: list[Floats]
     evaluations: int
     trace: Trace | None
+    off: tuple[str, ...] = ()
+
+
+def _without_terms(problem: Problem, begun: Begun, progress: Progress | None) -> Identification:
+    """The answer for what the search left of a sum: a term that is off must not come back as a small one."""
+    objective = problem.objective
+    rest = objective.law.without(*begun.off)
+    live = [objective.law.names.index(name) for name in rest.names]
+    fit = identify(
+        rest, problem.histories, objective.using, settings=problem.settings, start=begun.starts[0][live],
+        reference=objective.coordinates.reference, progress=progress,
+    )  # fmt: skip
+    told = f"the search left out {' and '.join(begun.off)} of law '{objective.law.name}'"
+    return replace(fit, trace=begun.trace, notes=(*fit.notes, told))
 
 
 def _searched(problem: Problem, through: Predictor | None, search: Search, progress: Progress | None) -> Begun:
@@ -101,7 +117,7 @@ def _searched(problem: Problem, through: Predictor | None, search: Search, progr
     landscape = problem.landscape(screening_of(first) or first)
     found = search.minima(landscape, progress)
     kept = distinct(found.minima, problem.box)
-    return Begun([m.u for m in kept], landscape.objective.evaluations, found.trace)
+    return Begun([m.u for m in kept], landscape.objective.evaluations, found.trace, kept[0].off)
 
 
 def _refined(

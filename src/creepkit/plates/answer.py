@@ -13,7 +13,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.confirm import Confirmation
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection import CREDIBLE, DECISIVE
-from creepkit.plates.alloys import Alloy
+from creepkit.records import History, Predictor
 
 Outputs: TypeAlias = Mapping[str, Floats]
 """{output: (frames,)} of one test."""
@@ -73,7 +73,7 @@ class AlloyAnswer:
         return len(self.laws) > 1 and self.laws[0].weight > DECISIVE
 
     @property
-    def set(self) -> tuple[str, ...]:
+    def remaining(self) -> tuple[str, ...]:
         """Names of the laws that the tests cannot rule out, best first."""
         return tuple(w.fit.law.name for k, w in enumerate(self.laws) if k == 0 or w.weight > CREDIBLE)
 
@@ -82,10 +82,11 @@ class AlloyAnswer:
         """What is set against the dense law: the one a penalty left, else the best of all."""
         return self.best if self.sparse is None else self.sparse
 
-    def with_tests(self, alloy: Alloy) -> AlloyAnswer:
-        """The same with the tests attached to every identification, for plots."""
-        laws = tuple(replace(w, fit=replace(w.fit, histories=alloy.tests)) for w in self.laws)
-        return replace(self, laws=laws)
+    def on(self, tests: tuple[History, ...], using: Predictor) -> AlloyAnswer:
+        """The same with its tests and predictor attached to every identification, for predictions and plots."""
+        laws = tuple(replace(w, fit=w.fit.on(tests, using)) for w in self.laws)
+        dense, sparse = (None if fit is None else fit.on(tests, using) for fit in (self.dense, self.sparse))
+        return replace(self, laws=laws, dense=dense, sparse=sparse)
 
 
 def loss(fit: Identification) -> float:

@@ -68,10 +68,10 @@ def using_given(given: Predictor | str | Mapping[str, Predictor] | None, histori
     return Together(dict(given)) if isinstance(given, Mapping) else given
 
 
-def folder_made(folder: Path) -> Path:
-    """The folder, which is there from now on."""
+def folder_made(folder: Path, inner: str) -> Path:
+    """The folder, which is there from now on, and one inside it."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        (folder / inner).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FitError(f"{folder}: cannot be made ({error.strerror}); name another folder for the answers") from None
     return folder

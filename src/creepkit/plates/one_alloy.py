@@ -43,7 +43,7 @@ def _identified(work: Screening, alloy: Alloy) -> AlloyAnswer:
     dense = sparse = None
     if work.dense is not None:
         dense, sparse = _without_sparsity(work, work.dense, alloy, found)
-    confirmation = _confirmed(work, best, alloy.tests)
+    confirmation = _confirmed(work, best, alloy, found)
     predictor = work.using if confirmation is None else specimen_behind(work.using)
     return AlloyAnswer(
         alloy.name,
@@ -74,11 +74,15 @@ def _without_sparsity(
         return None, None
 
 
-def _confirmed(work: Screening, best: Identification, tests: Sequence[History]) -> Confirmation | None:
-    """The finite element run of the best law, where it is asked for or in doubt."""
+def _confirmed(work: Screening, best: Identification, alloy: Alloy, found: list[str]) -> Confirmation | None:
+    """The finite element run of the best law, where it is asked for or in doubt; that it failed is a note."""
     if work.confirm is False or (work.confirm is not True and not doubtful(best)):
         return None
-    return confirm(best, tests, specimen_behind(work.using))
+    try:
+        return confirm(best, alloy.tests, specimen_behind(work.using))
+    except CreepkitError as error:
+        found.append(f"not confirmed: {error}")
+        return None
 
 
 def _predicted(best: Identification, tests: Sequence[History], using: Predictor) -> dict[str, Outputs]:

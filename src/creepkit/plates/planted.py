@@ -19,6 +19,7 @@ import numpy as np
 
 from creepkit import kernels, registry
 from creepkit.arrays import Floats
+from creepkit.errors import SolveError
 from creepkit.language import Elastic
 from creepkit.plates.compositions import Compositions, atomic_percent
 from creepkit.plates.table import write_text
@@ -137,7 +138,7 @@ def _test(name: str, law: str, shares: Mapping[str, float], rng: np.random.Gener
         found = specimen.predict(registry.default().law(law), values, [plan])
         if found.status[0, 0] == Status.COMPLETE:
             return Truth(law, values, thickness, shares), _measured(plan, found.outputs, found.of(0), rng)
-    raise RuntimeError(f"alloy {name} burst in {DRAWS} draws")
+    raise SolveError(f"alloy '{name}': its dimple burst in all of {DRAWS} draws; choose another seed")
 
 
 def _values(law: str, rng: np.random.Generator) -> dict[str, float]:

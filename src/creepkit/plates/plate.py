@@ -11,7 +11,7 @@ from creepkit.errors import FitError, nearest
 from creepkit.plates.alloys import Alloy
 from creepkit.plates.answer import AlloyAnswer
 from creepkit.plates.compositions import UNKNOWN, Compositions
-from creepkit.records import History
+from creepkit.records import History, Predictor
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +31,12 @@ class Plate:
 
     @classmethod
     def of(
-        cls, alloys: Sequence[Alloy], answers: Sequence[AlloyAnswer], compositions: Compositions | None,
-        folder: Path | None,
+        cls, alloys: Sequence[Alloy], answers: Sequence[AlloyAnswer], using: Predictor,
+        compositions: Compositions | None, folder: Path | None,
     ) -> Plate:  # fmt: skip
-        """The plate of these alloys, with the tests attached to their identifications."""
+        """The plate of these alloys, with tests and predictor attached to their identifications."""
         told = () if compositions is None else compositions.lacking([a.name for a in alloys])
-        whole = tuple(answer.with_tests(alloy) for answer, alloy in zip(answers, alloys, strict=True))
+        whole = tuple(answer.on(alloy.tests, using) for answer, alloy in zip(answers, alloys, strict=True))
         return cls(whole, {a.name: a.tests for a in alloys}, compositions, folder, told)
 
     @property

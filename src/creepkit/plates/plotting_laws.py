@@ -93,7 +93,7 @@ def shares_figure(plate: Plate) -> Figure:
         axes.bar(places, unsure, bottom=bottom + sure, color=f"C{k}", alpha=0.45, hatch="///", width=0.6,
                  edgecolor="white", linewidth=0)  # fmt: skip
         bottom += sure + unsure
-    axes.set_xticks(places, [f"{name}\n{len(m)} alloy{'s'[: len(m) > 1]}" for name, m in classes.items()])
+    axes.set_xticks(places, [f"{name}\n{len(m)} alloy{'s' if len(m) > 1 else ''}" for name, m in classes.items()])
     axes.set(ylim=(0, 1), xlim=(-0.6, max(len(classes), 3) - 0.4), ylabel="share of alloys")
     axes.set_title("identified laws by class; hatched: shared out by weight where not decisive", fontsize=10)
     figure.legend(loc="outside lower center", ncols=4, fontsize=8)

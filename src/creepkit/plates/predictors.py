@@ -28,16 +28,16 @@ def on_one_thread(predictor: Predictor) -> Predictor:
 
 
 def specimen_behind(predictor: Predictor) -> Predictor:
-    """What a surrogate stands for; anything else is taken for the specimen itself."""
+    """What a surrogate or a stand-in says that it stands for; anything else is taken for the specimen itself."""
     one: Any = predictor
     if isinstance(one, Together):
         return Together({name: specimen_behind(p) for name, p in one.predictors.items()})
-    return one.specimen if _is_surrogate(one) else predictor
+    return getattr(one, "specimen", predictor)
 
 
 def fingerprint_of(predictor: Predictor) -> str:
-    """The same for predictors that predict the same, as far as their records tell."""
-    return hashlib.sha256(_described(predictor)).hexdigest()[:16]
+    """The same for predictors that predict the same, as far as their records tell, on however many threads."""
+    return hashlib.sha256(_described(on_one_thread(predictor))).hexdigest()[:16]
 
 
 def _described(predictor: Predictor) -> bytes:

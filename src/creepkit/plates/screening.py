@@ -27,7 +27,7 @@ from creepkit.plates.answer import AlloyAnswer
 from creepkit.plates.compositions import Compositions, compositions_given
 from creepkit.plates.given import folder_made, histories_given, laws_given, size_given, using_given
 from creepkit.plates.plate import Plate
-from creepkit.plates.work import Screening
+from creepkit.plates.work import FITS, Screening
 from creepkit.records import History, Nuisance, Predictor
 
 Progress: TypeAlias = Callable[[str, int, int, str], None]
@@ -70,7 +70,7 @@ def screen(
         see identify().
     compositions : table of what the alloys are made of, or its file; classes follow from it.
     to : folder for one JSON file an alloy, in which an interrupted call finds what is done. Alloys whose tests and
-        settings are the same as there are not identified again.
+        settings are the same as there are not identified again. Its folder `fits` has the best identification of each.
     dense : the law whose misfit without sparsity is set against the reduced one's (Fig. 7b), None for none; penalty :
         what makes the reduced one of it, such as Sqrt(); by default it is the best of `laws`.
     confirm : whether the best law is simulated by the specimen itself: True, False, or "when in doubt", that is where
@@ -90,10 +90,10 @@ def screen(
         work = Screening(
             alloys=alloys_of(tests), laws=laws_given(LAWS if laws is None else laws), using=using_given(using, tests),
             through=through, settings=settings, dense=None if dense is None else laws_given([dense])[0],
-            penalty=penalty, confirm=confirm, folder=folder_made(Path(folder)),
+            penalty=penalty, confirm=confirm, folder=folder_made(Path(folder), FITS),
         )  # fmt: skip
         answers = _all(work, size_given(workers), progress)
-    return Plate.of(work.alloys, answers, table, None if to is None else Path(to))
+    return Plate.of(work.alloys, answers, work.using, table, None if to is None else Path(to))
 
 
 def _all(work: Screening, size: int, progress: Progress | None) -> list[AlloyAnswer]:

@@ -74,7 +74,7 @@ def record_of(plate: Plate, answer: AlloyAnswer) -> dict[str, Any]:
         "law": fit.law.name,
         "weight": _digits(answer.laws[0].weight),
         "decisive": "yes" if answer.decisive else "no",
-        "not_ruled_out": "; ".join(answer.set[1:]),
+        "not_ruled_out": "; ".join(answer.remaining[1:]),
         "equivalents": "; ".join(answer.equivalents),
         **_band("rate_100MPa", fit.rate(STRESS)),
         **_band("local_exponent_100MPa", fit.local_exponent(STRESS)),
@@ -112,7 +112,7 @@ def _row(plate: Plate, answer: AlloyAnswer) -> tuple[str, ...]:
     if not answer.identified:
         return (*start, "none", *[""] * (len(COLUMNS) - 3))
     fit = answer.best
-    names = fit.law.name + (f" or {', '.join(answer.set[1:])}" if len(answer.set) > 1 else "")
+    names = fit.law.name + (f" or {', '.join(answer.remaining[1:])}" if len(answer.remaining) > 1 else "")
     return (
         *start, names, f"{answer.laws[0].weight:.2f}", _ends(fit.rate(STRESS), 3), _ends(fit.local_exponent(STRESS), 3),
         f"{chi_square(fit):.3g}", _confirmed(answer),

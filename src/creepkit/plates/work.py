@@ -6,6 +6,7 @@ import hashlib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ClassVar
@@ -21,6 +22,8 @@ from creepkit.plates.alloys import Alloy
 from creepkit.plates.predictors import fingerprint_of, on_one_thread
 from creepkit.records import History, Predictor, Program
 
+FITS = "fits"
+"""The folder of the best identifications, inside that of the answers."""
 NOT_DATA = ("source", "labels")
 """Fields of a history that no identification looks at."""
 
@@ -53,8 +56,7 @@ class Screening:
 
     def fingerprint(self, number: int) -> str:
         """Of the tests of an alloy and of all that is asked."""
-        told = [f"creepkit {version('creepkit')}", *self._asked(), *map(_of_history, self.alloys[number].tests)]
-        return _hash("\n".join(told).encode())
+        return _hash("\n".join([self._asked, *map(_of_history, self.alloys[number].tests)]).encode())
 
     def on_one_thread(self) -> Screening:
         """The same with predictors that start no threads."""
@@ -62,14 +64,21 @@ class Screening:
         return replace(self, using=on_one_thread(self.using), through=through)
 
     def run(self, number: int) -> Answer:
-        """Screen an alloy and write its answer."""
+        """Screen an alloy and write its answer, and its best identification beside it, which other commands take."""
         from creepkit.plates.one_alloy import screened
 
         answer = replace(screened(self, self.alloys[number]), fingerprint=self.fingerprint(number))
+        if answer.identified:
+            answer.best.save(self.path(number).parent / FITS / self.path(number).name)
         files.save(answer, self.path(number))
         return Answer(number, "done", accepted=int(answer.identified))
 
-    def _asked(self) -> Iterator[str]:
+    @cached_property
+    def _asked(self) -> str:
+        return "\n".join(self._questions())
+
+    def _questions(self) -> Iterator[str]:
+        yield f"creepkit {version('creepkit')}"
         for law in (*self.laws, *([self.dense] if self.dense is not None else [])):
             yield f"{law.name} {law.fingerprint} {[(name, p.bounds, p.off) for name, p in law.table.items()]}"
         for predictor in (self.using, self.through):

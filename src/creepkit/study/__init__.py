@@ -4,10 +4,14 @@ from creepkit.study.files import load, read_histories, suspects, with_suspects_m
 from creepkit.study.models import identify, moduli, rank, select, simulate
 from creepkit.study.networks import surrogate, train
 from creepkit.study.nouns import law, laws, specimen, specimens
+from creepkit.study.plates import confirm, screen
 from creepkit.study.sets import generate, rate_family, read_dataset
 from creepkit.study.text import export, exporters
+from creepkit.study.trends import discover, temperature_study
 
 __all__ = [
+    "confirm",
+    "discover",
     "export",
     "exporters",
     "generate",
@@ -20,12 +24,14 @@ __all__ = [
     "rate_family",
     "read_dataset",
     "read_histories",
+    "screen",
     "select",
     "simulate",
     "specimen",
     "specimens",
     "surrogate",
     "suspects",
+    "temperature_study",
     "train",
     "with_suspects_marked",
 ]

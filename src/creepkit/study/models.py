@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from creepkit.inverse.search.landscape import Search
     from creepkit.inverse.selection import Ranking
     from creepkit.inverse.settings import Weights
+    from creepkit.inverse.sparsity.penalties import Penalty, Subsets
     from creepkit.language import CreepLaw, Elastic
 
 ROOM_TEMPERATURE = 293.15
@@ -79,6 +80,7 @@ def identify(
     nuisances: Sequence[Nuisance] | None = None,
     weights: Weights = "noise",
     search: Search | None = None,
+    penalty: Penalty | Subsets | None = None,
     through: Predictor | Literal["auto"] | None = "auto",
     starts: int = 8,
     frames: int = 40,
@@ -96,6 +98,8 @@ def identify(
         noise and autocorrelation of every output in values, intervals and ranking alike; "equal": Eq. (4) of the
         paper; or {output: weight} of relative squared errors, such as ck.PAPER_WEIGHTS, its Eq. (S3).
     search : how to begin: by default least squares from screened starts; ParticleSwarm() as in the paper, CmaEs().
+    penalty : on the contributions of a sum's terms, such as L2(), GroupL2(), Sqrt() or Subsets(): those that are left
+        out stand in the answer's `sparsity`, and the law of the answer is what remains.
     through : a surrogate in which the search's minima are refined before `using` (finite elements) has its last word;
         "auto" takes the one that comes with creepkit where it is of this specimen.
     starts, seed : of the search, which includes the centre of the bounds; frames : looked at in each history.
@@ -113,14 +117,16 @@ def identify(
     if nuisances is not None:
         settings = replace(settings, nuisances=tuple(nuisances))
     chosen = specimens_of(histories) if using is None else predictors_given(using)
+    on_the_way = _through(through, chosen, histories)
+    if penalty is not None:
+        from creepkit.inverse.sparsity.sparse import sparse
+
+        return sparse(
+            law_given(law), histories, chosen, penalty=penalty, search=search, through=on_the_way, settings=settings,
+            progress=progress,
+        )  # fmt: skip
     return run(
-        law_given(law),
-        histories,
-        chosen,
-        settings=settings,
-        search=search,
-        through=_through(through, chosen, histories),
-        progress=progress,
+        law_given(law), histories, chosen, settings=settings, search=search, through=on_the_way, progress=progress
     )
 
 

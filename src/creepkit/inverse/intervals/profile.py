@@ -8,11 +8,15 @@ may be lopsided, and open where the data never rise against a value.
 
 Each point minimises chi2(x) + ((q(x) - v) / w)^2. Where that ends is a point of the profile whatever w is: nothing
 of the same q fits better. A w far below the spread of q brings it to the v that was asked for.
+
+Where rates scatter from test to test, a test whose rate is off by a factor exp(b) leaves residuals of b d to first
+order, d the derivative to ln rate. On the scale of strains d changes along the way, and far from the optimum what is
+left of second order would count as misfit: with d half way between the optimum and where one is, it cancels.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +26,7 @@ from scipy.stats import t as student
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.inverse.covariance import whitener
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.intervals.opening import opened
 from creepkit.inverse.intervals.quantities import Function, Quantity, chosen, gradient
@@ -152,13 +157,21 @@ class _Walk:
     def _point(self, start: Floats, value: float | None) -> _Point:
         extra = None if value is None else _Held(self.function, self.size, value, SHARPNESS * self.sd)
         x = self.problem.minimise(start, extra=extra).u
+        x = self._bent(x).minimise(x, extra=extra).u if self.problem.scatter.rate > 0 else x
         found = float(self.function(x[: self.size]))
         return _Point(x, 0.0 if abs(found) < NOTHING * self.sd else found, self._chi_square(x))
 
+    def _bent(self, x: Floats) -> Opened:
+        """The problem with what a test's own rate does taken half way between the optimum and x."""
+        p = self.problem
+        effect = 0.5 * (p.residuals.rate_effect + p.objective.at(x).rate_effect)
+        return replace(p, factor=whitener(replace(p.residuals, rate_effect=effect), p.scatter))
+
     def _chi_square(self, x: Floats) -> float:
         """Of the data and the priors: the walls stand for bounds, at which a value is possible still."""
-        white, own = self.problem.white(x), x.size - self.size
-        data = int(self.problem.objective.entries.present.sum())
+        problem = self._bent(x) if self.problem.scatter.rate > 0 else self.problem
+        white, own = problem.white(x), x.size - self.size
+        data = int(problem.objective.entries.present.sum())
         return float((white[:data] ** 2).sum() + (white[white.size - own :] ** 2).sum())
 
 

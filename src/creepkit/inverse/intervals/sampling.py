@@ -22,6 +22,7 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.intervals.opening import opened
 from creepkit.inverse.intervals.posterior import Posterior
 from creepkit.inverse.intervals.quantities import Quantity, chosen, local_exponent, log_rate
+from creepkit.inverse.threads import single_threaded_algebra
 from creepkit.records import Predictor
 
 if TYPE_CHECKING:
@@ -139,9 +140,10 @@ def sample(
     moves = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)]
     sampler = emcee.EnsembleSampler(walkers, size, posterior, vectorize=True, moves=moves)
     start = emcee.State(_starts(fit, posterior, walkers, rng), random_state=np.random.RandomState(seed).get_state())
-    for k, _ in enumerate(sampler.sample(start, iterations=steps)):
-        if progress is not None:
-            progress("step", k + 1, steps)
+    with single_threaded_algebra():
+        for k, _ in enumerate(sampler.sample(start, iterations=steps)):
+            if progress is not None:
+                progress("step", k + 1, steps)
     return _samples(fit, sampler.get_chain(), sampler.get_log_prob(), sampler.acceptance_fraction, emcee)
 
 

@@ -19,6 +19,7 @@ from creepkit.inverse.search.box import RATE_WINDOW, Box
 from creepkit.inverse.search.landscape import Found, Landscape
 from creepkit.inverse.search.refining import Minimum, Progress
 from creepkit.inverse.search.side_by_side import refined_side_by_side
+from creepkit.inverse.search.trace import Trace
 
 GROWTH_WINDOW = (-4.0, 0.0)
 """Where the rate of an internal variable is drawn: ln of its rate times the life of a test."""
@@ -39,8 +40,9 @@ class MultiStart:
         starts, draws = self.starts or landscape.settings.starts, self.draws or landscape.settings.draws
         singles = from_single_terms(landscape, starts=max(2, starts // 3), draws=draws // 2)
         seeds = [*singles, *screened(landscape, starts=starts, draws=draws)]
-        found = refined_side_by_side(landscape, seeds, progress=progress)
-        return Found(tuple(found))
+        costs: list[Floats] = []
+        found = refined_side_by_side(landscape, seeds, progress=progress, costs=costs)
+        return Found(tuple(found), Trace.of("multi-start", costs) if costs else None)
 
 
 def from_single_terms(landscape: Landscape, *, starts: int, draws: int) -> list[Floats]:

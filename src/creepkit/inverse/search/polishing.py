@@ -75,9 +75,16 @@ def polished(
             progress("refinement", done + 1, len(chosen))
     spent = sum(minimum.evaluations for minimum in minima)
     minima.sort(key=lambda minimum: minimum.cost)
-    if seen.on is not None:  # a subset that ended as another one is that one
-        minima = [m for k, m in enumerate(minima) if m.off not in [other.off for other in minima[:k]]]
-    return Found(tuple(minima), replace(trace, polished=minima[0].cost, refinements=spent))
+    if seen.on is not None:
+        minima = _of_subsets(minima)
+    return Found(tuple(minima), replace(trace, polished=min(m.cost for m in minima), refinements=spent))
+
+
+def _of_subsets(minima: list[Minimum]) -> list[Minimum]:
+    """One of each subset, for some end as another one; of those that are as good as the best, the simplest first."""
+    different = [m for k, m in enumerate(minima) if m.off not in [other.off for other in minima[:k]]]
+    best = different[0].cost + SETTLED
+    return sorted(different, key=lambda m: (m.cost > best, -len(m.off) if m.cost <= best else 0, m.cost))
 
 
 def check_counts(search: str, values: Mapping[str, float], least: Mapping[str, int]) -> None:

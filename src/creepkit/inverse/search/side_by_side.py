@@ -24,9 +24,10 @@ DAMPING = (1e-3, 1e8)
 
 
 def refined_side_by_side(
-    landscape: Landscape, starts: Sequence[Floats], *, steps: int = STEPS, progress: Progress | None = None
-) -> list[Minimum]:
-    """The minima that the starts lead to, best first."""
+    landscape: Landscape, starts: Sequence[Floats], *, steps: int = STEPS, progress: Progress | None = None,
+    costs: list[Floats] | None = None,
+) -> list[Minimum]:  # fmt: skip
+    """The minima that the starts lead to, best first; costs : is given the costs of all starts after each step."""
     if landscape.objective.entries.whole.any():
         found = []
         for k, u in enumerate(starts):
@@ -34,7 +35,7 @@ def refined_side_by_side(
             if progress is not None:
                 progress("start", k + 1, len(starts))
         return sorted(found, key=lambda minimum: minimum.cost)
-    return _Marquardt(landscape, np.array(starts, float)).run(steps, progress)
+    return _Marquardt(landscape, np.array(starts, float)).run(steps, progress, [] if costs is None else costs)
 
 
 class _Marquardt:
@@ -51,9 +52,10 @@ class _Marquardt:
         self.asked = np.zeros(count, int)
         self._take(np.arange(count), self.u)
 
-    def run(self, steps: int, progress: Progress | None) -> list[Minimum]:
+    def run(self, steps: int, progress: Progress | None, costs: list[Floats]) -> list[Minimum]:
         """Step until all have arrived."""
         for _ in range(steps):
+            costs.append(self.cost.copy())
             going = np.flatnonzero((self.idle < 2) & (self.damping < DAMPING[1]))
             if progress is not None:
                 progress("start", len(self.u) - going.size, len(self.u))

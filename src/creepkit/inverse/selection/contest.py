@@ -60,7 +60,7 @@ class Contest:
         made = [thinned(h, a.settings.frames) for h in full]
         base = Entries.of(made, using, full)
         every = [*made, *(_with_outputs(d.history, using, base) for d in plans)]
-        told = _told(a, using, every, base)
+        told = _told(a, using, every, len(made), base)
         most = {name: _most(made, name) for name in base.outputs}
         kept = [(d, h) for d, h in zip(plans, (_cut(h, using, most) for h in told[len(made) :]), strict=True)
                 if h.used.sum() >= LEAST_FRAMES]  # fmt: skip
@@ -92,10 +92,9 @@ class Contest:
         own, b = [*range(self.made), *(self.made + k for k in chosen)], self.fit
         histories, made = [self.histories[k] for k in own], self.histories[: self.made]
         rows = {name: getattr(self.entries, name)[own] for name in ROWS}
-        unknowns = _unknowns(b, histories, self.using)
-        objective = Objective(
-            b.law, histories, self.using, b.coordinates, replace(self.entries, **rows), unknowns
-        )  # fmt: skip
+        unknowns = _unknowns(b, histories, self.made, self.using)
+        entries = replace(self.entries, **rows)
+        objective = Objective(b.law, histories, self.using, b.coordinates, entries, unknowns)
         known = {(n.kind, n.member): n.value for n in b.nuisances}
         owners = zip(unknowns.nuisances, unknowns.members, unknowns.mean, strict=True)
         x = np.concatenate([b.u, np.array([known.get((n.kind, m), mean) for n, m, mean in owners], float)])
@@ -119,9 +118,16 @@ def _with_outputs(plan: History, using: Predictor, base: Entries) -> History:
     return replace(_endless(plan), outputs={name: 0.0 * sd for name, sd in noise.items()}, standard_deviation=noise)
 
 
-def _told(a: Identification, using: Predictor, every: Sequence[History], base: Entries) -> list[History]:
+def _told(
+    a: Identification, using: Predictor, every: Sequence[History], made: int, base: Entries
+) -> list[History]:  # fmt: skip
     """Histories with what law a predicts in the place of what was measured, at the noise of what was."""
-    found = predict(using, a.law, a.values, every, effects=a.effects(every))
+    effects = a.effects(every)
+    if "thickness" in effects:
+        effects["thickness"] = effects["thickness"].copy()
+        for k, own in _thicknesses(every, made):
+            effects["thickness"][0, k] = own
+    found = predict(using, a.law, a.values, every, effects=effects)
     answer = []
     for k, history in enumerate(every):
         outputs, sd = {}, {}
@@ -149,10 +155,20 @@ def _cut(plan: History, using: Predictor, most: dict[str, float]) -> History:
     return replace(plan, used=alive & near & (plan.times > 0))
 
 
-def _unknowns(fit: Identification, histories: Sequence[History], using: Predictor) -> Unknowns:
-    """Those of the fit's nuisances, with the spreads that it found."""
+def _thicknesses(histories: Sequence[History], made: int) -> list[tuple[int, float]]:
+    """(position, mm) of the planned tests whose apex thickness is stated: it is what they are about."""
+    return [(k, h.geometry["apex_thickness"]) for k, h in enumerate(histories)
+            if k >= made and "apex_thickness" in h.geometry]  # fmt: skip
+
+
+def _unknowns(fit: Identification, histories: Sequence[History], made: int, using: Predictor) -> Unknowns:
+    """Those of the fit's nuisances, with the spreads that it found; planned thicknesses are known as well as others."""
     unknowns = Unknowns.of(fit.settings.nuisances, histories, using)
-    spread = {n.kind: n.spread for n in fit.nuisances}
     if not unknowns.mean.size:
         return unknowns
-    return replace(unknowns, sd=np.array([spread[n.kind] for n in unknowns.nuisances], float))
+    spread, mean = {n.kind: n.spread for n in fit.nuisances}, unknowns.mean.copy()
+    for k, own in _thicknesses(histories, made) if "thickness" in unknowns.place else ():
+        place = int(unknowns.place["thickness"][k])
+        if place >= 0 and unknowns.nuisances[place].scope == "test":
+            mean[place] = own
+    return replace(unknowns, mean=mean, sd=np.array([spread[n.kind] for n in unknowns.nuisances], float))

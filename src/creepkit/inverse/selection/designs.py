@@ -10,9 +10,11 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.inverse.together import predictor_of
 from creepkit.records import (
     History,
     Loading,
+    Predictor,
     PressureJump,
     StrainSteps,
     StressSteps,
@@ -37,23 +39,33 @@ class Design:
     history: History
 
 
-def designs(histories: Sequence[History], exponent: float = 0.0) -> tuple[Design, ...]:
+def designs(histories: Sequence[History], exponent: float = 0.0, using: Predictor | None = None) -> tuple[Design, ...]:
     """Variations of tests that were made: other levels, a change of level, longer; of bulge tests, other thickness.
 
     Each is made on the longest test of its kind of loading. A bar at another stress is tested for a time that goes
-    with stress^-exponent, so that it strains as much, but never for more than twice as long.
+    with stress^-exponent, so that it strains as much, but never for more than twice as long. The thickness that is
+    varied is that of the history, else that of the specimen `using`.
     """
     found: list[Design] = []
     for quantity in dict.fromkeys(h.loading.quantity for h in histories):
         tests = [h for h in histories if h.loading.quantity == quantity]
         if quantity in _VARIATIONS:
-            base = max(tests, key=lambda h: float(h.times[-1]))
+            base = _with_thickness(max(tests, key=lambda h: float(h.times[-1])), using)
             levels = np.concatenate([h.loading.program().values for h in tests])
             found += _VARIATIONS[quantity](base, levels[levels > 0], exponent)
     if not found:
         kinds = ", ".join(dict.fromkeys(h.loading.quantity for h in histories))
         raise FitError(f"no further tests are known for a loading by {kinds}; give designs=, a list of histories")
     return tuple(found)
+
+
+def _with_thickness(history: History, using: Predictor | None) -> History:
+    """The history, stating the apex thickness of its specimen where that has one and the history does not say."""
+    specimen = None if using is None else getattr(predictor_of(using, history), "geometry", None)
+    usual = getattr(specimen, "apex_thickness", None)
+    if usual is None or "apex_thickness" in history.geometry:
+        return history
+    return replace(history, geometry={**history.geometry, "apex_thickness": float(usual)})
 
 
 def planned(base: History, description: str, loading: Loading, end: float, **changes: object) -> Design:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -19,6 +19,11 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification, information_criterion, parameters_touched
 from creepkit.inverse.selection.common import judged
+
+if TYPE_CHECKING:
+    from creepkit.inverse.intervals.mixture import Mixture
+    from creepkit.inverse.selection.equivalence import Equivalence
+    from creepkit.inverse.selection.separation import Separation
 
 DECISIVE = 0.95
 CREDIBLE = 0.05
@@ -72,6 +77,25 @@ class Ranking:
         if self.decisive:
             return f"decisive: {names[0]}" if len(self.laws) > 1 else f"only {names[0]} was fitted"
         return f"not decisive: these tests cannot tell apart {' and '.join(names)}"
+
+    @property
+    def mixture(self) -> Mixture:
+        """All laws together, each with its weight: rate(), local_exponent(), with intervals that hold both doubts."""
+        from creepkit.inverse.intervals.mixture import Mixture
+
+        return Mixture.of(self)
+
+    def equivalents(self) -> tuple[Equivalence, ...]:
+        """Pairs of remaining laws that these tests cannot separate."""
+        from creepkit.inverse.selection.equivalence import equivalents
+
+        return equivalents(self)
+
+    def further_tests(self) -> tuple[Separation, ...]:
+        """What tests would tell the remaining laws apart, and by how much (some seconds of simulations)."""
+        from creepkit.inverse.selection.separation import further_tests
+
+        return further_tests(self)
 
     def __str__(self) -> str:
         from creepkit.inverse.selection.printing import text_of

@@ -20,6 +20,9 @@ from creepkit.records import History, Predictor
 
 FRAMES = 60
 """Frames of a history that are looked at, unless settings say otherwise."""
+FAR_BEHIND = 40.0
+"""Criterion over the best from which a law is ruled out by a surrogate already: e^-20 of the weight, which the errors
+of a surrogate, some noise in chi-square, do not make up for."""
 BEYOND_NOISE = 2.0
 """Drift that the best single law leaves in its first output, in units of the noise there, from which sums are tried."""
 
@@ -62,15 +65,39 @@ def _identified(
     laws: Sequence[CreepLaw], histories: Sequence[History], using: Predictor | Mapping[str, Predictor],
     settings: Settings, through: Predictor | None, progress: Progress | None, failed: dict[str, str],
 ) -> list[Identification]:  # fmt: skip
-    found = []
+    """The laws that can be identified; the others go to `failed`.
+
+    through : all laws are identified with it first, and those far behind go no further: they stay as it sees them.
+    """
+    first, found = through or using, []
     for k, law in enumerate(laws):
-        try:
-            found.append(identify(law, histories, using, settings=settings, through=through))
-        except CreepkitError as error:
-            failed[law.name] = str(error)
+        fit = _attempt(law, histories, first, settings, failed)
+        found += [fit] if fit is not None else []
         if progress is not None:
             progress("law", k + 1, len(laws))
-    return found
+    if through is None or not found:
+        return found
+    ahead = {id(r.fit) for r in rank(found).laws if r.excess < FAR_BEHIND}
+    refined = {id(fit): _attempt(fit.law, histories, using, settings, failed, fit) for fit in found if id(fit) in ahead}
+    return [refined.get(id(fit)) or _ruled_out(fit) for fit in found if fit.law.name not in failed]
+
+
+def _attempt(
+    law: CreepLaw, histories: Sequence[History], using: Predictor | Mapping[str, Predictor], settings: Settings,
+    failed: dict[str, str], before: Identification | None = None,
+) -> Identification | None:  # fmt: skip
+    """Identify one law, from where a cheaper predictor ended if it did; what goes wrong with it is told in `failed`."""
+    begun = {} if before is None else {"start": before.u, "known": before.nuisances, "reference": before.reference}
+    try:
+        return identify(law, histories, using, settings=settings, **begun)  # type: ignore[arg-type]
+    except CreepkitError as error:
+        failed[law.name] = str(error)
+        return None
+
+
+def _ruled_out(fit: Identification) -> Identification:
+    told = f"ruled out as the {fit.provenance['specimen']} sees it, and not refined any further"
+    return replace(fit, notes=(*fit.notes, told))
 
 
 def _leaves_more_than_noise(fit: Identification) -> bool:

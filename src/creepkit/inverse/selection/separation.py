@@ -16,10 +16,12 @@ import numpy as np
 
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.intervals.mixture import Laws
 from creepkit.inverse.selection.contest import Contest
 from creepkit.inverse.selection.designs import Design
 from creepkit.inverse.selection.designs import designs as variations
 from creepkit.inverse.selection.equivalence import SEPARATED
+from creepkit.inverse.selection.ranking import CREDIBLE
 from creepkit.inverse.threads import single_threaded_algebra
 from creepkit.records import History
 
@@ -85,10 +87,16 @@ def what_separates(
     return Separation(fit_a.law.name, fit_b.law.name, now, found, left_out)
 
 
+def further_tests(ranking: Laws) -> tuple[Separation, ...]:
+    """What would separate the best law of a ranking, if it is true, from each other one of more than 5 % of weight."""
+    best, *others = ranking.laws
+    return tuple(what_separates(best.fit, other.fit) for other in others if other.weight > CREDIBLE)
+
+
 def _planned(fit: Identification, designs: Sequence[Design | History] | None) -> tuple[Design, ...]:
     """The designs given, named so that they are no test that was made; else variations of those."""
     if designs is None:
-        return variations(fit.histories, float(fit.local_exponent(fit.reference.stress)[0]))
+        return variations(fit.histories, float(fit.local_exponent(fit.reference.stress)[0]), fit.using)
     given = (d if isinstance(d, Design) else Design(d.name, d) for d in designs)
     return tuple(Design(d.description, replace(d.history, name=f"plan: {d.description}")) for d in given)
 

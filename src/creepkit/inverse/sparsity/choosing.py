@@ -36,7 +36,10 @@ class Choice:
 def chosen(
     reductions: Reductions, penalty: Penalty | Subsets, search: Search | None = None, progress: Progress | None = None
 ) -> Choice:
-    """The terms that a penalty keeps; search : where the penalised landscape is searched besides the usual starts."""
+    """The terms that a penalty keeps.
+
+    search : where the penalised landscape is searched besides the usual starts; not for subsets, nor along a path.
+    """
     stage = reductions.stage
     if isinstance(penalty, Subsets):
         best = reductions.lowest(penalty.EVERY)

@@ -134,6 +134,13 @@ class Subsets:
     EVERY: ClassVar[int] = 4
 
 
+def check_penalty(penalty: object) -> None:
+    """A penalty is a record, such as L2(), and not its class or name."""
+    if isinstance(penalty, (type, str)) or not (isinstance(penalty, Subsets) or hasattr(penalty, "weights")):
+        told = penalty.__name__ if isinstance(penalty, type) else repr(penalty)
+        raise FitError(f"penalty is {told}; write L2(), GroupL2(), Sqrt() or Subsets()")
+
+
 def check_strength(strength: Strength) -> None:
     """A strength is a finite number of at least zero, or "auto"."""
     if isinstance(strength, str):

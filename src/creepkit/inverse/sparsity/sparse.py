@@ -13,7 +13,7 @@ from creepkit.inverse.search.refining import Progress
 from creepkit.inverse.settings import Settings
 from creepkit.inverse.sparsity.choosing import Choice, chosen
 from creepkit.inverse.sparsity.path import STRENGTHS, Path, path_of
-from creepkit.inverse.sparsity.penalties import Penalty, Subsets
+from creepkit.inverse.sparsity.penalties import Penalty, Subsets, check_penalty
 from creepkit.inverse.sparsity.record import Misfit, Sparsity
 from creepkit.inverse.sparsity.reduction import Reduced, Reductions
 from creepkit.inverse.sparsity.resampling import Frequencies, frequencies
@@ -34,7 +34,10 @@ def sparse(
     The whole sum is identified without penalty first: it gives the covariance on which everything is compared. Then
     misfit and penalty together are minimised from its optimum, from each term's own, and where `search` finds minima;
     terms that contribute less than 5 % are dropped; what is left is identified without penalty.
+
+    through : a surrogate by which terms are chosen; values and intervals are those of `using`.
     """
+    check_penalty(penalty)
     dense, reductions = opened(law, histories, using, through, settings, progress)
     return reduced_by(penalty, dense, reductions, search, progress)
 
@@ -87,7 +90,7 @@ def opened(
             "identify it without penalty, or a sum of laws with it"
         )
     dense = identify(law, histories, using, settings=settings, through=through, progress=progress)
-    return dense, Reductions(Stage.of(dense))
+    return dense, Reductions(Stage.of(dense, through))
 
 
 def confirmed(reductions: Reductions, choice: Choice) -> Reduced:

@@ -25,9 +25,12 @@ from creepkit.inverse.settings import Settings
 from creepkit.inverse.sparsity.contributions import Contributions
 from creepkit.inverse.sparsity.penalised import Penalised, exponents_of
 from creepkit.language import CreepLaw
+from creepkit.records import Predictor
 
 STEPS = 40
 TOLERANCE = 1e-7
+DRAWS = 64
+"""Of what a term that is to be absent depends on, besides its rate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +48,15 @@ class Stage:
     settings: Settings
 
     @classmethod
-    def of(cls, fit: Identification) -> Stage:
-        """The problem of an identification, opened again with the covariance that it found."""
+    def of(cls, fit: Identification, through: Predictor | None = None) -> Stage:
+        """The problem of an identification, opened again with the covariance that it found.
+
+        through : a cheaper predictor by which terms are chosen.
+        """
         opened = reopened(fit)
-        return cls(opened.objective, opened.box, opened.factor, opened.x, fit.settings)
+        o = opened.objective
+        objective = Objective(o.law, o.histories, through or o.using, o.coordinates, o.entries, o.unknowns)
+        return cls(objective, opened.box, opened.factor, opened.x, fit.settings)
 
     # ---- what it is ----------------------------------------------------------------------------------------------
 
@@ -119,14 +127,24 @@ class Stage:
         return replace(self, start=x)
 
     def placed(self, law: CreepLaw, x: Floats) -> Floats:
-        """x of a law of some of the terms as one of this law: all other terms as slow, and simple, as they can be."""
-        whole = self.start.copy()
-        for k, off in exponents_of(self.law):
-            whole[k] = off
-        rates = list(self.objective.coordinates.rates)
-        whole[rates] = self.box.low[rates]
-        whole[self._places(law)] = x
-        return whole
+        """x of a law of some of the terms as one of this law: the other terms as slow as the box allows.
+
+        Their exponents that can be off are; all else of theirs is drawn so that they matter least, within the fences.
+        """
+        rates, places = list(self.objective.coordinates.rates), self._places(law)
+        off = dict(exponents_of(self.law))
+        idle = [k for k in range(self.size) if k not in (*places, *rates, *off)]
+        whole = np.tile(np.concatenate([self.box.middle[: self.size], self.start[self.size :]]), (DRAWS, 1))
+        unit = np.random.default_rng(0).random((DRAWS - 1, len(idle)))
+        whole[1:, idle] = self.box.low[idle] + unit * self.box.width[idle]
+        whole[:, list(off)] = list(off.values())
+        whole[:, rates] = self.box.low[rates]
+        whole[:, places] = x
+        others = [k for k, label in enumerate(self.law.terms) if label not in law.terms]
+        present = self.contributions.values(whole[:, : self.size])[:, others].sum(axis=1)
+        fences = Fences(self.objective)
+        walls = np.array([(fences.values(one) ** 2).sum() for one in whole])
+        return np.asarray(whole[(present + walls).argmin()])
 
     def _places(self, law: CreepLaw) -> list[int]:
         own = [self.law.names.index(name) for name in law.names]

@@ -1,0 +1,121 @@
+"""The restricted likelihood against textbook results: unbiased variances, Student's freedom, generalised least squares."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from creepkit.inverse.residuals import Residuals
+from creepkit.inverse.restricted import Linear, inverses_of, restricted_log_likelihood
+from creepkit.inverse.satterthwaite import restricted_laplace
+from creepkit.inverse.scatter import OutputScatter, Scatter
+from creepkit.inverse.sizes import estimated
+
+
+def linear_model(values, design, clock=None, outputs=1):
+    """A linear model y = X b with b flat, looked at from b = 0."""
+    tests, entries, size = design.shape
+    clock = np.broadcast_to(np.linspace(0.0, 5.0, entries), (tests, entries)) if clock is None else clock
+    output = np.tile(np.arange(outputs).repeat(entries // outputs), (tests, 1))
+    ones = np.ones((tests, entries))
+    residuals = Residuals(values, ones, ones > 0, clock, design, 0 * ones, output, ones, np.ones(tests))
+    room = np.array([[-np.inf], [np.inf]]) * np.ones(size)
+    return Linear(residuals, np.full(size, 1e-12), np.zeros(size), np.ones(size, bool), room)
+
+
+def white(sd, names=("strain",), **more):
+    return Scatter({name: OutputScatter(sd, **more) for name in names})
+
+
+def polynomial(entries, degree, tests=1):
+    x = np.linspace(-1.0, 1.0, entries)
+    return np.tile(np.stack([x**k for k in range(degree + 1)], axis=-1), (tests, 1, 1))
+
+
+def test_white_noise_is_the_sum_of_squares_over_the_degrees_of_freedom():
+    """Patterson & Thompson: the restricted estimate of one variance is RSS / (n - p)."""
+    rng, design = np.random.default_rng(0), polynomial(30, 3)
+    values = 0.2 * rng.normal(size=(1, 30))
+    found = estimated(*_model(values, design), white(0.15), (), fixed=(), linear=linear_model(values, design))
+    left = values[0] - design[0] @ np.linalg.lstsq(design[0], values[0], rcond=None)[0]
+    assert found["strain"].noise ** 2 == pytest.approx((left**2).sum() / 26, rel=1e-4)
+
+
+def _model(values, design):
+    return (linear_model(values, design).residuals,)
+
+
+def test_intervals_of_white_noise_are_students():
+    """With one estimated variance the freedom is n - p, and the covariance s^2 (X'X)^-1."""
+    rng, design = np.random.default_rng(1), polynomial(25, 2)
+    linear = linear_model(0.3 * rng.normal(size=(1, 25)), design)
+    posterior, freedom = restricted_laplace(linear, white(0.3), ())
+    assert freedom == pytest.approx(22.0, rel=1e-6)
+    assert posterior == pytest.approx(0.09 * np.linalg.inv(design[0].T @ design[0]), rel=1e-6)
+
+
+def test_noise_that_was_given_leaves_no_doubt_about_itself():
+    linear = linear_model(np.zeros((1, 25)), polynomial(25, 2), outputs=1)
+    from creepkit.records import Nuisance
+
+    scatter = Scatter({"strain": OutputScatter(0.0, offset=0.1)})
+    freedom = restricted_laplace(replace(linear), scatter, (Nuisance("offset", sd=0.1),))[1]
+    assert freedom > 20.0
+
+
+def test_the_likelihood_is_that_of_contrasts_that_know_nothing_of_the_values():
+    """Harville (1974): -2 ln of the density of any n - p independent contrasts, up to a constant of X alone."""
+    rng, design = np.random.default_rng(2), polynomial(12, 2)
+    values = rng.normal(size=(1, 12))
+    contrasts = np.linalg.qr(design[0], mode="complete")[0][:, 3:]
+    scatters = [white(s, drift=d, reach=r) for s, d, r in ((0.5, 0.3, 1.0), (1.0, 0.8, 0.4), (0.2, 0.1, 2.0))]
+    mine, textbook = [], []
+    for scatter in scatters:
+        linear = linear_model(values, design)
+        c = np.linalg.inv(inverses_of(linear.residuals, scatter)[0][0])
+        mine.append(restricted_log_likelihood(linear, scatter))
+        textbook.append(multivariate_normal(np.zeros(9), contrasts.T @ c @ contrasts).logpdf(contrasts.T @ values[0]))
+    assert np.diff(mine) == pytest.approx(np.diff(textbook), rel=1e-6)
+
+
+def test_the_optimum_is_generalised_least_squares():
+    rng, design = np.random.default_rng(3), polynomial(20, 1, tests=2)
+    values, scatter = rng.normal(size=(2, 20)), white(0.1, drift=1.0, reach=0.7)
+    linear = linear_model(values, design)
+    inverses, _ = inverses_of(linear.residuals, scatter)
+    A = sum(x.T @ c @ x for x, c in zip(design, inverses, strict=True))
+    b = sum(x.T @ c @ y for x, c, y in zip(design, inverses, values, strict=True))
+    assert linear.solved(inverses).move == pytest.approx(-np.linalg.solve(A, b), rel=1e-9)
+
+
+def test_outputs_inverted_one_by_one_are_the_whole_matrix_inverted():
+    rng = np.random.default_rng(4)
+    linear = linear_model(rng.normal(size=(2, 20)), polynomial(20, 1, tests=2), outputs=2)
+    scatter = white(0.3, ("amplitude", "width"), drift=0.5, reach=0.3)
+    blocks, log_det = inverses_of(linear.residuals, scatter)
+    shared = replace(linear.residuals, known=np.zeros((2, 20, 1)))
+    whole, same = inverses_of(shared, scatter)
+    assert blocks == pytest.approx(whole, rel=1e-9, abs=1e-9)
+    assert log_det == pytest.approx(same, rel=1e-12)
+
+
+def test_autocorrelated_noise_is_not_taken_for_less_than_it_is():
+    """AR(1) noise of .9 under a cubic: plain maximum likelihood finds too little of it, the restricted one does not.
+
+    60 series of 48 frames; the mean of ln of the estimated variance of the process, to three standard errors.
+    """
+    rng, design = np.random.default_rng(5), polynomial(48, 3)
+    clock = np.linspace(5.0 / 48, 5.0, 48)[None]
+    lags = np.abs(np.arange(48)[:, None] - np.arange(48)[None])
+    factor = np.linalg.cholesky(0.9**lags)
+    restricted, plain = [], []
+    for _ in range(60):
+        values = (factor @ rng.normal(size=48))[None]
+        linear = linear_model(values, design, clock)
+        start = white(0.1, drift=0.7, reach=1.0)
+        restricted.append(estimated(linear.residuals, start, (), linear=linear)["strain"].drift)
+        left = values - (design[0] @ np.linalg.lstsq(design[0], values[0], rcond=None)[0])[None]
+        plain.append(estimated(replace(linear.residuals, values=left), start, ())["strain"].drift)
+    assert np.median(plain) < 0.75
+    assert np.median(restricted) == pytest.approx(1.0, abs=0.25)
