@@ -12,11 +12,14 @@ the former over the Fisher bound (white noise and scatter known, from the exact 
 """
 
 import argparse
+import json
+import multiprocessing
 import os
+import sys
 import time
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -50,7 +53,7 @@ def specimen_result(job):
     began = time.process_time()
     ranking = ck.select(planted.SINGLE, one.tests, using, nuisances=design.nuisances, sums=sums, seed=k)
     cost = time.process_time() - began
-    return summary(one, design, ranking, cost)
+    return {"k": k, **summary(one, design, ranking, cost)}
 
 
 def summary(one, design, ranking, cost):
@@ -65,7 +68,7 @@ def summary(one, design, ranking, cost):
             same |= {r.fit.law.fingerprint for r in ranking.laws if r.fit.law.name in mates}
     row = {
         "truth": one.law.name, "answer": ranking.best.law.name, "strict": laws[0] == truth, "merged": laws[0] in same,
-        "set": [r.fit.law.name for r in ranking.remaining], "in set": truth in laws[: len(ranking.remaining)],
+        "set": [r.fit.law.name for r in ranking.remaining], "in set": bool(truth in laws[: len(ranking.remaining)]),
         "decisive": ranking.decisive, "cost": cost, "cover": [], "cover mixture": [], "width": [],
         "gap": float(ranking.laws[position].excess) if position >= 0 else np.nan,
     }  # fmt: skip
@@ -163,18 +166,35 @@ def main():
     options.add_argument("--using", default="bulge", choices=["bulge", "net"])
     options.add_argument("--sums", action="store_true")
     options.add_argument("--jobs", type=int, default=2)
+    options.add_argument("--rows", default="build/law_recovery", help="folder in which finished specimens are kept")
     given = options.parse_args()
     names = PAIRS if given.sums else planted.SINGLE
     for design in given.design:
         numbers = range(given.first, given.first + given.specimens)
         jobs = [(k, design, names, given.using, given.sums) for k in numbers]
-        rows = []
-        with ProcessPoolExecutor(given.jobs) as pool:
-            for k, row in enumerate(pool.map(specimen_result, jobs)):
-                rows.append(row)
-                if not row["strict"]:
-                    print(f"  {row['truth']} {given.first + k} -> {row['set']}, behind by {row['gap']:.1f}", flush=True)
-        table(planted.DESIGNS[design].title + (", two-term laws" if given.sums else ""), rows, names)
+        rows = kept(Path(given.rows), jobs, given.jobs)
+        title = planted.DESIGNS[design].title + (", two-term laws" if given.sums else "")
+        table(f"{title} ({given.using})", rows, names)
+
+
+def kept(folder, jobs, processes):
+    """The rows of all jobs; what a folder holds of an earlier run, which may have been killed, is not done again."""
+    folder.mkdir(parents=True, exist_ok=True)
+    k, design, _, using, sums = jobs[0]
+    file = folder / f"{design}_{using}{'_sums' if sums else ''}.jsonl"
+    known = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    found = {row["k"]: row for row in known}
+    todo = [job for job in jobs if job[0] not in found]
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(processes, maxtasksperchild=20) as pool, file.open("a") as out:
+        for done, row in enumerate(pool.imap_unordered(specimen_result, todo)):
+            found[row["k"]] = row
+            print(json.dumps(row), file=out, flush=True)
+            if not row["strict"]:
+                print(f"  {row['truth']} {row['k']} -> {row['set']}, behind by {row['gap']:.1f}", flush=True)
+            if (done + 1) % 20 == 0:
+                print(f"  {done + 1} of {len(todo)}", file=sys.stderr, flush=True)
+    return [found[job[0]] for job in jobs]
 
 
 if __name__ == "__main__":

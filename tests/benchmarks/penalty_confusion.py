@@ -28,11 +28,9 @@ from scipy.optimize import brentq
 
 import creepkit as ck
 from creepkit.cli.compiled import share_compiled_code
-from creepkit.inverse.search.swarm import ParticleSwarm
 from creepkit.inverse.settings import Settings
-from creepkit.inverse.sparsity.penalties import L2, GroupL2, Sqrt, Subsets
 from creepkit.inverse.sparsity.resampling import binomial
-from creepkit.inverse.sparsity.sparse import opened, reduced_by, sparse
+from creepkit.inverse.sparsity.sparse import opened, reduced_by
 from creepkit.records import History
 
 SEED = 2026
@@ -45,14 +43,15 @@ TIMES = 900.0 * np.arange(1, 49)
 ENDS = (0.15, 1.2)
 """mm."""
 JUMP = ck.PressureJump(P1=8, P2=10, Tj=14400)
+SETTINGS = {"frames": 48, "starts": 4, "nuisances": (ck.Nuisance("modulus", sd=0.1),)}
 PENALTIES = {
-    "none": (L2(0.0), None),
-    "L2": (L2(), None),
-    "GroupL2": (GroupL2(), None),
-    "Sqrt": (Sqrt(), None),
-    "Subsets": (Subsets(), None),
-    "Sqrt auto": (Sqrt("auto"), None),
-    "paper": (L2(), ParticleSwarm()),
+    "none": (ck.L2(0.0), None),
+    "L2": (ck.L2(), None),
+    "GroupL2": (ck.GroupL2(), None),
+    "Sqrt": (ck.Sqrt(), None),
+    "Subsets": (ck.Subsets(), None),
+    "Sqrt auto": (ck.Sqrt("auto"), None),
+    "paper": (ck.L2(), ck.ParticleSwarm()),
 }
 
 
@@ -108,7 +107,7 @@ def rows_of(test, law, model, settings, labels):
         if search is None:
             fit = reduced_by(penalty, dense, reductions)
         else:
-            fit = sparse(law, [test], model, penalty=penalty, search=search, settings=settings)
+            fit = ck.identify(law, [test], using=model, search=search, penalty=penalty, **SETTINGS)
         yield label, (*answer(fit), (common if search is None else 0.0) + time.process_time() - began)
 
 
@@ -139,7 +138,7 @@ def main():
     given = options.parse_args()
     share_compiled_code()
     model, law = ck.surrogate(given.through), ck.law("combined")
-    settings = Settings(frames=48, starts=4, nuisances=(ck.Nuisance("modulus", sd=0.1),))
+    settings = Settings(**SETTINGS)
     found = {label: [] for label in given.penalties}
     for name in given.laws:
         for k in range(given.specimens):

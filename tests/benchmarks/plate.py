@@ -27,6 +27,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 import creepkit as ck
+from creepkit.cli.compiled import share_compiled_code
 from creepkit.plates.planted import THICKNESS, planted_plate
 from creepkit.plates.screening import screen
 
@@ -35,6 +36,7 @@ MERGED = {"hyperbolic-sine": "norton"}
 
 
 def main():
+    share_compiled_code()
     given = options().parse_args()
     planted = planted_plate(given.alloys, given.seed, thickness_known=not given.unknown_thickness)
     folder = nullcontext(given.to) if given.to else tempfile.TemporaryDirectory()

@@ -73,7 +73,10 @@ def test_poorly_known_scatter_widens_them(fit, tests):
 
 
 def test_rates_that_scatter_between_tests_count_once_a_test():
-    """ln rate of 12 tests on ln stress is a regression: the slope's standard error is sd / sqrt(sum of squares)."""
+    """ln rate of 12 tests on ln stress is a regression: the slope's standard error is sd / sqrt(sum of squares).
+
+    A quarter of the half width holds what draws scatter by, and what rates do beyond second order.
+    """
     stresses = np.geomspace(30.0, 80.0, 12)
     tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(s, 1000.0) for s in stresses], seed=5, rate=0.2, noise=1e-5)
     fit = identify(NORTON, tests, Steady(), settings=Settings(starts=3, draws=16, frames=12))
@@ -83,7 +86,7 @@ def test_rates_that_scatter_between_tests_count_once_a_test():
     sd = np.sqrt(((y - level - slope * x) ** 2).sum() / 10)
     half = student.ppf(0.975, 10) * sd / np.sqrt(((x - x.mean()) ** 2).sum())
     assert sample(fit, walkers=16, steps=400, seed=1).interval("n") == pytest.approx(
-        (slope, slope - half, slope + half), abs=0.2 * half
+        (slope, slope - half, slope + half), abs=0.25 * half
     )
 
 

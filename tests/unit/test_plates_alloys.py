@@ -8,7 +8,7 @@ from creepkit import study
 from creepkit.errors import FitError
 from creepkit.inverse.together import Together
 from creepkit.plates.alloys import Alloy, alloys_of, check, remarks
-from creepkit.plates.growth import growth
+from creepkit.inverse.growth import growth
 from creepkit.plates.profiles import displacement
 from creepkit.records import PressureJump
 

@@ -48,7 +48,7 @@ def command(
     seed: Annotated[int, typer.Option(help="Seed of the searches.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
 ) -> None:
-    """Find how a law's parameters depend on temperature, and judge the forms by the tests themselves.
+    """Find forms of temperature for the parameters of a law.
 
     Every temperature is identified alone, closed forms are found through the parameters and refitted to all tests.
     From saved identifications forms are found alone, for want of the tests. JSON, a plot, LaTeX and Python go to a

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from creepkit.cli.choices import penalty_of, search_of
 from creepkit.cli.printing import print_json, print_table
 from creepkit.cli.progress import Progress
 
@@ -37,8 +38,17 @@ def command(
         str, typer.Option(help="Of whole tests: gaussian; or student, with which one far from its twins weighs less.")
     ] = "gaussian",
     weights: Annotated[
-        str, typer.Option(help="noise, or weights of relative squared errors: amplitude=0.99,width=0.005,shape=0.005.")
+        str,
+        typer.Option(help="noise; likelihood; equal, Eq. (4); or amplitude=0.99,width=0.005,shape=0.005 as the paper."),
     ] = "noise",
+    search: Annotated[str, typer.Option(help="How to begin: multi-start, swarm or cma-es.")] = "multi-start",
+    penalty: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Reduce a sum of terms: l2, group-l2, sqrt or subsets.")
+    ] = None,
+    sums: Annotated[bool, typer.Option("--sums", help="With --weights likelihood: sums of two laws as well.")] = False,
+    further: Annotated[
+        bool, typer.Option("--further-tests", help="Say which tests would tell the remaining laws apart.")
+    ] = False,
     nuisance: Annotated[
         list[str] | None,
         typer.Option(metavar="KIND[=MEAN[:SD]]", help="What differs between tests, such as thickness=0.4935:0.027."),
@@ -66,13 +76,22 @@ def command(
         from creepkit.inverse.warmth import with_arrhenius
 
         named = [with_arrhenius(one, histories) for one in named]
-    how = {"loss": loss, "test_loss": test_loss, "weights": weights_of(weights), "nuisances": nuisances_of(nuisance)}
-    ranking = ranked(named, histories, starts=starts, seed=seed, **how)
+    how: dict[str, Any] = {"starts": starts, "seed": seed, "nuisances": nuisances_of(nuisance)}
+    if sums and weights != "likelihood":
+        raise FitError("--sums compares laws by their likelihood; add --weights likelihood")
+    if weights == "likelihood" and search == "multi-start" and penalty is None:
+        ranking = selected(named, histories, sums=sums, **how)
+    else:
+        how |= {"loss": loss, "test_loss": test_loss, "weights": weights_of(weights)}
+        ranking = ranked(named, histories, search=search_of(search), penalty=penalty_of(penalty), **how)
     written = write(ranking, to)
     if as_json:
         print_json(_answer(ranking, written))
     else:
         tell(ranking, written, histories)
+    if further:
+        for found in ranking.further_tests():
+            typer.echo(str(found), err=as_json)
 
 
 def check_folder(folder: Path) -> None:
@@ -110,16 +129,17 @@ def _warn_of_twins(histories: list[History]) -> None:
 
 
 def weights_of(text: str) -> Any:
-    """The weights of outputs, from text such as amplitude=0.99,width=0.01; or the word noise."""
+    """The weights of outputs, from text such as amplitude=0.99,width=0.01; or a word."""
     from creepkit.errors import FitError
 
-    if text == "noise":
+    if text in ("noise", "likelihood", "equal"):
         return text
     pairs = [part.partition("=") for part in text.split(",")]
     try:
         return {name.strip(): float(value) for name, _, value in pairs}
     except ValueError:
-        raise FitError(f"--weights {text} is not known; write noise or amplitude=0.99,width=0.005") from None
+        words = "noise, likelihood, equal or amplitude=0.99,width=0.005"
+        raise FitError(f"--weights {text} is not known; write {words}") from None
 
 
 def nuisances_of(texts: Sequence[str] | None) -> list[Nuisance] | None:
@@ -146,6 +166,14 @@ def nuisances_of(texts: Sequence[str] | None) -> list[Nuisance] | None:
         found = [n for n in found if n.kind != kind]
         found.append(Nuisance(known[0], mean=numbers[0], sd=numbers[1]))
     return found
+
+
+def selected(laws: Sequence[CreepLaw], histories: list[History], **how: Any) -> Ranking:
+    """Identify the laws by likelihood and rank them, showing progress."""
+    from creepkit import study
+
+    with Progress() as progress:
+        return study.select(laws, histories, progress=progress.tick, **how)
 
 
 def ranked(laws: Sequence[CreepLaw], histories: list[History], **how: Any) -> Ranking:

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from creepkit.cli.choices import penalty_of
 from creepkit.cli.identify import nuisances_of
 from creepkit.cli.printing import print_json, print_table
 from creepkit.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
 
-    from creepkit.inverse.sparsity.penalties import Penalty, Subsets
     from creepkit.plates.plate import Plate
     from creepkit.records import Predictor
 
@@ -36,7 +35,7 @@ def command(
         str | None, typer.Option(metavar="NAME", help="Identify through a surrogate alone, such as dimple.")
     ] = None,
     through: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Search through a surrogate, end with finite elements.")
+        str | None, typer.Option(metavar="NAME", help="Search sums through a surrogate, end with finite elements.")
     ] = None,
     dense: Annotated[
         str, typer.Option(metavar="NAME", help="Law to be had without sparsity, to compare with; or none.")
@@ -67,12 +66,12 @@ def command(
         plate = screen(
             folder, law, _surrogate(surrogate), compositions=compositions, to=to, nuisances=nuisances_of(nuisance),
             settings=Settings(seed=seed, frames=FRAMES), through=_surrogate(through),
-            dense=None if dense == "none" else dense, penalty=_penalty(penalty), confirm=_choice(confirm),
+            dense=None if dense == "none" else dense, penalty=penalty_of(penalty), confirm=_choice(confirm),
             workers=workers, progress=progress.tick,
         )  # fmt: skip
     written = [plate.to_csv(to / "plate.csv"), plate.to_hdf5(to / "plate.h5")]
     if plate.identified:
-        written += plate.plot(to / "pictures")
+        written += [to / "fits", *plate.plot(to / "pictures")]
     tell(plate, written, as_json)
 
 
@@ -106,21 +105,6 @@ def _surrogate(name: str | None) -> Predictor | None:
     from creepkit import study
 
     return study.surrogate(name)
-
-
-def _penalty(name: str | None) -> Penalty | Subsets | None:
-    from creepkit.errors import FitError
-    from creepkit.inverse.sparsity.penalties import L2, GroupL2, Sqrt, Subsets
-
-    known: dict[str, Callable[[], Penalty | Subsets]] = {
-        "sqrt": Sqrt,
-        "group-l2": GroupL2,
-        "l2": L2,
-        "subsets": Subsets,
-    }
-    if name is not None and name not in known:
-        raise FitError(f"--penalty {name} is not known; allowed are {', '.join(known)}")
-    return None if name is None else known[name]()
 
 
 def _choice(text: str) -> bool | Literal["when in doubt"]:

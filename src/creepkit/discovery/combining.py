@@ -82,9 +82,10 @@ def combine(
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Combinations:
     """Fit combinations of one library for each parameter, and weigh them."""
-    tried = _Tried(points, progress)
-    names = list(libraries)
-    if int(np.prod([len(own) for own in libraries.values()])) <= ALL:
+    names, every = list(libraries), int(np.prod([len(own) for own in libraries.values()]))
+    tried = _Tried(points, min(every, SWEEPS * sum(len(own) for own in libraries.values())), progress)
+    if every <= ALL:
+        tried.total = every
         for chosen in product(*libraries.values()):
             tried(chosen)
     else:
@@ -103,10 +104,10 @@ def combine(
 
 
 class _Tried:
-    """Regressions of combinations, each made once."""
+    """Regressions of combinations, each made once; total : how many there may be."""
 
-    def __init__(self, points: Points, progress: Callable[[str, int, int], None] | None) -> None:
-        self.points, self.progress = points, progress
+    def __init__(self, points: Points, total: int, progress: Callable[[str, int, int], None] | None) -> None:
+        self.points, self.total, self.progress = points, total, progress
         self._known: dict[tuple[str, ...], Regression] = {}
 
     def __call__(self, chosen: Sequence[Library]) -> Regression:
@@ -114,7 +115,7 @@ class _Tried:
         if key not in self._known:
             self._known[key] = regress(self.points, chosen)
             if self.progress is not None:
-                self.progress("combination of forms", len(self._known), 0)
+                self.progress("combination of forms", len(self._known), self.total)
         return self._known[key]
 
     @property

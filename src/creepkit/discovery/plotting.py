@@ -14,6 +14,7 @@ from creepkit.discovery.points import ENDLESS
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.uncertainty import band, quantile
+from creepkit.language import Param
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,7 +64,10 @@ def _draw(axes: Any, trend: TemperatureLaw, coordinates: Coordinates, k: int) ->
         return np.asarray((coordinates.u(theta) if rate else theta)[..., k] * scale)
 
     middle, half = shown_of(points.theta), quantile(ENDLESS) * _spread(shown_of, points.theta, points.covariance)
-    axes.errorbar(points.temperatures, middle, half, fmt="o", ms=4, color="0.25", capsize=2, lw=1)
+    low, high = (-np.inf, np.inf) if rate else _ends(trend.base.table[name], scale)
+    arms = np.maximum([np.minimum(half, middle - low), np.minimum(half, high - middle)], 0.0)
+    axes.errorbar(points.temperatures, middle, arms, fmt="o", ms=4, color="0.25", capsize=2, lw=1)
+    seen = [middle]
     T = np.linspace(*trend.range, 60)
     drawn: set[str] = set()
     for one in trend.candidates:
@@ -72,13 +76,14 @@ def _draw(axes: Any, trend: TemperatureLaw, coordinates: Coordinates, k: int) ->
             continue
         drawn.add(form)
         curve = shown_of(one.theta(T))
+        seen.append(curve)
         axes.plot(T, curve, lw=1.8 if len(drawn) == 1 else 1.0, label=f"{form} {_weight(trend, k, form):.2f}")
         if len(drawn) == 1:
             wide = _band(shown_of, one, T) * quantile(one.freedom)
             axes.fill_between(T, curve - wide, curve + wide, color="C0", alpha=0.15, lw=0)
-    low, high = float(middle.min()), float(middle.max())
-    room = max(3.0 * float(np.median(half)), 0.15 * (high - low), 1e-9)
-    axes.set(xlabel="temperature, K", ylim=(low - room, high + room))
+    bottom, top = float(np.min(np.concatenate(seen))), float(np.max(np.concatenate(seen)))
+    room = max(0.15 * (top - bottom), min(1.2 * float(np.median(half)), top - bottom), 0.02 * abs(top) + 1e-9)
+    axes.set(xlabel="temperature, K", ylim=(bottom - room, top + room))
     axes.legend(fontsize=7)
     axes.grid(alpha=0.25)
 
@@ -94,6 +99,12 @@ def _title(trend: TemperatureLaw, coordinates: Coordinates, k: int, name: str) -
         return f"log10 of the rate of {name} (1/s) at {r.stress:.3g} MPa, {r.time:.3g} s"
     unit = "" if param.unit == "1" else f", {param.unit}"
     return f"{'log10 of ' if param.scale == 'log' else ''}{name}: {param.meaning}{unit}"
+
+
+def _ends(param: Param, scale: float) -> tuple[float, float]:
+    """The bounds as they are drawn, beyond which no interval goes."""
+    low, high = (param.to_internal(b) * scale for b in param.bounds)
+    return low, high
 
 
 def _spread(function: Callable[[Floats], Floats], theta: Floats, covariance: Floats) -> Floats:

@@ -3,8 +3,8 @@
 Regression on estimates inherits how badly single temperatures determine them; the tests together do not. Each
 combination of forms makes an ordinary law, which is identified from all tests at once, beginning where the regression
 ended, and ranked by BIC. Where more forms of a parameter remain than are to be tried, one stands for those that the
-points cannot tell from it. One parameter's form is changed at a time, the others as they are best so far; the winner
-is then searched for anew.
+points cannot tell from it. One parameter's form is changed at a time, the others as they are best so far; then each is
+put back to the plain one, to see whether it was needed; the winner is searched for anew.
 """
 
 from __future__ import annotations
@@ -60,14 +60,13 @@ def refit(
     choices = {name: _representatives(trend, name, most) for name in trend.base.names}
     now = {one.parameter: one for one in trend.candidates[0].libraries}
     plain = {name: _plain(trend, name) for name in trend.base.names}
-    work.total = 2 + sum(len(own) - 1 for own in choices.values())
+    work.total = 2 + sum(len(own) for own in choices.values())
     work(list(plain.values()))
     work(list(now.values()))
     for name in sorted(choices, key=lambda n: -len(choices[n])):
-        for library in choices[name]:
-            work(list({**now, name: library}.values()))
-        if work.fitted:
-            now = {one.parameter: one for one in work.best.libraries}
+        now = work.tried(now, name, choices[name])
+    for name in [n for n in now if now[n].name != plain[n].name]:
+        now = work.tried(now, name, [plain[name]])
     if not work.fitted:
         raise FitError(f"no form could be refitted; the first said: {next(iter(work.failed.values()))}")
     if confirm:
@@ -111,6 +110,12 @@ class _Work:
             self.failed[key] = told
         if self.progress is not None:
             self.progress("form of temperature", min(len(self.fitted) + len(self.failed), self.total), self.total)
+
+    def tried(self, now: Mapping[str, Library], name: str, libraries: Sequence[Library]) -> dict[str, Library]:
+        """Other forms of one parameter put in the place of its form now; returns the best combination so far."""
+        for library in libraries:
+            self(list({**now, name: library}.values()))
+        return {one.parameter: one for one in self.best.libraries} if self.fitted else dict(now)
 
     def _identified(self, law: CreepLaw, start: Floats | None) -> Identification:
         return identify(

@@ -10,6 +10,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.fences import Fences
 from creepkit.inverse.frames import measured
+from creepkit.inverse.growth import growth
 from creepkit.inverse.objective import Objective
 from creepkit.inverse.scales import LOGARITHMIC
 from creepkit.inverse.together import outputs_of, predictor_of
@@ -53,13 +54,20 @@ def check_growth(objective: Objective) -> None:
             if (mine & (entries.measured > 2 * scale.floor)).any():
                 return
             continue
-        for values in (entries.measured[k, row] for k, row in enumerate(mine)):
-            if values.size and np.ptp(values) > VISIBLE * entries.noise[position]:
+        for k, history in enumerate(objective.histories):
+            values = entries.measured[k, mine[k]]
+            if values.size and np.ptp(values) > VISIBLE * entries.noise[position] and _creeps(history, name):
                 return
     grown = dict.fromkeys(entries.outputs[k] for k in entries.output[entries.leading])
     raise FitError(
-        f"no {' or '.join(grown)} of these histories rises above its noise; there is no creep to identify a law from"
+        f"no {' or '.join(grown)} of these histories rises above its noise while the load is held; there is no creep "
+        "to identify a law from"
     )
+
+
+def _creeps(history: History, output: str) -> bool:
+    """Whether a bulge test grows while its pressure is held: a jump of pressure alone moves it elastically."""
+    return history.loading.quantity != "pressure" or growth(history, output).visible
 
 
 def check_histories(law: CreepLaw, histories: Sequence[History], using: Predictor) -> None:

@@ -9,8 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from creepkit.records.prediction import Kind
 
 KIND = "creepkit identification"
-VERSION = 3
-"""Version 1 knew one output, strain, and no explicit nuisances; version 2 did not know how tests ended."""
+VERSION = 4
+"""Version 1 knew one output, strain, and no explicit nuisances; version 2 did not know how tests ended; version 3 had
+exponents in the place of local exponents among its coordinates, and no sparsity."""
 
 
 class Strict(BaseModel):
@@ -136,11 +137,38 @@ class SettingsPart(Strict):
     test_loss: str
 
 
+class MisfitPart(Strict):
+    """How well a sum, or what was left of it, fits."""
+
+    chi_square: float
+    parameters: int = Field(ge=0)
+    bic: float
+    errors: dict[str, ErrorsPart]
+
+
+class SparsityPart(Strict):
+    """How a sum was reduced to the law."""
+
+    law: str
+    penalty: str
+    strength: float | None
+    kept: list[str]
+    dropped: list[str]
+    off: list[str]
+    proposed: list[str]
+    shares_without: dict[str, float]
+    shares_with: dict[str, float]
+    shares_after: dict[str, float]
+    whole: MisfitPart
+    reduced: MisfitPart
+    frames: int = Field(ge=0)
+
+
 class Document(Strict):
     """The file."""
 
     kind: Literal["creepkit identification"]
-    version: Literal[3]
+    version: Literal[4]
     law: dict[str, Any]
     estimates: list[EstimatePart]
     u: list[float]
@@ -159,3 +187,4 @@ class Document(Strict):
     provenance: dict[str, str | int | float | list[str]]
     converged: bool
     notes: list[str]
+    sparsity: SparsityPart | None = None

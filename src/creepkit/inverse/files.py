@@ -20,12 +20,14 @@ from creepkit.inverse.document import (
     RupturePart,
     ScatterPart,
     SettingsPart,
+    SparsityPart,
     TestPart,
 )
 from creepkit.inverse.findings import NuisanceEstimate, OutputMisfit, RuptureMisfit, TestMisfit
 from creepkit.inverse.identification import Identification, Settings
 from creepkit.inverse.measures import Errors
 from creepkit.inverse.scatter import OutputScatter, Scatter
+from creepkit.inverse.sparsity.record import Sparsity
 from creepkit.inverse.uncertainty import Estimate
 from creepkit.language.tree import law_from_json, law_to_json
 from creepkit.records import Nuisance
@@ -57,7 +59,15 @@ def to_json(fit: Identification) -> dict[str, Any]:
         "provenance": dict(fit.provenance),
         "converged": fit.converged,
         "notes": list(fit.notes),
+        "sparsity": None if fit.sparsity is None else _numbers(fit.sparsity.to_dict()),
     }
+
+
+def _numbers(tree: Any) -> Any:
+    """The same with every number as JSON can hold it."""
+    if isinstance(tree, dict):
+        return {key: _numbers(value) for key, value in tree.items()}
+    return _number(tree) if isinstance(tree, float) else tree
 
 
 def _number(value: float) -> float | str | None:
@@ -146,7 +156,16 @@ def from_json(data: Any, source: str = "identification") -> Identification:
         nuisances=tuple(NuisanceEstimate(**{**n.model_dump(), "spread": float(n.spread)}) for n in document.nuisances),
         converged=document.converged,
         notes=tuple(document.notes),
+        sparsity=None if document.sparsity is None else _sparsity(document.sparsity),
     )
+
+
+def _sparsity(part: SparsityPart) -> Sparsity:
+    given = part.model_dump()
+    for name in ("whole", "reduced"):
+        own = getattr(part, name).errors
+        given[name]["errors"] = {k: vars(_errors(e)) for k, e in own.items()}
+    return Sparsity.from_dict(given)
 
 
 def _scatter(s: ScatterPart) -> Scatter:

@@ -33,6 +33,7 @@ def text_of(fit: Identification) -> str:
         *_linear_outputs(fit),
         *_table(fit),
     ]
+    lines += [f"  {fit.sparsity.verdict}"] if fit.sparsity is not None else []
     lines += [f"  note: {note}" for note in fit.notes]
     return "\n".join(lines)
 

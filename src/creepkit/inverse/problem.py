@@ -26,7 +26,7 @@ from creepkit.inverse.search.box import Box
 from creepkit.inverse.search.landscape import Landscape
 from creepkit.inverse.search.refining import Extra, Minimum, refine
 from creepkit.inverse.settings import Settings
-from creepkit.inverse.together import Together
+from creepkit.inverse.together import Together, errors_of
 from creepkit.inverse.weighting import Weighting, pulling
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
@@ -64,7 +64,9 @@ class Problem:
         check_growth(objective)
         check_effects([n.kind for n in unknowns.nuisances], entries, thin, using)
         box = Box.of(law, coordinates, measured_log_rate(thin, using), measured_log_pace(thin))
-        return cls(tuple(histories), tuple(thin), settings, objective, box, Weighting(settings, entries))
+        return cls(
+            tuple(histories), tuple(thin), settings, objective, box, Weighting(settings, entries, errors_of(using))
+        )
 
     @property
     def wide(self) -> Box:

@@ -130,6 +130,15 @@ def predict(
     return using.predict(law, values, histories, jacobian=jacobian)
 
 
+def errors_of(using: Predictor) -> dict[str, float]:
+    """{output: standard deviation} of what a predictor says that it is wrong by; the largest of several predictors."""
+    found: dict[str, float] = {}
+    for one in using.predictors.values() if isinstance(using, Together) else (using,):
+        for name, size in getattr(one, "error", {}).items():
+            found[name] = max(size, found.get(name, 0.0))
+    return found
+
+
 def offers(using: Predictor, kind: str) -> bool:
     """Whether a predictor knows an explicit nuisance: it names those it does in `effects`."""
     return kind in getattr(using, "effects", ())

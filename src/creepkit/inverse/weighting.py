@@ -14,7 +14,7 @@ from creepkit.inverse.entries import Entries
 from creepkit.inverse.measures import squares_about
 from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.restricted import Linear, restricted_log_likelihood
-from creepkit.inverse.scales import LOGARITHMIC, RUPTURE
+from creepkit.inverse.scales import LOGARITHMIC, RUPTURE, LinearScale
 from creepkit.inverse.scatter import ASSUMED_RATE, OutputScatter, Scatter, size_of, working_guess
 from creepkit.inverse.settings import Settings
 from creepkit.inverse.sizes import estimated
@@ -37,8 +37,9 @@ UNWEIGHTED = 1e-6
 class Weighting:
     """How the working scatter follows from settings: by likelihood, or by the weights of outputs."""
 
-    def __init__(self, settings: Settings, entries: Entries) -> None:
-        self.settings, self.entries = settings, entries
+    def __init__(self, settings: Settings, entries: Entries, errors: Mapping[str, float] | None = None) -> None:
+        """errors : {output: standard deviation of what the predictor itself is wrong by}, in the output's unit."""
+        self.settings, self.entries, self.errors = settings, entries, errors or {}
         self.likelihood = settings.weights == "likelihood"
         self.relative: Mapping[str, float] | None = None
         if settings.weights == "equal":
@@ -89,7 +90,15 @@ class Weighting:
         whole = estimated(r, self._begun(last, 0.01), nuisances, fixed=(), linear=linear)
         gain = 2.0 * (restricted_log_likelihood(linear, whole) - restricted_log_likelihood(linear, white))
         wandering = sum(sizes.drift > ABSENT for sizes in whole.outputs.values())
-        return whole if wandering and gain > chi2.ppf(ASKED_FOR, 2 * wandering) else white
+        return self._unsure(whole if wandering and gain > chi2.ppf(ASKED_FOR, 2 * wandering) else white)
+
+    def _unsure(self, scatter: Scatter) -> Scatter:
+        """The same with the errors of the predictor as drift: they follow the curve, and do not average out."""
+        for name, scale in zip(self.entries.outputs, self.entries.scales, strict=True):
+            if self.errors.get(name, 0.0) > 0 and isinstance(scale, LinearScale):
+                drift = float(np.hypot(scatter[name].drift, self.errors[name] / scale.size))
+                scatter = scatter.changed(name, drift=drift)
+        return scatter
 
     def _begun(self, scatter: Scatter, drift: float) -> Scatter:
         """The same with a drift to begin from, or none, and the noise that was measured."""

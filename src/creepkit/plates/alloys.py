@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from creepkit.errors import FitError
+from creepkit.inverse.growth import growth, levels
 from creepkit.inverse.scales import LOGARITHMIC
 from creepkit.inverse.together import Together, predictor_of
-from creepkit.plates.growth import growth, levels
 from creepkit.records import History, Predictor
 
 

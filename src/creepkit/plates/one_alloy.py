@@ -38,7 +38,7 @@ def screened(work: Screening, alloy: Alloy) -> AlloyAnswer:
 
 def _identified(work: Screening, alloy: Alloy) -> AlloyAnswer:
     laws = [with_arrhenius(law, alloy.tests) for law in work.laws]
-    ranking = select(laws, alloy.tests, work.using, settings=work.settings, through=work.through)
+    ranking = select(laws, alloy.tests, work.using, settings=work.settings, through=_through(work, laws))
     best, found = ranking.best, list(remarks(alloy, work.using))
     dense = sparse = None
     if work.dense is not None:
@@ -57,6 +57,11 @@ def _identified(work: Screening, alloy: Alloy) -> AlloyAnswer:
         predicted=_predicted(best, alloy.tests, predictor),
         notes=(*found, *best.notes),
     )
+
+
+def _through(work: Screening, laws: Sequence[CreepLaw]) -> Predictor | None:
+    """The surrogate, where a law has several terms: those of one cost no more without it."""
+    return work.through if any(len(law.terms) > 1 for law in laws) else None
 
 
 def _without_sparsity(

@@ -67,7 +67,7 @@ def screen(
         no alloy is an alloy by itself.
     laws : candidates, by default the four of Table 1 of Chen et al.; times an Arrhenius factor where the tests of an
         alloy span several temperatures. using : predictor, by default the specimen that the histories name; through :
-        see identify().
+        a surrogate in which laws of several terms are searched before `using` has the last word (see identify()).
     compositions : table of what the alloys are made of, or its file; classes follow from it.
     to : folder for one JSON file an alloy, in which an interrupted call finds what is done. Alloys whose tests and
         settings are the same as there are not identified again. Its folder `fits` has the best identification of each.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, fields
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -82,6 +82,15 @@ class Surrogate(ABC):
 
         A row outside the domain of the training has its values all the same, and Status.OUTSIDE_DOMAIN.
         """
+
+    @property
+    def error(self) -> dict[str, float]:
+        """{output: standard deviation of its error}, in the output's unit, as validation saw it.
+
+        1.25 times the mean absolute error, that of a Gaussian: rare large errors would make every answer unsure.
+        """
+        outputs = self.told.metrics.get("outputs", {})
+        return {name: 1.2533 * float(m["mae"]) for name, m in outputs.items() if "mae" in m}
 
     def screening(self) -> Predictor:
         """A stand-in for searches: that of the specimen, if it has one, else the network itself."""

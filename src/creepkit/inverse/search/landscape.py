@@ -65,10 +65,9 @@ class Landscape:
         self, u: Floats, steps: int = 30, tolerance: float = 1e-5, held: Mapping[int, float] | None = None
     ) -> Minimum:
         """Bounded least squares from u; held : {position: value} of coordinates that stay where they are."""
-        extra = None if self.penalty is None else self.penalty.at(u)
         return refine(
-            self.objective, self.box, self.factor, u, loss=self.loss, steps=steps, tolerance=tolerance, extra=extra,
-            held=held,
+            self.objective, self.box, self.factor, u, loss=self.loss, steps=steps, tolerance=tolerance,
+            extra=self.penalty, held=held,
         )  # fmt: skip
 
 
