@@ -27,7 +27,6 @@ from creepkit.inverse.measures import relative_squared_error
 T_REF = 1050.0
 R = 8.314462618
 R_PAPER = 8.31
-PAPER_WEIGHTS = {"amplitude": 0.99, "width": 0.005, "shape": 0.005}
 THICKNESS = ck.Nuisance("thickness", mean=0.4935, sd=0.027)  # 25 measured dimples of one plate
 dimple = ck.specimen("bulge")
 
@@ -91,7 +90,7 @@ tests = ck.with_suspects_marked(tests)
 # how far they lie from the others; and with the zero of each camera and each dimple's thickness unknown.
 
 ways = {
-    "paper's loss": dict(nuisances=(), weights=PAPER_WEIGHTS),
+    "paper's loss": dict(nuisances=(), weights="paper"),
     "robust": dict(nuisances=(), test_loss="student"),
     "offset, thickness": dict(nuisances=(ck.Nuisance("offset", sd=0.012), THICKNESS), test_loss="student"),
 }

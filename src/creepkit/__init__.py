@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from creepkit.inverse.search.evolution import CmaEs as CmaEs
     from creepkit.inverse.search.multistart import MultiStart as MultiStart
     from creepkit.inverse.search.swarm import ParticleSwarm as ParticleSwarm
-    from creepkit.inverse.settings import PAPER_WEIGHTS as PAPER_WEIGHTS
     from creepkit.inverse.sparsity.penalties import L2 as L2
     from creepkit.inverse.sparsity.penalties import GroupL2 as GroupL2
     from creepkit.inverse.sparsity.penalties import Sqrt as Sqrt
@@ -75,7 +74,6 @@ _HOMES = {
     "creepkit.inverse.search.evolution": "CmaEs",
     "creepkit.inverse.search.multistart": "MultiStart",
     "creepkit.inverse.search.swarm": "ParticleSwarm",
-    "creepkit.inverse.settings": "PAPER_WEIGHTS",
     "creepkit.inverse.sparsity.penalties": "GroupL2 L2 Sqrt Subsets",
     "creepkit.kernels": "lower",
     "creepkit.language": "CreepLaw Elastic Param State activated arrhenius exponential inverse linear wachtman",

@@ -39,7 +39,7 @@ def command(
     ] = "gaussian",
     weights: Annotated[
         str,
-        typer.Option(help="noise; likelihood; equal, Eq. (4); or amplitude=0.99,width=0.005,shape=0.005 as the paper."),
+        typer.Option(help="noise; likelihood; equal, Eq. (4); paper, Eq. (S3); or amplitude=0.99,width=0.01."),
     ] = "noise",
     search: Annotated[str, typer.Option(help="How to begin: multi-start, swarm or cma-es.")] = "multi-start",
     penalty: Annotated[
@@ -131,14 +131,15 @@ def _warn_of_twins(histories: list[History]) -> None:
 def weights_of(text: str) -> Any:
     """The weights of outputs, from text such as amplitude=0.99,width=0.01; or a word."""
     from creepkit.errors import FitError
+    from creepkit.inverse.settings import WEIGHTS
 
-    if text in ("noise", "likelihood", "equal"):
+    if text in WEIGHTS:
         return text
     pairs = [part.partition("=") for part in text.split(",")]
     try:
         return {name.strip(): float(value) for name, _, value in pairs}
     except ValueError:
-        words = "noise, likelihood, equal or amplitude=0.99,width=0.005"
+        words = f"{', '.join(WEIGHTS)} or amplitude=0.99,width=0.005"
         raise FitError(f"--weights {text} is not known; write {words}") from None
 
 

@@ -133,7 +133,7 @@ class SettingsPart(Strict):
     seed: int
     loss: str
     nuisances: list[NuisancePart]
-    weights: Literal["noise", "likelihood", "equal"] | dict[str, float]
+    weights: Literal["noise", "likelihood", "equal", "paper"] | dict[str, float]
     test_loss: str
 
 

@@ -14,8 +14,8 @@ from creepkit.records import ABSOLUTE, EXPLICIT, Nuisance
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
 TEST_LOSSES = ("gaussian", "student")
-WEIGHTS = ("noise", "likelihood", "equal")
-Weights = Literal["noise", "likelihood", "equal"] | Mapping[str, float]
+WEIGHTS = ("noise", "likelihood", "equal", "paper")
+Weights = Literal["noise", "likelihood", "equal", "paper"] | Mapping[str, float]
 PAPER_WEIGHTS = MappingProxyType({"amplitude": 0.99, "width": 0.005, "shape": 0.005})
 """The paper's weighted loss for measured histories, Eq. (S3): .99 on D_amp; how the rest is split is not said."""
 
@@ -30,9 +30,9 @@ class Settings:
     test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its pull.
     weights : "noise": values by least squares of frames of equal weight, intervals from all the scatter that the data
         show. "likelihood": values, intervals and ranking by one likelihood, white noise and autocorrelation of every
-        output estimated with it (see inverse.restricted). "equal": Eq. (4) of the paper, every output's relative
-        squared error. {output: weight}: the sum of weight times relative squared error (see inverse.measures), such
-        as PAPER_WEIGHTS, its Eq. (S3).
+        output estimated with it (see inverse.restricted). {output: weight}: the sum of weight times relative squared
+        error (see inverse.measures); "equal" weights are Eq. (4) of the paper, "paper" its Eq. (S3) for measured
+        histories, .99 on D_amp.
     nuisances : what differs between tests; unless told otherwise an offset of each output and test-to-test scatter
         of the rate, both estimated.
     """

@@ -16,7 +16,7 @@ from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.restricted import Linear, restricted_log_likelihood
 from creepkit.inverse.scales import LOGARITHMIC, RUPTURE, LinearScale
 from creepkit.inverse.scatter import ASSUMED_RATE, OutputScatter, Scatter, size_of, working_guess
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.settings import PAPER_WEIGHTS, Settings
 from creepkit.inverse.sizes import estimated
 
 FREEDOM = 4.0
@@ -44,6 +44,8 @@ class Weighting:
         self.relative: Mapping[str, float] | None = None
         if settings.weights == "equal":
             self.relative = _variances(dict.fromkeys(entries.outputs, 1.0), entries)
+        elif settings.weights == "paper":
+            self.relative = _variances(PAPER_WEIGHTS, entries)
         elif not isinstance(settings.weights, str):
             self.relative = _variances(settings.weights, entries)
 

@@ -96,7 +96,7 @@ def identify(
     nuisances : what differs between tests; by default an offset of each output and test-to-test scatter of the rate.
     weights : what is minimised. "noise": least squares of frames, intervals from all the scatter found; "likelihood":
         noise and autocorrelation of every output in values, intervals and ranking alike; "equal": Eq. (4) of the
-        paper; or {output: weight} of relative squared errors, such as ck.PAPER_WEIGHTS, its Eq. (S3).
+        paper; "paper": its Eq. (S3), .99 on D_amp; or {output: weight} of relative squared errors.
     search : how to begin: by default least squares from screened starts; ParticleSwarm() as in the paper, CmaEs().
     penalty : on the contributions of a sum's terms, such as L2(), GroupL2(), Sqrt() or Subsets(): those that are left
         out stand in the answer's `sparsity`, and the law of the answer is what remains.
