@@ -1,14 +1,16 @@
 """Which law? Planted laws, identified and ranked: the tables of the README on law recovery and on intervals.
 
-    python tests/benchmarks/law_recovery.py [--design jump ...] [--specimens 200] [--using bulge|net] [--sums] [--jobs 2]
+    python tests/benchmarks/law_recovery.py [--design jump ...] [--specimens 200] [--using bulge|net] [--sums]
 
 Designs, laws, priors and noise: tests/benchmarks/planted.py. Each specimen's tests are given to select() with the four
 single laws (--sums: two-term laws are planted, and sums of two are candidates beside the singles). Printed, with
-Clopper-Pearson 95 % intervals: share of strictly right answers; with laws that the ranking calls equivalent merged; with
-hyperbolic-sine and norton merged; truth in the set of laws above 5 %, and its mean size; share of decisive answers and
-how many of them are right; wrong and decisive; the confusion matrix. Then coverage of 95 % intervals for the log rate at
-.6, 1 and 1.4 times 120 MPa and the local exponent at 120 MPa: of the true law, of the mixture of laws; and the width of
-the former over the Fisher bound (white noise and scatter known, from the exact Jacobian at the truth).
+Clopper-Pearson 95 % intervals: share of strictly right answers; with laws that the ranking calls equivalent merged;
+with hyperbolic-sine and norton merged; truth in the set of laws above 5 %, and its mean size; share of decisive answers
+and how many of them are right; wrong and decisive; the confusion matrix. Then coverage of 95 % intervals for the log
+rate at .6, 1 and 1.4 times 120 MPa and the local exponent at 120 MPa: of the true law, of the mixture of laws; and the
+width of the former over the Fisher bound (scatter known, from the exact Jacobian at the truth).
+
+Finished specimens are kept in --rows: killed and started again, none is done twice.
 """
 
 import argparse
@@ -32,7 +34,7 @@ from creepkit import kernels
 from creepkit.cli.compiled import share_compiled_code
 from creepkit.inverse.covariance import covariance
 from creepkit.inverse.intervals.mixture import Mixture
-from creepkit.inverse.problem import Problem, reopened
+from creepkit.inverse.problem import reopened
 from creepkit.inverse.restricted import inverse
 from creepkit.inverse.scatter import OutputScatter, Scatter
 from creepkit.inverse.selection.equivalence import equivalents
@@ -130,7 +132,7 @@ def covered_by_mixture(one, ranking, fit):
     return [bool(low <= t <= high) for t, (_, low, high) in zip(truth, found, strict=True)]
 
 
-def table(title, rows, names):
+def table(title, rows):
     """Print one design."""
     n = len(rows)
     print(f"\n## {title}: {n} specimens, {np.mean([r['cost'] for r in rows]):.2f} CPU-s each")
@@ -174,13 +176,13 @@ def main():
         jobs = [(k, design, names, given.using, given.sums) for k in numbers]
         rows = kept(Path(given.rows), jobs, given.jobs)
         title = planted.DESIGNS[design].title + (", two-term laws" if given.sums else "")
-        table(f"{title} ({given.using})", rows, names)
+        table(f"{title} ({given.using})", rows)
 
 
 def kept(folder, jobs, processes):
     """The rows of all jobs; what a folder holds of an earlier run, which may have been killed, is not done again."""
     folder.mkdir(parents=True, exist_ok=True)
-    k, design, _, using, sums = jobs[0]
+    _, design, _, using, sums = jobs[0]
     file = folder / f"{design}_{using}{'_sums' if sums else ''}.jsonl"
     known = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
     found = {row["k"]: row for row in known}

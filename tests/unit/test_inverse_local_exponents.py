@@ -25,7 +25,7 @@ def test_that_of_sinh_is_n_x_coth_x():
 def test_that_of_a_drifting_exponent_is_n_at_the_reference_time():
     law = ck.law("drifting-exponent").fix(m=0)
     values = {"A": 1e-16, "n_0": 4.9, "n_inf": 4.3, "C": 2.7, "tau_d": 13823.6, "tau_r": 8090.4}
-    values = {name: value for name, value in zip(law.names, [values.get(n, 0.0) for n in law.names], strict=True)}
+    values = dict(zip(law.names, [values.get(n, 0.0) for n in law.names], strict=True))
     (local,) = local_exponents(law)
     assert law.names[local.p] == "n_inf"
     u = Coordinates(law, AT).u(inner(law, values))

@@ -11,7 +11,9 @@ def test_weights():
     assert weights_of("noise") == "noise"
     assert weights_of("paper") == "paper"
     assert weights_of("amplitude=0.99, width=0.005") == {"amplitude": 0.99, "width": 0.005}
-    with pytest.raises(FitError, match="--weights amplitude is not known; write noise, likelihood, equal, paper or amplitude=0.99"):
+    with pytest.raises(
+        FitError, match="--weights amplitude is not known; write noise, likelihood, equal, paper or amplitude=0.99"
+    ):
         weights_of("amplitude")
 
 

@@ -1,4 +1,4 @@
-"""The restricted likelihood against textbook results: unbiased variances, Student's freedom, generalised least squares."""
+"""The restricted likelihood against textbooks: unbiased variances, Student's freedom, generalised least squares."""
 
 from dataclasses import replace
 

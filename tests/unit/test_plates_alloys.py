@@ -6,9 +6,9 @@ from planted_alloys import bars, bulge
 
 from creepkit import study
 from creepkit.errors import FitError
+from creepkit.inverse.growth import growth
 from creepkit.inverse.together import Together
 from creepkit.plates.alloys import Alloy, alloys_of, check, remarks
-from creepkit.inverse.growth import growth
 from creepkit.plates.profiles import displacement
 from creepkit.records import PressureJump
 

@@ -61,7 +61,9 @@ def test_the_criteria_are_their_formulas(ranking):
 
 
 def test_a_law_and_its_special_case_are_not_told_apart():
-    ranking = ck.select(LAWS[:2], measured("norton", {"A": 1e-16, "n": 4.2}, seed=2), "uniaxial", nuisances=[], starts=3)
+    ranking = ck.select(
+        LAWS[:2], measured("norton", {"A": 1e-16, "n": 4.2}, seed=2), "uniaxial", nuisances=[], starts=3
+    )
     assert ranking.best.law.name == "norton"
     assert ranking.laws[1].chi_square == pytest.approx(ranking.laws[0].chi_square, abs=6.0)
     assert "strain-hardening" in str(ranking)
