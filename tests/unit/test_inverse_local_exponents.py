@@ -25,12 +25,11 @@ def test_that_of_sinh_is_n_x_coth_x():
 def test_that_of_a_drifting_exponent_is_n_at_the_reference_time():
     law = ck.law("drifting-exponent").fix(m=0)
     values = {"A": 1e-16, "n_0": 4.9, "n_inf": 4.3, "C": 2.7, "tau_d": 13823.6, "tau_r": 8090.4}
-    values = dict(zip(law.names, [values.get(n, 0.0) for n in law.names], strict=True))
     (local,) = local_exponents(law)
     assert law.names[local.p] == "n_inf"
     u = Coordinates(law, AT).u(inner(law, values))
     decay, rise = np.exp(-2e4 / values["tau_d"]), np.exp(-2e4 / values["tau_r"])
-    n = values["n_inf"] + (values["C"] + values[law.names[1]] - values["n_inf"]) * decay - values["C"] * rise
+    n = values["n_inf"] + (values["C"] + values["n_0"] - values["n_inf"]) * decay - values["C"] * rise
     assert u[local.p] == pytest.approx(n, rel=1e-12)
 
 

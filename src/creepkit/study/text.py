@@ -12,12 +12,13 @@ from creepkit.records import Exporter, Units, ValuedLaw
 from creepkit.study.nouns import law_given
 
 if TYPE_CHECKING:
+    from creepkit.discovery.trend import TemperatureLaw
     from creepkit.inverse.identification import Identification
     from creepkit.language import CreepLaw, Elastic
 
 
 def export(
-    source: CreepLaw | Identification | ValuedLaw | str,
+    source: CreepLaw | Identification | TemperatureLaw | ValuedLaw | str,
     target: str,
     values: Mapping[str, float] | None = None,
     *,
@@ -31,8 +32,9 @@ def export(
 ) -> str:
     """Return a law with its values as text for a target (latex, python, abaqus ...), and write it to a file if asked.
 
-    source : a law, which needs `values` {parameter: value}, or an identification, whose intervals and range of
-        validity become comments, or a ValuedLaw, such as an exported JSON read back.
+    source : a law, which needs `values` {parameter: value}, or an identification or a law of temperature that was
+        discovered, whose intervals and range of validity become comments, or a ValuedLaw, such as an exported JSON
+        read back.
     target : one of `exporters()`. units : of stress and time in the text, Units("Pa", "h") or {"stress": "Pa"}.
     temperature : K, puts a number in the place of the temperature, for targets that know none.
     elastic : E in MPa, and nu, for targets that state them. name : what the target calls the law.
@@ -64,11 +66,13 @@ def exporters() -> dict[str, Exporter]:
 
 
 def _valued(
-    source: CreepLaw | Identification | ValuedLaw | str, values: Mapping[str, float] | None, notes: Sequence[str]
-) -> ValuedLaw:
+    source: CreepLaw | Identification | TemperatureLaw | ValuedLaw | str, values: Mapping[str, float] | None,
+    notes: Sequence[str],
+) -> ValuedLaw:  # fmt: skip
     """The source with its own values, or those given in their place, which its notes then tell."""
     from creepkit.inverse.identification import Identification
 
+    source = getattr(source, "valued", source)  # a law of temperature has one
     if isinstance(source, Identification):
         from creepkit.inverse.printing import notes_of
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from creepkit.arrays import Floats
+from creepkit.errors import FitError
 from creepkit.inverse.fences import Fences
 from creepkit.inverse.objective import Objective
 from creepkit.inverse.search.box import Box
@@ -89,13 +90,18 @@ def refine(
             memory[key] = np.concatenate(values), np.concatenate(slopes)[:, free]
         return memory[key]
 
+    begun = np.clip(whole, box.low + 1e-9 * box.width, box.high - 1e-9 * box.width)[free]
+    if not all(np.isfinite(part).all() for part in evaluate(begun)):
+        raise FitError(
+            f"law '{objective.law.name}': its prediction is no number where a refinement begins; narrow the bounds of "
+            "its parameters, or give more starts"
+        )
     scale, own = 0.1 * box.width, objective.unknowns.size
     if own:
         scale[-own:] = np.minimum(objective.unknowns.sd, box.width[-own:])
-    room = 1e-9 * box.width
     result = least_squares(
         lambda part: evaluate(part)[0],
-        np.clip(whole, box.low + room, box.high - room)[free],
+        begun,
         jac=lambda part: evaluate(part)[1],
         bounds=(box.low[free], box.high[free]),
         x_scale=scale[free],
