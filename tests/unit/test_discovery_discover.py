@@ -77,7 +77,7 @@ def test_the_curves_themselves_decide(trend):
 def test_the_law_is_an_ordinary_one(trend, tmp_path):
     assert trend.law.names == ("A", "Q", "n", "n_T")
     assert trend.law.uses(temperature)
-    text = study.export(trend.valued, "python", to=tmp_path / "law.py")
+    text = study.export(trend, "python", to=tmp_path / "law.py")
     space = {}
     exec(compile(text, "law.py", "exec"), space)
     for T in (980.0, 1050.0):

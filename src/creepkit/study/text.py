@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from creepkit import registry
 from creepkit.errors import ExportError
@@ -72,18 +72,18 @@ def _valued(
     """The source with its own values, or those given in their place, which its notes then tell."""
     from creepkit.inverse.identification import Identification
 
-    source = getattr(source, "valued", source)  # a law of temperature has one
-    if isinstance(source, Identification):
+    given: Any = getattr(source, "valued", source)  # a law of temperature has one
+    if isinstance(given, Identification):
         from creepkit.inverse.printing import notes_of
 
-        source = ValuedLaw(source.law, source.values, tuple(notes_of(source)), ranges=source.ranges)
-    if not isinstance(source, ValuedLaw):
-        return ValuedLaw(law_given(source), values or {}, tuple(notes))
-    own, found = source.values, source if values is None else source.replace(values=values)
+        given = ValuedLaw(given.law, given.values, tuple(notes_of(given)), ranges=given.ranges)
+    if not isinstance(given, ValuedLaw):
+        return ValuedLaw(law_given(given), values or {}, tuple(notes))
+    own, found = given.values, given if values is None else given.replace(values=values)
     changed = [
         f"{k} = {v:.8g} was set by hand, in place of {own[k]:.8g}" for k, v in found.values.items() if v != own[k]
     ]
-    return found.replace(notes=(*source.notes, *changed, *notes))
+    return found.replace(notes=(*given.notes, *changed, *notes))
 
 
 def _units(given: Units | Mapping[str, str]) -> Units:
