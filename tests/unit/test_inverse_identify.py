@@ -141,6 +141,8 @@ def test_what_cannot_be_fitted_is_said(tests):
         identify(LAW, [], Steady())
     with pytest.raises(FitError, match="loss 'cubic'"):
         Settings(loss="cubic")
+    with pytest.raises(FitError, match="loss 'huber' does not go with weights 'likelihood'"):
+        Settings(loss="huber", weights="likelihood")
     with pytest.raises(FitError, match="fewer than two usable frames"):
         identify(LAW, [tests[0].replace(used=np.zeros(tests[0].times.size, bool))], Steady())
 

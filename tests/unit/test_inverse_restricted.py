@@ -1,6 +1,7 @@
 """The restricted likelihood against textbooks: unbiased variances, Student's freedom, generalised least squares."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +10,11 @@ from scipy.stats import multivariate_normal
 from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.restricted import Linear, inverses_of, restricted_log_likelihood
 from creepkit.inverse.satterthwaite import restricted_laplace
+from creepkit.inverse.scales import LinearScale
 from creepkit.inverse.scatter import OutputScatter, Scatter
+from creepkit.inverse.settings import Settings
 from creepkit.inverse.sizes import estimated
+from creepkit.inverse.weighting import Weighting
 
 
 def linear_model(values, design, clock=None, outputs=1):
@@ -53,6 +57,47 @@ def test_intervals_of_white_noise_are_students():
     posterior, freedom = restricted_laplace(linear, white(0.3), ())
     assert freedom == pytest.approx(22.0, rel=1e-6)
     assert posterior == pytest.approx(0.09 * np.linalg.inv(design[0].T @ design[0]), rel=1e-6)
+
+
+def test_what_a_predictor_states_of_its_error_is_not_asked_of_the_data():
+    """An error of a thousandth, under noise of .3, leaves the noise its n - p = 22; asked of the data it takes most."""
+    linear = linear_model(0.3 * np.random.default_rng(1).normal(size=(1, 25)), polynomial(25, 2))
+    entries = SimpleNamespace(outputs=("amplitude",), scales=(LinearScale(2.0, 1.0),))
+    weighting = Weighting(Settings(weights="likelihood"), entries, {"amplitude": 0.004})
+    scatter = white(0.3, ("amplitude",), drift=0.002)
+    assert weighting.stated(scatter) == {("amplitude", "drift"), ("amplitude", "reach")}
+    assert weighting.stated(white(0.3, ("amplitude",), drift=0.1)) == set()
+    assert restricted_laplace(linear, scatter, ())[1] < 10.0
+    assert restricted_laplace(linear, scatter, (), weighting.stated(scatter))[1] == pytest.approx(22.0, rel=1e-3)
+
+
+def test_tests_that_share_their_values_share_one_freedom():
+    """Six tests of four frames each and one mean: n - p = 23, whatever falls to which test."""
+    rng = np.random.default_rng(6)
+    linear = linear_model(0.3 * rng.normal(size=(6, 4)), np.ones((6, 4, 1)))
+    assert restricted_laplace(linear, white(0.3), ())[1] == pytest.approx(23.0, rel=1e-6)
+
+
+def test_the_mean_of_a_few_tests_has_their_number_less_one():
+    """Rates that scatter, seen without noise: Student's interval of the mean of T numbers has T - 1."""
+    linear = linear_model(np.zeros((5, 3)), np.ones((5, 3, 1)))
+    linear = replace(linear, residuals=replace(linear.residuals, rate_effect=np.ones((5, 3))))
+    scatter = Scatter({"strain": OutputScatter(1e-4)}, rate=0.3)
+    assert restricted_laplace(linear, scatter, ())[1] == pytest.approx(4.0, rel=1e-3)
+
+
+def test_a_spread_that_explains_no_more_is_not_more_likely():
+    """One unknown of a test without any data: its prior is normal whatever its spread, and the likelihood the same."""
+    linear = linear_model(np.ones((1, 10)), np.concatenate([polynomial(10, 0), np.zeros((1, 10, 1))], axis=-1))
+    narrow, broad = (replace(linear, precision=np.array([1e-12, p])) for p in (100.0, 0.01))
+    found = [restricted_log_likelihood(one, white(0.5)) for one in (narrow, broad)]
+    assert found[0] == pytest.approx(found[1], abs=1e-9)
+
+
+def test_a_prior_counts_where_its_unknown_stands_at_its_bound():
+    linear = linear_model(np.zeros((1, 10)), polynomial(10, 0))
+    held = replace(linear, precision=np.array([4.0]), distance=np.array([1.5]), free=np.zeros(1, bool))
+    assert held.solved(inverses_of(held.residuals, white(0.5))[0]).chi_square == pytest.approx(9.0, rel=1e-12)
 
 
 def test_noise_that_was_given_leaves_no_doubt_about_itself():

@@ -63,6 +63,19 @@ def test_planted_values_lie_within_their_intervals(planted):
     assert fit.scatter.rate == pytest.approx(0.15, abs=0.1)  # eight tests: give or take a quarter, and life's own
 
 
+def test_by_likelihood_ruptures_have_a_scatter_of_their_own_and_laws_are_ranked():
+    """Planted: lives that scatter by .08 beside the rates, one stopped test, which only some laws need to hear of."""
+    law, values = PLANTED["Kachanov-Rabotnov"]
+    tests = campaign(law, values, [55, 75, 100, 65, 100], 7, stopped=(0,))
+    how = {"using": BAR, "weights": "likelihood", "nuisances": [], "starts": 2, "frames": 20}
+    fits = [ck.identify(one, tests, **how) for one in (law, NORTON)]
+    assert fits[0].scatter[RUPTURE].drift == 0.0
+    assert fits[0].scatter[RUPTURE].misfit == pytest.approx(np.hypot(0.15, 0.08), rel=0.6)  # of four lives, rates in it
+    ends = [m.rupture for m in fits[0].misfits if not m.rupture.stopped]
+    assert all(one.low < one.measured < one.high for one in ends)
+    assert ck.rank(fits).best.law.name == law.name
+
+
 def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
     law, values, _, fit = planted
     stresses = np.array([50.0, 80.0, 130.0])

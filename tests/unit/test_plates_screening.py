@@ -10,6 +10,7 @@ from planted_alloys import NORTON, Deadly, Doubting, bars, bulge
 
 from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.settings import Settings
+from creepkit.inverse.sparsity.penalties import Sqrt
 from creepkit.plates import files
 from creepkit.plates.compositions import Compositions
 from creepkit.plates.screening import screen
@@ -218,6 +219,9 @@ def test_compositions_may_lie_beside_the_tests(tmp_path):
         ({"laws": []}, "laws must be at least one, each with a name of its own; found none"),
         ({"laws": ["norton", "norton"]}, "found 'norton' twice"),
         ({"confirm": "maybe"}, "confirm is 'maybe'; allowed are True, False and \"when in doubt\""),
+        ({"penalty": Sqrt}, "penalty is Sqrt; write L2\\(\\), GroupL2"),
+        ({"penalty": Sqrt()}, "a penalty reduces the dense law, and there is none"),
+        ({"settings": Settings(loss="huber")}, "loss 'huber' does not go with weights 'likelihood'"),
         ({"workers": 0}, "workers is 0; allowed are whole numbers above zero"),
     ],
 )

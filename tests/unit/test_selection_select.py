@@ -40,10 +40,11 @@ def test_the_planted_law_is_decisive(ranking):
     assert ranking.laws[0].chi_square == pytest.approx(120 - 3, abs=3 * np.sqrt(2 * 120))
 
 
-def test_its_values_lie_in_their_intervals(ranking):
-    estimates = {e.name: e for e in ranking.best.estimates}
-    for name, true in {"A": 5e-16, "n": 4.0, "m": -0.4}.items():
-        assert estimates[name].low <= true <= estimates[name].high
+def test_its_values_lie_within_three_standard_errors(ranking):
+    table = ranking.best.law.table
+    for e, true in zip(ranking.best.estimates, (5e-16, 4.0, -0.4), strict=True):
+        value, low, high = (table[e.name].to_internal(v) for v in (e.value, e.low, e.high))
+        assert table[e.name].to_internal(true) == pytest.approx(value, abs=1.5 * 0.5 * (high - low))
 
 
 def test_the_criteria_are_their_formulas(ranking):

@@ -202,3 +202,18 @@ def test_a_cut_forgets_how_every_test_ended():
         for name, end in (("far", 0.1), ("near", 0.03))
     ]  # fmt: skip
     assert [(h.rupture_time, h.unruptured) for h in _cut(tests, 0.05)] == [(None, False)] * 2
+
+
+def test_laws_are_ranked_by_likelihood_and_further_tests_are_told(tmp_path):
+    words = ("--law", "norton", "--law", "hyperbolic-sine", "--weights", "likelihood", "--further-tests", "--starts", 2)
+    result = creepkit("identify", *CURVES[:3], *words, "--to", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert "BIC - best" in result.stdout
+
+
+def test_a_search_and_a_penalty_are_asked_for_by_name(tmp_path):
+    words = ("identify", *CURVES[:2], "--law", "norton", "--starts", 1, "--to", tmp_path / "out")
+    assert "allowed are multi-start, swarm, cma-es" in sentence(creepkit(*words, "--search", "genetic"))
+    assert "allowed are l2, group-l2, sqrt, subsets" in sentence(creepkit(*words, "--penalty", "lasso"))
+    assert "has one term" in sentence(creepkit(*words, "--penalty", "sqrt"))
+    assert "add --weights likelihood" in sentence(creepkit(*words, "--sums"))

@@ -27,13 +27,11 @@ def command(
     from dataclasses import replace
 
     from creepkit import study
-    from creepkit.inverse.confirm import confirm
-    from creepkit.study.nouns import specimens_of
 
     found, histories = study.load(fit), study.read_histories(tests)
     if surrogate is not None:
         found = replace(found, using=study.surrogate(surrogate))
-    told = confirm(found, histories, specimens_of(histories))
+    told = study.confirm(found, histories)
     if as_json:
         print_json({"holds": told.holds, "verdict": told.verdict, **_finite(asdict(told))})
         return

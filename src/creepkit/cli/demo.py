@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.identify import ranked, slug, tell, write
+from creepkit.cli.identified import slug, tell, write
+from creepkit.cli.identify import ranked
 from creepkit.cli.printing import print_table
 
 if TYPE_CHECKING:

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import os
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from creepkit.cli.choices import penalty_of, search_of
-from creepkit.cli.printing import print_json, print_table
+from creepkit.cli.identified import answer_of, tell, write
+from creepkit.cli.printing import print_json
 from creepkit.cli.progress import Progress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection import Ranking
     from creepkit.language import CreepLaw
     from creepkit.records import History, Nuisance
+
+USUAL = ("likelihood", "multi-start", None, "linear", "gaussian")
+"""Weights, search, penalty, loss and loss of tests with which laws are selected, sums among them."""
 
 
 def command(
@@ -77,16 +79,21 @@ def command(
 
         named = [with_arrhenius(one, histories) for one in named]
     how: dict[str, Any] = {"starts": starts, "seed": seed, "nuisances": nuisances_of(nuisance)}
+    by_likelihood = (weights, search, penalty, loss, test_loss) == USUAL
     if sums and weights != "likelihood":
         raise FitError("--sums compares laws by their likelihood; add --weights likelihood")
-    if weights == "likelihood" and search == "multi-start" and penalty is None:
+    if sums and not by_likelihood:
+        raise FitError(
+            "--sums takes the usual search and losses; leave out --search, --penalty, --loss and --test-loss"
+        )
+    if by_likelihood:
         ranking = selected(named, histories, sums=sums, **how)
     else:
         how |= {"loss": loss, "test_loss": test_loss, "weights": weights_of(weights)}
         ranking = ranked(named, histories, search=search_of(search), penalty=penalty_of(penalty), **how)
     written = write(ranking, to)
     if as_json:
-        print_json(_answer(ranking, written))
+        print_json(answer_of(ranking, written))
     else:
         tell(ranking, written, histories)
     if further:
@@ -191,85 +198,3 @@ def ranked(laws: Sequence[CreepLaw], histories: list[History], **how: Any) -> Ra
 
             fits.append(study.identify(one, histories, progress=tick, **how))
     return rank(fits)
-
-
-def write(ranking: Ranking, folder: Path) -> list[Path]:
-    """Write every law's JSON and plot, and the best law as LaTeX and Python; returns the paths."""
-    from creepkit import study
-
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for entry in ranking.laws:
-        name = slug(entry.fit.law.name)
-        written.append(entry.fit.save(folder / f"{name}.json"))
-        entry.fit.plot(folder / f"{name}.png")
-        written.append(folder / f"{name}.png")
-    best = ranking.best
-    for language, suffix in (("latex", ".tex"), ("python", ".py")):
-        path = folder / f"{slug(best.law.name)}{suffix}"
-        study.export(best, language, to=path, force=True)
-        written.append(path)
-    return written
-
-
-def slug(name: str) -> str:
-    """A law's name as a file name."""
-    return re.sub(r"[^A-Za-z0-9.=-]+", "-", name).strip("-") or "law"
-
-
-def tell(ranking: Ranking, written: list[Path], histories: list[History]) -> None:
-    """Print the table of laws, the verdict, the best law and what was written."""
-    rows = [
-        (
-            entry.fit.law.name,
-            str(len(entry.fit.law.params)),
-            *_misfit(entry.fit),
-            f"{entry.excess:.1f}",
-            f"{entry.weight:.3f}",
-        )
-        for entry in ranking.laws
-    ]
-    columns = ("law", "parameters", *_misfit_columns(ranking.best), "BIC - best", "weight")
-    print_table(f"{len(histories)} tests", columns, rows)
-    typer.echo(f"{ranking.verdict}\n\n{ranking.best}\n")
-    for path in written:
-        typer.echo(f"wrote {path}")
-
-
-def _misfit_columns(fit: Identification) -> tuple[str, ...]:
-    first = next(iter(fit.errors))
-    return ("rms ln strain" if first == "strain" else f"error of {first}", "test to test", "not followed")
-
-
-def _misfit(fit: Identification) -> tuple[str, ...]:
-    first = next(iter(fit.errors))
-    met = f"{fit.rms:.3f}" if first == "strain" else f"{fit.errors[first].rse:.3g}"
-    return met, f"{100 * fit.scatter.rate:.0f} %", f"{100 * fit.scatter[first].drift:.0f} %"
-
-
-def _answer(ranking: Ranking, written: list[Path]) -> dict[str, Any]:
-    return {
-        "verdict": ranking.verdict,
-        "laws": [{**_summary(r.fit), "bic_excess": r.excess, "weight": r.weight} for r in ranking.laws],
-        "files": [str(path) for path in written],
-    }
-
-
-def _summary(fit: Identification) -> dict[str, Any]:
-    return {
-        "law": fit.law.name,
-        **({"rms_ln_strain": fit.rms} if "strain" in fit.errors else {}),
-        "errors": {name: _numbers(vars(e)) for name, e in fit.errors.items()},
-        "parameters": {e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
-                       for e in fit.estimates},
-        "nuisances": [_numbers(vars(n)) for n in fit.nuisances],
-        "scatter": fit.scatter.to_dict(),
-        "notes": list(fit.notes),
-    }  # fmt: skip
-
-
-def _numbers(record: dict[str, Any]) -> dict[str, Any]:
-    """The same with null for what JSON cannot hold."""
-    import math
-
-    return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in record.items()}

@@ -13,7 +13,6 @@ from creepkit.cli.printing import print_json, print_table
 from creepkit.cli.progress import Progress
 
 if TYPE_CHECKING:
-
     from creepkit.plates.plate import Plate
     from creepkit.records import Predictor
 

@@ -71,7 +71,8 @@ def alternate(
         everything = replace(residuals, present=objective.entries.present)
         if best is not None and weighting.likelihood and _gain(objective, box, x, residuals, working) < SETTLED:
             break
-        factor = whitener(everything, pulling(working, objective.entries))
+        pull = working if weighting.likelihood else pulling(working, objective.entries)
+        factor = whitener(everything, pull)
         tolerance = max(effort.tolerance, RESTRICTED) if weighting.likelihood else effort.tolerance
         minimum = refine(
             objective, box, factor, x, loss=weighting.settings.loss, steps=effort.steps, tolerance=tolerance

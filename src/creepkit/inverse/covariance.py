@@ -13,7 +13,8 @@ Each output has sizes of its own and shares none of them with another; the rate 
 
 Values are estimated with `working` scatter alone (noise, misfit, offset): every frame pulls with the same weight, so
 that a law which cannot bend as the data do still runs through the middle of them. Their intervals use the whole
-covariance. A test of little trust has its covariance divided by it.
+covariance; by likelihood (see inverse.restricted) the values do too. A test of little trust has its covariance divided
+by it.
 """
 
 from __future__ import annotations

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from creepkit.inverse.measures import Errors
 from creepkit.inverse.scatter import OutputScatter, Scatter
 from creepkit.inverse.sparsity.record import Sparsity
 from creepkit.inverse.uncertainty import Estimate
+from creepkit.inverse.writing import write_text
 from creepkit.language.tree import law_from_json, law_to_json
 from creepkit.records import Nuisance
 
@@ -90,17 +90,8 @@ def _plain_settings(s: Settings) -> dict[str, Any]:
 
 
 def save(fit: Identification, path: Path) -> Path:
-    """Write to a temporary name, then rename: a file is whole or absent."""
-    text = json.dumps(to_json(fit), indent=1, allow_nan=False) + "\n"
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        raise FitError(f"{path}: cannot be written ({error.strerror}); choose a file in a folder that exists") from None
-    finally:
-        temporary.unlink(missing_ok=True)
-    return path
+    """Write the identification; the file is whole or absent."""
+    return write_text(json.dumps(to_json(fit), indent=1, allow_nan=False) + "\n", path)
 
 
 def load(path: str | Path) -> Identification:

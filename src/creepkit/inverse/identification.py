@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from creepkit.inverse.sparsity.record import Sparsity
 
 
-__all__ = ["Identification", "NuisanceEstimate", "OutputMisfit", "Settings", "TestMisfit", "information_criterion"]
+__all__ = ["Identification", "NuisanceEstimate", "OutputMisfit", "Settings", "TestMisfit"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class Identification:
     nuisances : what was found of explicit nuisances.
     ranges : {"stress", "temperature", "strain", "time": (low, high)} that the fitted frames cover; MPa, K, s.
     log_likelihood : of the fitted frames as if they were independent (working scatter), with explicit nuisances
-        integrated out.
+        integrated out; of identifications by likelihood the restricted one, but for a constant of the law.
     freedom : degrees of freedom of the intervals (see inverse.uncertainty).
     trace : how its global search went; linear : the problem about its optimum, of identifications by likelihood
         (neither is saved).
@@ -100,7 +100,10 @@ class Identification:
 
         stress MPa, temperature K; strain and time default to those of the reference point.
         """
-        middle, sd = band(self._log_rates(stress, temperature, strain, time), self.u, self.covariance)
+        from creepkit.inverse.intervals.quantities import log_rate
+
+        asked = log_rate(self.coordinates, stress, temperature, strain, time)
+        middle, sd = band(asked, self.u, self.covariance)
         half = self._quantile * sd
         return np.exp(middle), np.exp(middle - half), np.exp(middle + half)
 
@@ -109,9 +112,10 @@ class Identification:
         time: ArrayLike | None = None,
     ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
         """Local stress exponent d ln rate / d ln stress with its 95 % interval."""
-        stress = np.asarray(stress, float)
-        up, down = (self._log_rates(stress * f, temperature, strain, time) for f in (1.0005, 1 / 1.0005))
-        middle, sd = band(lambda u: (up(u) - down(u)) / (2 * np.log(1.0005)), self.u, self.covariance)
+        from creepkit.inverse.intervals.quantities import local_exponent
+
+        asked = local_exponent(self.coordinates, stress, temperature, strain, time)
+        middle, sd = band(asked, self.u, self.covariance)
         half = self._quantile * sd
         return middle, middle - half, middle + half
 
@@ -230,39 +234,3 @@ class Identification:
     @property
     def _quantile(self) -> float:
         return quantile(self.freedom)
-
-    def _log_rates(
-        self, stress: ArrayLike, temperature: ArrayLike | None, strain: ArrayLike | None, time: ArrayLike | None
-    ) -> Any:
-        from creepkit.kernels import lower
-
-        kernel, coordinates, r = lower(self.law, "numpy"), self.coordinates, self.reference
-        if (np.asarray(stress, float) < 0).any():
-            raise FitError("a creep rate was asked for at a negative stress; give the von Mises stress, in MPa")
-        point = [
-            np.asarray(default if given is None else given, float)
-            for given, default in ((stress, r.stress), (strain, r.strain), (time, r.time), (temperature, r.temperature))
-        ]
-        point += [point[0], point[0] / 3]
-        inner = [z.initial for z in self.law.states.values()]
-
-        def log_rate(u: Floats) -> Floats:
-            out = kernel.internal_log_rate(*point, *inner, *coordinates.theta(u))
-            return np.asarray(out + np.zeros(np.broadcast_shapes(*(p.shape for p in point))), float)
-
-        return log_rate
-
-
-def information_criterion(fit: Identification, size: float) -> float:
-    """-2 ln L x size / frames + K ln(size): frames that move together count as one, and K what was fitted."""
-    frames = sum(m.frames for m in fit.misfits)
-    price = parameters_touched(fit) * float(np.log(size))
-    return -2.0 * fit.log_likelihood * min(size / max(frames, 1), 1.0) + price
-
-
-def parameters_touched(fit: Identification) -> int:
-    """How many parameters the data touch: the others have the variance of their bounds, by themselves."""
-    ends = [[p.to_internal(b) for b in p.bounds] for p in fit.law.params.values()]
-    own = np.diag(fit.covariance)
-    by_itself = (fit.covariance != 0).sum(axis=1) == 1
-    return int((~(by_itself & np.isclose(own, np.ptp(ends, axis=1) ** 2 / 12.0, rtol=1e-6))).sum())

@@ -19,10 +19,10 @@ from creepkit.inverse.findings import NuisanceEstimate
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.misfits import misfits, pooled_errors, pooled_rms
 from creepkit.inverse.problem import Problem
-from creepkit.inverse.provenance import FEW_TESTS, notes, of_domain, provenance, ranges
+from creepkit.inverse.provenance import notes, of_domain, provenance, ranges
 from creepkit.inverse.rupture import rupture_misfits
 from creepkit.inverse.satterthwaite import restricted_laplace
-from creepkit.inverse.scatter import ASSUMED_RATE, Scatter, full_guess
+from creepkit.inverse.scatter import ASSUMED_RATE, FEW_TESTS, Scatter, full_guess
 from creepkit.inverse.search.landscape import Search
 from creepkit.inverse.search.multistart import MultiStart, distinct
 from creepkit.inverse.search.refining import Progress
@@ -188,7 +188,8 @@ def _uncertainty(problem: Problem, best: Fitted) -> tuple[Scatter, Floats, float
     """The whole scatter, the posterior covariance of x = (u, e), and its degrees of freedom."""
     settings, weighting = problem.settings, problem.weighting
     if best.linear is not None:
-        return best.working, *restricted_laplace(best.linear, best.working, settings.nuisances)
+        stated = weighting.stated(best.working)
+        return best.working, *restricted_laplace(best.linear, best.working, settings.nuisances, stated)
     size, known = len(problem.objective.law.params), _with_known_rate(settings.nuisances, len(problem.histories))
     at_means = best.unknowns.integrated(best.residuals, best.minimum.u[size:])
     scatter = estimated(at_means, full_guess(weighting.measured(best.working), known), known)

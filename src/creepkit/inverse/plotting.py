@@ -10,6 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.inverse.figures import blank, written
 from creepkit.inverse.nominal import stresses
 from creepkit.inverse.plotting_linear import draw_linear
 from creepkit.inverse.plotting_rupture import draw_ruptures
@@ -32,9 +33,6 @@ TELLING = 0.02
 
 def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
     """Draw the tests and what is left of them over time, an output each, rates with 95 % bands, and ruptures."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     if not fit.histories:
         raise FitError(
             "this identification was loaded without its histories: attach them with fit.on(histories, using)"
@@ -42,8 +40,7 @@ def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
     shown = list(dict.fromkeys(m.outputs[0].output for m in fit.misfits))
     ends = with_ends(fit)
     ratios = (*(1.25, 1.0) * len(shown), 1.0, *[1.0][: len(ends)])
-    figure = Figure(figsize=(4.5 * len(ratios), 4.8), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = blank(4.5 * len(ratios), 4.8)
     panels = list(figure.subplots(1, len(ratios), width_ratios=ratios))
     if ends:
         draw_ruptures(panels.pop(), fit, _colours(fit.histories))
@@ -54,13 +51,7 @@ def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
         draw((panels[2 * k], panels[2 * k + 1]), fit, output, found, colours)
     _draw_rates(rates, fit)
     figure.suptitle(f"{fit.law.title or fit.law.name}   ({len(fit.histories)} tests)", fontsize=11)
-    if path is not None:
-        try:
-            figure.savefig(path, dpi=130)
-        except (OSError, ValueError) as error:
-            told = str(error).splitlines()[0]
-            raise FitError(f"{path}: the plot cannot be written ({told}); name a .png, .svg or .pdf file") from None
-    return figure
+    return written(figure, path)
 
 
 def _draw_strains(

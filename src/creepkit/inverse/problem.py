@@ -115,24 +115,9 @@ class Opened:
         values = np.linalg.solve(self.factor, self.objective.at(x).values[..., None])[..., 0]
         return np.concatenate([values[self.objective.entries.present], self.fences.values(x)])
 
-    def white_jacobian(self, x: Floats) -> Floats:
-        """Derivatives of white(x), (rows, unknowns)."""
-        jacobian = self.objective.at(x).jacobian
-        assert jacobian is not None
-        own = np.linalg.solve(self.factor, jacobian)[self.objective.entries.present]
-        return np.concatenate([own, self.fences.jacobian(x)])
-
     def chi2(self, x: Floats) -> float:
         """Chi-square of data and priors at x."""
         return float((self.white(x) ** 2).sum())
-
-    def chi2_of(self, u: Floats) -> Floats:
-        """(candidates,) the same of many u at once, unknowns of tests as at the optimum: one prediction."""
-        e = self.x[u.shape[1] :]
-        values = self.objective.screen(u, e)
-        white = np.linalg.solve(self.factor, np.moveaxis(values, 0, -1))[self.objective.entries.present]
-        walls = np.array([(self.fences.values(np.concatenate([one, e])) ** 2).sum() for one in u])
-        return np.asarray((white**2).sum(axis=0) + walls)
 
     def minimise(
         self, start: Floats | None = None, held: Mapping[int, float] | None = None, extra: Extra | None = None

@@ -16,13 +16,11 @@ from creepkit.inverse.findings import NuisanceEstimate, TestMisfit
 from creepkit.inverse.nominal import end_strain, stresses
 from creepkit.inverse.objective import Objective
 from creepkit.inverse.scales import usable
-from creepkit.inverse.scatter import ASSUMED_RATE
+from creepkit.inverse.scatter import ASSUMED_RATE, FEW_TESTS
 from creepkit.inverse.settings import Settings
 from creepkit.language import temperature
 from creepkit.records import History, Prediction, Status
 
-FEW_TESTS = 3
-"""Below this many tests the scatter between them cannot be seen, and is assumed."""
 DISTRUSTED = 0.5
 """Weight below which a test is named."""
 
@@ -88,7 +86,9 @@ def notes(
     if len(levels) == 1 and all(h.loading.quantity == "stress" for h in histories):
         found.append("all tests have one stress: the stress dependence is not determined by them")
     if len(histories) < FEW_TESTS and any(n.kind == "rate" and n.sd is None for n in settings.nuisances):
-        found.append(f"fewer than {FEW_TESTS} tests: their rates are assumed to scatter by {100 * ASSUMED_RATE:.0f} %")
+        assumed = f"their rates are assumed to scatter by {100 * ASSUMED_RATE:.0f} %"
+        unseen = "how their rates scatter cannot be seen, and intervals are those of these tests alone"
+        found.append(f"fewer than {FEW_TESTS} tests: {unseen if settings.weights == 'likelihood' else assumed}")
     found += _of_large_strains(histories)
     if (Fences(objective).violations(best.minimum.u[: len(law.params)]) > 1e-3).any():
         found.append("a constraint of the law does not hold over the tests at these values")

@@ -2,11 +2,12 @@
 
 Residuals are linear about where they were taken, r + J d, with a Gaussian prior of precision P on the unknowns. Then
 
-    -2 ln L = ln|C| + ln|A| + min over d of [ (r + J d)' C^-1 (r + J d) + (o + d)' P (o + d) ],   A = J' C^-1 J + P
+    -2 ln L = ln|C| + ln|A| - ln|P| + min over d of [ (r + J d)' C^-1 (r + J d) + (o + d)' P (o + d) ]
 
-with o the distance from the prior means. The second term makes up for what the values took out of the residuals: with
-autocorrelated noise over one test plain maximum likelihood finds much too little of it (Patterson & Thompson (1971),
-Biometrika 58, 545; Pinheiro & Bates (2000), Mixed-Effects Models in S and S-PLUS, 2.2.5).
+with A = J' C^-1 J + P and o the distance from the prior means. ln|P| is a constant unless spreads of unknowns of tests
+are estimated too; a prior without end leaves its own out. The second term makes up for what the values took out of the
+residuals: with autocorrelated noise over one test plain maximum likelihood finds much too little of it (Patterson &
+Thompson (1971), Biometrika 58, 545; Pinheiro & Bates (2000), Mixed-Effects Models in S and S-PLUS, 2.2.5).
 """
 
 from __future__ import annotations
@@ -50,11 +51,12 @@ class Linear:
         pulled = inverses @ J
         A = np.einsum("tep,teq->pq", J, pulled) + np.diag(p)
         M = inverse(A)
-        o = self.distance[self.free]
-        move = -M @ (np.einsum("tep,te->p", pulled, self.residuals.values) + p * o)
+        from_means = self.distance.copy()
+        move = -M @ (np.einsum("tep,te->p", pulled, self.residuals.values) + p * from_means[self.free])
+        from_means[self.free] += move
         left = self.residuals.values + J @ move
         white = (inverses @ left[..., None])[..., 0]
-        chi2 = float((left * white).sum() + (p * (o + move) ** 2).sum())
+        chi2 = float((left * white).sum() + (self.precision * from_means**2).sum())
         return Solved(move, left, white, pulled, M, chi2, -float(np.linalg.slogdet(M)[1]))
 
 
@@ -95,7 +97,8 @@ def restricted_log_likelihood(linear: Linear, scatter: Scatter) -> float:
     """ln L but for a constant; ln|A| over all unknowns, so that it does not jump where one meets its bound."""
     inverses, log_det = inverses_of(linear.residuals, scatter)
     whole = replace(linear, free=np.ones_like(linear.free)).solved(inverses)
-    return -0.5 * (log_det + whole.log_det + linear.solved(inverses).chi_square)
+    priors = float(np.log(linear.precision[linear.precision > 0]).sum())
+    return -0.5 * (log_det + whole.log_det - priors + linear.solved(inverses).chi_square)
 
 
 def inverse(matrix: Floats) -> Floats:

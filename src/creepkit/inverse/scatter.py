@@ -13,8 +13,10 @@ from creepkit.inverse.entries import Entries
 from creepkit.inverse.scales import RUPTURE
 from creepkit.records import Nuisance
 
+FEW_TESTS = 3
+"""Below this many tests the scatter between them cannot be seen."""
 ASSUMED_RATE = 0.3
-"""Scatter of ln rate between tests that is assumed when fewer than three of them can show it."""
+"""Scatter of ln rate between tests that is assumed then, unless a likelihood is asked for."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,8 @@ class Settings:
 
     draws : Sobol points that are screened, a power of two is best; frames : looked at in each history, with all
         their outputs.
-    loss : of frames, and of values only; intervals and scatter are Gaussian and see outliers as scatter.
+    loss : of frames, and of values only; intervals and scatter are Gaussian and see outliers as scatter. A likelihood
+        is one measure of all of these, and takes none.
     test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its pull.
     weights : "noise": values by least squares of frames of equal weight, intervals from all the scatter that the data
         show. "likelihood": values, intervals and ranking by one likelihood, white noise and autocorrelation of every
@@ -56,6 +57,11 @@ class Settings:
         if self.test_loss not in TEST_LOSSES:
             raise FitError(f"test_loss '{self.test_loss}' is not known; allowed are {' and '.join(TEST_LOSSES)}")
         _check_weights(self.weights)
+        if self.weights == "likelihood" and self.loss != "linear":
+            raise FitError(
+                f"loss '{self.loss}' does not go with weights 'likelihood', which judges values, scatter and laws; "
+                "leave one of them out, or set test_loss='student' against tests that are far off"
+            )
         for nuisance in self.nuisances:
             _check_nuisance(nuisance)
         kinds = [(n.kind, n.output) for n in self.nuisances]

@@ -42,7 +42,7 @@ def estimated(
     given = given_sizes(nuisances, list(start.outputs))
     free = [
         (o, n) for n in SOURCES for o, sizes in start.outputs.items()
-        if getattr(sizes, n) > 0 and (o, n) not in given and n not in fixed
+        if getattr(sizes, n) > 0 and (o, n) not in given and n not in fixed and (n != "reach" or sizes.drift > 0)
     ]  # fmt: skip
     free += [("", "rate")] if start.rate > 0 and ("", "rate") not in given else []
     if not free:

@@ -15,7 +15,7 @@ from creepkit.inverse.measures import squares_about
 from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.restricted import Linear, restricted_log_likelihood
 from creepkit.inverse.scales import LOGARITHMIC, RUPTURE, LinearScale
-from creepkit.inverse.scatter import ASSUMED_RATE, OutputScatter, Scatter, size_of, working_guess
+from creepkit.inverse.scatter import ASSUMED_RATE, FEW_TESTS, OutputScatter, Scatter, size_of, working_guess
 from creepkit.inverse.settings import PAPER_WEIGHTS, Settings
 from creepkit.inverse.sizes import estimated
 
@@ -28,8 +28,8 @@ ASKED_FOR = 0.95
 drifts has two sizes more, how far and for how long."""
 ABSENT = 1e-3
 """A drift below this, on its scale, is none."""
-SEVERAL = 3
-"""Tests from which on their scatter about the law can be seen."""
+ALONE = 0.3
+"""Scatter of ln of rupture times to begin from: one of each test, which has no noise, and cannot drift."""
 UNWEIGHTED = 1e-6
 """Share of the pull that an output keeps which the weights do not name."""
 
@@ -76,9 +76,10 @@ class Weighting:
         nuisances, found = self.settings.nuisances, {}
         for name, scale, noise in zip(self.entries.outputs, self.entries.scales, self.entries.noise, strict=True):
             offset = size_of(nuisances, "offset", scale.floor, name)
-            misfit = 0.03 if name in LOGARITHMIC else 0.0
-            found[name] = OutputScatter(max(float(noise), LEAST * scale.floor), misfit, offset, drift=0.1)
-        known = [n for n in nuisances if n.kind == "rate" and (n.sd is not None or tests >= SEVERAL)]
+            misfit = ALONE if name == RUPTURE else 0.03 if name in LOGARITHMIC else 0.0
+            drift = 0.0 if name == RUPTURE else 0.1
+            found[name] = OutputScatter(max(float(noise), LEAST * scale.floor), misfit, offset, drift)
+        known = [n for n in nuisances if n.kind == "rate" and (n.sd is not None or tests >= FEW_TESTS)]
         return Scatter(found, size_of(known, "rate", ASSUMED_RATE))
 
     def _shown(self, linear: Linear, last: Scatter) -> Scatter:
@@ -96,16 +97,25 @@ class Weighting:
 
     def _unsure(self, scatter: Scatter) -> Scatter:
         """The same with the errors of the predictor as drift: they follow the curve, and do not average out."""
-        for name, scale in zip(self.entries.outputs, self.entries.scales, strict=True):
-            if self.errors.get(name, 0.0) > 0 and isinstance(scale, LinearScale):
-                drift = float(np.hypot(scatter[name].drift, self.errors[name] / scale.size))
-                scatter = scatter.changed(name, drift=drift)
+        for name, error in self._of_predictor().items():
+            scatter = scatter.changed(name, drift=float(np.hypot(scatter[name].drift, error)))
         return scatter
+
+    def stated(self, scatter: Scatter) -> set[tuple[str, str]]:
+        """Those (output, source) that were not asked of the data: drifts that are the predictor's error and no more."""
+        own = [n for n, error in self._of_predictor().items() if scatter[n].drift <= float(np.hypot(error, ABSENT))]
+        return {(name, source) for name in own for source in ("drift", "reach")}
+
+    def _of_predictor(self) -> dict[str, float]:
+        """{output: standard deviation} of what the predictor is wrong by, on the output's scale."""
+        scales = zip(self.entries.outputs, self.entries.scales, strict=True)
+        linear = {name: scale.size for name, scale in scales if isinstance(scale, LinearScale)}
+        return {n: self.errors[n] / size for n, size in linear.items() if self.errors.get(n, 0.0) > 0}
 
     def _begun(self, scatter: Scatter, drift: float) -> Scatter:
         """The same with a drift to begin from, or none, and the noise that was measured."""
         for name, noise, scale in zip(self.entries.outputs, self.entries.noise, self.entries.scales, strict=True):
-            begun = max(scatter[name].drift, drift) if drift > 0 else 0.0
+            begun = max(scatter[name].drift, drift) if drift > 0 and name != RUPTURE else 0.0
             size = max(float(noise), LEAST * scale.floor)
             scatter = scatter.changed(name, noise=size, drift=begun, reach=1.0)
         return scatter

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,6 +12,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.confirm import Confirmation
 from creepkit.inverse.files import LARGEST, from_json, to_json
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.writing import write_text
 from creepkit.plates.answer import AlloyAnswer, Weighed
 
 
@@ -47,16 +47,8 @@ class Document(BaseModel):
 
 
 def save(answer: AlloyAnswer, path: Path) -> Path:
-    """Write to a temporary name, then rename."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        temporary.write_text(_document(answer).model_dump_json(indent=1) + "\n", encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        raise FitError(f"{path}: cannot be written ({error.strerror}); name a folder that can be written to") from None
-    finally:
-        temporary.unlink(missing_ok=True)
-    return path
+    """Write the answer; the file is whole or absent."""
+    return write_text(_document(answer).model_dump_json(indent=1) + "\n", path)
 
 
 def load(path: Path) -> AlloyAnswer:

@@ -68,7 +68,7 @@ def _without_sparsity(
     work: Screening, dense: CreepLaw, alloy: Alloy, found: list[str]
 ) -> tuple[Identification | None, Identification | None]:
     """The dense law, and what a penalty makes of it; a failure of these is a note, for the ranking stands."""
-    law, settings = with_arrhenius(dense, alloy.tests), replace(work.settings, weights="likelihood")
+    law, settings = with_arrhenius(dense, alloy.tests), work.settings
     try:
         if work.penalty is None:
             return identify(law, alloy.tests, work.using, settings=settings, through=work.through), None

@@ -20,9 +20,9 @@ import numpy as np
 from creepkit import kernels, registry
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
+from creepkit.inverse.writing import write_text
 from creepkit.language import Elastic
 from creepkit.plates.compositions import Compositions, atomic_percent
-from creepkit.plates.table import write_text
 from creepkit.readers.writing import write_history
 from creepkit.records import History, PressureJump, Status
 

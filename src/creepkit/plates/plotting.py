@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.errors import FitError
+from creepkit.inverse.figures import blank
 from creepkit.inverse.scales import usable
 from creepkit.plates.answer import AlloyAnswer
-from creepkit.plates.plotting_laws import Labels, blank, colours_of, misfit_figure, shares_figure
+from creepkit.plates.plotting_laws import Labels, colours_of, misfit_figure, shares_figure
 from creepkit.plates.plotting_tests import histories_figure
 from creepkit.plates.profiles import NEEDED, RADII, displacement
 

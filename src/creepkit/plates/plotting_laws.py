@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creepkit.inverse.figures import blank
 from creepkit.plates.answer import AlloyAnswer, chi_square, loss
 
 if TYPE_CHECKING:
@@ -37,16 +38,6 @@ class Labels:
 def colours_of(plate: Plate) -> Mapping[str, str]:
     """{class: colour}."""
     return {name: f"C{k % 10}" for k, name in enumerate(plate.classes())}
-
-
-def blank(width: float, height: float) -> Figure:
-    """A figure without panels, inches."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def misfit_figure(plate: Plate, answers: list[AlloyAnswer]) -> Figure:

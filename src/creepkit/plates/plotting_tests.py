@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from creepkit.inverse.figures import blank
 from creepkit.plates.answer import AlloyAnswer, Outputs
-from creepkit.plates.plotting_laws import blank
 from creepkit.plates.profiles import NEEDED, RADII, displacement
 
 if TYPE_CHECKING:

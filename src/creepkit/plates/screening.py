@@ -19,7 +19,7 @@ from creepkit.dataset.workers import ProcessWorkers
 from creepkit.errors import FitError
 from creepkit.inverse.selection.select import FRAMES
 from creepkit.inverse.settings import Settings
-from creepkit.inverse.sparsity.penalties import Penalty, Subsets
+from creepkit.inverse.sparsity.penalties import Penalty, Subsets, check_penalty
 from creepkit.language import CreepLaw
 from creepkit.plates import files
 from creepkit.plates.alloys import alloys_of
@@ -80,9 +80,13 @@ def screen(
     An alloy that cannot be identified is recorded with the reason, and the others go on.
     """
     tests, table = histories_given(histories, compositions), compositions_given(compositions)
-    settings = settings or Settings(frames=FRAMES)
+    settings = replace(settings or Settings(frames=FRAMES), weights="likelihood")
     if nuisances is not None:
         settings = replace(settings, nuisances=tuple(nuisances))
+    if penalty is not None:
+        check_penalty(penalty)
+        if dense is None:
+            raise FitError("a penalty reduces the dense law, and there is none; give dense=, such as 'combined'")
     if confirm not in (True, False, "when in doubt"):
         raise FitError(f'confirm is {confirm!r}; allowed are True, False and "when in doubt"')
     with ExitStack() as stack:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import math
-import os
-import secrets
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from creepkit.errors import FitError
+from creepkit.inverse.writing import write_text
 from creepkit.plates.answer import AlloyAnswer, chi_square, loss
 
 if TYPE_CHECKING:
@@ -92,19 +90,6 @@ def record_of(plate: Plate, answer: AlloyAnswer) -> dict[str, Any]:
     for e in fit.estimates:
         told |= {e.name: _digits(e.value), f"{e.name}_low": _digits(e.low), f"{e.name}_high": _digits(e.high)}
     return {**told, "notes": "; ".join([*answer.notes, *(f"{law}: {why}" for law, why in answer.failed.items())])}
-
-
-def write_text(text: str, path: Path) -> Path:
-    """Write a file that is whole or absent."""
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        raise FitError(f"{path}: cannot be written ({error.strerror}); choose a file in a folder that exists") from None
-    finally:
-        temporary.unlink(missing_ok=True)
-    return path
 
 
 def _row(plate: Plate, answer: AlloyAnswer) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from creepkit.inverse.covariance import whitener
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.problem import Opened, reopened
-from creepkit.inverse.provenance import FEW_TESTS
+from creepkit.inverse.scatter import FEW_TESTS
 
 
 def opened(fit: Identification) -> Opened:

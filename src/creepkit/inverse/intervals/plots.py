@@ -10,6 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.inverse.figures import blank, written
 from creepkit.records import ZERO_CELSIUS
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def profile_figure(found: Profile, path: str | Path | None = None) -> Figure:
         axes.set_xscale("log")
     axes.legend(fontsize=8)
     axes.grid(alpha=0.25)
-    return _written(figure, path)
+    return written(figure, path)
 
 
 def _with_margin(values: Floats, logarithmic: bool) -> tuple[float, float]:
@@ -71,7 +72,7 @@ def pairs_figure(samples: Samples, path: str | Path | None = None) -> Figure:
         for column, second in enumerate(names):
             _pair(panels[row, column], columns, (first, second), (row, column), count)
     figure.suptitle(f"{samples.coordinates.law.title or samples.coordinates.law.name}: posterior", fontsize=11)
-    return _written(figure, path)
+    return written(figure, path)
 
 
 def _columns(samples: Samples) -> dict[str, Floats]:
@@ -119,7 +120,7 @@ def correlation_figure(found: Correlation, path: str | Path | None = None) -> Fi
     axes.set_yticks(range(count), found.names)
     axes.set_title(found.title, fontsize=10)
     figure.colorbar(image, ax=axes, shrink=0.8, label="correlation")
-    return _written(figure, path)
+    return written(figure, path)
 
 
 def bands_figure(bands: Sequence[RateBand], path: str | Path | None = None) -> Figure:
@@ -137,24 +138,9 @@ def bands_figure(bands: Sequence[RateBand], path: str | Path | None = None) -> F
     axes.grid(alpha=0.25, which="both")
     axes.legend(fontsize=8, title="95 %: law and temperature (dark: law alone)", title_fontsize=7)
     axes.set_title("\n".join(dict.fromkeys(band.name for band in bands)), fontsize=9)
-    return _written(figure, path)
+    return written(figure, path)
 
 
 def _figure(width: float, height: float) -> tuple[Figure, Any]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = blank(width, height)
     return figure, figure.subplots()
-
-
-def _written(figure: Figure, path: str | Path | None) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    FigureCanvasAgg(figure)
-    if path is not None:
-        try:
-            figure.savefig(path, dpi=130)
-        except (OSError, ValueError) as error:
-            told = str(error).splitlines()[0]
-            raise FitError(f"{path}: the plot cannot be written ({told}); name a .png, .svg or .pdf file") from None
-    return figure

@@ -8,7 +8,6 @@ approximation bends (parameters at bounds, laws with little data) samples do not
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,9 +18,11 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.intervals.mixture import TAILS
 from creepkit.inverse.intervals.opening import opened
 from creepkit.inverse.intervals.posterior import Posterior
 from creepkit.inverse.intervals.quantities import Quantity, chosen, local_exponent, log_rate
+from creepkit.inverse.search.refining import Progress
 from creepkit.inverse.threads import single_threaded_algebra
 from creepkit.records import Predictor
 
@@ -32,9 +33,6 @@ ENOUGH = 50.0
 """Steps over autocorrelation time that emcee's authors ask for before its estimate may be trusted."""
 TRIES = 50
 """Draws of a walker's start that may fall outside the bounds."""
-
-Progress = Callable[[str, int, int], None]
-TAILS = (0.5, 0.025, 0.975)
 
 
 @dataclass(frozen=True, eq=False)

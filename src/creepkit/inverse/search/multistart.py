@@ -87,7 +87,7 @@ def screened(landscape: Landscape, *, starts: int, draws: int) -> list[Floats]:
         level = box.middle[rates[0]] - 0.5 * sum(RATE_WINDOW)
         rng = np.random.default_rng(seed)
         shares = rng.dirichlet(np.full(len(rates), 0.7), size=len(points))
-        shares[0] = _unequal(len(rates))
+        shares[0] = unequal(len(rates))
         points[:, rates] = level + np.log(np.maximum(shares, 1e-4))
         growths = list(objective.coordinates.growths)
         pace = (box.middle - 0.5 * sum(RATE_WINDOW))[growths]
@@ -146,7 +146,7 @@ def _same(a: Minimum, b: Minimum, box: Box, near: float) -> bool:
     return bool(np.mean((a.white - b.white) ** 2) < (ALIKE / GUESSED) ** 2)
 
 
-def _unequal(count: int) -> Floats:
+def unequal(count: int) -> Floats:
     """Shares .7, .2, .1 and so on: equal shares are a stationary point from which no search escapes."""
     shares = np.array([0.7, *(0.3 * 0.67**k for k in range(1, count))])
     return np.asarray(shares / shares.sum())

@@ -99,7 +99,8 @@ class _Marquardt:
         cost = 0.5 * float(rho(white**2, self.landscape.loss).sum() + (walls**2).sum())
         penalty = self.landscape.penalty
         cost += 0.0 if penalty is None else float(penalty.values(u[None])[0])
-        cost = cost if np.isfinite(cost) and np.isfinite(jacobian).all() else WORST
+        known = np.isfinite(cost) and np.isfinite(jacobian).all()
+        cost = cost if known else WORST
         if not cost < self.cost[k]:
             self.damping[k] *= 8.0
             self.idle[k] += int(cost <= self.cost[k] * (1.0 + TOLERANCE))
@@ -107,9 +108,11 @@ class _Marquardt:
         fall = (self.cost[k] - cost) / max(cost, 1e-300)
         self.idle[k] = self.idle[k] + 1 if fall < TOLERANCE else 0
         self.damping[k] = max(self.damping[k] * 0.1, 1e-12)
+        self.u[k], self.cost[k], self.white[k] = u, cost, white
+        if not known:
+            return  # without a direction it stays where it is
         weight = rho_slope(white**2, self.landscape.loss)
         slopes = np.concatenate([self.fences.jacobian(u), np.diag(hold)])
-        self.u[k], self.cost[k], self.white[k] = u, cost, white
         self.slope[k] = jacobian.T @ (weight * white) + slopes.T @ walls
         self.curve[k] = (jacobian.T * weight) @ jacobian + slopes.T @ slopes
         if penalty is not None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import FitError
+from creepkit.inverse.figures import blank, written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,17 +54,11 @@ class Trace:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw the lowest cost, and how the candidates spread; written to `path` when given."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(7.0, 4.4), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = blank(7.0, 4.4)
         axes = figure.subplots()
         self._draw(axes)
         self._count(axes)
-        if path is not None:
-            _write(figure, path)
-        return figure
+        return written(figure, path)
 
     def _draw(self, axes: Axes) -> None:
         iterations = np.arange(1, len(self) + 1)
@@ -93,11 +87,3 @@ class Trace:
         ticks = np.unique(np.linspace(0, len(self) - 1, min(len(self), 6)).astype(int))
         shown.set_xticks(iterations[ticks], [f"{count:,}" for count in self.evaluations[ticks]], fontsize=8)
         shown.set_xlabel("candidates evaluated", fontsize=8)
-
-
-def _write(figure: Figure, path: str | Path) -> None:
-    try:
-        figure.savefig(path, dpi=130)
-    except (OSError, ValueError) as error:
-        told = str(error).splitlines()[0]
-        raise FitError(f"{path}: the plot cannot be written ({told}); name a .png, .svg or .pdf file") from None

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.inverse.alternation import free
 from creepkit.inverse.covariance import whitener
 from creepkit.inverse.effects import Unknowns
 from creepkit.inverse.entries import Entries
@@ -96,11 +97,9 @@ class Contest:
         entries = replace(self.entries, **rows)
         objective = Objective(b.law, histories, self.using, b.coordinates, entries, unknowns)
         known = {(n.kind, n.member): n.value for n in b.nuisances}
-        owners = zip(unknowns.nuisances, unknowns.members, unknowns.mean, strict=True)
-        x = np.concatenate([b.u, np.array([known.get((n.kind, m), mean) for n, m, mean in owners], float)])
         rate = measured_log_rate(made, self.using)
         box = Box.of(b.law, b.coordinates, rate, measured_log_pace(made)).beside(unknowns)
-        x = box.clip(x)
+        x = box.clip(free(unknowns, b.u, known))
         factor = whitener(replace(objective.at(x), present=objective.entries.present), self.scatter)
         return objective, x, box, factor
 
@@ -118,9 +117,7 @@ def _with_outputs(plan: History, using: Predictor, base: Entries) -> History:
     return replace(_endless(plan), outputs={name: 0.0 * sd for name, sd in noise.items()}, standard_deviation=noise)
 
 
-def _told(
-    a: Identification, using: Predictor, every: Sequence[History], made: int, base: Entries
-) -> list[History]:  # fmt: skip
+def _told(a: Identification, using: Predictor, every: Sequence[History], made: int, base: Entries) -> list[History]:
     """Histories with what law a predicts in the place of what was measured, at the noise of what was."""
     effects = a.effects(every)
     if "thickness" in effects:

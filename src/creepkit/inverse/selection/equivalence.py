@@ -24,7 +24,7 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.intervals.mixture import Laws
 from creepkit.inverse.intervals.quantities import local_exponent
 from creepkit.inverse.problem import reopened
-from creepkit.inverse.selection.common import judged
+from creepkit.inverse.selection.judging import judged
 from creepkit.language import CreepLaw, strain, time
 
 SEPARATED = 2.0 * float(np.log(0.95 / 0.05))

@@ -1,6 +1,6 @@
 """Ranking of identified laws, with weights: a set of laws, "decisive" only above 0.95.
 
-Identifications by likelihood are judged under one covariance (see selection.common): chi-square + K ln n (BIC), or
+Identifications by likelihood are judged under one covariance (see selection.judging): chi-square + K ln n (BIC), or
 + 2K + 2K(K+1)/(n-K-1) (AICc), with n the independent frames and unknowns of tests integrated out. For others, whose
 values and scatter come from different rules, -2 ln L is weighed by independent frames over frames, as one does for
 correlated residuals; that is a rule, not a theorem. Weights are exp(-excess / 2) over their sum.
@@ -17,8 +17,8 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.identification import Identification, information_criterion, parameters_touched
-from creepkit.inverse.selection.common import judged
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.selection.judging import judged
 
 if TYPE_CHECKING:
     from creepkit.inverse.intervals.mixture import Mixture
@@ -86,7 +86,7 @@ class Ranking:
         return Mixture.of(self)
 
     def equivalents(self) -> tuple[Equivalence, ...]:
-        """Pairs of remaining laws that these tests cannot separate."""
+        """Pairs of laws that these tests cannot separate, be they good or bad."""
         from creepkit.inverse.selection.equivalence import equivalents
 
         return equivalents(self)
@@ -118,10 +118,11 @@ def rank(fits: Sequence[Identification], by: Criterion = "bic", failed: Mapping[
     if all(fit.linear is not None for fit in fits):
         common = judged(fits)
         size, chi_square = common.size, common.chi_square
-        score = chi_square + common.occam + [_price(parameters_touched(fit), size, by) for fit in fits]
+        score = chi_square + common.occam
     else:
         size = max(fits, key=lambda fit: fit.log_likelihood).size
-        score = np.array([information_criterion(fit, size) for fit in fits])
+        score = np.array([_deviance(fit, size) for fit in fits])
+    score = score + [_price(parameters_touched(fit), size, by) for fit in fits]
     return ranked(fits, score, by, size=size, chi_square=chi_square, failed=failed)
 
 
@@ -137,6 +138,20 @@ def ranked(
     order = np.argsort(excess, kind="stable")
     laws = tuple(Ranked(fits[k], float(excess[k]), float(weight[k]), float(squares[k])) for k in order)
     return Ranking(laws, by, float(size), MappingProxyType(dict(failed or {})))
+
+
+def _deviance(fit: Identification, size: float) -> float:
+    """-2 ln L, in which frames that move together count as one."""
+    frames = sum(m.frames for m in fit.misfits)
+    return -2.0 * fit.log_likelihood * min(size / max(frames, 1), 1.0)
+
+
+def parameters_touched(fit: Identification) -> int:
+    """How many parameters the data touch: the others have the variance of their bounds, by themselves."""
+    ends = [[p.to_internal(b) for b in p.bounds] for p in fit.law.params.values()]
+    own = np.diag(fit.covariance)
+    by_itself = (fit.covariance != 0).sum(axis=1) == 1
+    return int((~(by_itself & np.isclose(own, np.ptp(ends, axis=1) ** 2 / 12.0, rtol=1e-6))).sum())
 
 
 def _price(count: int, size: float, by: Criterion) -> float:

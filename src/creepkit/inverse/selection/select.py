@@ -13,7 +13,7 @@ from creepkit.inverse.identify import identify
 from creepkit.inverse.search.refining import Progress
 from creepkit.inverse.selection.candidates import sums_of_two
 from creepkit.inverse.selection.holding_out import hold_out_scores
-from creepkit.inverse.selection.ranking import Criterion, Ranking, rank, ranked
+from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, rank, ranked
 from creepkit.inverse.settings import Settings
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
@@ -45,6 +45,8 @@ def select(
     A law that cannot be identified is named in `failed`; FitError if none can.
     """
     settings = replace(settings or Settings(frames=FRAMES), weights="likelihood")
+    if by not in CRITERIA:
+        raise FitError(f"select(by={by!r}) is not known; allowed are {', '.join(CRITERIA)}")
     if not candidates:
         raise FitError("there are no candidate laws; give at least one, such as ck.law('norton')")
     failed: dict[str, str] = {}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import FitError
+from creepkit.inverse.figures import blank, written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,11 +22,7 @@ LEAST_RISE = 0.1
 
 def figure_of(path: Path, file: str | File | None = None) -> Figure:
     """Shares on the left axis, the rise of chi-square on the right one."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.2, 4.4), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = blank(7.2, 4.4)
     axes = figure.subplots()
     places = _places(path.strengths)
     for label, share in zip(path.labels, path.shares.T, strict=True):
@@ -39,13 +35,7 @@ def figure_of(path: Path, file: str | File | None = None) -> Figure:
     _misfit(axes, path, places)
     axes.legend(fontsize=8, loc="center left")
     axes.set_title(f"{path.penalty}: terms below 5 % (grey) are dropped", fontsize=10)
-    if file is not None:
-        try:
-            figure.savefig(file, dpi=130)
-        except (OSError, ValueError) as error:
-            told = str(error).splitlines()[0]
-            raise FitError(f"{file}: the plot cannot be written ({told}); name a .png, .svg or .pdf file") from None
-    return figure
+    return written(figure, file)
 
 
 def _places(strengths: Floats) -> Floats:

@@ -20,6 +20,7 @@ from creepkit.inverse.objective import Objective
 from creepkit.inverse.problem import reopened
 from creepkit.inverse.search.box import Box
 from creepkit.inverse.search.landscape import Landscape
+from creepkit.inverse.search.multistart import unequal
 from creepkit.inverse.search.refining import Extra, Minimum, refine
 from creepkit.inverse.settings import Settings
 from creepkit.inverse.sparsity.contributions import Contributions
@@ -163,7 +164,7 @@ class Stage:
         moved[rates] += level - self.total(x)
         return self.box.clip(moved)
 
-    def shared(self, x: Floats, shares: Sequence[float]) -> Floats:
+    def shared(self, x: Floats, shares: Sequence[float] | Floats) -> Floats:
         """x with these shares of its rate at the reference point, in the order of coordinates.rates."""
         moved, rates = np.array(x), list(self.objective.coordinates.rates)
         moved[rates] = self.total(x) + np.log(shares)
@@ -174,8 +175,7 @@ class Stage:
         count = len(self.objective.coordinates.rates)
         if count < 2:
             return []
-        plain = np.array([0.7, *(0.3 * 0.67**k for k in range(1, count))])
-        return [self.shared(x, np.roll(plain / plain.sum(), k)) for k in range(count)]
+        return [self.shared(x, np.roll(unequal(count), k)) for k in range(count)]
 
     def held(self, u: Floats) -> Floats:
         """x of conditioned coordinates, unknowns of tests as at the start."""

@@ -1,6 +1,7 @@
 """Identifications by likelihood, judged under one covariance: that of the law which explains the histories best.
 
-With a covariance of its own each law would excuse what it cannot follow as drift. The problems are linear about their
+With a covariance of its own each law would excuse what it cannot follow: as drift, as a rate of the test's own where it
+predicts that rates matter more, as a test of little trust. The problems are linear about their
 optima, so that no simulation is needed to move each law to its optimum under the common covariance.
 """
 
@@ -14,6 +15,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.covariance import effective_size
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.residuals import Residuals
 from creepkit.inverse.restricted import Linear, inverses_of
 from creepkit.inverse.weighting import ABSENT
 
@@ -22,7 +24,8 @@ from creepkit.inverse.weighting import ABSENT
 class Judged:
     """Chi-squares of laws under one covariance, (laws,), with priors; evidence of nuisances; independent frames.
 
-    chosen : position of the law whose covariance it is; white : (laws, data) residuals over that scatter.
+    chosen : position of the law whose covariance it is; white : (laws, entries) residuals over that scatter, zero
+        where there are no data, or where a law has nothing to say of a test that was stopped.
     """
 
     chi_square: Floats
@@ -37,14 +40,23 @@ def judged(fits: Sequence[Identification]) -> Judged:
     linears = [_linear(fit) for fit in fits]
     own = [_own_score(fit, linear) for fit, linear in zip(fits, linears, strict=True)]
     chosen = int(np.argmin(own))
-    scatter = fits[chosen].scatter
+    scatter, best = fits[chosen].scatter, linears[chosen].residuals
     found = [
-        _under(linear, inverses_of(linear.residuals, scatter)[0], len(f.u))
+        _under(linear, inverses_of(_scattering_as(best, linear.residuals), scatter)[0], len(f.u))
         for linear, f in zip(linears, fits, strict=True)
     ]
-    size = effective_size(linears[chosen].residuals, scatter)
+    size = effective_size(best, scatter)
     chi2, occam, white = zip(*found, strict=True)
     return Judged(np.array(chi2), np.array(occam), size, chosen, np.array(white))
+
+
+def _scattering_as(best: Residuals, own: Residuals) -> Residuals:
+    """A law's residuals with what makes the covariance, but for which entries it speaks of, as the best law has it."""
+    slopes, effect = (
+        np.where(best.present, mine, other)
+        for mine, other in ((best.slopes, own.slopes), (best.rate_effect, own.rate_effect))
+    )
+    return replace(own, slopes=slopes, rate_effect=effect, trust=best.trust)
 
 
 def _linear(fit: Identification) -> Linear:
@@ -86,7 +98,7 @@ def _chi_square(linear: Linear, inverses: Floats, move: Floats) -> tuple[float, 
     total = np.einsum("te,tef,tf->", left, inverses, left) + (linear.precision * from_means**2).sum()
     factor = np.linalg.cholesky(inverses)
     white = (np.swapaxes(factor, 1, 2) @ left[..., None])[..., 0]
-    return float(total), np.asarray(white[r.present])
+    return float(total), np.where(r.present, white, 0.0).ravel()
 
 
 def _occam(linear: Linear, inverses: Floats, count: int) -> float:

@@ -1,0 +1,32 @@
+"""Figures without a window, and their files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from creepkit.errors import FitError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def blank(width: float, height: float) -> Figure:
+    """A figure without panels, inches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def written(figure: Figure, path: str | Path | None) -> Figure:
+    """The figure, written to `path` where one is given."""
+    if path is not None:
+        try:
+            figure.savefig(path, dpi=130)
+        except (OSError, ValueError) as error:
+            told = str(error).splitlines()[0]
+            raise FitError(f"{path}: the plot cannot be written ({told}); name a .png, .svg or .pdf file") from None
+    return figure
