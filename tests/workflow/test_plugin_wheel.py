@@ -85,6 +85,10 @@ STEPS = {
         [*SIMULATE, "800", "--specimen", "bulge", "--pressure", "6", "--end-h", "1", "--points", "4"],
     ],
     "identify": [["identify", *(f"curve_{s}.csv" for s in CURVES), "--law", "soft-steel", "--starts", "2", "--json"]],
+    "confirm": [["confirm", "identified/soft-steel.json", *(f"curve_{s}.csv" for s in CURVES), "--json"]],
+    "screen": [["screen", ".", "--law", "soft-steel", "--dense", "none", "--workers", "1", "--to", "screened",
+                "--json"]],
+    "discover": [],  # asks for laws without temperature
     "export": [["export", "identified/soft-steel.json", "--to", "python"]],
     "generate": [["generate", "soft-steel", "--specimen", "uniaxial", "--draws", "48", "--interval", "2400", "--range",
                   "temperature=1050:1100", "--seed", "1", "--workers", "1", "--to", "set.h5"]],

@@ -24,7 +24,7 @@ from creepkit.inverse.rupture import rupture_misfits
 from creepkit.inverse.satterthwaite import restricted_laplace
 from creepkit.inverse.scatter import ASSUMED_RATE, FEW_TESTS, Scatter, full_guess
 from creepkit.inverse.search.landscape import Search
-from creepkit.inverse.search.multistart import MultiStart, distinct
+from creepkit.inverse.search.multistart import ALIKE, ALIKE_BY_STAND_IN, MultiStart, distinct
 from creepkit.inverse.search.refining import Progress
 from creepkit.inverse.settings import Settings
 from creepkit.inverse.sizes import estimated
@@ -112,11 +112,12 @@ def _without_terms(problem: Problem, begun: Begun, progress: Progress | None) ->
 
 
 def _searched(problem: Problem, through: Predictor | None, search: Search, progress: Progress | None) -> Begun:
-    """The best minima that differ, or for a sum the best one and its best term: a sum must not end worse than it."""
+    """The best minima that differ, by the stand-in of the cheapest predictor."""
     first = through or problem.objective.using
-    landscape = problem.landscape(screening_of(first) or first)
+    stand_in = screening_of(first)
+    landscape = problem.landscape(stand_in or first)
     found = search.minima(landscape, progress)
-    kept = distinct(found.minima, problem.box)
+    kept = distinct(found.minima, problem.box, alike=ALIKE if stand_in is None else ALIKE_BY_STAND_IN)
     return Begun([m.u for m in kept], landscape.objective.evaluations, found.trace, kept[0].off)
 
 

@@ -122,28 +122,30 @@ def _exponents_drawn(landscape: Landscape, points: Floats, unit: Floats) -> Floa
     return landscape.box.clip(points)
 
 
-ALIKE = 5e-3
-"""Root mean square difference of predictions, over the spread of what was measured, below which two minima are one:
-a stand-in is not better than that, and along a valley one start is enough."""
+ALIKE, ALIKE_BY_STAND_IN = 1e-5, 5e-3
+"""Root mean square difference of predictions, over the spread of what was measured, below which two minima are one. A
+stand-in is not better than the latter, and along a valley one start is enough for the predictor behind it."""
 GUESSED = 0.3
 """How wrong frames are in a search, over that spread (see inverse.scatter.working_guess)."""
 
 
-def distinct(minima: Sequence[Minimum], box: Box, most: int = 2, near: float = 0.02) -> list[Minimum]:
+def distinct(
+    minima: Sequence[Minimum], box: Box, *, alike: float = ALIKE, most: int = 2, near: float = 0.02
+) -> list[Minimum]:
     """The best minima that differ by more than 2 % of the box in some coordinate, and in what they predict."""
     kept: list[Minimum] = []
     for minimum in minima:
-        if not any(_same(minimum, other, box, near) for other in kept):
+        if not any(_same(minimum, other, box, alike, near) for other in kept):
             kept.append(minimum)
     return kept[:most]
 
 
-def _same(a: Minimum, b: Minimum, box: Box, near: float) -> bool:
+def _same(a: Minimum, b: Minimum, box: Box, alike: float, near: float) -> bool:
     if (np.abs(a.u - b.u) <= near * box.width).all():
         return True
     if a.white is None or b.white is None:
         return False
-    return bool(np.mean((a.white - b.white) ** 2) < (ALIKE / GUESSED) ** 2)
+    return bool(np.mean((a.white - b.white) ** 2) < (alike / GUESSED) ** 2)
 
 
 def unequal(count: int) -> Floats:

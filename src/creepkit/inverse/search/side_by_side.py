@@ -8,6 +8,7 @@ Comput. Appl. Math. 172, 375); a step is taken only if the cost falls.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +20,8 @@ from creepkit.inverse.search.refining import ANCHOR, Minimum, Progress
 STEPS = 40
 TOLERANCE = 1e-5
 """Relative fall of the cost below which a start has arrived, twice in turn."""
+BY_ITSELF = 4
+"""Of the best ends, how many go on where they have not arrived."""
 DAMPING = (1e-3, 1e8)
 """First damping, relative to the diagonal of J'J over the box, and the one at which a start has nowhere to go."""
 
@@ -27,15 +30,31 @@ def refined_side_by_side(
     landscape: Landscape, starts: Sequence[Floats], *, steps: int = STEPS, progress: Progress | None = None,
     costs: list[Floats] | None = None,
 ) -> list[Minimum]:  # fmt: skip
-    """The minima that the starts lead to, best first; costs : is given the costs of all starts after each step."""
-    if landscape.objective.entries.whole.any():
+    """The minima that the starts lead to, best first; costs : is given the costs of all starts after each step.
+
+    Damage that runs away makes a cost with kinks, at which projected steps come to rest: laws with internal variables,
+    and tests that are followed to rupture, are refined one by one in a trust region.
+    """
+    if landscape.objective.entries.whole.any() or landscape.objective.law.states:
         found = []
         for k, u in enumerate(starts):
             found.append(landscape.refine(u, steps=30))
             if progress is not None:
                 progress("start", k + 1, len(starts))
         return sorted(found, key=lambda minimum: minimum.cost)
-    return _Marquardt(landscape, np.array(starts, float)).run(steps, progress, [] if costs is None else costs)
+    ends = _Marquardt(landscape, np.array(starts, float)).run(steps, progress, [] if costs is None else costs)
+    return sorted([*_finished(landscape, ends[:BY_ITSELF]), *ends[BY_ITSELF:]], key=lambda minimum: minimum.cost)
+
+
+def _finished(landscape: Landscape, ends: Sequence[Minimum]) -> list[Minimum]:
+    """Minima that have not arrived go on by themselves, in a trust region that follows bent valleys better."""
+    found = []
+    for end in ends:
+        if not end.converged:
+            on = landscape.refine(end.u)
+            end = replace(on, evaluations=on.evaluations + end.evaluations) if on.cost < end.cost else end
+        found.append(end)
+    return found
 
 
 class _Marquardt:
