@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from creepkit.errors import FitError
 from creepkit.inverse.files import to_json as fit_to_json
+from creepkit.inverse.writing import write_text
 from creepkit.language.tree import law_to_json
 
 if TYPE_CHECKING:
@@ -60,14 +59,5 @@ def _plain(one: Candidate) -> dict[str, Any]:
 
 
 def save(trend: TemperatureLaw, path: Path) -> Path:
-    """Write to a temporary name, then rename: a file is whole or absent."""
-    text = json.dumps(to_json(trend), indent=1, allow_nan=False) + "\n"
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        raise FitError(f"{path}: cannot be written ({error.strerror}); choose a file in a folder that exists") from None
-    finally:
-        temporary.unlink(missing_ok=True)
-    return path
+    """Write a file that is whole or absent."""
+    return write_text(json.dumps(to_json(trend), indent=1, allow_nan=False) + "\n", path)
