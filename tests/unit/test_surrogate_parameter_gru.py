@@ -24,12 +24,7 @@ from creepkit.surrogate.train import train
 BRIEF = Training(epochs=2, batch=32, rate=1e-2)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 
 @pytest.fixture(scope="module")

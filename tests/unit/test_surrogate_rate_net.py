@@ -47,12 +47,7 @@ def amplitude(model: RateSurrogate, values: dict[str, float], history: History) 
     return model.predict(NORTON, values, [history]).values[0, 0, :, 0]
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.dataset.describe import columns, design_name, units
 from creepkit.errors import DatasetError
+from creepkit.figures import blank
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +44,7 @@ def inputs(data: Dataset, path: str | Path | None = None) -> Figure:
     """Histograms of all that was drawn, and of where samples ended: all of them grey, the accepted ones blue."""
     known = [(name, values) for name, values in columns(data) if np.isfinite(values).any()]
     rows = -(-len(known) // ACROSS)
-    figure = _figure(3.1 * ACROSS, 2.1 * rows + 0.5)
+    figure = blank(3.1 * ACROSS, 2.1 * rows + 0.5)
     panels = np.atleast_1d(figure.subplots(rows, ACROSS, squeeze=False).ravel())
     for axes, (name, values) in zip(panels, known, strict=False):
         _histogram(axes, values, data.reasons == 0, name, units(data)[name])
@@ -78,7 +79,7 @@ def _histogram(axes: Axes, values: Floats, accepted: Bools, name: str, unit: str
 def histories(data: Dataset, path: str | Path | None = None, *, seed: int = 0) -> Figure:
     """Outputs over time of a random handful of accepted samples, coloured by the largest load."""
     chosen = _handful(data, seed)
-    figure = _figure(4.6 * len(data.outputs), 4.0)
+    figure = blank(4.6 * len(data.outputs), 4.0)
     panels = figure.subplots(1, len(data.outputs), squeeze=False)[0]
     loads = _loads(data)[chosen]
     colours = _colours(loads)
@@ -120,15 +121,6 @@ def _title(data: Dataset) -> str:
 
 def _unit(unit: str) -> str:
     return f", {unit}" if unit not in ("", "1") else ""
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def _save(figure: Figure, path: str | Path | None) -> None:

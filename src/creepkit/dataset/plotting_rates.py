@@ -12,6 +12,7 @@ from creepkit.dataset.conditions import ROOM
 from creepkit.dataset.criteria import RateLimit
 from creepkit.dataset.term_rates import Point, internal, ln_rate
 from creepkit.errors import DatasetError
+from creepkit.figures import blank, written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,25 +33,13 @@ EXTENT = (-40.0, 10.0)
 
 def figure_of(found: Acceptance, path: str | Path | None = None) -> Figure:
     """Draw rates over stress for some rows, and the strain that the mean rate of every row gives by the end."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11.0, 4.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = blank(11.0, 4.6)
     rates, strains = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
     _draw_rates(rates, found)
     _draw_strains(strains, found)
     design = found.design
     figure.suptitle(f"{design.law.title or design.law.name}: {design.name} box, {len(found.draws)} draws", fontsize=11)
-    if path is not None:
-        try:
-            figure.savefig(path, dpi=130)
-        except OSError as error:
-            raise DatasetError(f"{path}: the plot cannot be written ({error.strerror})") from None
-        except ValueError as error:
-            told = str(error).splitlines()[0]
-            raise DatasetError(f"{path}: the plot cannot be written ({told}); name a .png, .svg or .pdf file") from None
-    return figure
+    return written(figure, path, DatasetError)
 
 
 def _draw_rates(axes: Axes, found: Acceptance) -> None:

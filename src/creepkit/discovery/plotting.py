@@ -11,7 +11,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.discovery.points import ENDLESS
-from creepkit.errors import FitError
+from creepkit.figures import blank, written
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.uncertainty import band, quantile
 from creepkit.language import Param
@@ -31,15 +31,11 @@ def figure_of(trend: TemperatureLaw, path: str | Path | None = None) -> Figure:
 
     The rate is that at the reference stress: coefficients themselves move with their exponents.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     coordinates = Coordinates(trend.base, trend.points.reference)
     names = trend.base.names
     across = min(COLUMNS, len(names))
     down = -(-len(names) // across)
-    figure = Figure(figsize=(4.6 * across, 3.7 * down), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = blank(4.6 * across, 3.7 * down)
     panels = figure.subplots(down, across, squeeze=False)
     for k, name in enumerate(names):
         _draw(panels.flat[k], trend, coordinates, k)
@@ -47,12 +43,7 @@ def figure_of(trend: TemperatureLaw, path: str | Path | None = None) -> Figure:
     for spare in list(panels.flat)[len(names) :]:
         spare.set_visible(False)
     figure.suptitle(f"{trend.law.title or trend.law.name}, judged by the {trend.judged_by}", fontsize=10)
-    if path is not None:
-        try:
-            figure.savefig(path, dpi=130)
-        except (OSError, ValueError) as error:
-            raise FitError(f"{path}: the plot cannot be written ({error}); choose another file") from None
-    return figure
+    return written(figure, path)
 
 
 def _draw(axes: Any, trend: TemperatureLaw, coordinates: Coordinates, k: int) -> None:

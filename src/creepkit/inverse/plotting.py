@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.figures import blank, written
+from creepkit.figures import blank, written
 from creepkit.inverse.nominal import stresses
 from creepkit.inverse.plotting_linear import draw_linear
 from creepkit.inverse.plotting_rupture import draw_ruptures

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.errors import FitError
-from creepkit.inverse.figures import blank
+from creepkit.figures import blank
 from creepkit.inverse.scales import usable
 from creepkit.plates.answer import AlloyAnswer
 from creepkit.plates.plotting_laws import Labels, colours_of, misfit_figure, shares_figure

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creepkit.inverse.figures import blank
+from creepkit.figures import blank
 from creepkit.plates.answer import AlloyAnswer, chi_square, loss
 
 if TYPE_CHECKING:

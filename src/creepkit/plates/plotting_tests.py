@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from creepkit.inverse.figures import blank
+from creepkit.figures import blank
 from creepkit.plates.answer import AlloyAnswer, Outputs
 from creepkit.plates.profiles import NEEDED, RADII, displacement
 

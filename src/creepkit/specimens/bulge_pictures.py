@@ -12,6 +12,7 @@ from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS
 from creepkit.fem.mesh_checks import SIDES, outline
 from creepkit.fem.shape import POINTS, shape_functions
+from creepkit.figures import blank
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +34,7 @@ def section(run: BulgeRun, time: float, name: str, path: str | Path | None = Non
     field = run.field(name, time)
     body = run.made.body
     moved = body.nodes + run._at(run.simulation.displacements, time)
-    figure = _figure(9.0, 3.1)
+    figure = blank(9.0, 3.1)
     axes = figure.subplots()
     places, facets = _facets(moved[body.elements])
     values = _at_facets(field.values.reshape(-1, 4), body.elements)
@@ -54,7 +55,7 @@ def section(run: BulgeRun, time: float, name: str, path: str | Path | None = Non
 
 def outputs(run: BulgeRun, path: str | Path | None = None) -> Figure:
     """Amplitude, width, shape and pressure over time, one below the other."""
-    figure = _figure(6.4, 6.6)
+    figure = blank(6.4, 6.6)
     panels = figure.subplots(4, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0, 0.8))
     hours, units = run.times / 3600.0, {"amplitude": ", mm", "width": ", mm"}
     for axes, (name, values) in zip(panels, run.outputs.items(), strict=False):
@@ -73,15 +74,6 @@ def outputs(run: BulgeRun, path: str | Path | None = None) -> Figure:
     figure.suptitle(f"{run.name}{ended}", fontsize=10)
     figure.align_ylabels(panels)
     _save(figure, path)
-    return figure
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
     return figure
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from creepkit.arrays import Floats
+from creepkit.figures import blank
 from creepkit.specimens.reduced_curves import LOG_GROWTH, LOG_STRESS
 from creepkit.specimens.reduced_redistribution import multiplier, redistribution_sizes
 from creepkit.specimens.reduced_tables import LOADS, Tables
@@ -52,11 +53,7 @@ def _table(title: str, corner: str, columns: Floats, labels: Floats, rows: list[
 
 def picture(tables: Tables, path: str | Path) -> None:
     """k and kappa against D for each thickness, and the multiplier against creep strain, side by side."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11.0, 3.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = blank(11.0, 3.6)
     left, middle, right = figure.subplots(1, 3)
     shades = np.linspace(0.75, 0.25, tables.thicknesses.size)
     for own, h, shade in zip(tables.curves, tables.thicknesses, shades, strict=True):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.errors import SurrogateError
+from creepkit.figures import blank, written
 from creepkit.surrogate.metrics import Compared, worst
 from creepkit.surrogate.recipe import Told
 
@@ -23,35 +24,12 @@ SHOWN = 6
 """Worst samples that are drawn."""
 
 
-def figure_of(size: tuple[float, float]) -> Figure:
-    """An empty figure that needs no display."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def written(figure: Figure, path: str | Path | None) -> Figure:
-    """The figure, written to a file if there is a path."""
-    if path is not None:
-        try:
-            figure.savefig(path, dpi=130)
-        except (OSError, ValueError) as error:
-            why = str(error).splitlines()[0]
-            raise SurrogateError(
-                f"{path}: the plot cannot be written ({why}); name a .png, .svg or .pdf file"
-            ) from None
-    return figure
-
-
 def curves(told: Told, path: str | Path | None = None) -> Figure:
     """The losses of each epoch, and where the rate fell."""
     known = told.curves
     if not known.get("loss"):
         raise SurrogateError("this surrogate holds no training curves")
-    figure = figure_of((6.4, 4.2))
+    figure = blank(6.4, 4.2)
     axes, epochs = figure.subplots(), np.arange(1, len(known["loss"]) + 1)
     axes.plot(epochs, known["loss"], lw=1.2, label="training, own loss")
     axes.plot(epochs, known["validation"], lw=1.2, label="validation, own loss")
@@ -67,12 +45,12 @@ def curves(told: Told, path: str | Path | None = None) -> Figure:
     axes.set(xlabel="epoch", ylabel="loss", yscale="log", title=f"{told.law.name}, {told.specimen.name}")
     axes.grid(alpha=0.25)
     axes.legend(fontsize=8)
-    return written(figure, path)
+    return written(figure, path, SurrogateError)
 
 
 def parity(found: Compared, times: Sequence[float], path: str | Path | None = None) -> Figure:
     """Predicted against true outputs at some times: a row each time, a column each output."""
-    figure = figure_of((3.4 * len(found.outputs) + 0.4, 3.1 * len(times)))
+    figure = blank(3.4 * len(found.outputs) + 0.4, 3.1 * len(times))
     panels = figure.subplots(len(times), len(found.outputs), squeeze=False)
     for row, time in zip(panels, times, strict=True):
         true, predicted = found.at(time)
@@ -84,7 +62,7 @@ def parity(found: Compared, times: Sequence[float], path: str | Path | None = No
     for axes in panels[:, 0]:
         axes.set_ylabel("predicted")
     figure.suptitle(f"{len(found.true)} samples, predicted against simulated", fontsize=10)
-    return written(figure, path)
+    return written(figure, path, SurrogateError)
 
 
 def _draw_parity(axes: Axes, true: Any, predicted: Any) -> None:
@@ -106,7 +84,7 @@ def _draw_parity(axes: Axes, true: Any, predicted: Any) -> None:
 def worst_samples(found: Compared, path: str | Path | None = None) -> Figure:
     """The samples with the largest errors of the first output, simulated and predicted over time."""
     rows = worst(found, found.largest())[:SHOWN]
-    figure = figure_of((9.6, 5.6))
+    figure = blank(9.6, 5.6)
     panels = figure.subplots(2, 3).ravel()
     for axes in panels[len(rows) :]:
         axes.axis("off")
@@ -121,4 +99,4 @@ def worst_samples(found: Compared, path: str | Path | None = None) -> Figure:
     name = found.outputs[0]
     figure.supxlabel("time, h", fontsize=10)
     figure.supylabel(LABELS.get(name, name), fontsize=10)
-    return written(figure, path)
+    return written(figure, path, SurrogateError)

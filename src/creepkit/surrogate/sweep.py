@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from creepkit.errors import SurrogateError
+from creepkit.figures import blank, written
 from creepkit.surrogate.parameter_gru import ParameterGru
 from creepkit.surrogate.parameter_module import Cell
-from creepkit.surrogate.plotting import figure_of, written
 from creepkit.surrogate.recipe import Progress
 from creepkit.surrogate.surrogate import Surrogate
 from creepkit.surrogate.train import train
@@ -120,7 +121,7 @@ def figure(entries: Sequence[Entry], path: str | Path | None = None) -> Figure:
     from matplotlib.ticker import LogLocator, NullFormatter
 
     ordered = sorted(entries, key=lambda e: e.loss)
-    made = figure_of((11.0, max(3.8, 0.28 * len(ordered) + 1.6)))
+    made = blank(11.0, max(3.8, 0.28 * len(ordered) + 1.6))
     left, right = made.subplots(1, 2, width_ratios=(1.15, 1.0))
     shades: list[Any] = [colormaps["viridis"](0.92 * k / max(len(ordered) - 1, 1)) for k in range(len(ordered))]
     for entry, shade in reversed(list(zip(ordered, shades, strict=True))):
@@ -141,4 +142,4 @@ def figure(entries: Sequence[Entry], path: str | Path | None = None) -> Figure:
     right.invert_yaxis()
     right.grid(alpha=0.25)
     right.legend(fontsize=8)
-    return written(made, path)
+    return written(made, path, SurrogateError)

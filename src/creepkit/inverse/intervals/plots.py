@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.figures import blank, written
+from creepkit.figures import blank, written
 from creepkit.records import ZERO_CELSIUS
 
 if TYPE_CHECKING:

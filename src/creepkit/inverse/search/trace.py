@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.inverse.figures import blank, written
+from creepkit.figures import blank, written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.figures import blank, written
+from creepkit.figures import blank, written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
