@@ -34,18 +34,18 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for celsius, stresses in CONDITIONS.items():
         for steps in stresses:
-            own = {**TRUTH, "A": TRUTH["A"] * np.exp(rng.normal(0, RATE_SCATTER))}
+            true_values = {**TRUTH, "A": TRUTH["A"] * np.exp(rng.normal(0, RATE_SCATTER))}
             times = np.concatenate([[0.0], np.geomspace(60, 2e7, 4000)])
             clean = ck.simulate(
-                law, specimen, own, loading=ck.StressSteps(tuple(steps)), times=times, temperature=celsius + 273.15
+                law, specimen, true_values, loading=ck.StressSteps(tuple(steps)), times=times, temperature=celsius + 273.15
             )
             strain = clean.outputs["strain"]
             end = times[: strain.size][strain < 0.03][-1]
-            kept = np.unique(np.searchsorted(times[: strain.size], np.geomspace(60, end, 60)))
-            noisy = strain[kept] + rng.normal(0, LOADING_STRAIN) + rng.normal(0, NOISE, kept.size)
+            indices = np.unique(np.searchsorted(times[: strain.size], np.geomspace(60, end, 60)))
+            noisy = strain[indices] + rng.normal(0, LOADING_STRAIN) + rng.normal(0, NOISE, indices.size)
             name = f"planted_{celsius}C_" + "_to_".join(f"{stress}" for _, stress in steps) + "MPa"
             test = clean.replace(
-                name=name, times=np.round(times[kept], 1), outputs={"strain": np.round(noisy, 7)}, source=""
+                name=name, times=np.round(times[indices], 1), outputs={"strain": np.round(noisy, 7)}, source=""
             )
             write_history(test, folder / f"{name}.csv")
     truth = {"law": "strain-hardening", "T_ref": T_REF, "values": TRUTH, "rate_scatter": RATE_SCATTER}

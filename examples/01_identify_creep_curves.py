@@ -14,8 +14,8 @@ folder = Path(sys.argv[1]) if len(sys.argv) > 1 else PLANTED
 tests = [test.up_to("strain", 0.05) for test in ck.read_histories(folder)]
 
 # Two candidates. Several temperatures call for an Arrhenius factor, written about one of them.
-warm = ck.arrhenius(T_ref=1073.15)
-fits = [ck.identify(ck.law(name).times(warm), tests, starts=4) for name in ("strain-hardening", "time-hardening")]
+arrhenius = ck.arrhenius(T_ref=1073.15)
+fits = [ck.identify(ck.law(name).times(arrhenius), tests, starts=4) for name in ("strain-hardening", "time-hardening")]
 
 # Which of them? Weights say how sure; two laws that the tests cannot tell apart are both named.
 ranking = ck.rank(fits)

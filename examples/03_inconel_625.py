@@ -21,7 +21,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import creepkit as ck
-from creepkit.inverse.holdout import leave_one_test_out, pooled_error, prediction_errors
+from creepkit.inverse.holdout import leave_one_test_out, pooled_relative_squared_error, prediction_errors
 from creepkit.inverse.measures import relative_squared_error
 
 T_REF = 1050.0
@@ -81,9 +81,9 @@ def virtual_tests() -> list[ck.History]:
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
 out = Path(sys.argv[2]) if len(sys.argv) > 2 else Path("inconel_625")
 tests = virtual_tests() if folder is None else ck.read_histories(folder)
-for suspect in ck.suspects(tests):
+for suspect in ck.check_data_quality(tests):
     print("suspect:", suspect)
-tests = ck.with_suspects_marked(tests)
+tests = ck.exclude_suspect_frames(tests)
 
 # ---- 3. One law for all tests --------------------------------------------------------------------------------------
 # Three readings of "the fit": the paper's loss with nothing unknown but the law; the same with whole tests weighed by
@@ -112,19 +112,19 @@ def measured(history: ck.History) -> tuple[np.ndarray, np.ndarray]:
 
 def amplitudes(which: ck.CreepLaw, values: dict, histories: Sequence[ck.History]) -> list[np.ndarray]:
     """Predicted amplitude at the used frames of each test; a dimple that burst keeps its last value."""
-    found = dimple.predict(which, which.values(values), histories)
-    rows = [found.of(k)[:, 0] for k in range(len(histories))]
+    prediction = dimple.predict(which, which.values(values), histories)
+    rows = [prediction.of(k)[:, 0] for k in range(len(histories))]
     return [np.where(np.isfinite(r), r, np.nanmax(r))[h.used] for r, h in zip(rows, histories, strict=True)]
 
 
 def line(label: str, predicted: Sequence[np.ndarray]) -> str:
     """One row of the table: pooled loss, relative rms, then each test's loss about its own mean."""
-    truth = [measured(h)[1] for h in tests]
-    pooled = relative_squared_error(truth, predicted)
-    off = np.concatenate([p - m for p, m in zip(predicted, truth, strict=True)])
-    relative = np.sqrt(np.mean(off**2) / np.mean(np.concatenate(truth) ** 2))
-    own = (relative_squared_error([m], [p], about="test") for m, p in zip(truth, predicted, strict=True))
-    return f"| {label} | {pooled:.3g} | {relative:.3g} | " + " | ".join(f"{v:.2g}" for v in own) + " |"
+    observed = [measured(h)[1] for h in tests]
+    pooled = relative_squared_error(observed, predicted)
+    residuals = np.concatenate([p - m for p, m in zip(predicted, observed, strict=True)])
+    relative = np.sqrt(np.mean(residuals**2) / np.mean(np.concatenate(observed) ** 2))
+    losses = (relative_squared_error([m], [p], about="test") for m, p in zip(observed, predicted, strict=True))
+    return f"| {label} | {pooled:.3g} | {relative:.3g} | " + " | ".join(f"{v:.2g}" for v in losses) + " |"
 
 
 names = [h.name.removeprefix("test_") for h in tests]
@@ -139,10 +139,10 @@ for label, fit in fits.items():
     found = fit.predict()
     print(line(label, [found.of(k)[h.used, 0] for k, h in enumerate(tests)]))
 if folder is not None:
-    held = leave_one_test_out(fits["robust"])
-    pooled = pooled_error(held, tests, "amplitude")
+    held_out = leave_one_test_out(fits["robust"])
+    pooled = pooled_relative_squared_error(held_out, tests, "amplitude")
     print(f"\nleft out in turn, predicted at nominal thickness: pooled loss {pooled:.3g}")
-    print("  " + ", ".join(f"{h.name.removeprefix('test_')} {h.errors['amplitude'].rse:.2g}" for h in held))
+    print("  " + ", ".join(f"{h.name.removeprefix('test_')} {h.errors['amplitude'].relative_squared_error:.2g}" for h in held_out))
 
 # ---- 5. What one test says alone, and the pressure jump (Fig. 6f) ---------------------------------------------------
 
@@ -152,7 +152,7 @@ for history in tests if folder is not None else ():
     n_inf = next(e for e in own.estimates if e.name == "n_inf")
     error = own.errors["amplitude"]
     print(
-        f"{history.name} alone: loss {error.rse:.2g}, chi square {error.chi_square:.2g}; "
+        f"{history.name} alone: loss {error.relative_squared_error:.2g}, chi square {error.chi_square:.2g}; "
         f"n_inf {n_inf.value:.2f} [{n_inf.low:.2f}, {n_inf.high:.2f}] {n_inf.verdict}"
     )
 jumps = [h for h in ck.read_histories(folder) if h.loading.P2 != h.loading.P1] if folder is not None else []
@@ -162,7 +162,7 @@ for history in jumps:
     own = ck.identify(alone, [first], using=dimple, nuisances=(ck.Nuisance("offset"),), starts=starts)
     error = prediction_errors(own, second)["amplitude"]
     print(
-        f"{history.name}: fitted before the jump, predicted after it within {100 * error.relative:.1f} % (relative rms)"
+        f"{history.name}: fitted before the jump, predicted after it within {100 * error.relative_rms_error:.1f} % (relative rms)"
     )
 
 # ---- 6. Figures ------------------------------------------------------------------------------------------------------
@@ -191,9 +191,9 @@ figure.savefig(out / "rates.png", dpi=150)
 chosen = [tests[k] for k in np.argsort([float(h.temperature) for h in tests])[:: max(1, len(tests) // 4)]][:4]
 figure, panels = plt.subplots(1, len(chosen), figsize=(3.4 * len(chosen), 3.2), squeeze=False)
 for axes, history in zip(panels[0], chosen, strict=True):
-    effects = {kind: float(v[0, 0]) for kind, v in best.effects([history]).items()}
+    nuisances = {kind: float(v[0, 0]) for kind, v in best.nuisance_values([history]).items()}
     run = ck.simulate(
-        law, dimple.replace(apex_thickness=effects.get("thickness", 0.4935)), best.values, loading=history.loading,
+        law, dimple.replace(apex_thickness=nuisances.get("thickness", 0.4935)), best.values, loading=history.loading,
         times=history.times, temperature=history.temperature, elastic=history.elastic,
     )  # fmt: skip
     D, S, p = (history.outputs[name] for name in ("amplitude", "width", "shape"))

@@ -13,7 +13,7 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.readers.writing import write_history
-from creepkit.registry import default
+from creepkit.registry import default_registry
 from creepkit.testing import check_law
 
 HOUR = 3600.0
@@ -32,7 +32,7 @@ def creepkit_laws():
     return [STEEL]
 """
 Path("steel.py").write_text(TEN_LINES)
-(steel,) = default().load_file("steel.py").offers["law"].values()  # creepkit --plugin steel.py ...
+(steel,) = default_registry().load_file("steel.py").contributions["law"].values()  # creepkit --plugin steel.py ...
 print(check_law(steel, samples=16))  # creepkit check steel.py
 
 # 2. It creeps already: here against A s^n t.
@@ -57,7 +57,7 @@ brittle = ck.CreepLaw(
     states={w: ck.State(0, C * (s_1 / (1 - w)) ** v, limit=0.99)},
     references=("Kachanov (1958), Izv. AN SSSR OTN 8, 26",),
 )
-print("conforms:", check_law(brittle, samples=16).ok)
+print("conforms:", check_law(brittle, samples=16).passed)
 
 # 4. Temperature: an Arrhenius factor on creep and, since damage is a state of its own, one more on damage.
 law = brittle.times(ck.arrhenius(T_ref=1073.15)).with_temperature(C=ck.activated(T_ref=1073.15))
@@ -67,7 +67,7 @@ truth = {name: truth[name] for name in law.names}
 
 # 5. The same law in other tests: relaxation, and a tube under tension and torsion.
 later = np.geomspace(1, 100 * HOUR, 40)
-held = ck.simulate(
+relaxation_run = ck.simulate(
     law, "relaxation", truth, loading=ck.constant_strain(0.001), times=later, temperature=1073.15,
     elastic=ck.Elastic(150e3),
 )  # fmt: skip
@@ -75,7 +75,7 @@ tube = ck.simulate(
     law, "point", truth, loading=ck.PointLoading(stress={"11": 60, "12": [(0, 0), (10 * HOUR, 35)]}),
     times=times, temperature=1073.15,
 )  # fmt: skip
-print(held)
+print(relaxation_run)
 print(tube)
 
 # 6. Tests as a laboratory would deliver them: five bars to rupture, with the noise of an extensometer.
@@ -113,9 +113,9 @@ left.plot(again.times / HOUR, 100 * again.outputs["strain_11"], "C1.", label="id
 left.plot(again.times / HOUR, 100 * again.outputs["strain_12"], "C1.")
 left.set(xlabel="time, h", ylabel="creep strain, %", title="60 MPa tension, 35 MPa torsion after 10 h")
 relaxed = ck.simulate(
-    law, "relaxation", fit.values, loading=held.loading, times=later, temperature=1073.15, elastic=held.elastic
+    law, "relaxation", fit.values, loading=relaxation_run.loading, times=later, temperature=1073.15, elastic=relaxation_run.elastic
 )
-right.plot(held.times / HOUR, held.outputs["stress"], "k-", label="truth")
+right.plot(relaxation_run.times / HOUR, relaxation_run.outputs["stress"], "k-", label="truth")
 right.plot(relaxed.times / HOUR, relaxed.outputs["stress"], "C1.", label="identified from bars")
 right.set(xscale="log", xlabel="time, h", ylabel="stress, MPa", title="a bar held at 0.1 % of strain")
 for axes in (left, right):

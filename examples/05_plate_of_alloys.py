@@ -14,8 +14,8 @@ from collections import Counter
 from pathlib import Path
 
 import creepkit as ck
-from creepkit.inverse.settings import Settings
-from creepkit.plates.planted import THICKNESS, planted_plate
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.plates.planted import THICKNESS_MEAN_SD, planted_plate
 from creepkit.plates.screening import screen
 
 options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -23,14 +23,14 @@ options.add_argument("--alloys", type=int, default=3)
 options.add_argument("--dense", action="store_true")
 options.add_argument("--unknown-thickness", action="store_true")
 options.add_argument("--to", type=Path, default=Path("plate"))
-given = options.parse_args()
+arguments = options.parse_args()
 
 # ---- 1. The plate: tests, compositions and the truth, as files -------------------------------------------------------
 
-planted = planted_plate(given.alloys, thickness_known=not given.unknown_thickness)
-tests, compositions = planted.write(given.to)
+planted = planted_plate(arguments.alloys, thickness_known=not arguments.unknown_thickness)
+tests, compositions = planted.write(arguments.to)
 for name, truth in planted.truth.items():
-    mixed = ", ".join(f"{100 * share:.0f} % {base}" for base, share in truth.shares.items() if share > 0.01)
+    mixed = ", ".join(f"{100 * share:.0f} % {base}" for base, share in truth.base_fractions.items() if share > 0.01)
     print(f"{name}: {planted.compositions.class_of(name)} ({mixed}), {truth.law}, {truth.thickness:.3f} mm")
 
 # ---- 2. Screened -----------------------------------------------------------------------------------------------------
@@ -39,33 +39,33 @@ for name, truth in planted.truth.items():
 
 began = time.monotonic()
 nuisances = [ck.Nuisance("offset"), ck.Nuisance("rate")]
-if given.unknown_thickness:
-    nuisances.append(ck.Nuisance("thickness", mean=THICKNESS[0], sd=THICKNESS[1]))
+if arguments.unknown_thickness:
+    nuisances.append(ck.Nuisance("thickness", mean=THICKNESS_MEAN_SD[0], sd=THICKNESS_MEAN_SD[1]))
 plate = screen(
-    tests, compositions=compositions, nuisances=nuisances, settings=Settings(starts=4, draws=32, frames=60),
-    confirm=True, dense="combined" if given.dense else None, to=given.to / "screened",
+    tests, compositions=compositions, nuisances=nuisances, settings=IdentificationSettings(starts=4, sobol_points=32, frames=60),
+    confirm=True, dense="combined" if arguments.dense else None, to=arguments.to / "screened",
     progress=lambda task, done, total, note: print(f"{task}: {done} of {total} ({note})", file=sys.stderr),
 )  # fmt: skip
 seconds = time.monotonic() - began
 print(f"\n{plate}")
-plate.to_csv(given.to / "plate.csv")
-plate.to_hdf5(given.to / "plate.h5")
-pictures = plate.plot(given.to / "pictures")
+plate.to_csv(arguments.to / "plate.csv")
+plate.to_hdf5(arguments.to / "plate.h5")
+pictures = plate.plot(arguments.to / "pictures")
 
 # ---- 3. Against the truth --------------------------------------------------------------------------------------------
 
-told = {answer.alloy: answer for answer in plate.identified}
-confusion = Counter((planted.truth[name].law, answer.best.law.name) for name, answer in told.items())
-laws = sorted({law for pair in confusion for law in pair})
+results = {answer.alloy: answer for answer in plate.identified}
+confusion_matrix = Counter((planted.truth[name].law, answer.best.law.name) for name, answer in results.items())
+laws = sorted({law for pair in confusion_matrix for law in pair})
 print("\nplanted (down), identified (across)\n" + " " * 18 + "".join(f"{law:>18}" for law in laws))
 for law in laws:
-    print(f"{law:18}" + "".join(f"{confusion[law, found]:18d}" for found in laws))
-right = sum(planted.truth[name].law == answer.best.law.name for name, answer in told.items())
-inside = sum(planted.truth[name].law in answer.remaining for name, answer in told.items())
-sure = [name for name, answer in told.items() if answer.decisive]
-wrong = sum(planted.truth[name].law != told[name].best.law.name for name in sure)
+    print(f"{law:18}" + "".join(f"{confusion_matrix[law, found]:18d}" for found in laws))
+correct = sum(planted.truth[name].law == answer.best.law.name for name, answer in results.items())
+contained = sum(planted.truth[name].law in answer.credible_laws for name, answer in results.items())
+decisive_names = [name for name, answer in results.items() if answer.decisive]
+wrong = sum(planted.truth[name].law != results[name].best.law.name for name in decisive_names)
 print(
-    f"best law right {right} of {len(told)}, truth in the set {inside}; decisive {len(sure)}, of them wrong {wrong}; "
+    f"best law right {correct} of {len(results)}, truth in the set {contained}; decisive {len(decisive_names)}, of them wrong {wrong}; "
     f"{seconds:.0f} s"
 )
 print("pictures:", ", ".join(map(str, pictures)))

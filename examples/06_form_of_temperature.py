@@ -14,7 +14,7 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.discovery.discover import discover
-from creepkit.discovery.temperature_study import grouped
+from creepkit.discovery.temperature_study import group_by_temperature
 
 T_REF = 1023.15  # K
 STRESSES = (60.0, 90.0, 120.0)  # MPa
@@ -28,11 +28,11 @@ def planted() -> list[ck.History]:
     rng, tests = np.random.default_rng(6), []
     for T in np.linspace(973.0, 1083.0, 5):
         for stress in STRESSES:
-            own = truth | {"A": truth["A"] * np.exp(0.01 * rng.normal())}
-            rate = float(ck.lower(law).rate(own, stress=stress, temperature=T))
+            values = truth | {"A": truth["A"] * np.exp(0.01 * rng.normal())}
+            rate = float(ck.lower(law).rate(values, stress=stress, temperature=T))
             times = np.geomspace(0.02, 1.0, 16) * 0.02 / rate
             run = ck.simulate(
-                law, bar, own, loading=ck.constant_stress(stress, "stress"), times=times, temperature=T,
+                law, bar, values, loading=ck.constant_stress(stress, "stress"), times=times, temperature=T,
                 name=f"{T:.0f} K, {stress:.0f} MPa",
             )  # fmt: skip
             tests.append(run.replace(outputs={"strain": run.outputs["strain"] + 1e-5 * rng.normal(size=times.size)}))
@@ -46,7 +46,7 @@ tests = planted() if folder is None else ck.read_histories(folder)
 # ---- 1. Each temperature alone --------------------------------------------------------------------------------------
 
 law = ck.law("norton")
-fits = [ck.identify(law, group, using=bar, starts=2, frames=16) for group in grouped(tests)]
+fits = [ck.identify(law, group, using=bar, starts=2, frames=16) for group in group_by_temperature(tests)]
 for fit in fits:
     n = next(e for e in fit.estimates if e.name == "n")
     print(f"{fit.reference.temperature:.0f} K: n = {n.value:.2f} [{n.low:.2f}, {n.high:.2f}]")
@@ -68,7 +68,7 @@ print(f"\n{trend}")
 
 Q = trend.estimate("Q")
 print(f"\nQ = {Q.value / 1e3:.0f} kJ/mol, 95 % from {Q.low / 1e3:.0f} to {Q.high / 1e3:.0f}")
-print(f"at 1050 K: {', '.join(f'{name} = {float(v[0]):.4g}' for name, v in trend.at(1050.0).items())}")
+print(f"at 1050 K: {', '.join(f'{name} = {float(v[0]):.4g}' for name, v in trend.parameters_at(1050.0).items())}")
 out.mkdir(parents=True, exist_ok=True)
 trend.plot(out / "temperature.png")
 trend.save(out / "temperature.json")

@@ -1,5 +1,5 @@
 """What all tests share."""
 
-from creepkit.cli.compiled import share_compiled_code
+from creepkit.cli.compiled import set_numba_cache
 
-share_compiled_code()
+set_numba_cache()

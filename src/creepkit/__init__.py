@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from creepkit.language import activated as activated
     from creepkit.language import arrhenius as arrhenius
     from creepkit.language import exponential as exponential
-    from creepkit.language import inverse as inverse
+    from creepkit.language import inverse_temperature as inverse_temperature
     from creepkit.language import linear as linear
     from creepkit.language import wachtman as wachtman
     from creepkit.records import History as History
@@ -60,10 +60,10 @@ if TYPE_CHECKING:
     from creepkit.study import specimen as specimen
     from creepkit.study import specimens as specimens
     from creepkit.study import surrogate as surrogate
-    from creepkit.study import suspects as suspects
+    from creepkit.study import check_data_quality as check_data_quality
     from creepkit.study import temperature_study as temperature_study
     from creepkit.study import train as train
-    from creepkit.study import with_suspects_marked as with_suspects_marked
+    from creepkit.study import exclude_suspect_frames as exclude_suspect_frames
     from creepkit.surrogate.parameter_gru import ParameterGru as ParameterGru
     from creepkit.surrogate.rate_net import RateNet as RateNet
     from creepkit.surrogate.recipe import Training as Training

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def blank(width: float, height: float) -> Figure:
+def empty_figure(width: float, height: float) -> Figure:
     """A figure without panels, inches; it needs no display."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -21,12 +21,12 @@ def blank(width: float, height: float) -> Figure:
     return figure
 
 
-def written(figure: Figure, path: str | Path | None, error: type[CreepkitError] = FitError) -> Figure:
+def save_figure(figure: Figure, path: str | Path | None, error_type: type[CreepkitError] = FitError) -> Figure:
     """The figure, written to `path` where one is given; `error` where it cannot be."""
     if path is not None:
         try:
             figure.savefig(path, dpi=130)
         except (OSError, ValueError) as found:
-            told = str(found).splitlines()[0]
-            raise error(f"{path}: the plot cannot be written ({told}); name a .png, .svg or .pdf file") from None
+            message = str(found).splitlines()[0]
+            raise error_type(f"{path}: the plot cannot be written ({message}); name a .png, .svg or .pdf file") from None
     return figure

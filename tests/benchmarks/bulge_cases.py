@@ -23,8 +23,8 @@ from creepkit.fem.simulation import Simulation, simulate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Loading, PressureJump, Program, RecordedLoading
 from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.bulge_course import Setup, setup
-from creepkit.specimens.bulge_prediction import settings_of
+from creepkit.specimens.bulge_course import TestSetup, set_up_test
+from creepkit.specimens.bulge_prediction import solver_settings
 from creepkit.specimens.dimple import DimpleGeometry
 
 BENCHMARKS = Path(__file__).resolve().parents[2].parent / "shared/data/benchmarks"
@@ -62,18 +62,18 @@ class Case:
             specimen="bulge", elastic=ck.Elastic(self.E),
         )  # fmt: skip
 
-    def simulation(self, end: float, **changes: float) -> tuple[Simulation, Setup]:
+    def simulation(self, end: float, **changes: float) -> tuple[Simulation, TestSetup]:
         """A run until `end`, s, by the specimen with some settings changed."""
         specimen = self.specimen.replace(**changes)
-        made = setup(specimen, self.history(np.array([end])), {})
+        made = set_up_test(specimen, self.history(np.array([end])), {})
         kernel = kernels.lower(self.model, "numba")
-        theta = kernel.internal(self.model.values(self.values))[0]
-        return simulate(kernel, theta, made.body, made.course, settings=settings_of(specimen)), made
+        theta = kernel.to_internal(self.model.values(self.values))[0]
+        return simulate(kernel, theta, made.model, made.load_history, settings=solver_settings(specimen)), made
 
     def outcome(self, times: Floats, **changes: float) -> Floats:
         """Apex in mm, D_amp in mm, S_d in mm and S_p at `times`, (times, 4)."""
         run, made = self.simulation(float(times[-1]), **changes)
-        top = run.displacements[:, made.body.top, 1]
+        top = run.displacements[:, made.model.top, 1]
         seen = made.observation.observe(made.radii, top)
         return np.column_stack([run.at(top[:, 0], times), run.at(seen, times)])
 

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import creepkit as ck
-from creepkit.cli.compiled import share_compiled_code
+from creepkit.cli.compiled import set_numba_cache
 from creepkit.dataset.campaign import generate
 from creepkit.dataset.dataset import Dataset
-from creepkit.dataset.design import Design, design_of
+from creepkit.dataset.design import SamplingDesign, sampling_design
 
 PAPER = 155_186
 """Samples of the paper's case 2."""
@@ -40,7 +40,7 @@ def cpu_seconds() -> float:
     return sum(one.ru_utime + one.ru_stime for one in used)
 
 
-def timed(design: Design, to: Path, workers: int, **wanted: int) -> tuple[Dataset, Cost]:
+def timed(design: SamplingDesign, to: Path, workers: int, **wanted: int) -> tuple[Dataset, Cost]:
     """A campaign and what it cost."""
     cpu, wall = cpu_seconds(), time.perf_counter()
     data = generate(design, DIMPLE, seed=1, to=to, workers=workers, rows=ROWS, **wanted)
@@ -49,7 +49,7 @@ def timed(design: Design, to: Path, workers: int, **wanted: int) -> tuple[Datase
 
 def measure(box: str, samples: int, folder: Path) -> list[str]:
     """The rows of the table for one box."""
-    design = design_of(ck.law("combined"), DIMPLE, box)
+    design = sampling_design(ck.law("combined"), DIMPLE, box)
     timed(design, folder / f"{box}-compiled.h5", 1, draws=1)
     _, start = timed(design, folder / f"{box}-start.h5", 1, draws=1)
     data, first = timed(design, folder / f"{box}-1.h5", 1, samples=samples)
@@ -71,7 +71,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Cost of campaigns")
     parser.add_argument("--samples", type=int, default=400, help="accepted samples of each box (400)")
     samples = parser.parse_args().samples
-    share_compiled_code()
+    set_numba_cache()
     print(f"{'':32s} {'':7s} {'':10s} {'':9s} {'':8s} {'':9s} {f'all {PAPER} samples':>26s}")
     print(
         f"{'box':12s} {'accepted of draws':19s} {'workers':>7s} {'CPU-s each':>10s} {'each s':>9s} {'scaling':>8s} "

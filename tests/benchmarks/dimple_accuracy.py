@@ -84,7 +84,7 @@ def seconds_of(case: Case) -> float:
 def converged(case: Case) -> Reference:
     """The reference of one case."""
     screened, made = case.simulation(TIMES[-1], tolerance=3e-2)
-    reason = _uninformative(screened.status, screened.at(screened.displacements[:, made.body.top[0], 1], _marks(case)))
+    reason = _uninformative(screened.status, screened.at(screened.displacements[:, made.model.top[0], 1], _marks(case)))
     if reason:
         return Reference(case.name, reason)
     outcomes = (case.outcome(TIMES, refinement=r, tolerance=t) for r, t in LEVELS)

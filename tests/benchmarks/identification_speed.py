@@ -14,7 +14,7 @@ import numpy as np
 import planted
 
 import creepkit as ck
-from creepkit.cli.compiled import share_compiled_code
+from creepkit.cli.compiled import set_numba_cache
 
 
 def timed(function):
@@ -28,7 +28,7 @@ def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--specimens", type=int, default=4)
     given = options.parse_args()
-    share_compiled_code()
+    set_numba_cache()
     dimple, model = ck.specimen("bulge"), ck.surrogate("dimple")
     design = planted.DESIGNS["jump"]
     specimens = [planted.specimen(k, planted.SINGLE, design, dimple) for k in range(given.specimens + 1)]

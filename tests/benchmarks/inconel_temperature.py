@@ -28,22 +28,22 @@ from pathlib import Path
 import numpy as np
 
 import creepkit as ck
-from creepkit.cli.compiled import share_compiled_code
+from creepkit.cli.compiled import set_numba_cache
 from creepkit.discovery.discover import discover
-from creepkit.discovery.libraries import law_with
+from creepkit.discovery.libraries import law_with_forms
 from creepkit.discovery.refitting import refit
-from creepkit.discovery.temperature_study import grouped
+from creepkit.discovery.temperature_study import group_by_temperature
 from creepkit.errors import CreepkitError
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.holdout import HeldOut, leave_one_test_out, pooled_error, prediction_errors
-from creepkit.inverse.identification import Identification, Settings
+from creepkit.inverse.holdout import HeldOutTest, leave_one_test_out, pooled_relative_squared_error, prediction_errors
+from creepkit.inverse.identification import Identification, IdentificationSettings
 from creepkit.inverse.identify import identify
 
 LAW = ck.law("drifting-exponent").fix(m=0)
 THICKNESS = ck.Nuisance("thickness", mean=0.4935, sd=0.027)
 OWN = (ck.Nuisance("offset", sd=0.012), THICKNESS)
-ALONE = Settings(starts=2, nuisances=OWN)
-SETTINGS = Settings(starts=2, nuisances=OWN, test_loss="student", weights="likelihood")
+ALONE = IdentificationSettings(starts=2, nuisances=OWN)
+SETTINGS = IdentificationSettings(starts=2, nuisances=OWN, test_loss="student", weights="likelihood")
 FORMS = dict.fromkeys(LAW.names, ("constant", "linear", "activated")) | {"A": ("arrhenius", "logarithmic")}
 
 
@@ -58,16 +58,16 @@ def main() -> None:
     options.add_argument("--no-finite-elements", action="store_true")
     options.add_argument("--plot", type=Path, default=None)
     given = options.parse_args()
-    share_compiled_code()
+    set_numba_cache()
     began = time.monotonic()
-    tests = amplitudes(ck.with_suspects_marked(ck.read_histories(given.folder)))
+    tests = amplitudes(ck.exclude_suspect_frames(ck.read_histories(given.folder)))
     using = ck.surrogate("dimple") if given.through == "dimple" else ck.specimen("bulge")
 
     joint = replace(SETTINGS, frames=given.frames)
     alone = each_alone(tests, using, replace(ALONE, frames=given.frames))
     trend = discover(alone, forms=FORMS)
     print(f"\nby the estimates alone\n{trend}\n", flush=True)
-    trend = refit(trend, tests, using, most=given.most, settings=joint, progress=told)
+    trend = refit(trend, tests, using, max_forms=given.most, settings=joint, progress=told)
     print(
         f"\nby the nine tests, through {given.through}, after {time.monotonic() - began:.0f} s\n{trend}\n", flush=True
     )
@@ -96,11 +96,11 @@ def amplitudes(tests: list[ck.History]) -> list[ck.History]:
     return [h.replace(outputs={"amplitude": h.outputs["amplitude"]}) for h in tests]
 
 
-def each_alone(tests: list[ck.History], using: object, settings: Settings) -> list[Identification]:
+def each_alone(tests: list[ck.History], using: object, settings: IdentificationSettings) -> list[Identification]:
     """One identification a temperature, with what it says."""
     fits = []
     print("| T, K | tests | " + " | ".join(LAW.names) + " |\n|" + "-|" * (2 + len(LAW.names)))
-    for group in grouped(tests):
+    for group in group_by_temperature(tests):
         fit = identify(LAW, group, using, settings=settings)
         fits.append(fit)
         row = " | ".join(f"{e.value:.3g} [{e.low:.2g}, {e.high:.2g}]" for e in fit.estimates)
@@ -115,7 +115,7 @@ def plain(trend: object) -> Identification:
 
 
 def one_at_a_time(
-    trend: object, tests: list[ck.History], using: object, settings: Settings
+    trend: object, tests: list[ck.History], using: object, settings: IdentificationSettings
 ) -> dict[str, Identification]:
     """Arrhenius and the discovered form of one other parameter, for each that is not constant."""
     base, found = plain(trend), {}
@@ -123,7 +123,7 @@ def one_at_a_time(
         if library.parameter == "A" or library.name == "constant":
             continue
         factor = next(o for o in trend.combinations.with_form("A", "arrhenius").libraries if o.parameter == "A")
-        law = law_with(LAW, [factor, library])
+        law = law_with_forms(LAW, [factor, library])
         theta = law_theta(law, base)
         start = Coordinates(law, base.reference).u(theta)
         name = f"Arrhenius, {library.parameter}: {library.name}"
@@ -139,15 +139,15 @@ def law_theta(law: ck.CreepLaw, base: Identification) -> np.ndarray:
 
 def again(fit: Identification, tests: list[ck.History], using: object) -> Identification:
     """The same law through another predictor, beginning where the first ended."""
-    return identify(fit.law, tests, using, settings=fit.settings, start=fit.u, known=fit.nuisances,
+    return identify(fit.law, tests, using, settings=fit.settings, start=fit.u, known_nuisances=fit.nuisances,
                     reference=fit.reference)  # fmt: skip
 
 
-def held_out(fit: Identification, tests: list[ck.History]) -> tuple[HeldOut, ...]:
+def held_out(fit: Identification, tests: list[ck.History]) -> tuple[HeldOutTest, ...]:
     return leave_one_test_out(fit, tests)
 
 
-def table(how: str, found: dict[str, tuple[Identification, tuple[HeldOut, ...]]], tests: list[ck.History]) -> None:
+def table(how: str, found: dict[str, tuple[Identification, tuple[HeldOutTest, ...]]], tests: list[ck.History]) -> None:
     """Misfit, BIC's ingredients, and the errors of amplitude of held-out tests."""
     names = [h.name.removeprefix("test_") for h in tests]
     print(f"\n{how}: relative squared error of the amplitude; fitted, then held out (pooled, without test 12, each)")
@@ -156,19 +156,19 @@ def table(how: str, found: dict[str, tuple[Identification, tuple[HeldOut, ...]]]
     for name, (fit, held) in found.items():
         kept = [one for one in held if not one.name.endswith("12")]
         few = [h for h in tests if not h.name.endswith("12")]
-        own = [one.errors["amplitude"].rse for one in held]
+        own = [one.errors["amplitude"].relative_squared_error for one in held]
         print(
-            f"| {name} | {len(fit.law.params)} | {-2 * fit.log_likelihood:.1f} | {fit.errors['amplitude'].rse:.2g} | "
-            f"{pooled_error(held, tests, 'amplitude'):.3g} | {pooled_error(kept, few, 'amplitude'):.3g} | "
+            f"| {name} | {len(fit.law.params)} | {-2 * fit.log_likelihood:.1f} | {fit.errors['amplitude'].relative_squared_error:.2g} | "
+            f"{pooled_relative_squared_error(held, tests, 'amplitude'):.3g} | {pooled_relative_squared_error(kept, few, 'amplitude'):.3g} | "
             f"{np.median(own):.2g} | " + " | ".join(f"{v:.2g}" for v in own) + " |",
             flush=True,
         )
     verdict(found)
 
 
-def verdict(found: dict[str, tuple[Identification, tuple[HeldOut, ...]]]) -> None:
+def verdict(found: dict[str, tuple[Identification, tuple[HeldOutTest, ...]]]) -> None:
     """Whether the discovered forms predict better than plain Arrhenius, test by test."""
-    one, other = (np.array([h.errors["amplitude"].rse for h in found[n][1]]) for n in ("plain Arrhenius", "discovered"))
+    one, other = (np.array([h.errors["amplitude"].relative_squared_error for h in found[n][1]]) for n in ("plain Arrhenius", "discovered"))
     better, gain = int((other < one).sum()), np.log(other / one)
     error = gain.std(ddof=1) / np.sqrt(gain.size)
     print(
@@ -181,21 +181,21 @@ def verdict(found: dict[str, tuple[Identification, tuple[HeldOut, ...]]]) -> Non
         print(f"verdict: the forms predict {'better' if gain.mean() < 0 else 'worse'} than plain Arrhenius")
 
 
-def nested(alone: list[Identification], tests: list[ck.History], using: object, most: int, settings: Settings) -> None:
+def nested(alone: list[Identification], tests: list[ck.History], using: object, most: int, settings: IdentificationSettings) -> None:
     """Forms chosen without the test that is then predicted."""
     print("\nforms chosen anew without the test held out\n| test | forms | rse, amplitude |\n|-|-|-|")
-    groups = grouped(tests)
+    groups = group_by_temperature(tests)
     for held in tests:
         kept = [fit for fit, group in zip(alone, groups, strict=True) if held not in group]
         others = [h for h in tests if h is not held]
         try:
             trend = discover(kept, forms=FORMS)
-            trend = refit(trend, others, using, most=most, settings=settings, confirm=False)
+            trend = refit(trend, others, using, max_forms=most, settings=settings, search_again=False)
         except CreepkitError as error:
             print(f"| {held.name} | {error} | |", flush=True)
             continue
         told_forms = ", ".join(f"{name}:{form}" for name, form in trend.forms.items() if form != "constant")
-        error = prediction_errors(trend.fit, held)["amplitude"].rse
+        error = prediction_errors(trend.fit, held)["amplitude"].relative_squared_error
         print(f"| {held.name} | {told_forms} | {error:.2g} |", flush=True)
 
 

@@ -31,13 +31,13 @@ import planted
 
 import creepkit as ck
 from creepkit import kernels
-from creepkit.cli.compiled import share_compiled_code
+from creepkit.cli.compiled import set_numba_cache
 from creepkit.inverse.covariance import covariance
-from creepkit.inverse.intervals.mixture import Mixture
-from creepkit.inverse.problem import reopened
-from creepkit.inverse.restricted import inverse
-from creepkit.inverse.scatter import OutputScatter, Scatter
-from creepkit.inverse.selection.equivalence import equivalents
+from creepkit.inverse.intervals.mixture import ModelAverage
+from creepkit.inverse.problem import least_squares_problem
+from creepkit.inverse.restricted import scaled_inverse
+from creepkit.inverse.scatter import OutputNoise, NoiseModel
+from creepkit.inverse.selection.equivalence import equivalent_laws
 
 PAIRS = (("norton", "strain-hardening"), ("norton", "time-hardening"), ("hyperbolic-sine", "time-hardening"),
          ("hyperbolic-sine", "strain-hardening"))  # fmt: skip
@@ -47,7 +47,7 @@ LEVELS = (0.6, 1.0, 1.4)
 def specimen_result(job):
     """Everything that the tables need of one specimen."""
     k, design_name, names, using_name, sums = job
-    share_compiled_code()
+    set_numba_cache()
     design = planted.DESIGNS[design_name]
     dimple = ck.specimen("bulge").replace(threads=1)
     using = dimple if using_name == "bulge" else ck.surrogate("dimple")
@@ -64,7 +64,7 @@ def summary(one, design, ranking, cost):
     laws = [r.fit.law.fingerprint for r in ranking.laws]
     position = laws.index(truth) if truth in laws else -1
     same = {truth}
-    for pair in equivalents(ranking):
+    for pair in equivalent_laws(ranking):
         mates = {pair.first, pair.second}
         if one.law.name in mates:
             same |= {r.fit.law.fingerprint for r in ranking.laws if r.fit.law.name in mates}
@@ -91,7 +91,7 @@ def quantities(fit, of):
 
 def true_quantities(one, fit):
     """The same of the planted values."""
-    u = fit.coordinates.u(kernels.lower(one.law, "numba").internal(one.values)[0])
+    u = fit.coordinates.u(kernels.lower(one.law, "numba").to_internal(one.values)[0])
     return [q[0] for q in quantities(fit, replace(fit, u=u))], u
 
 
@@ -108,27 +108,27 @@ def coverage(one, design, fit):
 
 def fisher(fit, u, design):
     """Covariance of u under the true scatter, from the exact Jacobian at the true values."""
-    opened = reopened(fit)
+    opened = least_squares_problem(fit)
     x = np.concatenate([u, opened.x[len(u) :]])
-    residuals = opened.objective.at(x)
+    residuals = opened.residual_function.evaluate(x)
     noise = dict(planted.NOISE)
-    sizes = {name: OutputScatter(sd) for name, sd in noise.items()}
+    sizes = {name: OutputNoise(sd) for name, sd in noise.items()}
     if design.correlated:
         coefficient, sd = design.correlated
-        scale = opened.objective.entries.scales[0].size
+        scale = opened.residual_function.observations.transforms[0].size
         reach = -5.0 / 48 / np.log(coefficient)
-        sizes["amplitude"] = OutputScatter(1e-6, drift=sd / scale, reach=reach)
-    weights = np.linalg.inv(covariance(replace(residuals, loudness=np.ones_like(residuals.loudness)), Scatter(sizes)))
+        sizes["amplitude"] = OutputNoise(1e-6, drift=sd / scale, correlation_length=reach)
+    weights = np.linalg.inv(covariance(replace(residuals, loudness=np.ones_like(residuals.relative_noise)), NoiseModel(sizes)))
     own = np.einsum("tep,tef,tfq->pq", residuals.jacobian, weights, residuals.jacobian, optimize=True)
-    wide = opened.box.width[: len(u)]
-    prior = np.concatenate([12.0 / wide**2, opened.objective.unknowns.precision])
-    return inverse(own + np.diag(prior))[: len(u), : len(u)]
+    wide = opened.bounds.width[: len(u)]
+    prior = np.concatenate([12.0 / wide**2, opened.residual_function.nuisance_parameters.precision])
+    return scaled_inverse(own + np.diag(prior))[: len(u), : len(u)]
 
 
 def covered_by_mixture(one, ranking, fit):
     """Which intervals of the mixture over laws hold the truth."""
     truth, _ = true_quantities(one, fit)
-    found = quantities(fit, Mixture.of(ranking))
+    found = quantities(fit, ModelAverage.from_ranking(ranking))
     return [bool(low <= t <= high) for t, (_, low, high) in zip(truth, found, strict=True)]
 
 

@@ -17,9 +17,9 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.inverse.selection import rank
-from creepkit.inverse.validation import leave_one_condition_out, loading_strains, measured_time, times_to_strain
-from creepkit.inverse.warmth import reference_temperature, several_temperatures
-from creepkit.readers.duplicates import duplicates
+from creepkit.inverse.validation import leave_one_condition_out, loading_strains, measured_time_to_strain, times_to_strain
+from creepkit.inverse.warmth import reference_temperature, spans_temperatures
+from creepkit.readers.duplicates import duplicate_tests
 
 LIMIT, LEVEL = 0.05, 0.01
 LAWS = (
@@ -41,7 +41,7 @@ def catalogue(histories):
     """{name: law}: each law alone, with temperature where the tests call for it, and what grows from them."""
     plain = {name: ck.law(name) for name in LAWS}
     plain["norton + strain-hardening"] = ck.law("norton") + ck.law("strain-hardening")
-    if not several_temperatures(histories):
+    if not spans_temperatures(histories):
         return plain
     T = reference_temperature(histories)
     warm = {f"{name} x arrhenius": law.times(ck.arrhenius(T_ref=T)) for name, law in plain.items()}
@@ -79,10 +79,10 @@ def usable(histories):
 
 def spread_of_repeats(histories):
     """(Z, tests beyond the first of each condition): what repeats of one condition scatter, which no law can better."""
-    twins = {other for _, other in duplicates(histories)}
+    twins = {other for _, other in duplicate_tests(histories)}
     logs = defaultdict(list)
     for h, start in zip(histories, loading_strains(histories), strict=True):
-        if h.name not in twins and (reached := measured_time(h, LEVEL + start)) is not None:
+        if h.name not in twins and (reached := measured_time_to_strain(h, LEVEL + start)) is not None:
             logs[h.condition].append(np.log10(reached))
     freedom = sum(len(v) - 1 for v in logs.values())
     squares = sum(((np.array(v) - np.mean(v)) ** 2).sum() for v in logs.values())

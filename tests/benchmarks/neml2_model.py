@@ -19,7 +19,7 @@ from neml2.factory import load_model
 
 from creepkit.export.cards.neml2 import Neml2Model
 from creepkit.kernels import lower
-from creepkit.records import ValuedLaw
+from creepkit.records import LawWithValues
 
 STEP = 10.0
 """s, of the backward Euler step whose residual is asked for."""
@@ -34,7 +34,7 @@ def neml2_rate(model: Model, stress: float, temperature: float) -> float:
     return float(residual.data.detach()[..., 0]) / (STEP * STEEL.E / (1 + STEEL.nu))
 
 
-def worst(source: ValuedLaw) -> float:
+def worst(source: LawWithValues) -> float:
     """The largest relative difference over stresses and temperatures."""
     kernel = lower(source.law, "numpy")
     with tempfile.TemporaryDirectory() as folder:

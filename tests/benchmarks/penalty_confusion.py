@@ -27,10 +27,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 import creepkit as ck
-from creepkit.cli.compiled import share_compiled_code
-from creepkit.inverse.settings import Settings
-from creepkit.inverse.sparsity.resampling import binomial
-from creepkit.inverse.sparsity.sparse import opened, reduced_by
+from creepkit.cli.compiled import set_numba_cache
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sparsity.resampling import binomial_interval
+from creepkit.inverse.sparsity.sparse import identify_full, identify_reduced
 from creepkit.records import History
 
 SEED = 2026
@@ -98,14 +98,14 @@ def answer(fit):
 def rows_of(test, law, model, settings, labels):
     """(label, (answer, terms, CPU seconds)) of one test by each penalty."""
     began = time.process_time()
-    dense, reductions = opened(law, [test], model, None, settings, None)
-    reductions.singles()
+    dense, reductions = identify_full(law, [test], model, None, settings, None)
+    reductions.single_terms()
     common = time.process_time() - began
     for label in labels:
         penalty, search = PENALTIES[label]
         began = time.process_time()
         if search is None:
-            fit = reduced_by(penalty, dense, reductions)
+            fit = identify_reduced(penalty, dense, reductions)
         else:
             fit = ck.identify(law, [test], using=model, search=search, penalty=penalty, **SETTINGS)
         yield label, (*answer(fit), (common if search is None else 0.0) + time.process_time() - began)
@@ -124,7 +124,7 @@ def table(rows):
         "one term": sum(terms == 1 for _, _, terms, _ in rows),
     }
     for what, count in right.items():
-        low, high = binomial(count, len(rows))
+        low, high = binomial_interval(count, len(rows))
         print(f"{what}: {count / len(rows):.2f} ({low:.2f} to {high:.2f})", end="; ")
     print(f"CPU {np.median([cpu for *_, cpu in rows]):.1f} s an identification (median)\n", flush=True)
 
@@ -136,9 +136,9 @@ def main():
     options.add_argument("--penalties", nargs="*", default=list(PENALTIES), choices=list(PENALTIES))
     options.add_argument("--through", default="dimple")
     given = options.parse_args()
-    share_compiled_code()
+    set_numba_cache()
     model, law = ck.surrogate(given.through), ck.law("combined")
-    settings = Settings(**SETTINGS)
+    settings = IdentificationSettings(**SETTINGS)
     found = {label: [] for label in given.penalties}
     for name in given.laws:
         for k in range(given.specimens):

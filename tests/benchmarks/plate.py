@@ -27,8 +27,8 @@ import numpy as np
 from scipy.stats import binomtest
 
 import creepkit as ck
-from creepkit.cli.compiled import share_compiled_code
-from creepkit.plates.planted import THICKNESS, planted_plate
+from creepkit.cli.compiled import set_numba_cache
+from creepkit.plates.planted import THICKNESS_MEAN_SD, planted_plate
 from creepkit.plates.screening import screen
 
 MERGED = {"hyperbolic-sine": "norton"}
@@ -36,7 +36,7 @@ MERGED = {"hyperbolic-sine": "norton"}
 
 
 def main():
-    share_compiled_code()
+    set_numba_cache()
     given = options().parse_args()
     planted = planted_plate(given.alloys, given.seed, thickness_known=not given.unknown_thickness)
     folder = nullcontext(given.to) if given.to else tempfile.TemporaryDirectory()
@@ -46,7 +46,7 @@ def main():
         wall, spent = time.perf_counter() - began, cpu() - before
     workers = given.workers or len(os.sched_getaffinity(0))
     print(f"{given.alloys} alloys, {given.how}: {wall / 60:.1f} min on {workers} workers, {spent / 60:.1f} CPU-min; "
-          f"of an alloy, CPU-s: {quantiles([a.seconds for a in plate.answers])}")  # fmt: skip
+          f"of an alloy, CPU-s: {quantiles([a.cpu_seconds for a in plate.results])}")  # fmt: skip
     recovered(plate, planted.truth)
     confirmed(plate)
     print(f"\n{plate}")
@@ -57,7 +57,7 @@ def how(given):
     model = None if given.how == "finite-elements" else ck.surrogate("dimple")
     nuisances = [ck.Nuisance("offset"), ck.Nuisance("rate")]
     if given.unknown_thickness:
-        nuisances.append(ck.Nuisance("thickness", mean=THICKNESS[0], sd=THICKNESS[1]))
+        nuisances.append(ck.Nuisance("thickness", mean=THICKNESS_MEAN_SD[0], sd=THICKNESS_MEAN_SD[1]))
     return {
         "using": model if given.how == "surrogate" else None,
         "through": model if given.how == "through" else None,
@@ -98,9 +98,9 @@ def confirmed(plate):
     told = [a.confirmation for a in plate.identified if a.confirmation is not None]
     print(f"confirmed {sum(c.holds for c in told)} of {len(told)}; finite elements from the fit, times the noise: "
           f"{quantiles([c.distance for c in told])}")  # fmt: skip
-    from creepkit.plates.answer import loss
+    from creepkit.plates.answer import mean_relative_squared_error
 
-    costs = [loss(a.reduced) / loss(a.dense) for a in plate.identified if a.dense is not None]
+    costs = [mean_relative_squared_error(a.reduced) / mean_relative_squared_error(a.dense) for a in plate.identified if a.dense is not None]
     if costs:
         print(f"loss of the reduced law over that without sparsity: {quantiles(costs)}")
 

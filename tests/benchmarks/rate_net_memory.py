@@ -16,7 +16,7 @@ import torch
 from torch import nn
 
 import creepkit as ck
-from creepkit.surrogate.rate_inputs import LOCAL
+from creepkit.surrogate.rate_inputs import LOCAL_INPUTS
 from creepkit.surrogate.rate_module import RateModule
 from creepkit.surrogate.rate_net import RateNet
 
@@ -44,8 +44,8 @@ class RecurrentRateNet(RateNet):
 
     def module(self, data, samples, train):
         made = RateModule(samples["inputs"].shape[-1], HIDDEN, self.layers)
-        made.layers = Memory(len(self.stress_factors) * len(self.strain_factors) + len(LOCAL), HIDDEN)
-        return made.fitted(samples, train)
+        made.layers = Memory(len(self.stress_factors) * len(self.strain_factors) + len(LOCAL_INPUTS), HIDDEN)
+        return made.with_scales(samples, train)
 
 
 def main():
@@ -65,7 +65,7 @@ def main():
             began = time.process_time()
             model = ck.train(data, kind(training=training), seed=seed)
             weights = sum(p.numel() for p in model.module.parameters())
-            told = model.told.metrics
+            told = model.metadata.metrics
             outputs = " | ".join(f"{1e4 * told['outputs'][name]['rse']:.2f}" for name in data.outputs)
             largest = told["outputs"][data.outputs[0]]
             cost = time.process_time() - began

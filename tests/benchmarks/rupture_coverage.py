@@ -25,7 +25,7 @@ STRESSES = (60, 70, 80, 95, 110, 60, 80, 110)
 def one(seed, truth):
     """Which parameters and the law's rupture time their intervals hold, and the share of single tests there."""
     fit = ck.identify(OMEGA, campaign(OMEGA, VALUES, STRESSES, seed, stopped=(0, 6)), using=BAR, starts=2, frames=16)
-    _, low, high = fit.rupture_time(50.0, 1000.0, scatter=False)
+    _, low, high = fit.rupture_time(50.0, 1000.0, test_scatter=False)
     spread = np.hypot(SCATTER["rate"], SCATTER["life"])
     tests = truth * np.exp(spread * np.random.default_rng(seed).standard_normal(1000))
     _, less, more = fit.rupture_time(50.0, 1000.0)

@@ -23,15 +23,15 @@ import numpy as np
 from scipy.stats import binomtest
 
 import creepkit as ck
-from creepkit.cli.compiled import share_compiled_code
-from creepkit.inverse.coordinates import Coordinates, Reference
+from creepkit.cli.compiled import set_numba_cache
+from creepkit.inverse.coordinates import Coordinates, ReferencePoint
 from creepkit.inverse.identify import identify
 from creepkit.inverse.search.evolution import CmaEs
 from creepkit.inverse.search.multistart import MultiStart, distinct
 from creepkit.inverse.search.swarm import ParticleSwarm
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.settings import IdentificationSettings
 
-REFERENCE = Reference(stress=120.0, strain=0.01, time=1e4, temperature=1000.0)
+REFERENCE = ReferencePoint(stress=120.0, strain=0.01, time=1e4, temperature=1000.0)
 RATE = (-7.3, -5.7)
 """log10 of the rate at the reference point, 1/s: some .1 to 1 mm of creep in 12 h."""
 PRIORS = {
@@ -62,7 +62,7 @@ class Kept:
 
     def minima(self, landscape, progress=None):
         found = self.search.minima(landscape, progress)
-        self.starts = [m.u for m in distinct(found.minima, landscape.box, most=OTHERS)]
+        self.starts = [m.u for m in distinct(found.minima, landscape.box, max_count=OTHERS)]
         return found
 
 
@@ -80,7 +80,7 @@ def drawn(law, name, rng):
     given["A"] = 1.0  # its place is taken by the rate
     coordinates = Coordinates(law, REFERENCE)
     u = np.array([p.to_internal(given[n]) for n, p in law.table.items()], float)
-    u[list(coordinates.rates)] = np.log(10.0) * rng.uniform(*RATE)
+    u[list(coordinates.term_rates)] = np.log(10.0) * rng.uniform(*RATE)
     values = coordinates.values(u)
     fits = all(p.bounds[0] <= values[n] <= p.bounds[1] for n, p in law.table.items())
     return values if fits else None
@@ -104,7 +104,7 @@ def specimen(name, using, rng):
 
 def compared(name, using, searches, rng, seed):
     """{search: (-2 ln L over the lowest, candidates, CPU seconds)} of one specimen."""
-    law, (values, test), settings = law_of(name), specimen(name, using, rng), Settings(seed=seed)
+    law, (values, test), settings = law_of(name), specimen(name, using, rng), IdentificationSettings(seed=seed)
     rows = {}
     for which in searches:
         began = time.process_time()
@@ -138,8 +138,8 @@ def main():
     options.add_argument("--through", default="stand-in", choices=("stand-in", "surrogate"))
     options.add_argument("--seed", type=int, default=0)
     given = options.parse_args()
-    share_compiled_code()
-    using = ck.specimen("bulge").screening() if given.through == "stand-in" else ck.surrogate("dimple")
+    set_numba_cache()
+    using = ck.specimen("bulge").reduced_order_model() if given.through == "stand-in" else ck.surrogate("dimple")
     print(f"{given.specimens} specimens a law, through the {given.through}")
     print("| law | search | within 2 of the best | largest gap | candidates | CPU s |\n" + "|-" * 6 + "|")
     everything = {which: [] for which in given.searches}

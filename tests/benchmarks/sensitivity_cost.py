@@ -65,7 +65,7 @@ def main() -> None:
         forward = least(lambda law=law, plan=plan, numbers=numbers: dimple.predict(law, numbers, [plan]))
         both = least(
             lambda law=law, plan=plan, numbers=numbers, modulus=modulus: dimple.predict(
-                law, numbers, [plan], jacobian=True, effects=modulus
+                law, numbers, [plan], jacobian=True, nuisances=modulus
             )
         )
         columns = len(law.names) + 1

@@ -20,7 +20,7 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.records import Status
-from creepkit.surrogate.metrics import rse
+from creepkit.surrogate.metrics import relative_squared_error
 
 SEED = 77
 SETS = {
@@ -99,7 +99,7 @@ def row(name, model, data):
     true, shown = data.values[:, FIRST_FRAME:].astype(float), shown[:, FIRST_FRAME:]
     mask = np.isfinite(true[..., 0]) & np.isfinite(shown[..., 0])
     relative = np.abs(shown[..., 0] / true[..., 0] - 1)
-    errors = [rse(true[..., [k]], np.nan_to_num(shown[..., [k]]), mask) for k in range(3)]
+    errors = [relative_squared_error(true[..., [k]], np.nan_to_num(shown[..., [k]]), mask) for k in range(3)]
     largest = 1e3 * np.where(mask, np.abs(shown[..., 0] - true[..., 0]), 0).max(axis=1)
     deepest = np.where(mask, true[..., 0], 0).max(axis=1)
     fine = (largest < 5) | (largest < 20 * deepest)
@@ -120,7 +120,7 @@ def main():
     given = options.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     sets = {name: held_out(name, given.samples, given.folder) for name in given.sets}
-    models = {"one degree of freedom": ck.specimen("bulge").screening(), "shipped": ck.surrogate("dimple")}
+    models = {"one degree of freedom": ck.specimen("bulge").reduced_order_model(), "shipped": ck.surrogate("dimple")}
     models |= {name: ck.surrogate(name) for name in given.models}
     for title, model in models.items():
         print(f"\n{title}\n")

@@ -19,8 +19,8 @@ import numpy as np
 from surrogate_accuracy import predicted
 
 import creepkit as ck
-from creepkit.surrogate.metrics import rse
-from creepkit.surrogate.trainable import split, trainable
+from creepkit.surrogate.metrics import relative_squared_error
+from creepkit.surrogate.trainable import training_split, trainable_samples
 
 
 def main():
@@ -30,13 +30,13 @@ def main():
     options.add_argument("--samples", type=int, default=400)
     options.add_argument("--seed", type=int, default=0)
     given = options.parse_args()
-    data = trainable(ck.read_dataset(given.data, accepted_only=True))
-    train, rows = (part.numpy() for part in split(len(data), ck.Training(), given.seed))
+    data = trainable_samples(ck.read_dataset(given.data, accepted_only=True))
+    train, rows = (part.numpy() for part in training_split(len(data), ck.Training(), given.seed))
     scale = np.nanstd(data.values[train].reshape(-1, len(data.outputs)).astype(float), axis=0)
     held = data.rows(rows[: given.samples])
     print("| model | Eq. (4) 1e-4 | D | S_d | S_p | largest um | 95 % | outside | ms | of 100 | runs | epochs |")
     print("|" + "-|" * 12)
-    models = {"one degree of freedom": ck.specimen("bulge").screening(), "shipped RateNet": ck.surrogate("dimple")}
+    models = {"one degree of freedom": ck.specimen("bulge").reduced_order_model(), "shipped RateNet": ck.surrogate("dimple")}
     for name, model in (models | {path: ck.surrogate(path) for path in given.models}).items():
         print(line(name, model, held, scale), flush=True)
     each, _ = costs(ck.specimen("bulge").replace(threads=1), held, few=3)
@@ -50,7 +50,7 @@ def line(name, model, held, scale):
     true = held.values[:, 1:].astype(float)
     mask = np.isfinite(true[..., 0]) & np.isfinite(shown[:, 1:, 0])
     true, shown = np.where(mask[..., None], true, 0.0), np.where(mask[..., None], shown[:, 1:], 0.0)
-    errors = [rse(true, shown, mask, scale), *(rse(true[..., [k]], shown[..., [k]], mask) for k in range(3))]
+    errors = [relative_squared_error(true, shown, mask, scale), *(relative_squared_error(true[..., [k]], shown[..., [k]], mask) for k in range(3))]
     largest = 1e3 * np.where(mask, np.abs(shown[..., 0] - true[..., 0]), 0).max(axis=1)
     each, of_many = costs(model, held)
     known = model.told.provenance if hasattr(model, "told") else {}

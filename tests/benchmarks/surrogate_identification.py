@@ -32,7 +32,7 @@ def specimens(name, tests, noise, folder):
     random = np.random.default_rng(SEED)
     found = []
     for k in range(tests):
-        plan = data.plan(k)
+        plan = data.planned_test(k)
         spread = np.stack([np.full(plan.times.size, noise * sd) for sd in SD.values()], axis=1)
         values = data.values[k].astype(float) + spread * random.standard_normal(spread.shape)
         outputs = dict(zip(data.outputs, values[1:].T, strict=True))
@@ -52,7 +52,7 @@ def identified(law, test, using):
 
 def true_u(fit, values):
     """The true values in the coordinates of a fit."""
-    return fit.coordinates.u(kernels.lower(fit.law, "numba").internal(values)[0])
+    return fit.coordinates.u(kernels.lower(fit.law, "numba").to_internal(values)[0])
 
 
 def main():

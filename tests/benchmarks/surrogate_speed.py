@@ -27,15 +27,15 @@ from creepkit.dataset.time_grid import TimeGrid
 from creepkit.records import History
 from creepkit.specimens.bulge import Bulge
 from creepkit.specimens.observation import OBSERVED
-from creepkit.specimens.reduced_courses import NO_FEATURES, courses
-from creepkit.surrogate.domain import Domain
+from creepkit.specimens.reduced_courses import WITHOUT_FEATURES, simulate_trajectories
+from creepkit.surrogate.domain import ApplicabilityDomain
 from creepkit.surrogate.parameter_module import ParameterModule
-from creepkit.surrogate.rate_inputs import names
+from creepkit.surrogate.rate_inputs import input_names
 from creepkit.surrogate.rate_module import RateModule
 from creepkit.surrogate.rate_net import RateNet
 from creepkit.surrogate.rate_surrogate import RateSurrogate
-from creepkit.surrogate.recipe import Told
-from creepkit.surrogate.surrogate import load
+from creepkit.surrogate.recipe import SurrogateMetadata
+from creepkit.surrogate.surrogate import load_surrogate
 
 LAWS = {
     "norton": {"A": 3e-15, "n": 3.5},
@@ -79,18 +79,18 @@ def row(name: str, count: int, simulated: int, file: str | None) -> str:
     """CPU times of one law."""
     law, surrogate, exact = ck.law(name), rate_surrogate(file, threads=1), Bulge(threads=1)
     compiled, many, few = kernels.lower(law, "numba"), scattered(name, count), scattered(name, simulated)
-    theta, factors = compiled.internal(many), surrogate.recipe.factors
+    theta, factors = compiled.to_internal(many), surrogate.recipe.factors
     thickness = {"thickness": np.full((1, 1), exact.geometry.apex_thickness)}
     some = {n: v[: max(1, count // 10)] for n, v in many.items()}
     spent = in_turns(
-        (lambda: courses(exact, compiled, theta, [TEST], factors=NO_FEATURES), count),
-        (lambda: courses(exact, compiled, theta, [TEST], factors=factors), count),
+        (lambda: simulate_trajectories(exact, compiled, theta, [TEST], factors=WITHOUT_FEATURES), count),
+        (lambda: simulate_trajectories(exact, compiled, theta, [TEST], factors=factors), count),
         (lambda: surrogate.predict(law, many, [TEST]), count),
-        (lambda: surrogate.predict(law, some, [TEST], jacobian=True, effects=thickness), max(1, count // 10)),
+        (lambda: surrogate.predict(law, some, [TEST], jacobian=True, nuisances=thickness), max(1, count // 10)),
     )
     slow = in_turns(
         (lambda: exact.predict(law, few, [TEST]), simulated),
-        (lambda: exact.predict(law, few, [TEST], jacobian=True, effects=thickness), simulated),
+        (lambda: exact.predict(law, few, [TEST], jacobian=True, nuisances=thickness), simulated),
         repeats=1,
     )
     ratios = f"{slow[0] / spent[2]:.0f}, {slow[1] / spent[3]:.0f}"
@@ -102,10 +102,10 @@ def walls(name: str, count: int, file: str | None) -> str:
     """Wall times of one law on all cores."""
     law, surrogate, cores = ck.law(name), rate_surrogate(file), len(os.sched_getaffinity(0))
     compiled, many = kernels.lower(law, "numba"), scattered(name, count)
-    theta, factors = compiled.internal(many), surrogate.recipe.factors
+    theta, factors = compiled.to_internal(many), surrogate.recipe.factors
     spent = in_turns(
         (lambda: surrogate.predict(law, many, [TEST]), 1),
-        (lambda: courses(Bulge(), compiled, theta, [TEST], factors=factors, threads=cores), 1),
+        (lambda: simulate_trajectories(Bulge(), compiled, theta, [TEST], factors=factors, threads=cores), 1),
         (gru(count, 49, cores), 1),
         (gru(count, TEST.times.size, cores), 1),
         clock=time.perf_counter,
@@ -139,21 +139,21 @@ def rate_surrogate(file: str | None, threads: int | None = None) -> RateSurrogat
     """A RateNet with some domain, of random weights unless there is a file."""
     specimen = Bulge() if threads is None else Bulge(threads=threads)
     if file is not None:
-        found = load(file)
+        found = load_surrogate(file)
         if not isinstance(found, RateSurrogate):
             raise SystemExit(f"{file} holds a {found.recipe.kind}; give a rate-net")
         return found
     recipe = RateNet()
-    known = names(recipe.factors.stress.size * recipe.factors.strain.size)
+    known = input_names(recipe.factors.stress.size * recipe.factors.strain.size)
     own = [n for n in known if not n.startswith(("mean", "fading"))]
-    domain = Domain.of(own, np.random.default_rng(0).normal(size=(500, len(own))))
-    told = Told(ck.law("norton"), specimen, OBSERVED, TimeGrid(TEST.times, False), (), (), domain=domain)
+    domain = ApplicabilityDomain.from_rows(own, np.random.default_rng(0).normal(size=(500, len(own))))
+    told = SurrogateMetadata(ck.law("norton"), specimen, OBSERVED, TimeGrid(TEST.times, False), (), (), domain=domain)
     return RateSurrogate(recipe, RateModule(len(known), recipe.hidden, recipe.layers), told)
 
 
 def gru(count: int, frames: int, cores: int) -> Callable[[], None]:
     """A run of the paper's network, threads sharing the candidates."""
-    module = ParameterModule(GRU_INPUTS, 128, 3, "gru", logarithm=False, based=False).eval()
+    module = ParameterModule(GRU_INPUTS, 128, 3, "gru", logarithm=False, corrects_base=False).eval()
     constants, series = torch.randn(count, GRU_INPUTS[0]), torch.randn(count, frames, GRU_INPUTS[1])
 
     def part(k: int) -> None:

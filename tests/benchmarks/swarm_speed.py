@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import creepkit as ck
-from creepkit.cli.compiled import share_compiled_code
+from creepkit.cli.compiled import set_numba_cache
 from creepkit.inverse.search.evolution import CmaEs
 from creepkit.inverse.search.multistart import MultiStart
 from creepkit.inverse.search.swarm import ParticleSwarm
@@ -91,7 +91,7 @@ def main():
     options.add_argument("--laws", nargs="*", default=["norton", "drifting-exponent"], choices=list(LAWS))
     options.add_argument("--repeats", type=int, default=1)
     given = options.parse_args()
-    share_compiled_code()
+    set_numba_cache()
     model, slowest = ck.surrogate("dimple"), 0.0
     size = f"{given.particles} x {given.iterations}"
     searches = {

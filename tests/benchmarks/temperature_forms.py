@@ -29,12 +29,12 @@ import numpy as np
 from scipy.stats import beta
 
 import creepkit as ck
-from creepkit.cli.compiled import share_compiled_code
+from creepkit.cli.compiled import set_numba_cache
 from creepkit.discovery.discover import discover
 from creepkit.discovery.refitting import refit
-from creepkit.discovery.temperature_study import grouped
+from creepkit.discovery.temperature_study import group_by_temperature
 from creepkit.discovery.trend import TemperatureLaw
-from creepkit.inverse.identification import Settings
+from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 
 SEED, T_REF = 625, 1033.15
@@ -64,7 +64,7 @@ def planted(design: str, through: str, seed: int, model: object) -> Planted:
     if design == "linear":
         law, values["n_T"] = law.with_temperature(n=ck.linear(T_REF)), slope
     elif design == "inverse":
-        law, values["n_I"] = law.with_temperature(n=ck.inverse(T_REF)), -slope * T_REF**2 / 1000.0
+        law, values["n_I"] = law.with_temperature(n=ck.inverse_temperature(T_REF)), -slope * T_REF**2 / 1000.0
     law = law.times(ck.arrhenius(T_REF))
     tests = dimples(law, values, rng, model) if through == "dimple" else bars(law, values, rng, model)
     return Planted(law, values, {"A": "arrhenius", "n": design}, tests)
@@ -110,7 +110,7 @@ class Outcome:
 
     @classmethod
     def of(cls, trend: TemperatureLaw, truth: Planted) -> Outcome:
-        names = {p: [form.name for form in own] for p, own in trend.sets.items()}
+        names = {p: [form.name for form in own] for p, own in trend.plausible_forms.items()}
         right = all(truth.forms[p] in names[p] for p in truth.forms)
         with_q = [e for e in trend.estimates if e.name == "Q"]
         covered = bool(with_q) and with_q[0].low <= truth.values["Q"] <= with_q[0].high
@@ -142,20 +142,20 @@ def main() -> None:
     options.add_argument("--most", type=int, default=3, help="forms of one parameter that are refitted")
     options.add_argument("--no-refit", action="store_true")
     given = options.parse_args()
-    share_compiled_code()
+    set_numba_cache()
     model = ck.surrogate("dimple") if given.through == "dimple" else ck.specimen("uniaxial")
     nuisances = () if given.through == "dimple" else (ck.Nuisance("rate", sd=0.03),)
-    settings = Settings(starts=2, draws=64, frames=given.frames, nuisances=nuisances)
+    settings = IdentificationSettings(starts=2, sobol_points=64, frames=given.frames, nuisances=nuisances)
     rows, began = [], time.monotonic()
     for design in given.design:
         points, tests, failed = [], [], []
         for k in range(given.specimens):
             truth = planted(design, given.through, k, model)
-            fits = [identify(BASE, group, model, settings=settings) for group in grouped(truth.tests)]
+            fits = [identify(BASE, group, model, settings=settings) for group in group_by_temperature(truth.tests)]
             trend = discover(fits)
             points.append(Outcome.of(trend, truth))
             if not given.no_refit:
-                trend = refit(trend, truth.tests, model, most=given.most, settings=settings, confirm=False)
+                trend = refit(trend, truth.tests, model, max_forms=given.most, settings=settings, search_again=False)
                 tests.append(Outcome.of(trend, truth))
             failed += trend.notes
             last = (tests or points)[-1]

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.stats import qmc
 
-from creepkit.integration import Integration, PointTest, Settings, integrate
+from creepkit.integration import Integration, PointTest, IntegrationSettings, integrate
 from creepkit.kernels import lower
 from creepkit.laws.combined import COMBINED
 from creepkit.records import Program
@@ -83,7 +83,7 @@ def main() -> None:
     test = PointTest(Program.constant(STRESS), Program.constant(1000.0), TIMES)
 
     def compiled(rows: np.ndarray, rtol: float, jacobian: bool = False) -> Integration:
-        return integrate(kernel, rows, [test], settings=Settings(rtol=rtol), jacobian=jacobian)
+        return integrate(kernel, rows, [test], settings=IntegrationSettings(rtol=rtol), jacobian=jacobian)
 
     compiled(theta[:1], 1e-5, True)
     exact = compiled(theta, 1e-10).strain

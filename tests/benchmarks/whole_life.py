@@ -22,8 +22,8 @@ import numpy as np
 import creepkit as ck
 from creepkit.inverse.selection import rank
 from creepkit.inverse.validation import leave_one_condition_out, times_to_rupture
-from creepkit.inverse.warmth import reference_temperature, several_temperatures
-from creepkit.readers.duplicates import duplicates
+from creepkit.inverse.warmth import reference_temperature, spans_temperatures
+from creepkit.readers.duplicates import duplicate_tests
 
 HEAD = (
     "| law | K | rms distance | Z fitted | Z held out | predicted/measured, 95 % | stopped, broken early "
@@ -42,7 +42,7 @@ def catalogue(histories):
         "mpc-omega, Omega(stress)": ck.law("mpc-omega"),
         "kachanov-rabotnov, primary": ck.law("kachanov-rabotnov").fix(alpha=0),
     }
-    if not several_temperatures(histories):
+    if not spans_temperatures(histories):
         return plain
     T = reference_temperature(histories)
     grows = {"kachanov": ("B",), "liu": ("B",), "sinh": ("M", "s_s", "s_t"), "mpc": ("Omega",)}
@@ -57,8 +57,8 @@ def catalogue(histories):
 def sets(folder):
     """{name: histories whose end is known, or that lasted to their last frame}."""
     alloy = [h for h in ck.read_histories(folder / "alloy617") if h.labels.get("product") == "Base"]
-    twins = {other for _, other in duplicates(alloy)}
-    alloy = [h if h.ended else h.replace(unruptured=True) for h in alloy if h.name not in twins]
+    twins = {other for _, other in duplicate_tests(alloy)}
+    alloy = [h if h.end_known else h.replace(unruptured=True) for h in alloy if h.name not in twins]
     return {"alloy617-base": alloy, "cmsx6": ck.read_histories(folder / "cmsx6")}
 
 
@@ -119,7 +119,7 @@ def main():
             quick = given.quick or len(histories) * len(law.params) > given.held_out
             rows.append(row(name, fit, histories, time.process_time() - before, quick))
             fits.append(fit)
-            print("done:", " | ".join(rows[-1]), f"| ln L {fit.log_likelihood:.1f}, size {fit.size:.1f}", flush=True)
+            print("done:", " | ".join(rows[-1]), f"| ln L {fit.log_likelihood:.1f}, size {fit.effective_frames:.1f}", flush=True)
             if given.plots:
                 given.plots.mkdir(parents=True, exist_ok=True)
                 fit.plot(given.plots / f"{title}_{name.replace(' ', '_')}.png")

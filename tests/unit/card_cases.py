@@ -10,7 +10,7 @@ from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Units, ValuedLaw
+from creepkit.records import Units, LawWithValues
 
 STEEL = Elastic(150e3, 0.3)
 
@@ -42,14 +42,14 @@ GAROFALO = CreepLaw(
 )
 
 
-def valued(law: CreepLaw, units: Units | None = None, elastic: Elastic | None = None, **values: float) -> ValuedLaw:
+def valued(law: CreepLaw, units: Units | None = None, elastic: Elastic | None = None, **values: float) -> LawWithValues:
     """A law with values, and with intervals as an identification leaves them."""
     notes = ("n = 5.2 [5.1, 5.3]", "valid from 973 to 1123 K")
-    return ValuedLaw(law, values, notes, units or Units(), elastic)
+    return LawWithValues(law, values, notes, units or Units(), elastic)
 
 
 WARM = arrhenius(1073.15)
-CASES: dict[str, ValuedLaw] = {
+CASES: dict[str, LawWithValues] = {
     "norton": valued(NORTON, elastic=STEEL, A=1.2e-16, n=5.2),
     "norton warm": valued(NORTON.times(WARM), elastic=STEEL, A=1.2e-16, n=5.2, Q=4e5),
     "strain hardening": valued(STRAIN_HARDENING, A=3e-12, n=4.0, m=-0.5),

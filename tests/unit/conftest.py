@@ -12,12 +12,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 @pytest.fixture
 def own_registry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A test that is a process of its own: a new registry, and an empty folder to work in."""
-    from creepkit.registry import default
+    from creepkit.registry import default_registry
 
     monkeypatch.chdir(tmp_path)
-    default.cache_clear()
+    default_registry.cache_clear()
     yield
-    default.cache_clear()
+    default_registry.cache_clear()
 
 
 @pytest.fixture(scope="module")

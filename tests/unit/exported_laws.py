@@ -12,7 +12,7 @@ import numpy as np
 import sympy
 from foreign_laws import EQUATIONS
 
-from creepkit.kernels.exact import Exact
+from creepkit.kernels.exact import MultiprecisionLaw
 from creepkit.language import (
     CreepLaw,
     Param,
@@ -28,16 +28,16 @@ from creepkit.language import (
     temperature,
     time,
 )
-from creepkit.language.symbols import POINT
+from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.registry import default
-from creepkit.testing import Samples, sample
-from creepkit.testing.parity import Truth, worst
+from creepkit.registry import default_registry
+from creepkit.testing import LawSamples, draw_samples
+from creepkit.testing.parity import MultiprecisionReference, largest_differences
 from creepkit.testing.sampling import constraints_hold
-from creepkit.testing.tables import Table
+from creepkit.testing.tables import KernelTable
 
 TOLERANCE = 1e-10
 SETS, POINTS = 2, 8
@@ -77,7 +77,7 @@ MULTIAXIAL = CreepLaw(
 """The rate and the growth feel all three stresses about equally."""
 
 LAWS: dict[str, CreepLaw] = {
-    **{f"registered {name}": default().law(name) for name in sorted(default().laws())},
+    **{f"registered {name}": default_registry().law(name) for name in sorted(default_registry().laws())},
     **{f"foreign {name}": law for name, law in EQUATIONS.items()},
     "pieces": PIECES,
     "multiaxial": MULTIAXIAL,
@@ -98,9 +98,9 @@ class Case:
     """A law at points: sets[k] are the author's values at drawn.points[k]."""
 
     law: CreepLaw
-    drawn: Samples
+    drawn: LawSamples
     sets: list[dict[str, float]]
-    truth: Truth
+    truth: MultiprecisionReference
 
     def worst(self, rows: np.ndarray, logs: np.ndarray) -> tuple[str, float]:
         """The largest relative difference of rows (samples, 1 + S, columns) from 50 digits, and where it is.
@@ -111,9 +111,9 @@ class Case:
         truth = copy.copy(self.truth)
         truth.rows = [[row[: rows.shape[2]] for row in sample] for sample in self.truth.rows]
         with np.errstate(over="ignore", invalid="ignore"):
-            differences = worst(truth, Table(rows, logs), forgive=True)
+            differences = largest_differences(truth, KernelTable(rows, logs), allow_cancellation=True)
         found = max(differences, key=lambda difference: difference.size)
-        return f"{self.law.name}: {found.size:.1e} in {truth.at(found)}", found.size
+        return f"{self.law.name}: {found.size:.1e} in {truth.location_text(found)}", found.size
 
     def logs(self, rates: np.ndarray) -> np.ndarray:
         """ln of the rates found, (samples,); the truth's where no double holds the rate, so that others are judged."""
@@ -124,7 +124,7 @@ class Case:
 
     def named(self, k: int) -> dict[str, float]:
         """Point k by the names of the law: the stress, variables that it uses, states."""
-        law, pairs = self.law, zip((*POINT, *self.law.states), self.drawn.points[k].tolist(), strict=True)
+        law, pairs = self.law, zip((*POINT_VARIABLES, *self.law.states), self.drawn.points[k].tolist(), strict=True)
         return {s.name: value for s, value in pairs if s == stress or law.uses(s) or s in law.states}
 
 
@@ -138,7 +138,7 @@ def case(name: str) -> Case:
     """A law of LAWS at Sobol points of its bounds where its constraints hold."""
     law = LAWS[name]
     points, theta, sets = [], [], []
-    drawn = sample(law, 16, seed=5)
+    drawn = draw_samples(law, 16, seed=5)
     for internal in drawn.theta[:SETS]:
         values = {n: p.from_internal(t) for (n, p), t in zip(law.table.items(), internal, strict=True)}
         again = [p.to_internal(values[n]) for n, p in law.table.items()]
@@ -147,5 +147,5 @@ def case(name: str) -> Case:
             points.append(point)
             theta.append(again)
             sets.append(values)
-    samples = Samples(np.array(points), np.array(theta).reshape(len(points), -1))
-    return Case(law, samples, sets, Truth(Exact(law), samples))
+    samples = LawSamples(np.array(points), np.array(theta).reshape(len(points), -1))
+    return Case(law, samples, sets, MultiprecisionReference(MultiprecisionLaw(law), samples))

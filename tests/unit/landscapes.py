@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.optimize import minimize
 
-from creepkit.inverse.search.box import Box
+from creepkit.inverse.search.box import Bounds
 from creepkit.inverse.search.refining import Minimum
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -24,8 +24,8 @@ class Known:
     """A landscape whose cost is a function of u, (candidates, parameters) to (candidates,); calls counts candidates."""
 
     of: Callable[[np.ndarray], np.ndarray]
-    box: Box
-    settings: Settings = field(default_factory=Settings)
+    box: Bounds
+    settings: IdentificationSettings = field(default_factory=IdentificationSettings)
     law: object = NORTON
     rates: tuple[int, ...] = (0,)
     calls: list[int] = field(default_factory=list)
@@ -50,15 +50,15 @@ class Known:
             moved[free] = part
             return float(self.of(moved[None])[0])
 
-        bounds = list(zip(self.box.low[free], self.box.high[free], strict=True))
+        bounds = list(zip(self.box.lower[free], self.box.upper[free], strict=True))
         found = minimize(cost, whole[free], bounds=bounds, method="L-BFGS-B")
         whole[free] = found.x
         return Minimum(whole, float(found.fun), bool(found.success), int(found.nfev))
 
 
-def cube(size: int, reach: float = 5.0) -> Box:
+def cube(size: int, reach: float = 5.0) -> Bounds:
     """All coordinates from -reach to reach."""
-    return Box(np.full(size, -reach), np.full(size, reach))
+    return Bounds(np.full(size, -reach), np.full(size, reach))
 
 
 def quadratic(u):

@@ -8,8 +8,8 @@ import numpy as np
 
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.scatter import OutputScatter, Scatter
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.scatter import OutputNoise, NoiseModel
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw
 from creepkit.records import History, Nuisance, Prediction, constant_stress
@@ -21,7 +21,7 @@ END = 1e5
 class LogRates:
     """Predictor: amplitude = ln(rate at the test's stress) + time / END, in mm, whatever that would be.
 
-    effects : "thickness" adds its distance from `nominal` times `by`.
+    nuisances : "thickness" adds its distance from `nominal` times `by`.
     """
 
     name = "log rates"
@@ -29,7 +29,7 @@ class LogRates:
 
     def __init__(self, nominal: float = 0.5, by: float = 0.0) -> None:
         self.nominal, self.by = nominal, by
-        self.effects = ("thickness",) if by else ()
+        self.nuisances = ("thickness",) if by else ()
 
     def reference_strain(self, history: History) -> float:
         """That of a rate of exp(-15) 1/s."""
@@ -37,7 +37,7 @@ class LogRates:
 
     def predict(
         self, law: CreepLaw, values: Mapping[str, Any], histories: Sequence[History], *, jacobian: bool = False,
-        effects: Mapping[str, Any] | None = None,
+        nuisances: Mapping[str, Any] | None = None,
     ) -> Prediction:  # fmt: skip
         columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[n], float)) for n in law.names))
         theta = [np.log(c) if p.scale == "log" else c for c, p in zip(columns, law.table.values(), strict=True)]
@@ -47,12 +47,12 @@ class LogRates:
             s = h.loading.program().values[0]
             log = np.broadcast_to(kernel.internal_log_rate(s, 1.0, 1.0, h.temperature, s, s / 3, *theta), (count,))
             found[:, k, : h.times.size, 0] = log[:, None] + h.times / END
-        shift = 0.0 if not effects else self.by * (np.asarray(effects["thickness"]) - self.nominal)
+        shift = 0.0 if not nuisances else self.by * (np.asarray(nuisances["thickness"]) - self.nominal)
         found += np.broadcast_to(shift, found.shape[:2])[..., None, None]
         ends, status = np.full(found.shape[:2], np.inf), np.zeros(found.shape[:2], np.int64)
-        slopes = {"thickness": np.full(found.shape, self.by)} if jacobian and effects else {}
+        slopes = {"thickness": np.full(found.shape, self.by)} if jacobian and nuisances else {}
         lengths = np.array([h.times.size for h in histories])
-        return Prediction(found, self.outputs, lengths, status, ends, effect_jacobian=slopes)
+        return Prediction(found, self.outputs, lengths, status, ends, nuisance_jacobian=slopes)
 
 
 def measured(
@@ -83,9 +83,9 @@ def known_scatter(
 
     Its covariance is that of least squares with the predictor's derivatives, taken by differences.
     """
-    settings = Settings(starts=2, draws=8, nuisances=nuisances)
+    settings = IdentificationSettings(starts=2, sobol_points=8, nuisances=nuisances)
     fit = identify(law, tests, using or LogRates(), settings=settings)
-    return replace(fit, scatter=Scatter({"amplitude": OutputScatter(noise=sd)}), freedom=1e9)
+    return replace(fit, scatter=NoiseModel({"amplitude": OutputNoise(noise=sd)}), freedom=1e9)
 
 
 def least_squares(tests: Sequence[History], sd: float) -> tuple[np.ndarray, np.ndarray]:

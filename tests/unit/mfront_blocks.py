@@ -10,15 +10,15 @@ from exported_laws import renamed
 
 from creepkit.export.mfront import MfrontExporter
 from creepkit.language import Elastic
-from creepkit.language.symbols import POINT
-from creepkit.records import Units, ValuedLaw
+from creepkit.language.symbols import POINT_VARIABLES
+from creepkit.records import Units, LawWithValues
 
 STUB = Path(__file__).with_name("tfel_stub.hxx")
 ELASTIC = Elastic(150e3, 0.3)
 
 
 def exported(law, values=None, **more):
-    return MfrontExporter().text(ValuedLaw(law, values or law.center(), **more))
+    return MfrontExporter().text(LawWithValues(law, values or law.center(), **more))
 
 
 def section(text, title):
@@ -49,12 +49,12 @@ def scalar_function(name, law, text):
     """The law's statements as the file has them, in a function of the point; and where each output stands."""
     other = renamed(text)
     own = [other.get(s.name, s.name) for s in law.states]
-    point = [f"{s.name}_now" for s in (*POINT, *law.states)]
+    point = [f"{s.name}_now" for s in (*POINT_VARIABLES, *law.states)]
     inputs = [f"const real {word} = point__[{k}]; (void){word};" for k, word in enumerate(point)]
     constants = [f"const real {word} = {value};" for word, value in declared(text, "Parameter").items()]
     body = section(text, "stable functions") + section(text, "the law")
-    columns = COLUMNS | {state: len(POINT) + k for k, state in enumerate(own)}
-    width, outputs = len(POINT) + len(own), []
+    columns = COLUMNS | {state: len(POINT_VARIABLES) + k for k, state in enumerate(own)}
+    width, outputs = len(POINT_VARIABLES) + len(own), []
     for row, rate in enumerate(["rate", *(f"{state}_rate" for state in own)]):
         outputs.append(f"found__[{row * (1 + width)}] = {rate};")
         for label, column in columns.items():

@@ -52,54 +52,54 @@ class OneDegree:
     calls: list[int] = field(default_factory=list)
     name: str = "one-degree"
     outputs: tuple[str, ...] = ("amplitude", "width", "shape")
-    effects: tuple[str, ...] = ("thickness", "modulus", "temperature", "window")
+    nuisances: tuple[str, ...] = ("thickness", "modulus", "temperature", "window")
 
     def __post_init__(self) -> None:
         if self.stand_in:
-            self.screening = lambda: OneDegree(coarseness=1.1, calls=self.calls)
+            self.reduced_order_model = lambda: OneDegree(coarseness=1.1, calls=self.calls)
 
     def predict(
         self, law: CreepLaw, values: Mapping[str, Any], histories: Sequence[History], *, jacobian: bool = False,
-        effects: Mapping[str, np.ndarray] | None = None,
+        nuisances: Mapping[str, np.ndarray] | None = None,
     ) -> Prediction:  # fmt: skip
         theta = [np.atleast_1d(np.log(values[n]) if p.scale == "log" else values[n]) for n, p in law.table.items()]
         theta = np.stack(np.broadcast_arrays(*theta), axis=-1)
-        for kind in effects or {}:
-            if kind not in self.effects:
+        for kind in nuisances or {}:
+            if kind not in self.nuisances:
                 raise SolveError(f"{self.name} does not know the nuisance '{kind}'")
-        count = max(len(theta), *(len(v) for v in effects.values())) if effects else len(theta)
-        own = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in (effects or {}).items()}
+        count = max(len(theta), *(len(v) for v in nuisances.values())) if nuisances else len(theta)
+        own = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in (nuisances or {}).items()}
         theta = np.broadcast_to(theta, (count, theta.shape[-1]))
         self.calls.append(count)
         found, ends = self._run(law, theta, histories, own)
         slopes, changes = self._slopes(law, theta, histories, own) if jacobian and self.exact else (None, {})
         lengths = np.array([h.times.size for h in histories])
         status = np.where(np.isfinite(ends), 1, 0)
-        return Prediction(found, self.outputs, lengths, status, ends, slopes, effect_jacobian=changes)
+        return Prediction(found, self.outputs, lengths, status, ends, slopes, nuisance_jacobian=changes)
 
-    def _slopes(self, law, theta, histories, effects):
+    def _slopes(self, law, theta, histories, nuisances):
         """Central differences of all candidates, in one batch: (parameters), then (kinds)."""
         (candidates, size), step = theta.shape, 1e-4
-        count = size + len(effects)
+        count = size + len(nuisances)
         points = np.repeat(theta[None], 2 * count, axis=0)
-        moved = {kind: np.repeat(v[None], 2 * count, axis=0) for kind, v in effects.items()}
+        moved = {kind: np.repeat(v[None], 2 * count, axis=0) for kind, v in nuisances.items()}
         for k in range(count):
             for row, sign in ((k, 1), (count + k, -1)):
                 if k < size:
                     points[row, :, k] += sign * step
                 else:
-                    moved[list(effects)[k - size]][row] += sign * step
+                    moved[list(nuisances)[k - size]][row] += sign * step
         flat = {kind: v.reshape(-1, v.shape[-1]) for kind, v in moved.items()}
         found = self._run(law, points.reshape(-1, size), histories, flat)[0]
         up, down = np.split(found.reshape(2 * count, candidates, *found.shape[1:]), 2)
         slope = (up - down) / (2 * step)
-        own = {kind: slope[size + k] for k, kind in enumerate(effects)}
+        own = {kind: slope[size + k] for k, kind in enumerate(nuisances)}
         return np.moveaxis(slope[:size], 0, -1), own
 
-    def _run(self, law, theta, histories, effects):
+    def _run(self, law, theta, histories, nuisances):
         shape = len(theta), len(histories)
-        D, ends = self._amplitude(law, theta, histories, effects)
-        window = np.broadcast_to(effects.get("window", 7.5), shape) - 7.5
+        D, ends = self._amplitude(law, theta, histories, nuisances)
+        window = np.broadcast_to(nuisances.get("window", 7.5), shape) - 7.5
         out = np.full((*shape, max(h.times.size for h in histories), 3), np.nan)
         for t, history in enumerate(histories):
             d = np.stack([np.interp(history.times, GRID, each, right=np.nan) for each in D[:, t]])
@@ -163,8 +163,8 @@ def planted(law, values, plans, *, seed=0, noise=(1.5e-3, 0.02, 0.02), frames=48
             specimen="one-degree", elastic=Elastic(180e3 - 100 * plan.celsius),
         )  # fmt: skip
         own = {**values, coefficient: values[coefficient] * plan.rate}
-        effects = {"thickness": np.array([[plan.thickness]]), "temperature": np.array([[plan.temperature]])}
-        clean = OneDegree().predict(law, own, [bare], effects=effects).of(0)
+        nuisances = {"thickness": np.array([[plan.thickness]]), "temperature": np.array([[plan.temperature]])}
+        clean = OneDegree().predict(law, own, [bare], nuisances=nuisances).of(0)
         noisy = clean + rng.normal(size=clean.shape) * noise
         noisy[:, 0] += plan.offset
         tests.append(bare.replace(outputs=dict(zip(OneDegree.outputs, noisy.T, strict=True))))

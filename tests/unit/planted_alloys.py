@@ -32,7 +32,7 @@ class Deadly:
     name: str = "deadly"
     outputs: tuple[str, ...] = ("strain",)
 
-    def predict(self, law, values, histories, *, jacobian=False, effects=None):
+    def predict(self, law, values, histories, *, jacobian=False, nuisances=None):
         os._exit(3)
 
 
@@ -48,8 +48,8 @@ class Doubting:
     def specimen(self):
         return study.specimen("uniaxial")
 
-    def predict(self, law, values, histories, *, jacobian=False, effects=None):
-        found = self.specimen.predict(law, values, histories, jacobian=jacobian, effects=effects)
+    def predict(self, law, values, histories, *, jacobian=False, nuisances=None):
+        found = self.specimen.predict(law, values, histories, jacobian=jacobian, nuisances=nuisances)
         outside = np.full_like(found.status, int(Status.OUTSIDE_DOMAIN))
         return replace(found, values=(1.0 + self.excess) * found.values, status=outside)
 

@@ -10,7 +10,7 @@ import numpy as np
 import creepkit as ck
 from creepkit.dataset.dataset import Dataset
 from creepkit.dataset.rate_family import rate_family
-from creepkit.dataset.simulating import header_of, simulate
+from creepkit.dataset.simulating import empty_dataset, simulate_rows
 from creepkit.dataset.time_grid import TimeGrid
 from creepkit.records import History
 
@@ -58,15 +58,15 @@ def dimples(count: int = 24) -> Dataset:
         "apex_thickness": 0.46 + 0.08 * unit[:, 7],
     }
     empty = data_set("bulge", ck.law("norton"), grid, parameters, columns, np.zeros((count, grid.frames, 3)))
-    found = [empty.specimen.predict(empty.law, empty.values_of(k), [empty.plan(k)]).of(0) for k in range(count)]
+    found = [empty.specimen.predict(empty.law, empty.values_of(k), [empty.planned_test(k)]).of(0) for k in range(count)]
     return data_set("bulge", empty.law, grid, parameters, columns, np.array(found))
 
 
 def rates(draws: int = 40) -> Dataset:
     """Dimples of the rate family by finite elements: those of some draws that are accepted."""
     family, specimen = rate_family(), ck.specimen("bulge")
-    header = header_of(family, specimen, {"seed": 1})
-    return simulate(family, header, 1, 0, draws, lambda row: None).accepted
+    header = empty_dataset(family, specimen, {"seed": 1})
+    return simulate_rows(family, header, 1, 0, draws, lambda row: None).accepted
 
 
 def unsimulated_rates(count: int) -> Dataset:
@@ -89,7 +89,7 @@ def data_set(
         law=law, specimen=ck.specimen(specimen), design_document={"name": "planted"}, grid=grid, outputs=outputs,
         parameter_names=law.names, condition_names=tuple(columns), parameters=np.array(parameters, float),
         conditions=np.stack([*columns.values()], axis=1), values=np.array(values, np.float32),
-        marks=np.full((count, 4, len(outputs)), np.nan, np.float32), status=np.zeros(count, np.int64),
+        hold_outputs=np.full((count, 4, len(outputs)), np.nan, np.float32), status=np.zeros(count, np.int64),
         end_times=np.array(ends, float), reasons=np.zeros(count, np.int64),
         reason_names=("accepted",), reason_texts=("all criteria are met",),
         index=np.arange(count), provenance={"seed": 1},

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from creepkit.discovery.points import Points
-from creepkit.inverse.coordinates import Reference
+from creepkit.discovery.points import IsothermalEstimates
+from creepkit.inverse.coordinates import ReferencePoint
 from creepkit.language import GAS_CONSTANT, CreepLaw
 from creepkit.laws.norton import NORTON
 
@@ -25,11 +25,11 @@ def arrhenius_line(T: np.ndarray, ln_A: float, Q: float) -> np.ndarray:
 
 def points(
     theta: np.ndarray, covariance: np.ndarray, T: np.ndarray = NINE, seed: int | None = None, law: CreepLaw = NORTON
-) -> Points:
+) -> IsothermalEstimates:
     """Points about theta (temperatures, parameters); scattered by their covariance when there is a seed."""
     every = np.broadcast_to(covariance, (T.size, *covariance.shape[-2:]))
     if seed is not None:
         rng = np.random.default_rng(seed)
         theta = theta + np.stack([np.linalg.cholesky(c) @ rng.normal(size=c.shape[0]) for c in every])
-    reference = Reference(STRESS, 0.01, 7200.0, T_REF)
-    return Points(law, T, theta, every, reference, {"temperature": (float(T.min()), float(T.max()))})
+    reference = ReferencePoint(STRESS, 0.01, 7200.0, T_REF)
+    return IsothermalEstimates(law, T, theta, every, reference, {"temperature": (float(T.min()), float(T.max()))})

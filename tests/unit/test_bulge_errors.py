@@ -220,7 +220,7 @@ def test_whatever_the_rate_nothing_comes_after_the_end(A_now: float) -> None:
     """Faster and faster creep only bursts earlier; never a number after the end."""
     soon = np.array([0.0, 1e-6, 1e-3, 1.0, 60.0, 3600.0, 43200.0])
     run = simulate(values={"A": A_now, "n": 3.0}, times=soon)
-    assert run.status is Status.BURST
+    assert run.status is Status.RUPTURED
     assert run.times[-1] <= run.end_time < 43200
     assert (np.abs(run.outputs["amplitude"]) < 3.5).all()
 
@@ -238,5 +238,5 @@ def test_a_predictor_of_candidates_never_holds_numbers_after_an_end() -> None:
     one: CreepLaw = ck.law("norton")
     plan = simulate(times=[0.0, 3600.0, 43200.0])
     found = ck.specimen("bulge").predict(one, {"A": np.array([5e-13, 5e-10]), "n": 3.0}, [plan])
-    assert found.status[:, 0].tolist() == [Status.COMPLETE, Status.BURST]
+    assert found.status[:, 0].tolist() == [Status.COMPLETE, Status.RUPTURED]
     assert np.isnan(found.values[1, 0, plan.times > found.end_times[1, 0]]).all()

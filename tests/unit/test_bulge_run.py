@@ -126,7 +126,7 @@ def test_creep_redistributes_the_elastic_stress(run: BulgeRun) -> None:
 def test_creep_strain_only_grows(run: BulgeRun) -> None:
     """To what the interpolation between steps costs, where next to nothing creeps."""
     _, strain = run.field("creep strain")
-    assert strain.shape == (9, len(run.places))
+    assert strain.shape == (9, len(run.point_coordinates))
     assert (strain[0] == 0).all()
     assert (np.diff(strain, axis=0) > -1e-4 * strain.max()).all()
 
@@ -150,7 +150,7 @@ def test_a_complete_run_says_so(run: BulgeRun) -> None:
 
 
 def test_a_burst_is_an_answer_up_to_there(burst: BulgeRun) -> None:
-    assert burst.status is Status.BURST
+    assert burst.status is Status.RUPTURED
     assert burst.reason == "the surface reached the deflection limit"
     assert burst.labels == {"ended": burst.reason}
     assert burst.rupture_time == burst.end_time

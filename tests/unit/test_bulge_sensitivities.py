@@ -16,20 +16,20 @@ from sympy import exp
 
 from creepkit import kernels
 from creepkit.arrays import Floats
-from creepkit.fem.body import body_of
-from creepkit.fem.shape import geometry_change
-from creepkit.fem.simulation import Simulation, differentiate, simulate
+from creepkit.fem.body import finite_element_model
+from creepkit.fem.shape import geometry_derivative
+from creepkit.fem.simulation import Simulation, sensitivities, simulate
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.language import CreepLaw, Elastic, mean_stress, parameters, principal_stress, stress, temperature
 from creepkit.laws.combined import COMBINED
 from creepkit.records import History, PressureJump, Status
 from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.bulge_course import Setup, setup
-from creepkit.specimens.bulge_prediction import settings_of
-from creepkit.specimens.bulge_slopes import Slopes, slopes_of
+from creepkit.specimens.bulge_course import TestSetup, set_up_test
+from creepkit.specimens.bulge_prediction import solver_settings
+from creepkit.specimens.bulge_slopes import BulgeSensitivities, output_sensitivities
 
 SPECIMEN = Bulge(refinement=0.5, threads=1)
-SETTINGS = settings_of(SPECIMEN, exact=True)._replace(newton=1e-12)
+SETTINGS = solver_settings(SPECIMEN, exact=True)._replace(newton=1e-12)
 NAMES = ("modulus", "temperature", "thickness", "window", "P1", "P2", "Tj")
 A, B, n, k, c = parameters("A B n k c")
 TRIAXIAL = law(A * stress**n * (1 + c * mean_stress / temperature), {A: RATE, n: number(1, 8), c: number(0, 10)})
@@ -58,9 +58,9 @@ class Base(NamedTuple):
     kernel: CompiledLaw
     theta: Floats
     history: History
-    made: Setup
+    made: TestSetup
     found: Simulation
-    slopes: Slopes
+    slopes: BulgeSensitivities
 
 
 @pytest.fixture(scope="module", params=CASES)
@@ -73,21 +73,21 @@ def base(request) -> Base:
         elastic=Elastic(E=210e3 - 60 * temperature),
     )  # fmt: skip
     kernel = kernels.lower(creep, "numba")
-    theta = kernel.internal(values)[0]
-    made = setup(SPECIMEN, history, {})
-    found = simulate(kernel, theta, made.body, made.course, settings=SETTINGS, keep_stages=True)
+    theta = kernel.to_internal(values)[0]
+    made = set_up_test(SPECIMEN, history, {})
+    found = simulate(kernel, theta, made.model, made.load_history, settings=SETTINGS, keep_stages=True)
     assert found.status == Status.COMPLETE
-    slopes = slopes_of(made, kernel, theta, history, found, found.displacements[:, made.body.top, 1], NAMES)[1]
+    slopes = output_sensitivities(made, kernel, theta, history, found, found.displacements[:, made.model.top, 1], NAMES)[1]
     return Base(kernel, theta, history, made, found, slopes)
 
 
-def seen(base: Base, theta: Floats | None = None, history: History | None = None, **effects: float) -> Floats:
+def seen(base: Base, theta: Floats | None = None, history: History | None = None, **nuisances: float) -> Floats:
     """Outputs (times, 3) of the same steps with something changed."""
     history = history or base.history
-    made = setup(SPECIMEN, history, effects)
+    made = set_up_test(SPECIMEN, history, nuisances)
     theta = base.theta if theta is None else theta
-    found = simulate(base.kernel, theta, made.body, made.course, settings=SETTINGS, like=base.found)
-    profiles = found.displacements[:, made.body.top, 1]
+    found = simulate(base.kernel, theta, made.model, made.load_history, settings=SETTINGS, same_steps_as=base.found)
+    profiles = found.displacements[:, made.model.top, 1]
     return found.at(made.observation.observe(made.radii, profiles), history.times)
 
 
@@ -109,7 +109,7 @@ def test_every_parameter_of_the_law(base) -> None:
 def test_modulus_temperature_and_window(base, name: str, step: float) -> None:
     start = base.made.observation.window if name == "window" else 0.0
     up, down = (seen(base, **{name: start + s}) for s in (step, -step))
-    agree(base.slopes.effects[name], up, down, step)
+    agree(base.slopes.nuisances[name], up, down, step)
 
 
 @pytest.mark.parametrize(("name", "step"), [("P1", 1e-4), ("P2", 1e-4), ("Tj", 1e-2)])
@@ -117,15 +117,15 @@ def test_loading(base, name: str, step: float) -> None:
     loading = base.history.loading
     moved = [replace(loading, **{name: getattr(loading, name) + s}) for s in (step, -step)]
     up, down = (seen(base, history=replace(base.history, loading=each)) for each in moved)
-    agree(base.slopes.effects[name], up, down, step)
+    agree(base.slopes.nuisances[name], up, down, step)
 
 
 def moved_profiles(base: Base, step: float) -> Floats:
     """Top profiles (steps, top) of the same steps on nodes moved as the thickness moves them."""
     mesh = base.made.geometry.mesh(SPECIMEN.refinement)
     velocity = base.made.geometry.mesh_velocity("apex_thickness", SPECIMEN.refinement)
-    body = body_of(mesh.moved(mesh.nodes + step * velocity))
-    found = simulate(base.kernel, base.theta, body, base.made.course, settings=SETTINGS, like=base.found)
+    body = finite_element_model(mesh.moved(mesh.nodes + step * velocity))
+    found = simulate(base.kernel, base.theta, body, base.made.load_history, settings=SETTINGS, same_steps_as=base.found)
     return found.displacements[:, body.top, 1]
 
 
@@ -133,8 +133,8 @@ def test_displacements_on_a_mesh_that_moves(base) -> None:
     """u_z of the top to the apex thickness, on the nodes of one mesh, at every step: within 1e-6 of the largest."""
     mesh = base.made.geometry.mesh(SPECIMEN.refinement)
     velocity = base.made.geometry.mesh_velocity("apex_thickness", SPECIMEN.refinement)
-    velocities = [(geometry_change(mesh, velocity), velocity)]
-    change = differentiate(base.kernel, base.theta, base.made.body, base.made.course, base.found, velocities=velocities)
+    velocities = [(geometry_derivative(mesh, velocity), velocity)]
+    change = sensitivities(base.kernel, base.theta, base.made.body, base.made.course, base.found, velocities=velocities)
     step = 1e-5
     difference = (moved_profiles(base, step) - moved_profiles(base, -step)) / (2 * step)
     np.testing.assert_allclose(change.surface[:, :, -1], difference, atol=1e-6 * np.abs(difference).max())
@@ -148,10 +148,10 @@ def test_thickness_on_a_mesh_that_moves(base) -> None:
     operator, radii = base.made.observation, base.made.radii
     frames = [operator.observe(radii + s * drift, moved_profiles(base, s)) for s in (step, -step)]
     up, down = (base.found.at(each, base.history.times) for each in frames)
-    agree(base.slopes.effects["thickness"], up, down, step)
+    agree(base.slopes.nuisances["thickness"], up, down, step)
 
 
 def test_thickness_as_the_specimen_meshes_it(base) -> None:
     """A dimple of another thickness spreads its columns otherwise too."""
     step = 1e-5
-    agree(base.slopes.effects["thickness"], seen(base, thickness=0.5 + step), seen(base, thickness=0.5 - step), step)
+    agree(base.slopes.nuisances["thickness"], seen(base, thickness=0.5 + step), seen(base, thickness=0.5 - step), step)

@@ -7,7 +7,7 @@ from bells import beside, cross, profile_with_apex
 from creepkit.errors import FitError
 from creepkit.specimens.camera_field import fit_field
 from creepkit.specimens.observation import Observation
-from creepkit.specimens.top_profile import interpolation
+from creepkit.specimens.top_profile import surface_interpolation
 
 
 def pixels(points=50):
@@ -33,7 +33,7 @@ def test_standard_errors_of_a_field_are_its_scatter():
     values = np.array([[f.amplitude, f.width, f.shape, f.x_center, f.y_center] for f in fits])
     scores = (values - truth) / [f.standard_errors for f in fits]
     np.testing.assert_allclose(scores.std(axis=0), 1.0, atol=0.2)  # 150 draws know a deviation to 6 %
-    np.testing.assert_allclose([f.scatter for f in fits], 0.02, rtol=0.15)
+    np.testing.assert_allclose([f.residual_sd for f in fits], 0.02, rtol=0.15)
 
 
 def test_lost_and_wild_points():
@@ -50,7 +50,7 @@ def test_field_and_operator_see_the_same():
     nodes, profile = profile_with_apex(0.81)
     x, y = pixels(160)
     inside = np.hypot(x, y) <= 5.0
-    heights = interpolation(nodes, np.hypot(x, y)[inside]) @ profile[0]
+    heights = surface_interpolation(nodes, np.hypot(x, y)[inside]) @ profile[0]
     fit = fit_field(x[inside] + 1.3, y[inside] - 2.0, heights)
     expected = Observation("field", 5.0).observe(nodes, profile)[0]
     np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], expected, rtol=2e-4)  # pixels end raggedly

@@ -20,24 +20,24 @@ def sources(tmp_path, monkeypatch):
 
 
 def test_an_edit_moves_the_folder_and_its_undoing_moves_it_back(sources):
-    first = compiled.compiled_folder()
+    first = compiled.numba_cache_folder()
     sources.write_text("a = 2")
-    assert compiled.compiled_folder() != first
+    assert compiled.numba_cache_folder() != first
     sources.write_text("a = 1")
-    assert compiled.compiled_folder() == first
+    assert compiled.numba_cache_folder() == first
 
 
 def test_a_folder_that_was_chosen_stays(sources, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", "elsewhere")
-    compiled.share_compiled_code()
+    compiled.set_numba_cache()
     assert os.environ["NUMBA_CACHE_DIR"] == "elsewhere"
 
 
 def test_the_oldest_states_are_forgotten(sources):
-    made = compiled.compiled_folder().parent
+    made = compiled.numba_cache_folder().parent
     for k in range(5):
         (made / str(k)).mkdir(parents=True)
         os.utime(made / str(k), (k, k))
-    compiled.share_compiled_code()
-    assert os.environ["NUMBA_CACHE_DIR"] == str(compiled.compiled_folder())
+    compiled.set_numba_cache()
+    assert os.environ["NUMBA_CACHE_DIR"] == str(compiled.numba_cache_folder())
     assert {path.name for path in made.iterdir()} == {"2", "3", "4"}

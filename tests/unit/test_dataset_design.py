@@ -11,9 +11,9 @@ import pytest
 from scipy.stats import qmc
 
 import creepkit as ck
-from creepkit.dataset.conditions import mark_times, plan
-from creepkit.dataset.design import Design, Draws, design_of
-from creepkit.dataset.sobol import sobol
+from creepkit.dataset.conditions import hold_times, planned_test
+from creepkit.dataset.design import SamplingDesign, Draws, sampling_design
+from creepkit.dataset.sobol import sobol_rows
 from creepkit.dataset.time_grid import TimeGrid
 from creepkit.errors import DatasetError
 from creepkit.records import PressureJump
@@ -31,7 +31,7 @@ def test_rows_are_those_of_scipy_whatever_the_block():
         warnings.simplefilter("ignore")
         whole = qmc.Sobol(5, scramble=True, seed=3).random(40)
     for first, count in ((0, 40), (0, 1), (1, 39), (7, 5), (39, 1)):
-        np.testing.assert_array_equal(sobol(5, first, count, 3), whole[first : first + count])
+        np.testing.assert_array_equal(sobol_rows(5, first, count, 3), whole[first : first + count])
 
 
 @pytest.mark.parametrize(
@@ -40,7 +40,7 @@ def test_rows_are_those_of_scipy_whatever_the_block():
 )
 def test_what_a_sequence_does_not_have(asked, told):
     with pytest.raises(DatasetError, match=told):
-        sobol(2, *asked)
+        sobol_rows(2, *asked)
 
 
 # ---- times ----------------------------------------------------------------------------------------------------------
@@ -77,25 +77,25 @@ def test_an_interval_longer_than_the_test():
 
 
 def test_the_test_of_a_dimple():
-    made = plan(DIMPLE, {**TEST, "apex_thickness": 0.48, "end_time": 20000.0}, GRID)
+    made = planned_test(DIMPLE, {**TEST, "apex_thickness": 0.48, "end_time": 20000.0}, GRID)
     assert made.loading == PressureJump(8.0, 10.0, 14400.0)
     assert made.elastic == ck.Elastic(150e3)
     assert made.geometry == {"apex_thickness": 0.48}
     assert made.times[-1] == 19950.0
     assert made.specimen == "bulge"
     assert made.temperature == 293.15
-    np.testing.assert_array_equal(mark_times(made), [5.0, 14400.0, 14405.0, 19950.0])
+    np.testing.assert_array_equal(hold_times(made), [5.0, 14400.0, 14405.0, 19950.0])
 
 
 def test_the_test_of_a_bar():
-    made = plan(BAR, {"stress_1": 100.0, "stress_2": 120.0, "Tj": 3600.0, "temperature": 1000.0}, GRID)
+    made = planned_test(BAR, {"stress_1": 100.0, "stress_2": 120.0, "Tj": 3600.0, "temperature": 1000.0}, GRID)
     np.testing.assert_array_equal(made.loading.program().at([0.0, 3599.0, 3600.0]), [100.0, 100.0, 120.0])
-    np.testing.assert_array_equal(mark_times(made), [0.0, 3600.0, 3600.0, 43200.0])
+    np.testing.assert_array_equal(hold_times(made), [0.0, 3600.0, 3600.0, 43200.0])
     assert made.temperature == 1000.0
 
 
 def test_without_a_jump_the_level_stays():
-    made = plan(DIMPLE, {"modulus": 150e3, "P1": 8.0}, GRID)
+    made = planned_test(DIMPLE, {"modulus": 150e3, "P1": 8.0}, GRID)
     np.testing.assert_array_equal(made.loading.program().at([10.0, 43200.0]), [8.0, 8.0])
 
 
@@ -109,12 +109,12 @@ def test_without_a_jump_the_level_stays():
 )
 def test_what_describes_no_test(conditions, told):
     with pytest.raises(DatasetError, match=told):
-        plan(DIMPLE, conditions, GRID)
+        planned_test(DIMPLE, conditions, GRID)
 
 
 def test_a_specimen_that_no_design_loads():
     with pytest.raises(DatasetError, match="'relaxation'"):
-        plan(ck.specimen("relaxation"), TEST, GRID)
+        planned_test(ck.specimen("relaxation"), TEST, GRID)
 
 
 # ---- the paper's box ------------------------------------------------------------------------------------------------
@@ -122,7 +122,7 @@ def test_a_specimen_that_no_design_loads():
 
 @pytest.mark.parametrize(("name", "inputs"), [("combined", 13), ("drifting-exponent", 11)])
 def test_the_papers_box_has_the_papers_inputs(name, inputs):
-    design = design_of(ck.law(name), DIMPLE, "paper")
+    design = sampling_design(ck.law(name), DIMPLE, "paper")
     draws = design.draw(0, 4096, seed=1)
     assert draws.parameters.shape[1] + draws.conditions.shape[1] == inputs
     for column, param in zip(draws.parameters.T, design.law.params.values(), strict=True):
@@ -136,7 +136,7 @@ def test_the_papers_box_has_the_papers_inputs(name, inputs):
 
 
 def test_pressures_are_uniform_where_the_second_is_not_below_the_first():
-    draws = design_of(ck.law("norton"), DIMPLE, "paper").draw(0, 4096, seed=1)
+    draws = sampling_design(ck.law("norton"), DIMPLE, "paper").draw(0, 4096, seed=1)
     P1, P2 = ((draws.condition(name) - 3) / 22 for name in ("P1", "P2"))
     assert (P1 <= P2).all()
     # Moments of the triangle 0 <= x <= y <= 1: 1/3, 2/3 and E[xy] = 1/4.
@@ -144,7 +144,7 @@ def test_pressures_are_uniform_where_the_second_is_not_below_the_first():
 
 
 def test_the_papers_ranges_of_modulus_and_jump():
-    draws = design_of(ck.law("norton"), DIMPLE, "paper").draw(0, 1024, seed=1)
+    draws = sampling_design(ck.law("norton"), DIMPLE, "paper").draw(0, 1024, seed=1)
     for name, low, high in (("modulus", 50e3, 300e3), ("Tj", 2 * 3600, 10 * 3600)):
         found = draws.condition(name)
         assert low <= found.min() < low + 0.02 * (high - low)
@@ -153,7 +153,7 @@ def test_the_papers_ranges_of_modulus_and_jump():
 
 def test_other_ranges_times_and_numbers():
     changes = {"P1": (5, 10), "P2": 12, "apex_thickness": (0.44, 0.6), "end_time": (7200, 14400), "every": 300}
-    design = design_of(ck.law("norton"), DIMPLE, "paper", **changes)
+    design = sampling_design(ck.law("norton"), DIMPLE, "paper", **changes)
     assert design.grid == TimeGrid.every(300.0, 14400.0)
     draws = design.draw(0, 256, seed=1)
     assert (draws.condition("P2") == 12).all()
@@ -163,25 +163,25 @@ def test_other_ranges_times_and_numbers():
 
 
 def test_a_bar_has_two_stresses_and_no_modulus():
-    design = design_of(ck.law("combined"), BAR, "paper")
+    design = sampling_design(ck.law("combined"), BAR, "paper")
     assert design.condition_names == ("stress_1", "stress_2", "Tj")
 
 
 @pytest.mark.parametrize("box", ["paper", "conditioned"])
 def test_a_design_travels_and_says_what_decides_it(box):
-    design = design_of(ck.law("combined"), DIMPLE, box)
-    assert isinstance(design, Design)
+    design = sampling_design(ck.law("combined"), DIMPLE, box)
+    assert isinstance(design, SamplingDesign)
     again = pickle.loads(pickle.dumps(design))
     assert again == design
     text = json.dumps(design.document(), allow_nan=False)
     assert text == json.dumps(again.document(), allow_nan=False)
-    other = design_of(ck.law("combined"), DIMPLE, box, P1=(3, 20))
+    other = sampling_design(ck.law("combined"), DIMPLE, box, P1=(3, 20))
     assert text != json.dumps(other.document(), allow_nan=False)
 
 
 @pytest.mark.parametrize("box", ["paper", "conditioned"])
 def test_a_row_is_the_same_in_every_block(box):
-    design = design_of(ck.law("combined"), DIMPLE, box)
+    design = sampling_design(ck.law("combined"), DIMPLE, box)
     whole = design.draw(0, 64, seed=5)
     for first, count in ((0, 1), (1, 7), (60, 4)):
         part = design.draw(first, count, seed=5)
@@ -206,19 +206,19 @@ def test_a_row_is_the_same_in_every_block(box):
 )
 def test_what_is_no_design(changes, told):
     with pytest.raises(DatasetError, match=told):
-        design_of(ck.law("norton"), DIMPLE, **changes)
+        sampling_design(ck.law("norton"), DIMPLE, **changes)
 
 
 def test_zero_samples():
     with pytest.raises(DatasetError, match="0 samples"):
-        design_of(ck.law("norton"), DIMPLE, "paper").draw(0, 0, seed=1)
+        sampling_design(ck.law("norton"), DIMPLE, "paper").draw(0, 0, seed=1)
 
 
 def test_a_law_of_temperature_needs_its_range():
     law = ck.law("norton").times(ck.arrhenius(T_ref=1073))
     with pytest.raises(DatasetError, match="depends on temperature"):
-        design_of(law, DIMPLE)
-    assert "temperature" in design_of(law, DIMPLE, temperature=(1000, 1100)).condition_names
+        sampling_design(law, DIMPLE)
+    assert "temperature" in sampling_design(law, DIMPLE, temperature=(1000, 1100)).condition_names
 
 
 def test_draws_whose_columns_do_not_fit():

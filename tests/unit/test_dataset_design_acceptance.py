@@ -7,7 +7,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.dataset.acceptance import acceptance
-from creepkit.dataset.design import design_of
+from creepkit.dataset.design import sampling_design
 from creepkit.dataset.rate_family import rate_family
 from creepkit.errors import DatasetError
 
@@ -16,16 +16,16 @@ DIMPLE = ck.specimen("bulge")
 
 def test_what_criteria_1_and_2_reject_of_nortons_law():
     """log10 A uniform in -40 .. -5, n in 1 .. 8: the shares are integrals of a clipped line over n."""
-    found = acceptance(design_of(ck.law("norton"), DIMPLE, "paper"), draws=4096, seed=1)
+    found = acceptance(sampling_design(ck.law("norton"), DIMPLE, "paper"), draws=4096, seed=1)
     n = np.linspace(1, 8, 100_001)
     first = np.clip((-5 - (-20 - n * np.log10(600))) / 35, 0, 1).mean()
     second = np.clip((-n * np.log10(50) + 40) / 35, 0, 1).mean()
-    np.testing.assert_allclose([found.met["1"].mean(), found.met["2"].mean()], [first, second], atol=2e-3)
+    np.testing.assert_allclose([found.criteria_met["1"].mean(), found.criteria_met["2"].mean()], [first, second], atol=2e-3)
     np.testing.assert_allclose(found.kept.mean(), first + second - 1, atol=4e-3)  # no law breaks both
 
 
 def test_the_table_says_what_is_known_before_simulation():
-    text = str(acceptance(design_of(ck.law("combined"), DIMPLE, "paper"), draws=1024, seed=1))
+    text = str(acceptance(sampling_design(ck.law("combined"), DIMPLE, "paper"), draws=1024, seed=1))
     lines = text.splitlines()
     assert lines[0] == "law 'combined', paper box, bulge test of 289 frames: 1024 draws, seed 1"
     assert [line.split()[0] for line in lines[2:7]] == ["1", "2", "3", "4", "5"]
@@ -35,13 +35,13 @@ def test_the_table_says_what_is_known_before_simulation():
 
 def test_few_laws_of_the_papers_box_are_useful_and_nearly_all_of_the_conditioned_one():
     law = ck.law("combined")
-    assert acceptance(design_of(law, DIMPLE, "paper"), 1024).useful.mean() < 0.15
-    assert acceptance(design_of(law, DIMPLE), 1024).useful.mean() > 0.99
+    assert acceptance(sampling_design(law, DIMPLE, "paper"), 1024).useful.mean() < 0.15
+    assert acceptance(sampling_design(law, DIMPLE), 1024).useful.mean() > 0.99
     assert acceptance(rate_family(), 1024).useful.mean() > 0.99
 
 
 def test_the_figure_is_written(tmp_path):
-    found = acceptance(design_of(ck.law("combined"), DIMPLE, "paper"), draws=256)
+    found = acceptance(sampling_design(ck.law("combined"), DIMPLE, "paper"), draws=256)
     figure = found.figure(tmp_path / "rates.png")
     assert (tmp_path / "rates.png").stat().st_size > 10_000
     legend = [text.get_text() for text in figure.axes[1].get_legend().get_texts()]

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.dataset.criteria import Outcome
-from creepkit.dataset.criteria_of_boxes import informative, paper_criteria
+from creepkit.dataset.criteria import SimulationOutcome
+from creepkit.dataset.criteria_of_boxes import conditioned_criteria, paper_criteria
 from creepkit.dataset.design import Draws
 from creepkit.records import Status
 
 PAPER = {c.name: c for c in paper_criteria("bulge")}
-INFORMATIVE = {c.name: c for c in informative(ck.law("drifting-exponent"), "bulge", 43200.0)}
+INFORMATIVE = {c.name: c for c in conditioned_criteria(ck.law("drifting-exponent"), "bulge", 43200.0)}
 NAN = float("nan")
 
 
@@ -26,7 +26,7 @@ def outcome(first=(0.05, 0.05), second=(0.07, 0.07), status=Status.COMPLETE, end
     jump = 14400.0
     times = np.array([0.0, 5.0, jump, jump + 5.0, 43200.0])
     seen = np.where(times <= end, [0.0, *marks], NAN)
-    return Outcome(times, seen[:, None], marks[:, None], status, end, {})
+    return SimulationOutcome(times, seen[:, None], marks[:, None], status, end, {})
 
 
 # ---- before simulation ----------------------------------------------------------------------------------------------
@@ -96,7 +96,7 @@ def test_creep_of_both_holds_adds_up():
 
 
 def test_a_burst_in_the_second_hold_counts_up_to_its_last_frame():
-    burst = outcome((0.05, 0.3), (0.4, NAN), Status.BURST, 20000.0)
+    burst = outcome((0.05, 0.3), (0.4, NAN), Status.RUPTURED, 20000.0)
     burst.outputs[3, 0] = 0.6
     assert PAPER["3"].passes(burst)
     assert PAPER["4"].passes(burst)
@@ -105,7 +105,7 @@ def test_a_burst_in_the_second_hold_counts_up_to_its_last_frame():
 
 
 def test_a_burst_in_the_first_hold_is_no_second_one():
-    burst = outcome((0.05, NAN), (NAN, NAN), Status.BURST, 7200.0)
+    burst = outcome((0.05, NAN), (NAN, NAN), Status.RUPTURED, 7200.0)
     assert PAPER["3"].passes(burst)
     assert not PAPER["4"].passes(burst)
 
@@ -113,8 +113,8 @@ def test_a_burst_in_the_first_hold_is_no_second_one():
 @pytest.mark.parametrize(
     ("status", "end", "met"),
     [
-        (Status.BURST, 3599.0, False),
-        (Status.BURST, 3600.0, True),
+        (Status.RUPTURED, 3599.0, False),
+        (Status.RUPTURED, 3600.0, True),
         (Status.NOT_CONVERGED, 40000.0, False),
         (Status.COMPLETE, 1200.0, True),
     ],

@@ -8,48 +8,48 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.dataset.criteria import LATER, Outcome
-from creepkit.dataset.criteria_of_boxes import informative, paper_criteria
-from creepkit.dataset.design import design_of
+from creepkit.dataset.criteria import BURST_TIME_FACTOR, SimulationOutcome
+from creepkit.dataset.criteria_of_boxes import conditioned_criteria, paper_criteria
+from creepkit.dataset.design import sampling_design
 from creepkit.dataset.shards import Campaign
-from creepkit.dataset.simulating import header_of, simulate
-from creepkit.records import Screened, Status
+from creepkit.dataset.simulating import empty_dataset, simulate_rows
+from creepkit.records import SupportsReducedOrderModel, Status
 
 DIMPLE, NORTON = ck.specimen("bulge").replace(threads=1), ck.law("norton")
 PAPER = {c.name: c for c in paper_criteria("bulge")}
 JUMP, END = 14400.0, 43200.0
 
 
-def sketch(end=END, growths=(0.1, 0.1), status=Status.BURST):
+def sketch(end=END, growths=(0.1, 0.1), status=Status.RUPTURED):
     """What a stand-in says, by hand: when it ended, mm of growth in each hold."""
     times = np.array([5.0, JUMP, JUMP + 5.0, END])
     marks = np.array([0.05, 0.05 + growths[0], 0.2, 0.2 + growths[1]])
-    return Outcome(times, marks[:, None], marks[:, None], status, end, {})
+    return SimulationOutcome(times, marks[:, None], marks[:, None], status, end, {})
 
 
 def test_a_stand_in_that_bursts_far_too_early_rules_out_an_hour():
-    limit = 3600.0 / LATER
-    assert PAPER["3"].rules_out(sketch(0.99 * limit))
-    assert not PAPER["3"].rules_out(sketch(1.01 * limit))
-    assert not PAPER["3"].rules_out(sketch(0.0, status=Status.NOT_CONVERGED))
-    assert not PAPER["3"].rules_out(sketch(END, status=Status.COMPLETE))
+    limit = 3600.0 / BURST_TIME_FACTOR
+    assert PAPER["3"].rejects_early(sketch(0.99 * limit))
+    assert not PAPER["3"].rejects_early(sketch(1.01 * limit))
+    assert not PAPER["3"].rejects_early(sketch(0.0, status=Status.NOT_CONVERGED))
+    assert not PAPER["3"].rejects_early(sketch(END, status=Status.COMPLETE))
 
 
 def test_a_stand_in_that_bursts_long_before_the_jump_rules_out_a_second_hold():
-    limit = (JUMP + 5.0) / LATER
-    assert PAPER["4"].rules_out(sketch(0.99 * limit))
-    assert not PAPER["4"].rules_out(sketch(1.01 * limit))
+    limit = (JUMP + 5.0) / BURST_TIME_FACTOR
+    assert PAPER["4"].rejects_early(sketch(0.99 * limit))
+    assert not PAPER["4"].rejects_early(sketch(1.01 * limit))
 
 
 @pytest.mark.parametrize("growths", [(0.0, 0.0), (1e-5, 3e-5), (0.1, 0.0)])
 def test_little_growth_rules_nothing_out(growths):
     """A stress of 27 times sinh's scale: .00001 mm of the stand-in were .022 mm of the dimple, whose edge yields."""
-    assert not PAPER["4"].rules_out(sketch(growths=growths, status=Status.COMPLETE))
+    assert not PAPER["4"].rejects_early(sketch(growths=growths, status=Status.COMPLETE))
 
 
 def test_without_a_number_of_seconds_a_burst_rules_nothing_out():
-    full = {c.name: c for c in informative(NORTON, "bulge", END)}["full history"]
-    assert not full.rules_out(sketch(1.0))
+    full = {c.name: c for c in conditioned_criteria(NORTON, "bulge", END)}["full history"]
+    assert not full.rejects_early(sketch(1.0))
 
 
 # ---- a design ------------------------------------------------------------------------------------------------------
@@ -57,8 +57,8 @@ def test_without_a_number_of_seconds_a_burst_rules_nothing_out():
 
 def few(screened, rows=24):
     """Few rows of the paper's box of Norton's law, at three times, its stresses high."""
-    design = design_of(NORTON, DIMPLE, "paper", every=21600.0, screened=screened)
-    return simulate(design, header_of(design, DIMPLE, {}), 1, 0, rows, lambda row: None)
+    design = sampling_design(NORTON, DIMPLE, "paper", every=21600.0, screened=screened)
+    return simulate_rows(design, empty_dataset(design, DIMPLE, {}), 1, 0, rows, lambda row: None)
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def test_the_description_says_how_many_were_not_simulated(some_simulated):
 
 
 def test_whether_samples_are_screened_decides_what_a_campaign_is(tmp_path):
-    both = [design_of(NORTON, DIMPLE, "paper", screened=screened) for screened in (True, False)]
+    both = [sampling_design(NORTON, DIMPLE, "paper", screened=screened) for screened in (True, False)]
     assert [design.document()["screened"] for design in both] == [True, False]
     prints = {Campaign(design, DIMPLE, 1, tmp_path).fingerprint for design in both}
     assert len(prints) == 2
@@ -120,8 +120,8 @@ class Fragile(type(ck.specimen("uniaxial"))):
 
 def test_a_stand_in_that_fails_leaves_it_to_the_simulation():
     bar = Fragile()
-    assert isinstance(bar, Screened)
-    design = design_of(NORTON, bar, "paper", every=21600.0)
-    found = simulate(design, header_of(design, bar, {}), 1, 0, 16, lambda row: None)
+    assert isinstance(bar, SupportsReducedOrderModel)
+    design = sampling_design(NORTON, bar, "paper", every=21600.0)
+    found = simulate_rows(design, empty_dataset(design, bar, {}), 1, 0, 16, lambda row: None)
     assert not found.failures
     np.testing.assert_array_equal(found.status >= 0, (found.reasons == 0) | (found.reasons > 2))

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from creepkit.errors import SolveError
-from creepkit.fem.mesh_checks import half_bandwidth, outline, quality
+from creepkit.fem.mesh_checks import half_bandwidth, outline, mesh_quality
 from creepkit.fem.shape import discretize, refuse_inverted
 from creepkit.fem.strip import strip_nodes
 from creepkit.specimens.dimple import DimpleGeometry
-from creepkit.specimens.dimple_columns import layout_of, sides
+from creepkit.specimens.dimple_columns import mesh_layout, column_lines
 
 TAPERED = DimpleGeometry()
 FILLET = DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",))
@@ -52,8 +52,8 @@ def test_the_production_meshes():
     np.testing.assert_allclose(tapered.nodes[:11:2, 1], 3.5 + 0.5 * layers, rtol=1e-14)
     np.testing.assert_allclose(fillet.nodes[:11:2, 1], [3, 3.17, 3.4, 3.6, 3.83, 4], rtol=1e-14)
     np.testing.assert_allclose(fillet.nodes[fillet.pressed[:8, 2], 0], 0.5 * np.arange(1, 9), rtol=1e-13)
-    assert quality(tapered).sine.min() > 0.6
-    assert quality(fillet).sine.min() > 0.7
+    assert mesh_quality(tapered).sine.min() > 0.6
+    assert mesh_quality(fillet).sine.min() > 0.7
 
 
 def test_twice_the_refinement_is_twice_the_elements_each_way():
@@ -144,7 +144,7 @@ def dimples(draw) -> DimpleGeometry:
 def test_every_dimple_of_a_wide_family_has_a_sound_mesh(g, refinement):
     mesh = g.mesh(refinement)
     refuse_inverted(mesh)
-    worst = quality(mesh)
+    worst = mesh_quality(mesh)
     assert worst.sine.min() > 0.04
     assert worst.evenness.min() > 0.01
 
@@ -156,10 +156,10 @@ def test_velocities_of_the_nodes_are_the_differences_of_the_mesh(g, field):
     value = getattr(g, field)
     step = 1e-6 * value
     sizes = [g._dimensions()._replace(**{field: value + s * step}) for s in (1, -1)]
-    layouts = [layout_of(size, 1.0) for size in sizes]
+    layouts = [mesh_layout(size, 1.0) for size in sizes]
     if layouts[0].counts != layouts[1].counts:
         layouts = [g._layout(1.0)] * 2
-    one, other = (strip_nodes(*sides(size, layout), layout.breaks) for size, layout in zip(sizes, layouts, strict=True))
+    one, other = (strip_nodes(*column_lines(size, layout), layout.breaks) for size, layout in zip(sizes, layouts, strict=True))
     central = (one - other) / (2 * step)
     velocity = g.mesh_velocity(field)
     # at the ends of the allowed range, as roof_radial = cavity_radius, the curve goes on with another curvature

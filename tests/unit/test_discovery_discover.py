@@ -12,11 +12,11 @@ from creepkit import study
 from creepkit.cli.app import app
 from creepkit.discovery.discover import discover
 from creepkit.discovery.refitting import refit
-from creepkit.discovery.temperature_study import grouped, temperature_study
+from creepkit.discovery.temperature_study import group_by_temperature, temperature_study
 from creepkit.errors import FitError
-from creepkit.inverse.coordinates import Coordinates, Reference
+from creepkit.inverse.coordinates import Coordinates, ReferencePoint
 from creepkit.inverse.identify import identify
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.kernels import lower
 from creepkit.language import Elastic, arrhenius, linear, temperature
 from creepkit.laws.norton import NORTON
@@ -27,7 +27,7 @@ T_REF = 1023.15
 TRUE = NORTON.with_temperature(n=linear(T_REF)).times(arrhenius(T_REF))
 TRUTH = {"A": 1.5e-16, "n": 4.6, "n_T": -8e-3, "Q": 4.2e5}
 FIVE = (973.0, 1000.5, 1028.0, 1055.5, 1083.0)
-QUICK = Settings(starts=1, draws=8, frames=12)
+QUICK = IdentificationSettings(starts=1, sobol_points=8, frames=12)
 FEW = {"A": ("arrhenius", "logarithmic"), "n": ("constant", "linear", "inverse")}
 
 
@@ -39,7 +39,7 @@ def tests():
 
 @pytest.fixture(scope="module")
 def alone(tests):
-    return [identify(NORTON, group, Steady(), settings=QUICK) for group in grouped(tests)]
+    return [identify(NORTON, group, Steady(), settings=QUICK) for group in group_by_temperature(tests)]
 
 
 @pytest.fixture(scope="module")
@@ -56,10 +56,10 @@ def inside(trend):
 
 def test_estimates_alone_hold_the_planted_form_and_energy(alone):
     found = discover(alone, forms=FEW)
-    assert found.judged_by == "points"
+    assert found.criterion_data == "points"
     assert found.fit is None
-    assert {"arrhenius"} <= {form.name for form in found.sets["A"]}
-    assert {"linear"} <= {form.name for form in found.sets["n"]}
+    assert {"arrhenius"} <= {form.name for form in found.plausible_forms["A"]}
+    assert {"linear"} <= {form.name for form in found.plausible_forms["n"]}
     assert inside(found)["Q"]
     assert sum(one.weight for one in found.candidates) == pytest.approx(1.0)
 
@@ -107,7 +107,7 @@ def test_text_file_and_plot(trend, tmp_path):
 def test_parameters_that_may_not_depend_on_temperature(alone):
     found = discover(alone, forms=FEW, parameters=("A",))
     assert found.forms["n"] == "constant"
-    assert list(found.odds["n"]) == ["constant"]
+    assert list(found.prior_odds["n"]) == ["constant"]
 
 
 def test_beyond_its_range_a_law_is_not_asked(trend):
@@ -119,15 +119,15 @@ def test_beyond_its_range_a_law_is_not_asked(trend):
 
 def test_a_study_groups_tests_and_finds_the_same(tests, trend):
     found = temperature_study(NORTON, tests, Steady(), settings=QUICK, forms=FEW)
-    assert found.moduli is None
-    assert len(found.alone) == 5
-    assert found.joint.law.names == ("A", "n", "Q")
-    assert found.trend.forms == trend.forms
+    assert found.moduli_fit is None
+    assert len(found.isothermal_fits) == 5
+    assert found.joint_fit.law.names == ("A", "n", "Q")
+    assert found.temperature_law.forms == trend.forms
     assert "Norton power law (PL), arrhenius in temperature" in str(found)
 
 
 def test_a_form_is_where_it_should_be_at_its_reference_temperature():
-    coordinates = Coordinates(TRUE, Reference(100.0, 0.01, 7e3, T_REF))
+    coordinates = Coordinates(TRUE, ReferencePoint(100.0, 0.01, 7e3, T_REF))
     theta = np.array([np.log(1.5e-16), 4.6, -8e-3, 4.2e5])
     assert np.allclose(coordinates.theta(coordinates.u(theta)), theta, rtol=1e-12)
     assert np.isfinite(coordinates.jacobian(coordinates.u(theta))).all()
@@ -175,7 +175,7 @@ def test_one_temperature_says_what_it_cannot(tests, alone):
     with pytest.raises(FitError, match="from one temperature neither an activation energy nor how any other parameter"):
         discover(alone[:1])
     found = temperature_study(NORTON, tests[:3], Steady(), settings=QUICK)
-    assert found.trend is None
+    assert found.temperature_law is None
     assert "all tests are at 973 K" in found.notes[0]
 
 
@@ -209,7 +209,7 @@ def test_a_form_that_cannot_be_refitted_is_told(trend, tests, monkeypatch):
         return identify(law, *given, **how)
 
     monkeypatch.setattr(refitting, "identify", failing)
-    found = refit(trend, tests, Steady(), settings=QUICK, confirm=False)
+    found = refit(trend, tests, Steady(), settings=QUICK, search_again=False)
     assert found.forms == trend.forms
     assert all("this one never converges" in note for note in found.notes)
 
@@ -231,7 +231,7 @@ def test_a_dimple_at_three_temperatures_through_the_surrogate():
         noisy = {name: value + sd[name] * rng.normal(size=value.size) for name, value in run.outputs.items()}
         known = {name: np.full(run.times.size, s) for name, s in sd.items()}
         tests.append(run.replace(outputs=noisy, standard_deviation=known))
-    settings = Settings(starts=1, draws=8, frames=12, nuisances=())
+    settings = IdentificationSettings(starts=1, sobol_points=8, frames=12, nuisances=())
     fits = [identify(NORTON, [test], model, settings=settings) for test in tests]
     trend = discover(fits, forms={"A": ("arrhenius",), "n": ("constant", "linear")}, histories=tests, settings=settings)
     assert trend.forms == {"A": "arrhenius", "n": "constant"}

@@ -13,13 +13,13 @@ from creepkit.language import (
     modified_arrhenius,
     t_log_t,
     temperature,
-    wachtman_like,
+    wachtman_form,
 )
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 
 T_REF = 1000.0
-EVERY = (boltzmann, curved, logarithmic, modified_arrhenius, t_log_t, wachtman_like)
+EVERY = (boltzmann, curved, logarithmic, modified_arrhenius, t_log_t, wachtman_form)
 WARM = np.array([850.0, 950.0, 1000.0, 1050.0, 1200.0])
 
 
@@ -58,7 +58,7 @@ def test_exponentials_of_reciprocal_temperature():
     found = value(boltzmann(T_REF), n=n, n_E=slope, n_T0=T0)
     b = slope * T_REF**2 / T0 / np.exp(-T0 / T_REF)
     assert np.allclose(found, n + b * (np.exp(-T0 / WARM) - np.exp(-T0 / T_REF)), rtol=1e-12)
-    found = value(wachtman_like(T_REF), n=n, n_W=slope, n_T0=T0)
+    found = value(wachtman_form(T_REF), n=n, n_W=slope, n_T0=T0)
     b = slope / (np.exp(-T0 / T_REF) * (1 + T0 / T_REF))
     assert np.allclose(found, n + b * (WARM * np.exp(-T0 / WARM) - T_REF * np.exp(-T0 / T_REF)), rtol=1e-12)
 

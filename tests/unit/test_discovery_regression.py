@@ -5,10 +5,10 @@ import pytest
 from temperature_points import NINE, T_REF, arrhenius_line, conditioned, points
 
 from creepkit import registry
-from creepkit.discovery.combining import APART, combine, distance
-from creepkit.discovery.libraries import candidates, curves, library_of
+from creepkit.discovery.combining import CHI_SQUARE_95, rank_combinations, squared_mahalanobis
+from creepkit.discovery.libraries import candidate_forms, evaluate_forms, candidate_form
 from creepkit.discovery.mixture import mixture_interval
-from creepkit.discovery.regression import by_pysindy, regress
+from creepkit.discovery.regression import solve_with_pysindy, regress
 from creepkit.errors import FitError
 from creepkit.language import TemperatureForm, arrhenius
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
@@ -20,12 +20,12 @@ FEW = {"A": ("constant", "arrhenius", "logarithmic"), "n": ("constant", "linear"
 
 
 def library(parameter, form, T=NINE, law=NORTON):
-    found = candidates(law, parameter, parameter == "A", T_REF, T, ("constant", form))
+    found = candidate_forms(law, parameter, parameter == "A", T_REF, T, ("constant", form))
     return next(one for one in found if one.name == form)
 
 
 def libraries(forms=FEW):
-    return {p: candidates(NORTON, p, p == "A", T_REF, NINE, own) for p, own in forms.items()}
+    return {p: candidate_forms(NORTON, p, p == "A", T_REF, NINE, own) for p, own in forms.items()}
 
 
 # ---- generalised least squares -------------------------------------------------------------------------------------
@@ -58,7 +58,7 @@ def test_pysindy_solves_what_scipy_does_and_leaves_the_global_seed_alone():
     np.random.seed(7)
     before = np.random.get_state()[1].copy()
     expected = np.linalg.lstsq(features, target, rcond=None)[0]
-    assert np.allclose(by_pysindy(features, target), expected, rtol=1e-9)
+    assert np.allclose(solve_with_pysindy(features, target), expected, rtol=1e-9)
     assert (np.random.get_state()[1] == before).all()
 
 
@@ -86,16 +86,16 @@ def test_variable_projection_finds_what_is_inside_an_exponential():
     assert found.values["n_T0"] == pytest.approx(T0, rel=1e-4)
     slope = 60.0 * np.exp(-T0 / T_REF) * T0 / T_REF**2
     assert found.values["n_E"] == pytest.approx(slope, rel=1e-3)
-    assert np.allclose(curves(found.libraries, found.values, T)[:, 1], n, atol=1e-5)
+    assert np.allclose(evaluate_forms(found.candidate_forms, found.values, T)[:, 1], n, atol=1e-5)
 
 
 def test_an_activation_energy_of_a_linear_parameter_is_inside_an_exponential_too():
     tau = 5000.0 * np.exp(2e5 / 8.314462618 * (1 / NINE - 1 / T_REF))
     law = DRIFTING_EXPONENT.fix(m=0, n_0=3.0, n_inf=4.0, C=2.0, tau_r=2000.0)
     form = library("tau_d", "activated", law=law)
-    assert [s.name for s in form.inner] == ["Q_tau_d"]
+    assert [s.name for s in form.nonlinear_parameters] == ["Q_tau_d"]
     given = points(np.stack([np.full(9, LN_A), tau], axis=1), np.diag([0.01, 25.0]), law=law)
-    constant = next(iter(candidates(law, "A", True, T_REF, NINE, ("constant",))))
+    constant = next(iter(candidate_forms(law, "A", True, T_REF, NINE, ("constant",))))
     found = regress(given, [constant, form])
     assert found.values["Q_tau_d"] == pytest.approx(-2e5, rel=1e-4)
 
@@ -109,64 +109,64 @@ def test_planted_forms_remain_and_q_lies_in_its_interval():
     own = libraries({"A": ("arrhenius", "logarithmic"), "n": ("constant", "linear", "inverse")})
     for seed in range(20):
         given = points(PLANTED, conditioned(0.05, 0.15), seed=seed)
-        found = combine(given, own)
-        names = {p: [form.name for form in forms] for p, forms in found.sets.items()}
+        found = rank_combinations(given, own)
+        names = {p: [form.name for form in forms] for p, forms in found.plausible_forms.items()}
         kept += "arrhenius" in names["A"] and "linear" in names["n"]
-        alike = [one for one in found.tried if one.forms["A"] == "arrhenius"]
+        alike = [one for one in found.combinations if one.forms["A"] == "arrhenius"]
         weights = np.array([one.weight for one in alike])
         value = np.array([one.regression.values["Q"] for one in alike])
         sd = np.array([np.sqrt(o.regression.covariance[(k := list(o.regression.values).index("Q")), k]) for o in alike])
-        low, high = mixture_interval(value, sd * np.sqrt(found.inflation), weights / weights.sum(), [1e9] * len(alike))
+        low, high = mixture_interval(value, sd * np.sqrt(found.overdispersion), weights / weights.sum(), [1e9] * len(alike))
         inside += low <= Q <= high
     assert kept >= 16
     assert inside >= 16
 
 
 def test_forms_that_ten_per_cent_of_temperature_cannot_separate_are_equivalent():
-    found = combine(points(PLANTED, conditioned(0.2, 0.3), seed=3), libraries())
-    equivalent = {form.name for form in found.sets["n"] if form.equivalent}
+    found = rank_combinations(points(PLANTED, conditioned(0.2, 0.3), seed=3), libraries())
+    equivalent = {form.name for form in found.plausible_forms["n"] if form.equivalent}
     assert {"linear", "inverse", "t-log-t"} <= equivalent
     a, b = found.with_form("n", "linear"), found.with_form("n", "inverse")
-    assert distance(a, b, points(PLANTED, conditioned(0.2, 0.3)), 1.0) < APART
-    sharp = combine(points(PLANTED, conditioned(1e-3, 1e-3), seed=3), libraries())
-    assert [form.name for form in sharp.sets["n"]] == ["linear"]
-    assert [form.name for form in sharp.sets["A"]] == ["arrhenius"]
+    assert squared_mahalanobis(a, b, points(PLANTED, conditioned(0.2, 0.3)), 1.0) < CHI_SQUARE_95
+    sharp = rank_combinations(points(PLANTED, conditioned(1e-3, 1e-3), seed=3), libraries())
+    assert [form.name for form in sharp.plausible_forms["n"]] == ["linear"]
+    assert [form.name for form in sharp.plausible_forms["A"]] == ["arrhenius"]
 
 
 def test_prior_odds_decide_what_the_points_do_not():
     given = points(PLANTED, conditioned(0.05, 0.3), seed=3)
     own = {
-        "A": candidates(NORTON, "A", True, T_REF, NINE, FEW["A"], {"logarithmic": 1e3}),
-        "n": candidates(NORTON, "n", False, T_REF, NINE, FEW["n"]),
+        "A": candidate_forms(NORTON, "A", True, T_REF, NINE, FEW["A"], {"logarithmic": 1e3}),
+        "n": candidate_forms(NORTON, "n", False, T_REF, NINE, FEW["n"]),
     }
-    assert combine(given, own).best.forms["A"] == "logarithmic"
-    assert combine(given, libraries()).best.forms["A"] == "arrhenius"
+    assert rank_combinations(given, own).best.forms["A"] == "logarithmic"
+    assert rank_combinations(given, libraries()).best.forms["A"] == "arrhenius"
     with pytest.raises(FitError, match="odds of 'linear' are 0; they must be above zero"):
-        candidates(NORTON, "n", False, T_REF, NINE, ("linear",), {"linear": 0.0})
+        candidate_forms(NORTON, "n", False, T_REF, NINE, ("linear",), {"linear": 0.0})
 
 
 def test_scatter_beyond_the_covariances_widens_them():
     given = points(PLANTED, conditioned(0.05, 0.15), seed=11)
     tight = points(given.theta, given.covariance[0] / 25.0)
-    assert combine(given, libraries()).inflation < 3.0
-    assert combine(tight, libraries()).inflation == pytest.approx(25.0 * combine_chi(given), rel=0.05)
+    assert rank_combinations(given, libraries()).overdispersion < 3.0
+    assert rank_combinations(tight, libraries()).overdispersion == pytest.approx(25.0 * combine_chi(given), rel=0.05)
 
 
 def combine_chi(given):
-    tried = combine(given, libraries()).tried
-    return min(one.regression.chi_square / (one.regression.rows - one.regression.size) for one in tried)
+    tried = rank_combinations(given, libraries()).combinations
+    return min(one.regression.chi_square / (one.regression.rows - one.regression.parameter_count) for one in tried)
 
 
 def test_a_form_with_a_number_of_its_own_is_an_offset():
     fixed = TemperatureForm("fixed", lambda s, p: (s * arrhenius(T_REF, Q=Q).expression, {}), "planted", T_REF)
-    made = library_of("fixed", NORTON, "A", fixed, True)
-    assert made.names == ("A",)
+    made = candidate_form("fixed", NORTON, "A", fixed, True)
+    assert made.parameter_names == ("A",)
     found = regress(points(PLANTED, conditioned(0.05, 0.1)), [made, library("n", "linear")])
     assert found.values["A"] == pytest.approx(LN_A, rel=1e-9)
 
 
 def test_forms_that_span_the_same_are_one():
-    names = [one.name for one in candidates(NORTON, "A", True, T_REF, NINE)]
+    names = [one.name for one in candidate_forms(NORTON, "A", True, T_REF, NINE)]
     assert "arrhenius" in names
     assert "activated" not in names
     assert {"linear", "inverse"}.isdisjoint(names)
@@ -174,9 +174,9 @@ def test_forms_that_span_the_same_are_one():
 
 def test_names_that_are_no_forms():
     with pytest.raises(FitError, match="there is no temperature form 'linaer'"):
-        candidates(NORTON, "n", False, T_REF, NINE, ("linaer",))
+        candidate_forms(NORTON, "n", False, T_REF, NINE, ("linaer",))
     with pytest.raises(FitError, match="none of the forms arrhenius suits parameter 'n'"):
-        candidates(NORTON, "n", False, T_REF, NINE, ("arrhenius",))
+        candidate_forms(NORTON, "n", False, T_REF, NINE, ("arrhenius",))
 
 
 PLUGIN = """
@@ -198,9 +198,9 @@ def creepkit_temperature_forms():
 def test_forms_of_plugins_are_candidates(own_registry, tmp_path):
     file = tmp_path / "square.py"
     file.write_text(PLUGIN)
-    registry.default().load_file(file)
+    registry.default_registry().load_file(file)
     bent = np.stack([arrhenius_line(NINE, LN_A, Q), N + 2e-4 * (NINE - T_REF) ** 2], axis=1)
-    own = {"A": candidates(NORTON, "A", True, T_REF, NINE, FEW["A"]), "n": candidates(NORTON, "n", False, T_REF, NINE)}
-    found = combine(points(bent, conditioned(0.02, 0.02), seed=2), own)
-    assert "square" in [form.name for form in found.sets["n"]]
+    own = {"A": candidate_forms(NORTON, "A", True, T_REF, NINE, FEW["A"]), "n": candidate_forms(NORTON, "n", False, T_REF, NINE)}
+    found = rank_combinations(points(bent, conditioned(0.02, 0.02), seed=2), own)
+    assert "square" in [form.name for form in found.plausible_forms["n"]]
     assert found.with_form("n", "square").values["n_2"] == pytest.approx(2e-4, rel=0.1)

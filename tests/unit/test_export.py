@@ -9,15 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from creepkit.errors import CreepkitError, ExportError, LawError
-from creepkit.export import write_text
+from creepkit.export import write_export
 from creepkit.export.builtin import creepkit_exporters
 from creepkit.export.document import JsonExporter, read_valued_law
-from creepkit.export.latex import LatexExporter, number
+from creepkit.export.latex import LatexExporter, latex_number
 from creepkit.language import CreepLaw, Param, State, activated, arrhenius, linear, parameters, states, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
-from creepkit.records import Exporter, Units, ValuedLaw
+from creepkit.records import Exporter, Units, LawWithValues
 
 A, n, k_max = parameters("A n k_max")
 (omega,) = states("omega")
@@ -41,7 +41,7 @@ NOTES = ("intervals: n = 4.5 +- 0.1 (95 %)", "valid from 700 to 900 C\nand 20 to
 
 
 def text_of(law, values, exporter, notes=(), **more):
-    return exporter.text(ValuedLaw(law, values, notes, **more))
+    return exporter.text(LawWithValues(law, values, notes, **more))
 
 
 def test_the_built_in_exporters_keep_the_protocol():
@@ -64,9 +64,9 @@ def test_the_built_in_exporters_keep_the_protocol():
 
 def test_values_are_checked():
     with pytest.raises(LawError, match="needs a value for n"):
-        ValuedLaw(NORTON, {"A": 1e-16})
+        LawWithValues(NORTON, {"A": 1e-16})
     with pytest.raises(LawError, match="'five' is not a number"):
-        ValuedLaw(NORTON, {"A": 1e-16, "n": "five"})
+        LawWithValues(NORTON, {"A": 1e-16, "n": "five"})
 
 
 FOR_PEOPLE = [e for e in creepkit_exporters() if e.name in ("latex", "markdown", "mathml", "json", "python")]
@@ -87,7 +87,7 @@ def test_what_has_no_limits_writes_every_law_with_its_notes(law, exporter):
 def test_json_comes_back_equal(law):
     values = {name: value * 1.0000000000000002 for name, value in law.center().items()}
     covered = {"stress": (20.0, 80.0), "temperature": (1000.0, 1100.0)}
-    back = read_valued_law(JsonExporter().text(ValuedLaw(law, values, NOTES, ranges=covered)))
+    back = read_valued_law(JsonExporter().text(LawWithValues(law, values, NOTES, ranges=covered)))
     assert back.law == law
     assert dict(back.values) == values
     assert back.notes == NOTES
@@ -198,16 +198,16 @@ def test_a_law_without_temperature_has_one_form():
     [(4.5, "4.5"), (8.0, "8"), (0.0, "0"), (-0.475, "-0.475"), (1e-23, r"1 \times 10^{-23}"), (475000.0, "475000")],
 )
 def test_numbers_in_latex(value, shown):
-    assert number(value) == shown
+    assert latex_number(value) == shown
 
 
 # ---- files ---------------------------------------------------------------------------------------------------------
 
-VALUED = ValuedLaw(NORTON, {"A": 1e-16, "n": 5}, NOTES)
+VALUED = LawWithValues(NORTON, {"A": 1e-16, "n": 5}, NOTES)
 
 
 def test_a_file_is_written_whole(tmp_path):
-    path = write_text(VALUED, JsonExporter(), tmp_path / "norton.json")
+    path = write_export(VALUED, JsonExporter(), tmp_path / "norton.json")
     assert read_valued_law(path.read_text(encoding="utf-8")).law == NORTON
     assert [p.name for p in tmp_path.iterdir()] == ["norton.json"]
 
@@ -216,9 +216,9 @@ def test_a_file_that_exists_stays_unless_forced(tmp_path):
     path = tmp_path / "norton.json"
     path.write_text("old")
     with pytest.raises(ExportError, match="norton.json exists already and was left as it is"):
-        write_text(VALUED, JsonExporter(), path)
+        write_export(VALUED, JsonExporter(), path)
     assert path.read_text() == "old"
-    write_text(VALUED, JsonExporter(), path, force=True)
+    write_export(VALUED, JsonExporter(), path, force=True)
     assert read_valued_law(path.read_text(encoding="utf-8")) == VALUED
     assert [p.name for p in tmp_path.iterdir()] == ["norton.json"]
 
@@ -227,19 +227,19 @@ def test_a_refused_export_leaves_the_old_file(tmp_path):
     path = tmp_path / "norton.json"
     path.write_text("old")
     with pytest.raises(ExportError, match="JSON holds a law in MPa and s"):
-        write_text(VALUED.replace(units=Units("Pa")), JsonExporter(), path, force=True)
+        write_export(VALUED.replace(units=Units("Pa")), JsonExporter(), path, force=True)
     assert path.read_text() == "old"
 
 
 def test_a_folder_that_does_not_exist_is_named(tmp_path):
     with pytest.raises(ExportError, match="cannot be written to .*missing.*No such file"):
-        write_text(VALUED, JsonExporter(), tmp_path / "missing" / "norton.json")
+        write_export(VALUED, JsonExporter(), tmp_path / "missing" / "norton.json")
 
 
 def test_a_file_is_no_folder(tmp_path):
     (tmp_path / "creep.f").write_text("mine")
     with pytest.raises(ExportError, match="law 'norton' cannot be written to .*creep.f/norton.json: Not a directory"):
-        write_text(VALUED, JsonExporter(), tmp_path / "creep.f" / "norton.json")
+        write_export(VALUED, JsonExporter(), tmp_path / "creep.f" / "norton.json")
     assert (tmp_path / "creep.f").read_text() == "mine"
 
 
@@ -252,5 +252,5 @@ def test_latex_tells_references_and_keeps_each_comment_a_comment():
 def test_a_folder_is_no_file(tmp_path):
     (tmp_path / "norton.json").mkdir()
     with pytest.raises(ExportError, match="cannot be written to .*: it is a folder"):
-        write_text(VALUED, JsonExporter(), tmp_path / "norton.json", force=True)
+        write_export(VALUED, JsonExporter(), tmp_path / "norton.json", force=True)
     assert [p.name for p in tmp_path.iterdir()] == ["norton.json"]

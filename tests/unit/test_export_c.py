@@ -11,13 +11,13 @@ from exported_laws import LAWS, TOLERANCE, case
 
 from creepkit.errors import ExportError
 from creepkit.export.c import CExporter
-from creepkit.export.c_text import HELPERS
+from creepkit.export.c_text import STABLE_FUNCTIONS
 from creepkit.language import CreepLaw, Param, parameters, stress
-from creepkit.language.symbols import POINT
+from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Units, ValuedLaw
+from creepkit.records import Units, LawWithValues
 
 STRICT = ("gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 COEFFICIENT = Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", 0.0)
@@ -38,9 +38,9 @@ class Compiled:
     """One law in a library."""
 
     def __init__(self, library, name, law):
-        self.used = [k for k, s in enumerate(POINT) if s == stress or law.uses(s)]
-        self.used += [len(POINT) + k for k in range(len(law.states))]
-        self.states, self.size = len(law.states), len(POINT) + len(law.states)
+        self.used = [k for k, s in enumerate(POINT_VARIABLES) if s == stress or law.uses(s)]
+        self.used += [len(POINT_VARIABLES) + k for k in range(len(law.states))]
+        self.states, self.size = len(law.states), len(POINT_VARIABLES) + len(law.states)
         self.entries = {end: getattr(library, f"{name}_{end}", None) for end in ("rate", "log_rate", "state_rates")}
         self.entries["rate"].restype = self.entries["log_rate"].restype = ctypes.c_double
 
@@ -82,7 +82,7 @@ def test_every_law_agrees_with_50_digits(tmp_path):
             key = (name, *values.values())
             if key not in places:
                 places[key] = f"law_{len(sources)}"
-                sources.append(ValuedLaw(LAWS[name], values, name=places[key]))
+                sources.append(LawWithValues(LAWS[name], values, name=places[key]))
     library = compiled(tmp_path, sources)
 
     bad = []
@@ -96,16 +96,16 @@ def test_every_law_agrees_with_50_digits(tmp_path):
 
 
 def test_these_laws_call_every_stable_function():
-    texts = [CExporter().text(ValuedLaw(case(name).law, case(name).sets[0])) for name in LAWS]
-    called = {name for text in texts for name in HELPERS if f"static double {name}(" in text}
-    assert called == {*HELPERS}
+    texts = [CExporter().text(LawWithValues(case(name).law, case(name).sets[0])) for name in LAWS]
+    called = {name for text in texts for name in STABLE_FUNCTIONS if f"static double {name}(" in text}
+    assert called == {*STABLE_FUNCTIONS}
 
 
 # ---- what the text holds -------------------------------------------------------------------------------------------
 
 
 def test_a_file_has_the_authors_numbers_and_says_how_to_call_it():
-    text = CExporter().text(ValuedLaw(NORTON, {"A": 1.2e-16, "n": 5.2}, ["n = 5.2 +- 0.1 (95 %)"]))
+    text = CExporter().text(LawWithValues(NORTON, {"A": 1.2e-16, "n": 5.2}, ["n = 5.2 +- 0.1 (95 %)"]))
     for line in (
         " * Stress in MPa, time in s, rates in 1/s. stress is a ratio to 1 MPa, time to 1 s, rates are per s.",
         " * Note: n = 5.2 +- 0.1 (95 %)",
@@ -119,12 +119,12 @@ def test_a_file_has_the_authors_numbers_and_says_how_to_call_it():
 
 
 def test_only_math_h_is_included():
-    text = CExporter().text(ValuedLaw(COMBINED, COMBINED.center()))
+    text = CExporter().text(LawWithValues(COMBINED, COMBINED.center()))
     assert [line for line in text.splitlines() if line.startswith("#")] == ["#include <math.h>"]
 
 
 def test_what_is_off_is_left_out_and_told():
-    text = CExporter().text(ValuedLaw(COMBINED, {**COMBINED.center(), "A_1": 0.0, "m_1": 0.0}))
+    text = CExporter().text(LawWithValues(COMBINED, {**COMBINED.center(), "A_1": 0.0, "m_1": 0.0}))
     assert " * Note: switched off and left out: A_1 = 0, m_1 = 0" in text.splitlines()
     assert "sinh" not in text.replace("sinh(x)", "")
     assert "combined_rate(double stress, double time)" in text
@@ -132,14 +132,14 @@ def test_what_is_off_is_left_out_and_told():
 
 def test_every_term_off_is_refused():
     with pytest.raises(ExportError):
-        CExporter().text(ValuedLaw(NORTON, {"A": 0.0, "n": 5.0}))
+        CExporter().text(LawWithValues(NORTON, {"A": 0.0, "n": 5.0}))
 
 
 def test_a_function_without_a_form_in_c_is_refused():
     (A,) = parameters("A")
     law = CreepLaw("gamma", {"x": A * sympy.gamma(stress)}, {A: COEFFICIENT})
     with pytest.raises(ExportError, match="law 'gamma', term 'x': the function gamma"):
-        CExporter().text(ValuedLaw(law, {"A": 1e-9}))
+        CExporter().text(LawWithValues(law, {"A": 1e-9}))
 
 
 # ---- what the compiled file does -----------------------------------------------------------------------------------
@@ -150,7 +150,7 @@ def test_units_are_converted_on_entry_and_on_exit(tmp_path):
     law = LAWS["foreign Kachanov-Rabotnov"] + TIME_HARDENING
     values = law.center()
     units = Units("Pa", "h")
-    sources = [ValuedLaw(law, values, name="native"), ValuedLaw(law, values, name="converted", units=units)]
+    sources = [LawWithValues(law, values, name="native"), LawWithValues(law, values, name="converted", units=units)]
     library = compiled(tmp_path, sources)
     plain, other = (Compiled(library, name, law) for name in ("native", "converted"))
     point = np.array([120.0, 0.01, 7.2e4, 1000.0, 90.0, 40.0, 0.3])
@@ -164,7 +164,7 @@ def test_units_are_converted_on_entry_and_on_exit(tmp_path):
 
 def test_internal_variables_start_and_end_as_the_law_says(tmp_path):
     law = LAWS["foreign Kachanov-Rabotnov"]
-    library = compiled(tmp_path, [ValuedLaw(law, law.center(), name="damage")])
+    library = compiled(tmp_path, [LawWithValues(law, law.center(), name="damage")])
     assert ctypes.c_double.in_dll(library, "damage_initial").value == 0.0
     assert ctypes.c_double.in_dll(library, "damage_limit").value == 0.99
 
@@ -177,7 +177,7 @@ def test_names_that_c_keeps_for_itself_are_renamed_openly(tmp_path):
         {words[0]: COEFFICIENT, **dict.fromkeys(words[1:], Param("number", (1, 8)))},
     )
     values = {s.name: 2.0 for s in words} | {"double": 1e-9}
-    source = ValuedLaw(law, values)
+    source = LawWithValues(law, values)
     text = CExporter().text(source)
     for name in ("double", "log", "y0", "printf", "slopes", "odd_rate", "new"):
         assert f" * '{name}' is called {name}_2 here" in text
@@ -186,12 +186,12 @@ def test_names_that_c_keeps_for_itself_are_renamed_openly(tmp_path):
 
 def test_nothing_in_a_note_becomes_code(tmp_path):
     notes = ["*/ broken", "/* nested", "*/*/ twice", "trigraph ??/", "back\\", "line\n*/ two", "\x00\u2028*/"]
-    library = compiled(tmp_path, [ValuedLaw(NORTON, {"A": 1e-16, "n": 5.0}, notes)])
+    library = compiled(tmp_path, [LawWithValues(NORTON, {"A": 1e-16, "n": 5.0}, notes)])
     assert Compiled(library, "norton", NORTON).rate([100.0]) == pytest.approx(1e-6, rel=1e-12)
 
 
 def test_virgin_and_unloaded_material_has_finite_numbers(tmp_path):
-    library = compiled(tmp_path, [ValuedLaw(COMBINED, COMBINED.center())])
+    library = compiled(tmp_path, [LawWithValues(COMBINED, COMBINED.center())])
     law = Compiled(library, "combined", COMBINED)
     for point in ([100.0, 0.0, 0.0], [0.0, 0.01, 1.0], [0.0, 0.0, 0.0]):
         rows, log = law.rows(point + [0.0] * 3)
@@ -202,7 +202,7 @@ def test_virgin_and_unloaded_material_has_finite_numbers(tmp_path):
 def test_beyond_doubles_the_rate_is_infinite_and_its_logarithm_is_not(tmp_path):
     """ln A sinh(x)^n = ln A + n (x - ln 2) for large x."""
     law = LAWS["registered hyperbolic-sine"]
-    library = compiled(tmp_path, [ValuedLaw(law, {"A": 1e-5, "n": 8.0, "B": 1.0})])
+    library = compiled(tmp_path, [LawWithValues(law, {"A": 1e-5, "n": 8.0, "B": 1.0})])
     found = Compiled(library, "hyperbolic_sine", law)
     assert found.rate([2000.0]) == math.inf
     log, slopes = found.log_rate([2000.0])

@@ -20,18 +20,18 @@ from creepkit.export.cards.code_aster import CodeAsterMaterial
 from creepkit.export.cards.moose import MooseBlock
 from creepkit.export.cards.neml2 import Neml2Model
 from creepkit.kernels import lower
-from creepkit.kernels.exact import Exact
+from creepkit.kernels.exact import MultiprecisionLaw
 from creepkit.language import GAS_CONSTANT, Elastic, arrhenius, linear, wachtman
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Units, ValuedLaw
-from creepkit.registry import default
+from creepkit.records import Units, LawWithValues
+from creepkit.registry import default_registry
 
 EXPORTERS = {e.name: e for e in (AbaqusCards(), AnsysCards(), MooseBlock(), CodeAsterMaterial(), Neml2Model())}
 GOLDEN = Path(__file__).parents[1] / "golden"
-EXACT = cache(Exact)
+EXACT = cache(MultiprecisionLaw)
 UNITS = [Units(), Units("Pa", "h"), Units("psi", "min")]
 TABLES = {"strain hardening warm", "time hardening warm", "time hardening warm, small", "stranger"}
 """Cases that Abaqus takes as a table against temperature."""
@@ -48,9 +48,9 @@ def points(count: int) -> list[list[float]]:
     return np.exp(qmc.scale(qmc.Sobol(4, seed=7).random(count), low, high)).tolist()
 
 
-def true_rate(source: ValuedLaw, s: float, e: float, t: float, T: float) -> float:
+def true_rate(source: LawWithValues, s: float, e: float, t: float, T: float) -> float:
     """The rate, 1/s, in 50 digits."""
-    return mpmath.fsum(EXACT(source.law).parts([s, e, t, T, s, s / 3], source.values.values()))
+    return mpmath.fsum(EXACT(source.law).term_and_state_rates([s, e, t, T, s, s / 3], source.values.values()))
 
 
 # ---- the round trip ------------------------------------------------------------------------------------------------
@@ -111,7 +111,7 @@ def test_moose_power_law_creep_cube():
     R, Q = 8.3143, 3e5
     law = NORTON.times(arrhenius(1000.0))
     values = {"A": 1e-15 * 1e24 * np.exp(-Q / (R * 1000.0)), "n": 4.0, "Q": Q * GAS_CONSTANT / R}
-    creep = hit(MooseBlock().text(ValuedLaw(law, values, units=Units("Pa"))))["Materials"]["power_law"]
+    creep = hit(MooseBlock().text(LawWithValues(law, values, units=Units("Pa"))))["Materials"]["power_law"]
     assert float(creep["coefficient"]) == pytest.approx(1e-15, rel=1e-12)
     assert float(creep["n_exponent"]) == 4
     assert float(creep["m_exponent"]) == 0
@@ -130,7 +130,7 @@ def test_code_aster_ssnp107():
     210 MPa of tension with 121.24 MPa of shear make 297 MPa; the ramp leaves p = (297 - 120)/H, H = E E_t/(E - E_t).
     code_aster asks for its reference to 1e-3.
     """
-    source = ValuedLaw(STRAIN_HARDENING, {"A": 8e-4**11, "n": 11.0, "m": -11 * 0.178571429})
+    source = LawWithValues(STRAIN_HARDENING, {"A": 8e-4**11, "n": 11.0, "m": -11 * 0.178571429})
     text = CodeAsterMaterial().text(source)
     lemaitre = aster_keywords(text)["LEMAITRE"]
     assert lemaitre == pytest.approx({"N": 11.0, "UN_SUR_K": 8e-4, "UN_SUR_M": 0.178571429}, rel=1e-12)
@@ -145,7 +145,7 @@ def test_code_aster_ssnp107():
 
 def test_code_aster_ssna104():
     """ssna104a is Newtonian: N = 1, K = 1, UN_SUR_M = 0."""
-    text = CodeAsterMaterial().text(ValuedLaw(NORTON, {"A": 1.0, "n": 1.0}, elastic=Elastic(1.0, 0.3)))
+    text = CodeAsterMaterial().text(LawWithValues(NORTON, {"A": 1.0, "n": 1.0}, elastic=Elastic(1.0, 0.3)))
     assert aster_keywords(text) == {
         "ELAS": {"E": 1.0, "NU": 0.3},
         "LEMAITRE": {"N": 1.0, "UN_SUR_K": 1.0, "UN_SUR_M": 0.0},
@@ -159,8 +159,8 @@ def test_abaqus_time_and_strain_hardening_have_one_set_of_constants():
     """
     A, n, m = 3e-13, 4.5, -0.6
     own = A ** (1 / (m + 1)) * (m + 1) ** (m / (m + 1))
-    by_time = AbaqusCards().text(ValuedLaw(TIME_HARDENING, {"A": A, "n": n, "m": m}))
-    by_strain = AbaqusCards().text(ValuedLaw(STRAIN_HARDENING, {"A": own, "n": n / (m + 1), "m": m / (m + 1)}))
+    by_time = AbaqusCards().text(LawWithValues(TIME_HARDENING, {"A": A, "n": n, "m": m}))
+    by_strain = AbaqusCards().text(LawWithValues(STRAIN_HARDENING, {"A": own, "n": n / (m + 1), "m": m / (m + 1)}))
     (time_law, (constants,)), (strain_law, (same,)) = (abaqus_cards(t)["CREEP"] for t in (by_time, by_strain))
     assert (time_law["LAW"], strain_law["LAW"]) == ("TIME", "STRAIN")
     assert constants == pytest.approx([A, n, m], rel=1e-12)
@@ -277,12 +277,12 @@ def test_a_temperature_makes_a_card_possible():
     assert rate(50.0, 0.0, 0.0, 1.0) == pytest.approx(float(true_rate(source, 50.0, 0.0, 0.0, 310.0)), rel=1e-10)
 
 
-@pytest.mark.parametrize("law", sorted(default().laws()))
-@pytest.mark.parametrize("name", sorted(default().exporters()))
+@pytest.mark.parametrize("law", sorted(default_registry().laws()))
+@pytest.mark.parametrize("name", sorted(default_registry().exporters()))
 def test_every_registered_law_is_exported_or_refused_with_a_reason(name, law):
-    exporter, source = default().exporters()[name].value, default().law(law)
+    exporter, source = default_registry().exporters()[name].value, default_registry().law(law)
     try:
-        text = exporter.text(ValuedLaw(source, source.center(), elastic=STEEL, units=Units("Pa", "h")))
+        text = exporter.text(LawWithValues(source, source.center(), elastic=STEEL, units=Units("Pa", "h")))
     except ExportError as error:
         told = str(error)
         sensible = f"'{law}'" in told and len(told) > 60
@@ -315,7 +315,7 @@ def golden_cases() -> dict[str, str]:
             ("neml2", "two power laws warm", None),
         )
     }
-    short = AbaqusCards(low=1000.0, high=1010.0).text(CASES["stranger"])
+    short = AbaqusCards(lowest_temperature=1000.0, highest_temperature=1010.0).text(CASES["stranger"])
     return files | {"abaqus-cards_stranger_1000_to_1010_K.inp": short}
 
 
@@ -333,6 +333,6 @@ def test_there_are_no_stray_golden_files():
 def test_a_table_covers_what_the_tests_did():
     law = STRAIN_HARDENING.times(arrhenius(T_ref=1073.15))
     values = {"A": 1e-16, "n": 4.0, "m": -0.3, "Q": 3e5}
-    text = AbaqusCards().text(ValuedLaw(law, values, ranges={"temperature": (1023.15, 1073.15)}))
+    text = AbaqusCards().text(LawWithValues(law, values, ranges={"temperature": (1023.15, 1073.15)}))
     kelvin = [float(line.split(",")[-1]) for line in text.splitlines() if line[:1].isdigit()]
     assert (kelvin[0], kelvin[-1]) == (998.15, 1098.15)

@@ -9,31 +9,31 @@ from card_cases import CASES
 from foreign_laws import EQUATIONS, POWER, RATE, A, B, Q, a, k, law, m, n, number, omega, s_0, scale
 
 from creepkit.errors import ExportError
-from creepkit.export.cards.forms import Form, forms_of
-from creepkit.kernels.exact import Exact
+from creepkit.export.cards.forms import CreepForm, creep_forms_of
+from creepkit.kernels.exact import MultiprecisionLaw
 from creepkit.language import GAS_CONSTANT, State, arrhenius, linear, strain, stress, temperature, time
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.records import Units, ValuedLaw
-from creepkit.registry import default
+from creepkit.records import Units, LawWithValues
+from creepkit.registry import default_registry
 
-ALL = {name: default().law(name) for name in default().laws()} | EQUATIONS
+ALL = {name: default_registry().law(name) for name in default_registry().laws()} | EQUATIONS
 POINT = (83.0, 0.013, 7.1e4, 1041.0)
 
 
 def forms(source, **values):
-    if not isinstance(source, ValuedLaw):
-        source = ValuedLaw(source, values or source.center())
-    return forms_of(source, "The code", "export it as 'abaqus'")
+    if not isinstance(source, LawWithValues):
+        source = LawWithValues(source, values or source.center())
+    return creep_forms_of(source, "The code", "export it as 'abaqus'")
 
 
-def rate_of(form: Form, s: float, e: float, t: float, T: float) -> mpmath.mpf:
+def rate_of(form: CreepForm, s: float, e: float, t: float, T: float) -> mpmath.mpf:
     """The form as its docstring writes it, without a logarithm where mathematics has none."""
-    shape = {"power": lambda: s**form.n, "sinh": lambda: mpmath.sinh(s / form.B) ** form.n}
-    f = shape.get(form.shape, lambda: mpmath.exp(s / form.B))()
+    shape = {"power": lambda: s**form.n, "sinh": lambda: mpmath.sinh(s / form.stress_scale) ** form.n}
+    f = shape.get(form.stress_function, lambda: mpmath.exp(s / form.stress_scale))()
     return (
-        mpmath.exp(form.log_coefficient) * f * e**form.strain * t**form.time * mpmath.exp(-form.Q / (GAS_CONSTANT * T))
+        mpmath.exp(form.log_coefficient) * f * e**form.strain_exponent * t**form.time_exponent * mpmath.exp(-form.Q / (GAS_CONSTANT * T))
     )
 
 
@@ -57,7 +57,7 @@ def test_the_catalogues_power_laws_and_sines_are_among_those_recognised():
 @pytest.mark.parametrize("name", sorted(RECOGNISED))
 def test_the_forms_of_a_law_add_up_to_it(name):
     one, (s, e, t, T) = ALL[name], POINT
-    exact = mpmath.fsum(Exact(one).parts([s, e, t, T, s, s / 3], one.center().values()))
+    exact = mpmath.fsum(MultiprecisionLaw(one).term_and_state_rates([s, e, t, T, s, s / 3], one.center().values()))
     total = mpmath.fsum(rate_of(form, s, e, t, T) for form in RECOGNISED[name])
     assert float(total / exact) == pytest.approx(1.0, rel=1e-12)
 
@@ -78,8 +78,8 @@ def test_a_planted_form_is_found_to_the_last_digits():
     )
     params = {A: RATE, n: POWER, B: scale(1, 1e3), m: number(0, 1), Q: number(1e5, 5e5)}
     (form,) = forms(law(written, params), A=2e-9, n=4.3, B=37.0, m=0.35, Q=3.1e5)
-    assert (form.shape, form.n, form.strain, form.Q) == ("power", 4.3, -0.5, pytest.approx(3.1e5, rel=1e-14))
-    assert form.time == pytest.approx(-0.65, rel=1e-14)
+    assert (form.stress_function, form.n, form.strain_exponent, form.Q) == ("power", 4.3, -0.5, pytest.approx(3.1e5, rel=1e-14))
+    assert form.time_exponent == pytest.approx(-0.65, rel=1e-14)
     assert form.log_coefficient == pytest.approx(math.log(6e-9) - 4.3 * math.log(37.0), rel=1e-14)
 
 
@@ -89,21 +89,21 @@ def test_a_planted_form_is_found_to_the_last_digits():
 )
 def test_exponentials_of_stress_in_any_notation(expression, B_found):
     (form,) = forms(law(A * expression, {A: RATE, B: scale(1, 1e3)}), A=1e-9, B=25.0)
-    assert (form.shape, form.B) == ("exponential", pytest.approx(B_found, rel=1e-14))
+    assert (form.stress_function, form.stress_scale) == ("exponential", pytest.approx(B_found, rel=1e-14))
 
 
 def test_what_is_switched_off_is_left_out():
     values = COMBINED.center() | {"A_1": 0.0, "A_3": 0.0, "m_1": 0.0}
     (form,) = forms(COMBINED, **values)
-    assert (form.label, form.shape, form.steady) == ("strain hardening", "power", True)
+    assert (form.label, form.stress_function, form.is_steady) == ("strain hardening", "power", True)
 
 
 def test_temperature_at_a_number_is_part_of_the_coefficient():
-    warm = ValuedLaw(NORTON.times(arrhenius(1073.15)), {"A": 1e-9, "n": 4.0, "Q": 3e5})
+    warm = LawWithValues(NORTON.times(arrhenius(1073.15)), {"A": 1e-9, "n": 4.0, "Q": 3e5})
     (form,), (cold,) = forms(warm), forms(warm.at(1000.0))
     assert cold.Q == 0
-    assert cold.log_coefficient == pytest.approx(form.at(1000.0), rel=1e-13)
-    assert form.at(1073.15) == pytest.approx(math.log(1e-9), rel=1e-13)
+    assert cold.log_coefficient == pytest.approx(form.log_coefficient_at(1000.0), rel=1e-13)
+    assert form.log_coefficient_at(1073.15) == pytest.approx(math.log(1e-9), rel=1e-13)
 
 
 CENTERED = {"A": 1e-12, "n": 4.0}
@@ -155,5 +155,5 @@ def test_internal_variables_are_refused_even_where_no_term_shows_them():
 def test_values_decide_and_not_names():
     """A law called norton that hardens is no Norton law, and one that softens to nothing is one."""
     (form,) = forms(STRAIN_HARDENING.rename("norton"), A=1e-12, n=4.0, m=-0.2)
-    assert form.strain == -0.2
+    assert form.strain_exponent == -0.2
     assert a != s_0

@@ -11,17 +11,17 @@ from exported_laws import LAWS, TOLERANCE, case
 from fortran_library import PARAMETERS, compiled, pointer
 
 from creepkit.errors import ExportError
-from creepkit.export.fortran.creep import AbaqusCreep, CalculixCreep
-from creepkit.export.fortran.law_routine import law_routine
-from creepkit.export.fortran.text import RESERVED, number, statement, text_of
+from creepkit.export.fortran.creep import AbaqusCreepSubroutine, CalculixCreepSubroutine
+from creepkit.export.fortran.law_routine import law_subroutine
+from creepkit.export.fortran.text import FORTRAN_RESERVED, fortran_number, fortran_statement, fortran_expression
 from creepkit.export.identifiers import Identifiers
-from creepkit.export.program import Program
+from creepkit.export.program import LawCode
 from creepkit.language import CreepLaw, Param, mean_stress, parameters, principal_stress, stress
-from creepkit.language.symbols import POINT
+from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Units, ValuedLaw
+from creepkit.records import Units, LawWithValues
 
 A, n, a = parameters("A n a")
 RATE = Param("rate coefficient", bounds=(1e-40, 1e-5), unit="1/s", scale="log", off=0.0)
@@ -34,7 +34,7 @@ def law(term, params, name="foreign", **more):
 
 
 def routine_of(values, name):
-    return law_routine(Program(values, Identifiers(RESERVED, ignore_case=True)), name)
+    return law_subroutine(LawCode(values, Identifiers(FORTRAN_RESERVED, ignore_case=True)), name)
 
 
 # ---- the law -------------------------------------------------------------------------------------------------------
@@ -47,7 +47,7 @@ def test_every_law_agrees_with_50_digits(tmp_path):
             key = (name, *values.values())
             if key not in places:
                 places[key] = f"law{len(places)}"
-                lines += routine_of(ValuedLaw(LAWS[name], values), places[key])
+                lines += routine_of(LawWithValues(LAWS[name], values), places[key])
     library = compiled("\n".join(lines) + "\n", tmp_path, "laws")[0]
 
     bad = []
@@ -62,7 +62,7 @@ def test_every_law_agrees_with_50_digits(tmp_path):
 
 def rows_of(library, name, point, judged):
     """Value and derivatives of the rate and of each state's rate, and ln rate, at one point."""
-    rows, width = 1 + len(judged.states), len(POINT) + len(judged.states)
+    rows, width = 1 + len(judged.states), len(POINT_VARIABLES) + len(judged.states)
     given, out = np.array(point), np.empty(rows * (1 + width))
     getattr(library, f"{name}_")(pointer(given), pointer(out))
     values, slopes = out[:rows].copy(), out[rows:].reshape(rows, width).copy()
@@ -82,9 +82,9 @@ def test_functions_that_fortran_lacks_keep_their_digits_near_zero(tmp_path):
         "double precision, intent(out) :: out(6)",
         *(f"out({k}) = {name}(a)" for k, name in enumerate(PROBED, 1)),
     ]
-    from creepkit.export.fortran.text import functions, statements
+    from creepkit.export.fortran.text import stable_function_definitions, fortran_statements
 
-    text = statements([*lines, "contains", *functions(PROBED), "end subroutine probe"])
+    text = fortran_statements([*lines, "contains", *stable_function_definitions(PROBED), "end subroutine probe"])
     library = compiled("\n".join(text) + "\n", tmp_path, "probe")[0]
     for a in (1e-12, 3e-5, 0.02, 0.4, 0.6, 0.9, 1.1, 5.0, 40.0, 600.0):
         out = np.empty(6)
@@ -115,12 +115,12 @@ PROBED = _probed()
 
 @pytest.mark.parametrize("name", LAWS)
 def test_every_file_is_fixed_form(name):
-    given = ValuedLaw(LAWS[name], LAWS[name].center(), notes=["a note " * 30])
+    given = LawWithValues(LAWS[name], LAWS[name].center(), notes=["a note " * 30])
     if LAWS[name].uses(principal_stress):
         with pytest.raises(ExportError, match="largest principal stress"):
-            AbaqusCreep().text(given)
+            AbaqusCreepSubroutine().text(given)
         return
-    text = AbaqusCreep().text(given)
+    text = AbaqusCreepSubroutine().text(given)
     assert text.isascii() or not given.law.title.isascii()
     for line in text.splitlines():
         assert len(line) <= 72
@@ -131,9 +131,9 @@ def test_every_file_is_fixed_form(name):
 def test_files_compile_without_a_warning(tmp_path):
     sources = []
     for k, name in enumerate(["combined with temperature", "registered drifting-exponent", "foreign names of Python"]):
-        for exporter in (AbaqusCreep(), CalculixCreep()):
+        for exporter in (AbaqusCreepSubroutine(), CalculixCreepSubroutine()):
             sources.append(tmp_path / f"{exporter.name}{k}.f")
-            sources[-1].write_text(exporter.text(ValuedLaw(LAWS[name], LAWS[name].center())))
+            sources[-1].write_text(exporter.text(LawWithValues(LAWS[name], LAWS[name].center())))
     (tmp_path / "ABA_PARAM.INC").write_text("      implicit real*8(a-h,o-z)\n")
     flags = ["-fsyntax-only", "-Wall", "-Wno-zerotrip", "-Wno-unused-dummy-argument"]
     run = subprocess.run(["gfortran", *flags, *sources], cwd=tmp_path, capture_output=True, text=True, check=False)
@@ -141,8 +141,8 @@ def test_files_compile_without_a_warning(tmp_path):
 
 
 def test_the_head_says_law_units_values_notes_and_what_the_input_file_needs():
-    text = AbaqusCreep().text(
-        ValuedLaw(TIME_HARDENING, {"A": 1.5e-12, "n": 4.0, "m": -0.3}, ["n = 4, 95 % interval 3.8 to 4.2"])
+    text = AbaqusCreepSubroutine().text(
+        LawWithValues(TIME_HARDENING, {"A": 1.5e-12, "n": 4.0, "m": -0.3}, ["n = 4, 95 % interval 3.8 to 4.2"])
     )
     words = " ".join(re.sub(r"^! *", "", line) for line in text.splitlines() if line.startswith("!"))
     for said in (
@@ -157,31 +157,31 @@ def test_the_head_says_law_units_values_notes_and_what_the_input_file_needs():
 
 
 def test_names_that_clash_without_case_are_renamed_openly():
-    text = AbaqusCreep().text(
-        ValuedLaw(law(A * stress**n * a, {A: RATE, n: POWER, a: POWER}), NORTON_VALUES | {"a": 2})
+    text = AbaqusCreepSubroutine().text(
+        LawWithValues(law(A * stress**n * a, {A: RATE, n: POWER, a: POWER}), NORTON_VALUES | {"a": 2})
     )
     assert "! 'a' is called a_2 here" in text
     assert "parameter :: a_2 = 2.0d0" in text
 
 
 def test_a_name_is_made_an_identifier_and_short_enough():
-    text = AbaqusCreep().text(ValuedLaw(NORTON, NORTON_VALUES, name="2nd law of Würzburg, " + 9 * "long "))
+    text = AbaqusCreepSubroutine().text(LawWithValues(NORTON, NORTON_VALUES, name="2nd law of Würzburg, " + 9 * "long "))
     assert re.search(r"subroutine x_2nd_law_of_wurzbur\w*_law\(x, out\)", text)
     assert max(len(name) for name in re.findall(r"subroutine (\w+)", text)) <= 31
 
 
-@pytest.mark.parametrize("exporter", [AbaqusCreep(), CalculixCreep()])
+@pytest.mark.parametrize("exporter", [AbaqusCreepSubroutine(), CalculixCreepSubroutine()])
 def test_names_that_are_long_or_those_of_routines_compile(exporter, tmp_path):
     clash, long, longer = parameters(f"foreign_law a_{80 * 'y'} a_{80 * 'y'}z")
     source = law(clash * stress**long * longer, {clash: RATE, long: POWER, longer: POWER})
-    text = exporter.text(ValuedLaw(source, {clash.name: 1e-16, long.name: 5, longer.name: 2}))
+    text = exporter.text(LawWithValues(source, {clash.name: 1e-16, long.name: 5, longer.name: 2}))
     assert "! 'foreign_law' is called foreign_law_2 here" in text
     assert max(len(line) for line in text.splitlines() if line[:1] != "!") <= 72
     assert not compiled(text, tmp_path, "clash")[1]
 
 
 def test_a_saturating_rate_raises_no_floating_point_exception_at_long_times(tmp_path):
-    text = AbaqusCreep().text(ValuedLaw(LAWS["foreign saturating"], {"A": 1e-20, "r": 1e-3, "n": 4.0}))
+    text = AbaqusCreepSubroutine().text(LawWithValues(LAWS["foreign saturating"], {"A": 1e-20, "r": 1e-3, "n": 4.0}))
     driver = """
       program trapped
         double precision x(6), out(7)
@@ -199,26 +199,26 @@ def test_a_saturating_rate_raises_no_floating_point_exception_at_long_times(tmp_
 def test_what_creep_is_not_told_is_refused():
     first = law(A * principal_stress**n, {A: RATE, n: POWER})
     with pytest.raises(ExportError, match="largest principal stress, which Abaqus does not pass to CREEP"):
-        AbaqusCreep().text(ValuedLaw(first, NORTON_VALUES))
+        AbaqusCreepSubroutine().text(LawWithValues(first, NORTON_VALUES))
     mean = law(A * (stress + mean_stress) ** n, {A: RATE, n: POWER})
-    assert "-p*mpa" in AbaqusCreep().text(ValuedLaw(mean, NORTON_VALUES))
+    assert "-p*mpa" in AbaqusCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
     with pytest.raises(ExportError, match="mean stress, which CalculiX does not pass"):
-        CalculixCreep().text(ValuedLaw(mean, NORTON_VALUES))
+        CalculixCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
 
 
 def test_every_term_off_is_refused():
     with pytest.raises(ExportError, match="nothing to export"):
-        AbaqusCreep().text(ValuedLaw(NORTON, {"A": 0.0, "n": 5.0}))
+        AbaqusCreepSubroutine().text(LawWithValues(NORTON, {"A": 0.0, "n": 5.0}))
 
 
 def test_what_is_off_is_left_out():
-    text = AbaqusCreep().text(ValuedLaw(COMBINED, COMBINED.center() | {"A_1": 0.0, "m_1": 0.0}))
+    text = AbaqusCreepSubroutine().text(LawWithValues(COMBINED, COMBINED.center() | {"A_1": 0.0, "m_1": 0.0}))
     assert "log_sinh" not in text
     assert "switched off and left out: A_1 = 0, m_1 = 0" in text
 
 
 def test_units_are_constants_of_the_file():
-    text = AbaqusCreep().text(ValuedLaw(NORTON, NORTON_VALUES, units=Units("Pa", "h")))
+    text = AbaqusCreepSubroutine().text(LawWithValues(NORTON, NORTON_VALUES, units=Units("Pa", "h")))
     assert "parameter :: mpa = 1.0d-6" in text
     assert "parameter :: seconds = 3600.0d0" in text
     assert "! Stress in Pa, time in h, rates in 1/h." in text
@@ -226,12 +226,12 @@ def test_units_are_constants_of_the_file():
 
 def test_statements_break_between_tokens():
     long = "total = " + " + ".join(f"share_of_term_{k}*1.25d-{k:02d}" for k in range(20))
-    lines = statement(long)
+    lines = fortran_statement(long)
     assert all(len(line) <= 72 for line in lines)
     assert all(line.startswith("     &") for line in lines[1:])
     assert "".join(line[6:] for line in lines).replace(" ", "") == long.replace(" ", "")
 
 
 def test_numbers_are_double_precision():
-    assert [number(v) for v in (5, 1e-120, -2.5, 0.1)] == ["5.0d0", "1.0d-120", "-2.5d0", "0.1d0"]
-    assert text_of(stress**n / 3) == "(0.3333333333333333d0)*power(stress, n)"
+    assert [fortran_number(v) for v in (5, 1e-120, -2.5, 0.1)] == ["5.0d0", "1.0d-120", "-2.5d0", "0.1d0"]
+    assert fortran_expression(stress**n / 3) == "(0.3333333333333333d0)*power(stress, n)"

@@ -16,7 +16,7 @@ from mfront_blocks import ELASTIC, Block, compiled, declared, exported, scalar_f
 
 from creepkit.errors import ExportError
 from creepkit.language import CreepLaw, Elastic, Param, State, parameters, states, stress, temperature
-from creepkit.language.symbols import POINT
+from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -40,7 +40,7 @@ def test_every_law_agrees_with_50_digits(tmp_path):
     bad = []
     for name, law in LAWS.items():
         judged = case(name)
-        shape = (1 + len(law.states), 1 + len(POINT) + len(law.states))
+        shape = (1 + len(law.states), 1 + len(POINT_VARIABLES) + len(law.states))
         rows = np.zeros((len(judged.sets), *shape))
         for k, (point, values) in enumerate(zip(judged.drawn.points, judged.sets, strict=True)):
             x, out = (ctypes.c_double * point.size)(*point), (ctypes.c_double * (shape[0] * shape[1]))()

@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 from exported_laws import LAWS, TOLERANCE, case, renamed
 
-from creepkit.export import write_text
+from creepkit.export import write_export
 from creepkit.export.numpy import NumpyExporter
 from creepkit.export.python import PythonExporter
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Units, ValuedLaw
+from creepkit.records import Units, LawWithValues
 
 
 def module(law, folder, values=None, exporter=None, **more):
     """The exported module, loaded."""
-    source = ValuedLaw(law, values or law.center(), **more)
-    path = write_text(source, exporter or NumpyExporter(), folder / "exported_arrays.py", force=True)
+    source = LawWithValues(law, values or law.center(), **more)
+    path = write_export(source, exporter or NumpyExporter(), folder / "exported_arrays.py", force=True)
     spec = importlib.util.spec_from_file_location("exported_arrays", path)
     loaded = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(loaded)
@@ -82,7 +82,7 @@ def test_units_are_converted_on_entry_and_rates_on_exit(tmp_path):
 @pytest.mark.parametrize("name", LAWS)
 def test_the_module_needs_numpy_alone(name):
     """The error function, which NumPy lacks, comes from the standard library."""
-    text = NumpyExporter().text(ValuedLaw(LAWS[name], LAWS[name].center()))
+    text = NumpyExporter().text(LawWithValues(LAWS[name], LAWS[name].center()))
     imports = [node for node in ast.walk(ast.parse(text)) if isinstance(node, (ast.Import, ast.ImportFrom))]
     modules = {getattr(node, "module", None) or node.names[0].name for node in imports}
     assert modules <= {"numpy", "math"}

@@ -10,7 +10,7 @@ import sympy
 from exported_laws import LAWS, TOLERANCE, case, renamed
 
 from creepkit.errors import ExportError
-from creepkit.export import write_text
+from creepkit.export import write_export
 from creepkit.export.python import PythonExporter
 from creepkit.language import (
     CreepLaw,
@@ -27,7 +27,7 @@ from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Units, ValuedLaw
+from creepkit.records import Units, LawWithValues
 
 A, n, C = parameters("A n C")
 (omega,) = states("omega")
@@ -42,8 +42,8 @@ DAMAGE = CreepLaw(
 
 
 def module(law, folder, values=None, notes=(), **more):
-    source = ValuedLaw(law, values or law.center(), notes, **more)
-    path = write_text(source, PythonExporter(), folder / "exported_law.py", force=True)
+    source = LawWithValues(law, values or law.center(), notes, **more)
+    path = write_export(source, PythonExporter(), folder / "exported_law.py", force=True)
     spec = importlib.util.spec_from_file_location("exported_law", path)
     loaded = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(loaded)
@@ -148,7 +148,7 @@ def test_branches_are_taken_lazily(tmp_path):
 
 def test_the_module_needs_math_alone_and_says_what_it_is():
     law = COMBINED.times(arrhenius())
-    source = ValuedLaw(law, law.center(), ["n_1 = 4.5 +- 0.2", "700 to\n900 C"])
+    source = LawWithValues(law, law.center(), ["n_1 = 4.5 +- 0.2", "700 to\n900 C"])
     text = PythonExporter().text(source)
     imports = [node for node in ast.walk(ast.parse(text)) if isinstance(node, (ast.Import, ast.ImportFrom))]
     assert [node.module for node in imports] == ["math"]
@@ -166,7 +166,7 @@ def test_the_module_needs_math_alone_and_says_what_it_is():
 
 
 def test_constraints_are_told():
-    text = PythonExporter().text(ValuedLaw(NORTON.with_temperature(n=linear()), {"A": 1e-16, "n": 5, "n_T": 1e-9}))
+    text = PythonExporter().text(LawWithValues(NORTON.with_temperature(n=linear()), {"A": 1e-16, "n": 5, "n_T": 1e-9}))
     assert "# Valid where n + n_T*(temperature - 1073.15) >= 0." in text
 
 
@@ -201,4 +201,4 @@ def test_words_of_python_and_math_may_name_parameters(tmp_path):
 def test_a_function_without_a_form_in_python_is_refused():
     law = CreepLaw("gamma", {"x": A * sympy.gamma(stress)}, {A: COEFFICIENT})
     with pytest.raises(ExportError, match="cannot be written as Python: law 'gamma', term 'x': the function gamma"):
-        PythonExporter().text(ValuedLaw(law, {"A": 1e-9}))
+        PythonExporter().text(LawWithValues(law, {"A": 1e-9}))

@@ -10,24 +10,24 @@ from foreign_laws import EQUATIONS
 from creepkit.errors import ExportError
 from creepkit.export.latex import LatexExporter
 from creepkit.export.markdown import MarkdownExporter
-from creepkit.export.mathml import NAMESPACE, MathmlExporter, MathmlPrinter
+from creepkit.export.mathml import MATHML_NAMESPACE, MathmlExporter, MathmlPrinter
 from creepkit.language import arrhenius, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
-from creepkit.records import Units, ValuedLaw
-from creepkit.registry import default
+from creepkit.records import Units, LawWithValues
+from creepkit.registry import default_registry
 
-LAWS = {name: default().law(name) for name in sorted(default().laws())} | EQUATIONS
+LAWS = {name: default_registry().law(name) for name in sorted(default_registry().laws())} | EQUATIONS
 NOTES = ("n = 4.5 [4.4, 4.6]", "valid from 700 to 900 C\nand below 200 MPa", "a | b & <c> `d` $e$ _f_ *g* \x0b\x00")
-WARM = ValuedLaw(NORTON.times(arrhenius(1073.15)), {"A": 1.2e-16, "n": 5.2, "Q": 4e5}, NOTES)
+WARM = LawWithValues(NORTON.times(arrhenius(1073.15)), {"A": 1.2e-16, "n": 5.2, "Q": 4e5}, NOTES)
 SHEETS = [MarkdownExporter(), MathmlExporter(), LatexExporter()]
 
 
 def page(law, **more):
     """The page of MathML, parsed, and its <math> elements."""
-    root = ET.fromstring(MathmlExporter().text(ValuedLaw(law, law.center(), NOTES, **more)))
-    return root, root.findall(f".//{{{NAMESPACE}}}math")
+    root = ET.fromstring(MathmlExporter().text(LawWithValues(law, law.center(), NOTES, **more)))
+    return root, root.findall(f".//{{{MATHML_NAMESPACE}}}math")
 
 
 def flat(element) -> str:
@@ -47,7 +47,7 @@ def test_mathml_is_well_formed_and_every_element_has_its_children(name):
     assert root.tag == "{http://www.w3.org/1999/xhtml}html"
     assert len(found) == 1 + len(law.states) + 2 * (len(law.params) + len(law.states)) + len(law.constraints)
     for element in (e for one in found for e in one.iter()):
-        tag = element.tag.removeprefix(f"{{{NAMESPACE}}}")
+        tag = element.tag.removeprefix(f"{{{MATHML_NAMESPACE}}}")
         assert tag[0] == "m"
         assert tag not in ARITY or len(element) == ARITY[tag]
         assert bool((element.text or "").strip()) == (tag in ("mi", "mn", "mo", "mtext")) or not len(element)
@@ -56,7 +56,7 @@ def test_mathml_is_well_formed_and_every_element_has_its_children(name):
 @pytest.mark.parametrize("name", ["combined", "two regimes", "Liu-Murakami", "combined with temperature"])
 def test_mathml_names_no_character_that_xml_does_not_know(name):
     law = LAWS[name]
-    text = MathmlExporter().text(ValuedLaw(law, law.center(), NOTES))
+    text = MathmlExporter().text(LawWithValues(law, law.center(), NOTES))
     assert {*re.findall(r"&(\w+);", text)} <= {"amp", "lt", "gt", "quot", "apos"}
     assert not any(
         f"&{known}" in text for known in html.entities.html5 if known in ("InvisibleTimes;", "ExponentialE;")
@@ -65,7 +65,7 @@ def test_mathml_names_no_character_that_xml_does_not_know(name):
 
 def test_mathml_reads_as_the_equation():
     _, (rate, *_) = page(COMBINED)
-    first, second, third = rate.findall(f".//{{{NAMESPACE}}}mtr")
+    first, second, third = rate.findall(f".//{{{MATHML_NAMESPACE}}}mtr")
     assert flat(first) == "ε˙cr=A1sinh(σeB)n1"
     assert flat(second) == "+A2εcrm1σen2"
     assert flat(third) == "+A3σen3tm2"
@@ -98,7 +98,7 @@ def test_mathml_tells_values_and_text_as_text():
 @pytest.mark.parametrize("name", LAWS)
 def test_markdown_has_one_table_whose_rows_have_four_cells(name):
     law = LAWS[name]
-    text = MarkdownExporter().text(ValuedLaw(law, law.center(), NOTES))
+    text = MarkdownExporter().text(LawWithValues(law, law.center(), NOTES))
     assert text.count("$$") == 2
     before, equation, after = text.split("$$")
     assert before.startswith("# ")
@@ -156,9 +156,9 @@ def test_a_law_that_no_numbers_convert_is_refused(exporter):
     with pytest.raises(
         ExportError, match="no constants give it with stress is a ratio to 1 Pa.*export it in MPa and s"
     ):
-        exporter.text(ValuedLaw(law, law.center() | {"m_T": 9e-6}, units=Units("Pa", "h")))
+        exporter.text(LawWithValues(law, law.center() | {"m_T": 9e-6}, units=Units("Pa", "h")))
 
 
 def test_a_law_that_fails_says_when():
     law = EQUATIONS["Kachanov-Rabotnov"]
-    assert "The material has failed when omega reaches 0.99." in MarkdownExporter().text(ValuedLaw(law, law.center()))
+    assert "The material has failed when omega reaches 0.99." in MarkdownExporter().text(LawWithValues(law, law.center()))

@@ -6,9 +6,9 @@ import sympy
 from foreign_laws import POWER, RATE, A, k, law, n, number
 
 from creepkit import kernels
-from creepkit.fem.body import Body, body_of
-from creepkit.fem.record import DEFLECTION_LIMIT, LIMIT_LOAD, STRAIN_LIMIT, TOO_MANY_STEPS, Settings
-from creepkit.fem.simulation import REASONS, Course, Simulation, simulate
+from creepkit.fem.body import FiniteElementModel, finite_element_model
+from creepkit.fem.record import DEFLECTION_LIMIT, LIMIT_LOAD, STRAIN_LIMIT, TOO_MANY_STEPS, SolverSettings
+from creepkit.fem.simulation import REASONS, LoadHistory, Simulation, simulate
 from creepkit.language import CreepLaw, Elastic, strain, stress, time
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
@@ -22,17 +22,17 @@ END = 14400.0
 
 
 @pytest.fixture(scope="module")
-def body() -> Body:
-    return body_of(DimpleGeometry().mesh(0.5))
+def body() -> FiniteElementModel:
+    return finite_element_model(DimpleGeometry().mesh(0.5))
 
 
-def run(body: Body, creep: CreepLaw, values, pressure: Program = RAMP, end: float = END, **settings) -> Simulation:
+def run(body: FiniteElementModel, creep: CreepLaw, values, pressure: Program = RAMP, end: float = END, **settings) -> Simulation:
     kernel = kernels.lower(creep, "numba")
-    course = Course(pressure, Program.constant(300.0), Program.constant(150e3), end)
-    return simulate(kernel, kernel.internal(values)[0], body, course, settings=Settings(**settings), keep_points=True)
+    course = LoadHistory(pressure, Program.constant(300.0), Program.constant(150e3), end)
+    return simulate(kernel, kernel.to_internal(values)[0], body, course, settings=SolverSettings(**settings), keep_points=True)
 
 
-def history_is_kept(made: Simulation, body: Body) -> None:
+def history_is_kept(made: Simulation, body: FiniteElementModel) -> None:
     """Finite up to the end, nothing after it."""
     assert made.end_time == made.times[-1]
     assert np.isfinite(made.displacements).all()
@@ -45,7 +45,7 @@ def history_is_kept(made: Simulation, body: Body) -> None:
 def test_burst_by_deflection(body) -> None:
     made = run(body, NORTON, FAST, deflection_limit=1.0)
     apex = made.displacements[:, body.top[0], 1]
-    assert (made.status, made.reason) == (Status.BURST, REASONS[DEFLECTION_LIMIT])
+    assert (made.status, made.reason) == (Status.RUPTURED, REASONS[DEFLECTION_LIMIT])
     assert apex[-2] < 1.0 <= apex[-1]
     assert 0 < made.end_time < END
     history_is_kept(made, body)
@@ -54,7 +54,7 @@ def test_burst_by_deflection(body) -> None:
 def test_burst_by_strain(body) -> None:
     made = run(body, NORTON, FAST, strain_limit=0.05)
     largest = made.values[:, :, 3].max(axis=1)
-    assert (made.status, made.reason) == (Status.BURST, REASONS[STRAIN_LIMIT])
+    assert (made.status, made.reason) == (Status.RUPTURED, REASONS[STRAIN_LIMIT])
     assert largest[-2] < 0.05 <= largest[-1]
     history_is_kept(made, body)
 
@@ -71,7 +71,7 @@ def test_a_burst_lies_where_the_unlimited_run_passes_the_limit(body) -> None:
 def test_the_cap_on_steps_counts_those_refused_as_well(body, most: int) -> None:
     made = run(body, NORTON, FAST, max_steps=most)
     assert (made.status, made.reason) == (Status.NOT_CONVERGED, REASONS[TOO_MANY_STEPS])
-    assert made.counts[:2].sum() == most
+    assert made.iterations[:2].sum() == most
     history_is_kept(made, body)
 
 
@@ -82,7 +82,7 @@ def test_limit_load(body) -> None:
     when it has bulged, more.
     """
     made = run(body, HYPERBOLIC_SINE, {"A": 1e-5, "n": 3.0, "B": 1.0}, deflection_limit=np.inf, strain_limit=np.inf)
-    assert (made.status, made.reason) == (Status.BURST, REASONS[LIMIT_LOAD])
+    assert (made.status, made.reason) == (Status.RUPTURED, REASONS[LIMIT_LOAD])
     assert made.end_time < 5.0
     assert made.mises.max() < 30.0
     history_is_kept(made, body)
@@ -91,7 +91,7 @@ def test_limit_load(body) -> None:
 def test_an_elastic_roof_that_buckles_has_a_limit_load_too(body) -> None:
     """Suction of 5e5 MPa, at once: no equilibrium, and no row but that of rest."""
     made = run(body, NORTON, {"A": 1e-40, "n": 1.0}, Program.constant(-5e5), deflection_limit=np.inf)
-    assert (made.status, made.reason) == (Status.BURST, REASONS[LIMIT_LOAD])
+    assert (made.status, made.reason) == (Status.RUPTURED, REASONS[LIMIT_LOAD])
     assert made.times.tolist() == [0.0]
 
 
@@ -114,9 +114,9 @@ WILD = {
 @pytest.mark.parametrize("name", WILD)
 def test_a_wild_law_ends_with_a_status(body, name: str) -> None:
     made = run(body, *WILD[name])
-    assert made.status in (Status.BURST, Status.NOT_CONVERGED)
+    assert made.status in (Status.RUPTURED, Status.NOT_CONVERGED)
     assert made.reason
-    assert made.counts[:2].sum() <= Settings().max_steps
+    assert made.iterations[:2].sum() <= SolverSettings().max_steps
     history_is_kept(made, body)
 
 
@@ -130,7 +130,7 @@ def test_a_failed_test_predicts_nothing_after_its_end() -> None:
     found = Bulge(refinement=0.5, threads=1, deflection_limit=0.5).predict(
         NORTON, {"A": np.array([1e-13, 1e-11, 1e-5]), "n": np.array([3.0, 3.0, 8.0])}, [test]
     )
-    assert found.status[:, 0].tolist() == [Status.COMPLETE, Status.BURST, Status.BURST]
+    assert found.status[:, 0].tolist() == [Status.COMPLETE, Status.RUPTURED, Status.RUPTURED]
     for c in range(3):
         assert (np.isfinite(found.values[c, 0]) == (times <= found.end_times[c, 0])[:, None]).all()
     assert found.end_times[0, 0] == END

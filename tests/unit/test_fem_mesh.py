@@ -7,9 +7,9 @@ import pytest
 
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS, Mesh
-from creepkit.fem.mesh_checks import half_bandwidth, outline, quality
-from creepkit.fem.shape import POINTS, discretize, geometry_change, shape_functions, shape_gradients
-from creepkit.fem.strip import strip, strip_nodes
+from creepkit.fem.mesh_checks import half_bandwidth, outline, mesh_quality
+from creepkit.fem.shape import GAUSS_POINTS, discretize, geometry_derivative, shape_functions, shape_gradients
+from creepkit.fem.strip import strip_mesh, strip_nodes
 
 MIDDLES = 0.5 * (CORNERS + np.roll(CORNERS, -1, axis=0))
 NODES = np.vstack([CORNERS, MIDDLES])
@@ -22,7 +22,7 @@ def ring(columns: int, layers: int, bend: float = 0.4) -> Mesh:
     angle = np.linspace(np.pi / 2, 0, 2 * columns + 1)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     breaks = np.linspace(0, 1, layers + 1) ** (1 + bend)
-    body = strip(CENTRE + circle, CENTRE + 2 * circle, breaks)
+    body = strip_mesh(CENTRE + circle, CENTRE + 2 * circle, breaks)
     held = np.zeros(body.nodes.shape, bool)
     held[body.last] = True
     return Mesh(body.nodes, body.elements, held, body.inner, [])
@@ -50,8 +50,8 @@ def test_shape_gradients_are_the_differences_of_the_values():
 def test_points_are_those_of_gauss_near_the_corner_of_their_number():
     for i, j in [(0, 0), (1, 0), (3, 2), (2, 2), (3, 3)]:
         exact = (2 / (i + 1) if i % 2 == 0 else 0) * (2 / (j + 1) if j % 2 == 0 else 0)
-        assert (POINTS[:, 0] ** i * POINTS[:, 1] ** j).sum() == pytest.approx(exact, abs=1e-15)
-    assert (np.sign(POINTS) == CORNERS).all()
+        assert (GAUSS_POINTS[:, 0] ** i * GAUSS_POINTS[:, 1] ** j).sum() == pytest.approx(exact, abs=1e-15)
+    assert (np.sign(GAUSS_POINTS) == CORNERS).all()
 
 
 def test_a_linear_field_has_its_gradient_at_every_point_of_a_curved_mesh():
@@ -78,7 +78,7 @@ def test_area_and_volume_of_a_ring_converge_with_the_fourth_order():
 def test_geometry_change_is_the_derivative_of_what_the_mesh_becomes():
     mesh = ring(3, 2)
     velocity = np.random.default_rng(2).normal(size=mesh.nodes.shape)
-    change, step = geometry_change(mesh, velocity), 1e-6
+    change, step = geometry_derivative(mesh, velocity), 1e-6
     ahead, behind = (discretize(mesh.moved(mesh.nodes + s * velocity)) for s in (step, -step))
     at = discretize(mesh)
     growth = np.log(ahead.weights / behind.weights) / (2 * step)
@@ -100,7 +100,7 @@ def test_a_strip_is_numbered_across(columns, layers):
 def test_sides_of_a_strip_lie_on_its_lines_with_the_solid_to_their_left():
     angle = np.linspace(np.pi / 2, 0, 9)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    body = strip(CENTRE + circle, CENTRE + 2 * circle, np.array([0, 0.2, 1.0]))
+    body = strip_mesh(CENTRE + circle, CENTRE + 2 * circle, np.array([0, 0.2, 1.0]))
     for sides, radius, sense in ((body.inner, 1, -1), (body.outer, 2, 1)):
         ends = body.nodes[sides] - CENTRE
         np.testing.assert_allclose(np.hypot(*ends.reshape(-1, 2).T), radius, rtol=1e-14)
@@ -128,7 +128,7 @@ def test_the_outline_of_a_strip_are_its_four_sides():
 def test_quality_is_one_of_a_rectangle_and_the_sine_of_a_parallelogram():
     for lean, sine in ((0.0, 1.0), (1.0, np.sqrt(0.5))):
         nodes = NODES @ [[2.0, 0.0], [lean, 1.0]] + [5.0, 0.0]
-        worst = quality(Mesh(nodes, [np.arange(8)], np.zeros((8, 2), bool), [], []))
+        worst = mesh_quality(Mesh(nodes, [np.arange(8)], np.zeros((8, 2), bool), [], []))
         assert worst.sine == pytest.approx(sine)
         assert worst.evenness == pytest.approx(1.0)
 

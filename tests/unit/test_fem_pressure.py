@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from creepkit import kernels
-from creepkit.fem.body import Body, body_of
-from creepkit.fem.element import BALANCED, assemble, forces_of, point_room, points_of
-from creepkit.fem.material import Stage
+from creepkit.fem.body import FiniteElementModel, finite_element_model
+from creepkit.fem.element import BALANCED, assemble, force_workspace, point_workspace, virgin_points
+from creepkit.fem.material import StageConditions
 from creepkit.fem.pressure import side_force, side_stiffness
 from creepkit.laws.norton import NORTON
 from creepkit.specimens.dimple import DimpleGeometry
@@ -31,9 +31,9 @@ def stiffness(ends: np.ndarray) -> np.ndarray:
     return out.reshape(2, 2, 3, 3).transpose(0, 2, 1, 3)
 
 
-def deformed(geometry: DimpleGeometry) -> tuple[Body, np.ndarray]:
+def deformed(geometry: DimpleGeometry) -> tuple[FiniteElementModel, np.ndarray]:
     """A coarse body, and displacements of up to 0.3 mm that respect what is held."""
-    body = body_of(geometry.mesh(0.5))
+    body = finite_element_model(geometry.mesh(0.5))
     r, z = body.nodes.T
     u = 0.3 * np.stack([np.sin(r) * np.cos(z), np.cos(0.3 * r) * z / 4], axis=1).ravel()
     return body, np.where(body.equations >= 0, u, 0.0)
@@ -56,7 +56,7 @@ def test_stiffness_of_a_side_is_the_derivative_of_its_force() -> None:
             np.testing.assert_allclose(found[:, :, i, a], slope, atol=1e-9)
 
 
-def surface_stiffness(body: Body, u: np.ndarray) -> np.ndarray:
+def surface_stiffness(body: FiniteElementModel, u: np.ndarray) -> np.ndarray:
     """Derivatives (2 nodes, 2 nodes) of the forces of a unit pressure on the whole surface."""
     total = np.zeros((u.size, u.size))
     for nodes in body.pressed:
@@ -90,13 +90,13 @@ def test_load_stiffness_is_skew_at_a_free_end() -> None:
     assert skew[2 * foot + 1, 2 * foot] != 0.0
 
 
-def tangents(geometry: DimpleGeometry) -> tuple[Body, np.ndarray, np.ndarray, np.ndarray]:
+def tangents(geometry: DimpleGeometry) -> tuple[FiniteElementModel, np.ndarray, np.ndarray, np.ndarray]:
     """Body, displacements, the tangent that Newton's method takes, and differences of the residual, (size, size)."""
     body, u = deformed(geometry)
     kernel = kernels.lower(NORTON, "numba")
-    theta = kernel.internal({"A": 1e-15, "n": 4.0})[0]
-    stage = Stage(0.0, 0.0, 300.0, E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU)), PRESSURE)
-    points, room, forces = points_of(4 * len(body.elements), 0, 2), point_room(0, 0), forces_of(body)
+    theta = kernel.to_internal({"A": 1e-15, "n": 4.0})[0]
+    stage = StageConditions(0.0, 0.0, 300.0, E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU)), PRESSURE)
+    points, room, forces = virgin_points(4 * len(body.elements), 0, 2), point_workspace(0, 0), force_workspace(body)
 
     def residual(moved: np.ndarray, stiff: bool = False) -> np.ndarray:
         assert assemble(kernel.update, theta, body, stage, moved, points, room, forces, stiff, 1e-3) == BALANCED

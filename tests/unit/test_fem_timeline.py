@@ -7,14 +7,14 @@ import pytest
 
 import creepkit as ck
 from creepkit import kernels
-from creepkit.fem.body import body_of
-from creepkit.fem.march import Settings
-from creepkit.fem.simulation import Course, simulate
-from creepkit.fem.timeline import Timeline
+from creepkit.fem.body import finite_element_model
+from creepkit.fem.march import SolverSettings
+from creepkit.fem.simulation import LoadHistory, simulate
+from creepkit.fem.timeline import TimeInterpolation
 from creepkit.records import Program
 from creepkit.specimens.dimple import DimpleGeometry
 
-DIMPLE = body_of(DimpleGeometry().mesh(0.5))
+DIMPLE = finite_element_model(DimpleGeometry().mesh(0.5))
 LAWS = {
     "norton": {"A": 6e-14, "n": 4.0},
     "strain-hardening": {"A": 1e-17, "n": 4.0, "m": -0.9},
@@ -41,7 +41,7 @@ def doubling(start, end, beta=1.0, share=1.0):
 @pytest.mark.parametrize("beta", [0.05, 0.3, 0.8])
 def test_a_power_of_time_from_zero_is_met_however_early_one_asks(beta):
     steps = doubling(0, 43200, beta, 0.05)
-    line = Timeline.of(steps, np.zeros(steps.size, int), program((0, 43200, 8, 8)), beta)
+    line = TimeInterpolation.from_steps(steps, np.zeros(steps.size, int), program((0, 43200, 8, 8)), beta)
     asked = np.array([1e-6, 0.01, 1, 7, 60, 1000, 43200])
     np.testing.assert_allclose(line.interpolate(1 + steps**beta, asked), 1 + asked**beta, rtol=1e-2)
 
@@ -50,7 +50,7 @@ def test_a_power_of_time_from_zero_is_met_however_early_one_asks(beta):
 def test_a_transient_after_a_jump_is_met_within_a_thousandth(decay):
     before, after = doubling(0, 14400), doubling(14400, 43200)
     times, segments = np.concatenate([before, after]), np.repeat([0, 1], [before.size, after.size])
-    line = Timeline.of(times, segments, program((0, 14400, 8, 8), (14400, 43200, 10, 10)))
+    line = TimeInterpolation.from_steps(times, segments, program((0, 14400, 8, 8), (14400, 43200, 10, 10)))
 
     def relaxing(y):
         return np.log1p(y / (decay + 20.0))
@@ -63,7 +63,7 @@ def test_a_transient_after_a_jump_is_met_within_a_thousandth(decay):
 
 def test_a_jump_has_the_value_before_it_and_time_zero_the_one_after():
     times, segments = np.array([0.0, 0.0, 10, 30, 100, 100, 110, 130]), np.array([0, 0, 0, 0, 0, 1, 1, 1])
-    line = Timeline.of(times, segments, program((0, 100, 8, 8), (100, 130, 10, 10)))
+    line = TimeInterpolation.from_steps(times, segments, program((0, 100, 8, 8), (100, 130, 10, 10)))
     values = np.array([0.0, 1, 2, 3, 4, 7, 8, 9])
     np.testing.assert_allclose(line.interpolate(values, [0, 10, 100, 130]), [1, 2, 4, 9], rtol=1e-14)
     assert 7 < line.interpolate(values, 100.01)[0] < 7.1
@@ -72,7 +72,7 @@ def test_a_jump_has_the_value_before_it_and_time_zero_the_one_after():
 
 def test_a_short_last_step_does_not_turn_its_small_errors_into_a_slope():
     times = np.append(doubling(0, 40000), 40003.0)
-    line = Timeline.of(times, np.zeros(times.size, int), program((0, 40003, 8, 8)))
+    line = TimeInterpolation.from_steps(times, np.zeros(times.size, int), program((0, 40003, 8, 8)))
     values = np.log1p(times / 500)
     values[-2] += 1e-4
     asked = np.array([22000.0, 28000, 35000, 39000])
@@ -80,14 +80,14 @@ def test_a_short_last_step_does_not_turn_its_small_errors_into_a_slope():
 
 
 def test_a_ramp_taken_in_one_step_is_straight():
-    line = Timeline.of(np.array([0.0, 5.0]), np.zeros(2, int), program((0, 5, 0, 8)), 0.1)
+    line = TimeInterpolation.from_steps(np.array([0.0, 5.0]), np.zeros(2, int), program((0, 5, 0, 8)), 0.1)
     asked = np.array([0, 0.1, 2.5, 5])
     np.testing.assert_allclose(line.interpolate(np.array([0.0, 1.0]), asked), asked / 5, atol=1e-15)
 
 
 def test_moving_all_steps_moves_the_curve():
     steps = doubling(100.0, 5000.0)
-    line = Timeline.of(
+    line = TimeInterpolation.from_steps(
         np.concatenate([[0.0, 100.0], steps[1:]]),
         np.concatenate([[0, 0], np.ones(steps.size - 1, int)]),
         program((0, 100, 0, 8), (100, 5000, 8, 8)),
@@ -101,9 +101,9 @@ def test_moving_all_steps_moves_the_curve():
 @cache
 def run_of(law, pressure, few):
     kernel = kernels.lower(ck.law(law), "numba")
-    theta = kernel.internal(ck.law(law).values(LAWS[law]))[0]
-    course = Course(pressure, Program.constant(1000.0), Program.constant(150e3), 1200.0)
-    return simulate(kernel, theta, DIMPLE, course, settings=Settings() if few else Settings(1e-3, 1e-5, 1.0))
+    theta = kernel.to_internal(ck.law(law).values(LAWS[law]))[0]
+    course = LoadHistory(pressure, Program.constant(1000.0), Program.constant(150e3), 1200.0)
+    return simulate(kernel, theta, DIMPLE, course, settings=SolverSettings() if few else SolverSettings(1e-3, 1e-5, 1.0))
 
 
 def apex(law, pressure, times, few):

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from steady import Steady, planted
 
 from creepkit.errors import CreepkitError
-from creepkit.inverse.files import from_json, load, to_json
-from creepkit.inverse.identification import Identification, Settings
+from creepkit.inverse.files import identification_from_json, load_identification, identification_to_json
+from creepkit.inverse.identification import Identification, IdentificationSettings
 from creepkit.inverse.identify import identify
 from creepkit.laws.norton import NORTON
 
@@ -25,14 +25,14 @@ FUZZ = settings(max_examples=150, deadline=None, derandomize=True, suppress_heal
 @pytest.fixture(scope="module")
 def valid():
     tests = planted(NORTON, {"A": 1e-16, "n": 5.0}, [(s, 1050.0) for s in (30, 50, 80)], seed=1, noise=1e-5)
-    fit = identify(NORTON, tests, Steady(), settings=Settings(starts=1, draws=4, frames=10))
-    return json.loads(json.dumps(to_json(fit)))
+    fit = identify(NORTON, tests, Steady(), settings=IdentificationSettings(starts=1, sobol_points=4, frames=10))
+    return json.loads(json.dumps(identification_to_json(fit)))
 
 
 def read(data):
     """Read: the answer, or the one error that reading may raise."""
     try:
-        return from_json(data)
+        return identification_from_json(data)
     except CreepkitError as error:
         return error
 
@@ -65,4 +65,4 @@ def test_any_bytes(tmp_path_factory, content):
     path = tmp_path_factory.mktemp("fuzz") / "fit.json"
     path.write_bytes(content)
     with pytest.raises(CreepkitError, match=r"fit\.json"):
-        load(path)
+        load_identification(path)

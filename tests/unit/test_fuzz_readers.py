@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from creepkit.errors import HistoryError
-from creepkit.readers.history_csv import CSV
+from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.indexed import INDEXED_FILES, INDEXED_TABLE
 from creepkit.readers.writing import write_history
 from creepkit.records import History, PressureJump, Program, Reader, StressSteps, constant_stress
@@ -67,8 +67,8 @@ def attempt(reader: Reader, path: Path) -> tuple[list[History], str]:
 
 def read_or_refuse(text: str | bytes, path: Path) -> None:
     path.write_bytes(text if isinstance(text, bytes) else text.encode("utf-8", errors="surrogatepass"))
-    assert CSV.accepts(path)
-    histories, complaint = attempt(CSV, path)
+    assert HISTORY_CSV.accepts(path)
+    histories, complaint = attempt(HISTORY_CSV, path)
     assert all(isinstance(history, History) and history.times.size > 1 for history in histories)
     assert bool(histories) != (str(path) in complaint)
     assert "\n" not in complaint
@@ -138,7 +138,7 @@ loadings = st.one_of(
 def test_round_trip(tmp_path, times, strain, loading, temperature, name, labels):
     outputs = {"strain": strain[: len(times)]}
     history = History(name, np.array(times), outputs, loading, temperature, labels=labels)
-    (back,) = CSV.read(write_history(history, tmp_path / "x.csv"))
+    (back,) = HISTORY_CSV.read(write_history(history, tmp_path / "x.csv"))
     assert (back.name, back.loading, back.temperature, back.labels) == (name, loading, history.temperature, labels)
     np.testing.assert_array_equal(back.times, history.times)
     np.testing.assert_array_equal(back.outputs["strain"], history.outputs["strain"])

@@ -5,44 +5,44 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from creepkit.integration.clock import SMALLEST_BETA, Clock, moment, plain, position, shifted, velocity, virgin
+from creepkit.integration.clock import SMALLEST_EXPONENT, TimeTransformation, transformed_time, linear_time, position, shifted_power_law_time, transformation_derivatives, power_law_time
 
 CLOCKS = [
-    Clock(0.0, 1e5, 0.3, 0.0),
-    Clock(0.0, 1e5, 0.05, 0.0),
-    Clock(3e3, 1e5, 0.4, 2.0),
-    Clock(3e3, 1e5, 0.4, 4e9),
-    Clock(3e3, 1e5, -0.7, 5e2),
-    plain(7.0, 20.0),
+    TimeTransformation(0.0, 1e5, 0.3, 0.0),
+    TimeTransformation(0.0, 1e5, 0.05, 0.0),
+    TimeTransformation(3e3, 1e5, 0.4, 2.0),
+    TimeTransformation(3e3, 1e5, 0.4, 4e9),
+    TimeTransformation(3e3, 1e5, -0.7, 5e2),
+    linear_time(7.0, 20.0),
 ]
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
-def test_position_and_moment_are_inverse(clock: Clock) -> None:
+def test_position_and_moment_are_inverse(clock: TimeTransformation) -> None:
     for s in (1e-3, 0.2, 0.7, 1.0):
-        assert position(clock, moment(clock, s).time) == pytest.approx(s, rel=1e-8)
+        assert position(clock, transformed_time(clock, s).time) == pytest.approx(s, rel=1e-8)
     assert position(clock, clock.start) == 0.0
-    assert moment(clock, 1.0).time == pytest.approx(clock.start + clock.length, rel=1e-14)
+    assert transformed_time(clock, 1.0).time == pytest.approx(clock.start + clock.length, rel=1e-14)
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
-def test_pace_is_the_derivative_of_time(clock: Clock) -> None:
+def test_pace_is_the_derivative_of_time(clock: TimeTransformation) -> None:
     for s in (0.1, 0.5, 0.9):
         h = 1e-5 * s
-        difference = (moment(clock, s + h).time - moment(clock, s - h).time) / (2 * h)
-        assert np.exp(moment(clock, s).log_pace) == pytest.approx(difference, rel=1e-6)
+        difference = (transformed_time(clock, s + h).time - transformed_time(clock, s - h).time) / (2 * h)
+        assert np.exp(transformed_time(clock, s).log_pace) == pytest.approx(difference, rel=1e-6)
 
 
 @pytest.mark.parametrize("clock", CLOCKS[:3] + CLOCKS[4:5])
-def test_velocity_is_the_derivative_to_the_clock(clock: Clock) -> None:
-    by_beta, by_tau = velocity(clock, 0.4)
+def test_velocity_is_the_derivative_to_the_clock(clock: TimeTransformation) -> None:
+    by_beta, by_tau = transformation_derivatives(clock, 0.4)
     for field, found in (("beta", by_beta), ("tau", by_tau)):
         value = getattr(clock, field)
         if value == 0.0:
             assert found == (0.0, 0.0)
             continue
         h = 1e-5 * value
-        up, down = (moment(clock._replace(**{field: value + d}), 0.4) for d in (h, -h))
+        up, down = (transformed_time(clock._replace(**{field: value + d}), 0.4) for d in (h, -h))
         assert found.time == pytest.approx((up.time - down.time) / (2 * h), rel=1e-6)
         assert found.log_pace == pytest.approx((up.log_pace - down.log_pace) / (2 * h), rel=1e-6)
 
@@ -50,15 +50,15 @@ def test_velocity_is_the_derivative_to_the_clock(clock: Clock) -> None:
 @pytest.mark.parametrize(("exponent", "lag"), [(0.4, 50.0), (0.9, 3e4), (-0.5, 1e3)])
 def test_a_shifted_power_of_time_gives_its_own_clock(exponent: float, lag: float) -> None:
     """For p = (1 + y/lag)^exponent, p'' = r p' with r = (exponent - 1)/(lag + y)."""
-    clock = shifted(10.0, 1e4, (exponent - 1) / lag, -(exponent - 1) / lag**2)
+    clock = shifted_power_law_time(10.0, 1e4, (exponent - 1) / lag, -(exponent - 1) / lag**2)
     assert (clock.beta, clock.tau) == pytest.approx((exponent, lag), rel=1e-12)
 
 
 def test_a_curve_that_does_not_harden_gets_plain_time() -> None:
     for bend, rate in ((1e-3, 1e-6), (-1e-3, -1e-6), (float("nan"), 1.0), (0.0, 0.0)):
-        assert shifted(0.0, 100.0, bend, rate) == plain(0.0, 100.0)
+        assert shifted_power_law_time(0.0, 100.0, bend, rate) == linear_time(0.0, 100.0)
 
 
 def test_exponents_are_kept_within_reach() -> None:
-    assert virgin(0.0, 1.0, 1e-3).beta == SMALLEST_BETA
-    assert virgin(0.0, 1.0, 7.0).beta == 1.0
+    assert power_law_time(0.0, 1.0, 1e-3).beta == SMALLEST_EXPONENT
+    assert power_law_time(0.0, 1.0, 7.0).beta == 1.0

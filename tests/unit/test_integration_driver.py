@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import quad
 
 from creepkit.errors import SolveError
-from creepkit.integration import Settings
-from creepkit.integration.driver import COMPONENTS, by_strain, by_stress, drive
+from creepkit.integration import IntegrationSettings
+from creepkit.integration.driver import COMPONENTS, prescribed_strain, prescribed_stress, integrate_tensor_point
 from creepkit.integration.tableau import SDIRK2, SDIRK4
 from creepkit.integration.tensor_point import TensorPoint
 from creepkit.kernels import lower
@@ -53,22 +53,22 @@ KACHANOV = CreepLaw(
 
 def run(law, values, controls, times, temperature=300.0, settings=None, tableau=SDIRK2):
     kernel = lower(law, "numba")
-    theta = kernel.internal(values)[0]
-    return drive(kernel, theta, STEEL, controls, temperature, times, settings=settings, tableau=tableau)
+    theta = kernel.to_internal(values)[0]
+    return integrate_tensor_point(kernel, theta, STEEL, controls, temperature, times, settings=settings, tableau=tableau)
 
 
 @pytest.mark.parametrize("weight", [1.0, 30.0, 1e3], ids=["elastic", "half crept", "crept"])
 def test_the_tangent_is_the_derivative_of_stress(weight: float) -> None:
     """Central differences of strain, for a law of all four: von Mises, principal, mean stress and a state."""
     kernel = lower(DAMAGING, "numba")
-    theta = kernel.internal({"A": 1e-14, "n": 4.0, "C": 1e-13, "v": 3.5})[0]
+    theta = kernel.to_internal({"A": 1e-14, "n": 4.0, "C": 1e-13, "v": 3.5})[0]
     point = TensorPoint(kernel, theta, STEEL, np.zeros(6, bool))
     point.row[TIME], point.row[TEMPERATURE] = 1e3, 300.0
     base = np.array([1e-4, -6e-5, -4e-5, 3e-5, 0.0, 1e-5, 2e-4, 0.1])
     strain = np.array([1.2e-3, 3e-4, -2e-4, 4e-4, 2e-4, -3e-4])
 
     def answer(change: np.ndarray):
-        return point.answer(strain + change, base, base, weight)
+        return point.constitutive_response(strain + change, base, base, weight)
 
     found = answer(np.zeros(6)).tangent
     for j, step in enumerate(1e-7 * np.eye(6)):
@@ -80,10 +80,10 @@ def test_the_tangent_is_the_derivative_of_stress(weight: float) -> None:
 def test_the_order_is_that_of_the_tableau(tableau) -> None:
     """A strain and a stress that grow, in equal steps; the error falls by 2^order when the steps are halved."""
     ramp = Program(np.array([0.0, 100.0]), np.array([2e-4, 1.2e-3]))
-    controls = {"11": by_strain(ramp), "12": by_strain(3e-4), "22": by_stress(Program(ramp.times, 6e4 * ramp.values))}
+    controls = {"11": prescribed_strain(ramp), "12": prescribed_strain(3e-4), "22": prescribed_stress(Program(ramp.times, 6e4 * ramp.values))}
 
     def end(step: float) -> float:
-        loose = Settings(rtol=1e9, first=step, longest=step)
+        loose = IntegrationSettings(rtol=1e9, first=step, longest=step)
         return float(run(NORTON, {"A": 1e-11, "n": 3}, controls, [100.0], settings=loose, tableau=tableau).stress[0, 0])
 
     coarse, middle, fine = (end(step) for step in (1 / 8, 1 / 16, 1 / 32))
@@ -98,7 +98,7 @@ def test_a_turned_frame_turns_the_answer() -> None:
     rows, columns = [int(k[0]) - 1 for k in COMPONENTS], [int(k[1]) - 1 for k in COMPONENTS]
     tensors = []
     for tensor in (strain, turn @ strain @ turn.T):
-        controls = {k: by_strain(e) for k, e in zip(COMPONENTS, tensor[rows, columns], strict=True)}
+        controls = {k: prescribed_strain(e) for k, e in zip(COMPONENTS, tensor[rows, columns], strict=True)}
         values = {"A": 1e-14, "n": 4.0, "C": 1e-12, "v": 3.5}
         result = run(DAMAGING, values, controls, [1e3])
         full = np.zeros((3, 3))
@@ -112,7 +112,7 @@ def test_temperature_follows_its_program() -> None:
     law = NORTON.times(arrhenius(T_ref=1000.0))
     values = {"A": 1e-14, "n": 4.0, "Q": 3e5}
     heating = Program(np.array([0.0, 3600.0]), np.array([900.0, 1100.0]))
-    result = run(law, values, {"12": by_stress(40.0)}, [3600.0], temperature=heating)
+    result = run(law, values, {"12": prescribed_stress(40.0)}, [3600.0], temperature=heating)
 
     def rate(t: float) -> float:
         return 1e-14 * 3**2 * 40.0**4 * np.exp(-3e5 / 8.314462618 * (1 / (900 + t / 18) - 1 / 1000))
@@ -121,7 +121,7 @@ def test_temperature_follows_its_program() -> None:
 
 
 def test_outputs_at_a_jump_show_what_holds_from_then_on() -> None:
-    controls = {"11": by_stress(Program.steps([(0.0, 50.0), (100.0, 80.0)]))}
+    controls = {"11": prescribed_stress(Program.steps([(0.0, 50.0), (100.0, 80.0)]))}
     result = run(NORTON, {"A": 1e-12, "n": 3}, controls, [0.0, 100.0, 100.0, 150.0])
     np.testing.assert_allclose(result.stress[:, 0], [50.0, 80.0, 80.0, 80.0])
     np.testing.assert_allclose(result.creep_strain[:, 0], 1e-12 * 50**3 * 100 * np.array([0, 1, 1, 1 + 0.5 * 1.6**3]))
@@ -131,7 +131,7 @@ def test_outputs_at_a_jump_show_what_holds_from_then_on() -> None:
 
 
 def test_without_load_nothing_happens() -> None:
-    result = run(DAMAGING, {"A": 1e-14, "n": 4.0, "C": 1e-12, "v": 3.5}, {"13": by_strain(0.0)}, [1e3])
+    result = run(DAMAGING, {"A": 1e-14, "n": 4.0, "C": 1e-12, "v": 3.5}, {"13": prescribed_strain(0.0)}, [1e3])
     assert result.status == Status.COMPLETE
     assert not result.stress.any()
     assert not result.strain.any()
@@ -140,18 +140,18 @@ def test_without_load_nothing_happens() -> None:
 class TestEnds:
     def test_a_state_at_its_limit(self) -> None:
         """Kachanov: (1 - damage)^(v+1) = 1 - (v+1) C s^v t; outputs beyond are left out."""
-        result = run(KACHANOV, {"A": 1e-16, "n": 4, "C": 1e-13, "v": 4}, {"11": by_stress(100.0)}, [5e3, 1.5e4, 1e5])
+        result = run(KACHANOV, {"A": 1e-16, "n": 4, "C": 1e-13, "v": 4}, {"11": prescribed_stress(100.0)}, [5e3, 1.5e4, 1e5])
         expected = (1 - 0.1**5) / (5 * 1e-13 * 100**4)
-        assert result.status == Status.BURST
+        assert result.status == Status.RUPTURED
         assert result.reason == "an internal variable reached its limit"
         assert result.end_time == pytest.approx(expected, rel=1e-4)
         np.testing.assert_array_equal(result.times, [5e3, 1.5e4])
         np.testing.assert_allclose(result.states[:, 0], 1 - (1 - 5e-5 * result.times) ** 0.2, rtol=1e-4)
 
     def test_the_strain_limit(self) -> None:
-        values, settings = {"A": 1e-13, "n": 4}, Settings(strain_limit=0.25)
-        result = run(NORTON, values, {"11": by_stress(100.0)}, [1e4, 1e5], settings=settings)
-        assert result.status == Status.BURST
+        values, settings = {"A": 1e-13, "n": 4}, IntegrationSettings(strain_limit=0.25)
+        result = run(NORTON, values, {"11": prescribed_stress(100.0)}, [1e4, 1e5], settings=settings)
+        assert result.status == Status.RUPTURED
         assert result.end_time == pytest.approx(0.25 / 1e-5, rel=1e-9)
         assert result.times.tolist() == [1e4]
 
@@ -160,14 +160,14 @@ class TestEnds:
         growth = C * stress**v / (15 * (1 - damage) ** 14)
         law = CreepLaw("rabotnov", {"creep": A * stress**n}, RATES, states={damage: State(0.0, growth, limit=0.99)})
         values = {"A": 1e-15, "n": 3.0, "C": 1e-14, "v": 4.0}
-        result = run(law, values, {"11": by_stress(100.0)}, [1.0, 2e6], tableau=SDIRK4)
-        assert result.status == Status.BURST
+        result = run(law, values, {"11": prescribed_stress(100.0)}, [1.0, 2e6], tableau=SDIRK4)
+        assert result.status == Status.RUPTURED
         assert result.reason == "an internal variable reached its limit"
         assert result.end_time == pytest.approx(1e6, rel=1e-4)
 
     def test_the_cap_on_steps(self) -> None:
-        settings = Settings(max_steps=5)
-        result = run(NORTON, {"A": 1e-10, "n": 4}, {"11": by_strain(1e-3)}, [0.0, 1e6], settings=settings)
+        settings = IntegrationSettings(max_steps=5)
+        result = run(NORTON, {"A": 1e-10, "n": 4}, {"11": prescribed_strain(1e-3)}, [0.0, 1e6], settings=settings)
         assert result.status == Status.NOT_CONVERGED
         assert result.reason == "the cap on steps was reached"
         assert result.times.tolist() == [0.0]
@@ -179,10 +179,10 @@ class TestEnds:
         ({"times": [2.0, 1.0]}, "output times must be finite, at or after 0 s, and must not decrease"),
         ({"theta": [1.0]}, "theta has 1 numbers, but the law needs 2: A, n"),
         ({"elastic": (0.0, 0.3)}, "E is 0 MPa and nu 0.3; allowed are E above 0 and nu in \\(-1, 0.5\\)"),
-        ({"controls": {"21": by_stress(1.0)}}, "no component '21' to drive; allowed are 11, 22, 33, 12, 23, 13"),
+        ({"controls": {"21": prescribed_stress(1.0)}}, "no component '21' to drive; allowed are 11, 22, 33, 12, 23, 13"),
     ],
 )
 def test_what_cannot_be_driven_is_refused(change, message: str) -> None:
     given = {"theta": [-30.0, 4.0], "elastic": STEEL, "controls": {}, "temperature": 300.0, "times": [1.0]}
     with pytest.raises(SolveError, match=message):
-        drive(lower(NORTON, "numba"), **(given | change))
+        integrate_tensor_point(lower(NORTON, "numba"), **(given | change))

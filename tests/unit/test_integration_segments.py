@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from creepkit.integration.segments import segments_of
+from creepkit.integration.segments import merge_programs
 from creepkit.records import Program
 
 
@@ -17,11 +17,11 @@ def test_jumps_and_ramps_are_merged() -> None:
         [20, 30, 90, 100, 950, 950],
         [30, 40, 100, 100, 950, 950],
     ]
-    np.testing.assert_allclose(segments_of(stress, temperature, end=40.0), expected)
+    np.testing.assert_allclose(merge_programs(stress, temperature, end=40.0), expected)
 
 
 def test_what_comes_after_the_end_is_left_out() -> None:
     stress = Program.steps([(0.0, 50.0), (100.0, 70.0)])
-    np.testing.assert_allclose(segments_of(stress, Program.constant(900.0), end=60.0), [[0, 60, 50, 50, 900, 900]])
-    np.testing.assert_allclose(segments_of(stress, Program.constant(900.0), end=100.0), [[0, 100, 50, 50, 900, 900]])
-    assert segments_of(stress, Program.constant(900.0), end=0.0).shape == (0, 6)
+    np.testing.assert_allclose(merge_programs(stress, Program.constant(900.0), end=60.0), [[0, 60, 50, 50, 900, 900]])
+    np.testing.assert_allclose(merge_programs(stress, Program.constant(900.0), end=100.0), [[0, 100, 50, 50, 900, 900]])
+    assert merge_programs(stress, Program.constant(900.0), end=0.0).shape == (0, 6)

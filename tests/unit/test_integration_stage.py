@@ -8,7 +8,7 @@ from kachanov import kachanov
 from numba import njit
 from scipy.stats import qmc
 
-from creepkit.integration.problem import NO_SOLUTION, SOLVED, UNIAXIAL, Axes, Problem
+from creepkit.integration.problem import NO_SOLUTION, SOLVED, UNIAXIAL, Axes, StageProblem
 from creepkit.integration.response import (
     BY_LOG_WEIGHT,
     BY_MEAN,
@@ -19,11 +19,11 @@ from creepkit.integration.response import (
     INPUTS,
     gradient_of_sensitivity,
     gradient_of_update,
-    respond,
+    differentiate_stage,
 )
-from creepkit.integration.stage import solve
+from creepkit.integration.stage import solve_stage
 from creepkit.kernels import lower
-from creepkit.kernels.interface import MEAN, PRINCIPAL, STRAIN, STRESS, TIME, pointer
+from creepkit.kernels.interface import MEAN_STRESS, PRINCIPAL_STRESS, STRAIN, STRESS, TIME, data_pointer
 from creepkit.language import Param, mean_stress, parameters, principal_stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
@@ -36,7 +36,7 @@ MULTIAXIAL_DAMAGE = kachanov(
 
 @njit
 def call(entry, row, theta, out):
-    return entry(1, pointer(row), pointer(theta), pointer(out))
+    return entry(1, data_pointer(row), data_pointer(theta), data_pointer(out))
 
 
 def solved(kernel, theta, problem, z0=(), axes=UNIAXIAL, time=1e3, guess=1e-6, tolerance=1e-7):
@@ -45,7 +45,7 @@ def solved(kernel, theta, problem, z0=(), axes=UNIAXIAL, time=1e3, guess=1e-6, t
     row = np.zeros(6 + z0.size)
     row[TIME], row[3], row[6:] = time, 1000.0, z0
     out = np.zeros((1 + z0.size) * (7 + z0.size))
-    increment, flag = solve(kernel.update, theta, axes, problem, z0, row, out, guess, tolerance)
+    increment, flag = solve_stage(kernel.update, theta, axes, problem, z0, row, out, guess, tolerance)
     return increment, flag, row, out
 
 
@@ -62,7 +62,7 @@ def test_the_stage_equation_holds_over_the_bounds_of_the_combined_law(stiffness:
         high = np.array([-10, 8, np.log(800), -10, 8, 0, -10, 8, 0])
         theta = low + u[:9] * (high - low)
         start = 0.0 if u[9] < 0.3 else 10 ** (-9 + 8 * u[9])
-        problem = Problem(10 ** (1 + 1.5 * u[10]), stiffness, 0.0, 10 ** (-3 + 8 * u[11]), start)
+        problem = StageProblem(10 ** (1 + 1.5 * u[10]), stiffness, 0.0, 10 ** (-3 + 8 * u[11]), start)
         increment, flag, row, out = solved(kernel, theta, problem, guess=10 ** (-12 + 11 * u[2]))
         assert flag == SOLVED
         if not 1e-25 < increment < 1e10:
@@ -77,9 +77,9 @@ def test_the_stage_equation_holds_over_the_bounds_of_the_combined_law(stiffness:
 def test_any_guess_leads_to_the_closed_form(guess: float) -> None:
     """Norton with n = 1: D = w A (trial - k D), a linear equation."""
     kernel = lower(NORTON, "numba")
-    theta = kernel.internal({"A": 1e-9, "n": 1.0})[0]
+    theta = kernel.to_internal({"A": 1e-9, "n": 1.0})[0]
     for weight in (1e-6, 1.0, 1e5, 1e12):
-        increment, flag, _, _ = solved(kernel, theta, Problem(100.0, 1e5, 0.0, weight, 0.0), guess=guess)
+        increment, flag, _, _ = solved(kernel, theta, StageProblem(100.0, 1e5, 0.0, weight, 0.0), guess=guess)
         assert flag == SOLVED
         assert increment == pytest.approx(weight * 1e-9 * 100 / (1 + weight * 1e-9 * 1e5), rel=1e-12)
 
@@ -87,44 +87,44 @@ def test_any_guess_leads_to_the_closed_form(guess: float) -> None:
 def test_constant_load_has_a_solution_only_up_to_the_turning_point() -> None:
     """D = w A s exp(n D) has its last solution at D = 1/n; beyond it the step must be refused."""
     kernel = lower(NORTON, "numba")
-    theta = kernel.internal({"A": 1e-9, "n": 4.0})[0]
+    theta = kernel.to_internal({"A": 1e-9, "n": 4.0})[0]
     last = 1 / (4 * np.e) / (1e-9 * 50.0**4)
-    increment, flag, _, _ = solved(kernel, theta, Problem(50.0, 0.0, 1.0, 0.9 * last, 0.0))
+    increment, flag, _, _ = solved(kernel, theta, StageProblem(50.0, 0.0, 1.0, 0.9 * last, 0.0))
     assert flag == SOLVED
     assert increment == pytest.approx(0.9 * last * 1e-9 * 50**4 * np.exp(4 * increment), rel=1e-10)
-    assert solved(kernel, theta, Problem(50.0, 0.0, 1.0, 1.1 * last, 0.0))[1] != SOLVED
+    assert solved(kernel, theta, StageProblem(50.0, 0.0, 1.0, 1.1 * last, 0.0))[1] != SOLVED
 
 
 def test_no_stress_no_creep() -> None:
     kernel = lower(NORTON, "numba")
-    theta = kernel.internal({"A": 1e-9, "n": 4.0})[0]
-    assert solved(kernel, theta, Problem(0.0, 0.0, 0.0, 1e3, 0.1))[:2] == (0.0, SOLVED)
-    assert solved(kernel, theta, Problem(-1.0, 1e5, 0.0, 1e3, 0.1))[1] == NO_SOLUTION
-    off = kernel.internal({"A": 0.0, "n": 4.0})[0]
-    assert solved(kernel, off, Problem(100.0, 0.0, 0.0, 1e3, 0.1))[:2] == (0.0, SOLVED)
+    theta = kernel.to_internal({"A": 1e-9, "n": 4.0})[0]
+    assert solved(kernel, theta, StageProblem(0.0, 0.0, 0.0, 1e3, 0.1))[:2] == (0.0, SOLVED)
+    assert solved(kernel, theta, StageProblem(-1.0, 1e5, 0.0, 1e3, 0.1))[1] == NO_SOLUTION
+    off = kernel.to_internal({"A": 0.0, "n": 4.0})[0]
+    assert solved(kernel, off, StageProblem(100.0, 0.0, 0.0, 1e3, 0.1))[:2] == (0.0, SOLVED)
 
 
 DAMAGE_VALUES = {"A": 1e-14, "n": 4.0, "C": 1e-12, "v": 3.5, "a": 0.4}
 
 
-@pytest.mark.parametrize("problem", [Problem(90.0, 0.0, 0.0, 1e4, 0.01), Problem(200.0, 1e5, 0.0, 3e4, 0.0)])
-def test_states_satisfy_their_equations(problem: Problem) -> None:
+@pytest.mark.parametrize("problem", [StageProblem(90.0, 0.0, 0.0, 1e4, 0.01), StageProblem(200.0, 1e5, 0.0, 3e4, 0.0)])
+def test_states_satisfy_their_equations(problem: StageProblem) -> None:
     kernel = lower(MULTIAXIAL_DAMAGE, "numba")
-    theta = kernel.internal(DAMAGE_VALUES)[0]
+    theta = kernel.to_internal(DAMAGE_VALUES)[0]
     axes = Axes(30.0, 0.7, 40.0, 0.0)
     increment, flag, row, out = solved(kernel, theta, problem, (0.1,), axes)
     assert flag == SOLVED
     call(kernel.update, row, theta, out)
     assert increment == pytest.approx(problem.weight * np.exp(out[0]), rel=1e-10)
     assert row[6] == pytest.approx(0.1 + problem.weight * out[1], rel=1e-10)
-    assert row[PRINCIPAL] == pytest.approx(30 + 0.7 * row[STRESS])
-    assert row[MEAN] == pytest.approx(40.0)
+    assert row[PRINCIPAL_STRESS] == pytest.approx(30 + 0.7 * row[STRESS])
+    assert row[MEAN_STRESS] == pytest.approx(40.0)
 
 
 def test_damage_beyond_the_last_solution_is_refused() -> None:
     kernel = lower(MULTIAXIAL_DAMAGE, "numba")
-    theta = kernel.internal(DAMAGE_VALUES)[0]
-    assert solved(kernel, theta, Problem(200.0, 0.0, 0.0, 1e9, 0.0), (0.1,))[1] != SOLVED
+    theta = kernel.to_internal(DAMAGE_VALUES)[0]
+    assert solved(kernel, theta, StageProblem(200.0, 0.0, 0.0, 1e9, 0.0), (0.1,))[1] != SOLVED
 
 
 def responses(kernel, theta, problem, z0, axes, entry):
@@ -142,19 +142,19 @@ def responses(kernel, theta, problem, z0, axes, entry):
         call(kernel.sensitivity, row, theta, full)
         gradient_of_sensitivity(full, problem, increment, gradient)
         response[:, INPUTS + len(z0) :] = problem.weight * full[size + size * width :].reshape(size, count)
-    assert respond(axes, problem, increment, row[STRESS], rates, gradient, np.zeros((size, size)), response)
+    assert differentiate_stage(axes, problem, increment, row[STRESS], rates, gradient, np.zeros((size, size)), response)
     return response
 
 
 @pytest.mark.parametrize("entry", ["update", "sensitivity"])
 @pytest.mark.parametrize(
     "problem",
-    [Problem(90.0, 0.0, 0.0, 1e4, 0.01), Problem(200.0, 1e5, 0.0, 3e4, 0.02), Problem(60.0, 0.0, 1.0, 3e4, 0.0)],
+    [StageProblem(90.0, 0.0, 0.0, 1e4, 0.01), StageProblem(200.0, 1e5, 0.0, 3e4, 0.02), StageProblem(60.0, 0.0, 1.0, 3e4, 0.0)],
     ids=["prescribed stress", "prescribed strain", "constant load"],
 )
-def test_responses_are_the_derivatives_of_the_solution(problem: Problem, entry: str) -> None:
+def test_responses_are_the_derivatives_of_the_solution(problem: StageProblem, entry: str) -> None:
     kernel = lower(MULTIAXIAL_DAMAGE, "numba")
-    theta = kernel.internal(DAMAGE_VALUES)[0]
+    theta = kernel.to_internal(DAMAGE_VALUES)[0]
     axes, z0, time = Axes(30.0, 0.7, 40.0, 0.1), np.array([0.1]), 1e3
     response = responses(kernel, theta, problem, z0, axes, entry)
 

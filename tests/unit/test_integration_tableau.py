@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from creepkit.integration.clock import plain
+from creepkit.integration.clock import linear_time
 from creepkit.integration.dense import dense_value
 from creepkit.integration.problem import SOLVED, UNIAXIAL
 from creepkit.integration.segments import Segment
-from creepkit.integration.step import Drive, advance, room
+from creepkit.integration.step import StressControl, advance, step_workspace
 from creepkit.integration.tableau import SDIRK2, SDIRK4, Tableau
 from creepkit.kernels import lower
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -75,19 +75,19 @@ def test_measured_order_of_step_and_dense_output(tableau: Tableau) -> None:
     """p' = A s^n p^m under constant true stress from p(0) = p0: p^(1-m) is a straight line in time."""
     A, n, m, stress, start, length = 1e-12, 3.0, -0.6, 100.0, 0.2, 2e5
     kernel = lower(STRAIN_HARDENING, "numba")
-    theta = kernel.internal({"A": A, "n": n, "m": m})[0]
-    segment, drive = Segment(0.0, length, stress, stress, 1000.0, 1000.0), Drive(0.0, 0.0, UNIAXIAL)
+    theta = kernel.to_internal({"A": A, "n": n, "m": m})[0]
+    segment, drive = Segment(0.0, length, stress, stress, 1000.0, 1000.0), StressControl(0.0, 0.0, UNIAXIAL)
 
     def exact(time: float) -> float:
         return float((start ** (1 - m) + (1 - m) * A * stress**n * time) ** (1 / (1 - m)))
 
     errors = []
     for steps in (16, 32):
-        work = room(0, 3, tableau.stages)
+        work = step_workspace(0, 3, tableau.stages)
         work.value[0], h, dense = start, 1.0 / steps, 0.0
         for k in range(steps):
             flag = advance(
-                kernel.update, theta, drive, segment, plain(0.0, length), tableau, work, k * h, h, 1e-2, 1e-9
+                kernel.update, theta, drive, segment, linear_time(0.0, length), tableau, work, k * h, h, 1e-2, 1e-9
             )
             assert flag == SOLVED
             if k == 0:

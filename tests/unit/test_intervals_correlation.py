@@ -8,12 +8,12 @@ from steady import Steady, planted
 from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.intervals.correlation import correlation, undetermined
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 
 TRUTH = {"A": float(np.exp(-15.0 - 4.0 * np.log(50.0))), "n": 4.0}
-QUICK = Settings(starts=3, draws=16, frames=20)
+QUICK = IdentificationSettings(starts=3, sobol_points=16, frames=20)
 
 
 @pytest.fixture(scope="module")

@@ -11,10 +11,10 @@ from steady import Steady, planted
 
 from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
-from creepkit.inverse.intervals.opening import opened
+from creepkit.inverse.intervals.opening import interval_problem
 from creepkit.inverse.intervals.profile import profile
-from creepkit.inverse.intervals.quantities import Quantity, exponent_at, rate_at
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.intervals.quantities import DerivedQuantity, exponent_at, rate_at
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance
 
@@ -67,7 +67,7 @@ def test_of_a_rate_and_a_local_exponent(fit, tests):
 def test_it_follows_a_change_of_variable(fit):
     """Ends of n squared are the squares of the ends of n: likelihood knows no scale, and Laplace's interval does."""
     own = profile(fit, "n")
-    squared = profile(fit, Quantity("n squared", "1", "linear", lambda c: lambda u: c.theta(u)[..., 1] ** 2))
+    squared = profile(fit, DerivedQuantity("n squared", "1", "linear", lambda c: lambda u: c.theta(u)[..., 1] ** 2))
     assert (squared.low, squared.high) == pytest.approx((own.low**2, own.high**2), rel=1e-3)
     assert squared.high - squared.best > squared.best - squared.low
 
@@ -85,7 +85,7 @@ def test_level_and_freedom_set_the_rise(fit):
 def test_ends_at_the_laws_bounds_are_said_to_be_open():
     """One stress says nothing of n, from bound to bound."""
     tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(50.0, 1050.0)] * 4, seed=2, rate=0.1, noise=1e-5)
-    fit = identify(NORTON, tests, Steady(), settings=Settings(starts=3, draws=16, frames=20))
+    fit = identify(NORTON, tests, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20))
     found = profile(fit, "n")
     assert found.low is None
     assert found.high is None
@@ -101,12 +101,12 @@ def test_scatter_between_few_tests_counts_as_in_laplaces_intervals():
     """Five tests and two parameters: the variance of their rates is 5/3 of what maximum likelihood says."""
     conditions = [(s, 1000.0) for s in (30.0, 50.0, 80.0, 40.0, 60.0)]
     tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, conditions, seed=5, rate=0.2, noise=1e-5)
-    fit = identify(NORTON, tests, Steady(), settings=Settings(starts=3, draws=16, frames=20))
-    assert opened(fit).scatter.rate == pytest.approx(fit.scatter.rate * np.sqrt(5 / 3))
+    fit = identify(NORTON, tests, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20))
+    assert interval_problem(fit).noise_model.rate == pytest.approx(fit.noise_model.rate * np.sqrt(5 / 3))
     found = profile(fit, "n")
     assert found.high - found.low == pytest.approx(found.laplace[1] - found.laplace[0], rel=0.2)
     known = replace(fit, settings=replace(fit.settings, nuisances=(Nuisance("offset"), Nuisance("rate", sd=0.2))))
-    assert opened(known).scatter.rate == fit.scatter.rate
+    assert interval_problem(known).noise_model.rate == fit.noise_model.rate
 
 
 def test_an_interval_cut_by_a_bound_is_open_on_that_side(tests):
@@ -119,7 +119,7 @@ def test_an_interval_cut_by_a_bound_is_open_on_that_side(tests):
 
 
 def test_a_quantity_that_nothing_moves_is_refused(fit):
-    still = Quantity("pi", "1", "linear", lambda c: lambda u: np.full(u.shape[:-1], np.pi))
+    still = DerivedQuantity("pi", "1", "linear", lambda c: lambda u: np.full(u.shape[:-1], np.pi))
     with pytest.raises(FitError, match="pi does not depend on any parameter"):
         profile(fit, still)
 

@@ -14,9 +14,9 @@ from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.intervals.posterior import Posterior
 from creepkit.inverse.intervals.quantities import exponent_at, rate_at
-from creepkit.inverse.intervals.sampling import sample
-from creepkit.inverse.problem import reopened
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.intervals.sampling import sample_posterior
+from creepkit.inverse.problem import least_squares_problem
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance
 
@@ -37,7 +37,7 @@ def fit(tests):
 
 @pytest.fixture(scope="module")
 def samples(fit):
-    return sample(fit, walkers=32, steps=800, seed=1)
+    return sample_posterior(fit, walkers=32, steps=800, seed=1)
 
 
 def test_of_a_linear_problem_they_are_normal(samples, tests):
@@ -67,7 +67,7 @@ def test_intervals_of_rate_and_exponent(samples, tests):
 def test_poorly_known_scatter_widens_them(fit, tests):
     """With 4 degrees of freedom the marginal of n is Student's t, whose 95 % interval is 2.78 standard errors."""
     best, covariance = least_squares(tests, SD)
-    found = sample(replace(fit, freedom=4.0), walkers=32, steps=500, seed=4)
+    found = sample_posterior(replace(fit, freedom=4.0), walkers=32, steps=500, seed=4)
     half = student.ppf(0.975, 4.0) * np.sqrt(covariance[1, 1])
     assert found.interval("n") == pytest.approx((best[1], best[1] - half, best[1] + half), abs=0.15 * half)
 
@@ -79,13 +79,13 @@ def test_rates_that_scatter_between_tests_count_once_a_test():
     """
     stresses = np.geomspace(30.0, 80.0, 12)
     tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, [(s, 1000.0) for s in stresses], seed=5, rate=0.2, noise=1e-5)
-    fit = identify(NORTON, tests, Steady(), settings=Settings(starts=3, draws=16, frames=12))
+    fit = identify(NORTON, tests, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=12))
     x = np.log(stresses)
     y = np.array([np.log(h.outputs["strain"][-1] / h.times[-1]) for h in tests])
     slope, level = np.polyfit(x, y, 1)
     sd = np.sqrt(((y - level - slope * x) ** 2).sum() / 10)
     half = student.ppf(0.975, 10) * sd / np.sqrt(((x - x.mean()) ** 2).sum())
-    assert sample(fit, walkers=16, steps=400, seed=1).interval("n") == pytest.approx(
+    assert sample_posterior(fit, walkers=16, steps=400, seed=1).interval("n") == pytest.approx(
         (slope, slope - half, slope + half), abs=0.25 * half
     )
 
@@ -93,7 +93,7 @@ def test_rates_that_scatter_between_tests_count_once_a_test():
 def test_a_bound_cuts_the_posterior(tests):
     """Far more than n = 3 allows: against its bound the density is an exponential tail, all of it below."""
     short = replace(NORTON, params={A: NORTON.params[A], N: replace(NORTON.params[N], bounds=(1.0, 3.0))})
-    found = sample(known_scatter(short, tests, SD), walkers=32, steps=400, seed=2)
+    found = sample_posterior(known_scatter(short, tests, SD), walkers=32, steps=400, seed=2)
     best, covariance = least_squares(tests, SD)
     middle, sd = best[1], float(np.sqrt(covariance[1, 1]))
     expected = middle + sd * norm.ppf(norm.cdf((3.0 - middle) / sd) * np.array([0.5, 0.025]))
@@ -108,7 +108,7 @@ def test_nuisances_are_integrated_out(tests):
     using = LogRates(by=3.0)
     own = (Nuisance("thickness", mean=0.5, sd=0.05),)
     fit = known_scatter(NORTON, tests, SD, using=using, nuisances=own)
-    posterior = Posterior.of(reopened(fit), fit.freedom)
+    posterior = Posterior.from_problem(least_squares_problem(fit), fit.freedom)
     rows = np.array(
         [(1.0, np.log(h.loading.program().values[0] / fit.reference.stress)) for h in tests for _ in h.times]
     )
@@ -117,7 +117,7 @@ def test_nuisances_are_integrated_out(tests):
     curvature = rows.T @ inverse @ rows
     step = np.array([0.03, 0.2])
     points = fit.u + np.array([step, -step, 0.0 * step])
-    up, down, middle = posterior.chi2(points)
+    up, down, middle = posterior.chi_square(points)
     assert up + down - 2 * middle == pytest.approx(2 * step @ curvature @ step, rel=1e-4)
     y = np.concatenate([h.outputs["amplitude"] - h.times / 1e5 for h in tests])
     left = [y - rows @ u for u in points]
@@ -125,13 +125,13 @@ def test_nuisances_are_integrated_out(tests):
 
 
 def test_a_seed_repeats_the_draws(fit):
-    first, again = (sample(fit, walkers=8, steps=20, seed=5) for _ in range(2))
+    first, again = (sample_posterior(fit, walkers=8, steps=20, seed=5) for _ in range(2))
     assert np.array_equal(first.chain, again.chain)
-    assert not np.array_equal(first.chain, sample(fit, walkers=8, steps=20, seed=6).chain)
+    assert not np.array_equal(first.chain, sample_posterior(fit, walkers=8, steps=20, seed=6).chain)
 
 
 def test_a_short_chain_says_so(fit):
-    found = sample(fit, walkers=8, steps=20, seed=5)
+    found = sample_posterior(fit, walkers=8, steps=20, seed=5)
     assert not found.converged
     assert "not converged" in found.notes[0]
     assert "not converged" in str(found)
@@ -139,10 +139,10 @@ def test_a_short_chain_says_so(fit):
 
 def test_what_cannot_be_sampled_is_refused(fit, monkeypatch):
     with pytest.raises(FitError, match="at least 6 walkers"):
-        sample(fit, walkers=4)
+        sample_posterior(fit, walkers=4)
     monkeypatch.setitem(sys.modules, "emcee", None)
     with pytest.raises(FitError, match=r"needs emcee, which is not installed: pip install 'creepkit\[mcmc\]'"):
-        sample(fit)
+        sample_posterior(fit)
 
 
 def test_pairs_are_drawn(samples, tmp_path):

@@ -10,9 +10,9 @@ from steady import Steady
 from steady import planted as planted_bars
 
 from creepkit.errors import FitError, SolveError
-from creepkit.inverse.files import load, to_json
-from creepkit.inverse.holdout import leave_one_test_out, pooled_error
-from creepkit.inverse.identification import Settings
+from creepkit.inverse.files import load_identification, identification_to_json
+from creepkit.inverse.holdout import leave_one_test_out, pooled_relative_squared_error
+from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify, refit
 from creepkit.inverse.measures import relative_squared_error
 from creepkit.language import arrhenius
@@ -26,7 +26,7 @@ PRESSURES = (8, 10, 8, 9, 11, 8, 7)
 MEAN, SPREAD, OFFSET = 0.4935, 0.02, 0.005
 BOTH = (Nuisance("offset"), Nuisance("rate"))
 THICKNESS = Nuisance("thickness", mean=MEAN, sd=SPREAD)
-QUICK = Settings(starts=1, draws=8, frames=20)
+QUICK = IdentificationSettings(starts=1, sobol_points=8, frames=20)
 WITH_THICKNESS = replace(QUICK, nuisances=(*BOTH, THICKNESS))
 
 
@@ -95,14 +95,14 @@ def test_predictions_of_fitted_tests_have_their_own_nuisances(fit, tests):
     stranger = fit.predict([tests[0].replace(name="another")])
     alike = fit.predict([tests[0]], own=False)
     np.testing.assert_array_equal(stranger.values, alike.values)
-    assert fit.effects([tests[0].replace(name="another")])["thickness"] == MEAN
+    assert fit.nuisances([tests[0].replace(name="another")])["thickness"] == MEAN
 
 
 def test_an_unknown_spread_is_estimated():
     """The spread of seven draws about a known mean: a standard error of 27 %, so a factor of two is three of them."""
     many = planted(LAW, TRUTH, plans(seed=8), seed=5, frames=24)
     fit = identify(LAW, many, EXACT, settings=replace(QUICK, nuisances=(*BOTH, Nuisance("thickness", mean=MEAN))))
-    assert SPREAD / 2 < fit.nuisances[0].spread < 2 * SPREAD
+    assert SPREAD / 2 < fit.nuisances[0].prior_sd < 2 * SPREAD
     assert "spread estimated" in str(fit)
 
 
@@ -114,7 +114,7 @@ def test_one_temperature_error_of_all_tests():
     shared = Nuisance("temperature", scope="all", sd=10.0)
     fit = identify(fixed, tests, EXACT, settings=replace(QUICK, nuisances=(Nuisance("offset"), shared)))
     (warmth,) = fit.nuisances
-    assert warmth.member == "all"
+    assert warmth.owner == "all"
     assert abs(warmth.value - 8.0) < 4 * warmth.sd
     assert warmth.sd < 2.0
 
@@ -151,7 +151,7 @@ def test_a_bad_test_loses_its_pull():
     plain, robust = (
         identify(LAW, tests, EXACT, settings=replace(QUICK, test_loss=loss)) for loss in ("gaussian", "student")
     )
-    weights = [m.weight for m in robust.misfits]
+    weights = [m.weight for m in robust.tests]
     assert weights[1] < 0.1
     assert min(w for k, w in enumerate(weights) if k != 1) > 0.3
     assert any("test_01" in note and "far from the others" in note for note in robust.notes)
@@ -174,7 +174,7 @@ def test_weights_minimise_the_weighted_relative_error(tests):
         )
 
     least = loss(fit.u)
-    assert least == pytest.approx(sum(w * fit.errors[o].rse for o, w in weights.items()), rel=1e-9)
+    assert least == pytest.approx(sum(w * fit.errors[o].relative_squared_error for o, w in weights.items()), rel=1e-9)
     for k, sd in enumerate(np.sqrt(np.diag(fit.covariance))):
         step = np.zeros(fit.u.size)
         step[k] = 0.05 * sd
@@ -192,9 +192,9 @@ def test_a_history_may_lack_outputs_and_frames(fit, tests):
     holed = np.where(np.arange(24) == 5, np.nan, tests[1].outputs["width"])
     partial[1] = tests[1].replace(outputs={**tests[1].outputs, "width": holed})
     some = identify(LAW, partial, EXACT, settings=replace(WITH_THICKNESS, frames=24))
-    assert [o.output for o in some.misfits[0].outputs] == ["amplitude"]
-    assert some.misfits[1]["width"].errors.frames == 23
-    assert some.misfits[1]["amplitude"].errors.frames == 24
+    assert [o.output for o in some.tests[0].outputs] == ["amplitude"]
+    assert some.tests[1]["width"].errors.frames == 23
+    assert some.tests[1]["amplitude"].errors.frames == 24
     assert all(inside(some).values())
 
 
@@ -239,26 +239,26 @@ def test_text_says_what_a_bulge_test_needs(fit):
 def test_round_trip_through_json(fit, tests, tmp_path):
     free = replace(WITH_THICKNESS, nuisances=(Nuisance("thickness", mean=MEAN, sd=np.inf, bounds=(0.4, 0.6)),))
     for one in (fit, replace(fit, settings=replace(free, weights={"amplitude": 0.99}))):
-        again = load(one.save(tmp_path / "fit.json"))
-        assert to_json(again) == to_json(one)
+        again = load_identification(one.save(tmp_path / "fit.json"))
+        assert identification_to_json(again) == identification_to_json(one)
         assert again.settings == one.settings
-    np.testing.assert_array_equal(again.on(tests, EXACT).predict().values, fit.predict().values)
+    np.testing.assert_array_equal(again.with_histories(tests, EXACT).predict().values, fit.predict().values)
 
 
 def test_files_of_the_first_version_are_refused(fit, tmp_path):
     path = tmp_path / "old.json"
-    path.write_text(json.dumps({**to_json(fit), "version": 1}))
+    path.write_text(json.dumps({**identification_to_json(fit), "version": 1}))
     with pytest.raises(FitError, match="earlier creepkit, in version 1 of the format; identify again"):
-        load(path)
+        load_identification(path)
 
 
 def test_a_test_that_was_left_out_is_predicted(fit, tests):
     """Thicknesses of unseen tests are only known to 4 %, which is a quarter of the rate: errors far above the noise."""
     held = leave_one_test_out(fit, tests[:3])
     assert [one.name for one in held] == [h.name for h in tests[:3]]
-    assert all(len(one.fit.misfits) == 2 for one in held)
-    assert all(np.isfinite(one.errors["amplitude"].rse) for one in held)
-    assert pooled_error(held, tests, "amplitude") > fit.errors["amplitude"].rse
+    assert all(len(one.fit.tests) == 2 for one in held)
+    assert all(np.isfinite(one.errors["amplitude"].relative_squared_error) for one in held)
+    assert pooled_relative_squared_error(held, tests, "amplitude") > fit.errors["amplitude"].rse
 
 
 def test_the_plot_has_amplitudes_residuals_and_rates(fit, tmp_path):
@@ -273,19 +273,19 @@ def test_the_plot_has_amplitudes_residuals_and_rates(fit, tmp_path):
 
 def test_what_means_nothing_is_refused_in_one_sentence(tests):
     with pytest.raises(FitError, match="'thickness' is a length in mm and needs its prior mean, such as mean=0.4935"):
-        Settings(nuisances=(Nuisance("thickness", sd=0.02, scope="all"),))
+        IdentificationSettings(nuisances=(Nuisance("thickness", sd=0.02, scope="all"),))
     with pytest.raises(FitError, match="its mean 0.5 lies outside its bounds"):
-        Settings(nuisances=(Nuisance("thickness", mean=0.5, bounds=(0.6, 0.7)),))
+        IdentificationSettings(nuisances=(Nuisance("thickness", mean=0.5, bounds=(0.6, 0.7)),))
     with pytest.raises(FitError, match="nuisance 'offset' is given twice"):
-        Settings(nuisances=(Nuisance("offset"), Nuisance("offset")))
+        IdentificationSettings(nuisances=(Nuisance("offset"), Nuisance("offset")))
     with pytest.raises(FitError, match="it has no output"):
-        Settings(nuisances=(Nuisance("temperature", output="width"),))
+        IdentificationSettings(nuisances=(Nuisance("temperature", output="width"),))
     with pytest.raises(FitError, match="weights must be numbers above zero"):
-        Settings(weights={"amplitude": -1.0})
+        IdentificationSettings(weights={"amplitude": -1.0})
     with pytest.raises(FitError, match='weights is "none"'):
-        Settings(weights="none")
+        IdentificationSettings(weights="none")
     with pytest.raises(FitError, match="test_loss 'robust' is not known; allowed are gaussian and student"):
-        Settings(test_loss="robust")
+        IdentificationSettings(test_loss="robust")
     with pytest.raises(FitError, match="weights name 'depth', which is not among the outputs amplitude, width, shape"):
         identify(LAW, tests, EXACT, settings=replace(QUICK, weights={"depth": 1.0}))
     shared = Nuisance("temperature", scope="all")
@@ -294,11 +294,11 @@ def test_what_means_nothing_is_refused_in_one_sentence(tests):
 
 
 def test_nuisances_that_a_predictor_does_not_know_are_refused(tests):
-    simple = OneDegree(effects=("temperature",))
+    simple = OneDegree(nuisances=("temperature",))
     with pytest.raises(FitError, match="nuisance 'thickness' means nothing to the predictor of these histories"):
         identify(LAW, tests, simple, settings=WITH_THICKNESS)
     with pytest.raises(SolveError, match="does not know the nuisance 'thickness'"):
-        simple.predict(LAW, TRUTH, tests, effects={"thickness": np.full((1, len(tests)), 0.5)})
+        simple.predict(LAW, TRUTH, tests, nuisances={"thickness": np.full((1, len(tests)), 0.5)})
 
 
 def test_histories_without_a_predicted_output_or_growth_are_refused(tests):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from creepkit.inverse.coordinates import Coordinates, Reference
+from creepkit.inverse.coordinates import Coordinates, ReferencePoint
 from creepkit.kernels import lower
 from creepkit.language import arrhenius, linear
 from creepkit.laws.combined import COMBINED
@@ -15,7 +15,7 @@ LAWS = [
     DRIFTING_EXPONENT,
     COMBINED.times(arrhenius(T_ref=1073.15)).with_temperature(n_2=linear(T_ref=1073.15)),
 ]
-REFERENCE = Reference(stress=63.0, strain=4e-3, time=2.3e4, temperature=1040.0)
+REFERENCE = ReferencePoint(stress=63.0, strain=4e-3, time=2.3e4, temperature=1040.0)
 
 
 def drawn(law, seed=3):
@@ -50,7 +50,7 @@ def test_coordinate_is_the_log_rate_of_its_term_at_the_reference():
     u = coordinates.u(theta)
     values = {n: p.from_internal(t) for (n, p), t in zip(law.table.items(), theta, strict=True)}
     point = {"stress": REFERENCE.stress, "strain": REFERENCE.strain, "time": REFERENCE.time}
-    for k, label in zip(coordinates.rates, law.terms, strict=True):
+    for k, label in zip(coordinates.term_rates, law.terms, strict=True):
         single = law.only(label)
         log_rate = lower(single, "numpy").log_rate({n: values[n] for n in single.names}, **point)
         assert u[k] == pytest.approx(float(log_rate), rel=1e-12)

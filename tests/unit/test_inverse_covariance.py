@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from creepkit.inverse.covariance import covariance, effective_size, expected_effects, log_likelihood
+from creepkit.inverse.covariance import covariance, effective_sample_size, predicted_random_effects, log_likelihood
 from creepkit.inverse.residuals import Residuals
-from creepkit.inverse.scatter import OutputScatter, Scatter
-from creepkit.inverse.sizes import estimated
+from creepkit.inverse.scatter import OutputNoise, NoiseModel
+from creepkit.inverse.sizes import estimate_variance_components
 from creepkit.records import Nuisance
 
 BOTH = (Nuisance("offset"), Nuisance("rate"))
@@ -17,7 +17,7 @@ BOTH = (Nuisance("offset"), Nuisance("rate"))
 
 def sizes(noise, misfit=0.0, offset=0.0, rate=0.0, drift=0.0, reach=1.0):
     """Scatter of strains alone."""
-    return Scatter({"strain": OutputScatter(noise, misfit, offset, drift, reach)}, rate)
+    return NoiseModel({"strain": OutputNoise(noise, misfit, offset, drift, reach)}, rate)
 
 
 def residuals_of(values, slopes, present, times, effect, output=None):
@@ -53,8 +53,8 @@ def test_absent_frames_do_not_count():
     present = whole.present.copy()
     present[1, 7:] = False
     part = replace(whole, present=present, values=np.where(present, whole.values, 0),
-                   slopes=np.where(present, whole.slopes, 0),
-                   rate_effect=np.where(present, whole.rate_effect, 0))  # fmt: skip
+                   slopes=np.where(present, whole.transform_derivatives, 0),
+                   rate_effect=np.where(present, whole.log_rate_sensitivity, 0))  # fmt: skip
     c = covariance(whole, scatter)
     truth = multivariate_normal(np.zeros(12), c[0]).logpdf(whole.values[0])
     truth += multivariate_normal(np.zeros(7), c[1][:7, :7]).logpdf(whole.values[1, :7])
@@ -65,23 +65,23 @@ def test_planted_scatter_is_found():
     """150 tests: the standard error of a standard deviation from 150 draws is 6 %, so 25 % is four of them."""
     truth = sizes(noise=2e-5, offset=1e-4, rate=0.4, drift=0.1, reach=1.5)
     residuals = made(150, 30, 2, truth)
-    found = estimated(residuals, sizes(2e-5, 0, 3e-5, 0.5, 0.2, 2.0), BOTH)
+    found = estimate_variance_components(residuals, sizes(2e-5, 0, 3e-5, 0.5, 0.2, 2.0), BOTH)
     assert found["strain"].offset == pytest.approx(truth["strain"].offset, rel=0.25)
     assert found.rate == pytest.approx(truth.rate, rel=0.25)
     assert found["strain"].drift == pytest.approx(truth["strain"].drift, rel=0.25)
-    assert found["strain"].reach == pytest.approx(truth["strain"].reach, rel=0.5)
+    assert found["strain"].correlation_length == pytest.approx(truth["strain"].correlation_length, rel=0.5)
 
 
 def test_a_given_prior_stays():
     residuals = made(20, 20, 3, sizes(2e-5, 0, 1e-4, 0.4, 0.1, 1.5))
-    found = estimated(residuals, sizes(2e-5, 0, 7e-5, 0.5, 0.1, 1.5), (Nuisance("offset", sd=7e-5), Nuisance("rate")))
+    found = estimate_variance_components(residuals, sizes(2e-5, 0, 7e-5, 0.5, 0.1, 1.5), (Nuisance("offset", sd=7e-5), Nuisance("rate")))
     assert found["strain"].offset == 7e-5
 
 
 def test_effective_size_counts_a_test_once_when_its_residuals_move_together():
     residuals = made(6, 40, 4, sizes(1e-6, 0.0, 0.0, 1.0, 0.0, 1.0))
-    assert effective_size(residuals, sizes(1e-6, 0.0, 0.0, 1.0, 0.0, 1.0)) == pytest.approx(6, rel=0.01)
-    assert effective_size(residuals, sizes(1e-1, 0.0, 0.0, 0.0, 0.0, 1.0)) == pytest.approx(240, rel=0.01)
+    assert effective_sample_size(residuals, sizes(1e-6, 0.0, 0.0, 1.0, 0.0, 1.0)) == pytest.approx(6, rel=0.01)
+    assert effective_sample_size(residuals, sizes(1e-1, 0.0, 0.0, 0.0, 0.0, 1.0)) == pytest.approx(240, rel=0.01)
 
 
 def test_expected_effects_find_the_offset_and_rate_of_each_test():
@@ -92,7 +92,7 @@ def test_expected_effects_find_the_offset_and_rate_of_each_test():
     offset, log_factor = np.array([3e-5, -2e-5]), np.array([0.2, -0.1])
     residual = -(slopes * offset[:, None] + effect * log_factor[:, None])
     shape = residuals_of(residual, slopes, np.ones_like(slopes, bool), times, effect)
-    found = expected_effects(shape, sizes(1e-8, 0.0, 1e-3, 2.0, 0.0, 1.0))
+    found = predicted_random_effects(shape, sizes(1e-8, 0.0, 1e-3, 2.0, 0.0, 1.0))
     np.testing.assert_allclose(found[0][:, 0], offset, rtol=1e-2)
     np.testing.assert_allclose(found[1], log_factor, rtol=1e-2)
 
@@ -106,8 +106,8 @@ def two_outputs():
     times = np.tile(np.geomspace(10, 1e4, 5), (2, 2))
     output = np.repeat([[0, 1]], 5, axis=1).repeat(2, axis=0)
     slopes, effect = 1 + rng.uniform(size=(2, 10)), rng.normal(size=(2, 10))
-    scatter = Scatter(
-        {"amplitude": OutputScatter(0.1, 0.2, 0.3, 0.4, 1.0), "width": OutputScatter(0.2, 0.1, 0.5, 0.3, 2.0)}, 0.6
+    scatter = NoiseModel(
+        {"amplitude": OutputNoise(0.1, 0.2, 0.3, 0.4, 1.0), "width": OutputNoise(0.2, 0.1, 0.5, 0.3, 2.0)}, 0.6
     )
     return residuals_of(rng.normal(size=(2, 10)), slopes, np.ones((2, 10), bool), times, effect, output), scatter
 
@@ -135,7 +135,7 @@ def test_outputs_share_the_rate_alone():
 
 def test_a_test_of_little_trust_scatters_more():
     residuals, scatter = two_outputs()
-    plain, doubted = covariance(residuals, scatter), covariance(residuals.trusting(np.array([1.0, 0.25])), scatter)
+    plain, doubted = covariance(residuals, scatter), covariance(residuals.with_test_weights(np.array([1.0, 0.25])), scatter)
     np.testing.assert_allclose(doubted[0], plain[0])
     np.testing.assert_allclose(doubted[1], 4 * plain[1])
 
@@ -145,7 +145,7 @@ def test_slopes_of_the_likelihood_are_its_differences():
 
     residuals, scatter = two_outputs()
     free = [(o, n) for o in scatter.outputs for n in ("misfit", "offset", "drift", "reach")] + [("", "rate")]
-    likelihood = _Likelihood(residuals.trusting(np.array([1.0, 0.3])), scatter, free)
+    likelihood = _Likelihood(residuals.with_test_weights(np.array([1.0, 0.3])), scatter, free)
     x = np.log([*(getattr(scatter[o], n) for o, n in free[:-1]), scatter.rate])
     slope = likelihood.cost(x)[1]
     for k in range(x.size):
@@ -153,5 +153,5 @@ def test_slopes_of_the_likelihood_are_its_differences():
         step[k] = 1e-5
         difference = (likelihood.cost(x + step)[0] - likelihood.cost(x - step)[0]) / 2e-5
         assert slope[k] == pytest.approx(difference, rel=1e-5, abs=1e-7)
-    ends = [likelihood.cost(x + d)[0] + log_likelihood(likelihood.residuals, likelihood.scatter(x + d)) for d in (0, 1)]
+    ends = [likelihood.cost(x + d)[0] + log_likelihood(likelihood.residuals, likelihood.noise_model(x + d)) for d in (0, 1)]
     assert ends[0] == pytest.approx(ends[1], rel=1e-12)

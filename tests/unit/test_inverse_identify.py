@@ -8,11 +8,11 @@ import pytest
 from steady import Steady, planted
 
 from creepkit.errors import FitError
-from creepkit.inverse.files import from_json, load, to_json
-from creepkit.inverse.identification import Settings
+from creepkit.inverse.files import identification_from_json, load_identification, identification_to_json
+from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify, refit
 from creepkit.inverse.selection import rank
-from creepkit.inverse.validation import leave_one_condition_out, measured_time, times_to_strain
+from creepkit.inverse.validation import leave_one_condition_out, measured_time_to_strain, times_to_strain
 from creepkit.language import arrhenius
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
@@ -21,7 +21,7 @@ from creepkit.records import Nuisance
 LAW = NORTON.times(arrhenius(T_ref=1073.15))
 TRUTH = {"A": 1e-16, "n": 5.2, "Q": 350e3}
 CONDITIONS = [(s, T) for T in (1000.0, 1050.0, 1100.0) for s in (30.0, 50.0, 80.0)]
-QUICK = Settings(starts=3, draws=16, frames=20)
+QUICK = IdentificationSettings(starts=3, sobol_points=16, frames=20)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_without_scatter_the_values_are_exact():
 
 
 def test_every_seed_reaches_the_same_minimum(tests, fit):
-    other = identify(LAW, tests, Steady(), settings=Settings(starts=3, draws=16, frames=20, seed=11))
+    other = identify(LAW, tests, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20, seed=11))
     assert (np.abs(other.u - fit.u) < 0.05 * np.sqrt(np.diag(fit.covariance))).all()
 
 
@@ -85,28 +85,28 @@ def test_power_law_and_sinh_over_a_narrow_stress_range_are_not_told_apart():
     )
     fits = [identify(law, tests, Steady(), settings=QUICK) for law in (NORTON, HYPERBOLIC_SINE)]
     ranking = rank(fits)
-    assert {r.fit.law.name for r in ranking.remaining} == {"norton", "hyperbolic-sine"}
+    assert {r.fit.law.name for r in ranking.credible} == {"norton", "hyperbolic-sine"}
     assert ranking.verdict.startswith("not decisive")
 
 
 def test_round_trip_through_json(fit, tmp_path):
-    again = load(fit.save(tmp_path / "fit.json"))
+    again = load_identification(fit.save(tmp_path / "fit.json"))
     assert str(again) == str(fit)
     assert again.law == fit.law
-    assert to_json(again) == to_json(fit)
+    assert identification_to_json(again) == identification_to_json(fit)
     assert [p.name for p in tmp_path.iterdir()] == ["fit.json"]
 
 
 def test_damaged_files_are_refused_in_one_sentence(fit, tmp_path):
-    data = json.loads(json.dumps(to_json(fit)))
+    data = json.loads(json.dumps(identification_to_json(fit)))
     with pytest.raises(FitError, match="covariance"):
-        from_json({**data, "covariance": [[1.0]]})
+        identification_from_json({**data, "covariance": [[1.0]]})
     with pytest.raises(FitError, match="law"):
-        from_json({k: v for k, v in data.items() if k != "law"})
+        identification_from_json({k: v for k, v in data.items() if k != "law"})
     path = tmp_path / "cut.json"
     path.write_text(json.dumps(data)[:200])
     with pytest.raises(FitError, match=r"cut\.json, line 1: not JSON"):
-        load(path)
+        load_identification(path)
 
 
 def test_refit_on_other_tests_starts_where_the_first_ended(fit, tests):
@@ -131,18 +131,18 @@ def test_leaving_conditions_out_predicts_each_once(fit, tests):
 
 def test_measured_time_interpolates(tests):
     test = tests[0]
-    t = measured_time(test, 0.01)
+    t = measured_time_to_strain(test, 0.01)
     assert np.interp(t, test.times, test.outputs["strain"]) == pytest.approx(0.01, rel=1e-9)
-    assert measured_time(test, 1.0) is None
+    assert measured_time_to_strain(test, 1.0) is None
 
 
 def test_what_cannot_be_fitted_is_said(tests):
     with pytest.raises(FitError, match="no histories"):
         identify(LAW, [], Steady())
     with pytest.raises(FitError, match="loss 'cubic'"):
-        Settings(loss="cubic")
+        IdentificationSettings(loss="cubic")
     with pytest.raises(FitError, match="loss 'huber' does not go with weights 'likelihood'"):
-        Settings(loss="huber", weights="likelihood")
+        IdentificationSettings(loss="huber", weights="likelihood")
     with pytest.raises(FitError, match="fewer than two usable frames"):
         identify(LAW, [tests[0].replace(used=np.zeros(tests[0].times.size, bool))], Steady())
 
@@ -163,15 +163,15 @@ def test_a_given_offset_prior_is_used(tests):
     fit = identify(
         LAW, tests, Steady(), settings=replace(QUICK, nuisances=(Nuisance("offset", sd=5e-5), Nuisance("rate", sd=0.2)))
     )
-    assert fit.scatter["strain"].offset == 5e-5
-    assert fit.scatter.rate == 0.2
+    assert fit.noise_model["strain"].offset == 5e-5
+    assert fit.noise_model.rate == 0.2
 
 
 def test_robust_loss_survives_a_wild_frame(tests):
     wild = [
         h.replace(outputs={"strain": np.where(np.arange(h.times.size) == 30, 0.5, h.outputs["strain"])}) for h in tests
     ]
-    fit = identify(LAW, wild, Steady(), settings=Settings(starts=3, draws=16, frames=20, loss="soft_l1"))
+    fit = identify(LAW, wild, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20, loss="soft_l1"))
     assert fit.values["n"] == pytest.approx(5.2, abs=0.6)
 
 
@@ -194,7 +194,7 @@ def test_two_tests_assume_a_scatter_between_them_and_say_so():
         tests = planted(
             NORTON, {"A": 1e-14, "n": 4.0}, [(40.0, 1050.0), (90.0, 1050.0)], seed=seed, rate=0.25, noise=1e-5
         )
-        fit = identify(NORTON, tests, Steady(), settings=Settings(starts=1, draws=8, frames=12))
+        fit = identify(NORTON, tests, Steady(), settings=IdentificationSettings(starts=1, sobol_points=8, frames=12))
         (n,) = (e for e in fit.estimates if e.name == "n")
         covered += n.low <= 4.0 <= n.high
     assert covered >= 17
@@ -205,7 +205,7 @@ def test_scatter_of_rates_is_found_when_the_coefficient_is_fixed():
     """With A fixed, the effect of a test's rate is the slope in ln t: planted tests without scatter must show none."""
     tests = planted(NORTON, {"A": 1e-14, "n": 4.0}, [(s, 1050.0) for s in (40, 60, 80, 100)], seed=2, noise=1e-5)
     fit = identify(NORTON.fix(A=1e-14), tests, Steady(), settings=QUICK)
-    assert fit.scatter.rate < 0.02
+    assert fit.noise_model.rate < 0.02
     assert fit.values["n"] == pytest.approx(4.0, abs=1e-3)
 
 
@@ -236,7 +236,7 @@ def test_fits_to_different_frames_are_not_ranked(fit, tests):
 def test_refit_keeps_the_nuisances(tests):
     plain = identify(LAW, tests, Steady(), settings=replace(QUICK, nuisances=()))
     again = refit(plain, tests[:-1])
-    assert again.scatter.rate == again.scatter["strain"].offset == 0.0
+    assert again.noise_model.rate == again.noise_model["strain"].offset == 0.0
 
 
 def test_histories_of_one_name_are_refused(tests):
@@ -252,9 +252,9 @@ def test_attaching_histories_goes_by_name(fit, tests):
 
 def test_settings_and_nuisances_that_mean_nothing_are_refused():
     with pytest.raises(FitError, match="starts is 0"):
-        Settings(starts=0)
+        IdentificationSettings(starts=0)
     with pytest.raises(FitError, match="about zero"):
-        Settings(nuisances=(Nuisance("offset", mean=0.01, sd=1e-3),))
+        IdentificationSettings(nuisances=(Nuisance("offset", mean=0.01, sd=1e-3),))
 
 
 def test_noise_of_a_smooth_sparse_curve_is_small():

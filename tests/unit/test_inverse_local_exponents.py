@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.coordinates import Coordinates, Reference
+from creepkit.inverse.coordinates import Coordinates, ReferencePoint
 from creepkit.inverse.local_exponents import local_exponents
 
-AT = Reference(stress=110.0, strain=0.004, time=2.0e4, temperature=1050.0)
+AT = ReferencePoint(stress=110.0, strain=0.004, time=2.0e4, temperature=1050.0)
 
 
 def inner(law, values):
@@ -26,11 +26,11 @@ def test_that_of_a_drifting_exponent_is_n_at_the_reference_time():
     law = ck.law("drifting-exponent").fix(m=0)
     values = {"A": 1e-16, "n_0": 4.9, "n_inf": 4.3, "C": 2.7, "tau_d": 13823.6, "tau_r": 8090.4}
     (local,) = local_exponents(law)
-    assert law.names[local.p] == "n_inf"
+    assert law.names[local.position] == "n_inf"
     u = Coordinates(law, AT).u(inner(law, values))
     decay, rise = np.exp(-2e4 / values["tau_d"]), np.exp(-2e4 / values["tau_r"])
     n = values["n_inf"] + (values["C"] + values["n_0"] - values["n_inf"]) * decay - values["C"] * rise
-    assert u[local.p] == pytest.approx(n, rel=1e-12)
+    assert u[local.position] == pytest.approx(n, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["norton", "strain-hardening", "time-hardening"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.inverse.measures import errors, relative_squared_error
+from creepkit.inverse.measures import output_errors, relative_squared_error
 
 MEASURED = [np.array([1.0, 3.0]), np.array([5.0, 7.0])]
 PREDICTED = [np.array([1.0, 4.0]), np.array([5.0, 5.0])]
@@ -27,13 +27,13 @@ def test_frames_of_unequal_tests_have_no_common_mean():
 
 
 def test_errors_of_one_output():
-    found = errors(np.array([1.0, 3.0]), np.array([1.0, 4.0]), np.array([0.5, 0.5]))
-    assert (found.frames, found.mse, found.mae) == (2, 0.5, 0.5)
-    assert found.rse == pytest.approx(1 / 2)
-    assert found.relative == pytest.approx(np.sqrt(0.5 / 5))
+    found = output_errors(np.array([1.0, 3.0]), np.array([1.0, 4.0]), np.array([0.5, 0.5]))
+    assert (found.frames, found.mean_squared_error, found.mean_absolute_error) == (2, 0.5, 0.5)
+    assert found.relative_squared_error == pytest.approx(1 / 2)
+    assert found.relative_rms_error == pytest.approx(np.sqrt(0.5 / 5))
     assert found.chi_square == pytest.approx(0.5 * (1 / 0.5) ** 2)
 
 
 def test_a_frame_that_was_not_predicted_leaves_no_number():
-    found = errors(np.array([1.0, 3.0]), np.array([1.0, np.nan]), np.ones(2))
-    assert all(np.isnan(v) for v in (found.rse, found.mse, found.mae, found.relative, found.chi_square))
+    found = output_errors(np.array([1.0, 3.0]), np.array([1.0, np.nan]), np.ones(2))
+    assert all(np.isnan(v) for v in (found.relative_squared_error, found.mean_squared_error, found.mean_absolute_error, found.relative_rms_error, found.chi_square))

@@ -7,14 +7,14 @@ import pytest
 from one_degree import OneDegree, Plan, planted
 
 from creepkit.errors import FitError
-from creepkit.inverse.identification import Settings
-from creepkit.inverse.moduli import identify_moduli, wachtman_through
+from creepkit.inverse.identification import IdentificationSettings
+from creepkit.inverse.moduli import identify_moduli, fit_wachtman
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
 
 LAW = NORTON.times(arrhenius(T_ref=1048.15))
 TRUTH = {"A": 3e-16, "n": 4.5, "Q": 420e3}
-QUICK = Settings(starts=1, draws=8, frames=15)
+QUICK = IdentificationSettings(starts=1, sobol_points=8, frames=15)
 
 
 def test_moduli_that_the_histories_state_wrongly_are_found() -> None:
@@ -35,7 +35,7 @@ def test_wachtman_through_its_own_values() -> None:
     """The paper's Fig. 6c: 177.5 - .21 T exp(-948.5/T) GPa; three numbers from exact values of five temperatures."""
     T = np.array([300.0, 600.0, 900.0, 1050.0, 1150.0])
     E = 177.5e3 - 210.0 * T * np.exp(-948.5 / T)
-    E0, b, T0 = wachtman_through(T, E, np.full(5, 1e3))
+    E0, b, T0 = fit_wachtman(T, E, np.full(5, 1e3))
     assert (E0, b, T0) == pytest.approx((177.5e3, 210.0, 948.5), rel=1e-5)
 
 

@@ -8,13 +8,13 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from creepkit.inverse.residuals import Residuals
-from creepkit.inverse.restricted import Linear, inverses_of, restricted_log_likelihood
-from creepkit.inverse.satterthwaite import restricted_laplace
-from creepkit.inverse.scales import LinearScale
-from creepkit.inverse.scatter import OutputScatter, Scatter
-from creepkit.inverse.settings import Settings
-from creepkit.inverse.sizes import estimated
-from creepkit.inverse.weighting import Weighting
+from creepkit.inverse.restricted import LinearisedProblem, inverse_covariances, restricted_log_likelihood
+from creepkit.inverse.satterthwaite import restricted_covariance
+from creepkit.inverse.scales import LinearTransform
+from creepkit.inverse.scatter import OutputNoise, NoiseModel
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sizes import estimate_variance_components
+from creepkit.inverse.weighting import WorkingNoise
 
 
 def linear_model(values, design, clock=None, outputs=1):
@@ -25,11 +25,11 @@ def linear_model(values, design, clock=None, outputs=1):
     ones = np.ones((tests, entries))
     residuals = Residuals(values, ones, ones > 0, clock, design, 0 * ones, output, ones, np.ones(tests))
     room = np.array([[-np.inf], [np.inf]]) * np.ones(size)
-    return Linear(residuals, np.full(size, 1e-12), np.zeros(size), np.ones(size, bool), room)
+    return LinearisedProblem(residuals, np.full(size, 1e-12), np.zeros(size), np.ones(size, bool), room)
 
 
 def white(sd, names=("strain",), **more):
-    return Scatter({name: OutputScatter(sd, **more) for name in names})
+    return NoiseModel({name: OutputNoise(sd, **more) for name in names})
 
 
 def polynomial(entries, degree, tests=1):
@@ -41,7 +41,7 @@ def test_white_noise_is_the_sum_of_squares_over_the_degrees_of_freedom():
     """Patterson & Thompson: the restricted estimate of one variance is RSS / (n - p)."""
     rng, design = np.random.default_rng(0), polynomial(30, 3)
     values = 0.2 * rng.normal(size=(1, 30))
-    found = estimated(*_model(values, design), white(0.15), (), fixed=(), linear=linear_model(values, design))
+    found = estimate_variance_components(*_model(values, design), white(0.15), (), fixed=(), linearised=linear_model(values, design))
     left = values[0] - design[0] @ np.linalg.lstsq(design[0], values[0], rcond=None)[0]
     assert found["strain"].noise ** 2 == pytest.approx((left**2).sum() / 26, rel=1e-4)
 
@@ -54,7 +54,7 @@ def test_intervals_of_white_noise_are_students():
     """With one estimated variance the freedom is n - p, and the covariance s^2 (X'X)^-1."""
     rng, design = np.random.default_rng(1), polynomial(25, 2)
     linear = linear_model(0.3 * rng.normal(size=(1, 25)), design)
-    posterior, freedom = restricted_laplace(linear, white(0.3), ())
+    posterior, freedom = restricted_covariance(linear, white(0.3), ())
     assert freedom == pytest.approx(22.0, rel=1e-6)
     assert posterior == pytest.approx(0.09 * np.linalg.inv(design[0].T @ design[0]), rel=1e-6)
 
@@ -62,28 +62,28 @@ def test_intervals_of_white_noise_are_students():
 def test_what_a_predictor_states_of_its_error_is_not_asked_of_the_data():
     """An error of a thousandth, under noise of .3, leaves the noise its n - p = 22; asked of the data it takes most."""
     linear = linear_model(0.3 * np.random.default_rng(1).normal(size=(1, 25)), polynomial(25, 2))
-    entries = SimpleNamespace(outputs=("amplitude",), scales=(LinearScale(2.0, 1.0),))
-    weighting = Weighting(Settings(weights="likelihood"), entries, {"amplitude": 0.004})
+    entries = SimpleNamespace(outputs=("amplitude",), scales=(LinearTransform(2.0, 1.0),))
+    weighting = WorkingNoise(IdentificationSettings(weights="likelihood"), entries, {"amplitude": 0.004})
     scatter = white(0.3, ("amplitude",), drift=0.002)
-    assert weighting.stated(scatter) == {("amplitude", "drift"), ("amplitude", "reach")}
-    assert weighting.stated(white(0.3, ("amplitude",), drift=0.1)) == set()
-    assert restricted_laplace(linear, scatter, ())[1] < 10.0
-    assert restricted_laplace(linear, scatter, (), weighting.stated(scatter))[1] == pytest.approx(22.0, rel=1e-3)
+    assert weighting.fixed_components(scatter) == {("amplitude", "drift"), ("amplitude", "reach")}
+    assert weighting.fixed_components(white(0.3, ("amplitude",), drift=0.1)) == set()
+    assert restricted_covariance(linear, scatter, ())[1] < 10.0
+    assert restricted_covariance(linear, scatter, (), weighting.fixed_components(scatter))[1] == pytest.approx(22.0, rel=1e-3)
 
 
 def test_tests_that_share_their_values_share_one_freedom():
     """Six tests of four frames each and one mean: n - p = 23, whatever falls to which test."""
     rng = np.random.default_rng(6)
     linear = linear_model(0.3 * rng.normal(size=(6, 4)), np.ones((6, 4, 1)))
-    assert restricted_laplace(linear, white(0.3), ())[1] == pytest.approx(23.0, rel=1e-6)
+    assert restricted_covariance(linear, white(0.3), ())[1] == pytest.approx(23.0, rel=1e-6)
 
 
 def test_the_mean_of_a_few_tests_has_their_number_less_one():
     """Rates that scatter, seen without noise: Student's interval of the mean of T numbers has T - 1."""
     linear = linear_model(np.zeros((5, 3)), np.ones((5, 3, 1)))
     linear = replace(linear, residuals=replace(linear.residuals, rate_effect=np.ones((5, 3))))
-    scatter = Scatter({"strain": OutputScatter(1e-4)}, rate=0.3)
-    assert restricted_laplace(linear, scatter, ())[1] == pytest.approx(4.0, rel=1e-3)
+    scatter = NoiseModel({"strain": OutputNoise(1e-4)}, rate=0.3)
+    assert restricted_covariance(linear, scatter, ())[1] == pytest.approx(4.0, rel=1e-3)
 
 
 def test_a_spread_that_explains_no_more_is_not_more_likely():
@@ -97,15 +97,15 @@ def test_a_spread_that_explains_no_more_is_not_more_likely():
 def test_a_prior_counts_where_its_unknown_stands_at_its_bound():
     linear = linear_model(np.zeros((1, 10)), polynomial(10, 0))
     held = replace(linear, precision=np.array([4.0]), distance=np.array([1.5]), free=np.zeros(1, bool))
-    assert held.solved(inverses_of(held.residuals, white(0.5))[0]).chi_square == pytest.approx(9.0, rel=1e-12)
+    assert held.solve(inverse_covariances(held.residuals, white(0.5))[0]).chi_square == pytest.approx(9.0, rel=1e-12)
 
 
 def test_noise_that_was_given_leaves_no_doubt_about_itself():
     linear = linear_model(np.zeros((1, 25)), polynomial(25, 2), outputs=1)
     from creepkit.records import Nuisance
 
-    scatter = Scatter({"strain": OutputScatter(0.0, offset=0.1)})
-    freedom = restricted_laplace(replace(linear), scatter, (Nuisance("offset", sd=0.1),))[1]
+    scatter = NoiseModel({"strain": OutputNoise(0.0, offset=0.1)})
+    freedom = restricted_covariance(replace(linear), scatter, (Nuisance("offset", sd=0.1),))[1]
     assert freedom > 20.0
 
 
@@ -118,7 +118,7 @@ def test_the_likelihood_is_that_of_contrasts_that_know_nothing_of_the_values():
     mine, textbook = [], []
     for scatter in scatters:
         linear = linear_model(values, design)
-        c = np.linalg.inv(inverses_of(linear.residuals, scatter)[0][0])
+        c = np.linalg.inv(inverse_covariances(linear.residuals, scatter)[0][0])
         mine.append(restricted_log_likelihood(linear, scatter))
         textbook.append(multivariate_normal(np.zeros(9), contrasts.T @ c @ contrasts).logpdf(contrasts.T @ values[0]))
     assert np.diff(mine) == pytest.approx(np.diff(textbook), rel=1e-6)
@@ -128,19 +128,19 @@ def test_the_optimum_is_generalised_least_squares():
     rng, design = np.random.default_rng(3), polynomial(20, 1, tests=2)
     values, scatter = rng.normal(size=(2, 20)), white(0.1, drift=1.0, reach=0.7)
     linear = linear_model(values, design)
-    inverses, _ = inverses_of(linear.residuals, scatter)
+    inverses, _ = inverse_covariances(linear.residuals, scatter)
     A = sum(x.T @ c @ x for x, c in zip(design, inverses, strict=True))
     b = sum(x.T @ c @ y for x, c, y in zip(design, inverses, values, strict=True))
-    assert linear.solved(inverses).move == pytest.approx(-np.linalg.solve(A, b), rel=1e-9)
+    assert linear.solve(inverses).step == pytest.approx(-np.linalg.solve(A, b), rel=1e-9)
 
 
 def test_outputs_inverted_one_by_one_are_the_whole_matrix_inverted():
     rng = np.random.default_rng(4)
     linear = linear_model(rng.normal(size=(2, 20)), polynomial(20, 1, tests=2), outputs=2)
     scatter = white(0.3, ("amplitude", "width"), drift=0.5, reach=0.3)
-    blocks, log_det = inverses_of(linear.residuals, scatter)
+    blocks, log_det = inverse_covariances(linear.residuals, scatter)
     shared = replace(linear.residuals, known=np.zeros((2, 20, 1)))
-    whole, same = inverses_of(shared, scatter)
+    whole, same = inverse_covariances(shared, scatter)
     assert blocks == pytest.approx(whole, rel=1e-9, abs=1e-9)
     assert log_det == pytest.approx(same, rel=1e-12)
 
@@ -159,8 +159,8 @@ def test_autocorrelated_noise_is_not_taken_for_less_than_it_is():
         values = (factor @ rng.normal(size=48))[None]
         linear = linear_model(values, design, clock)
         start = white(0.1, drift=0.7, reach=1.0)
-        restricted.append(estimated(linear.residuals, start, (), linear=linear)["strain"].drift)
+        restricted.append(estimate_variance_components(linear.residuals, start, (), linearised=linear)["strain"].drift)
         left = values - (design[0] @ np.linalg.lstsq(design[0], values[0], rcond=None)[0])[None]
-        plain.append(estimated(replace(linear.residuals, values=left), start, ())["strain"].drift)
+        plain.append(estimate_variance_components(replace(linear.residuals, values=left), start, ())["strain"].drift)
     assert np.median(plain) < 0.75
     assert np.median(restricted) == pytest.approx(1.0, abs=0.25)

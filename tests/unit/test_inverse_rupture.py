@@ -8,14 +8,14 @@ from foreign_laws import EQUATIONS
 
 import creepkit as ck
 from creepkit.errors import FitError, HistoryError
-from creepkit.inverse.coordinates import Coordinates, Reference
-from creepkit.inverse.effects import Unknowns
-from creepkit.inverse.entries import Entries
-from creepkit.inverse.life import predict_life
-from creepkit.inverse.objective import Objective
-from creepkit.inverse.scales import RUPTURE
-from creepkit.inverse.settings import Settings
-from creepkit.inverse.together import Together
+from creepkit.inverse.coordinates import Coordinates, ReferencePoint
+from creepkit.inverse.effects import NuisanceParameters
+from creepkit.inverse.entries import ObservationVector
+from creepkit.inverse.life import predict_to_rupture
+from creepkit.inverse.objective import ResidualFunction
+from creepkit.inverse.scales import RUPTURE_OUTPUT
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.together import CompositePredictor
 from creepkit.inverse.validation import leave_one_condition_out, times_to_rupture
 from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
@@ -39,7 +39,7 @@ def campaign(law, values, stresses, seed, stopped=()):
     rng, tests = np.random.default_rng(seed), []
     for k, stress in enumerate(stresses):
         plan = History(f"t{k}", np.array([1e8]), {}, constant_stress(stress), 1000.0, strain_measure="engineering")
-        life = float(BAR.predict_life(law, values, [plan]).life.ruptures[0, 0])
+        life = float(BAR.predict_life(law, values, [plan]).times_to_strain.rupture_times[0, 0])
         own, rate = (np.exp(SCATTER[name] * rng.standard_normal()) for name in ("life", "rate"))
         times = life * (SHARES[SHARES < 0.5] if k in stopped else SHARES[life * SHARES < life * own])
         strain = BAR.predict(law, values, [plan.replace(times=times)]).of(0)[:, 0]
@@ -69,9 +69,9 @@ def test_by_likelihood_ruptures_have_a_scatter_of_their_own_and_laws_are_ranked(
     tests = campaign(law, values, [55, 75, 100, 65, 100], 7, stopped=(0,))
     how = {"using": BAR, "weights": "likelihood", "nuisances": [], "starts": 2, "frames": 20}
     fits = [ck.identify(one, tests, **how) for one in (law, NORTON)]
-    assert fits[0].scatter[RUPTURE].drift == 0.0
-    assert fits[0].scatter[RUPTURE].misfit == pytest.approx(np.hypot(0.15, 0.08), rel=0.6)  # of four lives, rates in it
-    ends = [m.rupture for m in fits[0].misfits if not m.rupture.stopped]
+    assert fits[0].noise_model[RUPTURE_OUTPUT].drift == 0.0
+    assert fits[0].noise_model[RUPTURE_OUTPUT].misfit == pytest.approx(np.hypot(0.15, 0.08), rel=0.6)  # of four lives, rates in it
+    ends = [m.rupture for m in fits[0].tests if not m.rupture.censored]
     assert all(one.low < one.measured < one.high for one in ends)
     assert ck.rank(fits).best.law.name == law.name
 
@@ -80,7 +80,7 @@ def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
     law, values, _, fit = planted
     stresses = np.array([50.0, 80.0, 130.0])
     plans = [History(f"{s}", np.array([1e8]), {}, constant_stress(s), 1000.0) for s in stresses]
-    truth = BAR.predict_life(law, values, plans).life.ruptures[0]
+    truth = BAR.predict_life(law, values, plans).times_to_strain.rupture_times[0]
     time, less, more = fit.rupture_time(stresses, 1000.0)
     assert ((less < truth) & (truth < more)).all()
     np.testing.assert_allclose(time, truth, rtol=0.35)
@@ -99,7 +99,7 @@ def test_the_answer_says_how_tests_ended(planted, tmp_path):
     assert "2 stopped before, of which none should have broken" in str(fit)
     assert len(fit.plot(tmp_path / "fit.png").axes) == 4
     back = ck.load(fit.save(tmp_path / "fit.json"))
-    assert [m.rupture for m in back.misfits] == ends
+    assert [m.rupture for m in back.tests] == ends
     np.testing.assert_array_equal(back.rupture_time(80.0, using=BAR), fit.rupture_time(80.0))
     with pytest.raises(FitError, match="give using="):
         back.rupture_time(80.0)
@@ -144,10 +144,10 @@ def test_a_condition_left_out_is_predicted():
 
 
 def objective(law, tests):
-    reference = Reference.of(tests, BAR)
-    entries = Entries.of(tests, BAR)
-    unknowns = Unknowns.of(Settings().nuisances, tests, BAR)
-    return Objective(law, tests, BAR, Coordinates(law, reference), entries, unknowns)
+    reference = ReferencePoint.from_histories(tests, BAR)
+    entries = ObservationVector.from_histories(tests, BAR)
+    unknowns = NuisanceParameters.from_histories(IdentificationSettings().nuisances, tests, BAR)
+    return ResidualFunction(law, tests, BAR, Coordinates(law, reference), entries, unknowns)
 
 
 @pytest.mark.parametrize(("A", "B"), [(1.0, 1.0), (1.0, 5.0), (0.01, 0.02), (1.0, 1e-4), (30.0, 1e-4), (20.0, 0.5)])
@@ -156,31 +156,31 @@ def test_derivatives_of_candidates_that_break_early_late_or_never(A, B):
     found = objective(law, campaign(law, values, [60, 80, 110], 1, stopped=(1,)))
     theta = np.array([np.log(A * 1e-16), 4.0, np.log(B * 1e-15), 3.5, 4.0])
     u = found.coordinates.u(theta)
-    exact, step = found.at(u).jacobian, 1e-5
+    exact, step = found.evaluate(u).jacobian, 1e-5
     for k in range(u.size):
         h = step * np.eye(u.size)[k]
-        slope = (found.at(u + h).values - found.at(u - h).values) / (2 * step)
+        slope = (found.evaluate(u + h).values - found.evaluate(u - h).values) / (2 * step)
         assert np.isfinite(slope).all()
         np.testing.assert_allclose(exact[..., k], slope, rtol=0.01, atol=0.01 * max(1.0, np.abs(slope).max()))
-    np.testing.assert_allclose(found.screen(u[None])[0], found.at(u).values, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(found.batch_residuals(u[None])[0], found.evaluate(u).values, rtol=1e-3, atol=1e-3)
 
 
 def test_ruptures_count_in_ln_time_and_stopped_tests_only_where_they_outlasted():
     law, values = PLANTED["Kachanov-Rabotnov"]
     tests = campaign(law, values, [60, 80], 1, stopped=(1,))
     found = objective(law, tests)
-    last = found.entries.ruptures
+    last = found.observations.rupture_mask
     assert last.sum() == 2
     theta = np.array([np.log(1e-20), 4.0, np.log(1e-15), 3.5, 4.0])  # little creep: constant load hardly thins the bar
     for faster in (0.3, 20.0):
         theta[2] = np.log(faster * 1e-15)
-        residuals = found.at(found.coordinates.u(theta))
+        residuals = found.evaluate(found.coordinates.u(theta))
         life = {s: (1 - 0.01**5) / (5 * faster * 1e-15 * s**3.5) for s in (60.0, 80.0)}
         assert residuals.values[0, last[0]] == pytest.approx(np.log(tests[0].rupture_time / life[60.0]), abs=0.01)
         outlasted = np.log(tests[1].times[-1] / life[80.0])
         assert residuals.values[1, last[1]] == pytest.approx(max(outlasted, 0.0), abs=0.01)
         assert residuals.present[1, last[1]] == (outlasted > 0)
-    np.testing.assert_allclose(residuals.rate_effect[last], 1.0, atol=0.01)
+    np.testing.assert_allclose(residuals.log_rate_sensitivity[last], 1.0, atol=0.01)
 
 
 def test_histories_that_say_nothing_of_their_end_are_compared_as_ever():
@@ -188,16 +188,16 @@ def test_histories_that_say_nothing_of_their_end_are_compared_as_ever():
     tests = campaign(law, values, [60, 80], 1)
     cut = [h.up_to("strain", 0.01) for h in tests]
     assert not any(h.ended for h in cut)
-    assert RUPTURE not in objective(law, cut).entries.outputs
-    assert RUPTURE in objective(law, tests).entries.outputs
+    assert RUPTURE_OUTPUT not in objective(law, cut).observations.outputs
+    assert RUPTURE_OUTPUT in objective(law, tests).observations.outputs
 
 
 def test_a_coordinate_is_the_log_of_the_rate_of_damage():
     law = PLANTED["Kachanov-Rabotnov"][0]
-    coordinates = Coordinates(law, Reference(80.0, 0.1, 1e6, 1000.0))
+    coordinates = Coordinates(law, ReferencePoint(80.0, 0.1, 1e6, 1000.0))
     theta = np.array([np.log(1e-16), 4.0, np.log(1e-15), 3.5, 4.0])
     u = coordinates.u(theta)
-    assert (coordinates.rates, coordinates.growths) == ((0,), (2,))
+    assert (coordinates.term_rates, coordinates.state_rates) == ((0,), (2,))
     assert u[2] == pytest.approx(np.log(1e-15) + 3.5 * np.log(80.0))
     np.testing.assert_allclose(coordinates.theta(u), theta, rtol=1e-13)
     step = 1e-6 * np.eye(5)
@@ -212,17 +212,17 @@ def test_bars_are_followed_to_rupture_beside_tests_that_are_not():
         "held", np.array([10.0, 1e6]), {"stress": [100.0, 90.0]}, constant_strain(0.001), 1000.0, "relaxation",
         Elastic(E=150e3), rupture_time=2e6,
     )  # fmt: skip
-    both = Together({"uniaxial": BAR, "relaxation": Relaxation()})
+    both = CompositePredictor({"uniaxial": BAR, "relaxation": Relaxation()})
     given = {name: np.array([value]) for name, value in values.items()}
-    found = predict_life(both, law, given, [bars[0], held, bars[1]], jacobian=True).life
-    alone = BAR.predict_life(law, given, bars, jacobian=True).life
-    np.testing.assert_array_equal(found.ruptures[0, [0, 2]], alone.ruptures[0])
+    found = predict_to_rupture(both, law, given, [bars[0], held, bars[1]], jacobian=True).times_to_strain
+    alone = BAR.predict_life(law, given, bars, jacobian=True).times_to_strain
+    np.testing.assert_array_equal(found.rupture_times[0, [0, 2]], alone.rupture_times[0])
     for name in ("arrivals", "slopes", "arrival_jacobian"):
         joined, own = (getattr(life, name)[0] for life in (found, alone))
         np.testing.assert_array_equal(joined[[0, 2], : own.shape[1]], own)
-    assert np.isnan(found.ruptures[0, 1])
-    entries = Entries.of([bars[0], held, bars[1]], both)
-    assert entries.whole.tolist() == [True, False, True]
+    assert np.isnan(found.rupture_times[0, 1])
+    entries = ObservationVector.from_histories([bars[0], held, bars[1]], both)
+    assert entries.followed_to_rupture.tolist() == [True, False, True]
 
 
 def test_how_a_test_ended_survives_pickling():

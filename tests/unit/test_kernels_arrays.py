@@ -17,7 +17,7 @@ from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.testing import sample
+from creepkit.testing import draw_samples
 
 SHIPPED = [NORTON, STRAIN_HARDENING, TIME_HARDENING, HYPERBOLIC_SINE, DRIFTING_EXPONENT, COMBINED]
 LAWS = [*SHIPPED, EQUATIONS["combined with temperature"], EQUATIONS["Liu-Murakami"], EQUATIONS["threshold"]]
@@ -157,7 +157,7 @@ def test_nothing_is_nan_or_infinite_at_zero(law: CreepLaw, dtype: torch.dtype, z
 
 @each_law
 def test_autograd_gives_the_derivatives_by_symbols(law: CreepLaw) -> None:
-    drawn = sample(law, 64, seed=5)
+    drawn = draw_samples(law, 64, seed=5)
     found = lower(law, "numpy").internal_derivatives(*drawn.arguments())
     kept = np.isfinite(found.rate) & (found.rate > 1e-250) & (found.rate < 1e250)
     inputs = [torch.tensor(column[kept], requires_grad=True) for column in drawn.arguments()]

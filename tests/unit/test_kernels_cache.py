@@ -9,7 +9,7 @@ import pytest
 from foreign_laws import POWER, RATE, A, law, n
 
 from creepkit.kernels import disk_cache, lower
-from creepkit.kernels.disk_cache import SEAL, SOURCE, intact
+from creepkit.kernels.disk_cache import CHECKSUM_FILE, SOURCE_FILE, is_intact
 from creepkit.language import CreepLaw, stress
 
 PROGRAM = """
@@ -74,20 +74,20 @@ def test_processes_may_build_the_same_law_at_once(cache: Path) -> None:
 
     assert all(answer[:2] == NEW[:2] for answer in answers)
     assert sorted(p.name for p in (cache / "kernels").iterdir()) == [folder_of(cache).name]
-    assert intact(folder_of(cache))
+    assert is_intact(folder_of(cache))
     assert Other(cache).answer() == KNOWN
 
 
 @pytest.mark.parametrize(
     ("suffix", "damage", "factor"),
     [
-        (SOURCE, "truncated", 2),
-        (SOURCE, "changed", 3),
+        (SOURCE_FILE, "truncated", 2),
+        (SOURCE_FILE, "changed", 3),
         (".nbi", "emptied", 5),
         (".nbc", "truncated", 7),
         (".nbc", "changed", 11),
         (".nbc", "removed", 13),
-        (SEAL, "removed", 17),
+        (CHECKSUM_FILE, "removed", 17),
     ],
 )
 def test_what_is_damaged_is_made_anew(cache: Path, suffix: str, damage: str, factor: int) -> None:
@@ -99,14 +99,14 @@ def test_what_is_damaged_is_made_anew(cache: Path, suffix: str, damage: str, fac
     else:
         changed = content[: len(content) // 2] + b"#" + content[len(content) // 2 + 1 :]
         victim.write_bytes({"truncated": content[:-20], "emptied": b"", "changed": changed}[damage])
-    assert not intact(folder_of(cache))
+    assert not is_intact(folder_of(cache))
 
-    disk_cache._loaded.clear()
+    disk_cache._loaded_modules.clear()
     again = lower(some_law(factor), "numba")
 
-    assert intact(folder_of(cache))
+    assert is_intact(folder_of(cache))
     assert again.rate.cache_hits == 0
-    disk_cache._loaded.clear()
+    disk_cache._loaded_modules.clear()
     assert lower(some_law(factor), "numba").rate.cache_hits == 1
     assert [p.name for p in (cache / "kernels").iterdir()] == [folder_of(cache).name]
 
@@ -115,10 +115,10 @@ def test_a_file_that_does_not_belong_makes_the_folder_suspect(cache: Path) -> No
     lower(some_law(23), "numba")
     (folder_of(cache) / "extra.py").write_text("raise SystemExit('was run')")
 
-    assert not intact(folder_of(cache))
-    disk_cache._loaded.clear()
+    assert not is_intact(folder_of(cache))
+    disk_cache._loaded_modules.clear()
     lower(some_law(23), "numba")
-    assert intact(folder_of(cache))
+    assert is_intact(folder_of(cache))
 
 
 def test_without_a_folder_to_write_to_each_process_compiles_for_itself(tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_a_folder_that_is_read_only_still_serves_what_it_holds(cache: Path, monk
     lower(some_law(29), "numba")
     before = folder_of(cache)
     monkeypatch.setattr(disk_cache, "_writable", lambda folder: False)
-    disk_cache._loaded.clear()
+    disk_cache._loaded_modules.clear()
 
     known, new = lower(some_law(29), "numba"), lower(some_law(31), "numba")
 
@@ -146,7 +146,7 @@ def test_a_folder_that_is_read_only_still_serves_what_it_holds(cache: Path, monk
 
 def test_a_failure_leaves_nothing_half_made(cache: Path) -> None:
     with pytest.raises(SyntaxError):
-        disk_cache.load("broken", lambda: "def rate(:")
+        disk_cache.load_module("broken", lambda: "def rate(:")
 
     assert list((cache / "kernels").iterdir()) == []
 

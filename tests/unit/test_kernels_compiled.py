@@ -7,12 +7,12 @@ from numba import float64, int64, njit
 
 from creepkit.arrays import Floats
 from creepkit.kernels import CompiledLaw, lower
-from creepkit.kernels.calling import call
+from creepkit.kernels.calling import call_entry
 from creepkit.kernels.interface import (
     DERIVATIVE_NOT_FINITE,
-    ENTRY,
+    ENTRY_TYPE,
     RATE_NOT_FINITE,
-    pointer,
+    data_pointer,
 )
 from creepkit.language import CreepLaw, strain, stress
 from creepkit.laws.combined import COMBINED
@@ -21,7 +21,7 @@ from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.testing import sample
+from creepkit.testing import draw_samples
 
 SHIPPED = [NORTON, STRAIN_HARDENING, TIME_HARDENING, HYPERBOLIC_SINE, DRIFTING_EXPONENT, COMBINED]
 LAWS = [*SHIPPED, EQUATIONS["Liu-Murakami"], EQUATIONS["threshold"], EQUATIONS["combined with temperature"]]
@@ -40,11 +40,11 @@ def point(**given: float) -> Floats:
 
 def test_norton_by_hand() -> None:
     compiled = lower(NORTON, "numba")
-    theta = compiled.internal({"A": 1e-16, "n": 4.0})[0]
+    theta = compiled.to_internal({"A": 1e-16, "n": 4.0})[0]
 
-    rate, flags = call(compiled, "rate", point(), theta)
-    update, _ = call(compiled, "update", point(), theta)
-    sensitivity, _ = call(compiled, "sensitivity", point(), theta)
+    rate, flags = call_entry(compiled, "rate", point(), theta)
+    update, _ = call_entry(compiled, "update", point(), theta)
+    sensitivity, _ = call_entry(compiled, "sensitivity", point(), theta)
 
     assert flags == 0
     np.testing.assert_allclose(rate, [[1e-8]], rtol=1e-13)
@@ -55,12 +55,12 @@ def test_norton_by_hand() -> None:
 def test_damage_comes_after_the_rate_row_by_row() -> None:
     """Rate A s^n (1 + omega) and damage rate B s omega: values, then slopes to x of both, then to theta."""
     compiled = lower(damage(A * stress**n * (1 + omega), B * stress * omega, {A: RATE, n: POWER, B: RATE}), "numba")
-    theta = compiled.internal({"A": 1e-16, "n": 4.0, "B": 1e-9})[0]
+    theta = compiled.to_internal({"A": 1e-16, "n": 4.0, "B": 1e-9})[0]
     x = np.column_stack([point(), [[0.25]]])
 
-    rate, _ = call(compiled, "rate", x, theta)
-    update, _ = call(compiled, "update", x, theta)
-    sensitivity, _ = call(compiled, "sensitivity", x, theta)
+    rate, _ = call_entry(compiled, "rate", x, theta)
+    update, _ = call_entry(compiled, "update", x, theta)
+    sensitivity, _ = call_entry(compiled, "sensitivity", x, theta)
 
     f, g = 1.25e-8, 2.5e-8
     np.testing.assert_allclose(rate, [[f, g]], rtol=1e-13)
@@ -75,20 +75,20 @@ def test_damage_comes_after_the_rate_row_by_row() -> None:
 @each_law
 @pytest.mark.parametrize("entry", ["rate", "update", "sensitivity"])
 def test_rows_together_are_rows_one_by_one(law_: CreepLaw, entry: str) -> None:
-    compiled, drawn = lower(law_, "numba"), sample(law_, 16, seed=2)
+    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 16, seed=2)
     theta = drawn.theta[0]
 
-    together, _ = call(compiled, entry, drawn.points, theta)  # type: ignore[arg-type]
-    alone = np.vstack([call(compiled, entry, row[None], theta)[0] for row in drawn.points])  # type: ignore[arg-type]
+    together, _ = call_entry(compiled, entry, drawn.points, theta)  # type: ignore[arg-type]
+    alone = np.vstack([call_entry(compiled, entry, row[None], theta)[0] for row in drawn.points])  # type: ignore[arg-type]
 
     np.testing.assert_array_equal(together, alone)
 
 
 @each_law
 def test_update_is_the_logarithm_of_the_rate(law_: CreepLaw) -> None:
-    compiled, drawn = lower(law_, "numba"), sample(law_, 16, seed=4)
+    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 16, seed=4)
     for x, theta in zip(drawn.points, drawn.theta, strict=True):
-        sensitivity, update = (call(compiled, e, x[None], theta)[0][0] for e in ("sensitivity", "update"))
+        sensitivity, update = (call_entry(compiled, e, x[None], theta)[0][0] for e in ("sensitivity", "update"))
         inner = 1 + compiled.states
         if 1e-250 < sensitivity[0] < 1e250:
             assert np.exp(update[0]) == pytest.approx(sensitivity[0], rel=1e-12)
@@ -97,13 +97,13 @@ def test_update_is_the_logarithm_of_the_rate(law_: CreepLaw) -> None:
 
 
 def test_code_compiled_once_takes_any_law() -> None:
-    @njit(int64(ENTRY, float64[::1], float64[::1], float64[::1]))
+    @njit(int64(ENTRY_TYPE, float64[::1], float64[::1], float64[::1]))
     def called(entry, x, theta, out):  # type: ignore[no-untyped-def]
-        return entry(1, pointer(x), pointer(theta), pointer(out))
+        return entry(1, data_pointer(x), data_pointer(theta), data_pointer(out))
 
     for law_, expected in ((NORTON, 1e-8), (STRAIN_HARDENING, 1e-7)):
         compiled, out = lower(law_, "numba"), np.empty(1)
-        theta = compiled.internal({"A": 1e-16, "n": 4.0, **({"m": -0.5} if "m" in law_.names else {})})[0]
+        theta = compiled.to_internal({"A": 1e-16, "n": 4.0, **({"m": -0.5} if "m" in law_.names else {})})[0]
         assert called(compiled.rate, point()[0], theta, out) == 0
         assert out[0] == pytest.approx(expected, rel=1e-13)
 
@@ -112,12 +112,12 @@ def test_code_compiled_once_takes_any_law() -> None:
 
 
 def flags(compiled: CompiledLaw, entry: str, x: Floats, theta: Floats) -> int:
-    return call(compiled, entry, x, theta)[1]  # type: ignore[arg-type]
+    return call_entry(compiled, entry, x, theta)[1]  # type: ignore[arg-type]
 
 
 def test_a_rate_beyond_float64_is_flagged_but_not_its_logarithm() -> None:
     compiled = lower(HYPERBOLIC_SINE, "numba")
-    theta = compiled.internal({"A": 1e-5, "n": 8.0, "B": 1.0})[0]
+    theta = compiled.to_internal({"A": 1e-5, "n": 8.0, "B": 1.0})[0]
 
     assert flags(compiled, "rate", point(stress=2000.0), theta) == RATE_NOT_FINITE
     assert flags(compiled, "sensitivity", point(stress=2000.0), theta) == RATE_NOT_FINITE | DERIVATIVE_NOT_FINITE
@@ -126,10 +126,10 @@ def test_a_rate_beyond_float64_is_flagged_but_not_its_logarithm() -> None:
 
 def test_one_bad_row_among_good_ones_is_flagged() -> None:
     compiled = lower(HYPERBOLIC_SINE, "numba")
-    theta = compiled.internal({"A": 1e-5, "n": 8.0, "B": 1.0})[0]
+    theta = compiled.to_internal({"A": 1e-5, "n": 8.0, "B": 1.0})[0]
     rows = np.vstack([point(stress=1.0), point(stress=2000.0), point(stress=2.0)])
 
-    out, found = call(compiled, "rate", rows, theta)
+    out, found = call_entry(compiled, "rate", rows, theta)
 
     assert found == RATE_NOT_FINITE
     assert np.isfinite(out[[0, 2]]).all()
@@ -138,7 +138,7 @@ def test_one_bad_row_among_good_ones_is_flagged() -> None:
 def test_a_derivative_alone_can_be_flagged() -> None:
     """The rate at strain 0 is 1e-10 (1e-30)^-10 = 1e290, its slope a factor 1e31 larger."""
     compiled = lower(law(A * stress / strain**10, {A: scale(1e-12, 1e-5)}), "numba")
-    theta = compiled.internal({"A": 1e-10})[0]
+    theta = compiled.to_internal({"A": 1e-10})[0]
 
     assert flags(compiled, "sensitivity", point(strain=0.0, stress=1.0), theta) == DERIVATIVE_NOT_FINITE
 
@@ -153,7 +153,7 @@ def test_large_numbers_that_are_finite_are_not_flagged() -> None:
 @each_law
 def test_a_nan_is_flagged(law_: CreepLaw) -> None:
     compiled = lower(law_, "numba")
-    theta, x = compiled.internal(law_.center())[0], point(stress=np.nan)
+    theta, x = compiled.to_internal(law_.center())[0], point(stress=np.nan)
     x = np.column_stack([x, np.full((1, compiled.states), 0.1)])
 
     assert flags(compiled, "rate", x, theta) & RATE_NOT_FINITE
@@ -163,14 +163,14 @@ def test_a_nan_is_flagged(law_: CreepLaw) -> None:
 @each_law
 @pytest.mark.parametrize("zeros", [(), (0, 1, 2, 4, 5)], ids=["somewhere", "at zero"])
 def test_with_every_term_off_the_rate_is_zero_and_the_update_finite(law_: CreepLaw, zeros: tuple[int, ...]) -> None:
-    compiled, drawn = lower(law_, "numba"), sample(law_, 8)
+    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 8)
     x, theta = drawn.points.copy(), drawn.theta[0].copy()
     x[:, zeros] = 0.0
     theta[[k for k, p in enumerate(law_.params.values()) if p.off == 0 and p.scale == "log"]] = -np.inf
 
-    rate, rate_flags = call(compiled, "rate", x, theta)
-    update, update_flags = call(compiled, "update", x, theta)
-    sensitivity, sensitivity_flags = call(compiled, "sensitivity", x, theta)
+    rate, rate_flags = call_entry(compiled, "rate", x, theta)
+    update, update_flags = call_entry(compiled, "update", x, theta)
+    sensitivity, sensitivity_flags = call_entry(compiled, "sensitivity", x, theta)
 
     assert (rate[:, 0] == 0).all()
     assert (update[:, 0] < -1e20).all()
@@ -183,7 +183,7 @@ def test_a_term_that_is_off_leaves_the_others() -> None:
     compiled = lower(COMBINED, "numba")
     values = {**COMBINED.center(), "A_1": 0.0, "A_3": 0.0, "A_2": 1e-16, "n_2": 4.0, "m_1": -0.5}
 
-    update, _ = call(compiled, "update", point(), compiled.internal(values)[0])
+    update, _ = call_entry(compiled, "update", point(), compiled.to_internal(values)[0])
 
     np.testing.assert_allclose(update, [[np.log(1e-7), 0.04, -50.0, 0, 0, 0, 0]], rtol=1e-12)
 
@@ -194,7 +194,7 @@ def test_a_term_that_is_off_leaves_the_others() -> None:
 def test_internal_parameters_are_logarithms_where_the_scale_is_log() -> None:
     compiled = lower(HYPERBOLIC_SINE, "numba")
 
-    theta = compiled.internal({"A": np.array([1e-10, 0.0]), "n": 2.0, "B": 10.0})
+    theta = compiled.to_internal({"A": np.array([1e-10, 0.0]), "n": 2.0, "B": 10.0})
 
     assert compiled.log_scale.tolist() == [True, False, True]
     np.testing.assert_array_equal(theta, [[np.log(1e-10), 2.0, np.log(10.0)], [-np.inf, 2.0, np.log(10.0)]])

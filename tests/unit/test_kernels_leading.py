@@ -15,8 +15,8 @@ from creepkit.laws.time_hardening import TIME_HARDENING
 
 def leading(of: CreepLaw, point: list[float] | None = None, **values: float) -> float:
     compiled = lower(of, "numba")
-    theta = compiled.internal({**of.center(), **values})
-    return float(compiled.leading(theta)[0] if point is None else compiled.leading(theta, np.array([point]))[0])
+    theta = compiled.to_internal({**of.center(), **values})
+    return float(compiled.leading_exponent(theta)[0] if point is None else compiled.leading_exponent(theta, np.array([point]))[0])
 
 
 @pytest.mark.parametrize(
@@ -57,6 +57,6 @@ def test_an_exponent_that_varies_with_temperature_is_taken_at_the_point() -> Non
 
 def test_candidates_are_taken_together() -> None:
     compiled = lower(TIME_HARDENING, "numba")
-    theta = compiled.internal({"A": 1e-10, "n": 3.0, "m": np.array([-0.9, -0.5, 0.0])})
+    theta = compiled.to_internal({"A": 1e-10, "n": 3.0, "m": np.array([-0.9, -0.5, 0.0])})
 
-    np.testing.assert_allclose(compiled.leading(theta), [0.1, 0.5, 1.0], rtol=1e-12)
+    np.testing.assert_allclose(compiled.leading_exponent(theta), [0.1, 0.5, 1.0], rtol=1e-12)

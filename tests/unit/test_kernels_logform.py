@@ -13,22 +13,22 @@ from sympy import Piecewise, exp, gamma, sinh
 
 from creepkit.errors import LawError
 from creepkit.kernels import numba_functions, numpy_functions, stable_functions, torch_functions
-from creepkit.kernels.exponentials import paired
-from creepkit.kernels.logform import FLOOR, TINY, log_form
-from creepkit.kernels.printing import NAMES
-from creepkit.kernels.stable_functions import ExpDifference, Expm1, LogFloor, LogRise, LogSinh, Stable
+from creepkit.kernels.exponentials import with_exponential_differences
+from creepkit.kernels.logform import FLOOR, COMPOSITE_FLOOR, log_form
+from creepkit.kernels.printing import TARGET_FUNCTION_NAMES
+from creepkit.kernels.stable_functions import ExpDifference, Expm1, LogFloor, LogRise, LogSinh, StableFunction
 from creepkit.language import parameters, strain, stress, time
 
 x, y = sympy.symbols("x y", real=True)
 ln_A, ln_B = sympy.symbols("ln_A ln_B", real=True)
 FUNCTIONS = [
-    f for f in vars(stable_functions).values() if isinstance(f, type) and issubclass(f, Stable) and f != Stable
+    f for f in vars(stable_functions).values() if isinstance(f, type) and issubclass(f, StableFunction) and f != StableFunction
 ]
 ONE_ARGUMENT = [f for f in FUNCTIONS if f.nargs == sympy.FiniteSet(1)]
 
 
-def evaluated(function: type[Stable], value: float, target: str) -> float:
-    name = NAMES[function.__name__]
+def evaluated(function: type[StableFunction], value: float, target: str) -> float:
+    name = TARGET_FUNCTION_NAMES[function.__name__]
     if target == "torch":
         return float(getattr(torch_functions, name)(torch.tensor(value, dtype=torch.float64)))
     if target == "numba":
@@ -42,22 +42,22 @@ def evaluated(function: type[Stable], value: float, target: str) -> float:
 
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
 @pytest.mark.parametrize("at", [(1e-3, 2.0), (0.7, 0.7001), (40.0, 3.0)])
-def test_slopes_are_those_of_the_plain_forms(function: type[Stable], at: tuple[float, float]) -> None:
+def test_slopes_are_those_of_the_plain_forms(function: type[StableFunction], at: tuple[float, float]) -> None:
     """The floors, where there are any, lie below the points."""
-    arguments = (x, y) if function is ExpDifference else (x, sympy.Float(1e-30))[: len(function.slopes)]
+    arguments = (x, y) if function is ExpDifference else (x, sympy.Float(1e-30))[: len(function.partial_derivatives)]
     values = dict(zip((x, y), at, strict=True))
 
     for argument in (x, y)[: 2 if function is ExpDifference else 1]:
-        slope = stable_functions.in_full(sympy.diff(function(*arguments), argument))
-        plain = sympy.diff(function.plain(*arguments), argument)
+        slope = stable_functions.in_sympy_functions(sympy.diff(function(*arguments), argument))
+        plain = sympy.diff(function.sympy_form(*arguments), argument)
         assert abs(slope.evalf(60, subs=values) / plain.evalf(60, subs=values) - 1) < 1e-14
 
 
 @pytest.mark.parametrize("target", ["numpy", "torch", "numba"])
 @pytest.mark.parametrize("function", ONE_ARGUMENT, ids=lambda f: f.__name__)
-def test_values_keep_their_digits_from_tiny_to_huge_arguments(function: type[Stable], target: str) -> None:
+def test_values_keep_their_digits_from_tiny_to_huge_arguments(function: type[StableFunction], target: str) -> None:
     with mpmath.workdps(400):
-        exact = sympy.lambdify(x, function.plain(x), "mpmath")
+        exact = sympy.lambdify(x, function.sympy_form(x), "mpmath")
         for value in (1e-12, 1e-3, 0.5, 3.0, 40.0, 300.0):
             true, got = exact(mpmath.mpf(value)), evaluated(function, value, target)
             near_zero = function is LogSinh and value == 0.5  # ln sinh passes through 0 at 0.88
@@ -79,14 +79,14 @@ def test_exp_difference_keeps_its_digits(functions: Any, a: float, b: float) -> 
 
 
 def test_sums_that_vanish_as_a_whole_are_paired() -> None:
-    assert paired(1 - exp(-x)) == -Expm1(-x)
-    assert paired(y * exp(-x) - y * exp(-2 * x)) in (y * ExpDifference(-x, -2 * x), -y * ExpDifference(-2 * x, -x))
+    assert with_exponential_differences(1 - exp(-x)) == -Expm1(-x)
+    assert with_exponential_differences(y * exp(-x) - y * exp(-2 * x)) in (y * ExpDifference(-x, -2 * x), -y * ExpDifference(-2 * x, -x))
 
 
 def test_sums_that_do_not_vanish_stay_as_the_author_wrote_them() -> None:
     total = y + (2 - y) * exp(-x)
 
-    assert paired(total) == total
+    assert with_exponential_differences(total) == total
 
 
 # ---- logarithms of terms -------------------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ def test_a_negative_number_is_moved_into_a_sum() -> None:
     term = -3 * A * (stress - s_0)
     (found,) = log_form(law(term, {A: RATE, s_0: number(3000, 4000)})).terms
 
-    assert found.has(LogFloor(s_0 - stress, sympy.Float(TINY)))
+    assert found.has(LogFloor(s_0 - stress, sympy.Float(COMPOSITE_FLOOR)))
 
 
 def test_a_branch_that_is_zero_does_not_hide_the_coefficient() -> None:

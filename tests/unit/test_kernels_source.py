@@ -6,8 +6,8 @@ import pytest
 from foreign_laws import EQUATIONS, POWER, RATE, A, law, n
 
 from creepkit.kernels import lower
-from creepkit.kernels.entries import entries
-from creepkit.kernels.module_text import module_text
+from creepkit.kernels.entries import symbolic_kernel
+from creepkit.kernels.module_text import module_source
 from creepkit.language import CreepLaw, parameters, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
@@ -34,7 +34,7 @@ def test_norton_is_one_line_on_every_target() -> None:
 def test_what_needs_no_point_is_done_before_the_loop() -> None:
     """Functions of parameters alone, such as exp(-r) of Liu-Murakami, are not called again for every row."""
     for law_ in (COMBINED, EQUATIONS["Liu-Murakami"]):
-        for function in module_text(entries(law_)).split("@cfunc")[1:]:
+        for function in module_source(symbolic_kernel(law_)).split("@cfunc")[1:]:
             before, _, loop = function.partition("for row in range(rows):")
             theta = set(re.findall(r"(\w+) = ", before))
             for arguments in re.findall(r"\b(?:exp|expm1|log|log_floor|sqrt)\(([^()]*)\)", loop):
@@ -68,7 +68,7 @@ def test_a_label_cannot_leave_its_comment(monkeypatch: pytest.MonkeyPatch) -> No
     foreign = law({label: A * stress**n}, {A: RATE, n: POWER}, name=label)
 
     assert float(lower(foreign, "numpy").rate({"A": 1e-10, "n": 2.0}, stress=3.0)) == pytest.approx(9e-10, rel=1e-14)
-    text = module_text(entries(foreign))
+    text = module_source(symbolic_kernel(foreign))
     assert next(line for line in text.splitlines() if "SystemExit" in line).startswith("# ")
 
 

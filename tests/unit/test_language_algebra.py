@@ -16,7 +16,7 @@ from creepkit.language import (
     activated,
     arrhenius,
     exponential,
-    inverse,
+    inverse_temperature,
     linear,
     parameters,
     states,
@@ -234,7 +234,7 @@ def test_a_second_factor_gets_a_parameter_of_its_own():
 
 FORMS = {
     "linear": (linear(1000.0), "n", "n_T", lambda p, q: p + q * (1123.15 - 1000)),
-    "inverse": (inverse(1000.0), "n", "n_I", lambda p, q: p + q * (1000 / 1123.15 - 1)),
+    "inverse": (inverse_temperature(1000.0), "n", "n_I", lambda p, q: p + q * (1000 / 1123.15 - 1)),
 }
 
 
@@ -270,7 +270,7 @@ def test_a_constraint_follows_its_parameter_into_temperature():
     ("wrong", "message"),
     [
         (lambda: NORTON.with_temperature(A=linear()), "has a log scale: use exponential"),
-        (lambda: NORTON.with_temperature(A=inverse()), "has a log scale: use activated"),
+        (lambda: NORTON.with_temperature(A=inverse_temperature()), "has a log scale: use activated"),
         (lambda: NORTON.with_temperature(n="linear"), "n needs a form such as linear"),
         (lambda: NORTON.with_temperature(n=linear()).with_temperature(n=linear()), "depends on temperature twice"),
         (lambda: NORTON.with_temperature(q=linear()), "has no parameter 'q'"),

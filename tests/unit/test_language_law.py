@@ -124,11 +124,11 @@ def test_param_knows_its_middle_its_internal_form_and_what_it_admits():
     assert EXPONENT.center == 4.5
     assert RATE.to_internal(0.0) == -float("inf")
     assert RATE.from_internal(RATE.to_internal(1e-12)) == pytest.approx(1e-12, rel=1e-13)
-    assert RATE.admits(0.0)
-    assert RATE.admits(1e-40)
-    assert not RATE.admits(1e-4)
-    assert not EXPONENT.admits(0.0)
-    assert not EXPONENT.admits(float("nan"))
+    assert RATE.within_bounds(0.0)
+    assert RATE.within_bounds(1e-40)
+    assert not RATE.within_bounds(1e-4)
+    assert not EXPONENT.within_bounds(0.0)
+    assert not EXPONENT.within_bounds(float("nan"))
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from creepkit.errors import SolveError
 from creepkit.fem.drafts import renumbered
 from creepkit.fem.mesh import Mesh
-from creepkit.fem.mesh_checks import half_bandwidth, quality
+from creepkit.fem.mesh_checks import half_bandwidth, mesh_quality
 from creepkit.fem.mesh_files import read_input_deck, read_mesh
 from creepkit.fem.shape import discretize
 from creepkit.specimens.dimple import DimpleGeometry
@@ -141,7 +141,7 @@ def test_a_deck_may_press_elements_one_by_one(tmp_path):
 def check(mesh: Mesh) -> None:
     """Two squares, pressed from below, held at r = 2."""
     assert (len(mesh.elements), len(mesh.nodes)) == (2, 13)
-    np.testing.assert_allclose(quality(mesh).sine, 1.0)
+    np.testing.assert_allclose(mesh_quality(mesh).sine, 1.0)
     np.testing.assert_allclose(push(mesh), [0.0, 2.0], atol=1e-15)
     np.testing.assert_allclose(mesh.nodes[mesh.top], [[r, 1] for r in (0, 0.5, 1, 1.5, 2)])
     np.testing.assert_array_equal(mesh.held[:, 1], mesh.nodes[:, 0] == 2)

@@ -12,8 +12,8 @@ import creepkit as ck
 from creepkit.errors import LawError
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.language.tree import law_from_json, law_to_json
-from creepkit.registry import Registry, default
-from creepkit.registry.packages import PACKAGES, package_of
+from creepkit.registry import Registry, default_registry
+from creepkit.registry.packages import LAWS_BY_PACKAGE, package_with_law
 
 ROOT = Path(__file__).parents[2]
 A, n = parameters("A n")
@@ -74,13 +74,13 @@ def test_a_new_law_needs_a_new_name() -> None:
 def test_a_missing_law_names_the_package_that_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
     from creepkit.registry import sources
 
-    own = [pair for pair in sources.installed() if pair[0].origin.startswith("creepkit ")]
+    own = [pair for pair in sources.installed_entry_points() if pair[0].origin.startswith("creepkit ")]
     monkeypatch.setattr(sources, "installed", lambda: own)
     with pytest.raises(LawError) as raised:
         Registry().law("kachanov-rabotnov")
     package = "package creepkit-damage has it: pip install creepkit-damage"
     assert str(raised.value) == f"there is no law 'kachanov-rabotnov'; {package}"
-    default.cache_clear()
+    default_registry.cache_clear()
     assert "pip install creepkit-classic" in one_line(creepkit("laws", "theta-projection"))
     assert "did you mean 'norton'?" in one_line(creepkit("laws", "nortn"))
 
@@ -88,17 +88,17 @@ def test_a_missing_law_names_the_package_that_has_it(monkeypatch: pytest.MonkeyP
 def test_the_table_is_what_the_packages_of_this_project_offer() -> None:
     for project in (tomllib.loads(p.read_text()) for p in sorted(ROOT.glob("plugins/*/pyproject.toml"))):
         package = project["project"]["name"]
-        assert set(PACKAGES[package]) == set(project["project"]["entry-points"]["creepkit"])
-    assert package_of("norton") == ""
+        assert set(LAWS_BY_PACKAGE[package]) == set(project["project"]["entry-points"]["creepkit"])
+    assert package_with_law("norton") == ""
 
 
 def test_a_law_tells_which_package_it_came_from() -> None:
-    known = default()
+    known = default_registry()
     sum_of_two = (ck.law("logarithmic") + ck.law("norton")).times(ck.arrhenius())
     version = ck.__version__
-    assert known.origin(ck.law("logarithmic").fix(n=4)) == "creepkit-logarithmic 0.1.0"
-    assert known.origin(sum_of_two) == f"creepkit {version}, creepkit-logarithmic 0.1.0"
-    assert known.origin(limited(None)) == ""
+    assert known.distributions_of(ck.law("logarithmic").fix(n=4)) == "creepkit-logarithmic 0.1.0"
+    assert known.distributions_of(sum_of_two) == f"creepkit {version}, creepkit-logarithmic 0.1.0"
+    assert known.distributions_of(limited(None)) == ""
 
 
 # ---- limits --------------------------------------------------------------------------------------------------------

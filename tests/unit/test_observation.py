@@ -90,7 +90,7 @@ def test_a_frame_at_rest_has_no_amplitude_and_the_shape_of_the_next():
     frames = np.vstack([0 * moving[:1], 1e-12 * moving[:1], moving[:2], 0 * moving[:1], moving[2:], 0 * moving[:1]])
     for operator in FORMS[:2]:
         one, two, three = operator.observe(NODES, moving)
-        seen, slopes = operator.observe_with_slopes(NODES, frames)
+        seen, slopes = operator.observe_with_derivatives(NODES, frames)
         at_rest = [[0.0, *shape[1:]] for shape in (one, one, three, three)]
         np.testing.assert_allclose(seen[[0, 1, 4, 6]], at_rest, rtol=1e-12)
         np.testing.assert_allclose(seen[[2, 3, 5]], [one, two, three], rtol=1e-12)
@@ -119,10 +119,10 @@ HOPELESS = {
 @pytest.mark.parametrize("name", HOPELESS)
 def test_a_frame_without_a_fit_is_nan_and_leaves_its_neighbours_alone(name):
     good = plates(NODES, 3)
-    seen, slopes = Observation().observe_with_slopes(NODES, np.vstack([good[:2], HOPELESS[name], good[2:]]))
+    seen, slopes = Observation().observe_with_derivatives(NODES, np.vstack([good[:2], HOPELESS[name], good[2:]]))
     assert np.isnan(seen[2]).all()
     assert np.isnan(slopes[2]).all()
-    alone, alone_slopes = Observation().observe_with_slopes(NODES, good)
+    alone, alone_slopes = Observation().observe_with_derivatives(NODES, good)
     np.testing.assert_allclose(seen[[0, 1, 3]], alone, rtol=1e-12)
     np.testing.assert_allclose(slopes[[0, 1, 3]], alone_slopes, rtol=1e-8, atol=1e-11)
 
@@ -163,7 +163,7 @@ def test_slopes_against_differences(operator):
 
 def test_slopes_hold_far_from_a_perfect_fit():
     ragged = bell(NODES, 0.5, 3.8, 2.2) * (1 + 0.2 * np.cos(2.1 * NODES))
-    seen, slopes = Observation().observe_with_slopes(NODES, [ragged])
+    seen, slopes = Observation().observe_with_derivatives(NODES, [ragged])
     for node in (0, 3, 11, 20):
         expected = richardson(lambda h, k=node: Observation().observe(NODES, [ragged + h * np.eye(41)[k]])[0], 2e-4)
         np.testing.assert_allclose(slopes[0, :, node], expected, rtol=1e-7, atol=1e-8)
@@ -173,7 +173,7 @@ def test_slopes_hold_far_from_a_perfect_fit():
 def test_slopes_of_a_planted_bell_are_those_of_linear_least_squares():
     nodes = np.linspace(0.0, 7.5, 151)
     D, S, p = 0.4, 3.6, 2.3
-    _, slopes = Observation().observe_with_slopes(nodes, [bell(nodes, D, S, p)])
+    _, slopes = Observation().observe_with_derivatives(nodes, [bell(nodes, D, S, p)])
     with np.errstate(divide="ignore", invalid="ignore"):
         far = np.where(LOOKED_AT > 0, np.log(LOOKED_AT / S), 0.0)
     power, high = (LOOKED_AT / S) ** p, bell(LOOKED_AT, D, S, p)

@@ -5,7 +5,7 @@ import pytest
 
 from creepkit.errors import HistoryError
 from creepkit.plates.compositions import Compositions, atomic_percent, read_compositions
-from creepkit.plates.elements import MASSES
+from creepkit.plates.elements import ATOMIC_WEIGHTS
 
 
 def written(folder, text):
@@ -30,7 +30,7 @@ def test_atomic_per_cent_of_316l_against_hand_arithmetic():
 def test_masses_are_those_of_iupac():
     """A few of the standard atomic weights of 2021, as printed there to five digits."""
     told = {"Fe": 55.845, "Ni": 58.693, "Co": 58.933, "Cr": 51.996, "Mo": 95.95, "W": 183.84, "Al": 26.982, "Y": 88.906}
-    assert {name: MASSES[name] for name in told} == told
+    assert {name: ATOMIC_WEIGHTS[name] for name in told} == told
 
 
 def test_classes_follow_the_principal_element_unless_the_second_is_near():
@@ -69,7 +69,7 @@ def test_what_is_wrong_with_a_table_is_said_with_its_line(tmp_path, text, messag
 
 
 def test_an_alloy_that_the_table_lacks_is_named():
-    told = Compositions({"alloy 1": {"Fe": 100.0}}, "table.csv").lacking(["alloy 1", "aloy 1"])
+    told = Compositions({"alloy 1": {"Fe": 100.0}}, "table.csv").missing(["alloy 1", "aloy 1"])
     assert told == (
         "table.csv: no alloy 'aloy 1', whose class stays unknown; did you mean 'alloy 1'? (known: alloy 1)",
     )

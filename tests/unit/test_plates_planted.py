@@ -8,7 +8,7 @@ import pytest
 from creepkit import study
 from creepkit.inverse.scales import frame_noise
 from creepkit.plates.compositions import read_compositions
-from creepkit.plates.planted import BASE, FIGURE_7A, NOISE, mixture, planted_plate
+from creepkit.plates.planted import BASE_ALLOYS, FIGURE_7A, OUTPUT_SD, mix_base_alloys, planted_plate
 
 
 @pytest.fixture(scope="module")
@@ -17,12 +17,12 @@ def planted():
 
 
 def test_base_alloys_are_whole():
-    assert [sum(weights.values()) for weights in BASE.values()] == pytest.approx([100.0] * 4)
+    assert [sum(weights.values()) for weights in BASE_ALLOYS.values()] == pytest.approx([100.0] * 4)
 
 
 def test_a_mixture_of_one_is_that_base_and_mixes_by_weight():
     """Half IN625 and half 316L have (21.5 + 17) / 2 wt.% of chromium and (2 + 66.48) / 2 of iron."""
-    pure, half = mixture({"Haynes 25": 1.0}), mixture({"IN625": 0.5, "316L": 0.5})
+    pure, half = mix_base_alloys({"Haynes 25": 1.0}), mix_base_alloys({"IN625": 0.5, "316L": 0.5})
     assert max(pure, key=pure.__getitem__) == "Co"
     assert half["Cr"] / half["Fe"] == pytest.approx((38.5 / 51.996) / (68.48 / 55.845), rel=1e-6)
     assert sum(half.values()) == pytest.approx(100.0)
@@ -51,7 +51,7 @@ def test_the_same_alloys_come_first_however_many(planted):
 
 def test_tests_are_noisy_as_measured_and_rise_visibly(planted):
     for history in planted.histories:
-        for name, sd in NOISE.items():
+        for name, sd in OUTPUT_SD.items():
             assert frame_noise(history, name) == pytest.approx(sd, rel=0.2)
         assert 0.2 < history.outputs["amplitude"][-1] < 1.5
 

@@ -9,7 +9,7 @@ import pytest
 from planted_alloys import NORTON, Deadly, Doubting, bars, bulge
 
 from creepkit.errors import FitError, HistoryError
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import Sqrt
 from creepkit.plates import files
 from creepkit.plates.compositions import Compositions
@@ -17,7 +17,7 @@ from creepkit.plates.screening import screen
 from creepkit.readers.writing import write_history
 from creepkit.study import specimen
 
-QUICK = Settings(starts=2, draws=16)
+QUICK = IdentificationSettings(starts=2, sobol_points=16)
 COMPOSITIONS = Compositions({"X": {"Fe": 70.0, "Cr": 30.0}, "Y": {"Ni": 40.0, "Co": 38.0, "Cr": 22.0}})
 TWO = [*bars("X"), *bars("Y", values={"A": 4e-14, "n": 3.5}, seed=2)]
 
@@ -92,8 +92,8 @@ def test_a_confirmation_that_fails_is_a_note_and_no_failure(monkeypatch):
 
 def test_confirmed_by_the_specimen_itself():
     found = screened(TWO[:3], confirm=True)["X"]
-    assert found.confirmation.holds
-    assert found.confirmation.distance == 0.0
+    assert found.confirmation.confirmed
+    assert found.confirmation.noise_ratio == 0.0
     assert screened(TWO[:3])["X"].confirmation is None
 
 
@@ -101,8 +101,8 @@ def test_confirmed_by_the_specimen_itself():
 def test_where_a_guard_doubts_the_specimen_is_asked(excess, holds):
     """A stand-in that is off by half of every strain is found out, one that is right is confirmed."""
     found = screened(TWO[:3], using=Doubting(excess))
-    assert found["X"].confirmation.holds is holds
-    assert found["X"].confirmation.using == "uniaxial"
+    assert found["X"].confirmation.confirmed is holds
+    assert found["X"].confirmation.predictor_name == "uniaxial"
     assert ("X: not confirmed: uniaxial differs from the fit by" in str(found)) is not holds
     assert screened(TWO[:3], using=Doubting(excess), confirm=False)["X"].confirmation is None
 
@@ -112,7 +112,7 @@ def test_where_a_guard_doubts_the_specimen_is_asked(excess, holds):
 
 def test_an_answer_is_read_back_as_it_was(plate, tmp_path):
     answer = plate["X"]
-    found = files.load(files.save(answer, tmp_path / "X.json"))
+    found = files.read_result(files.write_result(answer, tmp_path / "X.json"))
     for field in ("alloy", "verdict", "notes", "failed", "equivalents", "seconds", "confirmation"):
         assert getattr(found, field) == getattr(answer, field)
     assert found.best.values == answer.best.values
@@ -132,7 +132,7 @@ def test_interrupted_it_goes_on_where_it_was(tmp_path):
     found = screened(TWO, to=tmp_path, progress=lambda *told: seen.append(told[1:3]))
     assert seen == [(2, 2)]
     assert (tmp_path / "X.json").read_bytes() == kept
-    assert [a.best.law.name for a in found.answers] == ["norton", "norton"]
+    assert [a.best.law.name for a in found.results] == ["norton", "norton"]
 
 
 def test_only_what_changed_is_done_again(tmp_path):
@@ -165,7 +165,7 @@ def test_names_that_are_no_file_names_still_have_their_own_files(tmp_path):
 def test_workers_find_what_this_process_finds_and_one_that_dies_costs_one_alloy():
     deadly = [h.replace(specimen="deadly") for h in bars("D")]
     apart = screened([*deadly, *TWO[:3]], using={"uniaxial": specimen("uniaxial"), "deadly": Deadly()}, workers=2)
-    assert apart.failed == {
+    assert apart.failures == {
         "D": "its worker process died 2 times, the last time by exit code 3; is there memory enough?"
     }
     assert apart["X"].best.values == screened(TWO[:3])["X"].best.values
@@ -177,8 +177,8 @@ def test_workers_find_what_this_process_finds_and_one_that_dies_costs_one_alloy(
 def test_an_alloy_without_creep_does_not_stop_the_others(tmp_path):
     found = screened([bulge("a", "E", rise=0.0), *TWO[:3]], to=tmp_path)
     assert found["X"].identified
-    assert list(found.failed) == ["E"]
-    assert found.failed["E"].startswith("alloy 'E': elastic only, there is no creep to identify")
+    assert list(found.failures) == ["E"]
+    assert found.failures["E"].startswith("alloy 'E': elastic only, there is no creep to identify")
     assert "failed: alloy 'E': elastic only" in str(found)
     with pytest.raises(FitError, match="alloy 'E' has no identified law: alloy 'E': elastic only"):
         _ = found["E"].best
@@ -188,7 +188,7 @@ def test_all_laws_failing_is_told_with_a_reason():
     few = [h.replace(times=h.times[:2], outputs={"strain": h.outputs["strain"][:2]}) for h in bars("Z", (80.0,))]
     found = screened([*few, *TWO[:3]], laws=["norton", "strain-hardening"])
     assert found["X"].identified
-    assert found.failed["Z"].startswith("none of the 2 laws could be identified; norton: law 'norton' has 2 parameters")
+    assert found.failures["Z"].startswith("none of the 2 laws could be identified; norton: law 'norton' has 2 parameters")
     with pytest.raises(FitError, match="no alloy of this plate has a law, so there is nothing to draw"):
         screened(few).plot("pictures")
 
@@ -221,7 +221,7 @@ def test_compositions_may_lie_beside_the_tests(tmp_path):
         ({"confirm": "maybe"}, "confirm is 'maybe'; allowed are True, False and \"when in doubt\""),
         ({"penalty": Sqrt}, "penalty is Sqrt; write L2\\(\\), GroupL2"),
         ({"penalty": Sqrt()}, "a penalty reduces the dense law, and there is none"),
-        ({"settings": Settings(loss="huber")}, "loss 'huber' does not go with weights 'likelihood'"),
+        ({"settings": IdentificationSettings(loss="huber")}, "loss 'huber' does not go with weights 'likelihood'"),
         ({"workers": 0}, "workers is 0; allowed are whole numbers above zero"),
     ],
 )

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from creepkit.language import Elastic
-from creepkit.readers.history_csv import CSV, HistoryCsv
-from creepkit.readers.words import Words
+from creepkit.readers.history_csv import HISTORY_CSV, HistoryCsvReader
+from creepkit.readers.words import HeaderVocabulary
 from creepkit.records import History, PressureJump, Program, RecordedLoading, StressSteps
 
 CREEP = "# temperature_C: 850\n# stress_MPa: 60\n"
@@ -15,7 +15,7 @@ CREEP = "# temperature_C: 850\n# stress_MPa: 60\n"
 
 @pytest.fixture
 def read(tmp_path: Path):
-    def one(text: str, reader: HistoryCsv = CSV) -> History:
+    def one(text: str, reader: HistoryCsvReader = HISTORY_CSV) -> History:
         path = tmp_path / "test_1.csv"
         path.write_text(text, encoding="utf-8")
         (history,) = reader.read(path)
@@ -148,11 +148,11 @@ def test_marks_blank_lines_and_spaces_do_not_matter(read, text):
 
 
 def test_words_of_another_laboratory(read):
-    words = Words(
-        rename={"Zeit_h": "time_h", "Dehnung_pct": "strain_pct", "Pruefspannung_MPa": "stress_MPa"},
-        averaged={"ofen_C": ("T1_C", "T2_C")},
+    words = HeaderVocabulary(
+        synonyms={"Zeit_h": "time_h", "Dehnung_pct": "strain_pct", "Pruefspannung_MPa": "stress_MPa"},
+        averaged_columns={"ofen_C": ("T1_C", "T2_C")},
     )
-    reader = HistoryCsv("lab", "our laboratory", columns=("Zeit_h", "Dehnung_pct"), words=words)
+    reader = HistoryCsvReader("lab", "our laboratory", columns=("Zeit_h", "Dehnung_pct"), vocabulary=words)
     text = "# Pruefspannung_MPa: 60\n# temperature_C: 850\nZeit_h,Dehnung_pct,T1_C,T2_C\n0,0,850,852\n1,2,850,851\n"
     history = read(text, reader)
     assert history.times.tolist() == [0.0, 3600.0]
@@ -161,7 +161,7 @@ def test_words_of_another_laboratory(read):
 
 
 def test_reader_with_columns_accepts_only_files_that_have_them(tmp_path):
-    reader = HistoryCsv("lab", "our laboratory", columns=("Zeit_h",))
+    reader = HistoryCsvReader("lab", "our laboratory", columns=("Zeit_h",))
     (tmp_path / "a.csv").write_text("# x: 1\n\nZeit_h,Dehnung_pct\n0,0\n")
     (tmp_path / "b.csv").write_text("time_h,strain\n0,0\n")
     assert [reader.accepts(tmp_path / name) for name in ("a.csv", "b.csv", "c.csv")] == [True, False, False]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from creepkit.errors import HistoryError
-from creepkit.readers.history_csv import CSV
+from creepkit.readers.history_csv import HISTORY_CSV
 
 HEAD = "# temperature_C: 850\n# stress_MPa: 60\n"
 BODY = "time_s,strain\n0,0\n10,0.1\n"
@@ -142,7 +142,7 @@ def test_message(case: str, tmp_path: Path):
     path = tmp_path / "x.csv"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(HistoryError, match=message) as caught:
-        CSV.read(path)
+        HISTORY_CSV.read(path)
     assert "\n" not in str(caught.value)
 
 
@@ -150,9 +150,9 @@ def test_bytes_that_are_no_text(tmp_path: Path):
     path = tmp_path / "x.csv"
     path.write_bytes(b"# alloy: a\n# heat: \xb0\n")
     with pytest.raises(HistoryError, match=r"x.csv:2: byte 0xb0 is not text in UTF-8; save the table as CSV in UTF-8"):
-        CSV.read(path)
+        HISTORY_CSV.read(path)
 
 
 def test_file_that_is_not_there(tmp_path: Path):
     with pytest.raises(HistoryError, match=r"x.csv: cannot be read \(No such file or directory\)"):
-        CSV.read(tmp_path / "x.csv")
+        HISTORY_CSV.read(tmp_path / "x.csv")

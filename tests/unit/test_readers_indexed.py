@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from creepkit.errors import HistoryError
-from creepkit.readers.indexed import INDEXED_FILES, INDEXED_TABLE, IndexedFolder
-from creepkit.readers.words import Words
+from creepkit.readers.indexed import INDEXED_FILES, INDEXED_TABLE, IndexedFolderReader
+from creepkit.readers.words import HeaderVocabulary
 
 INDEX = "key,temperature_C,stress_MPa,youngs_MPa,state\na/1,900,25,149000,Ruptured\na/2,950,20,144000,\n"
 CURVES = (
@@ -37,7 +37,7 @@ def test_one_table_for_all_tests(tmp_path):
     assert first.elastic.E == 149000.0
     assert first.temperature == 1173.15
     assert (first.rupture_time, first.labels["assumed"].split(", ")[-1]) == (10.0, "rupture at the last frame")
-    assert (second.rupture_time, second.unruptured, second.ended) == (None, False, False)
+    assert (second.rupture_time, second.unruptured, second.end_known) == (None, False, False)
     assert first.alloy == "alloy9"
     assert first.source.endswith("curves.csv (a/1)")
 
@@ -72,13 +72,13 @@ def test_alloy_from_the_index(tmp_path):
 
 
 def test_another_laboratory_is_a_declaration(tmp_path):
-    layout = IndexedFolder(
+    layout = IndexedFolderReader(
         name="lab",
         title="our laboratory",
-        key="Probe",
-        frames="{key}.csv",
-        index="Liste.csv",
-        words=Words(rename={"T_C": "temperature_C", "Spannung_MPa": "stress_MPa", "Dehnung_pct": "strain_pct"}),
+        key_column="Probe",
+        frames_file="{key}.csv",
+        index_file="Liste.csv",
+        vocabulary=HeaderVocabulary(synonyms={"T_C": "temperature_C", "Spannung_MPa": "stress_MPa", "Dehnung_pct": "strain_pct"}),
     )
     made = folder(
         tmp_path, {"Liste.csv": "Probe,T_C,Spannung_MPa\nx,600,90\n", "x.csv": "time_h,Dehnung_pct\n0,0\n1,2\n"}

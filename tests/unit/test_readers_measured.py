@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from creepkit.readers.builtin import creepkit_readers
-from creepkit.readers.duplicates import duplicates
+from creepkit.readers.duplicates import duplicate_tests
 from creepkit.readers.reading import read_histories
 from creepkit.records import History, PressureJump
 
@@ -65,7 +65,7 @@ def test_alloy_617_readings_of_one_time_are_merged(alloy617):
 
 
 def test_alloy_617_holds_four_tests_twice(alloy617):
-    found = duplicates(list(alloy617.values()))
+    found = duplicate_tests(list(alloy617.values()))
     assert found == [(f"kaeri_2/AirBase_900_{s}_a", f"kaeri_3/AirBase_900_{s}_a") for s in (25, 40, 45, 50)]
     for one, two in (map(alloy617.get, pair) for pair in found):  # they agree all along, though thinned differently
         times = np.linspace(0.2, 0.9, 8) * one.times[-1]
@@ -85,7 +85,7 @@ def test_cmsx_6():
     assert first.labels["measured_temperature_C"] == "980.36"
     assert curves["Vh5205_C-85"].unruptured
     assert [h.rupture_time is None for h in curves.values()].count(True) == 3
-    assert duplicates(list(curves.values())) == []
+    assert duplicate_tests(list(curves.values())) == []
 
 
 def test_inconel_625_bulges():

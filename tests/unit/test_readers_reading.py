@@ -7,7 +7,7 @@ import pytest
 
 from creepkit.errors import HistoryError
 from creepkit.readers.builtin import creepkit_readers
-from creepkit.readers.duplicates import duplicates
+from creepkit.readers.duplicates import duplicate_tests
 from creepkit.readers.reading import read_histories
 from creepkit.records import History, Program, constant_stress
 
@@ -118,7 +118,7 @@ def planned(name: str, end: float = 1e6, strain: float = 0.4, stress: float = 25
 
 def test_test_published_twice_is_found():
     records = [planned("a"), planned("b", stress=26.0), planned("c", end=1e6 + 0.7), planned("d", strain=0.40001)]
-    assert duplicates(records) == [("a", "c"), ("a", "d"), ("c", "d")]
+    assert duplicate_tests(records) == [("a", "c"), ("a", "d"), ("c", "d")]
 
 
 @pytest.mark.parametrize(
@@ -132,4 +132,4 @@ def test_test_published_twice_is_found():
     ],
 )
 def test_like_tests_are_no_duplicates(other):
-    assert duplicates([planned("a"), other]) == []
+    assert duplicate_tests([planned("a"), other]) == []

@@ -10,7 +10,7 @@ from creepkit.errors import HistoryError
 from creepkit.language import Elastic
 from creepkit.readers.builtin import creepkit_readers
 from creepkit.readers.reading import read_histories
-from creepkit.readers.suspects import suspects, with_suspects_marked
+from creepkit.readers.suspects import check_data_quality, exclude_suspect_frames
 from creepkit.records import History, Prediction, PressureJump, StressSteps
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
@@ -23,7 +23,7 @@ TIMES = np.arange(1, 97) * 150.0
 class ElasticDimple:
     """Shows 749 mm x (1 + 830 x)^-.723 of amplitude, x = P/E: a published fit for the dimple of .5 mm thickness."""
 
-    def predict(self, law, values, histories, *, jacobian=False, effects=None):
+    def predict(self, law, values, histories, *, jacobian=False, nuisances=None):
         (history,) = histories
         x = history.loading.program().at(history.times) / history.elastic.E
         value = 749 * x * (1 + 830 * x) ** -0.723
@@ -71,7 +71,7 @@ def measured():
 @needs_data
 def test_verdict_on_the_nine_bulges(measured):
     """Test 11 after its jump, test 12 beside its twin test 08; cold tests begin high; every last frame is unloading."""
-    found = suspects(measured, ElasticDimple())
+    found = check_data_quality(measured, ElasticDimple())
     unloaded = {(h.name, "unloading") for h in measured}
     high = {(f"test_{k:02d}", "first frame") for k in (1, 2, 6, 9)}
     assert kinds(found) == unloaded | high | {("test_11", "falling"), ("test_12", "twin"), ("test_12", "first frame")}
@@ -85,10 +85,10 @@ def test_verdict_on_the_nine_bulges(measured):
 @needs_data
 def test_the_second_part_of_test_11_can_be_left_out(measured):
     """The jump is at 4.05 h; 28950 and 29100 s are after the end of that test."""
-    (jumped,) = (h for h in with_suspects_marked(measured) if h.name == "test_11")
+    (jumped,) = (h for h in exclude_suspect_frames(measured) if h.name == "test_11")
     assert jumped.times[jumped.used].max() == 14550.0
     assert jumped.labels["suspect"] == "unloading, frames 192-193; falling, frames 97-191"
-    others = [h for h in with_suspects_marked(measured, kinds=["falling"]) if h.name != "test_11"]
+    others = [h for h in exclude_suspect_frames(measured, kinds=["falling"]) if h.name != "test_11"]
     assert all("suspect" not in h.labels for h in others)
 
 
@@ -96,7 +96,7 @@ def test_the_second_part_of_test_11_can_be_left_out(measured):
 def test_unloading_is_seen_without_being_told(measured):
     """Without the end times of the headers: the last frame of tests 01 to 09."""
     naive = [h.replace(used=np.ones(h.times.size, bool), labels={}) for h in measured]
-    found = {s.history: s.frames for s in suspects(naive) if s.kind == "unloading"}
+    found = {s.history: s.frames for s in check_data_quality(naive) if s.kind == "unloading"}
     assert found == {f"test_{k:02d}": (96,) for k in (1, 2, 3, 4, 6, 8, 9)}
 
 
@@ -104,11 +104,11 @@ def test_unloading_is_seen_without_being_told(measured):
 def test_uniaxial_curves_are_mostly_believed():
     """Some tens of frames of 94 tests with 14 thousand frames; no falling strain, no outliers in the smooth CMSX-6."""
     steel = read_histories(DATA / "uniaxial/alloy617", creepkit_readers())
-    found = [s for s in suspects(steel) if s.frames]
+    found = [s for s in check_data_quality(steel) if s.frames]
     assert sum(h.times.size for h in steel) > 10_000
     assert len(found) < 60
     smooth = read_histories(DATA / "uniaxial/cmsx6", creepkit_readers())
-    assert not [s for s in suspects(smooth) if s.frames]
+    assert not [s for s in check_data_quality(smooth) if s.frames]
 
 
 # ---- planted -------------------------------------------------------------------------------------------------------
@@ -120,8 +120,8 @@ def test_no_false_alarms_on_clean_bulges():
     tests = [
         bulge(rng, name=f"t{k}", celsius=720 + 90 * rng.random(), P2=10.0 if k % 4 == 0 else 8.0) for k in range(100)
     ]
-    assert suspects(tests, ElasticDimple()) == ()
-    marked = with_suspects_marked(tests)
+    assert check_data_quality(tests, ElasticDimple()) == ()
+    marked = exclude_suspect_frames(tests)
     assert all(a is b for a, b in zip(marked, tests, strict=True))
 
 
@@ -129,7 +129,7 @@ def test_no_false_alarms_on_clean_bars():
     rng = np.random.default_rng(1)
     for k in range(100):
         times = np.linspace(1e3, 1e6, 60) if k % 2 else None
-        assert suspects([bar(rng, times=times, noise=10 ** rng.uniform(-6, -4))]) == ()
+        assert check_data_quality([bar(rng, times=times, noise=10 ** rng.uniform(-6, -4))]) == ()
 
 
 def test_no_false_alarm_without_creep_or_noise():
@@ -138,7 +138,7 @@ def test_no_false_alarm_without_creep_or_noise():
     constant = bulge(rng, amplitude=np.full(TIMES.size, 0.055), noise=0.0)
     exact = bulge(rng, noise=0.0)
     rounded = exact.replace(outputs={"amplitude": exact.outputs["amplitude"].round(3)})
-    assert [suspects([test]) for test in (flat, constant, exact, rounded)] == [()] * 4
+    assert [check_data_quality([test]) for test in (flat, constant, exact, rounded)] == [()] * 4
 
 
 @pytest.mark.parametrize("frames", [1, 3, 5])
@@ -146,7 +146,7 @@ def test_unloading_at_the_end(frames):
     test = bulge(np.random.default_rng(3))
     D = test.outputs["amplitude"].copy()
     D[-frames:] -= 0.03
-    (found,) = suspects([test.replace(outputs={"amplitude": D})])
+    (found,) = check_data_quality([test.replace(outputs={"amplitude": D})])
     assert found.kind == "unloading"
     assert found.frames == tuple(range(96 - frames, 96))
     assert "the load was taken off" in found.reason
@@ -155,14 +155,14 @@ def test_unloading_at_the_end(frames):
 def test_frames_after_the_end_are_told():
     test = bulge(np.random.default_rng(4))
     used = np.arange(96) < 94
-    (found,) = suspects([test.replace(used=used, labels={"frames_after_end": "2"})])
+    (found,) = check_data_quality([test.replace(used=used, labels={"frames_after_end": "2"})])
     assert str(found) == "planted: unloading: frames 94-95: from 14250 s on, after the end of the test"
 
 
 def test_an_amplitude_that_falls_under_a_held_pressure():
     rng = np.random.default_rng(5)
     shape = np.where(TIMES < 9000, TIMES / 9000, 2 - TIMES / 9000)
-    (found,) = suspects([bulge(rng, amplitude=0.055 + 0.2 * shape)])
+    (found,) = check_data_quality([bulge(rng, amplitude=0.055 + 0.2 * shape)])
     assert found.kind == "falling"
     assert abs(found.frames[0] - 59) <= 4  # 9000 s is frame 59
     assert found.frames[-1] == 95
@@ -172,7 +172,7 @@ def test_an_amplitude_that_falls_under_a_held_pressure():
 def test_a_fall_after_the_pressure_was_lowered_is_no_fault():
     rng = np.random.default_rng(6)
     amplitude = np.where(TIMES > 2 * HOUR, 0.2 - 0.05 * (TIMES - 2 * HOUR) / 2 / HOUR, 0.06 + 0.15 * TIMES / 2 / HOUR)
-    assert suspects([bulge(rng, amplitude=amplitude, P2=4.0)]) == ()
+    assert check_data_quality([bulge(rng, amplitude=amplitude, P2=4.0)]) == ()
 
 
 @pytest.mark.parametrize("frame", [2, 40, 93])
@@ -181,9 +181,9 @@ def test_single_frames_that_jump(frame):
     test = bulge(np.random.default_rng(7))
     D = test.outputs["amplitude"].copy()
     D[frame] += 0.02
-    (found,) = suspects([test.replace(outputs={"amplitude": D})])
+    (found,) = check_data_quality([test.replace(outputs={"amplitude": D})])
     assert (found.kind, found.frames) == ("outlier", (frame,))
-    (marked,) = with_suspects_marked([test.replace(outputs={"amplitude": D})])
+    (marked,) = exclude_suspect_frames([test.replace(outputs={"amplitude": D})])
     assert np.flatnonzero(~marked.used).tolist() == [frame]
     assert marked.labels["suspect"] == f"outlier, frame {frame}"
 
@@ -192,7 +192,7 @@ def test_two_jumps_in_a_bar():
     test = bar(np.random.default_rng(8))
     strain = test.outputs["strain"].copy()
     strain[[20, 50]] -= 1e-3
-    found = suspects([test.replace(outputs={"strain": strain})])
+    found = check_data_quality([test.replace(outputs={"strain": strain})])
     assert {s.frames for s in found} == {(20,), (50,)}
     assert all("neighbours by -0.001 of strain" in s.reason for s in found)
 
@@ -202,7 +202,7 @@ def test_a_step_of_the_load_is_no_jump():
     times = np.linspace(1e3, 1e6, 60)
     test = bar(rng, times=times, steps=((0.0, 100.0), (5e5, 120.0)))
     strain = test.outputs["strain"] + np.where(times > 5e5, 2e-3, 0.0)
-    assert suspects([test.replace(outputs={"strain": strain})]) == ()
+    assert check_data_quality([test.replace(outputs={"strain": strain})]) == ()
 
 
 def campaign(rng, **faults):
@@ -213,19 +213,19 @@ def campaign(rng, **faults):
 
 def test_a_twin_far_from_the_other():
     rng = np.random.default_rng(10)
-    assert suspects(campaign(rng)) == ()
-    found = suspects(campaign(rng, twin={"rate": 0.5}))
+    assert check_data_quality(campaign(rng)) == ()
+    found = check_data_quality(campaign(rng, twin={"rate": 0.5}))
     assert ("twin", "twin") in kinds(found)
     assert {s.history for s in found} == {"twin"}
     pair = campaign(rng, twin={"rate": 0.5})[-2:]
-    assert kinds(suspects(pair)) == {("t7", "twin"), ("twin", "twin")}  # two alone cannot tell
+    assert kinds(check_data_quality(pair)) == {("t7", "twin"), ("twin", "twin")}  # two alone cannot tell
 
 
 def test_twins_have_one_alloy_and_one_load():
     rng = np.random.default_rng(11)
     one, two = campaign(rng, twin={"rate": 0.5})[-2:]
-    assert suspects([one, two.replace(alloy="another")]) == ()
-    assert suspects([one, two.replace(loading=PressureJump(6.0, 6.0, HOUR))]) == ()
+    assert check_data_quality([one, two.replace(alloy="another")]) == ()
+    assert check_data_quality([one, two.replace(loading=PressureJump(6.0, 6.0, HOUR))]) == ()
 
 
 def test_a_temperature_out_of_line():
@@ -235,7 +235,7 @@ def test_a_temperature_out_of_line():
     tests[3] = bulge(rng, name="t3", celsius=tests[3].temperature - 273.15 - 30.0).replace(
         temperature=tests[3].temperature, elastic=tests[3].elastic
     )
-    (found,) = suspects(tests)
+    (found,) = check_data_quality(tests)
     assert (found.history, found.kind, found.frames) == ("t3", "temperature", ())
     assert "K colder than" in found.reason
     assert 20 <= float(found.reason.split("been ")[1].split()[0]) <= 40
@@ -244,7 +244,7 @@ def test_a_temperature_out_of_line():
 def test_a_modulus_out_of_line():
     tests = campaign(np.random.default_rng(13))
     tests[2] = tests[2].replace(elastic=Elastic(tests[2].elastic.E * 0.9))
-    (found,) = suspects(tests)
+    (found,) = check_data_quality(tests)
     assert (found.history, found.kind) == ("t2", "modulus")
     assert "where the others lead to" in found.reason
 
@@ -252,8 +252,8 @@ def test_a_modulus_out_of_line():
 @pytest.mark.parametrize(("offset", "word"), [(0.014, "above"), (-0.014, "below")])
 def test_a_first_frame_off_the_elastic_one(offset, word):
     test = bulge(np.random.default_rng(14), celsius=730.0, offset=offset)
-    assert suspects([test]) == ()
-    (found,) = suspects([test], ElasticDimple())
+    assert check_data_quality([test]) == ()
+    (found,) = check_data_quality([test], ElasticDimple())
     assert (found.kind, found.frames) == ("first frame", (0,))
     assert word in found.reason
 
@@ -263,8 +263,8 @@ def test_a_first_frame_off_the_elastic_one(offset, word):
 
 def test_the_door():
     test = bulge(np.random.default_rng(15))
-    assert ck.suspects([test]) == ()
-    (same,) = ck.with_suspects_marked([test])
+    assert ck.check_data_quality([test]) == ()
+    (same,) = ck.exclude_suspect_frames([test])
     assert same is test
 
 
@@ -272,13 +272,13 @@ def test_kinds_that_cannot_be_marked():
     with pytest.raises(
         HistoryError, match="'twin'; that kind questions a whole test; the kinds of frames are unloading"
     ):
-        with_suspects_marked([], kinds=["twin"])
+        exclude_suspect_frames([], kinds=["twin"])
     with pytest.raises(HistoryError, match="frames cannot be marked for 'colour'; the kinds of frames are"):
-        with_suspects_marked([], kinds=["colour"])
+        exclude_suspect_frames([], kinds=["colour"])
 
 
 def test_histories_with_next_to_nothing():
     empty = History("few", np.array([1.0, 2.0]), {"strain": np.array([np.nan, 0.1])}, StressSteps(((0, 50.0),)), 900.0)
     silent = empty.replace(outputs={})
-    assert suspects([empty, silent]) == ()
-    assert suspects([]) == ()
+    assert check_data_quality([empty, silent]) == ()
+    assert check_data_quality([]) == ()

@@ -7,7 +7,7 @@ import pytest
 
 from creepkit.errors import HistoryError
 from creepkit.language import Elastic, wachtman
-from creepkit.readers.history_csv import CSV
+from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.readers.writing import history_text, write_history
 from creepkit.records import History, PressureJump, Program, RecordedLoading, StressSteps, constant_stress
 
@@ -58,7 +58,7 @@ def assert_same(one: History, two: History) -> None:
 @pytest.mark.parametrize("history", HISTORIES, ids=lambda history: history.name)
 def test_round_trip(history: History, tmp_path: Path):
     path = write_history(history, tmp_path / "x.csv")
-    (back,) = CSV.read(path)
+    (back,) = HISTORY_CSV.read(path)
     assert_same(history, back)
     assert back.source == str(path)
     assert history_text(back) == path.read_text()
@@ -68,7 +68,7 @@ def test_round_trip(history: History, tmp_path: Path):
 def test_modulus_of_temperature_is_written_at_the_temperature_of_the_test(tmp_path):
     elastic = Elastic(wachtman(210e3, 80.0, 300.0))
     history = HISTORIES[0].replace(elastic=elastic)
-    (back,) = CSV.read(write_history(history, tmp_path / "x.csv"))
+    (back,) = HISTORY_CSV.read(write_history(history, tmp_path / "x.csv"))
     assert back.elastic.E == pytest.approx(210e3 - 80.0 * 1123.15 * np.exp(-300.0 / 1123.15), rel=1e-12)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import SolveError
-from creepkit.inverse.together import screening_of
+from creepkit.inverse.together import reduced_order_model_of
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Elastic, Param, State, linear, parameters, states, stress
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
@@ -14,14 +14,14 @@ from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import History, Predictor, PressureJump, Program, RecordedLoading, Status, constant_stress
 from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.reduced import ReducedBulge
-from creepkit.specimens.reduced_courses import courses
-from creepkit.specimens.reduced_curves import LOG_GROWTH, LOG_STRESS, curve, place
+from creepkit.specimens.reduced import BulgeReducedOrderModel
+from creepkit.specimens.reduced_courses import simulate_trajectories
+from creepkit.specimens.reduced_curves import LOG_GROWTH, LOG_STRESS, curve_value, grid_position
 from creepkit.specimens.reduced_files import read_tables, write_tables
-from creepkit.specimens.reduced_tables import tables
+from creepkit.specimens.reduced_tables import build_tables
 
 BULGE = Bulge(threads=1)
-REDUCED = ReducedBulge(BULGE)
+REDUCED = BulgeReducedOrderModel(BULGE)
 HOURS = 3600.0
 STIFF = Elastic(9e7)
 """So stiff that stresses are those of steady creep from the first."""
@@ -53,13 +53,13 @@ def held(pressure, end, frames=20, **more):
 
 
 def known():
-    return tables(BULGE, BULGE.geometry, BULGE.observation)
+    return build_tables(BULGE, BULGE.geometry, BULGE.observation)
 
 
 def at(which, thickness, deflections):
     """A curve of the tables, as the march reads it."""
     dimple = known().dimple(thickness)
-    return np.array([curve(which, place(float(d), dimple), dimple, 0.0) for d in np.atleast_1d(deflections)])
+    return np.array([curve_value(which, grid_position(float(d), dimple), dimple, 0.0) for d in np.atleast_1d(deflections)])
 
 
 def k_and_kappa(deflection, thickness=0.5):
@@ -96,8 +96,8 @@ def test_a_dimple_ten_times_as_large_has_the_same_k():
     lengths = {name: 10 * getattr(BULGE.geometry, name) for name in BULGE.geometry.lengths}
     large = BULGE.replace(**lengths, deflection_limit=30.0)
     large = large.replace(observation=BULGE.observation.replace(window=75.0))
-    theirs = tables(large, large.geometry, large.observation)
-    ours = tables(BULGE, BULGE.geometry, BULGE.observation)
+    theirs = build_tables(large, large.geometry, large.observation)
+    ours = build_tables(BULGE, BULGE.geometry, BULGE.observation)
     small = slice(0, 55)  # the last deflections are where runs end
     np.testing.assert_allclose(theirs.curves[:, LOG_STRESS, small], ours.curves[:, LOG_STRESS, small], atol=0.01)
     larger = theirs.curves[:, LOG_GROWTH, small] - ours.curves[:, LOG_GROWTH, small]
@@ -217,9 +217,9 @@ JUMP = history(np.linspace(0, 4 * HOURS, 25), PressureJump(8.0, 10.0, 2 * HOURS)
 
 
 def test_the_specimen_offers_it():
-    stand_in = screening_of(BULGE)
+    stand_in = reduced_order_model_of(BULGE)
     assert isinstance(stand_in, Predictor)
-    assert (stand_in.outputs, stand_in.effects) == (BULGE.outputs, BULGE.effects)
+    assert (stand_in.outputs, stand_in.nuisances) == (BULGE.outputs, BULGE.nuisances)
     assert np.array_equal(stand_in.reference_stress(JUMP), BULGE.reference_stress(JUMP))
 
 
@@ -242,7 +242,7 @@ def test_candidates_and_tests_do_not_know_of_each_other():
 def test_effects_are_changed_histories(kind, value, change):
     law = NORTON.with_temperature(n=linear(T_ref=1000.0, slope=(-0.01, 0.01)))
     values = {"A": 3e-15, "n": 3.5, "n_T": 0.01}
-    assumed = REDUCED.predict(law, values, [JUMP, JUMP], effects={kind: np.array([[value, value]])})
+    assumed = REDUCED.predict(law, values, [JUMP, JUMP], nuisances={kind: np.array([[value, value]])})
     changed = REDUCED.predict(law, values, [JUMP.replace(**change)]).of(0)
     np.testing.assert_allclose(assumed.of(1), changed, rtol=1e-12)
     assert (np.abs(REDUCED.predict(law, values, [JUMP]).of(0)[1:] / changed[1:] - 1) > 1e-4).any()
@@ -250,12 +250,12 @@ def test_effects_are_changed_histories(kind, value, change):
 
 def test_effects_of_candidates_do_not_mix():
     rng, kinds = np.random.default_rng(5), {"thickness": (0.45, 0.55), "modulus": (-0.1, 0.1), "temperature": (-20, 20)}
-    effects = {kind: rng.uniform(*limits, (4, 2)) for kind, limits in kinds.items()}
+    nuisances = {kind: rng.uniform(*limits, (4, 2)) for kind, limits in kinds.items()}
     tests = [JUMP, held(6.0, 7 * HOURS, frames=9, elastic=Elastic(1.2e5))]
-    together = REDUCED.predict(NORTON, SLOW, tests, effects=effects)
+    together = REDUCED.predict(NORTON, SLOW, tests, nuisances=nuisances)
     for c, k in np.ndindex(4, 2):
         alone = REDUCED.predict(
-            NORTON, SLOW, [tests[k]], effects={n: v[c : c + 1, k : k + 1] for n, v in effects.items()}
+            NORTON, SLOW, [tests[k]], nuisances={n: v[c : c + 1, k : k + 1] for n, v in nuisances.items()}
         )
         np.testing.assert_allclose(together.of(k, c), alone.of(0), rtol=1e-12)
 
@@ -274,7 +274,7 @@ def test_a_modulus_that_depends_on_temperature():
     same = REDUCED.predict(NORTON, SLOW, [JUMP.replace(elastic=falling)]).of(0)
     np.testing.assert_allclose(same, REDUCED.predict(NORTON, SLOW, [JUMP]).of(0), rtol=1e-12)
     softer = REDUCED.predict(
-        NORTON, SLOW, [JUMP.replace(elastic=falling)], effects={"temperature": np.array([[100.0]])}
+        NORTON, SLOW, [JUMP.replace(elastic=falling)], nuisances={"temperature": np.array([[100.0]])}
     )
     np.testing.assert_allclose(
         softer.of(0), REDUCED.predict(NORTON, SLOW, [JUMP.replace(elastic=Elastic(9.5e4))]).of(0)
@@ -305,7 +305,7 @@ def test_a_jump_to_the_same_pressure_changes_nothing():
 def test_bursts_end_rows():
     values = {"A": np.array([3e-15, 1e-11, 1e-9, 1.0]), "n": 3.5}
     found = REDUCED.predict(NORTON, values, [JUMP])
-    assert found.status[:, 0].tolist() == [Status.COMPLETE, Status.BURST, Status.BURST, Status.BURST]
+    assert found.status[:, 0].tolist() == [Status.COMPLETE, Status.RUPTURED, Status.RUPTURED, Status.RUPTURED]
     ends = found.end_times[:, 0]
     assert ends[0] == JUMP.times[-1]
     assert (np.diff(ends[1:]) < 0).all()
@@ -326,9 +326,9 @@ def test_complaints_are_those_of_the_specimen():
     with pytest.raises(SolveError, match="needs elastic data"):
         REDUCED.predict(NORTON, SLOW, [JUMP.replace(elastic=None)])
     with pytest.raises(SolveError, match="does not know the nuisance 'colour'"):
-        REDUCED.predict(NORTON, SLOW, [JUMP], effects={"colour": np.zeros((1, 1))})
+        REDUCED.predict(NORTON, SLOW, [JUMP], nuisances={"colour": np.zeros((1, 1))})
     with pytest.raises(SolveError, match="the modulus is -5000 MPa; it must be above zero"):
-        REDUCED.predict(NORTON, SLOW, [JUMP], effects={"modulus": np.array([[-1.05]])})
+        REDUCED.predict(NORTON, SLOW, [JUMP], nuisances={"modulus": np.array([[-1.05]])})
 
 
 # ---- files ---------------------------------------------------------------------------------------------------------
@@ -338,12 +338,12 @@ def test_tables_come_back_from_their_file(tmp_path):
     file = write_tables(known(), tmp_path / "dimple.safetensors")
     back = read_tables(file)
     compiled = lower(NORTON, "numba")
-    theta = compiled.internal(SLOW)
-    own, theirs = (courses(BULGE, compiled, theta, [JUMP], known=tables) for tables in (None, back))
+    theta = compiled.to_internal(SLOW)
+    own, theirs = (simulate_trajectories(BULGE, compiled, theta, [JUMP], tables=tables) for tables in (None, back))
     assert np.array_equal(own.values, theirs.values)
     other = JUMP.replace(geometry={"cavity_radius": 7.0, "roof_radial": 7.0})
     with pytest.raises(SolveError, match="cavity_radius is 7 mm, but the tables .* are for 7.5 mm"):
-        courses(BULGE, compiled, theta, [other], known=back)
+        simulate_trajectories(BULGE, compiled, theta, [other], tables=back)
 
 
 def test_files_that_are_no_tables(tmp_path):

@@ -12,13 +12,13 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import History, PressureJump, Program, RecordedLoading
 from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.reduced_courses import courses
-from creepkit.specimens.reduced_march import EFFECTS, Factors
-from creepkit.specimens.reduced_observed import COLUMNS
+from creepkit.specimens.reduced_courses import simulate_trajectories
+from creepkit.specimens.reduced_march import NUISANCE_DIRECTIONS, FeatureFactors
+from creepkit.specimens.reduced_observed import TRAJECTORY_COLUMNS
 
 BULGE = Bulge(threads=1)
 HOURS = 3600.0
-FACTORS = Factors(np.array([0.6, 1.0, 1.6]), np.array([0.2, 1.0]))
+FACTORS = FeatureFactors(np.array([0.6, 1.0, 1.6]), np.array([0.2, 1.0]))
 STEPS = {"thickness": 1e-5, "modulus": 1e-4, "temperature": 1e-2}
 
 
@@ -50,9 +50,9 @@ CASES = {
 }
 
 
-def values_of(law, theta, history, **effects):
-    assumed = {kind: np.array([[value]]) for kind, value in effects.items()}
-    found = courses(BULGE, law, theta, [history], effects=assumed, factors=FACTORS, exact=True)
+def values_of(law, theta, history, **nuisances):
+    assumed = {kind: np.array([[value]]) for kind, value in nuisances.items()}
+    found = simulate_trajectories(BULGE, law, theta, [history], nuisances=assumed, factors=FACTORS, exact=True)
     assert (found.status == 0).all()
     return found
 
@@ -62,14 +62,14 @@ def values_of(law, theta, history, **effects):
 def test_derivatives_are_those_of_the_march(case, history):
     law, values = CASES[case]
     compiled = kernels.lower(law, "numba")
-    theta = compiled.internal(values)[0]
-    found = values_of(compiled, theta, history).changes[0, 0]
+    theta = compiled.to_internal(values)[0]
+    found = values_of(compiled, theta, history).jacobian[0, 0]
     for p in range(theta.size):
         step = np.zeros(theta.size)
         step[p] = 1e-5 * max(1.0, abs(theta[p]) ** 0.5)
         _close(found[..., p], *(values_of(compiled, theta + s * step, history).values[0, 0] for s in (1, -1)), step[p])
     nominal = {"thickness": history.geometry.get("apex_thickness", 0.5), "modulus": 0.0, "temperature": 0.0}
-    for e, kind in enumerate(EFFECTS):
+    for e, kind in enumerate(NUISANCE_DIRECTIONS):
         both = (
             values_of(compiled, theta, history, **{kind: nominal[kind] + s * STEPS[kind]}).values[0, 0] for s in (1, -1)
         )
@@ -80,15 +80,15 @@ def _close(found, above, below, step):
     expected = (above - below) / (2 * step)
     scale = np.abs(expected).max(axis=0) + 1e-7 * np.abs(above).max(axis=0) / step
     worst = (np.abs(found - expected) / (scale + 1e-6)).max(axis=0)
-    names = [*COLUMNS, *(f"feature {k}" for k in range(found.shape[1] - len(COLUMNS)))]
+    names = [*TRAJECTORY_COLUMNS, *(f"feature {k}" for k in range(found.shape[1] - len(TRAJECTORY_COLUMNS)))]
     assert (worst < 2e-4).all(), {n: float(w) for n, w in zip(names, worst, strict=True) if w >= 2e-4}
 
 
 def test_threads_do_the_same():
     law, values = CASES["strain hardening"]
     compiled = kernels.lower(law, "numba")
-    theta = compiled.internal({**values, "n": np.linspace(2.5, 3.5, 7)})
-    one, three = (courses(BULGE, compiled, theta, [JUMP, DOWN], factors=FACTORS, threads=n) for n in (1, 3))
+    theta = compiled.to_internal({**values, "n": np.linspace(2.5, 3.5, 7)})
+    one, three = (simulate_trajectories(BULGE, compiled, theta, [JUMP, DOWN], factors=FACTORS, threads=n) for n in (1, 3))
     assert np.array_equal(one.values, three.values)
 
 
@@ -96,8 +96,8 @@ def test_features_of_a_power_law_are_its_exponents():
     """f ~ s^3 eps^-0.5: log10 of the rate changes by 3 log10(1.6), and by -0.5 log10(0.2)."""
     law, values = CASES["strain hardening"]
     compiled = kernels.lower(law, "numba")
-    found = courses(BULGE, compiled, compiled.internal(values), [JUMP], factors=FACTORS).values[
-        0, 0, 1:, len(COLUMNS) :
+    found = simulate_trajectories(BULGE, compiled, compiled.to_internal(values), [JUMP], factors=FACTORS).values[
+        0, 0, 1:, len(TRAJECTORY_COLUMNS) :
     ]
     expected = 3 * np.log10(FACTORS.stress) - 0.5 * np.log10(FACTORS.strain)[:, None]
     np.testing.assert_allclose(found, np.broadcast_to(expected.ravel(), found.shape), rtol=1e-3, atol=1e-9)

@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from creepkit.errors import ExportError, HistoryError, LawError, PluginError, SolveError
-from creepkit.language import CreepLaw, Factor, arrhenius
+from creepkit.language import CreepLaw, TemperatureFactor, arrhenius
 from creepkit.registry import Plugin, Registry
 
 LAW = """
@@ -81,7 +81,7 @@ def test_every_built_in_plugin_loads() -> None:
 
     assert len(own) >= 10
     assert [plugin.problem for plugin in own if plugin.problem] == []
-    assert [plugin.provenance.name for plugin in own if not any(plugin.offers.values())] == []
+    assert [plugin.provenance.name for plugin in own if not any(plugin.contributions.values())] == []
 
 
 def test_the_six_laws_of_the_paper_are_there() -> None:
@@ -96,7 +96,7 @@ def test_the_six_laws_of_the_paper_are_there() -> None:
 def test_a_temperature_form_is_found_by_name() -> None:
     factor = Registry().temperature_form("arrhenius")(T_ref=1000.0)
 
-    assert isinstance(factor, Factor)
+    assert isinstance(factor, TemperatureFactor)
     assert factor == arrhenius(T_ref=1000.0)
 
 
@@ -153,7 +153,7 @@ def test_an_edited_file_is_read_anew_and_leaves_no_bytecode(write: Write) -> Non
     Registry().load_file(file)
     file.write_text(LAW.format(name="behind"))
 
-    assert list(Registry().load_file(file).offers["law"]) == ["behind"]
+    assert list(Registry().load_file(file).contributions["law"]) == ["behind"]
     assert not (file.parent / "__pycache__").exists()
 
 
@@ -183,7 +183,7 @@ def test_two_plugins_with_one_name_are_both_named(install: Write, write: Write) 
     assert "the law 'same' is offered twice" in told
     assert "plugin 'mine' (first-pack 1.2)" in told
     assert f"plugin 'second' ({file.resolve()})" in told
-    assert registry.clashes() == (told,)
+    assert registry.conflicts() == (told,)
 
 
 def test_a_clash_takes_no_other_law_down(install: Write, write: Write) -> None:

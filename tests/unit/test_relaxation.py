@@ -98,11 +98,11 @@ def test_an_engineering_strain_is_taken_as_its_logarithm():
 def test_temperature_and_modulus_may_be_off():
     law = NORTON.times(ck.arrhenius(T_ref=1000.0))
     values = {**VALUES, "Q": 3e5}
-    effects = {"temperature": np.array([[4.0]]), "modulus": np.array([[0.1]])}
-    found = stress(held(), law=law, values=values, effects=effects, jacobian=True)
+    nuisances = {"temperature": np.array([[4.0]]), "modulus": np.array([[0.1]])}
+    found = stress(held(), law=law, values=values, nuisances=nuisances, jacobian=True)
     same = stress(held(temperature=1004.0, elastic=ck.Elastic(1.1 * E)), law=law, values=values)
     np.testing.assert_allclose(found.values, same.values, rtol=1e-10)
-    first = found.effect_jacobian["modulus"][0, 0, 0, 0]
+    first = found.nuisance_jacobian["modulus"][0, 0, 0, 0]
     assert first == pytest.approx(START, rel=0.02), "at first stress is E times strain"
 
 
@@ -188,7 +188,7 @@ def test_planted_values_are_found_from_relaxation_alone():
     assert all(e.low <= VALUES[e.name] <= e.high for e in fit.estimates)
     assert fit.estimates[1].high - fit.estimates[1].low < 0.1
     assert fit.errors["stress"].chi_square == pytest.approx(1.0, abs=0.4)
-    assert fit.scatter["stress"].noise == pytest.approx(0.5, rel=0.3)
+    assert fit.noise_model["stress"].noise == pytest.approx(0.5, rel=0.3)
 
 
 def test_planted_values_are_found_from_relaxation_and_creep_together():

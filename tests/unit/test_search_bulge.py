@@ -5,10 +5,10 @@ import pytest
 
 import creepkit as ck
 from creepkit.inverse.identify import identify
-from creepkit.inverse.problem import Problem
+from creepkit.inverse.problem import IdentificationProblem
 from creepkit.inverse.search.evolution import CmaEs
 from creepkit.inverse.search.swarm import ParticleSwarm
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.settings import IdentificationSettings
 
 TRUTH = {"A": 2e-16, "n": 4.5}
 TIMES = np.arange(1800.0, 43201.0, 1800.0)
@@ -16,14 +16,14 @@ LOADING, ELASTIC = ck.PressureJump(P1=8, P2=10, Tj=14400), ck.Elastic(E=150e3)
 NORTON = ck.law("norton")
 SUM = NORTON + ck.law("time-hardening")
 SEARCHES = {
-    "swarm": ParticleSwarm(particles=40, iterations=15, polish=2),
-    "cma": CmaEs(iterations=30, restarts=0, polish=1),
+    "swarm": ParticleSwarm(particles=40, iterations=15, refined_candidates=2),
+    "cma": CmaEs(iterations=30, restarts=0, refined_candidates=1),
 }
 
 
 @pytest.fixture(scope="module")
 def stand_in():
-    return ck.specimen("bulge").screening()
+    return ck.specimen("bulge").reduced_order_model()
 
 
 @pytest.fixture(scope="module")
@@ -41,21 +41,21 @@ def test_a_planted_law_lies_in_its_intervals_whatever_searched(stand_in, test, n
     default = identify(NORTON, [test], stand_in)
     assert all(e.low <= TRUTH[e.name] <= e.high for e in fit.estimates)
     assert fit.log_likelihood == pytest.approx(default.log_likelihood, abs=0.01)
-    assert fit.trace is not None
-    assert fit.trace.polished <= fit.trace.best[-1] + 1e-3 < fit.trace.best[0]
-    assert fit.trace.evaluations[-1] <= fit.provenance["search_evaluations"]
+    assert fit.search_trace is not None
+    assert fit.search_trace.refined_cost <= fit.search_trace.best_cost[-1] + 1e-3 < fit.search_trace.best_cost[0]
+    assert fit.search_trace.evaluations[-1] <= fit.provenance["search_evaluations"]
 
 
 def test_each_iteration_is_one_prediction_of_all_particles(stand_in, test):
     class Counted:
-        name, outputs, effects, calls = "counted", stand_in.outputs, stand_in.effects, []
+        name, outputs, nuisances, calls = "counted", stand_in.outputs, stand_in.nuisances, []
 
         def predict(self, law, values, histories, **options):
             self.calls.append((max(np.size(v) for v in values.values()), len(histories)))
             return stand_in.predict(law, values, histories, **options)
 
     using = Counted()
-    identify(NORTON, [test, test.replace(name="twin")], using, search=ParticleSwarm(30, 7, polish=1))
+    identify(NORTON, [test, test.replace(name="twin")], using, search=ParticleSwarm(30, 7, refined_candidates=1))
     assert using.calls[:7] == [(30, 2)] * 7
 
 
@@ -64,13 +64,13 @@ def test_of_a_sum_the_swarm_keeps_the_best_of_each_subset(stand_in, test):
 
     Half of a chi-square of three, 99 %: 5.7 (the landscape's scatter is wider than the planted one, so less here).
     """
-    problem = Problem.of(SUM, [test], stand_in, Settings(), None)
-    swarm = ParticleSwarm(particles=80, iterations=25, off="any")
-    found = {m.off: m for m in swarm.minima(problem.landscape(stand_in)).minima}
+    problem = IdentificationProblem.from_histories(SUM, [test], stand_in, IdentificationSettings(), None)
+    swarm = ParticleSwarm(particles=80, iterations=25, maskable_terms="any")
+    found = {m.terms_off: m for m in swarm.minima(problem.cost_function(stand_in)).minima}
     _, hardening = SUM.terms
-    single = Problem.of(NORTON, [test], stand_in, Settings(), problem.objective.coordinates.reference)
+    single = IdentificationProblem.from_histories(NORTON, [test], stand_in, IdentificationSettings(), problem.residual_function.coordinates.reference)
     alone = found[(hardening,)]
-    (expected,) = ParticleSwarm(40, 15, polish=1).minima(single.landscape(stand_in)).minima
+    (expected,) = ParticleSwarm(40, 15, refined_candidates=1).minima(single.cost_function(stand_in)).minima
     assert alone.cost == pytest.approx(expected.cost, abs=0.01)
     np.testing.assert_allclose(alone.u[:2], expected.u, atol=0.02)
     assert alone.cost - min(m.cost for m in found.values()) < 5.7

@@ -5,12 +5,12 @@ import pytest
 from landscapes import Known, cube, quadratic, rastrigin, rosenbrock
 
 from creepkit.errors import FitError
-from creepkit.inverse.search.box import Box
+from creepkit.inverse.search.box import Bounds
 from creepkit.inverse.search.evolution import CmaEs
-from creepkit.inverse.search.trace import Trace
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.search.trace import SearchTrace
+from creepkit.inverse.settings import IdentificationSettings
 
-BARE = CmaEs(polish=0)
+BARE = CmaEs(refined_candidates=0)
 
 
 @pytest.mark.parametrize(
@@ -30,24 +30,24 @@ def test_restarts_find_what_one_run_misses():
     np.testing.assert_allclose(found.minima[0].u, 0.0, atol=1e-3)
     starts = (0, *found.trace.restarts)
     assert [landscape.calls[k] for k in starts] == [landscape.calls[0] * 2**run for run in range(len(starts))]
-    alone = CmaEs(iterations=600, restarts=0, polish=0).minima(Known(rastrigin, cube(4, 5.12)))
-    assert alone.trace.best[-1] > 0.5  # the next best minimum lies at 1
+    alone = CmaEs(iterations=600, restarts=0, refined_candidates=0).minima(Known(rastrigin, cube(4, 5.12)))
+    assert alone.trace.best_cost[-1] > 0.5  # the next best minimum lies at 1
     assert alone.trace.restarts == ()
 
 
 def test_candidates_stay_in_the_box_and_an_optimum_beyond_a_wall_is_found_on_it():
-    landscape = Known(quadratic, Box(np.array([2.0, -5.0]), np.array([5.0, 5.0])))
+    landscape = Known(quadratic, Bounds(np.array([2.0, -5.0]), np.array([5.0, 5.0])))
     found = CmaEs().minima(landscape).minima[0]
     everything = np.concatenate(landscape.seen)
-    assert (everything >= landscape.box.low).all()
-    assert (everything <= landscape.box.high).all()
+    assert (everything >= landscape.box.lower).all()
+    assert (everything <= landscape.box.upper).all()
     np.testing.assert_allclose(found.u, [2.0, 2.0], atol=1e-4)
 
 
 def test_a_generation_is_one_call_and_a_seed_gives_the_same_answer_twice():
     runs = []
     for seed in (7, 7, 8):
-        landscape = Known(rosenbrock, cube(3), Settings(seed=seed))
+        landscape = Known(rosenbrock, cube(3), IdentificationSettings(seed=seed))
         runs.append(CmaEs(population=12, iterations=25, restarts=0).minima(landscape))
         assert landscape.calls == [12] * len(runs[-1].trace)
     np.testing.assert_array_equal(runs[0].minima[0].u, runs[1].minima[0].u)
@@ -57,7 +57,7 @@ def test_a_generation_is_one_call_and_a_seed_gives_the_same_answer_twice():
 
 def test_progress_is_told():
     told = []
-    CmaEs(iterations=4, restarts=0, polish=1).minima(Known(rosenbrock, cube(2)), lambda *a: told.append(a))
+    CmaEs(iterations=4, restarts=0, refined_candidates=1).minima(Known(rosenbrock, cube(2)), lambda *a: told.append(a))
     assert told == [("generation", k, 4) for k in range(1, 5)] + [("refinement", 1, 1)]
 
 
@@ -81,8 +81,8 @@ COSTS = [np.array([9.0, 5.0, 7.0]), np.array([6.0, 8.0, 10.0]), np.array([3.0, 4
 
 
 def test_a_trace_keeps_the_lowest_so_far_what_was_asked_and_the_quartiles():
-    trace = Trace.of("search", COSTS)
-    np.testing.assert_array_equal(trace.best, [5, 5, 3])
+    trace = SearchTrace.from_costs("search", COSTS)
+    np.testing.assert_array_equal(trace.best_cost, [5, 5, 3])
     np.testing.assert_array_equal(trace.evaluations, [3, 6, 11])
     np.testing.assert_array_equal(trace.quartiles, [[6, 7, 8], [7, 8, 9], [4, 5, 6]])
     assert len(trace) == 3
@@ -94,7 +94,7 @@ def test_the_picture_shows_the_best_on_a_logarithmic_axis_and_candidates_on_a_se
     (axes,) = figure.axes
     assert axes.get_yscale() == "log"
     best = next(line for line in axes.lines if line.get_label() == "best so far")
-    np.testing.assert_array_equal(best.get_ydata(), trace.best)
+    np.testing.assert_array_equal(best.get_ydata(), trace.best_cost)
     (above,) = axes.child_axes
     figure.draw_without_rendering()
     shown = [int(t.get_text().replace(",", "")) for t in above.get_xticklabels()]
@@ -104,10 +104,10 @@ def test_the_picture_shows_the_best_on_a_logarithmic_axis_and_candidates_on_a_se
 
 
 def test_a_trace_of_a_few_rows_without_quartiles_is_drawn(tmp_path):
-    Trace("starts", np.array([4.0]), np.array([8])).plot(tmp_path / "one.svg")
+    SearchTrace("starts", np.array([4.0]), np.array([8])).plot(tmp_path / "one.svg")
     assert (tmp_path / "one.svg").read_text().startswith("<?xml")
 
 
 def test_a_picture_that_cannot_be_written(tmp_path):
     with pytest.raises(FitError, match=r"the plot cannot be written .*name a \.png, \.svg or \.pdf file"):
-        Trace.of("search", COSTS).plot(tmp_path / "trace.word")
+        SearchTrace.from_costs("search", COSTS).plot(tmp_path / "trace.word")

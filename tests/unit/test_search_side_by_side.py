@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.problem import Problem
-from creepkit.inverse.search.landscape import rho, rho_slope
-from creepkit.inverse.search.multistart import MultiStart, distinct, screened
-from creepkit.inverse.search.side_by_side import refined_side_by_side
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.problem import IdentificationProblem
+from creepkit.inverse.search.landscape import robust_loss, robust_weight
+from creepkit.inverse.search.multistart import MultiStart, distinct, screened_starts
+from creepkit.inverse.search.side_by_side import batched_levenberg_marquardt
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import History
 
 TIMES = np.geomspace(600.0, 4e5, 25)
@@ -22,7 +22,7 @@ def landscape(law, values, stresses=(60.0, 90.0, 130.0)):
         run = ck.simulate(law, bar, values, loading=ck.constant_stress(stress), times=TIMES)
         tests.append(History(name=f"{stress:g}", times=TIMES, outputs=run.outputs, loading=run.loading,
                              temperature=293.15))  # fmt: skip
-    return Problem.of(law, tests, bar, Settings()).landscape(bar)
+    return IdentificationProblem.from_histories(law, tests, bar, IdentificationSettings()).cost_function(bar)
 
 
 @pytest.mark.parametrize(
@@ -33,20 +33,20 @@ def landscape(law, values, stresses=(60.0, 90.0, 130.0)):
 def test_planted_values_are_found_from_many_starts(name, values):
     law = ck.law(name)
     view = landscape(law, values)
-    ends = refined_side_by_side(view, screened(view, starts=6, draws=32))
+    ends = batched_levenberg_marquardt(view, screened_starts(view, starts=6, draws=32))
     found = view.objective.coordinates.values(ends[0].u)
     assert {n: found[n] for n in values} == pytest.approx(values, rel=1e-3)
     assert sum(end.cost < ends[0].cost + 1e-4 for end in ends) >= 4
-    assert all((view.box.low <= end.u).all() and (end.u <= view.box.high).all() for end in ends)
+    assert all((view.bounds.lower <= end.u).all() and (end.u <= view.bounds.upper).all() for end in ends)
 
 
 def test_one_prediction_for_all_starts_is_as_good_as_one_each():
     law = ck.law("strain-hardening")
     view = landscape(law, {"A": 3e-16, "n": 4.0, "m": -0.4})
-    starts = np.array(screened(view, starts=4, draws=16))
-    values, jacobian = view.objective.side_by_side(starts)
+    starts = np.array(screened_starts(view, starts=4, draws=16))
+    values, jacobian = view.objective.batch_jacobian(starts)
     for k, u in enumerate(starts):
-        alone = view.objective.at(u)
+        alone = view.objective.evaluate(u)
         assert values[k] == pytest.approx(alone.values, rel=1e-6, abs=1e-9)
         assert jacobian[k] == pytest.approx(alone.jacobian, rel=1e-4, abs=1e-6)
 
@@ -54,11 +54,11 @@ def test_one_prediction_for_all_starts_is_as_good_as_one_each():
 def test_minima_that_predict_the_same_are_one():
     view = landscape(ck.law("hyperbolic-sine"), {"A": 2e-9, "n": 1.7, "B": 45.0})
     found = MultiStart().minima(view).minima
-    assert len(distinct(found, view.box)) <= 2
+    assert len(distinct(found, view.bounds)) <= 2
 
 
 @pytest.mark.parametrize("loss", ["linear", "soft_l1", "huber", "cauchy", "arctan"])
 def test_losses_have_their_own_slopes(loss):
     z = np.geomspace(1e-3, 30.0, 40)
-    slope = (rho(z * (1 + 1e-6), loss) - rho(z * (1 - 1e-6), loss)) / (2e-6 * z)
-    assert rho_slope(z, loss) == pytest.approx(slope, rel=1e-6)
+    slope = (robust_loss(z * (1 + 1e-6), loss) - robust_loss(z * (1 - 1e-6), loss)) / (2e-6 * z)
+    assert robust_weight(z, loss) == pytest.approx(slope, rel=1e-6)

@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from creepkit.errors import FitError
-from creepkit.inverse.coordinates import Coordinates, Reference
-from creepkit.inverse.sparsity.contributions import Contributions
-from creepkit.inverse.sparsity.visited import FACTORS, Visited, strain_course, stress_course
+from creepkit.inverse.coordinates import Coordinates, ReferencePoint
+from creepkit.inverse.sparsity.contributions import TermContributions
+from creepkit.inverse.sparsity.visited import STRESS_FACTORS, EvaluationPoints, strain_history, stress_history
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
@@ -23,7 +23,7 @@ def bar(stress, name="bar", T=1000.0, frames=10):
 
 
 def contributions(law, tests):
-    return Contributions(law, Coordinates(law, Reference.of(tests)), Visited.of(tests))
+    return TermContributions(law, Coordinates(law, ReferencePoint.from_histories(tests)), EvaluationPoints.from_histories(tests))
 
 
 def internal(law, **values):
@@ -35,12 +35,12 @@ def test_two_power_laws_at_one_stress_have_the_closed_form():
     law, sigma = NORTON + NORTON, 40.0
     own = contributions(law, [bar(sigma)])
     u = own.coordinates.u(internal(law, A_1=2e-13, n_1=3.0, A_2=1e-16, n_2=5.0))
-    stress = sigma * np.array(FACTORS)
+    stress = sigma * np.array(STRESS_FACTORS)
     first, second = 2e-13 * stress**3, 1e-16 * stress**5
     share = first / (first + second)
     wanted = [np.sqrt(np.mean(share**2)), np.sqrt(np.mean((1 - share) ** 2))]
     assert_allclose(own.values(u[None])[0], wanted, rtol=1e-12)
-    assert own.named(u) == pytest.approx(dict(zip(law.terms, wanted, strict=True)))
+    assert own.by_term(u) == pytest.approx(dict(zip(law.terms, wanted, strict=True)))
 
 
 def test_equal_rates_everywhere_are_equal_shares():
@@ -84,9 +84,9 @@ def test_the_jacobian_is_that_of_the_closed_form():
     law = NORTON + NORTON
     own = contributions(law, [bar(40.0)])
     u = own.coordinates.u(internal(law, A_1=2e-13, n_1=3.0, A_2=1e-16, n_2=5.0))
-    s, c = own.shares(u[None])[0], own.values(u[None])[0]
+    s, c = own.fractions(u[None])[0], own.values(u[None])[0]
     slopes = s[:, :, None] * (np.eye(2) - s[:, None, :])
-    wanted = np.einsum("p,pi,pij->ij", own.visited.weight, s, slopes) / c[:, None]
+    wanted = np.einsum("p,pi,pij->ij", own.points.weight, s, slopes) / c[:, None]
     found = own.jacobian(u)
     assert_allclose(found[:, [law.names.index("A_1"), law.names.index("A_2")]], wanted, atol=1e-9)
 
@@ -100,10 +100,10 @@ def test_nothing_overflows_where_rates_do():
 
 
 def test_all_tests_weigh_alike():
-    visited = Visited.of([bar(40.0, frames=3), bar(80.0, "long", frames=400)])
+    visited = EvaluationPoints.from_histories([bar(40.0, frames=3), bar(80.0, "long", frames=400)])
     assert visited.weight.sum() == pytest.approx(1.0)
     assert visited.weight[visited.stress > 1.31 * 40.0].sum() == pytest.approx(0.5, abs=0.2)
-    low = np.isin(np.round(visited.stress / 40.0, 6), FACTORS) & (visited.weight > visited.weight.min())
+    low = np.isin(np.round(visited.stress / 40.0, 6), STRESS_FACTORS) & (visited.weight > visited.weight.min())
     assert visited.weight[low].sum() == pytest.approx(0.5)
 
 
@@ -129,18 +129,18 @@ def dimple(**more):
 
 def test_stress_follows_the_jump_of_pressure():
     times = np.array([1 * HOUR, 3.9 * HOUR, 4.1 * HOUR, 12 * HOUR])
-    assert_allclose(stress_course(dimple(), Dimple(), times)[:, 0], [100.0, 100.0, 125.0, 125.0])
+    assert_allclose(stress_history(dimple(), Dimple(), times)[:, 0], [100.0, 100.0, 125.0, 125.0])
 
 
 def test_stress_of_a_bar_follows_its_steps():
     steps = StressSteps(((0.0, 30.0), (5 * HOUR, 60.0), (8 * HOUR, 30.0)), "stress")
     test = bar(30.0).replace(loading=steps)
     times = np.array([1.0, 6.0, 9.0]) * HOUR
-    assert_allclose(stress_course(test, None, times)[:, 0], [30.0, 60.0, 30.0])
+    assert_allclose(stress_history(test, None, times)[:, 0], [30.0, 60.0, 30.0])
 
 
 def test_strain_of_a_dimple_is_its_growth_over_30_mm():
-    course = strain_course(dimple(), Dimple())
+    course = strain_history(dimple(), Dimple())
     assert course[-1] == pytest.approx((0.3 * 47 / 48) / 30.0, rel=1e-6)
     assert (np.diff(course) >= 0).all()
     assert course[0] > 0
@@ -148,6 +148,6 @@ def test_strain_of_a_dimple_is_its_growth_over_30_mm():
 
 def test_a_test_without_load_is_left_out_and_none_is_an_error():
     idle = bar(30.0, "idle").replace(loading=constant_stress(0.0, "stress"))
-    assert_allclose(np.unique(Visited.of([idle, bar(40.0)]).stress), 40.0 * np.array(FACTORS))
+    assert_allclose(np.unique(EvaluationPoints.from_histories([idle, bar(40.0)]).stress), 40.0 * np.array(STRESS_FACTORS))
     with pytest.raises(FitError, match="no test is ever under load"):
-        Visited.of([idle])
+        EvaluationPoints.from_histories([idle])

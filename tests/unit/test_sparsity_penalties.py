@@ -9,7 +9,7 @@ from scipy.optimize import approx_fprime
 from test_sparsity_contributions import bar, contributions, internal
 
 from creepkit.errors import FitError
-from creepkit.inverse.sparsity.penalised import Penalised, exponents_of
+from creepkit.inverse.sparsity.penalised import PenalisedTerms, switchable_exponents
 from creepkit.inverse.sparsity.penalties import L2, GroupL2, Sqrt, Subsets, check_penalty
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
@@ -59,7 +59,7 @@ def combined():
     """Contributions of Eq. (2), and a point at which all terms matter."""
     own = contributions(COMBINED, [bar(40.0), bar(55.0, "other")])
     u = own.coordinates.u(internal(COMBINED, **{**COMBINED.center(), "m_1": -0.3, "m_2": -0.6}))
-    rates = list(own.coordinates.rates)
+    rates = list(own.coordinates.term_rates)
     u[rates] = np.log([0.5, 0.3, 0.2]) - 14.0
     return own, u
 
@@ -67,7 +67,7 @@ def combined():
 @pytest.mark.parametrize("penalty", EVERY, ids=lambda p: type(p).__name__)
 def test_residuals_are_the_penalty_and_their_gradient_is_its_gradient(penalty, combined):
     own, u = combined
-    found = Penalised(own, penalty, 3.0)
+    found = PenalisedTerms(own, penalty, 3.0)
     residuals, jacobian = found.residuals(u), found.jacobian(u)
     assert 0.5 * (residuals**2).sum() == pytest.approx(found.values(u[None])[0], rel=1e-12)
     wanted = approx_fprime(u, lambda v: found.values(v[None])[0], 1e-7)
@@ -77,8 +77,8 @@ def test_residuals_are_the_penalty_and_their_gradient_is_its_gradient(penalty, c
 @pytest.mark.parametrize("penalty", EVERY, ids=lambda p: type(p).__name__)
 def test_with_weights_kept_residuals_touch_at_that_point_and_lie_above_elsewhere(penalty, combined):
     own, u = combined
-    found = Penalised(own, penalty, 3.0)
-    kept = found.at(u)
+    found = PenalisedTerms(own, penalty, 3.0)
+    kept = found.frozen_weights_at(u)
     assert 0.5 * (kept.residuals(u) ** 2).sum() == pytest.approx(found.values(u[None])[0], rel=1e-12)
     rng = np.random.default_rng(1)
     for v in u + rng.normal(0, 0.3, (20, u.size)):
@@ -89,7 +89,7 @@ def test_with_weights_kept_residuals_touch_at_that_point_and_lie_above_elsewhere
 
 def test_unknowns_of_tests_cost_nothing(combined):
     own, u = combined
-    found, x = Penalised(own, Sqrt(), 3.0), np.append(u, [0.02, -0.1])
+    found, x = PenalisedTerms(own, Sqrt(), 3.0), np.append(u, [0.02, -0.1])
     assert_allclose(found.residuals(x), found.residuals(u))
     assert found.values(x[None]) == found.values(u[None])
     assert found.jacobian(x).shape == (6, u.size + 2)
@@ -98,8 +98,8 @@ def test_unknowns_of_tests_cost_nothing(combined):
 
 def test_exponents_that_can_be_off_are_those_of_memory():
     """n of 1 to 8 has {0} outside its bounds; m of -1 to 0 can get there."""
-    assert [COMBINED.names[k] for k, _ in exponents_of(COMBINED)] == ["m_1", "m_2"]
-    assert exponents_of(NORTON) == []
+    assert [COMBINED.names[k] for k, _ in switchable_exponents(COMBINED)] == ["m_1", "m_2"]
+    assert switchable_exponents(NORTON) == []
 
 
 def test_a_simple_term_costs_less_than_one_with_memory(combined):
@@ -107,8 +107,8 @@ def test_a_simple_term_costs_less_than_one_with_memory(combined):
     simple = u.copy()
     simple[COMBINED.names.index("m_1")] = 0.0
     both = np.stack([u, simple])
-    same = Penalised(own, Sqrt(exponents=0.0), 1.0).values(both)
-    dearer = Penalised(own, Sqrt(), 1.0).values(both) - same
+    same = PenalisedTerms(own, Sqrt(exponents=0.0), 1.0).values(both)
+    dearer = PenalisedTerms(own, Sqrt(), 1.0).values(both) - same
     assert dearer[0] > dearer[1]
 
 
@@ -116,7 +116,7 @@ def test_a_law_without_such_exponents_is_penalised_too():
     law = NORTON + NORTON
     own = contributions(law, [bar(40.0)])
     u = own.coordinates.u(internal(law, A_1=2e-13, n_1=3.0, A_2=1e-16, n_2=5.0))
-    assert Penalised(own, Sqrt(), 1.0).residuals(u).shape == (3,)
+    assert PenalisedTerms(own, Sqrt(), 1.0).residuals(u).shape == (3,)
 
 
 @pytest.mark.parametrize(("strength", "told"), [(-1.0, "-1"), (np.nan, "nan"), ("strong", "strong")])

@@ -10,8 +10,8 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import ExportError, HistoryError, LawError, SolveError
-from creepkit.records import History, Prediction, Status, ValuedLaw
-from creepkit.registry import default
+from creepkit.records import History, Prediction, Status, LawWithValues
+from creepkit.registry import default_registry
 
 READERS = """
 from dataclasses import dataclass
@@ -67,9 +67,9 @@ class Steady:
 
 @pytest.fixture
 def _own_registry() -> Iterator[None]:
-    default.cache_clear()
+    default_registry.cache_clear()
     yield
-    default.cache_clear()
+    default_registry.cache_clear()
 
 
 def simulate(using: Steady, times: Sequence[float] = (1.0, 2.0, 4.0)) -> History:
@@ -97,10 +97,10 @@ def test_a_simulation_is_a_history_of_what_a_perfect_test_would_measure() -> Non
 
 
 def test_a_simulation_that_bursts_ends_there() -> None:
-    run = simulate(Steady(Status.BURST, end=3.0))
+    run = simulate(Steady(Status.RUPTURED, end=3.0))
 
     assert run.times.tolist() == [1.0, 2.0]
-    assert (run.status, run.end_time, run.reason) == (Status.BURST, 3.0, "burst")
+    assert (run.status, run.end_time, run.reason) == (Status.RUPTURED, 3.0, "burst")
     assert (run.labels, run.rupture_time) == ({"ended": "burst"}, 3.0)
     assert str(run) == "simulated: ended at 3 s (burst); 2 frames to 2 s, where strain 0.0002"
 
@@ -115,7 +115,7 @@ def test_a_simulation_that_fails_is_an_answer_up_to_there() -> None:
 @pytest.mark.parametrize("times", [(1.0, 2.0), (0.0, 1.0)])
 def test_a_simulation_without_any_of_its_times_is_an_error(times: tuple[float, ...]) -> None:
     with pytest.raises(SolveError) as said:
-        simulate(Steady(Status.BURST, end=0.5), times)
+        simulate(Steady(Status.RUPTURED, end=0.5), times)
     assert str(said.value) == (
         "simulation of law 'norton' ended at 0.5 s, before any of the times asked for: burst; "
         "check values, loading and times"
@@ -130,11 +130,11 @@ def test_numbers_after_the_end_are_left_out() -> None:
             told = super().predict(*args, **kwargs)
             return replace(told, values=np.nan_to_num(told.values, nan=9.0))
 
-    assert simulate(Careless(Status.BURST, end=3.0)).outputs["strain"].tolist() == pytest.approx([1e-4, 2e-4])
+    assert simulate(Careless(Status.RUPTURED, end=3.0)).outputs["strain"].tolist() == pytest.approx([1e-4, 2e-4])
 
 
 def test_a_run_survives_a_pickle() -> None:
-    run = simulate(Steady(Status.BURST, end=3.0))
+    run = simulate(Steady(Status.RUPTURED, end=3.0))
     again = pickle.loads(pickle.dumps(run))
 
     assert type(again) is type(run)
@@ -152,7 +152,7 @@ def test_a_law_that_needs_a_temperature_asks_for_it() -> None:
 def test_histories_are_read_by_name_by_pattern_and_by_folder(tmp_path: Path) -> None:
     plugin = tmp_path / "readers.py"
     plugin.write_text(READERS.format(suffix=".two"))
-    default().load_file(plugin)
+    default_registry().load_file(plugin)
     for name, strain in [("b.one", 0.2), ("a.one", 0.1), ("c.two", 0.3)]:
         (tmp_path / name).write_text(str(strain))
 
@@ -166,7 +166,7 @@ def test_histories_are_read_by_name_by_pattern_and_by_folder(tmp_path: Path) -> 
 def test_what_cannot_be_read_is_one_sentence(tmp_path: Path) -> None:
     plugin = tmp_path / "readers.py"
     plugin.write_text(READERS.format(suffix=".one"))
-    default().load_file(plugin)
+    default_registry().load_file(plugin)
     (tmp_path / "a.one").write_text("0.1")
 
     with pytest.raises(HistoryError, match="nothing.one"):
@@ -178,7 +178,7 @@ def test_what_cannot_be_read_is_one_sentence(tmp_path: Path) -> None:
 
 
 def test_values_set_by_hand_are_told_beside_the_notes_that_they_contradict() -> None:
-    found = ValuedLaw(ck.law("norton"), {"A": 1e-16, "n": 5.25}, ("n = 5.25, 95 % interval 5 to 5.5",))
+    found = LawWithValues(ck.law("norton"), {"A": 1e-16, "n": 5.25}, ("n = 5.25, 95 % interval 5 to 5.5",))
 
     text = ck.export(found, "c", {"A": 1e-16, "n": 4.0})
 
@@ -190,7 +190,7 @@ def test_values_set_by_hand_are_told_beside_the_notes_that_they_contradict() -> 
 
 
 def test_a_valued_law_keeps_its_own_units_moduli_and_name() -> None:
-    found = ValuedLaw(
+    found = LawWithValues(
         ck.law("norton"), {"A": 1e-16, "n": 5}, units=ck.Units("Pa", "h"), elastic=ck.Elastic(E=150e3), name="blade"
     )
 

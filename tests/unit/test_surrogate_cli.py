@@ -8,10 +8,10 @@ from command_line import creepkit, one_line
 from planted_sets import bars
 
 import creepkit as ck
-from creepkit.dataset.store import write
+from creepkit.dataset.store import write_dataset
 from creepkit.surrogate import sweep as sweeping
 from creepkit.surrogate.evaluation import evaluate
-from creepkit.surrogate.trainable import split
+from creepkit.surrogate.trainable import training_split
 
 PNG = b"\x89PNG"
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write(bars(60), tmp_path_factory.mktemp("set") / "bars.h5")
+    return write_dataset(bars(60), tmp_path_factory.mktemp("set") / "bars.h5")
 
 
 def test_train_writes_a_surrogate_and_its_pictures(file: Path, tmp_path: Path) -> None:
@@ -66,20 +66,20 @@ def test_a_sweep_is_a_table_and_a_picture_and_is_not_redone(file: Path, tmp_path
 
 def test_a_sweep_judges_every_number_of_samples_by_the_same_rows(tmp_path: Path) -> None:
     data, recipe = bars(60), ck.ParameterGru(4, 1, training=ck.Training(epochs=2))
-    entries = sweeping.sweep(data, recipe, to=tmp_path, samples=(10, 20, 48))
+    entries = sweeping.size_study(data, recipe, to=tmp_path, samples=(10, 20, 48))
     judged = [evaluate(ck.surrogate(tmp_path / e.file), data) for e in entries]
     for entry, one in zip(entries, judged, strict=True):
-        assert one.found.index.tolist() == judged[0].found.index.tolist()
+        assert one.comparison.index.tolist() == judged[0].comparison.index.tolist()
         assert entry.loss == one.metrics["loss"]
-        learnt = split(len(data), ck.Training(samples=entry.samples), 0)[0].tolist()
-        assert (len(learnt), set(learnt) & set(one.found.index)) == (entry.samples, set())
+        learnt = training_split(len(data), ck.Training(samples=entry.samples), 0)[0].tolist()
+        assert (len(learnt), set(learnt) & set(one.comparison.index)) == (entry.samples, set())
     assert len({e.loss for e in entries}) == 3
 
 
 def test_the_best_of_a_sweep_stands_on_top(file: Path, tmp_path: Path) -> None:
     recipe = ck.ParameterGru(4, 1, training=ck.Training(epochs=2))
-    entries = sweeping.sweep(bars(60), recipe, to=tmp_path, hidden=(2, 8))
-    _, rows = sweeping.rows_of(entries)
+    entries = sweeping.size_study(bars(60), recipe, to=tmp_path, hidden=(2, 8))
+    _, rows = sweeping.size_study_rows(entries)
     losses = [float(row[5]) for row in rows]
     assert losses == sorted(losses)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import SurrogateError
-from creepkit.surrogate.domain import Domain
+from creepkit.surrogate.domain import ApplicabilityDomain
 
 
 def mahalanobis(row: np.ndarray, others: np.ndarray) -> float:
@@ -18,16 +18,16 @@ def mahalanobis(row: np.ndarray, others: np.ndarray) -> float:
 def test_the_limit_is_the_largest_distance_of_a_row_from_all_others() -> None:
     rows = np.random.default_rng(0).normal(size=(30, 3)) * [1.0, 100.0, 1e-3]
     brute = max(mahalanobis(row, np.delete(rows, k, axis=0)) for k, row in enumerate(rows))
-    assert Domain.of("abc", rows).limit == pytest.approx(brute, rel=1e-9)
+    assert ApplicabilityDomain.from_rows("abc", rows).limit == pytest.approx(brute, rel=1e-9)
 
 
 def test_training_rows_are_inside() -> None:
     rows = np.random.default_rng(1).uniform(size=(200, 6))
-    assert not Domain.of("abcdef", rows).outside(rows).any()
+    assert not ApplicabilityDomain.from_rows("abcdef", rows).outside(rows).any()
 
 
 def test_one_input_beyond_its_range_is_outside_and_named() -> None:
-    domain = Domain.of(("log10 A", "n"), np.random.default_rng(2).uniform(size=(100, 2)) * [10, 1] + [-20, 3])
+    domain = ApplicabilityDomain.from_rows(("log10 A", "n"), np.random.default_rng(2).uniform(size=(100, 2)) * [10, 1] + [-20, 3])
     assert domain.outside(np.array([-15.0, 4.2]))
     assert domain.reason(np.array([-15.0, 4.2])).startswith("n = 4.2 (trained on 3.0")
     assert domain.reason(np.array([-15.0, 3.5])) == ""
@@ -36,7 +36,7 @@ def test_one_input_beyond_its_range_is_outside_and_named() -> None:
 def test_a_combination_that_never_occurred_is_outside_though_each_input_is_within_its_range() -> None:
     n = np.linspace(2.0, 8.0, 60)
     rows = np.stack([-7.0 - 2.0 * n + 0.3 * np.random.default_rng(3).normal(size=60), n], axis=1)
-    domain = Domain.of(("log10 A", "n"), rows)
+    domain = ApplicabilityDomain.from_rows(("log10 A", "n"), rows)
     odd = np.array([-11.0, 7.5])
     assert (domain.low < odd).all()
     assert (odd < domain.high).all()
@@ -47,14 +47,14 @@ def test_a_combination_that_never_occurred_is_outside_though_each_input_is_withi
 
 def test_what_never_varied_may_not_vary() -> None:
     rows = np.stack([np.full(50, 0.5), np.linspace(0, 1, 50)], axis=1)
-    domain = Domain.of(("apex_thickness", "x"), rows)
+    domain = ApplicabilityDomain.from_rows(("apex_thickness", "x"), rows)
     assert not domain.outside(np.array([0.5, 0.3]))
     assert domain.outside(np.array([0.51, 0.3]))
 
 
 def test_each_input_is_forgiven_what_it_is_told() -> None:
     rows = np.random.default_rng(7).uniform(size=(400, 2)) * [1, 10]
-    domain = replace(Domain.of(("thickness", "exponent"), rows, [0.05, 0.5]), limit=np.inf)
+    domain = replace(ApplicabilityDomain.from_rows(("thickness", "exponent"), rows, [0.05, 0.5]), limit=np.inf)
     assert domain.outside(np.array([[1.04, 5.0], [1.06, 5.0], [0.5, 14.5], [0.5, 15.5]])).tolist() == [0, 1, 0, 1]
     assert domain.reason(np.array([1.06, 14.5])).startswith("thickness = 1.06 (trained on 0.00")
     assert "exponent" not in domain.reason(np.array([1.06, 14.5]))
@@ -62,22 +62,22 @@ def test_each_input_is_forgiven_what_it_is_told() -> None:
 
 def test_documents_that_say_nothing_of_it_forgive_one_percent() -> None:
     rows = np.stack([np.linspace(0.0, 1.0, 50), np.random.default_rng(8).normal(size=50)], axis=1)
-    document = {**Domain.of("ab", rows, 0.5).document(), "limit": None}
+    document = {**ApplicabilityDomain.from_rows("ab", rows, 0.5).document(), "limit": None}
     del document["forgiven"]
     edges = np.array([[1.009, 0.5], [1.02, 0.5]])
-    assert Domain.from_document(document).outside(edges).tolist() == [False, True]
+    assert ApplicabilityDomain.from_document(document).outside(edges).tolist() == [False, True]
 
 
 def test_inputs_that_are_not_there_are_not_far() -> None:
     rows = np.random.default_rng(4).uniform(size=(50, 2))
     rows[::3, 0] = np.nan
-    domain = Domain.of("ab", rows)
+    domain = ApplicabilityDomain.from_rows("ab", rows)
     assert not domain.outside(np.array([np.nan, 0.5]))
     assert domain.outside(np.array([np.nan, 5.0]))
 
 
 def test_few_rows_leave_the_box_alone() -> None:
-    domain = Domain.of("abc", np.array([[0.0, 0, 0], [1.0, 1, 0], [0.0, 1, 1]]))
+    domain = ApplicabilityDomain.from_rows("abc", np.array([[0.0, 0, 0], [1.0, 1, 0], [0.0, 1, 1]]))
     assert domain.limit == np.inf
     assert not domain.outside(np.array([0.5, 0.5, 0.5]))
     assert domain.outside(np.array([1.5, 0.5, 0.5]))
@@ -85,13 +85,13 @@ def test_few_rows_leave_the_box_alone() -> None:
 
 def test_the_document_is_json_and_gives_the_same_distances() -> None:
     rows = np.random.default_rng(5).normal(size=(40, 4))
-    domain = Domain.of("abcd", rows)
-    again = Domain.from_document(json.loads(json.dumps(domain.document())))
+    domain = ApplicabilityDomain.from_rows("abcd", rows)
+    again = ApplicabilityDomain.from_document(json.loads(json.dumps(domain.document())))
     assert np.array_equal(again.distance(rows), domain.distance(rows))
 
 
 def test_a_damaged_document_says_so() -> None:
-    document = Domain.of("ab", np.random.default_rng(6).normal(size=(9, 2))).document()
+    document = ApplicabilityDomain.from_rows("ab", np.random.default_rng(6).normal(size=(9, 2))).document()
     for changes in ({"low": [0.0]}, {"mean": "x"}, {"names": None}, {"whitening": [[1.0, 0.0]]}):
         with pytest.raises(SurrogateError, match="the domain in the header of this surrogate is damaged"):
-            Domain.from_document({**document, **changes})
+            ApplicabilityDomain.from_document({**document, **changes})

@@ -17,9 +17,9 @@ from creepkit.surrogate import rate_gradient
 from creepkit.surrogate.rate_net import RateNet
 from creepkit.surrogate.rate_surrogate import RateSurrogate
 from creepkit.surrogate.recipe import Training
-from creepkit.surrogate.surrogate import load
+from creepkit.surrogate.surrogate import load_surrogate
 from creepkit.surrogate.train import train
-from creepkit.surrogate.trainable import split
+from creepkit.surrogate.trainable import training_split
 
 HOW = Training(epochs=60, batch=8, rate=3e-3, schedule="cosine", clip=1.0)
 RECIPE = RateNet(hidden=24, layers=2, training=HOW)
@@ -63,25 +63,25 @@ def learnt(family: Dataset) -> RateSurrogate:
 @pytest.fixture(scope="module")
 def exact(learnt: RateSurrogate) -> RateSurrogate:
     """The same in float64: a difference over 1e-5 of numbers with seven digits has two."""
-    return RateSurrogate(learnt.recipe, copy.deepcopy(learnt.module).double(), learnt.told)
+    return RateSurrogate(learnt.recipe, copy.deepcopy(learnt.module).double(), learnt.metadata)
 
 
 # ---- what it learns --------------------------------------------------------------------------------------------------
 
 
 def test_training_corrects_the_base(learnt: RateSurrogate, family: Dataset) -> None:
-    samples = RECIPE.samples(family)
-    train_rows, aside = split(len(family), HOW, 0)
+    samples = RECIPE.sample_tensors(family)
+    train_rows, aside = training_split(len(family), HOW, 0)
     batch = {name: tensor[aside] for name, tensor in samples.items()}
     with torch.no_grad():
         base, after = (float(m.loss(batch)) for m in (RECIPE.module(family, samples, train_rows), learnt.module))
     assert after < 0.6 * base
-    assert learnt.told.metrics["outputs"]["amplitude"]["rse"] < 1e-2
+    assert learnt.metadata.metrics["outputs"]["amplitude"]["rse"] < 1e-2
 
 
 def test_the_file_holds_the_same_network(learnt: RateSurrogate, tmp_path) -> None:
-    again = load(learnt.save(tmp_path / "m.safetensors"))
-    assert again.header == learnt.header
+    again = load_surrogate(learnt.save(tmp_path / "m.safetensors"))
+    assert again.file_header == learnt.file_header
     found = [model.predict(NORTON, norton(5.0), [dimple()], jacobian=True) for model in (learnt, again)]
     assert np.array_equal(found[0].values, found[1].values)
     assert np.array_equal(found[0].jacobian, found[1].jacobian)
@@ -117,11 +117,11 @@ def test_jacobians_are_central_differences(exact: RateSurrogate, law, values) ->
     test = dimple(end=4 * HOURS, elastic=ck.Elastic(E=1.5e5 - 50.0 * symbols.temperature))
     at = {"thickness": np.array([[0.51]]), "modulus": np.array([[0.02]]), "temperature": np.array([[3.0]])}
 
-    def shown(values: dict, effects: dict) -> np.ndarray:
+    def shown(values: dict, nuisances: dict) -> np.ndarray:
         # with the jacobian, for whose sake steps are solved to 1e-11
-        return exact.predict(law, values, [test], jacobian=True, effects=effects).values
+        return exact.predict(law, values, [test], jacobian=True, nuisances=nuisances).values
 
-    found = exact.predict(law, values, [test], jacobian=True, effects=at)
+    found = exact.predict(law, values, [test], jacobian=True, nuisances=at)
     for k, (name, param) in enumerate(law.table.items()):
         middle, ends = param.to_internal(values[name]), []
         for step in (1e-5, -1e-5):
@@ -129,7 +129,7 @@ def test_jacobians_are_central_differences(exact: RateSurrogate, law, values) ->
         check(found.jacobian[..., k], (ends[0] - ends[1]) / 2e-5)
     for kind, step in (("thickness", 1e-5), ("modulus", 1e-4), ("temperature", 1e-2)):
         ends = [shown(values, {**at, kind: at[kind] + s}) for s in (step, -step)]
-        check(found.effect_jacobian[kind], (ends[0] - ends[1]) / (2 * step))
+        check(found.nuisance_jacobian[kind], (ends[0] - ends[1]) / (2 * step))
 
 
 def check(slope: np.ndarray, numeric: np.ndarray) -> None:
@@ -142,9 +142,9 @@ def test_gradients_in_torch_are_the_jacobian(exact: RateSurrogate) -> None:
     values, test = norton(5.0), dimple()
     theta = torch.tensor([[p.to_internal(values[n]) for n, p in NORTON.table.items()]], dtype=torch.float64)
     found = exact.predict(NORTON, values, [test], jacobian=True)
-    slopes = torch.autograd.functional.jacobian(lambda t: rate_gradient.outputs(exact, NORTON, t, test), theta)
+    slopes = torch.autograd.functional.jacobian(lambda t: rate_gradient.differentiable_outputs(exact, NORTON, t, test), theta)
     assert slopes[0, :, :, 0].numpy() == pytest.approx(found.jacobian[0, 0], rel=1e-9, abs=1e-12)
-    shown = rate_gradient.outputs(exact, NORTON, theta, test)[0]
+    shown = rate_gradient.differentiable_outputs(exact, NORTON, theta, test)[0]
     assert shown.detach().numpy() == pytest.approx(found.values[0, 0], rel=1e-12)
 
 
@@ -178,7 +178,7 @@ def test_a_grid_of_150_s_holds_one_of_900_s(learnt: RateSurrogate) -> None:
 def test_a_burst_has_values_up_to_it(learnt: RateSurrogate) -> None:
     test = dimple()
     found = learnt.predict(NORTON, norton(5.0, 2e-4), [test])
-    assert found.status[0, 0] == Status.BURST
+    assert found.status[0, 0] == Status.RUPTURED
     before = test.times < found.end_times[0, 0]
     assert 0 < before.sum() < 48
     assert np.isfinite(found.values[0, 0, before]).all()
@@ -192,8 +192,8 @@ def test_a_burst_has_values_up_to_it(learnt: RateSurrogate) -> None:
 def guarded(learnt: RateSurrogate) -> RateSurrogate:
     """With the domain of more samples; those need not be simulated."""
     drawn = unsimulated_rates(200)
-    told = RECIPE.told(drawn, RECIPE.samples(drawn), torch.arange(len(drawn)))
-    return RateSurrogate(RECIPE, learnt.module, replace(learnt.told, domain=told.domain))
+    told = RECIPE.metadata(drawn, RECIPE.sample_tensors(drawn), torch.arange(len(drawn)))
+    return RateSurrogate(RECIPE, learnt.module, replace(learnt.metadata, domain=told.domain))
 
 
 FALLING = RecordedLoading(Program(np.array([0.0, 100, 2e4, 20100, 43200]), np.array([0.0, 10, 10, 4, 4])), "pressure")
@@ -224,7 +224,7 @@ def test_what_is_usual_is_not_flagged(guarded: RateSurrogate) -> None:
 
 
 def test_other_kinds_of_tests_are_refused(learnt: RateSurrogate) -> None:
-    bar = bars(1).plan(0).replace(elastic=ck.Elastic(E=150e3))
+    bar = bars(1).planned_test(0).replace(elastic=ck.Elastic(E=150e3))
     cases = [
         (
             dimple(geometry={"cavity_radius": 6.0}),
@@ -240,7 +240,7 @@ def test_other_kinds_of_tests_are_refused(learnt: RateSurrogate) -> None:
             learnt.predict(NORTON, norton(5.0), [history])
         assert "\n" not in str(caught.value)
     with pytest.raises(SurrogateError, match="does not know the nuisance 'window'; it knows thickness, modulus, temp"):
-        learnt.predict(NORTON, norton(5.0), [dimple()], effects={"window": np.full((1, 1), 6.0)})
+        learnt.predict(NORTON, norton(5.0), [dimple()], nuisances={"window": np.full((1, 1), 6.0)})
 
 
 def test_bars_teach_it_nothing() -> None:

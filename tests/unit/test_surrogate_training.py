@@ -11,14 +11,14 @@ from planted_sets import bars
 
 from creepkit.dataset.dataset import Dataset
 from creepkit.errors import DatasetError, SurrogateError
-from creepkit.surrogate.checkpoint import fingerprint
+from creepkit.surrogate.checkpoint import dataset_fingerprint
 from creepkit.surrogate.evaluation import evaluate
 from creepkit.surrogate.parameter_gru import ParameterGru
 from creepkit.surrogate.parameter_module import ParameterModule
 from creepkit.surrogate.recipe import Training
-from creepkit.surrogate.schedule import rate_of, since_best
+from creepkit.surrogate.schedule import learning_rate, epochs_since_best
 from creepkit.surrogate.train import train
-from creepkit.surrogate.trainable import split
+from creepkit.surrogate.trainable import training_split
 
 SMALL = ParameterGru(hidden=8, layers=1, training=Training(epochs=6, batch=16, rate=1e-2))
 
@@ -51,7 +51,7 @@ def test_resumed_is_bit_for_bit_uninterrupted(data: Dataset, tmp_path: Path) -> 
             train(data, SMALL, to=path, seed=3, progress=stop_at(epoch))
         assert not path.exists()
     resumed = train(data, SMALL, to=path, seed=3)
-    assert resumed.told.curves == whole.told.curves
+    assert resumed.metadata.curves == whole.metadata.curves
     pairs = zip(resumed.module.state_dict().values(), whole.module.state_dict().values(), strict=True)
     assert all(torch.equal(a, b) for a, b in pairs)
     assert [p.name for p in tmp_path.iterdir()] == ["m.safetensors"]
@@ -67,7 +67,7 @@ def test_a_training_leaves_the_generator_of_others_alone(data: Dataset) -> None:
 
 def test_another_seed_is_another_training(data: Dataset) -> None:
     one, other = (train(data, SMALL, seed=seed, training=Training(epochs=1)) for seed in (0, 1))
-    assert one.told.curves["loss"] != other.told.curves["loss"]
+    assert one.metadata.curves["loss"] != other.metadata.curves["loss"]
 
 
 def test_what_is_done_is_returned_and_what_is_another_is_kept(data: Dataset, tmp_path: Path) -> None:
@@ -76,7 +76,7 @@ def test_what_is_done_is_returned_and_what_is_another_is_kept(data: Dataset, tmp
     stamp = path.stat().st_mtime_ns
     again = train(data, SMALL, to=path, seed=3)
     assert path.stat().st_mtime_ns == stamp
-    assert again.told.curves == once.told.curves
+    assert again.metadata.curves == once.metadata.curves
     with pytest.raises(SurrogateError, match="another surrogate is there already; remove it or choose another name"):
         train(data, SMALL, to=path, seed=4)
 
@@ -102,20 +102,20 @@ def test_a_damaged_checkpoint_says_so(data: Dataset, tmp_path: Path) -> None:
 
 def test_early_stop_and_the_best_epoch(data: Dataset) -> None:
     model = train(data, SMALL, training=Training(epochs=50, rate=0.5, schedule="constant", early_stop=3))
-    losses, known = model.told.curves["validation"], model.told.provenance
+    losses, known = model.metadata.curves["validation"], model.metadata.provenance
     assert known["epochs"] == len(losses) < 50
-    assert since_best(losses) == 3
+    assert epochs_since_best(losses) == 3
     assert known["best_epoch"] == int(np.argmin(losses)) + 1
-    assert model.told.metrics["loss"] == pytest.approx(model.told.curves["rse"][known["best_epoch"] - 1], rel=1e-5)
+    assert model.metadata.metrics["loss"] == pytest.approx(model.metadata.curves["rse"][known["best_epoch"] - 1], rel=1e-5)
 
 
 def test_training_learns_and_the_file_holds_the_same_network(data: Dataset, tmp_path: Path) -> None:
     model = train(data, SMALL, to=tmp_path / "m.safetensors", training=Training(epochs=40, rate=2e-2, batch=16))
-    assert model.told.metrics["loss"] < 0.25
+    assert model.metadata.metrics["loss"] < 0.25
     judged = evaluate(model, data)
-    assert judged.metrics == model.told.metrics
-    assert len(judged.found.true) == round(0.2 * len(data))
-    assert sorted(model.told.metrics["times"]) == ["18750"[:5], "31250", "6250"]
+    assert judged.metrics == model.metadata.metrics
+    assert len(judged.comparison.true) == round(0.2 * len(data))
+    assert sorted(model.metadata.metrics["times"]) == ["18750"[:5], "31250", "6250"]
 
 
 def test_the_plateau_is_torchs() -> None:
@@ -124,22 +124,22 @@ def test_the_plateau_is_torchs() -> None:
     adam = torch.optim.Adam([torch.zeros(1, requires_grad=True)], lr=1e-3)
     plateau = torch.optim.lr_scheduler.ReduceLROnPlateau(adam, patience=3)
     for k, loss in enumerate(losses):
-        assert rate_of(training, list(losses[:k])) == pytest.approx(adam.param_groups[0]["lr"], rel=1e-12)
+        assert learning_rate(training, list(losses[:k])) == pytest.approx(adam.param_groups[0]["lr"], rel=1e-12)
         plateau.step(loss)
 
 
 def test_the_cosine_ends_at_zero() -> None:
     training = Training(rate=1e-2, schedule="cosine", epochs=4)
-    assert rate_of(training, []) == 1e-2
-    assert rate_of(training, [1.0], share=1.0) == pytest.approx(5e-3)
-    assert rate_of(training, [1.0] * 3, share=1.0) == pytest.approx(0.0, abs=1e-12)
+    assert learning_rate(training, []) == 1e-2
+    assert learning_rate(training, [1.0], epoch_fraction=1.0) == pytest.approx(5e-3)
+    assert learning_rate(training, [1.0] * 3, epoch_fraction=1.0) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_rows_set_aside_are_a_fifth_and_none_is_lost() -> None:
-    aside, kept = split(101, Training(), seed=0)[::-1]
+    aside, kept = training_split(101, Training(), seed=0)[::-1]
     assert len(aside) == 20
     assert sorted([*aside.tolist(), *kept.tolist()]) == list(range(101))
-    assert split(101, Training(), seed=1)[1].tolist() != aside.tolist()
+    assert training_split(101, Training(), seed=1)[1].tolist() != aside.tolist()
 
 
 def test_frames_that_are_not_numbers_teach_nothing(data: Dataset) -> None:
@@ -147,7 +147,7 @@ def test_frames_that_are_not_numbers_teach_nothing(data: Dataset) -> None:
     values[::2, 7:] = np.nan
     short = replace(data, values=values)
     model = train(short, SMALL)
-    assert math.isfinite(model.told.metrics["loss"])
+    assert math.isfinite(model.metadata.metrics["loss"])
     values[1, :] = np.nan
     with pytest.raises(DatasetError, match=r"sample 1 of the data set is accepted, but no frame .* \(so it is with 1"):
         train(replace(data, values=values), SMALL)
@@ -157,7 +157,7 @@ def test_samples_that_were_rejected_teach_nothing(data: Dataset) -> None:
     reasons = np.zeros(len(data), np.int64)
     reasons[20:] = 2
     model = train(replace(data, reasons=reasons), SMALL)
-    assert model.told.provenance["training_rows"] + model.told.provenance["validation_rows"] == 20
+    assert model.metadata.provenance["training_rows"] + model.metadata.provenance["validation_rows"] == 20
     reasons[9:] = -1
     with pytest.raises(
         DatasetError, match="a data set with 9 accepted samples of 96 teaches nothing; 10 are the least"
@@ -169,8 +169,8 @@ def test_a_constant_column_is_told_and_harmless(data: Dataset) -> None:
     parameters = data.parameters.copy()
     parameters[:, 1] = 4.5
     model = train(replace(data, parameters=parameters), SMALL)
-    assert model.told.notes == ("constant in training, so that nothing is known beyond: n",)
-    assert math.isfinite(model.told.metrics["loss"])
+    assert model.metadata.notes == ("constant in training, so that nothing is known beyond: n",)
+    assert math.isfinite(model.metadata.metrics["loss"])
 
 
 def test_conditions_in_another_unit_are_noticed(data: Dataset) -> None:
@@ -194,8 +194,8 @@ def test_a_training_that_diverges_says_so(data: Dataset, monkeypatch: pytest.Mon
 def test_fingerprints_see_what_can_be_learnt(data: Dataset) -> None:
     values = data.values.copy()
     values[3, 4] += 1e-4
-    assert fingerprint(replace(data, values=values)) != fingerprint(data)
-    assert fingerprint(replace(data, provenance={})) == fingerprint(data)
+    assert dataset_fingerprint(replace(data, values=values)) != dataset_fingerprint(data)
+    assert dataset_fingerprint(replace(data, provenance={})) == dataset_fingerprint(data)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from creepkit.language import (
     activated,
     arrhenius,
     exponential,
-    inverse,
+    inverse_temperature,
     linear,
     parameters,
     states,
@@ -24,7 +24,7 @@ from creepkit.language import (
     time,
 )
 from creepkit.language.nodes import DEPTH_LIMIT
-from creepkit.language.tree import condition_from_tree, from_tree, law_from_json, law_to_json, to_tree
+from creepkit.language.tree import condition_from_tree, expression_from_tree, law_from_json, law_to_json, expression_to_tree
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
@@ -57,7 +57,7 @@ LAWS = [
     COMBINED.times(arrhenius()),
     COMBINED.times(arrhenius(T_ref=1234.567, Q=4.1e5)),
     NORTON.with_temperature(n=linear()),
-    NORTON.with_temperature(A=exponential(), n=inverse(1001.1)),
+    NORTON.with_temperature(A=exponential(), n=inverse_temperature(1001.1)),
     HYPERBOLIC_SINE.with_temperature(B=activated()).times(arrhenius()),
     DRIFTING_EXPONENT.with_temperature(n_0=linear()),
     STRAIN_HARDENING.fix(m=0),
@@ -100,23 +100,23 @@ EXPRESSIONS = [
 
 @pytest.mark.parametrize("expression", EXPRESSIONS, ids=str)
 def test_an_expression_comes_back_equal(expression):
-    rebuilt = from_tree(json.loads(json.dumps(to_tree(expression))), SYMBOLS)
+    rebuilt = expression_from_tree(json.loads(json.dumps(expression_to_tree(expression))), SYMBOLS)
     assert rebuilt == expression
     assert sympy.srepr(rebuilt) == sympy.srepr(expression)
 
 
 @pytest.mark.parametrize("value", [0.1, 1 / 3, 5e-324, 1.7976931348623157e308, -1073.15, 2.0**-1074 * 3, 0.0])
 def test_a_float_comes_back_bit_for_bit(value):
-    rebuilt = from_tree(json.loads(json.dumps(to_tree(sympy.Float(value) + stress))), SYMBOLS)
+    rebuilt = expression_from_tree(json.loads(json.dumps(expression_to_tree(sympy.Float(value) + stress))), SYMBOLS)
     assert float(rebuilt.subs(stress, 0)).hex() == value.hex()
 
 
 def test_a_tree_is_readable():
-    assert to_tree(A * stress**n) == ["mul", "A", ["pow", "stress", "n"]]
+    assert expression_to_tree(A * stress**n) == ["mul", "A", ["pow", "stress", "n"]]
 
 
 def test_a_condition_comes_back_equal():
-    assert condition_from_tree(to_tree(n >= 0), SYMBOLS) == (n >= 0)
+    assert condition_from_tree(expression_to_tree(n >= 0), SYMBOLS) == (n >= 0)
 
 
 nested = "stress"
@@ -170,7 +170,7 @@ BAD_TREES = {
 def test_a_bad_tree_is_one_sentence(case):
     tree, message = BAD_TREES[case]
     with pytest.raises(LawError, match=message) as error:
-        from_tree(tree, SYMBOLS)
+        expression_from_tree(tree, SYMBOLS)
     assert "\n" not in str(error.value)
     assert len(str(error.value)) < 400
 
@@ -187,7 +187,7 @@ def test_a_bad_tree_is_one_sentence(case):
 )
 def test_what_cannot_be_written(expression, message):
     with pytest.raises(LawError, match=message):
-        to_tree(expression)
+        expression_to_tree(expression)
 
 
 def _changed(*path, to):

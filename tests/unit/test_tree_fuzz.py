@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from creepkit.errors import LawError
 from creepkit.language import CreepLaw, arrhenius, parameters, stress, time
-from creepkit.language.nodes import _HEADS
-from creepkit.language.tree import from_tree, law_from_json, law_to_json
+from creepkit.language.nodes import _NODE_TYPES
+from creepkit.language.tree import expression_from_tree, law_from_json, law_to_json
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
@@ -49,9 +49,9 @@ def _compound(inner):
     relation = st.tuples(st.sampled_from(["ge", "gt", "le", "lt"]), inner, inner).map(list)
     either = st.tuples(st.sampled_from(["and", "or"]), relation, relation).map(list)
     branches = st.lists(st.tuples(inner, relation | either).map(list), min_size=1, max_size=2)
-    numeric = {name: head for name, head in _HEADS.items() if head.gives is sympy.Expr}
+    numeric = {name: head for name, head in _NODE_TYPES.items() if head.result_kind is sympy.Expr}
     heads = [
-        st.tuples(st.just(name), st.lists(inner, min_size=head.least, max_size=min(head.most, 3)))
+        st.tuples(st.just(name), st.lists(inner, min_size=head.fewest_arguments, max_size=min(head.most_arguments, 3)))
         for name, head in numeric.items()
     ]
     cases = st.tuples(branches, inner).map(lambda bi: ["piecewise", *bi[0], [bi[1], ["true"]]])
@@ -81,7 +81,7 @@ def test_any_json_as_a_law(data):
 @settings(max_examples=400, deadline=None)
 def test_any_tree_as_an_expression(tree):
     try:
-        expression = from_tree(tree, SYMBOLS)
+        expression = expression_from_tree(tree, SYMBOLS)
     except LawError:
         return
     assert expression.free_symbols <= set(SYMBOLS.values())

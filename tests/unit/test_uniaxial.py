@@ -123,14 +123,14 @@ def test_a_heating_ramp_is_integrated() -> None:
 def test_a_burst_keeps_the_history_so_far() -> None:
     fast = {"A": 1e-9, "n": 4.0}
     run = ck.simulate(NORTON, Uniaxial(), fast, loading=constant_stress(100.0), times=[1.0, 2.0, 1e3])
-    assert run.status is Status.BURST
+    assert run.status is Status.RUPTURED
     assert run.end_time == pytest.approx((1 - np.exp(-4)) / (4 * 0.1), rel=1e-4)
     np.testing.assert_allclose(run.outputs["strain"], -np.log1p(-0.4 * run.times) / 4, rtol=1e-4)
     assert run.times.tolist() == [1.0, 2.0]
     assert run.reason == "creep strain reached the strain limit"
     assert (run.labels, run.rupture_time) == ({"ended": run.reason}, run.end_time)
     result = Uniaxial().predict(NORTON, fast, [history(loading=constant_stress(100.0), times=[1.0, 2.0, 1e3])])
-    assert result.status[0, 0] == Status.BURST
+    assert result.status[0, 0] == Status.RUPTURED
     assert np.isfinite(result.of(0)[:2]).all()
     assert np.isnan(result.of(0)[2]).all()
 

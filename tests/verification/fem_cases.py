@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from creepkit import kernels
-from creepkit.fem.body import body_of
+from creepkit.fem.body import finite_element_model
 from creepkit.fem.mesh import Mesh
-from creepkit.fem.record import Settings
+from creepkit.fem.record import SolverSettings
 from creepkit.fem.shape import discretize
-from creepkit.fem.simulation import Course, Simulation, simulate
-from creepkit.fem.strip import Strip, strip
+from creepkit.fem.simulation import LoadHistory, Simulation, simulate
+from creepkit.fem.strip import StripMesh, strip_mesh
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.language import CreepLaw
 from creepkit.laws.norton import NORTON
@@ -28,24 +28,24 @@ STILL = {"A": 1e-40, "n": 1.0}
 """Norton's law for a body that does not creep: at 1e5 MPa it would take 1e27 s to."""
 
 
-def block(radii, heights) -> Strip:
+def block(radii, heights) -> StripMesh:
     """A block of rectangles; radii, heights : (columns + 1,) and (layers + 1,) mm."""
     radii, heights = np.asarray(radii, float), np.asarray(heights, float)
     along = np.interp(np.arange(2 * radii.size - 1) / 2, np.arange(radii.size), radii)
     below, above = (np.stack([along, np.full(along.size, z)], axis=1) for z in heights[[0, -1]])
-    return strip(below, above, (heights - heights[0]) / np.ptp(heights))
+    return strip_mesh(below, above, (heights - heights[0]) / np.ptp(heights))
 
 
-def shell(inner: float, outer: float, columns: int, layers: int) -> Strip:
+def shell(inner: float, outer: float, columns: int, layers: int) -> StripMesh:
     """The upper half of a hollow sphere, from the axis to the equator; layers grow in proportion to the radius."""
     turn = np.linspace(np.pi / 2, 0, 2 * columns + 1)
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     circle[0, 0] = circle[-1, 1] = 0.0
     breaks = (inner * (outer / inner) ** np.linspace(0, 1, layers + 1) - inner) / (outer - inner)
-    return strip(inner * circle, outer * circle, np.clip(breaks, 0.0, 1.0))
+    return strip_mesh(inner * circle, outer * circle, np.clip(breaks, 0.0, 1.0))
 
 
-def mesh_of(body: Strip, *, r=(), z=(), pressed=(), top=()) -> Mesh:
+def mesh_of(body: StripMesh, *, r=(), z=(), pressed=(), top=()) -> Mesh:
     """A strip whose nodes `r` are held in radius and whose nodes `z` are held in height."""
     held = np.zeros(body.nodes.shape, bool)
     held[np.asarray(r, int), 0] = True
@@ -53,12 +53,12 @@ def mesh_of(body: Strip, *, r=(), z=(), pressed=(), top=()) -> Mesh:
     return Mesh(body.nodes, body.elements, held, pressed, top)
 
 
-def left_of(body: Strip) -> np.ndarray:
+def left_of(body: StripMesh) -> np.ndarray:
     """Sides of elements (layers, 3) along the first column line, the solid to their left."""
     return np.stack([body.first[2::2], body.first[1::2], body.first[:-2:2]], axis=1)
 
 
-def right_of(body: Strip) -> np.ndarray:
+def right_of(body: StripMesh) -> np.ndarray:
     """Sides of elements (layers, 3) along the last column line, the solid to their left."""
     return np.stack([body.last[:-2:2], body.last[1::2], body.last[2::2]], axis=1)
 
@@ -69,18 +69,18 @@ def lowered(law: CreepLaw) -> CompiledLaw:
     return kernels.lower(law, "numba")
 
 
-def course(pressure, end: float, modulus: float, poisson: float = 0.3, **more) -> Course:
+def course(pressure, end: float, modulus: float, poisson: float = 0.3, **more) -> LoadHistory:
     """A course at one temperature; pressure : a number or a Program, MPa."""
     pressure = pressure if isinstance(pressure, Program) else Program.constant(pressure)
-    return Course(pressure, Program.constant(293.15), Program.constant(modulus), end, poisson, **more)
+    return LoadHistory(pressure, Program.constant(293.15), Program.constant(modulus), end, poisson, **more)
 
 
-def run(mesh: Mesh, way: Course, law: CreepLaw = NORTON, values=STILL, like=None, keep=False, **settings) -> Simulation:
+def run(mesh: Mesh, way: LoadHistory, law: CreepLaw = NORTON, values=STILL, like=None, keep=False, **settings) -> Simulation:
     """Simulate without limits on deflection or strain, unless settings give them."""
     kernel = lowered(law)
-    theta = kernel.internal(values)[0]
-    settings = Settings(**{**FREE, **settings})
-    return simulate(kernel, theta, body_of(mesh), way, settings=settings, like=like, keep_points=keep)
+    theta = kernel.to_internal(values)[0]
+    settings = SolverSettings(**{**FREE, **settings})
+    return simulate(kernel, theta, finite_element_model(mesh), way, settings=settings, same_steps_as=like, keep_points=keep)
 
 
 def steady_velocity(mesh: Mesh, pressure, values, *, modulus: float, elastic: float, speed: float) -> np.ndarray:

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.export.fortran.creep import AbaqusCreep, CalculixCreep
+from creepkit.export.fortran.creep import AbaqusCreepSubroutine, CalculixCreepSubroutine
 from creepkit.language import CreepLaw, Param, State, mean_stress, parameters, states, strain, stress
-from creepkit.records import Program, Units, ValuedLaw
+from creepkit.records import Program, Units, LawWithValues
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
 from fortran_library import Routine
@@ -77,13 +77,13 @@ def routines(tmp_path_factory):
     folder = tmp_path_factory.mktemp("creep")
     made = {}
 
-    def routine(name, exporter=AbaqusCreep, **how):
+    def routine(name, exporter=AbaqusCreepSubroutine, **how):
         key = (name, exporter.name, *map(str, how.items()))
         if key not in made:
             law, values = CASES[name]
             place = folder / f"r{len(made)}"
             place.mkdir()
-            text = exporter().text(ValuedLaw(law, values, name="mine", **how))
+            text = exporter().text(LawWithValues(law, values, name="mine", **how))
             made[key] = Routine(text, place, f"mine{len(made)}")
         return made[key]
 
@@ -168,7 +168,7 @@ def test_a_state_that_feeds_its_own_growth_never_runs_backwards(folds, tmp_path)
         "growth", {"term": B * (omega + c)}, {B: RATE, c: POWER}, states={omega: State(0.0, B * (omega + c))}
     )
     routine, inner = (
-        Routine(AbaqusCreep().text(ValuedLaw(law, {"B": 1e-4, "c": 1e-3})), tmp_path, "growth"),
+        Routine(AbaqusCreepSubroutine().text(LawWithValues(law, {"B": 1e-4, "c": 1e-3})), tmp_path, "growth"),
         np.zeros(10),
     )
     found, _ = routine.creep(60.0, 0.0, folds / 1e-4, folds / 1e-4, states=inner)
@@ -200,7 +200,7 @@ def test_the_derivatives_are_those_of_the_update(name, creep, routines):
 
 def test_the_derivative_to_the_pressure(tmp_path):
     law = CreepLaw("mean", {"term": A * (stress + 0.5 * mean_stress) ** n}, {A: RATE, n: POWER})
-    text = AbaqusCreep().text(ValuedLaw(law, {"A": 1e-16, "n": 4.0}, units=Units("Pa", "h")))
+    text = AbaqusCreepSubroutine().text(LawWithValues(law, {"A": 1e-16, "n": 4.0}, units=Units("Pa", "h")))
     routine = Routine(text, tmp_path, "mean")
     found = [routine.creep(70e6, 0.0, 2.0, 2.0, pressure=p)[0] for p in (-30e6, -30e6 + 1e3, -30e6 - 1e3)]
     assert found[0][0] == pytest.approx(1e-16 * 85.0**4 * 7200.0, rel=1e-12)
@@ -216,7 +216,7 @@ def test_pascal_and_hours_give_the_same_strain(name, routines):
 
 def test_temperature_steps_agree_with_the_integrator(tmp_path):
     law, values = ck.law("norton").times(ck.arrhenius(T_ref=1000.0)), {"A": 1e-16, "n": 4.0, "Q": 3e5}
-    routine = Routine(AbaqusCreep().text(ValuedLaw(law, values)), tmp_path, "warm")
+    routine = Routine(AbaqusCreepSubroutine().text(LawWithValues(law, values)), tmp_path, "warm")
     ramp = (np.array([0.0, 2e4, 2.2e4, END]), np.array([1000.0, 1000.0, 1080.0, 1080.0]))
     exact = reference(law, values, temperature=Program(*ramp))
     errors = [abs(marched(routine, count, warm=ramp)[0] / exact - 1) for count in (150, 300, 600)]
@@ -262,7 +262,7 @@ def relaxed(routine, E, total, count):
 
 
 def test_calculix_is_given_the_stress_for_an_increment_where_elasticity_is_anisotropic(routines):
-    routine = routines("combined", CalculixCreep)
+    routine = routines("combined", CalculixCreepSubroutine)
     forward, _ = routine.creep(73.0, 0.01, 2e4, 4e3)
     back, q = routine.creep(0.0, 0.01, 2e4, 4e3, lend=3, wanted=forward[0])
     assert q == pytest.approx(73.0, rel=1e-9)
@@ -273,7 +273,7 @@ def test_calculix_is_given_the_stress_for_an_increment_where_elasticity_is_aniso
 def test_calculix_routines_keep_states_themselves_through_iterations_and_cutbacks(name, routines, tmp_path):
     """Against Abaqus' STATEV: an iteration at another stress and a step that fails must leave nothing behind."""
     law, values = CASES[name]
-    routine = Routine(CalculixCreep().text(ValuedLaw(law, values, name="mine")), tmp_path, "fresh")
+    routine = Routine(CalculixCreepSubroutine().text(LawWithValues(law, values, name="mine")), tmp_path, "fresh")
     inner, creep = np.zeros(10), 0.0
     for before, after in pairwise(np.linspace(0.0, 3e4, 11)):
         routine.creep(95.0, creep, before + 4 * (after - before), 4 * (after - before))  # cut back

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fem_cases import BENCHMARKS, course, run
 
-from creepkit.fem.simulation import Course, Simulation
+from creepkit.fem.simulation import LoadHistory, Simulation
 from creepkit.language import CreepLaw
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
@@ -19,7 +19,7 @@ from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import PressureJump, Program, Status
 from creepkit.specimens.dimple import DimpleGeometry
 from creepkit.specimens.observation import Observation
-from creepkit.specimens.top_profile import interpolation
+from creepkit.specimens.top_profile import surface_interpolation
 
 if not BENCHMARKS.is_dir():
     pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)
@@ -41,7 +41,7 @@ class Case(NamedTuple):
 
     law: CreepLaw
     values: dict[str, float]
-    course: Course
+    course: LoadHistory
 
 
 def true_case(name: str) -> Case:
@@ -77,7 +77,7 @@ def simulated(geometry: DimpleGeometry, case: Case, refinement: float, **setting
 
 def observed(radii, profiles, made: Simulation, times) -> dict[str, np.ndarray]:
     """Histories at `times` by the names of dimple_reference.json."""
-    points = made.at(profiles @ interpolation(radii, [0, 2, 4]).T, times)
+    points = made.at(profiles @ surface_interpolation(radii, [0, 2, 4]).T, times)
     fit = made.at(Observation().observe(radii, profiles), times)
     return dict(zip(("apex", "u_r2", "u_r4", "D_amp", "S_d", "S_p"), [*points.T, *fit.T], strict=True))
 
@@ -115,7 +115,7 @@ def flat_errors(name: str, refinement: float, **settings) -> tuple[float, float,
     radii, profiles, made = simulated(FILLET, flat_case(name), refinement, **settings)
     history = made.at(profiles[:, 0], np.array(FLAT["times_s"])) - case["apex"]
     wanted = {float(r): u for r, u in case["final_top_profile_uz"].items()}
-    profile = interpolation(radii, list(wanted)) @ profiles[-1] - list(wanted.values())
+    profile = surface_interpolation(radii, list(wanted)) @ profiles[-1] - list(wanted.values())
     largest = max(case["apex"])
     return profiles[1, 0] / case["u_elastic"] - 1, np.abs(history).max() / largest, np.abs(profile).max() / largest
 

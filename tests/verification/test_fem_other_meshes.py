@@ -14,7 +14,7 @@ from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import PressureJump, Program, Status
 from creepkit.specimens.dimple import DimpleGeometry
 from creepkit.specimens.observation import Observation
-from creepkit.specimens.top_profile import interpolation
+from creepkit.specimens.top_profile import surface_interpolation
 
 if not BENCHMARKS.is_dir():
     pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)
@@ -41,7 +41,7 @@ def deck(request):
     made = run(mesh, course(RAMP, 14400.0, 1e5), law, values, tolerance=1e-3, newton=1e-6)
     assert made.status == Status.COMPLETE
     radii, profiles, times = mesh.nodes[mesh.top, 0], made.displacements[:, mesh.top, 1], table["time_s"]
-    along = made.at(profiles @ interpolation(radii, RADII).T, times)
+    along = made.at(profiles @ surface_interpolation(radii, RADII).T, times)
     fit = made.at(Observation().observe(radii, profiles), times)
     return table, along, fit, made.at(made.mises, times).max(axis=1)
 

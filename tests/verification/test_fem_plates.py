@@ -9,7 +9,7 @@ import pytest
 from fem_cases import BENCHMARKS, block, course, mesh_of, run, steady_velocity
 
 from creepkit.fem.mesh import Mesh
-from creepkit.fem.strip import Strip
+from creepkit.fem.strip import StripMesh
 from creepkit.records import Program
 
 if not BENCHMARKS.is_dir():
@@ -22,7 +22,7 @@ SUPPORT = {"clamped": 1.0, "simply_supported": (5 + NU) / (1 + NU)}
 """Elastic deflection over that of a clamped plate, 3 p a^4 (1 - nu^2)/(16 E h^3) (Timoshenko and Woinowsky-Krieger)."""
 
 
-def plate(thickness: float, layers: int, clamped: bool, radii) -> tuple[Strip, Mesh]:
+def plate(thickness: float, layers: int, clamped: bool, radii) -> tuple[StripMesh, Mesh]:
     """A plate pressed from below; a simple support holds the middle of its edge."""
     body = block(radii, np.linspace(0.0, thickness, layers + 1))
     edge = {"r": body.last, "z": body.last} if clamped else {"z": body.last[layers : layers + 1]}

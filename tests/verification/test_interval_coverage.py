@@ -8,7 +8,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
 from steady import Steady, planted
 
-from creepkit.inverse.identification import Settings
+from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 from creepkit.kernels import lower
 from creepkit.language import arrhenius
@@ -25,7 +25,7 @@ def test_coverage_with_test_to_test_scatter_and_offsets():
     law = NORTON.times(arrhenius(T_ref=1073.15))
     truth = {"A": 1e-16, "n": 5.2, "Q": 350e3}
     conditions = [(s, T) for T in (1000.0, 1050.0, 1100.0) for s in (30.0, 50.0, 80.0)]
-    settings = Settings(starts=1, draws=8, frames=15)
+    settings = IdentificationSettings(starts=1, sobol_points=8, frames=15)
     covered = dict.fromkeys((*truth, "rate"), 0)
     at = {"stress": 50.0, "temperature": 1050.0}
     true_rate = float(lower(law, "numpy").rate(truth, **at))

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import creepkit
-from creepkit.kernels.exact import Exact
+from creepkit.kernels.exact import MultiprecisionLaw
 from creepkit.language import CreepLaw
-from creepkit.testing import sample
-from creepkit.testing.parity import Truth, worst
-from creepkit.testing.tables import TABLES
+from creepkit.testing import draw_samples
+from creepkit.testing.parity import MultiprecisionReference, largest_differences
+from creepkit.testing.tables import KERNEL_EVALUATORS
 
 SAMPLES = 1024
 SHIPPED = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine", "drifting-exponent", "combined")
@@ -30,22 +30,22 @@ def law_of(name: str) -> CreepLaw:
 
 
 @functools.cache
-def truth_of(name: str) -> Truth:
+def truth_of(name: str) -> MultiprecisionReference:
     """Exact rows at Sobol points, made once for all targets."""
     law = law_of(name)
-    return Truth(Exact(law), sample(law, SAMPLES, seed=7))
+    return MultiprecisionReference(MultiprecisionLaw(law), draw_samples(law, SAMPLES, seed=7))
 
 
-@pytest.mark.parametrize("target", TABLES)
+@pytest.mark.parametrize("target", KERNEL_EVALUATORS)
 @pytest.mark.parametrize("name", [*SHIPPED, "sum with temperature"])
 def test_a_kernel_is_exact(name: str, target: str) -> None:
     truth = truth_of(name)
 
     with np.errstate(over="ignore", invalid="ignore"):  # sinh^8 of 2000 is 1e6941: no float64, and judged in ln rate
-        values, derivatives = worst(truth, TABLES[target](law_of(name), truth.drawn))
+        values, derivatives = largest_differences(truth, KERNEL_EVALUATORS[target](law_of(name), truth.samples))
 
-    assert values.size <= VALUE, truth.at(values)
-    assert derivatives.size <= DERIVATIVE, truth.at(derivatives)
+    assert values.size <= VALUE, truth.location_text(values)
+    assert derivatives.size <= DERIVATIVE, truth.location_text(derivatives)
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -57,7 +57,7 @@ def test_enough_of_the_points_have_a_rate_that_float64_holds(name: str) -> None:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_points_fill_the_bounds(name: str) -> None:
-    drawn, law = truth_of(name).drawn, law_of(name)
+    drawn, law = truth_of(name).samples, law_of(name)
 
     low, high = np.array([[p.to_internal(b) for b in p.bounds] for p in law.params.values()]).T
     reached = (drawn.theta - low) / (high - low)

@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.stats import qmc
 
-from creepkit.integration import PointTest, Settings, integrate
+from creepkit.integration import PointTest, IntegrationSettings, integrate
 from creepkit.kernels import lower
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
@@ -23,7 +23,7 @@ from creepkit.records import Program
 
 ROOM = Program.constant(1000.0)
 GRID = np.concatenate([np.geomspace(1e-3, 1e-2, 8, endpoint=False), np.linspace(0.01, 1.0, 50)])
-TIGHT, DEFAULT = Settings(rtol=1e-9, smallest=1e-9), Settings()
+TIGHT, DEFAULT = IntegrationSettings(rtol=1e-9, smallest=1e-9), IntegrationSettings()
 
 
 def strain_of(law, theta, stress, times, settings, **kwargs):
@@ -207,7 +207,7 @@ class TestRelaxation:
 def test_nafems_uniaxial_cases():
     """NAFEMS R0027 (Becker and Hyde), A = 3.125e-14 in hours, n = 5: case 1A (steady), case 8A (e = A s^n t^0.5)."""
     hours = np.array([1.0, 10.0, 100.0, 200.0, 500.0, 1000.0])
-    settings = Settings(rtol=1e-9, strain_limit=100.0)
+    settings = IntegrationSettings(rtol=1e-9, strain_limit=100.0)
     steady = strain_of(NORTON, [np.log(3.125e-14), 5.0], 200.0, hours, settings)
     np.testing.assert_allclose(steady, [0.01, 0.1, 1.0, 2.0, 5.0, 10.0], rtol=1e-9)
     primary = strain_of(TIME_HARDENING, [np.log(0.5 * 3.125e-14), 5.0, -0.5], 200.0, hours, settings)
@@ -225,7 +225,7 @@ def test_sensitivities_are_the_derivatives_of_the_solution(loading):
             marks = end * np.array([0.0, 0.3, 0.3, 0.6, 0.7, 1.0])
             program = Program(marks, stress * np.array([1.0, 1.0, 1.15, 1.15, 0.8, 0.8]))
         test = PointTest(program, ROOM, end * GRID, constant_load=loading == "load")
-        result = integrate(kernel, theta, [test], settings=Settings(rtol=1e-8, strain_limit=10.0), jacobian=True)
+        result = integrate(kernel, theta, [test], settings=IntegrationSettings(rtol=1e-8, strain_limit=10.0), jacobian=True)
         if result.status[0, 0] != 0:
             continue  # differences mean nothing where a neighbour bursts
         reached = result.strain[0] < 0.3
@@ -245,6 +245,6 @@ def _difference(kernel, test, theta, p):
     nudged = np.repeat(theta[None], 4, axis=0)
     nudged[:, p] += shifts
     far_down, down, up, far_up = integrate(
-        kernel, nudged, [test], settings=Settings(rtol=1e-11, smallest=1e-9, strain_limit=20.0)
+        kernel, nudged, [test], settings=IntegrationSettings(rtol=1e-11, smallest=1e-9, strain_limit=20.0)
     ).strain
     return (8 * (up - down) - (far_up - far_down)) / (12 * step)

@@ -16,7 +16,7 @@ from creepkit.dataset import campaign
 from creepkit.dataset.campaign import generate
 from creepkit.dataset.columns import COLUMNS
 from creepkit.dataset.shards import Campaign
-from creepkit.dataset.worker import attempt
+from creepkit.dataset.worker import run_task
 
 ROWS = 16
 
@@ -42,7 +42,7 @@ class Here:
         self.asked.append(number)
 
     def answers(self, timeout):
-        found = [attempt(self.campaign, number) for number in self.asked]
+        found = [run_task(self.campaign, number) for number in self.asked]
         self.asked.clear()
         return found
 

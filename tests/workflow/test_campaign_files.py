@@ -71,7 +71,7 @@ def test_a_target_that_is_something_else_is_refused_before_any_work(tmp_path, wh
     with pytest.raises(DatasetError, match=r"a\.h5: not an HDF5 file"):
         run_here(to)
     assert to.read_text() == "precious"
-    store.write(whole, to)
+    store.write_dataset(whole, to)
     with pytest.raises(
         DatasetError, match=r"holds another data set \(there and here seed is 0 and 1\); choose another name"
     ):

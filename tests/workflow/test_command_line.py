@@ -66,7 +66,7 @@ def test_identifying_again_replaces_what_was_left(tmp_path):
 def test_saved_identification_reloads_and_predicts(identified):
     folder, _ = identified
     fit = ck.load(folder / "strain-hardening-arrhenius.json")
-    again = fit.on(ck.read_histories(CURVES), ck.specimen("uniaxial"))
+    again = fit.with_histories(ck.read_histories(CURVES), ck.specimen("uniaxial"))
     assert again.predict().values.shape[1] == len(CURVES)
 
 
@@ -191,7 +191,7 @@ def test_demo_of_bars_prints_the_truth_beside_the_answer(tmp_path):
 
 def test_a_cut_forgets_how_every_test_ended():
     """A stopped test that never came to the strain of the cut must not be the only one judged by its end."""
-    from creepkit.cli.identify import _cut
+    from creepkit.cli.identify import _truncate_at_strain
 
     times = np.linspace(3600, 36000, 5)
     tests = [
@@ -201,7 +201,7 @@ def test_a_cut_forgets_how_every_test_ended():
         )
         for name, end in (("far", 0.1), ("near", 0.03))
     ]  # fmt: skip
-    assert [(h.rupture_time, h.unruptured) for h in _cut(tests, 0.05)] == [(None, False)] * 2
+    assert [(h.rupture_time, h.unruptured) for h in _truncate_at_strain(tests, 0.05)] == [(None, False)] * 2
 
 
 def test_laws_are_ranked_by_likelihood_and_further_tests_are_told(tmp_path):

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import creepkit as ck
 from creepkit.cli.app import app
-from creepkit.cli.generate import changes_given, design_named
+from creepkit.cli.generate import design_changes, select_design
 from creepkit.errors import DatasetError
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "cluster"
@@ -91,12 +91,12 @@ def test_a_dry_run_simulates_nothing(tmp_path):
 
 
 def test_ranges_of_conditions_and_what_is_left_out_can_be_said():
-    ranges = changes_given(["temperature=1000:1150", "modulus=150e3"], None, None, False)
-    design = design_named("dorn", ck.specimen("bulge"), None, ranges, None)
+    ranges = design_changes(["temperature=1000:1150", "modulus=150e3"], None, None, False)
+    design = select_design("dorn", ck.specimen("bulge"), None, ranges, None)
     draws = design.draw(0, 64, seed=0)
     assert (draws.condition("modulus") == 150e3).all()
     assert 1000 <= draws.condition("temperature").min() < draws.condition("temperature").max() <= 1150
-    unscreened = design_named("norton", ck.specimen("bulge"), "paper", changes_given([], 6.0, "paper", True), None)
+    unscreened = select_design("norton", ck.specimen("bulge"), "paper", design_changes([], 6.0, "paper", True), None)
     assert not unscreened.screened
     assert unscreened.grid.end == 6 * 3600
 

@@ -70,7 +70,7 @@ def test_rupture_times_of_conditions_that_the_fit_did_not_see():
     by_name = dict(zip(held.names, held.predicted / held.measured, strict=True))
     np.testing.assert_allclose(sorted(held.measured / 3600), sorted(measured), rtol=1e-12)
     assert all(0.5 < ratio < 2 for ratio in by_name.values())
-    assert all(m.rupture.predicted > m.rupture.measured for m in fit.misfits if m.rupture.stopped)
+    assert all(m.rupture.predicted > m.rupture.measured for m in fit.tests if m.rupture.censored)
 
 
 def test_times_to_one_percent_are_within_a_factor_of_two(answer):

@@ -24,31 +24,31 @@ UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 """{unit of time: seconds}."""
 
 
-def convert(values: Mapping[str, float], given: str, wanted: str) -> Values:
+def convert(values: Mapping[str, float], source: str, target: str) -> Values:
     """Return {A, n, m} in the notation `wanted`, from values in the notation `given`; LawError where there are none.
 
     >>> convert({"A": 6e-15, "n": 4.0, "m": 0.5}, "norton-bailey-time", "norton-bailey-rate")
     {'A': 3e-15, 'n': 4.0, 'm': -0.5}
     """
-    A, n, m = _checked(values, given)
-    to_rate, _ = _notation(given)
-    _, from_rate = _notation(wanted)
+    A, n, m = _check_values(values, source)
+    to_rate, _ = _notation(source)
+    _, from_rate = _notation(target)
     rate = to_rate(A, n, m)
     if not rate[2] > -1:
-        raise LawError(f"{given}: m = {m:g} is a strain that does not start from zero; {_ALLOWED[given]}")
-    return _expressible(*from_rate(*_expressible(*rate, given).values()), wanted)
+        raise LawError(f"{source}: m = {m:g} is a strain that does not start from zero; {_ALLOWED[source]}")
+    return _values_in_range(*from_rate(*_values_in_range(*rate, source).values()), target)
 
 
-def per_second(values: Mapping[str, float], given: str, unit: str) -> Values:
+def per_second(values: Mapping[str, float], notation: str, unit: str) -> Values:
     """Return the values of the notation `given` for time in s, from values for time in `unit`: "h", "min" or "d"."""
-    A, n, m = _checked(values, given)
+    A, n, m = _check_values(values, notation)
     if unit not in UNITS:
         raise LawError(f"no unit of time '{unit}': {nearest(unit, UNITS)}")
     powers = {"norton-bailey-time": m, "strain-hardening": 1.0}
-    return _expressible(A * UNITS[unit] ** -powers.get(given, m + 1), n, m, given)
+    return _values_in_range(A * UNITS[unit] ** -powers.get(notation, m + 1), n, m, notation)
 
 
-def _expressible(A: float, n: float, m: float, notation: str) -> Values:
+def _values_in_range(A: float, n: float, m: float, notation: str) -> Values:
     """The values, unless a strain or time exponent far from steady creep has carried A out of double precision."""
     if not 1e-300 < A < 1e300:
         raise LawError(
@@ -111,11 +111,11 @@ def _notation(name: str) -> tuple[_Rule, _Rule]:
     return _NOTATIONS[name]
 
 
-def _checked(values: Mapping[str, float], given: str) -> tuple[float, float, float]:
-    _notation(given)
+def _check_values(values: Mapping[str, float], notation: str) -> tuple[float, float, float]:
+    _notation(notation)
     if {*values} != {"A", "n", "m"}:
-        raise LawError(f"{given}: the values are those of {', '.join(sorted(values)) or 'nothing'}; give A, n and m")
+        raise LawError(f"{notation}: the values are those of {', '.join(sorted(values)) or 'nothing'}; give A, n and m")
     A, n, m = (float(values[name]) for name in ("A", "n", "m"))
     if not (A > 0 and isfinite(A) and isfinite(n) and isfinite(m)):
-        raise LawError(f"{given}: A = {A:g}, n = {n:g}, m = {m:g}; A must be positive and all of them finite")
+        raise LawError(f"{notation}: A = {A:g}, n = {n:g}, m = {m:g}; A must be positive and all of them finite")
     return A, n, m

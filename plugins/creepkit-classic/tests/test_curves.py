@@ -108,7 +108,7 @@ def test_mpc_omega(c: float) -> None:
     )
 
     np.testing.assert_allclose(run.outputs["strain"], -np.log1p(-omega * 1e-9 * times) / omega, rtol=1e-6)
-    assert run.status is Status.BURST
+    assert run.status is Status.RUPTURED
     assert run.end_time * omega * 1e-9 == pytest.approx(1 - np.exp(-omega), rel=1e-7)
 
 

@@ -27,7 +27,7 @@ A, s_s, lambda_, M, s_t, chi, phi, alpha, beta = parameters("A s_s lambda_ M s_t
 
 # A rupture stress below zero has no real power: compression does not damage.
 rupture_stress = sympy.Max(alpha * principal_stress + 3 * beta * mean_stress + (1 - alpha - beta) * stress, 0)
-growth = M * (1 - sympy.exp(-phi)) / phi * sympy.sinh(rupture_stress / s_t) ** chi * sympy.exp(phi * w)
+damage_rate = M * (1 - sympy.exp(-phi)) / phi * sympy.sinh(rupture_stress / s_t) ** chi * sympy.exp(phi * w)
 
 SINH_DAMAGE = CreepLaw(
     name="sinh-damage",
@@ -44,7 +44,7 @@ SINH_DAMAGE = CreepLaw(
         alpha: Param("share of the largest principal stress in the rupture stress", bounds=(0, 1), off=0.0),
         beta: Param("share of the hydrostatic stress in the rupture stress", bounds=(0, 1), off=0.0),
     },
-    states={w: State(0.0, growth, "damage", limit=1.0)},
+    states={w: State(0.0, damage_rate, "damage", limit=1.0)},
     constraints=(alpha + beta <= 1,),
     references=(
         "Stewart (2013), A Hybrid Constitutive Model for Creep, Fatigue, and Creep-Fatigue Damage, UCF dissertation",

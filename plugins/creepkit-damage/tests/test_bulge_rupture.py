@@ -27,7 +27,7 @@ def test_rupture_ends_the_test_with_its_reason(name: str) -> None:
     sound = law.fix(**{"M" if name == "sinh-damage" else "B": 0})
     steady = ck.simulate(sound, "bulge", {name: values[name] for name in sound.names}, **PRESSED)
 
-    assert run.status is Status.BURST
+    assert run.status is Status.RUPTURED
     assert "internal variable" in run.reason
     assert "limit" in run.reason
     assert run.times[-1] <= run.end_time < steady.end_time

@@ -73,7 +73,7 @@ def test_rupture_comes_when_the_damage_reaches_its_limit(name: str) -> None:
     times = np.linspace(0.05, 1.2, 23) * LIFE
     run = ck.simulate(name, BAR, VALUES[name], loading=ck.constant_stress(STRESS, "stress"), times=times)
 
-    assert run.status is Status.BURST
+    assert run.status is Status.RUPTURED
     assert run.end_time == pytest.approx(LIFE, rel=1e-6)
     assert (run.times == times[times < LIFE]).all()
 
@@ -86,7 +86,7 @@ def test_rupture_is_met_however_steep_the_damage(phi: float) -> None:
         "kachanov-rabotnov", BAR, values, loading=ck.constant_stress(STRESS, "stress"), times=[1.0, 2 * LIFE]
     )
 
-    assert run.status is Status.BURST
+    assert run.status is Status.RUPTURED
     assert run.end_time == pytest.approx(LIFE, rel=1e-6)
 
 

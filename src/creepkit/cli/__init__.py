@@ -6,7 +6,7 @@ from __future__ import annotations
 def main() -> None:
     """Run the command line; the entry point of the script `creepkit`."""
     from creepkit.cli.app import app
-    from creepkit.cli.compiled import share_compiled_code
+    from creepkit.cli.compiled import set_numba_cache
 
-    share_compiled_code()
+    set_numba_cache()
     app()

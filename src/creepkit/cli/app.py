@@ -34,18 +34,18 @@ from creepkit.cli import (
 from creepkit.errors import CreepkitError, PluginError
 
 
-class Door(TyperGroup):
+class CommandGroup(TyperGroup):
     """The group of all commands; it asks plugins for theirs when a command is not one of creepkit's own.
 
     Only then: asking imports every plugin, and `creepkit --help` has no time for that.
     """
 
-    _asked = False
+    _plugins_loaded = False
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an error of ours becomes one line on stderr and exit code 1."""
         try:
-            _load_files(ctx.params["plugin"])
+            _load_plugin_files(ctx.params["plugin"])
             return super().invoke(ctx)
         except (CreepkitError, OSError) as error:
             if ctx.params["debug"]:
@@ -55,14 +55,14 @@ class Door(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of this name, creepkit's own or a plugin's."""
-        if cmd_name not in self.commands and not self._asked:
-            self._asked = True
-            self.commands.update(_plugin_commands(taken=set(self.commands)))
+        if cmd_name not in self.commands and not self._plugins_loaded:
+            self._plugins_loaded = True
+            self.commands.update(_plugin_commands(own_names=set(self.commands)))
         return super().get_command(ctx, cmd_name)
 
 
 app = typer.Typer(
-    cls=Door,
+    cls=CommandGroup,
     name="creepkit",
     add_completion=False,
     rich_markup_mode=None,  # plain help and errors: half the start-up time, and an error stays one line
@@ -94,8 +94,8 @@ for name, command in COMMANDS.items():
     app.command(name)(command)
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(requested: bool) -> None:
+    if requested:
         import creepkit
 
         typer.echo(f"creepkit {creepkit.__version__}")
@@ -103,7 +103,7 @@ def _print_version(wanted: bool) -> None:
 
 
 @app.callback()
-def options(
+def global_options(
     plugin: Annotated[
         list[Path] | None,
         typer.Option(metavar="FILE", help="Load this plugin file as well; may be given several times."),
@@ -119,21 +119,21 @@ def options(
     """
 
 
-def _load_files(files: list[Path] | None) -> None:
+def _load_plugin_files(files: list[Path] | None) -> None:
     if files:
         from creepkit import registry
 
         for file in files:
-            registry.default().load_file(file)
+            registry.default_registry().load_file(file)
 
 
-def _plugin_commands(taken: set[str]) -> dict[str, Any]:
+def _plugin_commands(own_names: set[str]) -> dict[str, Any]:
     """Return {name: command} of what plugins add; PluginError when a name is one of creepkit's own."""
     from creepkit import registry
 
     extra = typer.Typer()
-    registry.default().add_commands(extra)
+    registry.default_registry().add_commands(extra)
     added = typer.main.get_group(extra).commands
-    for name in sorted(taken & set(added)):
+    for name in sorted(own_names & set(added)):
         raise PluginError(f"a plugin adds the command '{name}', which creepkit has already; see 'creepkit plugins'")
     return dict(added)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from creepkit.cli.loads import numbers
+from creepkit.cli.loads import parse_numbers
 
 
 def command(
@@ -26,17 +26,17 @@ def command(
     from creepkit.errors import SolveError
     from creepkit.specimens.bulge import Bulge
     from creepkit.specimens.reduced_files import write_tables
-    from creepkit.specimens.reduced_picture import described
-    from creepkit.specimens.reduced_picture import picture as draw
-    from creepkit.specimens.reduced_tables import tables
+    from creepkit.specimens.reduced_picture import describe_tables
+    from creepkit.specimens.reduced_picture import plot_tables as draw
+    from creepkit.specimens.reduced_tables import build_tables
 
-    body = study.specimen(specimen)
-    if not isinstance(body, Bulge):
+    specimen_record = study.specimen(specimen)
+    if not isinstance(specimen_record, Bulge):
         raise SolveError(f"--specimen {specimen}: only a bulge has a one-degree-of-freedom model; leave it out")
-    body = body.replace(**numbers(geometry or [], "--geometry", "cavity_radius=6"))
-    found = tables(body, body.geometry, body.observation)
-    typer.echo(described(found))
+    specimen_record = specimen_record.replace(**parse_numbers(geometry or [], "--geometry", "cavity_radius=6"))
+    model_tables = build_tables(specimen_record, specimen_record.geometry, specimen_record.observation)
+    typer.echo(describe_tables(model_tables))
     if picture is not None:
-        draw(found, picture)
+        draw(model_tables, picture)
         typer.echo(f"wrote {picture}", err=True)
-    typer.echo(f"wrote {write_tables(found, to)}", err=True)
+    typer.echo(f"wrote {write_tables(model_tables, to)}", err=True)

@@ -18,13 +18,13 @@ def command(
     from creepkit.testing import check_law
 
     laws = [law for target in targets for law in _laws_of(target)]
-    failed = 0
+    failure_count = 0
     for law in laws:
         report = check_law(law)
         typer.echo(str(report))
-        failed += not report.ok
-    if failed:
-        typer.echo(f"creepkit: {failed} of {len(laws)} laws failed the check", err=True)
+        failure_count += not report.passed
+    if failure_count:
+        typer.echo(f"creepkit: {failure_count} of {len(laws)} laws failed the check", err=True)
         raise typer.Exit(1)
 
 
@@ -34,9 +34,9 @@ def _laws_of(target: str) -> list[CreepLaw]:
     from creepkit.errors import PluginError
 
     if not (target.endswith(".py") or Path(target).is_file()):
-        return [registry.default().law(target)]
-    plugin = registry.default().load_file(target)
-    laws = list(plugin.offers.get("law", {}).values())
+        return [registry.default_registry().law(target)]
+    plugin = registry.default_registry().load_file(target)
+    laws = list(plugin.contributions.get("law", {}).values())
     if not laws:
         raise PluginError(f"{plugin.provenance} offers no law; return one from creepkit_laws")
     return laws

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from creepkit.inverse.search.landscape import Search
-    from creepkit.inverse.sparsity.penalties import Penalty, Subsets
+    from creepkit.inverse.search.landscape import GlobalSearch
+    from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
 
 SEARCHES = ("multi-start", "swarm", "cma-es")
 
 
-def search_of(name: str) -> Search | None:
+def search_named(name: str) -> GlobalSearch | None:
     """The search of this name; None for the default."""
     from creepkit.errors import FitError
     from creepkit.inverse.search.evolution import CmaEs
@@ -24,14 +24,14 @@ def search_of(name: str) -> Search | None:
     return {"multi-start": None, "swarm": ParticleSwarm(), "cma-es": CmaEs()}[name]
 
 
-def penalty_of(name: str | None) -> Penalty | Subsets | None:
+def penalty_named(name: str | None) -> ContributionPenalty | Subsets | None:
     """The penalty of this name, its strength chosen automatically; None for none."""
     from creepkit.errors import FitError
     from creepkit.inverse.sparsity.penalties import L2, GroupL2, Sqrt, Subsets
 
-    known: dict[str, Callable[[], Penalty | Subsets]] = {
+    penalties: dict[str, Callable[[], ContributionPenalty | Subsets]] = {
         "l2": L2, "group-l2": GroupL2, "sqrt": Sqrt, "subsets": Subsets,
     }  # fmt: skip
-    if name is not None and name not in known:
-        raise FitError(f"--penalty {name} is not known; allowed are {', '.join(known)}")
-    return None if name is None else known[name]()
+    if name is not None and name not in penalties:
+        raise FitError(f"--penalty {name} is not known; allowed are {', '.join(penalties)}")
+    return None if name is None else penalties[name]()

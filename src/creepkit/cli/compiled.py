@@ -12,34 +12,34 @@ import zlib
 from pathlib import Path
 
 _SOURCES = Path(__file__).parents[1]
-_COMPILED = ("integration/*.py", "kernels/*.py", "fem/*.py", "specimens/gaussian_*.py", "specimens/reduced_*.py")
-_STATES_KEPT = 3
+_COMPILED_SOURCES = ("integration/*.py", "kernels/*.py", "fem/*.py", "specimens/gaussian_*.py", "specimens/reduced_*.py")
+_KEPT_CACHES = 3
 
 
-def share_compiled_code() -> None:
+def set_numba_cache() -> None:
     """Let numba keep its code in that folder unless NUMBA_CACHE_DIR is set; numba must not be imported yet."""
     if "NUMBA_CACHE_DIR" not in os.environ:
-        folder = compiled_folder()
+        folder = numba_cache_folder()
         os.environ["NUMBA_CACHE_DIR"] = str(folder)
-        _forget_old(folder)
+        _remove_old_caches(folder)
 
 
-def compiled_folder() -> Path:
+def numba_cache_folder() -> Path:
     """The folder for these sources, in CREEPKIT_CACHE or the user's cache folder."""
-    total = 0
-    for pattern in _COMPILED:
+    checksum = 0
+    for pattern in _COMPILED_SOURCES:
         for path in sorted(_SOURCES.glob(pattern)):
-            total = zlib.crc32(path.read_bytes(), total)
-    chosen = os.environ.get("CREEPKIT_CACHE")
+            checksum = zlib.crc32(path.read_bytes(), checksum)
+    configured = os.environ.get("CREEPKIT_CACHE")
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "creepkit"
-    return Path(chosen or cache) / "compiled" / f"{total:08x}"
+    return Path(configured or cache) / "compiled" / f"{checksum:08x}"
 
 
-def _forget_old(folder: Path) -> None:
+def _remove_old_caches(folder: Path) -> None:
     """Remove what the oldest states of the sources have left; another process may be at it too."""
     if folder.is_dir():
         os.utime(folder)
         return
-    others = sorted(folder.parent.glob("*"), key=lambda path: path.stat().st_mtime, reverse=True)
-    for old in others[_STATES_KEPT:]:
+    other_folders = sorted(folder.parent.glob("*"), key=lambda path: path.stat().st_mtime, reverse=True)
+    for old in other_folders[_KEPT_CACHES:]:
         shutil.rmtree(old, ignore_errors=True)

@@ -28,39 +28,39 @@ def command(
 
     from creepkit import study
 
-    found, histories = study.load(fit), study.read_histories(tests)
+    identification, histories = study.load(fit), study.read_histories(tests)
     if surrogate is not None:
-        found = replace(found, using=study.surrogate(surrogate))
-    told = study.confirm(found, histories)
+        identification = replace(identification, predictor=study.surrogate(surrogate))
+    confirmation = study.confirm(identification, histories)
     if as_json:
-        print_json({"holds": told.holds, "verdict": told.verdict, **_finite(asdict(told))})
+        print_json({"holds": confirmation.confirmed, "verdict": confirmation.verdict, **_json_value(asdict(confirmation))})
         return
-    print_table(f"{told.law} by {told.using}", COLUMNS, rows_of(told))
-    typer.echo(told.verdict)
+    print_table(f"{confirmation.law} by {confirmation.predictor_name}", CONFIRMATION_COLUMNS, confirmation_rows(confirmation))
+    typer.echo(confirmation.verdict)
 
 
-COLUMNS = ("test", "output", "chi-square", "of the fit", "rms", "apart, noise")
+CONFIRMATION_COLUMNS = ("test", "output", "chi-square", "of the fit", "rms", "apart, noise")
 
 
-def rows_of(told: Confirmation) -> list[tuple[str, ...]]:
+def confirmation_rows(confirmation: Confirmation) -> list[tuple[str, ...]]:
     """One row an output of a test."""
-    return [_row(test.name, one) for test in told.tests for one in test.outputs]
+    return [_row(test.name, comparison) for test in confirmation.tests for comparison in test.outputs]
 
 
-def _row(test: str, one: ConfirmedOutput) -> tuple[str, ...]:
-    own = "" if one.fitted is None else _digits(one.fitted.chi_square)
-    rms = _digits(math.sqrt(one.simulated.mse))
-    return test, one.output, _digits(one.simulated.chi_square), own, rms, _digits(one.difference)
+def _row(test: str, comparison: ConfirmedOutput) -> tuple[str, ...]:
+    fit_chi_square = "" if comparison.fit_errors is None else _number_text(comparison.fit_errors.chi_square)
+    rms = _number_text(math.sqrt(comparison.simulation_errors.mean_squared_error))
+    return test, comparison.output, _number_text(comparison.simulation_errors.chi_square), fit_chi_square, rms, _number_text(comparison.rms_difference)
 
 
-def _digits(number: float) -> str:
+def _number_text(number: float) -> str:
     return "" if math.isnan(number) else f"{number:.3g}"
 
 
-def _finite(value: Any) -> Any:
+def _json_value(value: Any) -> Any:
     """The same with null for what JSON cannot hold."""
     if isinstance(value, dict):
-        return {name: _finite(one) for name, one in value.items()}
+        return {name: _json_value(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_finite(one) for one in value]
+        return [_json_value(one) for one in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -28,7 +28,7 @@ def command(
     else:
         typer.echo(str(data))
     if plots is not None:
-        from creepkit.dataset.plotting import draw
+        from creepkit.dataset.plotting import write_dataset_figures
 
-        for path in draw(data, plots, seed):
+        for path in write_dataset_figures(data, plots, seed):
             typer.echo(f"wrote {path}", err=as_json)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.identified import slug, tell, write
-from creepkit.cli.identify import ranked
+from creepkit.cli.identified import file_stem, print_ranking, write_ranking
+from creepkit.cli.identify import rank_laws
 from creepkit.cli.printing import print_table
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ PLANTED = Path(__file__).parent / "planted"
 """Nine creep curves of bars, and the truth behind them."""
 PLANTED_BULGE = Path(__file__).parent / "planted_bulge"
 """A bulge test of one dimple, and the truth behind it."""
-LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
+UNIAXIAL_LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
 BULGE_LAWS = ("norton", "strain-hardening", "time-hardening")
 
 
@@ -38,57 +38,57 @@ def command(
     folder = PLANTED if uniaxial else PLANTED_BULGE
     truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
     histories = study.read_histories(sorted(folder.glob("*.csv")))
-    ranking = _of_bars(histories) if uniaxial else _of_a_dimple(histories)
-    written = write(ranking, to)
+    ranking = _rank_uniaxial_laws(histories) if uniaxial else _rank_bulge_laws(histories)
+    written_files = write_ranking(ranking, to)
     if not uniaxial:
-        written.append(_section(ranking.best, histories[0], to))
-    tell(ranking, written, histories)
-    _beside(truth, ranking.best)
+        written_files.append(_plot_section(ranking.best, histories[0], to))
+    print_ranking(ranking, written_files, histories)
+    _print_truth(truth, ranking.best)
 
 
-def prepare() -> None:
+def compile_kernels() -> None:
     """Compile what the demo needs and keep it on disk, as part of setting up."""
     from creepkit import study
-    from creepkit.inverse.together import screening_of
+    from creepkit.inverse.together import reduced_order_model_of
 
     (test,) = study.read_histories(sorted(PLANTED_BULGE.glob("*.csv")))
-    short = test.replace(times=test.times[:3], outputs={name: values[:3] for name, values in test.outputs.items()})
+    shortened_test = test.replace(times=test.times[:3], outputs={name: values[:3] for name, values in test.outputs.items()})
     law = study.law(BULGE_LAWS[0])
     values = {name: param.center for name, param in law.table.items()}
-    dimple = study.specimen("bulge")
-    dimple.predict(law, values, [short], jacobian=True)
-    stand_in = screening_of(dimple)
-    assert stand_in is not None
-    stand_in.predict(law, values, [short])  # a fit to a bulge test asks it where to begin
+    bulge = study.specimen("bulge")
+    bulge.predict(law, values, [shortened_test], jacobian=True)
+    reduced_model = reduced_order_model_of(bulge)
+    assert reduced_model is not None
+    reduced_model.predict(law, values, [shortened_test])  # a fit to a bulge test asks it where to begin
 
 
-def _of_bars(histories: list[History]) -> Ranking:
+def _rank_uniaxial_laws(histories: list[History]) -> Ranking:
     from creepkit import study
     from creepkit.inverse.warmth import with_arrhenius
 
     typer.echo(f"{len(histories)} creep curves made by this package, with noise, from a law that is now forgotten:")
     for history in histories:
         typer.echo(f"  {history.condition:16} {history.times.size} frames to {history.times[-1] / 3600:.0f} h")
-    laws = [with_arrhenius(study.law(name), histories) for name in LAWS]
-    return ranked(laws, histories, starts=8, seed=0, loss="linear")
+    laws = [with_arrhenius(study.law(name), histories) for name in UNIAXIAL_LAWS]
+    return rank_laws(laws, histories, starts=8, seed=0, loss="linear")
 
 
-def _of_a_dimple(histories: list[History]) -> Ranking:
+def _rank_bulge_laws(histories: list[History]) -> Ranking:
     from creepkit import study
     from creepkit.records import Nuisance
 
     (test,) = histories
-    levels = dict.fromkeys(f"{value:g}" for value in test.loading.program().values if value > 0)
+    pressures = dict.fromkeys(f"{value:g}" for value in test.loading.program().values if value > 0)
     typer.echo(
         "a bulge test made by this package, with the noise of cameras, from a law that is now forgotten:\n"
-        f"  {' then '.join(levels)} MPa, {test.times.size} frames to {test.times[-1] / 3600:.0f} h, top raised by "
+        f"  {' then '.join(pressures)} MPa, {test.times.size} frames to {test.times[-1] / 3600:.0f} h, top raised by "
         f"{test.outputs['amplitude'][-1]:.2f} mm; every candidate is simulated by finite elements"
     )
     laws = [study.law(name) for name in BULGE_LAWS]
-    return ranked(laws, histories, nuisances=[Nuisance("offset")], starts=1, seed=0, loss="linear")
+    return rank_laws(laws, histories, nuisances=[Nuisance("offset")], starts=1, seed=0, loss="linear")
 
 
-def _section(fit: Identification, test: History, folder: Path) -> Path:
+def _plot_section(fit: Identification, test: History, folder: Path) -> Path:
     """Draw the section of the dimple at the end of the test, as the identified law has it."""
     from creepkit import study
 
@@ -96,21 +96,21 @@ def _section(fit: Identification, test: History, folder: Path) -> Path:
         fit.law, "bulge", fit.values, loading=test.loading, times=test.times, temperature=test.temperature,
         elastic=test.elastic, name=f"{test.name}, {fit.law.name} as identified",
     )  # fmt: skip
-    path = folder / f"{slug(fit.law.name)}-section.png"
+    path = folder / f"{file_stem(fit.law.name)}-section.png"
     run.section(path=path)  # type: ignore[attr-defined]
     return path
 
 
-def _beside(truth: dict[str, Any], fit: Identification) -> None:
+def _print_truth(truth: dict[str, Any], fit: Identification) -> None:
     """The planted values beside the identified ones."""
-    right = fit.law.name.startswith(truth["law"])
+    law_is_correct = fit.law.name.startswith(truth["law"])
     rows = []
-    for e in fit.estimates if right else ():
+    for e in fit.estimates if law_is_correct else ():
         planted = truth["values"][e.name]
         inside = "yes" if e.low <= planted <= e.high else "no"
         rows.append((e.name, f"{planted:.4g}", f"{e.value:.4g}", f"{e.low:.4g} to {e.high:.4g}", inside))
     if "rate_scatter" in truth:
-        scatter = f"{100 * truth['rate_scatter']:.0f} %", f"{100 * fit.scatter.rate:.0f} %"
+        scatter = f"{100 * truth['rate_scatter']:.0f} %", f"{100 * fit.noise_model.rate:.0f} %"
         rows.append(("rate between tests", *scatter, "", ""))
     typer.echo("")
     print_table(f"the truth: {truth['law']}", ("parameter", "planted", "identified", "95 % interval", "inside"), rows)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from creepkit.cli.printing import print_json
-from creepkit.cli.progress import Progress
+from creepkit.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,114 +57,114 @@ def command(
     from creepkit.cli.identify import check_folder
 
     check_folder(to)
-    forms, odds = forms_of(form), prior_of(prior)
+    forms, prior_odds = parse_forms(form), parse_prior_odds(prior)
     if all(name.endswith(".json") for name in files):
-        trend = _from_identifications(files, forms, odds)
+        temperature_law = _discover_from_identifications(files, forms, prior_odds)
     else:
-        trend = _from_tests(
-            files, reader, law, through, forms, odds, nuisance, within=within, starts=starts, seed=seed, moduli=moduli
+        temperature_law = _discover_from_tests(
+            files, reader, law, through, forms, prior_odds, nuisance, within=within, starts=starts, seed=seed, moduli=moduli
         )
-    written = write(trend, to)
+    written = write_temperature_law(temperature_law, to)
     if as_json:
-        print_json(_answer(trend, written))
+        print_json(_json_result(temperature_law, written))
         return
-    typer.echo(str(trend))
+    typer.echo(str(temperature_law))
     for path in written:
         typer.echo(f"wrote {path}")
 
 
-def forms_of(texts: Sequence[str] | None) -> dict[str, list[str]] | None:
+def parse_forms(texts: Sequence[str] | None) -> dict[str, list[str]] | None:
     """{parameter: names of forms}, from n=constant,linear."""
     from creepkit.errors import FitError
 
-    found = {}
+    forms_by_parameter = {}
     for text in texts or ():
-        name, _, rest = text.partition("=")
-        if not rest:
+        name, _, names = text.partition("=")
+        if not names:
             raise FitError(f"--form {text} is not known; write n=constant,linear")
-        found[name.strip()] = [one.strip() for one in rest.split(",")]
-    return found or None
+        forms_by_parameter[name.strip()] = [form_name.strip() for form_name in names.split(",")]
+    return forms_by_parameter or None
 
 
-def prior_of(texts: Sequence[str] | None) -> dict[str, dict[str, float]]:
+def parse_prior_odds(texts: Sequence[str] | None) -> dict[str, dict[str, float]]:
     """{parameter: {form: odds}}, from A:arrhenius=10."""
     from creepkit.errors import FitError
 
-    found: dict[str, dict[str, float]] = {}
+    odds_by_parameter: dict[str, dict[str, float]] = {}
     for text in texts or ():
-        place, _, odds = text.partition("=")
-        name, _, form = place.partition(":")
+        target, _, odds = text.partition("=")
+        name, _, form = target.partition(":")
         try:
-            found.setdefault(name.strip(), {})[form.strip()] = float(odds)
+            odds_by_parameter.setdefault(name.strip(), {})[form.strip()] = float(odds)
         except ValueError:
             raise FitError(f"--prior {text} is not known; write A:arrhenius=10") from None
-    return found
+    return odds_by_parameter
 
 
-def _from_identifications(files: Sequence[str], forms: Any, prior: Any) -> TemperatureLaw:
+def _discover_from_identifications(files: Sequence[str], forms: Any, prior: Any) -> TemperatureLaw:
     from creepkit import study
     from creepkit.discovery.discover import discover
 
     fits: list[Identification] = [study.load(Path(name)) for name in files]
-    with Progress() as progress:
+    with ProgressBar() as progress:
         return discover(fits, forms=forms, prior=prior, progress=progress.tick)
 
 
-def _from_tests(
+def _discover_from_tests(
     files: Sequence[str], reader: str | None, law: str, through: str | None, forms: Any, prior: Any,
     nuisance: Sequence[str] | None, *, within: float, starts: int, seed: int, moduli: bool,
 ) -> TemperatureLaw:  # fmt: skip
     from creepkit import study
-    from creepkit.cli.identify import nuisances_of
+    from creepkit.cli.identify import parse_nuisances
     from creepkit.discovery.temperature_study import temperature_study
     from creepkit.errors import FitError
-    from creepkit.inverse.settings import Settings
-    from creepkit.study.nouns import specimens_of
+    from creepkit.inverse.settings import IdentificationSettings
+    from creepkit.study.nouns import specimens_of_histories
 
     tests = study.read_histories(list(files), reader)
-    using = study.surrogate(through) if through else specimens_of(tests)
+    using = study.surrogate(through) if through else specimens_of_histories(tests)
     if isinstance(using, dict):
         raise FitError(f"the tests are of several specimens, {', '.join(using)}; discover() takes those of one")
-    nuisances = nuisances_of(nuisance)
-    settings = Settings(starts=starts, seed=seed)
+    nuisances = parse_nuisances(nuisance)
+    settings = IdentificationSettings(starts=starts, seed=seed)
     if nuisances is not None:
-        settings = Settings(starts=starts, seed=seed, nuisances=tuple(nuisances))
-    with Progress() as progress:
-        found = temperature_study(
+        settings = IdentificationSettings(starts=starts, seed=seed, nuisances=tuple(nuisances))
+    with ProgressBar() as progress:
+        result = temperature_study(
             study.law(law), tests, using, moduli=moduli, within=within, forms=forms, prior=prior, settings=settings,
             progress=progress.tick,
         )  # fmt: skip
-    for note in found.notes:
+    for note in result.notes:
         typer.echo(f"note: {note}", err=True)
-    if found.trend is None:
-        raise FitError(found.notes[-1])
-    return found.trend
+    if result.temperature_law is None:
+        raise FitError(result.notes[-1])
+    return result.temperature_law
 
 
-def write(trend: TemperatureLaw, folder: Path) -> list[Path]:
+def write_temperature_law(temperature_law: TemperatureLaw, folder: Path) -> list[Path]:
     """Write the answer as JSON, plot, LaTeX and Python; returns the paths."""
     from creepkit import study
 
     folder.mkdir(parents=True, exist_ok=True)
-    written = [trend.save(folder / "temperature.json"), folder / "temperature.png"]
-    trend.plot(written[1])
+    written = [temperature_law.save(folder / "temperature.json"), folder / "temperature.png"]
+    temperature_law.plot(written[1])
     for language, suffix in (("latex", ".tex"), ("python", ".py")):
         path = folder / f"law{suffix}"
-        study.export(trend.valued, language, to=path, force=True)
+        study.export(temperature_law.valued, language, to=path, force=True)
         written.append(path)
     return written
 
 
-def _answer(trend: TemperatureLaw, written: Sequence[Path]) -> dict[str, Any]:
+def _json_result(temperature_law: TemperatureLaw, written: Sequence[Path]) -> dict[str, Any]:
     return {
-        "law": trend.law.name,
-        "judged_by": trend.judged_by,
-        "range_K": list(trend.range),
-        "T_ref_K": trend.T_ref,
-        "forms": trend.forms,
-        "sets": {name: [vars(one) for one in own] for name, own in trend.sets.items()},
-        "parameters": {e.name: {k: v for k, v in vars(e).items() if k != "name"} for e in trend.estimates},
-        "candidates": [{"forms": o.forms, "excess": o.excess, "weight": o.weight} for o in trend.candidates],
-        "notes": list(trend.notes),
+        "law": temperature_law.law.name,
+        "judged_by": temperature_law.criterion_data,
+        "range_K": list(temperature_law.temperature_range),
+        "T_ref_K": temperature_law.T_ref,
+        "forms": temperature_law.forms,
+        "sets": {name: [vars(form_weight) for form_weight in form_weights] for name, form_weights in temperature_law.plausible_forms.items()},
+        "parameters": {e.name: {k: v for k, v in vars(e).items() if k != "name"} for e in temperature_law.estimates},
+        "candidates": [{"forms": candidate.forms, "excess": candidate.criterion_difference, "weight": candidate.weight} for candidate in temperature_law.candidates],
+        "notes": list(temperature_law.notes),
         "files": [str(path) for path in written],
     }

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from creepkit.inverse.identification import Identification
     from creepkit.language import CreepLaw
-    from creepkit.records import ValuedLaw
+    from creepkit.records import LawWithValues
 
 
 def command(
@@ -46,11 +46,11 @@ def command(
         for target in study.exporters().values():
             typer.echo(f"{target.name:16} {target.suffix:8} {target.title}")
         return
-    found = _source(source)
+    law_source = _resolve_source(source)
     text = study.export(
-        found,
+        law_source,
         to,
-        _values(found, value),
+        _merged_values(law_source, value),
         units={"stress": stress_unit, "time": time_unit},
         temperature=None if temperature_c is None else temperature_c + ZERO_CELSIUS,
         elastic=None if modulus_gpa is None else Elastic(E=1e3 * modulus_gpa, nu=poisson),
@@ -61,24 +61,24 @@ def command(
     typer.echo(text.rstrip("\n") if output is None else f"wrote {output}")
 
 
-def _source(text: str) -> CreepLaw | Identification | ValuedLaw:
+def _resolve_source(text: str) -> CreepLaw | Identification | LawWithValues:
     """A file where there is one, or where its name says so; else a law by name."""
     from creepkit import study
 
     path = Path(text)
     if path.suffix.lower() == ".json" or path.is_file():
-        from creepkit.export.document import read_source
+        from creepkit.export.document import read_law_file
 
-        return read_source(path)
+        return read_law_file(path)
     return study.law(text)
 
 
-def _values(found: CreepLaw | Identification | ValuedLaw, given: list[str] | None) -> dict[str, float] | None:
+def _merged_values(law_source: CreepLaw | Identification | LawWithValues, assignments: list[str] | None) -> dict[str, float] | None:
     """The values of the source with those given in their place; None for a source's own."""
-    from creepkit.cli.loads import numbers
+    from creepkit.cli.loads import parse_numbers
 
-    changed = numbers(given or [], "--set", "n=5.2")
-    own: Mapping[str, float] | None = getattr(found, "values", None) if hasattr(found, "law") else None
-    if own is None:
-        return changed
-    return {**own, **changed} if changed else None
+    given_values = parse_numbers(assignments or [], "--set", "n=5.2")
+    source_values: Mapping[str, float] | None = getattr(law_source, "values", None) if hasattr(law_source, "law") else None
+    if source_values is None:
+        return given_values
+    return {**source_values, **given_values} if given_values else None

@@ -9,24 +9,24 @@ import typer
 
 from creepkit.cli.loads import BULGE
 from creepkit.cli.printing import print_json
-from creepkit.cli.progress import Progress
+from creepkit.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
-    from creepkit.dataset.design import Design
+    from creepkit.dataset.design import SamplingDesign
     from creepkit.records import Specimen
 
-FAMILY = "rate-family"
+RATE_FAMILY = "rate-family"
 """What is asked for in the place of a law, to have rate functions of many laws."""
 
 
 def command(
-    law: Annotated[str, typer.Argument(metavar="LAW", help=f"Name of a law; or {FAMILY}, rates of many kinds.")],
+    law: Annotated[str, typer.Argument(metavar="LAW", help=f"Name of a law; or {RATE_FAMILY}, rates of many kinds.")],
     to: Annotated[Path | None, typer.Option(help="HDF5 file to write; its shards lie in FILE.parts.")] = None,
     samples: Annotated[int | None, typer.Option(min=1, help="Accepted samples wanted.")] = None,
     draws: Annotated[int | None, typer.Option(min=1, help="Or draws, whatever becomes of them.")] = None,
     specimen: Annotated[str, typer.Option(help="bulge or uniaxial; see 'creepkit specimens'.")] = BULGE,
-    box: Annotated[
+    domain: Annotated[
         str | None, typer.Option(help="conditioned (the default; most samples creep visibly) or paper.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the Sobol sequence.")] = 0,
@@ -58,26 +58,26 @@ def command(
     from creepkit import study
     from creepkit.errors import DatasetError
 
-    body = study.specimen(specimen)
-    design = design_named(law, body, box, changes_given(ranges or [], end_h, box, unscreened), interval)
+    specimen_record = study.specimen(specimen)
+    design = select_design(law, specimen_record, domain, design_changes(ranges or [], end_h, domain, unscreened), interval)
     if dry_run:
-        tell_acceptance(design, seed, to, as_json)
+        print_acceptance(design, seed, to, as_json)
         return
     if to is None:
         raise DatasetError("--to FILE is missing: name the HDF5 file to write, such as --to combined.h5")
-    with Progress() as progress:
+    with ProgressBar() as progress:
         data = study.generate(
-            design, body, samples, draws=draws, seed=seed, to=to, workers=workers, cluster=cluster,
-            part=part_of(part), progress=progress.tick,
+            design, specimen_record, samples, draws=draws, seed=seed, to=to, workers=workers, cluster=cluster,
+            part=parse_part(part), progress=progress.tick,
         )  # fmt: skip
-    tell(data, to, part, as_json)
+    print_dataset(data, to, part, as_json)
 
 
-def changes_given(ranges: list[str], end_h: float | None, box: str | None, unscreened: bool) -> dict[str, Any]:
+def design_changes(ranges: list[str], end_h: float | None, domain: str | None, unscreened: bool) -> dict[str, Any]:
     """What options change in a design."""
     from creepkit.errors import DatasetError
 
-    changes: dict[str, Any] = dict(range_given(text) for text in ranges)
+    changes: dict[str, Any] = dict(parse_range(text) for text in ranges)
     if len(changes) < len(ranges):
         raise DatasetError(f"--range {' '.join(ranges)}: a condition is given twice; keep one of them")
     if end_h is not None:
@@ -85,44 +85,44 @@ def changes_given(ranges: list[str], end_h: float | None, box: str | None, unscr
             raise DatasetError("--end-h and --range end_time both say when tests end; leave one of them out")
         changes["end_time"] = 3600.0 * end_h
     if unscreened:
-        if box != "paper":
+        if domain != "paper":
             raise DatasetError("--unscreened belongs to --box paper; nothing else leaves samples out")
         changes["screened"] = False
     return changes
 
 
-def range_given(text: str) -> tuple[str, tuple[float, float]]:
+def parse_range(text: str) -> tuple[str, tuple[float, float]]:
     """(condition, (low, high)) from NAME=LOW:HIGH, or from NAME=NUMBER."""
     from creepkit.errors import DatasetError
 
-    name, _, ends = text.partition("=")
+    name, _, limits = text.partition("=")
     try:
-        low, high = (float(end) for end in (ends if ":" in ends else f"{ends}:{ends}").split(":"))
+        low, high = (float(end) for end in (limits if ":" in limits else f"{limits}:{limits}").split(":"))
     except ValueError:
         raise DatasetError(f"--range {text}: write NAME=LOW:HIGH or NAME=NUMBER, such as P1=5:20") from None
     return name.strip(), (low, high)
 
 
-def design_named(law: str, body: Specimen, box: str | None, changes: dict[str, Any], interval: float | None) -> Design:
+def select_design(law: str, specimen: Specimen, domain: str | None, changes: dict[str, Any], interval: float | None) -> SamplingDesign:
     """The design that these options name; interval : s between frames."""
     import numpy as np
 
     from creepkit import study
-    from creepkit.dataset.rate_family import ENDS
+    from creepkit.dataset.rate_family import END_TIME_RANGE
     from creepkit.dataset.time_grid import TimeGrid
     from creepkit.errors import DatasetError
-    from creepkit.study.sets import design_given
+    from creepkit.study.sets import resolve_design
 
-    if law != FAMILY:
-        return design_given(law, body, box, changes if interval is None else {**changes, "every": interval})
-    if box is not None:
-        raise DatasetError(f"--box {box}: {FAMILY} has a box of its own; leave --box out")
+    if law != RATE_FAMILY:
+        return resolve_design(law, specimen, domain, changes if interval is None else {**changes, "every": interval})
+    if domain is not None:
+        raise DatasetError(f"--box {domain}: {RATE_FAMILY} has a box of its own; leave --box out")
     if interval is not None:
-        changes["grid"] = TimeGrid.every(interval, np.max(changes.get("end_time", ENDS[1])))
-    return study.rate_family(body, **changes)
+        changes["grid"] = TimeGrid.every(interval, np.max(changes.get("end_time", END_TIME_RANGE[1])))
+    return study.rate_family(specimen, **changes)
 
 
-def part_of(text: str | None) -> tuple[int, int] | None:
+def parse_part(text: str | None) -> tuple[int, int] | None:
     """K/N as two numbers."""
     from creepkit.errors import DatasetError
 
@@ -134,24 +134,24 @@ def part_of(text: str | None) -> tuple[int, int] | None:
     return int(k), int(n)
 
 
-def tell_acceptance(design: Design, seed: int, to: Path | None, as_json: bool) -> None:
+def print_acceptance(design: SamplingDesign, seed: int, to: Path | None, as_json: bool) -> None:
     """Print what the design would draw, and draw the rates of its samples."""
     from creepkit.dataset.acceptance import acceptance
-    from creepkit.dataset.box import Box
+    from creepkit.dataset.box import SamplingDomain
 
-    assert isinstance(design, Box)  # the command line knows no others
-    found = acceptance(design, seed=seed)
-    picture = Path("rates.png") if to is None else to.with_suffix(".rates.png")
-    found.figure(picture)
+    assert isinstance(design, SamplingDomain)  # the command line knows no others
+    acceptance_rates = acceptance(design, seed=seed)
+    plot_file = Path("rates.png") if to is None else to.with_suffix(".rates.png")
+    acceptance_rates.figure(plot_file)
     if as_json:
-        met = {name: float(passed.mean()) for name, passed in found.met.items()}
-        shares = {"simulated": float(found.kept.mean()), "useful": float(found.useful.mean())}
-        print_json({"draws": len(found.draws), "met": met, **shares, "picture": str(picture)})
+        criterion_fractions = {name: float(passed.mean()) for name, passed in acceptance_rates.criteria_met.items()}
+        fractions = {"simulated": float(acceptance_rates.kept.mean()), "useful": float(acceptance_rates.useful.mean())}
+        print_json({"draws": len(acceptance_rates.draws), "met": criterion_fractions, **fractions, "picture": str(plot_file)})
     else:
-        typer.echo(f"{found}\nwrote {picture}; nothing was simulated")
+        typer.echo(f"{acceptance_rates}\nwrote {plot_file}; nothing was simulated")
 
 
-def tell(data: Dataset, to: Path, part: str | None, as_json: bool) -> None:
+def print_dataset(data: Dataset, to: Path, part: str | None, as_json: bool) -> None:
     """Print what was made, and where it lies."""
     if as_json:
         from creepkit.dataset.describe import summary

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.choices import penalty_of, search_of
-from creepkit.cli.identified import answer_of, tell, write
+from creepkit.cli.choices import penalty_named, search_named
+from creepkit.cli.identified import ranking_to_json, print_ranking, write_ranking
 from creepkit.cli.printing import print_json
-from creepkit.cli.progress import Progress
+from creepkit.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
     from creepkit.records import History, Nuisance
 
-USUAL = ("likelihood", "multi-start", None, "linear", "gaussian")
+DEFAULT_METHOD = ("likelihood", "multi-start", None, "linear", "gaussian")
 """Weights, search, penalty, loss and loss of tests with which laws are selected, sums among them."""
 
 
@@ -69,17 +69,17 @@ def command(
     if up_to is not None and not up_to > 0:
         raise FitError(f"--up-to {up_to:g} is not a strain above zero; write 0.05 for 5 %")
     check_folder(to)
-    named = [study.law(name) for name in dict.fromkeys(law)]
+    candidate_laws = [study.law(name) for name in dict.fromkeys(law)]
     histories = study.read_histories(files, reader)
     if up_to is not None:
-        histories = _cut(histories, up_to)
-    _warn_of_twins(histories)
+        histories = _truncate_at_strain(histories, up_to)
+    _warn_of_duplicates(histories)
     if temperature == "auto":
         from creepkit.inverse.warmth import with_arrhenius
 
-        named = [with_arrhenius(one, histories) for one in named]
-    how: dict[str, Any] = {"starts": starts, "seed": seed, "nuisances": nuisances_of(nuisance)}
-    by_likelihood = (weights, search, penalty, loss, test_loss) == USUAL
+        candidate_laws = [with_arrhenius(candidate_law, histories) for candidate_law in candidate_laws]
+    options: dict[str, Any] = {"starts": starts, "seed": seed, "nuisances": parse_nuisances(nuisance)}
+    by_likelihood = (weights, search, penalty, loss, test_loss) == DEFAULT_METHOD
     if sums and weights != "likelihood":
         raise FitError("--sums compares laws by their likelihood; add --weights likelihood")
     if sums and not by_likelihood:
@@ -87,18 +87,18 @@ def command(
             "--sums takes the usual search and losses; leave out --search, --penalty, --loss and --test-loss"
         )
     if by_likelihood:
-        ranking = selected(named, histories, sums=sums, **how)
+        ranking = select_laws(candidate_laws, histories, sums=sums, **options)
     else:
-        how |= {"loss": loss, "test_loss": test_loss, "weights": weights_of(weights)}
-        ranking = ranked(named, histories, search=search_of(search), penalty=penalty_of(penalty), **how)
-    written = write(ranking, to)
+        options |= {"loss": loss, "test_loss": test_loss, "weights": parse_weights(weights)}
+        ranking = rank_laws(candidate_laws, histories, search=search_named(search), penalty=penalty_named(penalty), **options)
+    written = write_ranking(ranking, to)
     if as_json:
-        print_json(answer_of(ranking, written))
+        print_json(ranking_to_json(ranking, written))
     else:
-        tell(ranking, written, histories)
+        print_ranking(ranking, written, histories)
     if further:
-        for found in ranking.further_tests():
-            typer.echo(str(found), err=as_json)
+        for proposed_test in ranking.further_tests():
+            typer.echo(str(proposed_test), err=as_json)
 
 
 def check_folder(folder: Path) -> None:
@@ -112,89 +112,89 @@ def check_folder(folder: Path) -> None:
         raise FitError(f"--to {folder}: {existing} cannot be written to; name another folder for the results")
 
 
-def _cut(histories: list[History], limit: float) -> list[History]:
+def _truncate_at_strain(histories: list[History], limit: float) -> list[History]:
     """Frames up to a strain; a curve that has fewer than two of them is left out, and said.
 
     How a test ended is forgotten, also of those that never came so far: all are compared over the same part of life.
     """
-    cut = [
+    truncated = [
         h.up_to("strain", limit).replace(rupture_time=None, unruptured=False) if "strain" in h.outputs else h
         for h in histories
     ]
-    kept = [h for h in cut if int((h.used & (h.times > 0)).sum()) >= 2]
-    for history in cut:
-        if history not in kept:
+    retained = [h for h in truncated if int((h.used & (h.times > 0)).sum()) >= 2]
+    for history in truncated:
+        if history not in retained:
             typer.echo(f"left out: {history.name} has no two frames below a strain of {limit:g}", err=True)
-    return kept
+    return retained
 
 
-def _warn_of_twins(histories: list[History]) -> None:
-    from creepkit.readers.duplicates import duplicates
+def _warn_of_duplicates(histories: list[History]) -> None:
+    from creepkit.readers.duplicates import duplicate_tests
 
-    for one, other in duplicates(histories):
-        typer.echo(f"note: {one} and {other} look like one test published twice; both count", err=True)
+    for first, second in duplicate_tests(histories):
+        typer.echo(f"note: {first} and {second} look like one test published twice; both count", err=True)
 
 
-def weights_of(text: str) -> Any:
+def parse_weights(text: str) -> Any:
     """The weights of outputs, from text such as amplitude=0.99,width=0.01; or a word."""
     from creepkit.errors import FitError
-    from creepkit.inverse.settings import WEIGHTS
+    from creepkit.inverse.settings import WEIGHTINGS
 
-    if text in WEIGHTS:
+    if text in WEIGHTINGS:
         return text
     pairs = [part.partition("=") for part in text.split(",")]
     try:
         return {name.strip(): float(value) for name, _, value in pairs}
     except ValueError:
-        words = f"{', '.join(WEIGHTS)} or amplitude=0.99,width=0.005"
+        words = f"{', '.join(WEIGHTINGS)} or amplitude=0.99,width=0.005"
         raise FitError(f"--weights {text} is not known; write {words}") from None
 
 
-def nuisances_of(texts: Sequence[str] | None) -> list[Nuisance] | None:
+def parse_nuisances(texts: Sequence[str] | None) -> list[Nuisance] | None:
     """The usual offset and rate, and those named: temperature, thickness=0.4935 or thickness=0.4935:0.027."""
     from typing import get_args
 
     from creepkit.errors import FitError
     from creepkit.records import Nuisance
-    from creepkit.records.prediction import Kind
+    from creepkit.records.prediction import NuisanceKind
 
     if not texts:
         return None
-    found = [Nuisance("offset"), Nuisance("rate")]
+    nuisances = [Nuisance("offset"), Nuisance("rate")]
     for text in texts:
-        kind, _, rest = text.partition("=")
-        mean, _, sd = rest.partition(":")
+        kind, _, numbers_text = text.partition("=")
+        mean, _, sd = numbers_text.partition(":")
         try:
             numbers = float(mean or 0.0), float(sd) if sd else None
         except ValueError:
-            raise FitError(f"--nuisance {text}: '{rest}' is not MEAN or MEAN:SD, such as 0.4935:0.027") from None
-        known = [one for one in get_args(Kind) if one == kind]
-        if not known:
-            raise FitError(f"--nuisance {text}: '{kind}' is not known; allowed are {', '.join(get_args(Kind))}")
-        found = [n for n in found if n.kind != kind]
-        found.append(Nuisance(known[0], mean=numbers[0], sd=numbers[1]))
-    return found
+            raise FitError(f"--nuisance {text}: '{numbers_text}' is not MEAN or MEAN:SD, such as 0.4935:0.027") from None
+        matching_kinds = [known_kind for known_kind in get_args(NuisanceKind) if known_kind == kind]
+        if not matching_kinds:
+            raise FitError(f"--nuisance {text}: '{kind}' is not known; allowed are {', '.join(get_args(NuisanceKind))}")
+        nuisances = [n for n in nuisances if n.kind != kind]
+        nuisances.append(Nuisance(matching_kinds[0], mean=numbers[0], sd=numbers[1]))
+    return nuisances
 
 
-def selected(laws: Sequence[CreepLaw], histories: list[History], **how: Any) -> Ranking:
+def select_laws(laws: Sequence[CreepLaw], histories: list[History], **options: Any) -> Ranking:
     """Identify the laws by likelihood and rank them, showing progress."""
     from creepkit import study
 
-    with Progress() as progress:
-        return study.select(laws, histories, progress=progress.tick, **how)
+    with ProgressBar() as progress:
+        return study.select(laws, histories, progress=progress.tick, **options)
 
 
-def ranked(laws: Sequence[CreepLaw], histories: list[History], **how: Any) -> Ranking:
+def rank_laws(laws: Sequence[CreepLaw], histories: list[History], **options: Any) -> Ranking:
     """Fit each law, showing progress, and rank them."""
     from creepkit import study
     from creepkit.inverse.selection import rank
 
     fits = []
-    with Progress() as progress:
-        for one in laws:
+    with ProgressBar() as progress:
+        for law in laws:
 
-            def tick(task: str, done: int, total: int, name: str = one.name) -> None:
+            def tick(task: str, done: int, total: int, name: str = law.name) -> None:
                 progress.tick(f"{name}, {task}", done, total)
 
-            fits.append(study.identify(one, histories, progress=tick, **how))
+            fits.append(study.identify(law, histories, progress=tick, **options))
     return rank(fits)

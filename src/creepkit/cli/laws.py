@@ -20,34 +20,34 @@ def command(
     """List the laws that are known, or show one in full."""
     from creepkit import registry
 
-    known = registry.default().laws()
+    registered = registry.default_registry().laws()
     if name is not None:
-        law = registry.default().law(name)
-        _show_one(law, known[name], as_json)
+        law = registry.default_registry().law(name)
+        _print_law(law, registered[name], as_json)
     elif as_json:
-        print_json([_record(found) for found in known.values()])
+        print_json([_law_to_json(entry) for entry in registered.values()])
     else:
-        rows = [(law.name, law.title, " ".join(law.names)) for law in (found.value for found in known.values())]
+        rows = [(law.name, law.title, " ".join(law.names)) for law in (found.value for found in registered.values())]
         print_table(f"{len(rows)} laws", ("name", "title", "parameters"), rows)
-        for sentence in registry.default().clashes():
+        for sentence in registry.default_registry().conflicts():
             typer.echo(f"left out: {sentence}", err=True)
 
 
-def _show_one(law: CreepLaw, found: Registered[CreepLaw], as_json: bool) -> None:
+def _print_law(law: CreepLaw, entry: Registered[CreepLaw], as_json: bool) -> None:
     if as_json:
-        print_json(_record(found))
+        print_json(_law_to_json(entry))
     else:
-        typer.echo(f"{law}\n  from {found.provenance}\n  LaTeX: {law.latex()}")
+        typer.echo(f"{law}\n  from {entry.provenance}\n  LaTeX: {law.latex()}")
 
 
-def _record(found: Registered[CreepLaw]) -> dict[str, Any]:
+def _law_to_json(entry: Registered[CreepLaw]) -> dict[str, Any]:
     """Return all that a law says, as JSON types; the text of a term is for reading, never to be parsed."""
-    law = found.value
+    law = entry.value
     table = law.table.items()
     return {
         "name": law.name,
         "title": law.title,
-        "provenance": str(found.provenance),
+        "provenance": str(entry.provenance),
         "fingerprint": law.fingerprint,
         "terms": {label: str(term) for label, term in law.terms.items()},
         "parameters": {

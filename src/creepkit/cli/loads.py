@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from creepkit.records import Loading
 
-BULGE, UNIAXIAL, RELAXATION, POINT = "bulge", "uniaxial", "relaxation", "point"
-RAMP = 5.0
+BULGE, UNIAXIAL, RELAXATION, MATERIAL_POINT = "bulge", "uniaxial", "relaxation", "point"
+RAMP_TIME = 5.0
 """s, in which each pressure is reached."""
 
-OWNERS = {
-    "--stress": (UNIAXIAL, POINT),
-    "--strain": (RELAXATION, POINT),
+SPECIMENS_OF_OPTION = {
+    "--stress": (UNIAXIAL, MATERIAL_POINT),
+    "--strain": (RELAXATION, MATERIAL_POINT),
     "--pressure": (BULGE,),
     "--control": (UNIAXIAL,),
     "--ramp": (RELAXATION,),
@@ -24,21 +24,21 @@ OWNERS = {
 """Which specimens an option is for."""
 
 
-def refuse_strangers(specimen: str, options: dict[str, object]) -> None:
+def check_options(specimen: str, options: dict[str, object]) -> None:
     """Options of another specimen would go unheard; what a plugin's specimen takes is its own affair."""
     from creepkit.errors import SolveError
 
-    if specimen not in {name for owners in OWNERS.values() for name in owners}:
+    if specimen not in {name for specimens in SPECIMENS_OF_OPTION.values() for name in specimens}:
         return
-    for option, given in options.items():
-        if given not in (None, []) and specimen not in OWNERS[option]:
-            belongs = " or ".join(OWNERS[option])
+    for option, option_value in options.items():
+        if option_value not in (None, []) and specimen not in SPECIMENS_OF_OPTION[option]:
+            allowed_specimens = " or ".join(SPECIMENS_OF_OPTION[option])
             raise SolveError(
-                f"{option} belongs to --specimen {belongs}, found --specimen {specimen}; leave one of them out"
+                f"{option} belongs to --specimen {allowed_specimens}, found --specimen {specimen}; leave one of them out"
             )
 
 
-def loading_of(
+def parse_loading(
     specimen: str,
     stress: Sequence[str] | None,
     strain: Sequence[str] | None,
@@ -50,23 +50,23 @@ def loading_of(
     """The loading of a test that ends at `end`, s."""
     from creepkit.errors import SolveError
 
-    named = [text for text in (*(stress or ()), *(strain or ())) if "=" in text]
-    if named and specimen in (UNIAXIAL, RELAXATION):
-        raise SolveError(f"{named[0]} names a component, which --specimen {specimen} has not; give --specimen point")
-    if named or specimen == POINT:
-        return _by_components(stress, strain)
+    component_texts = [text for text in (*(stress or ()), *(strain or ())) if "=" in text]
+    if component_texts and specimen in (UNIAXIAL, RELAXATION):
+        raise SolveError(f"{component_texts[0]} names a component, which --specimen {specimen} has not; give --specimen point")
+    if component_texts or specimen == MATERIAL_POINT:
+        return _point_loading(stress, strain)
     if specimen == BULGE or pressure:
-        return _by_pressure(pressure, end)
+        return _pressure_loading(pressure, end)
     if specimen == RELAXATION or strain:
         if not strain:
             raise SolveError("a bar in relaxation needs a strain: give --strain, such as 0.002, or 3600:0.003 later on")
         from creepkit.records import StrainSteps
 
-        return StrainSteps(tuple(steps(strain, "--strain")), ramp or 0.0)
-    return _by_stress(stress, control)
+        return StrainSteps(tuple(parse_steps(strain, "--strain")), ramp or 0.0)
+    return _stress_loading(stress, control)
 
 
-def _by_stress(texts: Sequence[str] | None, control: str | None) -> Loading:
+def _stress_loading(texts: Sequence[str] | None, control: str | None) -> Loading:
     from creepkit.errors import SolveError
     from creepkit.records import StressSteps
 
@@ -74,37 +74,37 @@ def _by_stress(texts: Sequence[str] | None, control: str | None) -> Loading:
         raise SolveError("a bar needs a stress: give --stress, such as 100, or --specimen bulge with --pressure")
     if control not in (None, "load", "stress"):
         raise SolveError(f"--control {control} is not known; allowed are load and stress")
-    return StressSteps(tuple(steps(texts, "--stress")), "stress" if control == "stress" else "load")
+    return StressSteps(tuple(parse_steps(texts, "--stress")), "stress" if control == "stress" else "load")
 
 
-def _by_components(stress: Sequence[str] | None, strain: Sequence[str] | None) -> Loading:
+def _point_loading(stress: Sequence[str] | None, strain: Sequence[str] | None) -> Loading:
     from creepkit.errors import SolveError
     from creepkit.records import PointLoading
 
     if not (stress or strain):
         raise SolveError("a material point needs a component: give --stress 11=100, or --strain 12=0.001")
-    return PointLoading(_components(stress, "--stress"), _components(strain, "--strain"))
+    return PointLoading(_component_steps(stress, "--stress"), _component_steps(strain, "--strain"))
 
 
-def _components(texts: Sequence[str] | None, option: str) -> dict[str, list[tuple[float, float]]]:
+def _component_steps(texts: Sequence[str] | None, option: str) -> dict[str, list[tuple[float, float]]]:
     """Steps by component, in the order in which they were given."""
     from creepkit.errors import SolveError
 
-    found: dict[str, list[tuple[float, float]]] = {}
+    steps_by_component: dict[str, list[tuple[float, float]]] = {}
     for text in texts or ():
-        name, equals, rest = text.partition("=")
-        if not equals:
+        name, separator, value_text = text.partition("=")
+        if not separator:
             raise SolveError(f"{option} {text}: name the component of a material point, such as 11={text}")
-        found.setdefault(name.strip(), []).extend(steps([rest], option))
-    for name, pairs in found.items():
+        steps_by_component.setdefault(name.strip(), []).extend(parse_steps([value_text], option))
+    for name, pairs in steps_by_component.items():
         if pairs[0][0] != 0.0:
             pairs.insert(0, (0.0, 0.0))  # until its first step a component is at rest
         if sorted(pairs) != pairs:
             raise SolveError(f"{option}: the steps of component {name} must follow one another in time")
-    return found
+    return steps_by_component
 
 
-def _by_pressure(texts: Sequence[str] | None, end: float) -> Loading:
+def _pressure_loading(texts: Sequence[str] | None, end: float) -> Loading:
     """One or two pressures as a PressureJump, more as the program that they are."""
     import numpy as np
 
@@ -113,35 +113,35 @@ def _by_pressure(texts: Sequence[str] | None, end: float) -> Loading:
 
     if not texts:
         raise SolveError("a dimple needs a pressure: give --pressure, such as 8, or 7200:10 for a later step")
-    starts, pressures = np.array(steps(texts, "--pressure")).T
-    if starts[0] != 0.0 or (np.diff(starts) < RAMP).any() or pressures.min() < 0.0:
+    starts, pressures = np.array(parse_steps(texts, "--pressure")).T
+    if starts[0] != 0.0 or (np.diff(starts) < RAMP_TIME).any() or pressures.min() < 0.0:
         raise SolveError(
             f"--pressure {' '.join(texts)}: the first pressure starts at 0 s, none is negative, and each comes "
-            f"{RAMP:g} s or more after the one before, for the ramp takes that long"
+            f"{RAMP_TIME:g} s or more after the one before, for the ramp takes that long"
         )
-    if len(texts) <= 2 and pressures.min() > 0.0 and (len(texts) == 1 or starts[1] > RAMP):
-        change = starts[1] if len(texts) == 2 else max(end, 2 * RAMP)
-        return PressureJump(float(pressures[0]), float(pressures[-1]), float(change), RAMP)
-    times = np.stack([starts, starts + RAMP], axis=1).ravel()
+    if len(texts) <= 2 and pressures.min() > 0.0 and (len(texts) == 1 or starts[1] > RAMP_TIME):
+        jump_time = starts[1] if len(texts) == 2 else max(end, 2 * RAMP_TIME)
+        return PressureJump(float(pressures[0]), float(pressures[-1]), float(jump_time), RAMP_TIME)
+    times = np.stack([starts, starts + RAMP_TIME], axis=1).ravel()
     values = np.repeat(np.append(0.0, pressures), 2)[1:-1]
     return RecordedLoading(Program(times, values), "pressure")
 
 
-def steps(texts: Sequence[str], option: str) -> list[tuple[float, float]]:
+def parse_steps(texts: Sequence[str], option: str) -> list[tuple[float, float]]:
     """(start in s, value) pairs from texts such as 100 and 3600:120."""
     from creepkit.errors import SolveError
 
-    found = []
+    pairs = []
     for text in texts:
         start, _, value = text.rpartition(":")
         try:
-            found.append((float(start or 0.0), float(value)))
+            pairs.append((float(start or 0.0), float(value)))
         except ValueError:
             raise SolveError(f"{option} {text}: write a number, or SECONDS:NUMBER for a later step") from None
-    return found
+    return pairs
 
 
-def numbers(texts: Sequence[str], option: str, example: str) -> dict[str, float]:
+def parse_numbers(texts: Sequence[str], option: str, example: str) -> dict[str, float]:
     """{name: value} from texts such as n=5.2."""
     from creepkit.errors import SolveError
 

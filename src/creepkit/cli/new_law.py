@@ -22,18 +22,18 @@ def command(
 
     if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name):
         raise typer.BadParameter(f"'{name}' is not a law's name: use lower-case words joined by '-', such as my-law")
-    if name in registry.default().laws():
+    if name in registry.default_registry().laws():
         raise LawError(f"there is a law '{name}' already; choose another name, see 'creepkit laws'")
     typer.echo(_write_file(name) if file else _write_package(name))
 
 
 def _write_file(name: str) -> str:
     """Write the law alone; say what to do next."""
-    from creepkit.cli.new_law_texts import LAW
+    from creepkit.cli.new_law_texts import LAW_TEMPLATE
 
     path = Path(f"{name.replace('-', '_')}.py")
-    _refuse(path)
-    path.write_text(_filled(LAW, name), encoding="utf-8")
+    _check_absent(path)
+    path.write_text(_fill_template(LAW_TEMPLATE, name), encoding="utf-8")
     return (
         f"wrote {path}; next: edit its terms and params, then run 'creepkit check {path}', "
         f"and 'creepkit --plugin {path}' before any other command"
@@ -42,19 +42,19 @@ def _write_file(name: str) -> str:
 
 def _write_package(name: str) -> str:
     """Write a folder with the law, its project file, README and test; say what to do next."""
-    from creepkit.cli.new_law_texts import LAW, PROJECT, README, TEST
+    from creepkit.cli.new_law_texts import LAW_TEMPLATE, PROJECT_TEMPLATE, README_TEMPLATE, TEST_TEMPLATE
 
-    folder, module = Path(name), _module(name)
-    _refuse(folder)
+    folder, module = Path(name), _module_name(name)
+    _check_absent(folder)
     (folder / "tests").mkdir(parents=True)
     texts = {
-        f"{module}.py": LAW,
-        "pyproject.toml": PROJECT,
-        "README.md": README,
-        f"tests/test_{name.replace('-', '_')}.py": TEST,
+        f"{module}.py": LAW_TEMPLATE,
+        "pyproject.toml": PROJECT_TEMPLATE,
+        "README.md": README_TEMPLATE,
+        f"tests/test_{name.replace('-', '_')}.py": TEST_TEMPLATE,
     }
     for path, text in texts.items():
-        (folder / path).write_text(_filled(text, name), encoding="utf-8")
+        (folder / path).write_text(_fill_template(text, name), encoding="utf-8")
     law = folder / f"{module}.py"
     return (
         f"wrote {folder}/ ({', '.join(texts)})\n"
@@ -63,17 +63,17 @@ def _write_package(name: str) -> str:
     )
 
 
-def _module(name: str) -> str:
+def _module_name(name: str) -> str:
     return f"creepkit_{name.replace('-', '_')}"
 
 
-def _filled(text: Template, name: str) -> str:
+def _fill_template(text: Template, name: str) -> str:
     title = name.replace("-", " ").capitalize()
     constant = name.replace("-", "_").upper()
-    return text.substitute(name=name, title=title, constant=constant, module=_module(name), package=f"creepkit-{name}")
+    return text.substitute(name=name, title=title, constant=constant, module=_module_name(name), package=f"creepkit-{name}")
 
 
-def _refuse(path: Path) -> None:
+def _check_absent(path: Path) -> None:
     """What exists is left as it is."""
     from creepkit.errors import PluginError
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from string import Template
 
-LAW = Template('''\
+LAW_TEMPLATE = Template('''\
 """$title: say here in one line what the law describes."""
 
 from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress
@@ -28,7 +28,7 @@ def creepkit_laws():
     return [$constant]
 ''')
 
-PROJECT = Template("""\
+PROJECT_TEMPLATE = Template("""\
 [build-system]
 requires = ["hatchling>=1.26"]
 build-backend = "hatchling.build"
@@ -48,7 +48,7 @@ $name = "$module"
 include = ["$module.py"]
 """)
 
-README = Template("""\
+README_TEMPLATE = Template("""\
 # $package
 
 $title: say here what it describes, and where it was published.
@@ -59,7 +59,7 @@ $title: say here what it describes, and where it was published.
     pytest
 """)
 
-TEST = Template("""\
+TEST_TEMPLATE = Template("""\
 import creepkit
 from creepkit.testing import check_law
 

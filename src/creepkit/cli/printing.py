@@ -24,6 +24,6 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
     (console if console.is_terminal else Console(width=120)).print(table)
 
 
-def print_json(answer: Any) -> None:
+def print_json(value: Any) -> None:
     """Print an answer as JSON."""
-    typer.echo(json.dumps(answer, indent=2, ensure_ascii=False))
+    typer.echo(json.dumps(value, indent=2, ensure_ascii=False))

@@ -8,18 +8,18 @@ from types import TracebackType
 from typing import Any
 
 
-class Progress:
+class ProgressBar:
     """Use as a context; call `tick(task, done, total)`, maybe with a note, from the work. Writes to stderr."""
 
-    QUIET, SHARE = 2.0, 0.01
+    LINE_INTERVAL, ELAPSED_FRACTION = 2.0, 0.01
     """s between plain lines, and the share of the time so far: nobody reads five thousand lines of three hours."""
 
     def __init__(self) -> None:
         self._bar: Any = None
         self._tasks: dict[str, Any] = {}
-        self._start = self._told = time.monotonic()
+        self._start = self._last_line = time.monotonic()
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> ProgressBar:
         if sys.stderr.isatty():
             from rich.console import Console
             from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
@@ -49,9 +49,9 @@ class Progress:
                 self._tasks[task] = self._bar.add_task(task, total=total, note=note)
             self._bar.update(self._tasks[task], completed=done, total=total, note=note)
         elif done == total or self._is_due():
-            self._told = time.monotonic()
+            self._last_line = time.monotonic()
             print(f"{task}: {done} of {total}{note and f' ({note})'}", file=sys.stderr, flush=True)
 
     def _is_due(self) -> bool:
         now = time.monotonic()
-        return now - self._told > max(self.QUIET, self.SHARE * (now - self._start))
+        return now - self._last_line > max(self.LINE_INTERVAL, self.ELAPSED_FRACTION * (now - self._start))

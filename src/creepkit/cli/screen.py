@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from creepkit.cli.choices import penalty_of
-from creepkit.cli.identify import nuisances_of
+from creepkit.cli.choices import penalty_named
+from creepkit.cli.identify import parse_nuisances
 from creepkit.cli.printing import print_json, print_table
-from creepkit.cli.progress import Progress
+from creepkit.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
     from creepkit.plates.plate import Plate
     from creepkit.records import Predictor
 
-CONFIRM = {"when-in-doubt": "when in doubt", "always": True, "never": False}
+CONFIRMATION_CHOICES = {"when-in-doubt": "when in doubt", "always": True, "never": False}
 
 
 def command(
@@ -57,48 +57,48 @@ def command(
 
     Interrupted, it goes on where it was when it is started again in the same way.
     """
-    from creepkit.inverse.selection.select import FRAMES
-    from creepkit.inverse.settings import Settings
+    from creepkit.inverse.selection.select import SELECTION_FRAMES
+    from creepkit.inverse.settings import IdentificationSettings
     from creepkit.plates.screening import screen
 
-    with Progress() as progress:
+    with ProgressBar() as progress:
         plate = screen(
-            folder, law, _surrogate(surrogate), compositions=compositions, to=to, nuisances=nuisances_of(nuisance),
-            settings=Settings(seed=seed, frames=FRAMES), through=_surrogate(through),
-            dense=None if dense == "none" else dense, penalty=penalty_of(penalty), confirm=_choice(confirm),
+            folder, law, _surrogate_named(surrogate), compositions=compositions, to=to, nuisances=parse_nuisances(nuisance),
+            settings=IdentificationSettings(seed=seed, frames=SELECTION_FRAMES), through=_surrogate_named(through),
+            dense=None if dense == "none" else dense, penalty=penalty_named(penalty), confirm=_confirmation_choice(confirm),
             workers=workers, progress=progress.tick,
         )  # fmt: skip
     written = [plate.to_csv(to / "plate.csv"), plate.to_hdf5(to / "plate.h5")]
     if plate.identified:
         written += [to / "fits", *plate.plot(to / "pictures")]
-    tell(plate, written, as_json)
+    print_screening(plate, written, as_json)
 
 
-def tell(plate: Plate, written: list[Path], as_json: bool) -> None:
+def print_screening(plate: Plate, written: list[Path], as_json: bool) -> None:
     """Print the table, what it sums up to, and what was written."""
-    from creepkit.plates.table import COLUMNS, rows_of, summary
+    from creepkit.plates.table import TABLE_COLUMNS, table_rows, summary_lines
 
     if as_json:
-        print_json(_answer(plate, written))
+        print_json(_json_result(plate, written))
         return
-    print_table(f"{len(plate.answers)} alloys", COLUMNS, rows_of(plate))
-    for line in (*summary(plate), *(f"wrote {path}" for path in written)):
+    print_table(f"{len(plate.results)} alloys", TABLE_COLUMNS, table_rows(plate))
+    for line in (*summary_lines(plate), *(f"wrote {path}" for path in written)):
         typer.echo(line)
 
 
-def _answer(plate: Plate, written: list[Path]) -> dict[str, Any]:
-    from creepkit.plates.table import record_of
+def _json_result(plate: Plate, written: list[Path]) -> dict[str, Any]:
+    from creepkit.plates.table import result_columns
 
     return {
-        "alloys": [record_of(plate, answer) for answer in plate.answers],
-        "shares": plate.shares(),
-        "failed": plate.failed,
+        "alloys": [result_columns(plate, result) for result in plate.results],
+        "shares": plate.law_fractions(),
+        "failed": plate.failures,
         "notes": list(plate.notes),
         "files": [str(path) for path in written],
     }
 
 
-def _surrogate(name: str | None) -> Predictor | None:
+def _surrogate_named(name: str | None) -> Predictor | None:
     if name is None:
         return None
     from creepkit import study
@@ -106,9 +106,9 @@ def _surrogate(name: str | None) -> Predictor | None:
     return study.surrogate(name)
 
 
-def _choice(text: str) -> bool | Literal["when in doubt"]:
+def _confirmation_choice(text: str) -> bool | Literal["when in doubt"]:
     from creepkit.errors import FitError
 
-    if text not in CONFIRM:
-        raise FitError(f"--confirm {text} is not known; allowed are {', '.join(CONFIRM)}")
-    return CONFIRM[text]  # type: ignore[return-value]
+    if text not in CONFIRMATION_CHOICES:
+        raise FitError(f"--confirm {text} is not known; allowed are {', '.join(CONFIRMATION_CHOICES)}")
+    return CONFIRMATION_CHOICES[text]  # type: ignore[return-value]

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit.cli.loads import BULGE, POINT, RELAXATION, UNIAXIAL, loading_of, numbers, refuse_strangers, steps
+from creepkit.cli.loads import BULGE, MATERIAL_POINT, RELAXATION, UNIAXIAL, parse_loading, parse_numbers, check_options, parse_steps
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
     from creepkit.language import CreepLaw
     from creepkit.records import History, Program, Specimen
 
-FRAMES, EVERY = 200, 150.0
+DEFAULT_FRAMES, DEFAULT_INTERVAL = 200, 150.0
 """Frames of a bar; s between those of a dimple, as its cameras take them."""
 
 
@@ -60,24 +60,24 @@ def command(
     from creepkit.errors import SolveError
     from creepkit.language import Elastic
 
-    body = study.specimen(specimen)
-    given = {"--stress": stress, "--strain": strain, "--pressure": pressure, "--control": control, "--ramp": ramp}
-    refuse_strangers(specimen, {**given, "--geometry": geometry, "--picture": picture})
+    specimen_record = study.specimen(specimen)
+    load_options = {"--stress": stress, "--strain": strain, "--pressure": pressure, "--control": control, "--ramp": ramp}
+    check_options(specimen, {**load_options, "--geometry": geometry, "--picture": picture})
     chosen = study.law(law)
     if not 0 < end_h < 1e9:
         raise SolveError(f"--end-h {end_h:g} is not a time above zero (and below 1e9 h)")
-    times = _times(3600.0 * end_h, points, every, specimen)
-    loading = loading_of(specimen, stress, strain, pressure, control, ramp, float(times[-1]))
-    if modulus_gpa is None and (specimen in (BULGE, RELAXATION) or (specimen == POINT and strain)):
-        what = "a dimple" if specimen == BULGE else "a prescribed strain"
-        raise SolveError(f"{what} needs a modulus: give --modulus-gpa, such as 150")
+    times = _frame_times(3600.0 * end_h, points, every, specimen)
+    loading = parse_loading(specimen, stress, strain, pressure, control, ramp, float(times[-1]))
+    if modulus_gpa is None and (specimen in (BULGE, RELAXATION) or (specimen == MATERIAL_POINT and strain)):
+        requirement = "a dimple" if specimen == BULGE else "a prescribed strain"
+        raise SolveError(f"{requirement} needs a modulus: give --modulus-gpa, such as 150")
     run = study.simulate(
         chosen,
-        _with_geometry(body, geometry),
-        numbers(value, "--set", "n=5.2"),
+        _with_geometry(specimen_record, geometry),
+        parse_numbers(value, "--set", "n=5.2"),
         loading=loading,
         times=times,
-        temperature=_temperature(chosen, temperature_c),
+        temperature=_parse_temperature(chosen, temperature_c),
         elastic=None if modulus_gpa is None else Elastic(1e3 * modulus_gpa),
         name=chosen.name if to is None else to.stem,
     )
@@ -86,10 +86,10 @@ def command(
     if picture is not None:
         run.section(path=picture)  # type: ignore[attr-defined]
         typer.echo(f"wrote {picture}", err=True)
-    _write(run, to)
+    _write_history(run, to)
 
 
-def _temperature(law: CreepLaw, texts: Sequence[str] | None) -> float | Program | None:
+def _parse_temperature(law: CreepLaw, texts: Sequence[str] | None) -> float | Program | None:
     """K; None where nothing was said and the law does not ask."""
     from creepkit.errors import SolveError
     from creepkit.language.symbols import temperature
@@ -99,7 +99,7 @@ def _temperature(law: CreepLaw, texts: Sequence[str] | None) -> float | Program 
         if law.uses(temperature):
             raise SolveError(f"law '{law.name}' depends on temperature: give --temperature-c")
         return None
-    levels = [(start, celsius + ZERO_CELSIUS) for start, celsius in steps(texts, "--temperature-c")]
+    levels = [(start, celsius + ZERO_CELSIUS) for start, celsius in parse_steps(texts, "--temperature-c")]
     if levels[0][0] != 0.0:
         raise SolveError(
             f"--temperature-c {texts[0]}: nothing is said of the time before; give the first one from 0 s on"
@@ -107,7 +107,7 @@ def _temperature(law: CreepLaw, texts: Sequence[str] | None) -> float | Program 
     return levels[0][1] if len(levels) == 1 else Program.steps(levels)
 
 
-def _write(run: History, to: Path | None) -> None:
+def _write_history(run: History, to: Path | None) -> None:
     from creepkit.readers.writing import history_text, write_history
 
     if to is None:
@@ -117,7 +117,7 @@ def _write(run: History, to: Path | None) -> None:
         typer.echo(f"wrote {to}: {run.times.size} frames to {run.times[-1] / 3600:.4g} h")
 
 
-def _times(end: float, points: int | None, every: float | None, specimen: str) -> Floats:
+def _frame_times(end: float, points: int | None, every: float | None, specimen: str) -> Floats:
     """The frames, s, the last one at the end."""
     import numpy as np
 
@@ -126,24 +126,24 @@ def _times(end: float, points: int | None, every: float | None, specimen: str) -
     if points is not None and every is not None:
         raise SolveError("--points and --every both say when frames are taken; give one of them")
     if points is None and every is None and specimen == BULGE:
-        every = EVERY
+        every = DEFAULT_INTERVAL
     if every is None:
-        return np.linspace(0.0, end, points or FRAMES)
+        return np.linspace(0.0, end, points or DEFAULT_FRAMES)
     if not end / 1e6 <= every <= end:
         raise SolveError(f"--every {every:g} s is not a step of a test of {end:g} s (allowed are 1 to 1000000 frames)")
-    inner = np.arange(0.0, end * (1 - 1e-9), every)
-    return np.append(inner, end)
+    frame_times = np.arange(0.0, end * (1 - 1e-9), every)
+    return np.append(frame_times, end)
 
 
-def _with_geometry(body: Specimen, texts: Sequence[str] | None) -> Specimen:
+def _with_geometry(specimen: Specimen, texts: Sequence[str] | None) -> Specimen:
     """The specimen with its lengths changed."""
     from creepkit.errors import SolveError, nearest
 
-    lengths = numbers(texts or (), "--geometry", "apex_thickness=0.48")
+    lengths = parse_numbers(texts or (), "--geometry", "apex_thickness=0.48")
     if not lengths:
-        return body
-    known = getattr(getattr(body, "geometry", None), "lengths", ())
+        return specimen
+    known_lengths = getattr(getattr(specimen, "geometry", None), "lengths", ())
     for name in lengths:
-        if name not in known:
-            raise SolveError(f"--geometry: no length is called '{name}'; {nearest(name, known)}")
-    return body.replace(**lengths)  # type: ignore[attr-defined, no-any-return]
+        if name not in known_lengths:
+            raise SolveError(f"--geometry: no length is called '{name}'; {nearest(name, known_lengths)}")
+    return specimen.replace(**lengths)  # type: ignore[attr-defined, no-any-return]

@@ -17,20 +17,20 @@ def command(as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")]
     """List the specimens, and what is observed of each."""
     from creepkit import registry
 
-    known = registry.default().specimens()
+    registered = registry.default_registry().specimens()
     if as_json:
-        print_json([_record(found) for found in known.values()])
+        print_json([_specimen_to_json(entry) for entry in registered.values()])
         return
-    rows = [(one.name, one.title, " ".join(one.outputs)) for one in (found.value for found in known.values())]
+    rows = [(specimen.name, specimen.title, " ".join(specimen.outputs)) for specimen in (found.value for found in registered.values())]
     print_table(f"{len(rows)} specimens", ("name", "title", "outputs"), rows)
 
 
-def _record(found: Registered[Specimen]) -> dict[str, Any]:
-    one = found.value
+def _specimen_to_json(entry: Registered[Specimen]) -> dict[str, Any]:
+    specimen = entry.value
     return {
-        "name": one.name,
-        "title": one.title,
-        "outputs": list(one.outputs),
-        "nuisances": list(getattr(one, "effects", ())),
-        "provenance": str(found.provenance),
+        "name": specimen.name,
+        "title": specimen.title,
+        "outputs": list(specimen.outputs),
+        "nuisances": list(getattr(specimen, "nuisances", ())),
+        "provenance": str(entry.provenance),
     }

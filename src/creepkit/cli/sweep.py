@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from creepkit.cli.printing import print_json, print_table
-from creepkit.cli.progress import Progress
+from creepkit.cli.progress import ProgressBar
 
 
 def command(
@@ -35,31 +35,31 @@ def command(
     """
     import torch
 
-    from creepkit.cli.train import recipe_given
-    from creepkit.dataset.store import read
+    from creepkit.cli.train import select_recipe
+    from creepkit.dataset.store import read_dataset
     from creepkit.surrogate.parameter_gru import ParameterGru
-    from creepkit.surrogate.sweep import figure, rows_of, sweep
+    from creepkit.surrogate.sweep import size_study_figure, size_study_rows, size_study
 
     if threads is not None:
         torch.set_num_threads(threads)
-    how = {"epochs": epochs, "rate": rate, "schedule": schedule}
-    recipe = recipe_given("parameter-gru", {"target": target}, how)
+    training_options = {"epochs": epochs, "rate": rate, "schedule": schedule}
+    recipe = select_recipe("parameter-gru", {"target": target}, training_options)
     assert isinstance(recipe, ParameterGru)
-    with Progress() as progress:
-        entries = sweep(
-            read(data, accepted_only=True), recipe, to=to, layers=whole(layers, "--layers"),
-            hidden=whole(hidden, "--hidden"), cells=tuple(cell.split(",")),  # type: ignore[arg-type]  # words; ParameterGru says which it knows
-            samples=whole(samples, "--samples") if samples else (), seed=seed, device=device, progress=progress.tick,
+    with ProgressBar() as progress:
+        entries = size_study(
+            read_dataset(data, accepted_only=True), recipe, to=to, layers=parse_whole_numbers(layers, "--layers"),
+            hidden=parse_whole_numbers(hidden, "--hidden"), cells=tuple(cell.split(",")),  # type: ignore[arg-type]  # words; ParameterGru says which it knows
+            samples=parse_whole_numbers(samples, "--samples") if samples else (), seed=seed, device=device, progress=progress.tick,
         )  # fmt: skip
-    figure(entries, to / "sweep.png")
+    size_study_figure(entries, to / "sweep.png")
     if as_json:
         print_json({"trainings": [vars(e) for e in entries], "picture": str(to / "sweep.png")})
         return
-    print_table("", *rows_of(entries))
+    print_table("", *size_study_rows(entries))
     typer.echo(f"wrote {to / 'sweep.png'}")
 
 
-def whole(text: str, option: str) -> tuple[int, ...]:
+def parse_whole_numbers(text: str, option: str) -> tuple[int, ...]:
     """Whole numbers above zero, from text such as 1,2,3."""
     from creepkit.errors import SurrogateError
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from creepkit.cli.printing import print_json
-from creepkit.cli.progress import Progress
+from creepkit.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
     from creepkit.surrogate.recipe import Recipe
     from creepkit.surrogate.surrogate import Surrogate
 
-RECIPES = ("parameter-gru", "rate-net")
+RECIPE_NAMES = ("parameter-gru", "rate-net")
 
 
 def command(
@@ -52,53 +52,53 @@ def command(
     import torch
 
     from creepkit import study
-    from creepkit.dataset.store import read
+    from creepkit.dataset.store import read_dataset
 
     if threads is not None:
         torch.set_num_threads(threads)
-    sizes = {"hidden": hidden, "layers": layers, "cell": cell, "target": target, "base": base,
+    network_options = {"hidden": hidden, "layers": layers, "cell": cell, "target": target, "base": base,
              "inputs": None if inputs is None else tuple(inputs.split(","))}  # fmt: skip
-    how = {"epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule, "early_stop": early_stop, "clip": clip}
-    chosen, samples = recipe_given(recipe, sizes, how), read(data, accepted_only=True)
-    with Progress() as progress:
-        model = study.train(samples, chosen, to=to, seed=seed, device=device, progress=progress.tick)
-    drawn = draw(model, samples, plots or to.parent, to.stem)
+    training_options = {"epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule, "early_stop": early_stop, "clip": clip}
+    selected_recipe, samples = select_recipe(recipe, network_options, training_options), read_dataset(data, accepted_only=True)
+    with ProgressBar() as progress:
+        model = study.train(samples, selected_recipe, to=to, seed=seed, device=device, progress=progress.tick)
+    plot_files = plot_surrogate(model, samples, plots or to.parent, to.stem)
     if as_json:
-        print_json({"file": str(to), "metrics": model.told.metrics, "pictures": [str(path) for path in drawn]})
+        print_json({"file": str(to), "metrics": model.metadata.metrics, "pictures": [str(path) for path in plot_files]})
         return
     typer.echo(f"{model}\n")
-    for path in (to, *drawn):
+    for path in (to, *plot_files):
         typer.echo(f"wrote {path}")
 
 
-def recipe_given(kind: str, sizes: dict[str, Any], how: dict[str, Any]) -> Recipe:
+def select_recipe(recipe_name: str, network_options: dict[str, Any], training_options: dict[str, Any]) -> Recipe:
     """The recipe of this kind with what was given of its fields; SurrogateError for a field that it has not."""
     from dataclasses import fields, replace
 
     import creepkit as ck
     from creepkit.errors import SurrogateError, nearest
 
-    if kind not in RECIPES:
-        raise SurrogateError(f"--recipe {kind} is not known; {nearest(kind, RECIPES)}")
-    made: Any = ck.ParameterGru() if kind == "parameter-gru" else ck.RateNet()
-    known = {f.name for f in fields(made) if f.init}
-    given = {name: value for name, value in sizes.items() if value is not None}
-    for name in given.keys() - known:
-        raise SurrogateError(f"--{name} means nothing to {kind}; it has {', '.join(sorted(known - {'training'}))}")
-    training = replace(made.training, **{name: value for name, value in how.items() if value is not None})
-    recipe: Recipe = replace(made, **given, training=training)
+    if recipe_name not in RECIPE_NAMES:
+        raise SurrogateError(f"--recipe {recipe_name} is not known; {nearest(recipe_name, RECIPE_NAMES)}")
+    default_recipe: Any = ck.ParameterGru() if recipe_name == "parameter-gru" else ck.RateNet()
+    field_names = {f.name for f in fields(default_recipe) if f.init}
+    given_options = {name: value for name, value in network_options.items() if value is not None}
+    for name in given_options.keys() - field_names:
+        raise SurrogateError(f"--{name} means nothing to {recipe_name}; it has {', '.join(sorted(field_names - {'training'}))}")
+    training = replace(default_recipe.training, **{name: value for name, value in training_options.items() if value is not None})
+    recipe: Recipe = replace(default_recipe, **given_options, training=training)
     return recipe
 
 
-def draw(model: Surrogate, data: Dataset, folder: Path, name: str) -> list[Path]:
+def plot_surrogate(model: Surrogate, data: Dataset, folder: Path, name: str) -> list[Path]:
     """Draw the curves, the parity plot and the worst samples; returns their paths."""
     from creepkit.surrogate import plotting
     from creepkit.surrogate.evaluation import evaluate
 
     folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / f"{name}-{what}.png" for what in ("curves", "parity", "worst")]
-    judged = evaluate(model, data)
-    plotting.curves(model.told, paths[0])
-    plotting.parity(judged.found, judged.times, paths[1])
-    plotting.worst_samples(judged.found, paths[2])
+    evaluation = evaluate(model, data)
+    plotting.training_curves(model.metadata, paths[0])
+    plotting.parity_figure(evaluation.comparison, evaluation.times, paths[1])
+    plotting.worst_samples_figure(evaluation.comparison, paths[2])
     return paths

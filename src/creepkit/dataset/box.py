@@ -11,25 +11,25 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.dataset.criteria import Criterion
 from creepkit.dataset.design import Draws
-from creepkit.dataset.ranges import Conditions, range_of
-from creepkit.dataset.reference import Reference
+from creepkit.dataset.ranges import ConditionRanges, condition_range
+from creepkit.dataset.reference import ReferenceStress
 from creepkit.dataset.time_grid import PAPER_END, TimeGrid
 from creepkit.language import CreepLaw
 from creepkit.language.tree import law_to_json
 
 
 @dataclass(frozen=True)
-class Box:
+class SamplingDomain:
     """A design that draws a law's parameters and the conditions of its tests from ranges.
 
     reference : what stands for a test where the rate of its material is wanted, and which rates are useful.
     """
 
     law: CreepLaw
-    conditions: Conditions
+    conditions: ConditionRanges
     grid: TimeGrid
     criteria: tuple[Criterion, ...]
-    reference: Reference
+    reference_stress: ReferenceStress
 
     name: ClassVar[str]
     """The word for it; part of its document."""
@@ -60,12 +60,12 @@ class Box:
         }
 
 
-def within_bounds(law: CreepLaw, unit: Floats) -> Floats:
+def uniform_in_bounds(law: CreepLaw, unit_coordinates: Floats) -> Floats:
     """Internal parameters at coordinates (rows, parameters) from 0 to 1, each uniform on its own scale."""
     low, high = np.array([[p.to_internal(b) for b in p.bounds] for p in law.params.values()]).reshape(-1, 2).T
-    return np.asarray(low + unit * (high - low))
+    return np.asarray(low + unit_coordinates * (high - low))
 
 
-def grid_for(every: float, given: Mapping[str, Any]) -> TimeGrid:
+def default_grid(interval: float, ranges: Mapping[str, Any]) -> TimeGrid:
     """Frames up to the end of the longest test."""
-    return TimeGrid.every(every, range_of("end_time", given.get("end_time", PAPER_END)).high)
+    return TimeGrid.every(interval, condition_range("end_time", ranges.get("end_time", PAPER_END)).high)

@@ -16,26 +16,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.dataset import shards, store
-from creepkit.dataset.ledger import Ledger
-from creepkit.dataset.merging import AGAIN, is_enough, merge
-from creepkit.dataset.pace import Pace, Progress
-from creepkit.dataset.shards import Answer, Campaign
+from creepkit.dataset.ledger import ProgressRecord
+from creepkit.dataset.merging import POLL_INTERVAL, is_complete, merge_shards
+from creepkit.dataset.pace import ProgressReporter, ProgressCallback
+from creepkit.dataset.shards import TaskResult, Campaign
 from creepkit.dataset.workers import ProcessWorkers, Workers
 from creepkit.errors import DatasetError
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
-    from creepkit.dataset.design import Design
+    from creepkit.dataset.design import SamplingDesign
     from creepkit.records import Specimen
 
 _log = logging.getLogger("creepkit.dataset")
 
-PATIENCE = 20
+MOST_WORKER_DEATHS = 20
 """Deaths of workers at one shard, after which something else than a sample must be wrong."""
 
 
 def generate(
-    design: Design,
+    design: SamplingDesign,
     specimen: Specimen,
     *,
     samples: int | None = None,
@@ -45,8 +45,8 @@ def generate(
     cluster: str | None = None,
     draws: int | None = None,
     part: tuple[int, int] | None = None,
-    progress: Progress | None = None,
-    rows: int = shards.ROWS,
+    progress: ProgressCallback | None = None,
+    rows: int = shards.SHARD_ROWS,
 ) -> Dataset:
     """Simulate samples of a design until enough are accepted, write them to a file, and return them.
 
@@ -60,69 +60,69 @@ def generate(
     path = Path(to)
     if not path.name:
         raise DatasetError(f"'{to}' is no name of a file; name the HDF5 file to write, such as combined.h5")
-    campaign = Campaign(design, specimen, _whole("seed", seed), path.with_name(f"{path.name}.parts"), rows)
-    ledger = Ledger(campaign, samples, draws, part)
-    if part is None and is_enough(campaign, ledger, path):
-        return store.read(path)
+    campaign = Campaign(design, specimen, _whole_number("seed", seed), path.with_name(f"{path.name}.parts"), rows)
+    record = ProgressRecord(campaign, samples, draws, part)
+    if part is None and is_complete(campaign, record, path):
+        return store.read_dataset(path)
     campaign.open_folder()
-    ledger.look()
-    with _crew(campaign, workers, cluster) as crew:
-        fill(ledger, crew, progress)
+    record.scan_finished()
+    with _start_workers(campaign, workers, cluster) as pool:
+        run_until_enough(record, pool, progress)
     if part is not None:
-        return shards.together(campaign, sorted(ledger.done))
-    merge(campaign, ledger, path, progress)
-    return store.read(path)
+        return shards.read_shards(campaign, sorted(record.done))
+    merge_shards(campaign, record, path, progress)
+    return store.read_dataset(path)
 
 
-def _whole(what: str, number: object) -> int:
+def _whole_number(name: str, value: object) -> int:
     """A number from zero on, which must be whole: 1.5 does not become 1."""
-    if not isinstance(number, int | np.integer) or isinstance(number, bool) or number < 0:
-        raise DatasetError(f"{what} is {number!r}; allowed are whole numbers from zero on")
-    return int(number)
+    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 0:
+        raise DatasetError(f"{name} is {value!r}; allowed are whole numbers from zero on")
+    return int(value)
 
 
-def fill(ledger: Ledger, crew: Workers, progress: Progress | None) -> None:
+def run_until_enough(record: ProgressRecord, pool: Workers, progress: ProgressCallback | None) -> None:
     """Have shards simulated until there are enough; DatasetError when one cannot be."""
-    pace = Pace(ledger, progress)
-    taken: dict[int, float] = {}
+    reporter = ProgressReporter(record, progress)
+    locked_elsewhere: dict[int, float] = {}
     deaths: Counter[int] = Counter()
-    while ledger.leading() is None:
-        for number in [n for n, since in taken.items() if time.monotonic() - since > AGAIN][: crew.free]:
-            del taken[number]
-            crew.submit(number)
-        while crew.free and (following := ledger.following()) is not None:
-            ledger.at_work.add(following)
-            crew.submit(following)
-        for answer in crew.answers(AGAIN):
-            _enter(answer, ledger, taken)
-            if answer.kind == "died":
-                _again(answer, deaths, crew)
-        pace.tell()
+    while record.leading_run() is None:
+        for number in [n for n, since in locked_elsewhere.items() if time.monotonic() - since > POLL_INTERVAL][: pool.free_slots]:
+            del locked_elsewhere[number]
+            pool.submit(number)
+        while pool.free_slots and (shard := record.next_shard()) is not None:
+            record.running.add(shard)
+            pool.submit(shard)
+        for result in pool.results(POLL_INTERVAL):
+            _record_result(result, record, locked_elsewhere)
+            if result.status == "died":
+                _resubmit(result, deaths, pool)
+        reporter.report()
 
 
-def _enter(answer: Answer, ledger: Ledger, taken: dict[int, float]) -> None:
+def _record_result(result: TaskResult, record: ProgressRecord, locked_elsewhere: dict[int, float]) -> None:
     """Enter what became of a shard; DatasetError when it cannot be done."""
-    if answer.kind == "done":
-        ledger.note(answer.number, answer.accepted)
-    elif answer.kind == "taken":
-        taken[answer.number] = time.monotonic()
-    elif answer.kind == "error":
-        raise DatasetError(answer.text)
+    if result.status == "done":
+        record.mark_done(result.number, result.accepted)
+    elif result.status == "taken":
+        locked_elsewhere[result.number] = time.monotonic()
+    elif result.status == "error":
+        raise DatasetError(result.text)
 
 
-def _again(answer: Answer, deaths: Counter[int], crew: Workers) -> None:
+def _resubmit(result: TaskResult, deaths: Counter[int], pool: Workers) -> None:
     """Have a shard done again whose worker died."""
-    deaths[answer.number] += 1
-    if deaths[answer.number] > PATIENCE:
+    deaths[result.number] += 1
+    if deaths[result.number] > MOST_WORKER_DEATHS:
         raise DatasetError(
-            f"shard {answer.number}: its worker process died {PATIENCE} times, the last time by {answer.text}; "
+            f"shard {result.number}: its worker process died {MOST_WORKER_DEATHS} times, the last time by {result.text}; "
             "is there memory enough for so many workers?"
         )
-    _log.warning("a worker process died (%s); its shard %d is simulated again", answer.text, answer.number)
-    crew.submit(answer.number)
+    _log.warning("a worker process died (%s); its shard %d is simulated again", result.text, result.number)
+    pool.submit(result.number)
 
 
-def _crew(campaign: Campaign, workers: int | None, cluster: str | None) -> AbstractContextManager[Workers]:
+def _start_workers(campaign: Campaign, workers: int | None, cluster: str | None) -> AbstractContextManager[Workers]:
     """Who simulates: processes here, or a cluster."""
     if cluster is not None:
         from creepkit.dataset.cluster import ClusterWorkers

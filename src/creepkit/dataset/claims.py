@@ -14,14 +14,14 @@ from collections import Counter
 from pathlib import Path
 from types import TracebackType
 
-NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
+UNSUPPORTED_LOCK_ERRORS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
 """What file systems without locks answer."""
 
 MOST_DIGITS = 19
 """Of the number of a sample; what has more is none."""
 
 
-class Claim:
+class ShardLock:
     """The claim on a shard; a context, `held` in it when nobody else has it.
 
     deaths : {sample: how often its process died in it}.
@@ -30,23 +30,23 @@ class Claim:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._file = -1
-        self._known = b""
+        self._recorded_deaths = b""
         self.held = False
         self.deaths: Counter[int] = Counter()
 
-    def __enter__(self) -> Claim:
+    def __enter__(self) -> ShardLock:
         self._file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
         self.held = _locked(self._file)
         if self.held:
             lines = os.pread(self._file, 1 << 20, 0).split()
             self.deaths = Counter(int(line) for line in lines if line.isdigit() and len(line) < MOST_DIGITS)
-            self._known = b"".join(b"%d\n" % row for row in self.deaths.elements())
+            self._recorded_deaths = b"".join(b"%d\n" % row for row in self.deaths.elements())
         return self
 
-    def starting(self, row: int) -> None:
+    def record_start(self, sample: int) -> None:
         """Note that a sample is being simulated now."""
-        os.ftruncate(self._file, len(self._known))
-        os.pwrite(self._file, b"%d\n" % row, len(self._known))
+        os.ftruncate(self._file, len(self._recorded_deaths))
+        os.pwrite(self._file, b"%d\n" % sample, len(self._recorded_deaths))
 
     def remove(self) -> None:
         """Take the file away: the shard is done."""
@@ -56,7 +56,7 @@ class Claim:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self.held:  # what ends here, be it by an error, has not died
-            os.ftruncate(self._file, len(self._known))
+            os.ftruncate(self._file, len(self._recorded_deaths))
         os.close(self._file)
 
 
@@ -66,6 +66,6 @@ def _locked(file: int) -> bool:
     except BlockingIOError:
         return False
     except OSError as error:
-        if error.errno not in NO_LOCKS:
+        if error.errno not in UNSUPPORTED_LOCK_ERRORS:
             raise
     return True

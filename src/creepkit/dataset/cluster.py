@@ -8,26 +8,26 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Any
 
-from creepkit.dataset.shards import Answer, Campaign
-from creepkit.dataset.worker import attempt
+from creepkit.dataset.shards import TaskResult, Campaign
+from creepkit.dataset.worker import run_task
 from creepkit.errors import DatasetError
 
 ADDRESS = re.compile(r"inproc://.+|[a-z]+://.+:[0-9]+/?")
-WAIT = 30
+CONNECT_TIMEOUT = 30
 """s, in which a scheduler answers."""
-FEWEST = 8
+LEAST_QUEUED = 8
 """Shards handed over while a cluster has few workers or none: an adaptive one grows by what waits."""
-LOST = ("KilledWorker", "FutureCancelledError", "CancelledError")
+DEAD_WORKER_ERRORS = ("KilledWorker", "FutureCancelledError", "CancelledError")
 """What dask says of a task whose workers died."""
 
 
 class ClusterWorkers:
     """The workers of a dask scheduler, at most `size` of their threads at once (None: all); a context."""
 
-    def __init__(self, campaign: Campaign, address: str, size: int | None = None) -> None:
-        self._campaign = campaign.on_one_thread()
+    def __init__(self, job: Campaign, address: str, thread_limit: int | None = None) -> None:
+        self._job = job.on_one_thread()
         self._address = address
-        self._size = size
+        self._size = thread_limit
         self._client: Any = None
         self._futures: dict[Any, int] = {}
 
@@ -40,7 +40,7 @@ class ClusterWorkers:
             raise DatasetError(f"'{self._address}' is no address of a dask scheduler; write tcp://host:port")
         try:
             self._client = Client(  # type: ignore[no-untyped-call]
-                self._address, timeout=WAIT, set_as_default=False
+                self._address, timeout=CONNECT_TIMEOUT, set_as_default=False
             )
         except (OSError, ValueError) as error:
             raise DatasetError(f"no dask scheduler answers at {self._address}: {_one_line(error)}") from None
@@ -53,16 +53,16 @@ class ClusterWorkers:
         self._client.close()
 
     @property
-    def free(self) -> int:
+    def free_slots(self) -> int:
         """How many more shards can be handed over: two for each thread, so that none waits for us."""
-        size = self._size or max(FEWEST, 2 * sum(self._client.nthreads().values()))
+        size = self._size or max(LEAST_QUEUED, 2 * sum(self._client.nthreads().values()))
         return max(size - len(self._futures), 0)
 
     def submit(self, number: int) -> None:
         """Hand a shard to the scheduler."""
-        self._futures[self._client.submit(attempt, self._campaign, number, pure=False)] = number
+        self._futures[self._client.submit(run_task, self._job, number, pure=False)] = number
 
-    def answers(self, timeout: float) -> list[Answer]:
+    def results(self, timeout: float) -> list[TaskResult]:
         """Wait for answers, at most so many s."""
         from distributed import wait
 
@@ -71,25 +71,25 @@ class ClusterWorkers:
             return []
         with suppress(TimeoutError), self._client.as_current():
             wait(list(self._futures), timeout, "FIRST_COMPLETED")  # type: ignore[no-untyped-call]
-        ended = [future for future in self._futures if future.done()]
-        return [self._answer(future, self._futures.pop(future)) for future in ended]
+        finished = [future for future in self._futures if future.done()]
+        return [self._result(future, self._futures.pop(future)) for future in finished]
 
-    def _answer(self, future: Any, number: int) -> Answer:
+    def _result(self, future: Any, number: int) -> TaskResult:
         """What a task returned; a worker that died in it often enough is an answer too."""
         error = future.exception()
         if error is None:
-            answer: Answer = future.result()
-            return self._seen(answer)
-        if type(error).__name__ in LOST:
-            return Answer(number, "died", text=type(error).__name__)
-        return Answer(number, "error", text=f"a dask worker could not run its shard: {_one_line(error)}")
+            result: TaskResult = future.result()
+            return self._checked(result)
+        if type(error).__name__ in DEAD_WORKER_ERRORS:
+            return TaskResult(number, "died", text=type(error).__name__)
+        return TaskResult(number, "error", text=f"a dask worker could not run its shard: {_one_line(error)}")
 
-    def _seen(self, answer: Answer) -> Answer:
+    def _checked(self, result: TaskResult) -> TaskResult:
         """The answer, unless what was done there cannot be seen here."""
-        if answer.kind == "done" and not self._campaign.path(answer.number).exists():
-            text = f"a dask worker wrote {self._campaign.path(answer.number)}, which is not there on this machine"
-            return Answer(answer.number, "error", text=f"{text}; name a file in a folder that all machines share")
-        return answer
+        if result.status == "done" and not self._job.path(result.number).exists():
+            text = f"a dask worker wrote {self._job.path(result.number)}, which is not there on this machine"
+            return TaskResult(result.number, "error", text=f"{text}; name a file in a folder that all machines share")
+        return result
 
 
 def _one_line(error: BaseException) -> str:

@@ -14,17 +14,17 @@ from functools import lru_cache
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.dataset.looks import Looks, mean_ln_rate
+from creepkit.dataset.looks import RateEvaluationPoints, mean_ln_rate
 from creepkit.errors import DatasetError
 from creepkit.kernels.logform import log_form
 from creepkit.language import CreepLaw
 
-LARGEST = 690.0
+LARGEST_LN_COEFFICIENT = 690.0
 """ln of a coefficient that is still finite in double precision: what a term that is nowhere above zero gets."""
 
 
 @dataclass(frozen=True)
-class Part:
+class TermGroup:
     """Terms of a law with one coefficient.
 
     law : these terms alone. positions : of its parameters in the whole law. coefficient : position of the coefficient
@@ -34,65 +34,65 @@ class Part:
     law: CreepLaw
     positions: tuple[int, ...]
     coefficient: int
-    slope: float
+    exponent: float
 
-    def ln_rate(self, theta: Floats, looks: Looks, factor: float = 1.0) -> Floats:
+    def ln_mean_rate(self, theta: Floats, points: RateEvaluationPoints, stress_factor: float = 1.0) -> Floats:
         """ln of the part's mean rate over a test, 1/s, (rows, ...).
 
         theta : (rows, ..., parameters) internal ones of the whole law. factor : on the stresses.
         """
-        return mean_ln_rate(self.law, theta[..., list(self.positions)], looks, factor)
+        return mean_ln_rate(self.law, theta[..., list(self.positions)], points, stress_factor)
 
 
 @lru_cache(maxsize=64)
-def parts_of(law: CreepLaw) -> tuple[Part, ...]:
+def term_groups(law: CreepLaw) -> tuple[TermGroup, ...]:
     """The parts of a law; DatasetError where a term has no coefficient to set its rate with."""
-    slopes = slopes_of(law)
-    found = []
-    for group in _groups(slopes):
-        common = set.intersection(*(set(slopes[k]) for k in group))
-        others = {p for k, own in enumerate(slopes) if k not in group for p in own}
-        mine = sorted(p for p in common - others if len({slopes[k][p] for k in group}) == 1)
-        if not mine:
-            told = "', '".join(list(law.terms)[k] for k in group)
+    exponents = coefficient_exponents(law)
+    groups = []
+    for term_numbers in _connected_terms(exponents):
+        common = set.intersection(*(set(exponents[k]) for k in term_numbers))
+        others = {p for k, term_exponents in enumerate(exponents) if k not in term_numbers for p in term_exponents}
+        exclusive = sorted(p for p in common - others if len({exponents[k][p] for k in term_numbers}) == 1)
+        if not exclusive:
+            labels = "', '".join(list(law.terms)[k] for k in term_numbers)
             raise DatasetError(
-                f"law '{law.name}': term '{told}' has no linear rate coefficient (of log scale, with off=0) to set "
+                f"law '{law.name}': term '{labels}' has no linear rate coefficient (of log scale, with off=0) to set "
                 "its rate with; use the paper's box"
             )
-        only = law.only(*(list(law.terms)[k] for k in group))
-        positions = tuple(law.names.index(name) for name in only.names)
-        found.append(Part(only, positions, mine[0], slopes[group[0]][mine[0]]))
-    return tuple(found)
+        group_law = law.only(*(list(law.terms)[k] for k in term_numbers))
+        positions = tuple(law.names.index(name) for name in group_law.names)
+        groups.append(TermGroup(group_law, positions, exclusive[0], exponents[term_numbers[0]][exclusive[0]]))
+    return tuple(groups)
 
 
-def solve(parts: Sequence[Part], theta: Floats, rates: Floats, looks: Looks) -> Floats:
+def solve_coefficients(groups: Sequence[TermGroup], theta: Floats, ln_rates: Floats, points: RateEvaluationPoints) -> Floats:
     """Return theta with coefficients that give each part its mean rate over the test.
 
     theta : (rows, parameters) internal. rates : (rows, parts) ln of the wanted rates, -inf: off.
     """
     solved = np.array(theta)
-    solved[:, [part.coefficient for part in parts]] = 0.0
-    at_one = [part.ln_rate(solved, looks) for part in parts]
-    for part, wanted, found in zip(parts, rates.T, at_one, strict=True):
-        solved[:, part.coefficient] = np.minimum((wanted - found) / part.slope, LARGEST)
+    solved[:, [group.coefficient for group in groups]] = 0.0
+    ln_unit_rates = [part.ln_mean_rate(solved, points) for part in groups]
+    for part, ln_rate, ln_unit_rate in zip(groups, ln_rates.T, ln_unit_rates, strict=True):
+        solved[:, part.coefficient] = np.minimum((ln_rate - ln_unit_rate) / part.exponent, LARGEST_LN_COEFFICIENT)
     return solved
 
 
-def slopes_of(law: CreepLaw) -> list[dict[int, float]]:
+def coefficient_exponents(law: CreepLaw) -> list[dict[int, float]]:
     """For each term {position of a parameter that can switch it off: the power at which it multiplies the term}."""
     form = log_form(law)
-    table = list(law.params.values())
-    found = []
+    parameters = list(law.params.values())
+    exponents = []
     for term, positions in zip(form.terms, form.coefficients, strict=True):
-        slopes = {k: term.diff(form.theta[k]) for k in positions if table[k].off == 0.0}
-        found.append({k: float(slope) for k, slope in slopes.items() if slope.is_number and slope > 0})
-    return found
+        derivatives = {k: term.diff(form.theta[k]) for k in positions if parameters[k].off == 0.0}
+        exponents.append({k: float(derivative) for k, derivative in derivatives.items() if derivative.is_number and derivative > 0})
+    return exponents
 
 
-def _groups(slopes: Sequence[dict[int, float]]) -> list[list[int]]:
+def _connected_terms(exponents: Sequence[dict[int, float]]) -> list[list[int]]:
     """Terms that share a coefficient, directly or through others, together."""
     groups: list[list[int]] = []
-    for k, own in enumerate(slopes):
-        touching = [g for g in groups if any(set(own) & set(slopes[j]) for j in g)]
-        groups = [g for g in groups if g not in touching] + [sorted([k, *(j for g in touching for j in g)])]
+    for k, term_exponents in enumerate(exponents):
+        connected = [g for g in groups if any(set(term_exponents) & set(exponents[j]) for j in g)]
+        groups = [g for g in groups if g not in connected] + [sorted([k, *(j for g in connected for j in g)])]
     return sorted(groups)

@@ -15,8 +15,8 @@ class Column(NamedTuple):
     chunk : samples that are compressed together.
     """
 
-    stored: type
-    held: type
+    file_type: type
+    memory_type: type
     axes: tuple[str, ...] = ()
     chunk: int = 4096
 
@@ -32,11 +32,11 @@ COLUMNS = {
     "index": Column(np.int64, np.int64),
 }
 
-MARKS = 4
+HOLD_TIMES = 4
 """Ends of the first ramp, of the first hold, of the second ramp, and of the test."""
 
 
-def nothing(sizes: Mapping[str, int]) -> dict[str, Any]:
+def empty_columns(sizes: Mapping[str, int]) -> dict[str, Any]:
     """Every column with no samples in it yet; sizes : of its axes, by their names."""
-    inner = {name: tuple(sizes[axis] for axis in column.axes) for name, column in COLUMNS.items()}
-    return {name: np.empty((0, *inner[name]), column.held) for name, column in COLUMNS.items()}
+    shapes = {name: tuple(sizes[axis] for axis in column.axes) for name, column in COLUMNS.items()}
+    return {name: np.empty((0, *shapes[name]), column.memory_type) for name, column in COLUMNS.items()}

@@ -14,93 +14,93 @@ from typing import Any, ClassVar
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.dataset.box import Box, grid_for, within_bounds
-from creepkit.dataset.coefficients import parts_of, solve
-from creepkit.dataset.conditions import kind_of
-from creepkit.dataset.criteria_of_boxes import informative
+from creepkit.dataset.box import SamplingDomain, default_grid, uniform_in_bounds
+from creepkit.dataset.coefficients import term_groups, solve_coefficients
+from creepkit.dataset.conditions import test_kind
+from creepkit.dataset.criteria_of_boxes import conditioned_criteria
 from creepkit.dataset.design import Draws
-from creepkit.dataset.growths import solve_growths
-from creepkit.dataset.looks import Looks
-from creepkit.dataset.ranges import PAPER, conditions
-from creepkit.dataset.reference import reference_of
-from creepkit.dataset.shares import DIMENSIONS, HOW_MANY, ln_shares, present
-from creepkit.dataset.sobol import sobol, spread_step
-from creepkit.dataset.stress_scales import draw_scales, scales_of
-from creepkit.dataset.term_rates import authors
+from creepkit.dataset.growths import solve_damage_coefficients
+from creepkit.dataset.looks import RateEvaluationPoints
+from creepkit.dataset.ranges import PAPER_RANGES, condition_ranges
+from creepkit.dataset.reference import reference_stress_of
+from creepkit.dataset.shares import SELECTION_DIMENSIONS, TERM_COUNT_PROBABILITIES, ln_term_fractions, active_terms
+from creepkit.dataset.sobol import sobol_rows, additive_recurrence_step
+from creepkit.dataset.stress_scales import draw_stress_scales, stress_scale_positions
+from creepkit.dataset.term_rates import author_parameters
 from creepkit.dataset.time_grid import PAPER_INTERVAL, TimeGrid
 from creepkit.language import CreepLaw, temperature
 from creepkit.records import Specimen
 
-TURNS = 32
+MOST_TRIALS = 32
 """Places at which the parameters of a row are looked for."""
 
 
 @dataclass(frozen=True)
-class ConditionedBox(Box):
+class ConditionedDomain(SamplingDomain):
     """Uniform in the log of the mean rate at the reference stress; how_many : shares of rows with 1, 2, 3 parts."""
 
-    how_many: tuple[float, ...] = HOW_MANY
+    term_count_probabilities: tuple[float, ...] = TERM_COUNT_PROBABILITIES
 
     name: ClassVar[str] = "conditioned"
 
     def draw(self, first: int, count: int, seed: int) -> Draws:
         """Return rows of the sequence: total rate, choice of parts, their shares, parameters, then conditions."""
-        parts = len(parts_of(self.law))
-        sizes = (1, DIMENSIONS, parts, len(self.law.params), len(self.condition_names))
-        unit = np.split(sobol(sum(sizes), first, count, seed), np.cumsum(sizes)[:-1], axis=1)
-        tests = Draws(np.zeros((count, 0)), self.conditions.draw(unit[4]), self.condition_names)
-        low, high = self.reference.window(tests, self.conditions.end)
-        there = present(unit[1], parts, self.how_many)
-        rates = np.log(10.0) * (low + unit[0][:, 0] * (high - low))[:, None] + ln_shares(unit[2], there)
-        looks = self.reference.looks(tests, self.conditions.end)
-        return Draws(self._parameters(unit[3], there, rates, looks, tests), tests.conditions, self.condition_names)
+        group_count = len(term_groups(self.law))
+        sizes = (1, SELECTION_DIMENSIONS, group_count, len(self.law.params), len(self.condition_names))
+        unit_coordinates = np.split(sobol_rows(sum(sizes), first, count, seed), np.cumsum(sizes)[:-1], axis=1)
+        tests = Draws(np.zeros((count, 0)), self.conditions.draw(unit_coordinates[4]), self.condition_names)
+        low, high = self.reference_stress.useful_rates(tests, self.conditions.end)
+        active = active_terms(unit_coordinates[1], group_count, self.term_count_probabilities)
+        ln_rates = np.log(10.0) * (low + unit_coordinates[0][:, 0] * (high - low))[:, None] + ln_term_fractions(unit_coordinates[2], active)
+        points = self.reference_stress.evaluation_points(tests, self.conditions.end)
+        return Draws(self._parameters(unit_coordinates[3], active, ln_rates, points, tests), tests.conditions, self.condition_names)
 
-    def _parameters(self, unit: Floats, there: Bools, rates: Floats, looks: Looks, tests: Draws) -> Floats:
+    def _parameters(self, unit_coordinates: Floats, active: Bools, ln_rates: Floats, points: RateEvaluationPoints, tests: Draws) -> Floats:
         """The author's parameters for wanted rates.
 
         A row whose parameters leave the bounds or break the law's constraints moves on, by a fixed step in all
         coordinates at once, to the first place where they do not.
         """
-        found = self._solved(unit, there, rates, looks)
-        left, step = np.arange(len(unit)), spread_step(unit.shape[1])
-        for turn in range(1, TURNS):
-            left = left[~self._sound(Draws(found[left], tests.conditions[left], self.condition_names))]
-            if not left.size:
+        parameters = self._solved_parameters(unit_coordinates, active, ln_rates, points)
+        rejected_rows, step = np.arange(len(unit_coordinates)), additive_recurrence_step(unit_coordinates.shape[1])
+        for trial in range(1, MOST_TRIALS):
+            rejected_rows = rejected_rows[~self._meets_draw_criteria(Draws(parameters[rejected_rows], tests.conditions[rejected_rows], self.condition_names))]
+            if not rejected_rows.size:
                 break
-            moved = (unit[left] + turn * step) % 1.0
-            found[left] = self._solved(moved, there[left], rates[left], looks.rows(left))
-        return found
+            shifted = (unit_coordinates[rejected_rows] + trial * step) % 1.0
+            parameters[rejected_rows] = self._solved_parameters(shifted, active[rejected_rows], ln_rates[rejected_rows], points.rows(rejected_rows))
+        return parameters
 
-    def _solved(self, unit: Floats, there: Bools, rates: Floats, looks: Looks) -> Floats:
-        parts = parts_of(self.law)
-        theta = self.exponents(unit, there, looks)
-        theta = draw_scales(self.law, parts, theta, unit[:, list(scales_of(self.law))], rates, looks)
-        theta = solve(parts, theta, rates, looks)
-        return authors(self.law, solve_growths(self.law, theta, unit, looks))
+    def _solved_parameters(self, unit_coordinates: Floats, active: Bools, ln_rates: Floats, points: RateEvaluationPoints) -> Floats:
+        groups = term_groups(self.law)
+        theta = self.shape_parameters(unit_coordinates, active, points)
+        theta = draw_stress_scales(self.law, groups, theta, unit_coordinates[:, list(stress_scale_positions(self.law))], ln_rates, points)
+        theta = solve_coefficients(groups, theta, ln_rates, points)
+        return author_parameters(self.law, solve_damage_coefficients(self.law, theta, unit_coordinates, points))
 
-    def _sound(self, draws: Draws) -> Bools:
+    def _meets_draw_criteria(self, draws: Draws) -> Bools:
         met = [c.passes(self.law, draws) for c in self.criteria if c.stage == "before"]
         return np.asarray(np.all(met, axis=0))
 
-    def exponents(self, unit: Floats, there: Bools, looks: Looks) -> Floats:
+    def shape_parameters(self, unit_coordinates: Floats, active: Bools, points: RateEvaluationPoints) -> Floats:
         """Internal parameters within their bounds, before coefficients and stress scales; there : which parts are."""
-        return within_bounds(self.law, unit)
+        return uniform_in_bounds(self.law, unit_coordinates)
 
     def document(self) -> dict[str, Any]:
         """Everything that decides the draws, as JSON-able data."""
-        return {**super().document(), "reference": vars(self.reference), "how_many": self.how_many}
+        return {**super().document(), "reference": vars(self.reference_stress), "how_many": self.term_count_probabilities}
 
 
-def conditioned_box(
-    law: CreepLaw, specimen: Specimen, *, every: float = PAPER_INTERVAL, grid: TimeGrid | None = None, **given: Any
-) -> ConditionedBox:
+def conditioned_domain(
+    law: CreepLaw, specimen: Specimen, *, every: float = PAPER_INTERVAL, grid: TimeGrid | None = None, **ranges: Any
+) -> ConditionedDomain:
     """Return the conditioned box for any law whose terms have rate coefficients (else DatasetError).
 
     every : s between frames. grid : in its place, other times. given : other ranges of conditions, see design_of.
     """
-    kind = kind_of(specimen)
-    parts_of(law)
-    grid = grid or grid_for(every, given)
-    space = conditions(kind, grid, given, PAPER[kind], warm=law.uses(temperature))
-    reference = reference_of(specimen)
-    return ConditionedBox(law, space, grid, informative(law, kind, space.end), reference)
+    kind = test_kind(specimen)
+    term_groups(law)
+    grid = grid or default_grid(every, ranges)
+    condition_space = condition_ranges(kind, grid, ranges, PAPER_RANGES[kind], needs_temperature=law.uses(temperature))
+    reference = reference_stress_of(specimen)
+    return ConditionedDomain(law, condition_space, grid, conditioned_criteria(law, kind, condition_space.end), reference)

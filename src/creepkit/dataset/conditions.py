@@ -18,12 +18,12 @@ from creepkit.language import Elastic
 from creepkit.records import History, PressureJump, Specimen, StressSteps
 from creepkit.records.history import ZERO_CELSIUS
 
-ROOM = ZERO_CELSIUS + 20.0
+ROOM_TEMPERATURE = ZERO_CELSIUS + 20.0
 """K; the temperature of tests of laws that do not depend on it."""
 
 BULGE, UNIAXIAL = "bulge", "uniaxial"
 
-UNITS = {
+CONDITION_UNITS = {
     "modulus": "MPa",
     "P1": "MPa",
     "P2": "MPa",
@@ -35,80 +35,80 @@ UNITS = {
     "temperature": "K",
 }
 
-KNOWN = {
+CONDITIONS = {
     BULGE: ("modulus", "P1", "P2", "Tj", "end_time", "apex_thickness", "temperature"),
     UNIAXIAL: ("stress_1", "stress_2", "Tj", "end_time", "temperature"),
 }
 """Conditions of each kind of specimen."""
 
-NEEDED = {BULGE: ("modulus", "P1"), UNIAXIAL: ("stress_1",)}
+REQUIRED = {BULGE: ("modulus", "P1"), UNIAXIAL: ("stress_1",)}
 
-LEVELS = {BULGE: ("P1", "P2"), UNIAXIAL: ("stress_1", "stress_2")}
+LOAD_LEVELS = {BULGE: ("P1", "P2"), UNIAXIAL: ("stress_1", "stress_2")}
 """The two levels of the load."""
 
 
-def kind_of(specimen: Specimen) -> str:
+def test_kind(specimen: Specimen) -> str:
     """Which kind of test a specimen is put through: bulge or uniaxial (stand-ins say so before a comma)."""
     kind = specimen.name.split(",")[0]
-    if kind not in KNOWN:
-        raise DatasetError(f"no design knows how to load a specimen '{specimen.name}'; {nearest(kind, KNOWN)}")
+    if kind not in CONDITIONS:
+        raise DatasetError(f"no design knows how to load a specimen '{specimen.name}'; {nearest(kind, CONDITIONS)}")
     return kind
 
 
-def plan(specimen: Specimen, conditions: Mapping[str, float], grid: TimeGrid, name: str = "sample") -> History:
+def planned_test(specimen: Specimen, conditions: Mapping[str, float], grid: TimeGrid, name: str = "sample") -> History:
     """Return the test that conditions describe, without outputs: all times of the grid up to its end."""
-    kind = kind_of(specimen)
-    check_names(kind, conditions)
-    for needed in NEEDED[kind]:
-        if needed not in conditions:
-            raise DatasetError(f"a {kind} test needs the condition '{needed}' ({UNITS[needed]}); it is missing")
+    kind = test_kind(specimen)
+    check_condition_names(kind, conditions)
+    for required in REQUIRED[kind]:
+        if required not in conditions:
+            raise DatasetError(f"a {kind} test needs the condition '{required}' ({CONDITION_UNITS[required]}); it is missing")
     end = float(conditions["end_time"]) if "end_time" in conditions else grid.end
     times = grid.times(end)
-    levels, jump = _levels(kind, conditions, end)
-    thickness = {"apex_thickness": conditions["apex_thickness"]} if "apex_thickness" in conditions else {}
+    levels, jump = _load_levels(kind, conditions, end)
+    geometry = {"apex_thickness": conditions["apex_thickness"]} if "apex_thickness" in conditions else {}
     return History(
         name=name,
         times=times[times <= end * (1 + 1e-12)],
         outputs={},
-        loading=PressureJump(*levels, jump) if kind == BULGE else _steps(levels, jump),
-        temperature=conditions.get("temperature", ROOM),
+        loading=PressureJump(*levels, jump) if kind == BULGE else _stress_steps(levels, jump),
+        temperature=conditions.get("temperature", ROOM_TEMPERATURE),
         specimen=kind,
         elastic=Elastic(conditions["modulus"]) if kind == BULGE else None,
-        geometry=thickness,
+        geometry=geometry,
     )
 
 
-def mark_times(test: History) -> Floats:
+def hold_times(test: History) -> Floats:
     """When the holds of a planned test begin and end, (4,) s: after the first ramp, before and after the jump, the end.
 
     Growth between two of them is creep: no elastic jump lies within a hold.
     """
     end = float(test.times[-1])
     if isinstance(test.loading, PressureJump):
-        ramp, jump = test.loading.ramp, test.loading.Tj
-        return np.minimum([ramp, jump, jump + ramp, end], end)
-    starts = [t for t, _ in getattr(test.loading, "steps", ())]
-    jump = starts[1] if len(starts) > 1 else end
-    return np.minimum([0.0, jump, jump, end], end)
+        ramp, jump_time = test.loading.ramp, test.loading.Tj
+        return np.minimum([ramp, jump_time, jump_time + ramp, end], end)
+    step_times = [t for t, _ in getattr(test.loading, "steps", ())]
+    jump_time = step_times[1] if len(step_times) > 1 else end
+    return np.minimum([0.0, jump_time, jump_time, end], end)
 
 
-def check_names(kind: str, names: Mapping[str, object]) -> None:
+def check_condition_names(kind: str, names: Mapping[str, object]) -> None:
     """DatasetError where a condition is none of a kind of specimen."""
     for name in names:
-        if name not in KNOWN[kind]:
-            raise DatasetError(f"a {kind} test has no condition '{name}': {nearest(name, KNOWN[kind])}")
+        if name not in CONDITIONS[kind]:
+            raise DatasetError(f"a {kind} test has no condition '{name}': {nearest(name, CONDITIONS[kind])}")
 
 
-def _levels(kind: str, conditions: Mapping[str, float], end: float) -> tuple[tuple[float, float], float]:
+def _load_levels(kind: str, conditions: Mapping[str, float], end: float) -> tuple[tuple[float, float], float]:
     """Both levels and when the second begins; without a jump the level stays."""
-    first, second = LEVELS[kind]
-    if (second in conditions) != ("Tj" in conditions):
-        raise DatasetError(f"a jump of a {kind} test needs both {second} and Tj; give both or neither")
-    low = float(conditions[first])
-    return (low, float(conditions.get(second, low))), float(conditions.get("Tj", 0.5 * end))
+    first_name, second_name = LOAD_LEVELS[kind]
+    if (second_name in conditions) != ("Tj" in conditions):
+        raise DatasetError(f"a jump of a {kind} test needs both {second_name} and Tj; give both or neither")
+    first_level = float(conditions[first_name])
+    return (first_level, float(conditions.get(second_name, first_level))), float(conditions.get("Tj", 0.5 * end))
 
 
-def _steps(levels: tuple[float, float], jump: float) -> StressSteps:
+def _stress_steps(levels: tuple[float, float], jump_time: float) -> StressSteps:
     if levels[0] == levels[1]:
         return StressSteps(((0.0, levels[0]),))
-    return StressSteps(((0.0, levels[0]), (jump, levels[1])))
+    return StressSteps(((0.0, levels[0]), (jump_time, levels[1])))

@@ -16,22 +16,22 @@ from typing import ClassVar, Literal, TypeAlias
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.dataset.conditions import ROOM
+from creepkit.dataset.conditions import ROOM_TEMPERATURE
 from creepkit.dataset.constraints import constraints_hold
 from creepkit.dataset.design import Draws
-from creepkit.dataset.term_rates import Point, log10_rate
+from creepkit.dataset.term_rates import RateArguments, log10_rate
 from creepkit.language import CreepLaw
 from creepkit.records import Status
 
 FIRST_HOLD, BEFORE_JUMP, AFTER_JUMP, END = range(4)
 """Rows of an outcome's marks: a hold is from the first to the second, and from the third to the fourth."""
 
-LATER = 2.0
+BURST_TIME_FACTOR = 2.0
 """How many times too early a stand-in must burst before it is believed; the dimple's is within 1.6 as a rule."""
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class SimulationOutcome:
     """One simulated sample, or what a stand-in predicts of it.
 
     times : (frames,) s. outputs : (frames, outputs), first the one that grows with creep; NaN after the end.
@@ -41,26 +41,26 @@ class Outcome:
 
     times: Floats
     outputs: Floats
-    marks: Floats
+    hold_outputs: Floats
     status: Status
     end_time: float
     conditions: Mapping[str, float]
 
     @property
-    def last(self) -> float:
+    def last_output(self) -> float:
         """The first output in the last frame that has one; NaN without any."""
-        seen = self.outputs[np.isfinite(self.outputs[:, 0]), 0]
-        return float(seen[-1]) if seen.size else float("nan")
+        finite_outputs = self.outputs[np.isfinite(self.outputs[:, 0]), 0]
+        return float(finite_outputs[-1]) if finite_outputs.size else float("nan")
 
     @property
-    def growths(self) -> tuple[float, float]:
+    def creep_in_holds(self) -> tuple[float, float]:
         """Growth of the first output in each hold, elastic jumps left out.
 
         Of a hold that a burst cut short up to the last frame; NaN of one that never began.
         """
-        begin, before, after, end = self.marks[:, 0]
-        first = (self.last if np.isnan(before) else before) - begin
-        return float(first), float((self.last if np.isnan(end) else end) - after)
+        start, before, after, end = self.hold_outputs[:, 0]
+        first_hold = (self.last_output if np.isnan(before) else before) - start
+        return float(first_hold), float((self.last_output if np.isnan(end) else end) - after)
 
 
 @dataclass(frozen=True)
@@ -73,18 +73,18 @@ class RateLimit:
     name: str
     text: str
     stress: float
-    least: float | None = None
-    most: float | None = None
+    lower: float | None = None
+    upper: float | None = None
     strain: float = 0.01
     time: float = 1e4
     stage: ClassVar[Literal["before"]] = "before"
 
     def passes(self, law: CreepLaw, draws: Draws) -> Bools:
         """Which draws meet it, (rows,)."""
-        point = Point(self.stress, self.strain, self.time, draws.condition("temperature", ROOM))
-        found = log10_rate(law, draws.parameters, point)
-        low, high = (limit if limit is not None else found for limit in (self.least, self.most))
-        return np.asarray((found >= low) & (found <= high))
+        arguments = RateArguments(self.stress, self.strain, self.time, draws.condition("temperature", ROOM_TEMPERATURE))
+        log10_rates = log10_rate(law, draws.parameters, arguments)
+        low, high = (limit if limit is not None else log10_rates for limit in (self.lower, self.upper))
+        return np.asarray((log10_rates >= low) & (log10_rates <= high))
 
 
 @dataclass(frozen=True)
@@ -98,9 +98,9 @@ class WithinBounds:
     def passes(self, law: CreepLaw, draws: Draws) -> Bools:
         """Which draws meet it, (rows,)."""
         low, high = np.array([param.bounds for param in law.params.values()]).reshape(-1, 2).T
-        off = np.array([np.nan if param.off is None else param.off for param in law.params.values()])
-        found, slack = draws.parameters, 1e-9 * np.abs([low, high])
-        return np.asarray((((found >= low - slack[0]) & (found <= high + slack[1])) | (found == off)).all(axis=1))
+        off_values = np.array([np.nan if param.off is None else param.off for param in law.params.values()])
+        values, slack = draws.parameters, 1e-9 * np.abs([low, high])
+        return np.asarray((((values >= low - slack[0]) & (values <= high + slack[1])) | (values == off_values)).all(axis=1))
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class ConstraintsHold:
 
 
 @dataclass(frozen=True)
-class Lasts:
+class SurvivesTime:
     """The simulation converged and went on for `seconds`, or to the end of a shorter test: criterion 3.
 
     None stands for the whole test. A burst is no failure of the simulation: with a number of seconds, one after them
@@ -130,20 +130,20 @@ class Lasts:
     seconds: float | None = None
     stage: ClassVar[Literal["after"]] = "after"
 
-    def passes(self, outcome: Outcome) -> bool:
+    def passes(self, outcome: SimulationOutcome) -> bool:
         """Whether the outcome meets it."""
         if outcome.status == Status.COMPLETE:
             return True
-        return self.seconds is not None and outcome.status == Status.BURST and outcome.end_time >= self.seconds
+        return self.seconds is not None and outcome.status == Status.RUPTURED and outcome.end_time >= self.seconds
 
-    def rules_out(self, sketch: Outcome) -> bool:
+    def rejects_early(self, screening_outcome: SimulationOutcome) -> bool:
         """Whether a stand-in's prediction leaves no hope: it bursts far too early."""
-        burst = sketch.status == Status.BURST
-        return burst and self.seconds is not None and LATER * sketch.end_time < self.seconds
+        burst = screening_outcome.status == Status.RUPTURED
+        return burst and self.seconds is not None and BURST_TIME_FACTOR * screening_outcome.end_time < self.seconds
 
 
 @dataclass(frozen=True)
-class GrowsInEachHold:
+class CreepInEachHold:
     """Creep above `least` in either hold, elastic jumps left out: criterion 4.
 
     A hold that a burst cut short counts up to its last frame; a second hold that was never reached is no growth.
@@ -151,50 +151,50 @@ class GrowsInEachHold:
 
     name: str
     text: str
-    least: float
+    threshold: float
     stage: ClassVar[Literal["after"]] = "after"
 
-    def passes(self, outcome: Outcome) -> bool:
+    def passes(self, outcome: SimulationOutcome) -> bool:
         """Whether the outcome meets it."""
-        return all(growth > self.least for growth in outcome.growths)
+        return all(growth > self.threshold for growth in outcome.creep_in_holds)
 
-    def rules_out(self, sketch: Outcome) -> bool:
+    def rejects_early(self, screening_outcome: SimulationOutcome) -> bool:
         """Whether a stand-in's prediction leaves no hope: it bursts long before the second hold begins.
 
         Little growth is no reason. Under a nearly plastic law a dimple creeps at its clamped edge, where the stress is
         high: the stand-in, which knows one stress, has called a growth of .02 mm one of 1e-5.
         """
-        return sketch.status == Status.BURST and LATER * sketch.end_time < sketch.times[-2]
+        return screening_outcome.status == Status.RUPTURED and BURST_TIME_FACTOR * screening_outcome.end_time < screening_outcome.times[-2]
 
 
 @dataclass(frozen=True)
-class Creeps:
+class TotalCreepAbove:
     """Creep of `least` or more in both holds together, elastic jumps left out."""
 
     name: str
     text: str
-    least: float
+    threshold: float
     stage: ClassVar[Literal["after"]] = "after"
 
-    def passes(self, outcome: Outcome) -> bool:
+    def passes(self, outcome: SimulationOutcome) -> bool:
         """Whether the outcome meets it."""
-        return float(np.nansum(outcome.growths)) >= self.least
+        return float(np.nansum(outcome.creep_in_holds)) >= self.threshold
 
 
 @dataclass(frozen=True)
-class EndsAbove:
+class FinalOutputAbove:
     """The first output is above `least` at the end: criterion 5. After a burst, in the last frame before it."""
 
     name: str
     text: str
-    least: float
+    threshold: float
     stage: ClassVar[Literal["after"]] = "after"
 
-    def passes(self, outcome: Outcome) -> bool:
+    def passes(self, outcome: SimulationOutcome) -> bool:
         """Whether the outcome meets it."""
-        return outcome.last > self.least
+        return outcome.last_output > self.threshold
 
 
-Before: TypeAlias = RateLimit | WithinBounds | ConstraintsHold
-After: TypeAlias = Lasts | GrowsInEachHold | Creeps | EndsAbove
-Criterion: TypeAlias = Before | After
+DrawCriterion: TypeAlias = RateLimit | WithinBounds | ConstraintsHold
+OutcomeCriterion: TypeAlias = SurvivesTime | CreepInEachHold | TotalCreepAbove | FinalOutputAbove
+Criterion: TypeAlias = DrawCriterion | OutcomeCriterion

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.dataset.columns import COLUMNS
-from creepkit.dataset.conditions import plan
-from creepkit.dataset.describe import text
-from creepkit.dataset.joining import joined
+from creepkit.dataset.conditions import planned_test
+from creepkit.dataset.describe import dataset_text
+from creepkit.dataset.joining import join
 from creepkit.errors import DatasetError
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Dataset:
     parameters: Floats
     conditions: Floats
     values: NDArray[np.float32]
-    marks: NDArray[np.float32]
+    hold_outputs: NDArray[np.float32]
     status: Ints
     end_times: Floats
     reasons: Ints
@@ -68,7 +68,7 @@ class Dataset:
         return len(self.index)
 
     def __str__(self) -> str:
-        return text(self)
+        return dataset_text(self)
 
     def __repr__(self) -> str:
         accepted = int((self.reasons == 0).sum())
@@ -79,13 +79,13 @@ class Dataset:
         """The samples that met every criterion."""
         return self.rows(self.reasons == 0)
 
-    def rows(self, chosen: Sequence[int] | slice | Ints | Bools) -> Dataset:
+    def rows(self, selection: Sequence[int] | slice | Ints | Bools) -> Dataset:
         """The data set of some rows, by their numbers or a mask."""
-        numbers = np.arange(len(self))[chosen]
-        place = {int(old): new for new, old in enumerate(numbers)}
-        own = {name: getattr(self, name)[numbers] for name in COLUMNS}
-        kept = {place[row]: text for row, text in self.failures.items() if row in place}
-        return replace(self, **own, failures=kept)
+        numbers = np.arange(len(self))[selection]
+        new_row = {int(old): new for new, old in enumerate(numbers)}
+        columns = {name: getattr(self, name)[numbers] for name in COLUMNS}
+        failures = {new_row[row]: text for row, text in self.failures.items() if row in new_row}
+        return replace(self, **columns, failures=failures)
 
     def values_of(self, row: int) -> dict[str, float]:
         """The law's parameters of one sample."""
@@ -95,15 +95,15 @@ class Dataset:
         """The conditions of one sample."""
         return dict(zip(self.condition_names, self.conditions[row].tolist(), strict=True))
 
-    def plan(self, row: int) -> History:
+    def planned_test(self, row: int) -> History:
         """The test of one sample, without outputs."""
-        return plan(self.specimen, self.conditions_of(row), self.grid)
+        return planned_test(self.specimen, self.conditions_of(row), self.grid)
 
     def times(self, row: int) -> Floats:
         """(frames,) s, of one sample."""
-        known = self.conditions_of(row)
+        conditions = self.conditions_of(row)
         # a relative grid has no end of its own to fall back on
-        end = known["end_time"] if "end_time" in known else self.grid.end  # noqa: SIM401
+        end = conditions["end_time"] if "end_time" in conditions else self.grid.end  # noqa: SIM401
         return self.grid.times(end)
 
     def output(self, name: str) -> NDArray[np.float32]:
@@ -114,4 +114,4 @@ class Dataset:
 
     def joined(self, other: Dataset) -> Dataset:
         """Both data sets as one; DatasetError when they are not of one kind, or share samples."""
-        return joined(self, other)
+        return join(self, other)

@@ -56,7 +56,7 @@ class Draws:
 
 
 @runtime_checkable
-class Design(Protocol):
+class SamplingDesign(Protocol):
     """Which samples are drawn; a frozen record that worker processes can be sent."""
 
     @property
@@ -98,17 +98,17 @@ class Design(Protocol):
         ...
 
 
-def design_of(law: CreepLaw, specimen: Specimen, box: str = "conditioned", **changes: Any) -> Design:
+def sampling_design(law: CreepLaw, specimen: Specimen, domain: str = "conditioned", **changes: Any) -> SamplingDesign:
     """Return a design for a law and a specimen; see paper_box.paper_box and conditioned_box.conditioned_box.
 
     box : "conditioned", whose samples creep visibly, or "paper", uniform in the law's bounds.
     changes : ranges of conditions, (low, high) or a number: P1=(5, 20), apex_thickness=(.44, .6), end_time=3600;
         `every`, s between frames, or `grid`, a TimeGrid.
     """
-    from creepkit.dataset.conditioned_box import conditioned_box
-    from creepkit.dataset.paper_box import paper_box
+    from creepkit.dataset.conditioned_box import conditioned_domain
+    from creepkit.dataset.paper_box import paper_domain
 
-    boxes: dict[str, Callable[..., Design]] = {"conditioned": conditioned_box, "paper": paper_box}
-    if box not in boxes:
-        raise DatasetError(f"there is no box '{box}': {nearest(box, boxes)}")
-    return boxes[box](law, specimen, **changes)
+    domains: dict[str, Callable[..., SamplingDesign]] = {"conditioned": conditioned_domain, "paper": paper_domain}
+    if domain not in domains:
+        raise DatasetError(f"there is no box '{domain}': {nearest(domain, domains)}")
+    return domains[domain](law, specimen, **changes)

@@ -15,81 +15,81 @@ import sympy
 from scipy.special import logsumexp
 
 from creepkit.arrays import Floats
-from creepkit.dataset.coefficients import LARGEST, Part, slopes_of
-from creepkit.dataset.looks import Looks
+from creepkit.dataset.coefficients import LARGEST_LN_COEFFICIENT, TermGroup, coefficient_exponents
+from creepkit.dataset.looks import RateEvaluationPoints
 from creepkit.dataset.term_rates import ln_rate
 from creepkit.errors import LawError
 from creepkit.language import CreepLaw, State
 
-LIFE_SHARES = (0.03, 0.7)
+LIFE_FRACTIONS = (0.03, 0.7)
 """Of the life of the material that a test takes: damage is hardly seen, or soon breaks it."""
 
-STEPS = 64
+QUADRATURE_POINTS = 64
 """Of the integral over an internal variable, in the middle of equal spans."""
 
 
 @dataclass(frozen=True)
-class Growth:
+class DamageRateScaling:
     """One internal variable: part is its rate as a law; initial, reach : where it starts, and from there to its limit.
 
     place : of the variable among the law's states.
     """
 
-    part: Part
-    place: int
+    group: TermGroup
+    state_index: int
     initial: float
-    reach: float
+    range: float
 
-    def wanted(self, theta: Floats, share: Floats, looks: Looks) -> Floats:
+    def ln_initial_rate(self, theta: Floats, life_fraction: Floats, points: RateEvaluationPoints) -> Floats:
         """ln of the virgin variable's rate, 1/s, for which a test takes `share` of life, (rows,)."""
-        return np.asarray(np.log(share * abs(self.reach) / looks.ends) + self._ln_slowness(theta, looks))
+        return np.asarray(np.log(life_fraction * abs(self.range) / points.end_times) + self._ln_life_factor(theta, points))
 
-    def _ln_slowness(self, theta: Floats, looks: Looks) -> Floats:
+    def _ln_life_factor(self, theta: Floats, points: RateEvaluationPoints) -> Floats:
         """ln of life times the virgin rate over the reach: 0 where the rate stays as it begins, (rows,)."""
-        law = self.part.law
+        law = self.group.law
         states: list[float | Floats] = [state.initial for state in law.states.values()]
-        own, point = theta[:, None, list(self.part.positions)], looks.middle_point(axes=1)
-        virgin = ln_rate(law, own, point, states)
-        states[self.place] = self.initial + self.reach * (np.arange(STEPS) + 0.5) / STEPS
-        return np.asarray(logsumexp(virgin - ln_rate(law, own, point, states), axis=1) - np.log(STEPS))
+        group_theta, arguments = theta[:, None, list(self.group.positions)], points.midpoint_arguments(axes=1)
+        ln_initial_rate = ln_rate(law, group_theta, arguments, states)
+        states[self.state_index] = self.initial + self.range * (np.arange(QUADRATURE_POINTS) + 0.5) / QUADRATURE_POINTS
+        return np.asarray(logsumexp(ln_initial_rate - ln_rate(law, group_theta, arguments, states), axis=1) - np.log(QUADRATURE_POINTS))
 
 
 @lru_cache(maxsize=64)
-def growths_of(law: CreepLaw) -> tuple[Growth, ...]:
+def damage_rate_scalings(law: CreepLaw) -> tuple[DamageRateScaling, ...]:
     """The internal variables of a law that have a limit, and a coefficient of their own."""
-    found = []
-    for place, (symbol, state) in enumerate(law.states.items()):
+    scalings = []
+    for state_index, (symbol, state) in enumerate(law.states.items()):
         if state.limit is not None:
-            part = _part(law, symbol, state)
-            found += [] if part is None else [Growth(part, place, state.initial, state.limit - state.initial)]
-    return tuple(found)
+            group = _rate_group(law, symbol, state)
+            scalings += [] if group is None else [DamageRateScaling(group, state_index, state.initial, state.limit - state.initial)]
+    return tuple(scalings)
 
 
-def solve_growths(law: CreepLaw, theta: Floats, unit: Floats, looks: Looks) -> Floats:
+def solve_damage_coefficients(law: CreepLaw, theta: Floats, unit_coordinates: Floats, points: RateEvaluationPoints) -> Floats:
     """Return theta with coefficients that make tests take a share of life; unit : (rows, parameters), their own."""
-    solved, (low, high) = np.array(theta), np.log(LIFE_SHARES)
-    for growth in growths_of(law):
-        k, part = growth.part.coefficient, growth.part
+    solved, (low, high) = np.array(theta), np.log(LIFE_FRACTIONS)
+    for scaling in damage_rate_scalings(law):
+        k, group = scaling.group.coefficient, scaling.group
         solved[:, k] = 0.0
-        share = np.exp(low + unit[:, k] * (high - low))
-        ln_coefficient = (growth.wanted(solved, share, looks) - part.ln_rate(solved, looks)) / part.slope
-        solved[:, k] = np.minimum(ln_coefficient, LARGEST)
+        life_fraction = np.exp(low + unit_coordinates[:, k] * (high - low))
+        ln_coefficient = (scaling.ln_initial_rate(solved, life_fraction, points) - group.ln_mean_rate(solved, points)) / group.exponent
+        solved[:, k] = np.minimum(ln_coefficient, LARGEST_LN_COEFFICIENT)
     return solved
 
 
-def _part(law: CreepLaw, symbol: sympy.Symbol, state: State) -> Part | None:
+def _rate_group(law: CreepLaw, symbol: sympy.Symbol, state: State) -> TermGroup | None:
     """The rate of an internal variable as a law with one coefficient, None where there is none."""
     sign = 1 if state.limit is None or state.limit > state.initial else -1
-    own = {p: param for p, param in law.params.items() if any(p in z.rate.free_symbols for z in law.states.values())}
-    grown = replace(law, terms={f"rate of {symbol}": sign * state.rate}, params=own, constraints=())
-    others = [*law.terms.values(), *(z.rate for s, z in law.states.items() if s != symbol)]
-    shared = {name for name in grown.names if any(law.symbol(name) in e.free_symbols for e in others)}
+    rate_parameters = {p: param for p, param in law.params.items() if any(p in z.rate.free_symbols for z in law.states.values())}
+    rate_law = replace(law, terms={f"rate of {symbol}": sign * state.rate}, params=rate_parameters, constraints=())
+    other_expressions = [*law.terms.values(), *(z.rate for s, z in law.states.items() if s != symbol)]
+    shared = {name for name in rate_law.names if any(law.symbol(name) in e.free_symbols for e in other_expressions)}
     try:
-        (slopes,) = slopes_of(grown)
+        (exponents,) = coefficient_exponents(rate_law)
     except LawError:
         return None
-    mine = [k for k in slopes if grown.names[k] not in shared]
-    if not mine:
+    exclusive = [k for k in exponents if rate_law.names[k] not in shared]
+    if not exclusive:
         return None
-    positions = tuple(law.names.index(name) for name in grown.names)
-    return Part(grown, positions, positions[mine[0]], slopes[mine[0]])
+    positions = tuple(law.names.index(name) for name in rate_law.names)
+    return TermGroup(rate_law, positions, positions[exclusive[0]], exponents[exclusive[0]])

@@ -8,15 +8,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from creepkit.dataset.shards import Campaign, count
+from creepkit.dataset.shards import Campaign, accepted_count
 from creepkit.errors import DatasetError
 
-HOPELESS = 16384
+MOST_DRAWS_WITHOUT_ACCEPTED = 16384
 """Draws after which a design of which none was accepted is given up."""
 
 
 @dataclass
-class Ledger:
+class ProgressRecord:
     """The account of a campaign.
 
     samples : accepted ones wanted; or draws : rows wanted, accepted or not. part : (k, n), only shards k-1, k-1+n ...,
@@ -29,44 +29,44 @@ class Ledger:
     draws: int | None
     part: tuple[int, int] | None = None
     done: dict[int, int] = field(default_factory=dict)
-    at_work: set[int] = field(default_factory=set)
+    running: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        for what, wanted in (("samples", self.samples), ("draws", self.draws)):
-            if wanted is not None and (not isinstance(wanted, int | np.integer) or wanted < 1):
-                raise DatasetError(f"{what} is {wanted!r}; ask for a whole number, at least one")
+        for name, value in (("samples", self.samples), ("draws", self.draws)):
+            if value is not None and (not isinstance(value, int | np.integer) or value < 1):
+                raise DatasetError(f"{name} is {value!r}; ask for a whole number, at least one")
         if (self.samples is None) == (self.draws is None):
             raise DatasetError("say either how many accepted samples are wanted (samples), or how many draws (draws)")
         if self.part is not None and not 1 <= self.part[0] <= self.part[1]:
             raise DatasetError(f"part {self.part[0]}/{self.part[1]} is none; allowed are 1/N to N/N")
 
-    def look(self) -> None:
+    def scan_finished(self) -> None:
         """Find the shards that are done already."""
         for path in sorted(self.campaign.folder.glob("[0-9]*.h5")):
-            if path.stem.isdigit() and self._is_ours(int(path.stem)):
-                self.note(int(path.stem), count(self.campaign, int(path.stem)))
+            if path.stem.isdigit() and self._in_part(int(path.stem)):
+                self.mark_done(int(path.stem), accepted_count(self.campaign, int(path.stem)))
 
-    def note(self, number: int, accepted: int | None) -> None:
+    def mark_done(self, number: int, accepted: int | None) -> None:
         """A shard is done."""
-        self.at_work.discard(number)
+        self.running.discard(number)
         if accepted is not None:
             self.done[number] = accepted
-        self._refuse_the_hopeless()
+        self._check_acceptance()
 
     @property
     def target(self) -> int:
         """What `reached` has to come to: accepted samples, or rows."""
         if self.samples is None:
-            return self.campaign.rows * len(list(self._numbers()))
+            return self.campaign.rows * len(list(self._shard_numbers()))
         return self.samples if self.part is None else -(-self.samples // self.part[1])
 
     @property
-    def reached(self) -> int:
+    def count(self) -> int:
         """Accepted samples, or rows, of all shards that are done."""
-        return sum(self._worth(number) for number in self.done)
+        return sum(self._contribution(number) for number in self.done)
 
     @property
-    def share(self) -> float:
+    def acceptance_rate(self) -> float:
         """Accepted samples per draw, so far; 1 before the first are known."""
         return self.accepted / (len(self.done) * self.campaign.rows) if self.done else 1.0
 
@@ -75,48 +75,48 @@ class Ledger:
         """Accepted samples so far."""
         return sum(self.done.values())
 
-    def leading(self) -> list[int] | None:
+    def leading_run(self) -> list[int] | None:
         """The shortest leading run of done shards that is enough; None while there is none."""
-        reached, run = 0, []
-        for number in self._numbers():
-            if self.samples is not None and reached >= self.target:
+        total, run = 0, []
+        for number in self._shard_numbers():
+            if self.samples is not None and total >= self.target:
                 break
             if number not in self.done:
                 return None
             run.append(number)
-            reached += self._worth(number)
+            total += self._contribution(number)
         return run
 
-    def following(self) -> int | None:
+    def next_shard(self) -> int | None:
         """The next shard to simulate; None when what is done and at work should do."""
         expected = 0.0
-        for number in self._numbers():
+        for number in self._shard_numbers():
             if self.samples is not None and expected >= self.target:
                 break
             if number in self.done:
-                expected += self._worth(number)
-            elif number in self.at_work:
-                expected += self.share * self.campaign.rows
+                expected += self._contribution(number)
+            elif number in self.running:
+                expected += self.acceptance_rate * self.campaign.rows
             else:
                 return number
         return None
 
-    def _numbers(self) -> Iterable[int]:
+    def _shard_numbers(self) -> Iterable[int]:
         """The shards that may be needed, first ones first."""
         first, step = (0, 1) if self.part is None else (self.part[0] - 1, self.part[1])
         if self.draws is None:
             return itertools.count(first, step)
         return range(first, -(-self.draws // self.campaign.rows), step)
 
-    def _worth(self, number: int) -> int:
+    def _contribution(self, number: int) -> int:
         return self.done[number] if self.draws is None else self.campaign.rows
 
-    def _is_ours(self, number: int) -> bool:
+    def _in_part(self, number: int) -> bool:
         return self.part is None or number % self.part[1] == self.part[0] - 1
 
-    def _refuse_the_hopeless(self) -> None:
+    def _check_acceptance(self) -> None:
         drawn = len(self.done) * self.campaign.rows
-        if self.samples is not None and drawn >= HOPELESS and not self.accepted:
+        if self.samples is not None and drawn >= MOST_DRAWS_WITHOUT_ACCEPTED and not self.accepted:
             raise DatasetError(
                 f"none of the first {drawn} draws was accepted; see 'creepkit generate --dry-run', change the "
                 "design, or ask for draws instead of samples"

@@ -8,58 +8,58 @@ import numpy as np
 from scipy.special import logsumexp
 
 from creepkit.arrays import Floats, Ints
-from creepkit.dataset.term_rates import Point, ln_rate
+from creepkit.dataset.term_rates import RateArguments, ln_rate
 from creepkit.language import CreepLaw, time
 
-COUNT = 12
-SHARES = (np.arange(COUNT) + 0.5) / COUNT
+POINT_COUNT = 12
+POINT_FRACTIONS = (np.arange(POINT_COUNT) + 0.5) / POINT_COUNT
 """Of the end of the test."""
 
-STRAIN = 0.01
+REFERENCE_STRAIN = 0.01
 """At which rates are stated, as in the paper's criteria 1 and 2."""
 
 
 @dataclass(frozen=True, eq=False)
-class Looks:
+class RateEvaluationPoints:
     """stress : (rows, looks) MPa, or (rows, 1) where it stays. times : (rows, looks) s. temperature : (rows,) K."""
 
     stress: Floats
     times: Floats
     temperature: Floats
 
-    def point(self, axes: int = 0, *, timeless: bool = False, factor: float = 1.0) -> Point:
+    def arguments(self, axes: int = 0, *, one_time: bool = False, factor: float = 1.0) -> RateArguments:
         """The point with `axes` more axes between rows and looks; timeless : one look will do where stress stays."""
-        times = self.times[:, :1] if timeless else self.times
-        given = (factor * self.stress, times, self.temperature[:, None])
-        stress, seconds, warmth = (v.reshape(v.shape[0], *[1] * axes, v.shape[1]) for v in given)
-        return Point(stress, STRAIN, seconds, warmth)
+        times = self.times[:, :1] if one_time else self.times
+        columns = (factor * self.stress, times, self.temperature[:, None])
+        stress, seconds, temperature = (v.reshape(v.shape[0], *[1] * axes, v.shape[1]) for v in columns)
+        return RateArguments(stress, REFERENCE_STRAIN, seconds, temperature)
 
-    def rows(self, chosen: Ints) -> Looks:
+    def rows(self, rows: Ints) -> RateEvaluationPoints:
         """Some of the rows."""
-        return Looks(self.stress[chosen], self.times[chosen], self.temperature[chosen])
+        return RateEvaluationPoints(self.stress[rows], self.times[rows], self.temperature[rows])
 
     @property
-    def ends(self) -> Floats:
+    def end_times(self) -> Floats:
         """When the tests end, (rows,) s."""
-        return np.asarray(self.times[:, -1] / SHARES[-1])
+        return np.asarray(self.times[:, -1] / POINT_FRACTIONS[-1])
 
-    def middle_point(self, axes: int = 0) -> Point:
+    def midpoint_arguments(self, axes: int = 0) -> RateArguments:
         """The point at the middle stress, half way in time, with `axes` axes after the rows."""
         shape = (len(self.times), *[1] * axes)
-        stress, seconds, warmth = (v.reshape(shape) for v in (self.middle, 0.5 * self.ends, self.temperature))
-        return Point(stress, STRAIN, seconds, warmth)
+        stress, seconds, temperature = (v.reshape(shape) for v in (self.mean_stress, 0.5 * self.end_times, self.temperature))
+        return RateArguments(stress, REFERENCE_STRAIN, seconds, temperature)
 
     @property
-    def middle(self) -> Floats:
+    def mean_stress(self) -> Floats:
         """The geometric mean of the stresses, (rows,) MPa."""
         return np.asarray(np.exp(np.log(self.stress).mean(axis=1)))
 
 
-def mean_ln_rate(law: CreepLaw, theta: Floats, looks: Looks, factor: float = 1.0) -> Floats:
+def mean_ln_rate(law: CreepLaw, theta: Floats, points: RateEvaluationPoints, stress_factor: float = 1.0) -> Floats:
     """ln of the mean rate over a test, 1/s, (rows, ...).
 
     theta : (rows, ..., parameters) internal. factor : on the stresses.
     """
-    point = looks.point(theta.ndim - 2, timeless=not law.uses(time), factor=factor)
-    found = ln_rate(law, theta[..., None, :], point)
-    return np.asarray(logsumexp(found, axis=-1) - np.log(found.shape[-1]))
+    arguments = points.arguments(theta.ndim - 2, one_time=not law.uses(time), factor=stress_factor)
+    ln_rates = ln_rate(law, theta[..., None, :], arguments)
+    return np.asarray(logsumexp(ln_rates, axis=-1) - np.log(ln_rates.shape[-1]))

@@ -14,37 +14,37 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 
-class QuietFile(io.FileIO):
+class FaultTolerantFile(io.FileIO):
     """A new file that keeps its first failure to write, for `check` to raise."""
 
     failure: OSError | None = None
 
     def write(self, data: Any, /) -> int:
         """Write all of it, or keep the failure."""
-        rest = memoryview(data).cast("B")
-        whole = len(rest)
-        while rest:
-            done = self._tried(super().write, rest)
-            if not done:
+        remaining = memoryview(data).cast("B")
+        size = len(remaining)
+        while remaining:
+            written = self._attempt(super().write, remaining)
+            if not written:
                 break
-            rest = rest[done:]
-        return whole
+            remaining = remaining[written:]
+        return size
 
     def truncate(self, size: int | None = None, /) -> int:
         """Change the size, or keep the failure."""
-        self._tried(super().truncate, size)
+        self._attempt(super().truncate, size)
         return self.tell() if size is None else size
 
-    def check(self) -> None:
+    def raise_failure(self) -> None:
         """Raise the failure that was kept."""
         if self.failure is not None:
             raise self.failure
 
-    def _tried(self, act: Callable[[Any], int | None], what: Any) -> int | None:
+    def _attempt(self, operation: Callable[[Any], int | None], argument: Any) -> int | None:
         """What the act returns; None once one has failed."""
         if self.failure is None:
             try:
-                return act(what)
+                return operation(argument)
             except OSError as error:
                 self.failure = error
         return None

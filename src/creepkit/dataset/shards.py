@@ -24,23 +24,23 @@ import numpy as np
 
 from creepkit import registry
 from creepkit.dataset import store
-from creepkit.dataset.claims import Claim
+from creepkit.dataset.claims import ShardLock
 from creepkit.dataset.columns import COLUMNS
 from creepkit.dataset.dataset import Dataset
 from creepkit.dataset.joining import first_difference
-from creepkit.dataset.layout import LAYOUT
-from creepkit.dataset.simulating import SampleFailed, header_of, simulate
-from creepkit.dataset.specimen_document import specimen_document
+from creepkit.dataset.layout import LAYOUT_VERSION
+from creepkit.dataset.simulating import SampleFailedError, empty_dataset, simulate_rows
+from creepkit.dataset.specimen_document import specimen_to_json
 from creepkit.errors import DatasetError
 from creepkit.language.tree import law_to_json
 
 if TYPE_CHECKING:
-    from creepkit.dataset.design import Design
+    from creepkit.dataset.design import SamplingDesign
     from creepkit.records import Specimen
 
-ROWS = 256
+SHARD_ROWS = 256
 """Rows of a shard: some seconds of a dimple, so that little is lost when a process dies."""
-DEADLY = 2
+MOST_PROCESS_DEATHS = 2
 """How often a sample may kill its process before it counts as failed."""
 
 _log = logging.getLogger("creepkit.dataset")
@@ -53,12 +53,12 @@ class Campaign:
     rows : of a shard. Worker processes are sent this record.
     """
 
-    design: Design
+    design: SamplingDesign
     specimen: Specimen
     seed: int
     folder: Path
-    rows: int = ROWS
-    part: ClassVar[str] = "shard"
+    rows: int = SHARD_ROWS
+    task_name: ClassVar[str] = "shard"
 
     def on_one_thread(self) -> Campaign:
         """The campaign with a specimen that simulates on one thread."""
@@ -66,23 +66,23 @@ class Campaign:
             return self
         return replace(self, specimen=self.specimen.replace(threads=1))  # type: ignore[attr-defined]
 
-    def run(self, number: int) -> Answer:
+    def run(self, number: int) -> TaskResult:
         """Simulate a shard; see run() below."""
-        return run(self, number)
+        return run_shard(self, number)
 
     @cached_property
     def document(self) -> dict[str, Any]:
         """Everything that decides what the shards hold."""
-        told = {
+        document = {
             "design": self.design.document(),
             "law": law_to_json(self.design.law),
-            "specimen": specimen_document(self.specimen),
+            "specimen": specimen_to_json(self.specimen),
             "seed": self.seed,
             "rows": self.rows,
-            "layout": LAYOUT,
+            "layout": LAYOUT_VERSION,
             "creepkit": version("creepkit"),
         }
-        return dict(json.loads(json.dumps(told)))
+        return dict(json.loads(json.dumps(document)))
 
     @cached_property
     def fingerprint(self) -> str:
@@ -98,14 +98,14 @@ class Campaign:
             "h5py": h5py.__version__,
             "law": self.design.law.name,
             "law_fingerprint": self.design.law.fingerprint,
-            "origin": registry.default().origin(self.design.law),
+            "origin": registry.default_registry().distributions_of(self.design.law),
             "specimen": self.specimen.name,
             "design": self.design.name,
             "seed": self.seed,
             "fingerprint": self.fingerprint,
             "when": datetime.now(UTC).isoformat(timespec="seconds"),
         }
-        return header_of(self.design, self.specimen, provenance)
+        return empty_dataset(self.design, self.specimen, provenance)
 
     def path(self, number: int) -> Path:
         """The file of a shard."""
@@ -113,25 +113,25 @@ class Campaign:
 
     def open_folder(self) -> None:
         """Make the folder, or check that the one that is there belongs to this campaign."""
-        told = self.folder / "campaign.json"
+        path = self.folder / "campaign.json"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            if not told.exists():
-                _write_once(told, json.dumps(self.document, indent=1))
-            found = json.loads(told.read_text(encoding="utf-8"))
+            if not path.exists():
+                write_if_absent(path, json.dumps(self.document, indent=1))
+            existing = json.loads(path.read_text(encoding="utf-8"))
         except OSError as error:
             raise DatasetError(f"{self.folder}: no shards can be written there ({error.strerror})") from None
         except ValueError:
-            raise DatasetError(f"{told}: damaged; remove it if the shards beside it are of this campaign") from None
-        if found != self.document:
-            where = first_difference(found, self.document, "")
+            raise DatasetError(f"{path}: damaged; remove it if the shards beside it are of this campaign") from None
+        if existing != self.document:
+            difference = first_difference(existing, self.document, "")
             raise DatasetError(
-                f"{self.folder}: holds shards of another campaign (there and here {where}); choose another name, or "
+                f"{self.folder}: holds shards of another campaign (there and here {difference}); choose another name, or "
                 "remove the folder"
             )
 
 
-def _write_once(path: Path, text: str) -> None:
+def write_if_absent(path: Path, text: str) -> None:
     """Write a file that is whole or absent, and that the first of several writers decides."""
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
@@ -150,95 +150,95 @@ def _write_once(path: Path, text: str) -> None:
 
 
 @dataclass(frozen=True)
-class Answer:
+class TaskResult:
     """What became of a shard that was asked for.
 
     kind : "done"; "taken", by another process; "died", its own process did; "error", as text says.
     """
 
     number: int
-    kind: str
+    status: str
     accepted: int = 0
     text: str = ""
 
 
-def run(campaign: Campaign, number: int) -> Answer:
+def run_shard(campaign: Campaign, number: int) -> TaskResult:
     """Simulate a shard and write its file, unless it is done or another process is at it."""
     path = campaign.path(number)
-    with Claim(path.with_suffix(".claim")) as claim:
-        if not claim.held:
-            return Answer(number, "taken")
-        accepted = count(campaign, number, quiet=True)
+    with ShardLock(path.with_suffix(".claim")) as lock:
+        if not lock.held:
+            return TaskResult(number, "taken")
+        accepted = accepted_count(campaign, number, quiet=True)
         if accepted is None:
-            store.remove_left(path)
+            store.remove_temporary_files(path)
             first, rows = number * campaign.rows, campaign.rows
-            samples = simulate(campaign.design, campaign.header, campaign.seed, first, rows, _spared(claim))
-            write(campaign, number, samples)
+            samples = simulate_rows(campaign.design, campaign.header, campaign.seed, first, rows, _start_guard(lock))
+            write_shard(campaign, number, samples)
             accepted = int((samples.reasons == 0).sum())
-        claim.remove()
-    return Answer(number, "done", accepted)
+        lock.remove()
+    return TaskResult(number, "done", accepted)
 
 
-def _spared(claim: Claim) -> Callable[[int], None]:
+def _start_guard(lock: ShardLock) -> Callable[[int], None]:
     """Note each sample before it is simulated; those that killed their process too often are not."""
 
     def starting(row: int) -> None:
-        if claim.deaths[row] >= DEADLY:
-            raise SampleFailed(f"its process died {claim.deaths[row]} times while it was simulated")
-        claim.starting(row)
+        if lock.deaths[row] >= MOST_PROCESS_DEATHS:
+            raise SampleFailedError(f"its process died {lock.deaths[row]} times while it was simulated")
+        lock.record_start(row)
 
     return starting
 
 
-def write(campaign: Campaign, number: int, samples: Dataset) -> None:
+def write_shard(campaign: Campaign, number: int, samples: Dataset) -> None:
     """Write the file of a shard."""
-    with store.replacing(campaign.path(number)) as temporary, store.created(temporary) as file:
+    with store.replace_on_success(campaign.path(number)) as temporary, store.create_hdf5(temporary) as file:
         store.write_header(file, samples)
-        store.append(file, samples)
-        file.attrs.update({"campaign": campaign.fingerprint, "shard": number, "checksum": checksum(samples)})
+        store.append_samples(file, samples)
+        file.attrs.update({"campaign": campaign.fingerprint, "shard": number, "checksum": sample_checksum(samples)})
 
 
-def checksum(samples: Dataset) -> str:
+def sample_checksum(samples: Dataset) -> str:
     """Of all that a data set holds of its samples."""
     digest = hashlib.sha256(repr(sorted(samples.failures.items())).encode())
     for name, column in COLUMNS.items():
-        digest.update(np.ascontiguousarray(getattr(samples, name), dtype=column.stored).tobytes())
+        digest.update(np.ascontiguousarray(getattr(samples, name), dtype=column.file_type).tobytes())
     return digest.hexdigest()
 
 
-def read(campaign: Campaign, number: int) -> Dataset:
+def read_shard(campaign: Campaign, number: int) -> Dataset:
     """The samples of a shard; DatasetError when it is not whole, or of another campaign."""
     path = campaign.path(number)
-    with store.opened(path) as file:
+    with store.open_hdf5(path) as file:
         if file.attrs.get("campaign") != campaign.fingerprint or file.attrs.get("shard") != number:
             raise DatasetError(f"{path}: a shard of another campaign")
         samples = store.read_samples(file, campaign.header)
-        told = file.attrs["checksum"]
-    if checksum(samples) != told:
+        expected = file.attrs["checksum"]
+    if sample_checksum(samples) != expected:
         raise DatasetError(f"{path}: damaged, its checksum is not that of what it holds")
     return samples
 
 
-def count(campaign: Campaign, number: int, *, quiet: bool = False) -> int | None:
+def accepted_count(campaign: Campaign, number: int, *, quiet: bool = False) -> int | None:
     """How many samples of a shard were accepted; None when it has to be simulated, or again, which is logged."""
     path = campaign.path(number)
     if not path.exists():
         return None
     try:
-        return int((read(campaign, number).reasons == 0).sum())
+        return int((read_shard(campaign, number).reasons == 0).sum())
     except DatasetError as error:
         if not quiet:
             _log.warning("%s; it is simulated again", error)
         return None
 
 
-def together(campaign: Campaign, numbers: Sequence[int]) -> Dataset:
+def read_shards(campaign: Campaign, numbers: Sequence[int]) -> Dataset:
     """The samples of several shards."""
-    parts = [read(campaign, number) for number in numbers] or [campaign.header]
+    parts = [read_shard(campaign, number) for number in numbers] or [campaign.header]
     columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
     failures: dict[int, str] = {}
-    before = 0
-    for one in parts:
-        failures.update({before + row: text for row, text in one.failures.items()})
-        before += len(one)
+    offset = 0
+    for shard_samples in parts:
+        failures.update({offset + row: text for row, text in shard_samples.failures.items()})
+        offset += len(shard_samples)
     return replace(campaign.header, **columns, failures=failures)

@@ -12,24 +12,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Ints
-from creepkit.dataset.conditions import mark_times, plan
-from creepkit.dataset.criteria import GrowsInEachHold, Lasts, Outcome
-from creepkit.records import Predictor, Screened, Status
+from creepkit.dataset.conditions import hold_times, planned_test
+from creepkit.dataset.criteria import CreepInEachHold, SurvivesTime, SimulationOutcome
+from creepkit.records import Predictor, SupportsReducedOrderModel, Status
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
-    from creepkit.dataset.design import Design
+    from creepkit.dataset.design import SamplingDesign
 
 
-def ruled_out(design: Design, samples: Dataset) -> Ints:
+def rejected_by_screening(design: SamplingDesign, samples: Dataset) -> Ints:
     """(rows,) the number of the criterion that a sample cannot meet, 0 where it must be simulated to know."""
     reasons = np.zeros(len(samples), dtype=np.int64)
-    if not getattr(design, "screened", False) or not isinstance(samples.specimen, Screened):
+    if not getattr(design, "screened", False) or not isinstance(samples.specimen, SupportsReducedOrderModel):
         return reasons
-    stand_in = samples.specimen.screening()
+    reduced_model = samples.specimen.reduced_order_model()
     for row in np.flatnonzero(samples.reasons == 0).tolist():
         try:
-            reasons[row] = _first(design, _sketch(design, samples, row, stand_in))
+            reasons[row] = _first_rejection(design, _screening_outcome(design, samples, row, reduced_model))
         except (MemoryError, OSError):
             raise
         except Exception:
@@ -37,20 +37,20 @@ def ruled_out(design: Design, samples: Dataset) -> Ints:
     return reasons
 
 
-def _sketch(design: Design, samples: Dataset, row: int, stand_in: Predictor) -> Outcome:
+def _screening_outcome(design: SamplingDesign, samples: Dataset, row: int, reduced_model: Predictor) -> SimulationOutcome:
     """What the stand-in makes of one sample, looked at when the holds begin and end."""
     conditions = samples.conditions_of(row)
-    test = plan(samples.specimen, conditions, design.grid)
-    at = mark_times(test)
-    times = np.unique(at)
-    found = stand_in.predict(samples.law, samples.values_of(row), [test.replace(times=times)])
-    seen = found.of(0)
-    status, end = Status(int(found.status[0, 0])), float(found.end_times[0, 0])
-    return Outcome(times, seen, seen[np.searchsorted(times, at)], status, end, conditions)
+    test = planned_test(samples.specimen, conditions, design.grid)
+    hold_instants = hold_times(test)
+    times = np.unique(hold_instants)
+    prediction = reduced_model.predict(samples.law, samples.values_of(row), [test.replace(times=times)])
+    outputs = prediction.of(0)
+    status, end_time = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
+    return SimulationOutcome(times, outputs, outputs[np.searchsorted(times, hold_instants)], status, end_time, conditions)
 
 
-def _first(design: Design, sketch: Outcome) -> int:
+def _first_rejection(design: SamplingDesign, screening_outcome: SimulationOutcome) -> int:
     for number, criterion in enumerate(design.criteria, start=1):
-        if isinstance(criterion, Lasts | GrowsInEachHold) and criterion.rules_out(sketch):
+        if isinstance(criterion, SurvivesTime | CreepInEachHold) and criterion.rejects_early(screening_outcome):
             return number
     return 0

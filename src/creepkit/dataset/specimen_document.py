@@ -11,60 +11,60 @@ from creepkit.errors import CreepkitError, DatasetError
 if TYPE_CHECKING:
     from creepkit.records import Specimen
 
-NOT_TOLD = ("threads",)
+COMPUTATION_FIELDS = ("threads",)
 """Fields that say how, not what, is computed."""
 
 
-def specimen_document(specimen: Specimen) -> dict[str, Any]:
+def specimen_to_json(specimen: Specimen) -> dict[str, Any]:
     """The specimen as JSON-able data: its name and the fields that decide what it predicts."""
     record: Any = specimen
     if not is_dataclass(record):
         raise DatasetError(
             f"specimen '{specimen.name}' is no dataclass, so that a data set cannot say which one it was made with"
         )
-    return {"name": specimen.name, "fields": _plain(record, specimen.name)}
+    return {"name": specimen.name, "fields": _to_json(record, specimen.name)}
 
 
-def _plain(record: Any, where: str) -> Any:
+def _to_json(record: Any, path: str) -> Any:
     if record is None or isinstance(record, bool | int | float | str):
         return record
     if isinstance(record, tuple | list):
-        return [_plain(item, where) for item in record]
-    if is_dataclass(record) and not isinstance(record, type) and _is_of_numbers(record):
-        told = [f.name for f in fields(record) if f.init and f.name not in NOT_TOLD]
-        return {name: _plain(getattr(record, name), f"{where}.{name}") for name in told}
+        return [_to_json(item, path) for item in record]
+    if is_dataclass(record) and not isinstance(record, type) and _has_no_arrays(record):
+        field_names = [f.name for f in fields(record) if f.init and f.name not in COMPUTATION_FIELDS]
+        return {name: _to_json(getattr(record, name), f"{path}.{name}") for name in field_names}
     raise DatasetError(
-        f"{where} is a {type(record).__name__}, which a data set cannot hold; allowed are numbers, words and records "
+        f"{path} is a {type(record).__name__}, which a data set cannot hold; allowed are numbers, words and records "
         "of them"
     )
 
 
-def _is_of_numbers(record: Any) -> bool:
+def _has_no_arrays(record: Any) -> bool:
     """Whether a record is rebuilt from its fields by putting them into the registered specimen's own."""
     return all(not hasattr(getattr(record, f.name), "shape") for f in fields(record) if f.init)
 
 
-def specimen_of(document: Any, source: str) -> Specimen:
+def specimen_from_json(document: Any, source: str) -> Specimen:
     """The specimen that `specimen_document` told of; DatasetError, naming `source`, when that cannot be."""
     if not (isinstance(document, dict) and isinstance(document.get("name"), str) and "fields" in document):
         raise DatasetError(f"{source}: does not say its specimen; it is damaged or was not written by creepkit")
     try:
-        found: Specimen = _filled(registry.default().specimen(document["name"]), document["fields"])
+        specimen: Specimen = _with_fields(registry.default_registry().specimen(document["name"]), document["fields"])
     except (CreepkitError, TypeError, AttributeError) as error:
         raise DatasetError(f"{source}: its specimen '{document['name']}' cannot be rebuilt here: {error}") from None
-    return found
+    return specimen
 
 
-def _filled(template: Any, told: Any) -> Any:
+def _with_fields(template: Any, values: Any) -> Any:
     changes = {}
-    for name, value in told.items():
-        inner = getattr(template, name)
+    for name, value in values.items():
+        current = getattr(template, name)
         if isinstance(value, dict):
-            changes[name] = _filled(inner, value)
+            changes[name] = _with_fields(current, value)
         else:
-            changes[name] = _tuples(value)
+            changes[name] = _to_tuples(value)
     return replace(template, **changes)
 
 
-def _tuples(value: Any) -> Any:
-    return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
+def _to_tuples(value: Any) -> Any:
+    return tuple(_to_tuples(item) for item in value) if isinstance(value, list) else value

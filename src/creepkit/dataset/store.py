@@ -42,21 +42,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from creepkit.arrays import Bools
-from creepkit.dataset.columns import COLUMNS, MARKS, nothing
+from creepkit.dataset.columns import COLUMNS, HOLD_TIMES, empty_columns
 from creepkit.dataset.dataset import Dataset
 from creepkit.dataset.layout import (
     FORMAT,
-    LAYOUT,
-    UNITS,
-    WORDS,
-    check_numbers,
+    LAYOUT_VERSION,
+    FILE_UNITS,
+    NAME_LISTS,
+    check_values,
     check_shapes,
-    check_words,
-    refuse_strangers,
+    check_attributes,
+    check_format,
 )
-from creepkit.dataset.quiet_file import QuietFile
-from creepkit.dataset.specimen_document import specimen_document, specimen_of
-from creepkit.dataset.time_grid import MOST, TimeGrid
+from creepkit.dataset.quiet_file import FaultTolerantFile
+from creepkit.dataset.specimen_document import specimen_to_json, specimen_from_json
+from creepkit.dataset.time_grid import MOST_FRAMES, TimeGrid
 from creepkit.errors import DatasetError, LawError
 from creepkit.language import CreepLaw
 from creepkit.language.tree import law_from_json, law_to_json
@@ -66,61 +66,61 @@ COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 # ---- writing -------------------------------------------------------------------------------------------------------
 
 
-def write(data: Dataset, path: str | Path) -> Path:
+def write_dataset(data: Dataset, path: str | Path) -> Path:
     """Write a data set; the file is whole or absent, and one that is there is replaced."""
     path = Path(path)
-    with replacing(path) as temporary, created(temporary) as file:
+    with replace_on_success(path) as temporary, create_hdf5(temporary) as file:
         write_header(file, data)
-        append(file, data)
+        append_samples(file, data)
     return path
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replace_on_success(path: Path) -> Iterator[Path]:
     """A temporary name beside `path` that takes its place at the end; removed when writing fails, which is said."""
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
         yield temporary
         os.replace(temporary, path)
     except OSError as error:
-        raise DatasetError(f"{path}: cannot be written: {_cause(error)}") from None
+        raise DatasetError(f"{path}: cannot be written: {_error_cause(error)}") from None
     finally:
         if temporary.exists():
             temporary.unlink()
 
 
-def remove_left(path: Path) -> None:
+def remove_temporary_files(path: Path) -> None:
     """Remove what processes that died while they wrote `path` have left; nobody must be writing it now."""
-    for left in path.parent.glob(f".{path.name}.*.part"):
-        left.unlink(missing_ok=True)
+    for temporary in path.parent.glob(f".{path.name}.*.part"):
+        temporary.unlink(missing_ok=True)
 
 
 @contextmanager
-def created(path: Path) -> Iterator[h5py.File]:
+def create_hdf5(path: Path) -> Iterator[h5py.File]:
     """A new file, of a version in which attributes may be long; OSError when there is no room for it."""
-    with QuietFile(path, "w+") as raw:
+    with FaultTolerantFile(path, "w+") as raw:
         try:
             with h5py.File(raw, "w", libver=("v110", "v110")) as file:
                 yield file
         finally:
-            raw.check()  # in the place of what HDF5 says when it reads what was dropped
+            raw.raise_failure()  # in the place of what HDF5 says when it reads what was dropped
 
 
-def _cause(error: OSError) -> str:
-    what = os.strerror(error.errno) if error.errno else " ".join(str(error).split())
+def _error_cause(error: OSError) -> str:
+    message = os.strerror(error.errno) if error.errno else " ".join(str(error).split())
     full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-    return f"{what}; {'make room' if full else 'choose another folder'} and start again, nothing done is lost"
+    return f"{message}; {'make room' if full else 'choose another folder'} and start again, nothing done is lost"
 
 
 def write_header(file: h5py.File, data: Dataset) -> None:
     """Write everything but the samples, with room for these."""
-    file.attrs.update({"format": FORMAT, "layout": LAYOUT, "units": UNITS})
+    file.attrs.update({"format": FORMAT, "layout": LAYOUT_VERSION, "units": FILE_UNITS})
     text = h5py.string_dtype()
-    for name in WORDS:
+    for name in NAME_LISTS:
         file.attrs.create(name, np.array(getattr(data, name), dtype=object), dtype=text)
     documents = {
         "law": law_to_json(data.law),
-        "specimen": specimen_document(data.specimen),
+        "specimen": specimen_to_json(data.specimen),
         "design": data.design_document,
         "provenance": data.provenance,
     }
@@ -128,18 +128,18 @@ def write_header(file: h5py.File, data: Dataset) -> None:
         file.attrs[name] = json.dumps(document, sort_keys=True)
     grid = file.create_dataset("time_grid", data=data.grid.values, dtype=np.float64)
     grid.attrs["relative"] = bool(data.grid.relative)
-    sizes = {**{name: len(getattr(data, name)) for name in WORDS}, "marks": MARKS, "frames": grid.size}
+    sizes = {**{name: len(getattr(data, name)) for name in NAME_LISTS}, "marks": HOLD_TIMES, "frames": grid.size}
     for name, column in COLUMNS.items():
-        inner = tuple(sizes[axis] for axis in column.axes)
+        shape = tuple(sizes[axis] for axis in column.axes)
         # the last axis apart: neighbours in a chunk are then neighbours in time, which compress better
-        chunks = (column.chunk, *(max(size, 1) for size in inner[:-1]), *(1 for _ in inner[-1:]))
-        file.create_dataset(name, (0, *inner), column.stored, maxshape=(None, *inner), chunks=chunks, **COMPRESSION)
+        chunks = (column.chunk, *(max(size, 1) for size in shape[:-1]), *(1 for _ in shape[-1:]))
+        file.create_dataset(name, (0, *shape), column.file_type, maxshape=(None, *shape), chunks=chunks, **COMPRESSION)
     failures = file.create_group("failures")
     failures.create_dataset("rows", (0,), np.int64, maxshape=(None,), chunks=(1024,))
     failures.create_dataset("texts", (0,), text, maxshape=(None,), chunks=(1024,))
 
 
-def append(file: h5py.File, data: Dataset) -> None:
+def append_samples(file: h5py.File, data: Dataset) -> None:
     """Write the samples of a data set behind those that are there."""
     before = len(file["index"])
     for name in COLUMNS:
@@ -158,17 +158,17 @@ def _extend(dataset: h5py.Dataset, values: Any) -> None:
 # ---- reading -------------------------------------------------------------------------------------------------------
 
 
-def read(path: str | Path, *, accepted_only: bool = False) -> Dataset:
+def read_dataset(path: str | Path, *, accepted_only: bool = False) -> Dataset:
     """Read a data set that `write` or a campaign wrote; DatasetError, in one sentence, when the file is another.
 
     accepted_only : leave rejected and failed samples in the file, which spares their memory.
     """
-    with opened(Path(path)) as file:
+    with open_hdf5(Path(path)) as file:
         return read_samples(file, read_header(file, str(path)), accepted_only)
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[h5py.File]:
+def open_hdf5(path: Path) -> Iterator[h5py.File]:
     """The file open for reading; DatasetError when there is none, when it is no HDF5, or when it is damaged."""
     try:
         with h5py.File(path, "r") as file:
@@ -187,25 +187,25 @@ def opened(path: Path) -> Iterator[h5py.File]:
 
 def read_header(file: h5py.File, source: str) -> Dataset:
     """The data set of a file with no samples in it yet."""
-    refuse_strangers(file, source)
-    words: dict[str, Any] = {name: tuple(str(word) for word in file.attrs[name]) for name in WORDS}
+    check_format(file, source)
+    name_lists: dict[str, Any] = {name: tuple(str(word) for word in file.attrs[name]) for name in NAME_LISTS}
     documents = {name: json.loads(file.attrs[name]) for name in ("law", "specimen", "design", "provenance")}
-    check_words({**words, **documents}, source)
-    sizes = {**{name: len(told) for name, told in words.items()}, "marks": MARKS, "frames": len(file["time_grid"])}
-    empty = nothing(sizes)
-    check_shapes(file, empty, source)
+    check_attributes({**name_lists, **documents}, source)
+    sizes = {**{name: len(values) for name, values in name_lists.items()}, "marks": HOLD_TIMES, "frames": len(file["time_grid"])}
+    columns = empty_columns(sizes)
+    check_shapes(file, columns, source)
     return Dataset(
-        law=_law(documents["law"], words["parameter_names"], source),
-        specimen=specimen_of(documents["specimen"], source),
+        law=_read_law(documents["law"], name_lists["parameter_names"], source),
+        specimen=specimen_from_json(documents["specimen"], source),
         design_document=documents["design"],
-        grid=_grid(file["time_grid"], source),
+        grid=_read_grid(file["time_grid"], source),
         provenance=documents["provenance"],
-        **words,
-        **empty,
+        **name_lists,
+        **columns,
     )
 
 
-def _law(document: Any, names: tuple[str, ...], source: str) -> CreepLaw:
+def _read_law(document: Any, names: tuple[str, ...], source: str) -> CreepLaw:
     try:
         law = law_from_json(document, source)
     except LawError as error:
@@ -216,8 +216,8 @@ def _law(document: Any, names: tuple[str, ...], source: str) -> CreepLaw:
     return law
 
 
-def _grid(array: h5py.Dataset, source: str) -> TimeGrid:
-    if array.size > MOST or array.dtype.kind != "f":
+def _read_grid(array: h5py.Dataset, source: str) -> TimeGrid:
+    if array.size > MOST_FRAMES or array.dtype.kind != "f":
         raise DatasetError(f"{source}: its time grid is {array.dtype} {array.shape}; the file is damaged")
     try:
         return TimeGrid(array[:], bool(array.attrs["relative"]))
@@ -228,23 +228,23 @@ def _grid(array: h5py.Dataset, source: str) -> TimeGrid:
 def read_samples(file: h5py.File, header: Dataset, accepted_only: bool = False) -> Dataset:
     """The header with the samples of a file, in blocks that spare memory."""
     reasons = file["reasons"][:]
-    wanted = reasons == 0 if accepted_only else np.ones(len(reasons), dtype=bool)
-    own: dict[str, Any] = {name: _rows(file[name], wanted, COLUMNS[name].held) for name in COLUMNS}
-    place = {int(row): k for k, row in enumerate(np.flatnonzero(wanted))}
+    selected = reasons == 0 if accepted_only else np.ones(len(reasons), dtype=bool)
+    columns: dict[str, Any] = {name: _read_rows(file[name], selected, COLUMNS[name].memory_type) for name in COLUMNS}
+    new_row = {int(row): k for k, row in enumerate(np.flatnonzero(selected))}
     rows, texts = file["failures/rows"][:], file["failures/texts"].asstr()[:]
-    failures = {place[row]: str(text) for row, text in zip(rows.tolist(), texts, strict=True) if row in place}
-    check_numbers(own, header, file.filename)
-    return replace(header, **own, failures=failures)
+    failures = {new_row[row]: str(text) for row, text in zip(rows.tolist(), texts, strict=True) if row in new_row}
+    check_values(columns, header, file.filename)
+    return replace(header, **columns, failures=failures)
 
 
-def _rows(dataset: h5py.Dataset, wanted: Bools, held: type, block: int = 4096) -> NDArray[Any]:
+def _read_rows(dataset: h5py.Dataset, selected: Bools, dtype: type, block: int = 4096) -> NDArray[Any]:
     """The wanted rows; reading by mask is slow in HDF5, and the whole may be many times larger."""
-    found = np.empty((int(wanted.sum()), *dataset.shape[1:]), held)
+    rows = np.empty((int(selected.sum()), *dataset.shape[1:]), dtype)
     filled = 0
-    for start in range(0, len(wanted), block):
-        mask = wanted[start : start + block]
+    for start in range(0, len(selected), block):
+        mask = selected[start : start + block]
         if mask.any():
-            own = dataset[start : start + block][mask]
-            found[filled : filled + len(own)] = own
-            filled += len(own)
-    return found
+            chunk = dataset[start : start + block][mask]
+            rows[filled : filled + len(chunk)] = chunk
+            filled += len(chunk)
+    return rows

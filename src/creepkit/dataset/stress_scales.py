@@ -13,46 +13,46 @@ from dataclasses import dataclass
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.dataset.coefficients import Part
-from creepkit.dataset.looks import Looks
+from creepkit.dataset.coefficients import TermGroup
+from creepkit.dataset.looks import RateEvaluationPoints
 from creepkit.language import CreepLaw, Param
 
-RATIOS = (0.05, 4.0)
-STEEPEST = 12.0
+STRESS_RATIOS = (0.05, 4.0)
+LARGEST_STRESS_EXPONENT = 12.0
 """Largest local stress exponent."""
-CELLS = 32
+RATIO_INTERVALS = 32
 """Into which the range of a ratio is cut to see where it may lie."""
 
 
-def scales_of(law: CreepLaw) -> tuple[int, ...]:
+def stress_scale_positions(law: CreepLaw) -> tuple[int, ...]:
     """Positions of the parameters in MPa."""
     return tuple(k for k, param in enumerate(law.params.values()) if param.unit == "MPa")
 
 
-def draw_scales(
-    law: CreepLaw, parts: Sequence[Part], theta: Floats, unit: Floats, rates: Floats, looks: Looks
+def draw_stress_scales(
+    law: CreepLaw, groups: Sequence[TermGroup], theta: Floats, unit_coordinates: Floats, ln_rates: Floats, points: RateEvaluationPoints
 ) -> Floats:
     """Return theta with its stress scales drawn, one after another.
 
     unit : (rows, scales) coordinates from 0 to 1. rates : (rows, parts) ln of the wanted rates, -inf: off.
     """
-    drawn, table = np.array(theta), list(law.params.values())
-    spans = {k: _Span.of(table[k], looks.middle) for k in scales_of(law)}
-    for (k, span), u in zip(spans.items(), unit.T, strict=True):
-        drawn[:, k] = span.at(u[:, None])[:, 0]
-    for (k, span), u in zip(spans.items(), unit.T, strict=True):
-        allowed = np.ones((len(u), CELLS), bool)
-        for part, wanted in zip(parts, rates.T, strict=True):
-            if k in part.positions:
-                many = np.repeat(drawn[:, None, :], CELLS, axis=1)
-                many[..., k] = span.at((np.arange(CELLS) + 0.5) / CELLS)
-                allowed &= _allowed(law, part, many, wanted, looks) | np.isneginf(wanted)[:, None]
-        drawn[:, k] = span.at(_among(allowed, u)[:, None])[:, 0]
-    return drawn
+    result, parameters = np.array(theta), list(law.params.values())
+    ratio_ranges = {k: _RatioRange.from_bounds(parameters[k], points.mean_stress) for k in stress_scale_positions(law)}
+    for (k, ratio_range), coordinates in zip(ratio_ranges.items(), unit_coordinates.T, strict=True):
+        result[:, k] = ratio_range.internal_value(coordinates[:, None])[:, 0]
+    for (k, ratio_range), coordinates in zip(ratio_ranges.items(), unit_coordinates.T, strict=True):
+        allowed = np.ones((len(coordinates), RATIO_INTERVALS), bool)
+        for group, ln_rate in zip(groups, ln_rates.T, strict=True):
+            if k in group.positions:
+                trial_theta = np.repeat(result[:, None, :], RATIO_INTERVALS, axis=1)
+                trial_theta[..., k] = ratio_range.internal_value((np.arange(RATIO_INTERVALS) + 0.5) / RATIO_INTERVALS)
+                allowed &= _allowed(law, group, trial_theta, ln_rate, points) | np.isneginf(ln_rate)[:, None]
+        result[:, k] = ratio_range.internal_value(_uniform_over_allowed(allowed, coordinates)[:, None])[:, 0]
+    return result
 
 
 @dataclass(frozen=True, eq=False)
-class _Span:
+class _RatioRange:
     """The range of one parameter's ratio that keeps it within its bounds; all but `param` (rows, 1)."""
 
     param: Param
@@ -61,38 +61,38 @@ class _Span:
     high: Floats
 
     @classmethod
-    def of(cls, param: Param, stress: Floats) -> _Span:
-        least, most = stress / param.bounds[1], stress / max(param.bounds[0], 1e-30)
-        low = np.clip(RATIOS[0], least, most)
-        high = np.maximum(low, np.minimum(RATIOS[1], most))
+    def from_bounds(cls, param: Param, stress: Floats) -> _RatioRange:
+        lowest_ratio, highest_ratio = stress / param.bounds[1], stress / max(param.bounds[0], 1e-30)
+        low = np.clip(STRESS_RATIOS[0], lowest_ratio, highest_ratio)
+        high = np.maximum(low, np.minimum(STRESS_RATIOS[1], highest_ratio))
         return cls(param, stress[:, None], low[:, None], high[:, None])
 
-    def at(self, unit: Floats) -> Floats:
+    def internal_value(self, unit_coordinates: Floats) -> Floats:
         """The internal parameter at coordinates from 0 to 1 of the range, (rows, coordinates)."""
-        value = np.clip(self.stress / (self.low + unit * (self.high - self.low)), *self.param.bounds)
+        value = np.clip(self.stress / (self.low + unit_coordinates * (self.high - self.low)), *self.param.bounds)
         return np.asarray(np.log(value) if self.param.scale == "log" else value)
 
 
-def _allowed(law: CreepLaw, part: Part, theta: Floats, wanted: Floats, looks: Looks) -> Bools:
+def _allowed(law: CreepLaw, group: TermGroup, theta: Floats, ln_rate: Floats, points: RateEvaluationPoints) -> Bools:
     """Where a part has a stress exponent and a coefficient that will do, (rows, cells)."""
-    theta[..., part.coefficient] = 0.0
-    coefficient = (wanted[:, None] - part.ln_rate(theta, looks)) / part.slope
-    low, high = np.log(list(law.params.values())[part.coefficient].bounds)
-    exponent = local_exponent(part, theta, looks)
-    return np.asarray((exponent > 0) & (exponent <= STEEPEST) & (coefficient >= low) & (coefficient <= high))
+    theta[..., group.coefficient] = 0.0
+    ln_coefficient = (ln_rate[:, None] - group.ln_mean_rate(theta, points)) / group.exponent
+    low, high = np.log(list(law.params.values())[group.coefficient].bounds)
+    exponent = local_stress_exponent(group, theta, points)
+    return np.asarray((exponent > 0) & (exponent <= LARGEST_STRESS_EXPONENT) & (ln_coefficient >= low) & (ln_coefficient <= high))
 
 
-def local_exponent(part: Part, theta: Floats, looks: Looks) -> Floats:
+def local_stress_exponent(group: TermGroup, theta: Floats, points: RateEvaluationPoints) -> Floats:
     """d ln f / d ln stress of a part, by a difference of 2 %."""
-    up, down = (part.ln_rate(theta, looks, factor) for factor in (1.01, 1 / 1.01))
-    return np.asarray((up - down) / (2 * np.log(1.01)))
+    ln_rate_above, ln_rate_below = (group.ln_mean_rate(theta, points, factor) for factor in (1.01, 1 / 1.01))
+    return np.asarray((ln_rate_above - ln_rate_below) / (2 * np.log(1.01)))
 
 
-def _among(allowed: Bools, u: Floats) -> Floats:
+def _uniform_over_allowed(allowed: Bools, coordinates: Floats) -> Floats:
     """Coordinates from 0 to 1 that are uniform over the allowed cells; over all where none is."""
     weights = np.where(allowed.any(axis=1, keepdims=True), allowed, True).astype(float)
     sums = np.cumsum(weights, axis=1)
-    target = u * sums[:, -1]
-    cell = np.minimum((sums <= target[:, None]).sum(axis=1), CELLS - 1)
-    inside = np.clip(target - (np.take_along_axis(sums, cell[:, None], axis=1)[:, 0] - 1.0), 0.0, 1.0)
-    return np.asarray((cell + inside) / CELLS)
+    target = coordinates * sums[:, -1]
+    interval = np.minimum((sums <= target[:, None]).sum(axis=1), RATIO_INTERVALS - 1)
+    fraction = np.clip(target - (np.take_along_axis(sums, interval[:, None], axis=1)[:, 0] - 1.0), 0.0, 1.0)
+    return np.asarray((interval + fraction) / RATIO_INTERVALS)

@@ -13,10 +13,10 @@ from creepkit.errors import DatasetError
 PAPER_INTERVAL, PAPER_END = 150.0, 43200.0
 """s; Materials and Methods of the paper: 289 frames from 0 to 12 h."""
 
-MOST = 100_000
+MOST_FRAMES = 100_000
 """Frames of a sample: a typing error should not ask for all the memory."""
 
-SHARES = (0.0, 60 / 43200, 240 / 43200, *(k / 48 for k in range(1, 49)))
+RELATIVE_TIMES = (0.0, 60 / 43200, 240 / 43200, *(k / 48 for k in range(1, 49)))
 """Of the end of a test: 51 frames, two of them in the fast start; 900 s apart in 12 h."""
 
 
@@ -45,9 +45,9 @@ class TimeGrid:
         """Frames `interval` s apart from 0 to `end` s."""
         if not (0 < interval <= end < np.inf):
             raise DatasetError(f"frames every {interval:g} s until {end:g} s: the interval must lie from 0 to the end")
-        if end / interval > MOST:
+        if end / interval > MOST_FRAMES:
             raise DatasetError(
-                f"frames every {interval:g} s until {end:g} s are {end / interval:.0f}; at most {MOST} are simulated"
+                f"frames every {interval:g} s until {end:g} s are {end / interval:.0f}; at most {MOST_FRAMES} are simulated"
             )
         frames = int(np.floor(end / interval * (1 + 1e-12)))
         return cls(interval * np.arange(frames + 1, dtype=float))

@@ -15,50 +15,50 @@ from dataclasses import asdict
 from typing import IO, TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from creepkit.dataset.workers import Work
+    from creepkit.dataset.workers import Job
 
 
 def main() -> None:
     """Answer each number with what became of its shard, a line of JSON."""
-    signal.signal(signal.SIGTERM, _end)
-    told, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
+    signal.signal(signal.SIGTERM, _terminate)
+    stdin, stdout = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # whatever else is printed belongs on stderr
-    sys.path[:] = _part(told)
-    work = _part(told).on_one_thread()
-    _say(answers, {"ready": True})
-    for line in told:
-        _say(answers, asdict(attempt(work, int(line))))
+    sys.path[:] = _read_pickled(stdin)
+    job = _read_pickled(stdin).on_one_thread()
+    _write_result(stdout, {"ready": True})
+    for line in stdin:
+        _write_result(stdout, asdict(run_task(job, int(line))))
 
 
-def _end(*_: object) -> None:
+def _terminate(*_: object) -> None:
     """End as after an error: a sample that is given up on request has not killed its process."""
     raise SystemExit(0)
 
 
-def _part(told: IO[bytes]) -> Any:
-    (size,) = struct.unpack("!Q", told.read(8))
-    return pickle.loads(told.read(size))
+def _read_pickled(stream: IO[bytes]) -> Any:
+    (size,) = struct.unpack("!Q", stream.read(8))
+    return pickle.loads(stream.read(size))
 
 
-def _say(answers: IO[bytes], what: dict[str, Any]) -> None:
+def _write_result(stream: IO[bytes], document: dict[str, Any]) -> None:
     try:
-        answers.write(json.dumps(what).encode() + b"\n")
+        stream.write(json.dumps(document).encode() + b"\n")
     except BrokenPipeError:
         raise SystemExit(0) from None  # who asked is gone; the shard is done all the same
 
 
-def attempt(work: Work, number: int) -> Any:
+def run_task(job: Job, number: int) -> Any:
     """Run a part; an error is an answer too, whatever a design or a criterion of somebody raises."""
-    from creepkit.dataset.shards import Answer
-    from creepkit.dataset.simulating import words
+    from creepkit.dataset.shards import TaskResult
+    from creepkit.dataset.simulating import error_text
     from creepkit.errors import CreepkitError
 
     try:
-        return work.run(number)
+        return job.run(number)
     except CreepkitError as error:
-        return Answer(number, "error", text=words(error))
+        return TaskResult(number, "error", text=error_text(error))
     except Exception as error:
-        return Answer(number, "error", text=f"{work.part} {number} cannot be simulated: {words(error)}")
+        return TaskResult(number, "error", text=f"{job.task_name} {number} cannot be simulated: {error_text(error)}")
 
 
 if __name__ == "__main__":

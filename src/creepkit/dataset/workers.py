@@ -21,29 +21,29 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import IO, Protocol
 
-from creepkit.dataset.shards import Answer
+from creepkit.dataset.shards import TaskResult
 from creepkit.errors import DatasetError
 
-LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMBA")
+THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMBA")
 """Those that start threads of their own: two on one busy core are many times slower than one."""
-ONE_THREAD = dict.fromkeys((f"{library}_NUM_THREADS" for library in LIBRARIES), "1")
-LAST_WORDS = 5
+ONE_THREAD = dict.fromkeys((f"{library}_NUM_THREADS" for library in THREADED_LIBRARIES), "1")
+TERMINATION_TIMEOUT = 5
 """s, in which a worker that is asked to end does so."""
 
 
-class Work(Protocol):
+class Job(Protocol):
     """What worker processes are sent, pickled, to do parts of."""
 
     @property
-    def part(self) -> str:
+    def task_name(self) -> str:
         """What a part is called, such as "shard"."""
         ...
 
-    def on_one_thread(self) -> Work:
+    def on_one_thread(self) -> Job:
         """The same work, to be done on one thread."""
         ...
 
-    def run(self, number: int) -> Answer:
+    def run(self, number: int) -> TaskResult:
         """Do one part and leave what came of it in a file."""
         ...
 
@@ -52,7 +52,7 @@ class Workers(Protocol):
     """Whoever does parts of some work."""
 
     @property
-    def free(self) -> int:
+    def free_slots(self) -> int:
         """How many more parts can be worked on at once."""
         ...
 
@@ -60,46 +60,46 @@ class Workers(Protocol):
         """Have a part done."""
         ...
 
-    def answers(self, timeout: float) -> list[Answer]:
+    def results(self, timeout: float) -> list[TaskResult]:
         """Wait for answers, at most so many s."""
         ...
 
 
 @dataclass
-class Process:
+class WorkerProcess:
     """A worker process. shard : the part it is at, None when it is idle. ready : whether it has started."""
 
     popen: subprocess.Popen[bytes]
-    shard: int | None = None
+    task: int | None = None
     ready: bool = False
-    heard: bytes = b""
+    buffer: bytes = b""
 
 
 class ProcessWorkers:
     """Worker processes of this machine; a context."""
 
-    def __init__(self, work: Work, size: int) -> None:
+    def __init__(self, job: Job, process_count: int) -> None:
         paths = pickle.dumps(sys.path)
-        self._greeting = b"".join(struct.pack("!Q", len(part)) + part for part in (paths, pickle.dumps(work)))
-        self._size = size
-        self._processes: list[Process] = []
+        self._setup_message = b"".join(struct.pack("!Q", len(part)) + part for part in (paths, pickle.dumps(job)))
+        self._size = process_count
+        self._processes: list[WorkerProcess] = []
         self._selector = selectors.DefaultSelector()
 
     @property
-    def free(self) -> int:
+    def free_slots(self) -> int:
         """How many more parts can be worked on at once."""
-        return self._size - sum(process.shard is not None for process in self._processes)
+        return self._size - sum(process.task is not None for process in self._processes)
 
     def submit(self, number: int) -> None:
         """Give a part to an idle worker, or to a new one."""
-        idle = [process for process in self._processes if process.shard is None]
-        process = idle[0] if idle else self._started()
-        process.shard = number
-        _tell(process.popen, b"%d\n" % number)
+        idle = [process for process in self._processes if process.task is None]
+        process = idle[0] if idle else self._start()
+        process.task = number
+        _send(process.popen, b"%d\n" % number)
 
-    def answers(self, timeout: float) -> list[Answer]:
+    def results(self, timeout: float) -> list[TaskResult]:
         """Wait for answers, at most so many s."""
-        return [answer for key, _ in self._selector.select(timeout) for answer in self._heard(key.data)]
+        return [result for key, _ in self._selector.select(timeout) for result in self._read_results(key.data)]
 
     def __enter__(self) -> ProcessWorkers:
         return self
@@ -110,9 +110,9 @@ class ProcessWorkers:
         for process in self._processes:
             process.popen.terminate()
         for process in list(self._processes):
-            self._forget(process)
+            self._close(process)
 
-    def _started(self) -> Process:
+    def _start(self) -> WorkerProcess:
         """A new process, in a session of its own: Ctrl-C is for us alone, who then end it."""
         popen = subprocess.Popen(
             [sys.executable, "-m", "creepkit.dataset.worker"],
@@ -122,47 +122,47 @@ class ProcessWorkers:
             env={**os.environ, **ONE_THREAD},
             start_new_session=True,
         )
-        process = Process(popen)
+        process = WorkerProcess(popen)
         self._processes.append(process)
         self._selector.register(_pipe(popen.stdout), selectors.EVENT_READ, process)
-        _tell(popen, self._greeting)
+        _send(popen, self._setup_message)
         return process
 
-    def _heard(self, process: Process) -> list[Answer]:
+    def _read_results(self, process: WorkerProcess) -> list[TaskResult]:
         """What a process says: that it is ready, what became of its part, or, by silence, that it is dead."""
-        read = _pipe(process.popen.stdout).read(1 << 16)
-        if not read:
-            return self._died(process)
-        *lines, process.heard = (process.heard + read).split(b"\n")
-        told = [json.loads(line) for line in lines]
-        answers = [Answer(**one) for one in told if "number" in one]
+        data = _pipe(process.popen.stdout).read(1 << 16)
+        if not data:
+            return self._after_death(process)
+        *lines, process.buffer = (process.buffer + data).split(b"\n")
+        messages = [json.loads(line) for line in lines]
+        results = [TaskResult(**message) for message in messages if "number" in message]
         process.ready = True
-        process.shard = None if answers else process.shard
-        return answers
+        process.task = None if results else process.task
+        return results
 
-    def _died(self, process: Process) -> list[Answer]:
-        code = self._forget(process)
-        how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+    def _after_death(self, process: WorkerProcess) -> list[TaskResult]:
+        code = self._close(process)
+        cause = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
         if code > 0 and not process.ready:
-            raise DatasetError(f"a worker process ended as it started ({how}); what it said is above")
-        return [] if process.shard is None else [Answer(process.shard, "died", text=how)]
+            raise DatasetError(f"a worker process ended as it started ({cause}); what it said is above")
+        return [] if process.task is None else [TaskResult(process.task, "died", text=cause)]
 
-    def _forget(self, process: Process) -> int:
+    def _close(self, process: WorkerProcess) -> int:
         self._processes.remove(process)
         self._selector.unregister(_pipe(process.popen.stdout))
         for pipe in (process.popen.stdin, process.popen.stdout):
             _pipe(pipe).close()
         try:
-            return process.popen.wait(LAST_WORDS)
+            return process.popen.wait(TERMINATION_TIMEOUT)
         except subprocess.TimeoutExpired:
             process.popen.kill()
             return process.popen.wait()
 
 
-def _tell(popen: subprocess.Popen[bytes], what: bytes) -> None:
+def _send(popen: subprocess.Popen[bytes], data: bytes) -> None:
     """Write to a worker; that it has died is heard where its answers are."""
     with suppress(BrokenPipeError):
-        _pipe(popen.stdin).write(what)
+        _pipe(popen.stdin).write(data)
 
 
 def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:

@@ -18,25 +18,25 @@ from itertools import product
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.discovery.libraries import ARRHENIUS, Library
-from creepkit.discovery.points import Points
+from creepkit.discovery.libraries import ARRHENIUS, CandidateForm
+from creepkit.discovery.points import IsothermalEstimates
 from creepkit.discovery.regression import Regression, regress
 from creepkit.errors import FitError
 
-ALL = 150
+MAX_EXHAUSTIVE = 150
 """Up to so many combinations are all tried."""
-SWEEPS = 4
-CREDIBLE = 0.95
-APART = 3.84
+MAX_SWEEPS = 4
+CREDIBLE_MASS = 0.95
+CHI_SQUARE_95 = 3.84
 """chi^2 of one degree of freedom at 95 %: curves closer than that, by the points' own covariances, are equivalent."""
 
 
 @dataclass(frozen=True, eq=False)
-class Weighted:
+class WeightedCombination:
     """One combination of forms, its quasi AICc less the best, and its Akaike weight."""
 
     regression: Regression
-    excess: float
+    criterion_difference: float
     weight: float
 
     @property
@@ -46,7 +46,7 @@ class Weighted:
 
 
 @dataclass(frozen=True)
-class Form:
+class FormWeight:
     """A form of one parameter: its share of belief, and whether the points can tell it from the best one."""
 
     name: str
@@ -55,118 +55,118 @@ class Form:
 
 
 @dataclass(frozen=True, eq=False)
-class Combinations:
+class RankedCombinations:
     """All combinations that were tried, best first.
 
     inflation : c, by which the covariances of the points fell short. sets : {parameter: forms that remain, best
         first}: those that hold 95 % of the belief, and those equivalent to the best that have no more numbers.
     """
 
-    tried: tuple[Weighted, ...]
-    inflation: float
-    sets: Mapping[str, tuple[Form, ...]]
+    combinations: tuple[WeightedCombination, ...]
+    overdispersion: float
+    plausible_forms: Mapping[str, tuple[FormWeight, ...]]
 
     @property
     def best(self) -> Regression:
         """The combination of the highest weight."""
-        return self.tried[0].regression
+        return self.combinations[0].regression
 
     def with_form(self, parameter: str, form: str) -> Regression:
         """The best combination that has this form of a parameter."""
-        return next(one.regression for one in self.tried if one.forms[parameter] == form)
+        return next(combination.regression for combination in self.combinations if combination.forms[parameter] == form)
 
 
-def combine(
-    points: Points,
-    libraries: Mapping[str, Sequence[Library]],
+def rank_combinations(
+    points: IsothermalEstimates,
+    candidates: Mapping[str, Sequence[CandidateForm]],
     progress: Callable[[str, int, int], None] | None = None,
-) -> Combinations:
+) -> RankedCombinations:
     """Fit combinations of one library for each parameter, and weigh them."""
-    names, every = list(libraries), int(np.prod([len(own) for own in libraries.values()]))
-    tried = _Tried(points, min(every, SWEEPS * sum(len(own) for own in libraries.values())), progress)
-    if every <= ALL:
-        tried.total = every
-        for chosen in product(*libraries.values()):
-            tried(chosen)
+    names, combination_count = list(candidates), int(np.prod([len(forms) for forms in candidates.values()]))
+    cache = _RegressionCache(points, min(combination_count, MAX_SWEEPS * sum(len(own) for own in candidates.values())), progress)
+    if combination_count <= MAX_EXHAUSTIVE:
+        cache.total = combination_count
+        for forms_of_combination in product(*candidates.values()):
+            cache(forms_of_combination)
     else:
-        _greedy(tried, libraries)
-    found = [one for one in tried.all if one.size < one.rows - 1 and one.admissible()]
-    if not found:
+        _coordinate_search(cache, candidates)
+    admissible = [regression for regression in cache.regressions if regression.parameter_count < regression.rows - 1 and regression.within_bounds()]
+    if not admissible:
         raise FitError(f"no form of {', '.join(names)} within its bounds has fewer numbers than these points allow")
-    inflation = max(1.0, min(one.chi_square / (one.rows - one.size) for one in found))
-    scores = np.array([_score(one, inflation) for one in found])
+    overdispersion = max(1.0, min(one.chi_square / (one.rows - one.parameter_count) for one in admissible))
+    scores = np.array([_quasi_aicc(one, overdispersion) for one in admissible])
     weights = np.exp(-0.5 * (scores - scores.min()))
     weights /= weights.sum()
     order = np.argsort(scores, kind="stable")
-    ordered = [Weighted(found[k], float(scores[k] - scores.min()), float(weights[k])) for k in order]
-    sets = {name: _set(name, ordered, points, inflation) for name in names}
-    return Combinations(tuple(ordered), inflation, sets)
+    combinations = [WeightedCombination(admissible[k], float(scores[k] - scores.min()), float(weights[k])) for k in order]
+    plausible_forms = {name: _plausible_forms(name, combinations, points, overdispersion) for name in names}
+    return RankedCombinations(tuple(combinations), overdispersion, plausible_forms)
 
 
-class _Tried:
+class _RegressionCache:
     """Regressions of combinations, each made once; total : how many there may be."""
 
-    def __init__(self, points: Points, total: int, progress: Callable[[str, int, int], None] | None) -> None:
+    def __init__(self, points: IsothermalEstimates, total: int, progress: Callable[[str, int, int], None] | None) -> None:
         self.points, self.total, self.progress = points, total, progress
-        self._known: dict[tuple[str, ...], Regression] = {}
+        self._regressions: dict[tuple[str, ...], Regression] = {}
 
-    def __call__(self, chosen: Sequence[Library]) -> Regression:
-        key = tuple(one.name for one in chosen)
-        if key not in self._known:
-            self._known[key] = regress(self.points, chosen)
+    def __call__(self, forms: Sequence[CandidateForm]) -> Regression:
+        key = tuple(form.name for form in forms)
+        if key not in self._regressions:
+            self._regressions[key] = regress(self.points, forms)
             if self.progress is not None:
-                self.progress("combination of forms", len(self._known), self.total)
-        return self._known[key]
+                self.progress("combination of forms", len(self._regressions), self.total)
+        return self._regressions[key]
 
     @property
-    def all(self) -> list[Regression]:
-        return list(self._known.values())
+    def regressions(self) -> list[Regression]:
+        return list(self._regressions.values())
 
 
-def _greedy(tried: _Tried, libraries: Mapping[str, Sequence[Library]]) -> None:
+def _coordinate_search(cache: _RegressionCache, candidates: Mapping[str, Sequence[CandidateForm]]) -> None:
     """From Arrhenius and constants, change one parameter's form at a time for the better until none is."""
-    now = [next((one for one in own if one.name == ARRHENIUS), own[0]) for own in libraries.values()]
-    for _ in range(SWEEPS):
-        before = [one.name for one in now]
-        for k, own in enumerate(libraries.values()):
-            trials = [[*now[:k], one, *now[k + 1 :]] for one in own]
-            now = min(trials, key=lambda chosen: _score(tried(chosen), 1.0))
-        if [one.name for one in now] == before:
+    current = [next((form for form in forms if form.name == ARRHENIUS), forms[0]) for forms in candidates.values()]
+    for _ in range(MAX_SWEEPS):
+        previous = [one.name for one in current]
+        for k, own in enumerate(candidates.values()):
+            combinations = [[*current[:k], one, *current[k + 1 :]] for one in own]
+            current = min(combinations, key=lambda chosen: _quasi_aicc(cache(chosen), 1.0))
+        if [one.name for one in current] == previous:
             return
 
 
-def _score(one: Regression, inflation: float) -> float:
-    k, rows = one.size, one.rows
+def _quasi_aicc(regression: Regression, overdispersion: float) -> float:
+    k, rows = regression.parameter_count, regression.rows
     if rows - k - 1 <= 0:
         return np.inf
-    small = 2.0 * k * (k + 1) / (rows - k - 1)
-    return float(one.chi_square / inflation + 2.0 * k + small - 2.0 * np.log(one.odds))
+    small_sample_correction = 2.0 * k * (k + 1) / (rows - k - 1)
+    return float(regression.chi_square / overdispersion + 2.0 * k + small_sample_correction - 2.0 * np.log(regression.prior_odds))
 
 
-def distance(one: Regression, other: Regression, points: Points, inflation: float) -> float:
+def squared_mahalanobis(first: Regression, second: Regression, points: IsothermalEstimates, overdispersion: float) -> float:
     """chi^2 between the curves of two combinations, by the covariances of the points.
 
     It is by how much chi^2 would rise on average if one were true and the other fitted.
     """
-    white: Floats = np.einsum("kij,kj->ki", points.whiteners, one.curves - other.curves)
-    return float((white**2).sum() / inflation)
+    whitened: Floats = np.einsum("kij,kj->ki", points.whitening, first.fitted_theta - second.fitted_theta)
+    return float((whitened**2).sum() / overdispersion)
 
 
-def _set(name: str, ordered: Sequence[Weighted], points: Points, inflation: float) -> tuple[Form, ...]:
+def _plausible_forms(name: str, combinations: Sequence[WeightedCombination], points: IsothermalEstimates, overdispersion: float) -> tuple[FormWeight, ...]:
     weights: dict[str, float] = {}
-    first: dict[str, Regression] = {}
-    for one in ordered:
-        form = one.forms[name]
-        weights[form] = weights.get(form, 0.0) + one.weight
-        first.setdefault(form, one.regression)
+    best_regression: dict[str, Regression] = {}
+    for combination in combinations:
+        form = combination.forms[name]
+        weights[form] = weights.get(form, 0.0) + combination.weight
+        best_regression.setdefault(form, combination.regression)
     ranked = sorted(weights, key=lambda form: -weights[form])
-    before = np.cumsum([0.0, *(weights[form] for form in ranked)])
-    near = {form: distance(first[form], first[ranked[0]], points, inflation) < APART for form in ranked}
-    sizes = {form: _numbers(first[form], name) for form in ranked}
-    simple = {form: near[form] and sizes[form] <= sizes[ranked[0]] for form in ranked}
-    kept = [form for form, held in zip(ranked, before, strict=False) if held < CREDIBLE or simple[form]]
-    return tuple(Form(form, weights[form], near[form]) for form in kept)
+    cumulative_weight = np.cumsum([0.0, *(weights[form] for form in ranked)])
+    equivalent = {form: squared_mahalanobis(best_regression[form], best_regression[ranked[0]], points, overdispersion) < CHI_SQUARE_95 for form in ranked}
+    sizes = {form: _parameter_count(best_regression[form], name) for form in ranked}
+    equivalent_and_no_larger = {form: equivalent[form] and sizes[form] <= sizes[ranked[0]] for form in ranked}
+    retained = [form for form, mass_before in zip(ranked, cumulative_weight, strict=False) if mass_before < CREDIBLE_MASS or equivalent_and_no_larger[form]]
+    return tuple(FormWeight(form, weights[form], equivalent[form]) for form in retained)
 
 
-def _numbers(one: Regression, parameter: str) -> int:
-    return next(library.size for library in one.libraries if library.parameter == parameter)
+def _parameter_count(regression: Regression, parameter: str) -> int:
+    return next(library.parameter_count for library in regression.candidate_forms if library.parameter == parameter)

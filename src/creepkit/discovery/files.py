@@ -7,57 +7,57 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from creepkit.inverse.files import to_json as fit_to_json
-from creepkit.inverse.writing import write_text
+from creepkit.inverse.files import identification_to_json as fit_to_json
+from creepkit.inverse.writing import write_text_atomically
 from creepkit.language.tree import law_to_json
 
 if TYPE_CHECKING:
-    from creepkit.discovery.trend import Candidate, TemperatureLaw
+    from creepkit.discovery.trend import CandidateLaw, TemperatureLaw
 
-KIND = "creepkit temperature law"
-VERSION = 1
-LISTED = 20
+FILE_KIND = "creepkit temperature law"
+FILE_VERSION = 1
+MAX_COMBINATIONS_WRITTEN = 20
 """Combinations that are written, best first."""
 
 
-def to_json(trend: TemperatureLaw) -> dict[str, Any]:
+def temperature_law_to_json(temperature_law: TemperatureLaw) -> dict[str, Any]:
     """The answer as JSON-able data."""
-    points = trend.points
+    estimates = temperature_law.isothermal_estimates
     return {
-        "kind": KIND,
-        "version": VERSION,
+        "kind": FILE_KIND,
+        "version": FILE_VERSION,
         "creepkit": version("creepkit"),
-        "law": law_to_json(trend.law),
-        "base": law_to_json(trend.base),
-        "T_ref": trend.T_ref,
-        "range": list(trend.range),
-        "judged_by": trend.judged_by,
-        "estimates": [vars(e) for e in trend.estimates],
-        "sets": {name: [vars(form) for form in own] for name, own in trend.sets.items()},
-        "odds": {name: dict(own) for name, own in trend.odds.items()},
-        "candidates": [_plain(one) for one in trend.candidates[:LISTED]],
+        "law": law_to_json(temperature_law.law),
+        "base": law_to_json(temperature_law.isothermal_law),
+        "T_ref": temperature_law.T_ref,
+        "range": list(temperature_law.temperature_range),
+        "judged_by": temperature_law.criterion_data,
+        "estimates": [vars(e) for e in temperature_law.estimates],
+        "sets": {name: [vars(form) for form in forms] for name, forms in temperature_law.plausible_forms.items()},
+        "odds": {name: dict(own) for name, own in temperature_law.prior_odds.items()},
+        "candidates": [_candidate_to_json(candidate) for candidate in temperature_law.candidates[:MAX_COMBINATIONS_WRITTEN]],
         "points": {
-            "temperatures": points.temperatures.tolist(),
-            "internal": points.theta.tolist(),
-            "covariance": points.covariance.tolist(),
-            "inflation": trend.combinations.inflation,
+            "temperatures": estimates.temperatures.tolist(),
+            "internal": estimates.theta.tolist(),
+            "covariance": estimates.covariance.tolist(),
+            "inflation": temperature_law.combinations.overdispersion,
         },
-        "reference": vars(points.reference),
-        "fit": None if trend.fit is None else fit_to_json(trend.fit),
-        "notes": list(trend.notes),
+        "reference": vars(estimates.reference),
+        "fit": None if temperature_law.fit is None else fit_to_json(temperature_law.fit),
+        "notes": list(temperature_law.notes),
     }
 
 
-def _plain(one: Candidate) -> dict[str, Any]:
+def _candidate_to_json(candidate: CandidateLaw) -> dict[str, Any]:
     return {
-        "forms": one.forms,
-        "internal": dict(one.internal),
-        "covariance": one.covariance.tolist(),
-        "excess": one.excess,
-        "weight": one.weight,
+        "forms": candidate.forms,
+        "internal": dict(candidate.internal_values),
+        "covariance": candidate.covariance.tolist(),
+        "excess": candidate.criterion_difference,
+        "weight": candidate.weight,
     }
 
 
-def save(trend: TemperatureLaw, path: Path) -> Path:
+def write_temperature_law(temperature_law: TemperatureLaw, path: Path) -> Path:
     """Write a file that is whole or absent."""
-    return write_text(json.dumps(to_json(trend), indent=1, allow_nan=False) + "\n", path)
+    return write_text_atomically(json.dumps(temperature_law_to_json(temperature_law), indent=1, allow_nan=False) + "\n", path)

@@ -7,75 +7,75 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from creepkit.discovery.combining import CREDIBLE, Form, distance
-from creepkit.discovery.libraries import Library
+from creepkit.discovery.combining import CREDIBLE_MASS, FormWeight, squared_mahalanobis
+from creepkit.discovery.libraries import CandidateForm
 from creepkit.discovery.regression import Regression
-from creepkit.discovery.trend import Candidate, TemperatureLaw, estimates_of
+from creepkit.discovery.trend import CandidateLaw, TemperatureLaw, averaged_estimates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection import rank
 
 
 @dataclass(frozen=True, eq=False)
-class Refitted:
+class RefittedCombination:
     """A combination of forms, its regression on the points, and the identification of its law."""
 
-    libraries: tuple[Library, ...]
+    forms: tuple[CandidateForm, ...]
     regression: Regression
     fit: Identification
 
 
-def between(trend: TemperatureLaw, one: Regression, other: Regression) -> float:
+def curve_distance(temperature_law: TemperatureLaw, first: Regression, second: Regression) -> float:
     """chi^2 between the curves of two combinations, by the covariances of the points."""
-    return distance(one, other, trend.points, trend.combinations.inflation)
+    return squared_mahalanobis(first, second, temperature_law.isothermal_estimates, temperature_law.combinations.overdispersion)
 
 
-def judged(trend: TemperatureLaw, refits: Sequence[Refitted], failed: Mapping[tuple[str, ...], str]) -> TemperatureLaw:
+def weigh_refits(temperature_law: TemperatureLaw, refits: Sequence[RefittedCombination], failed: Mapping[tuple[str, ...], str]) -> TemperatureLaw:
     """The trend as the tests see it; failed : {forms: why they could not be refitted}, which become notes."""
-    ranking = rank([one.fit for one in refits])
-    excess = {id(entry.fit): entry.excess for entry in ranking.laws}
-    odds = np.array([one.regression.odds for one in refits])
-    scores = np.array([excess[id(one.fit)] for one in refits]) - 2.0 * np.log(odds)
+    ranking = rank([refit.fit for refit in refits])
+    bic_differences = {id(entry.fit): entry.excess for entry in ranking.laws}
+    odds = np.array([one.regression.prior_odds for one in refits])
+    scores = np.array([bic_differences[id(one.fit)] for one in refits]) - 2.0 * np.log(odds)
     weights = np.exp(-0.5 * (scores - scores.min()))
     weights /= weights.sum()
     order = np.argsort(scores, kind="stable")
-    candidates = tuple(_candidate(refits[k], float(scores[k] - scores.min()), float(weights[k])) for k in order)
+    candidates = tuple(_candidate_law(refits[k], float(scores[k] - scores.min()), float(weights[k])) for k in order)
     best = candidates[0]
     assert best.fit is not None
     return replace(
-        trend,
+        temperature_law,
         law=best.fit.law,
-        estimates=estimates_of(best.fit.law, candidates),
-        judged_by="histories",
-        sets={name: _set(trend, candidates, name) for name in trend.base.names},
+        estimates=averaged_estimates(best.fit.law, candidates),
+        criterion_data="histories",
+        plausible_forms={name: _plausible_forms_of_refits(temperature_law, candidates, name) for name in temperature_law.isothermal_law.names},
         candidates=candidates,
         fit=best.fit,
-        notes=(*trend.notes, *(f"not refitted: {', '.join(key)}: {told}" for key, told in failed.items())),
+        notes=(*temperature_law.notes, *(f"not refitted: {', '.join(key)}: {reason}" for key, reason in failed.items())),
     )
 
 
-def _candidate(one: Refitted, excess: float, weight: float) -> Candidate:
-    fit, names = one.fit, [name for library in one.libraries for name in library.names]
+def _candidate_law(refit: RefittedCombination, criterion_difference: float, weight: float) -> CandidateLaw:
+    fit, names = refit.fit, [name for library in refit.forms for name in library.parameter_names]
     theta = dict(zip(fit.law.names, fit.coordinates.theta(fit.u), strict=True))
     jacobian = fit.coordinates.jacobian(fit.u)
     covariance = jacobian @ fit.covariance @ jacobian.T
-    places = [fit.law.names.index(name) for name in names]
+    indices = [fit.law.names.index(name) for name in names]
     internal = {name: float(theta[name]) for name in names}
-    return Candidate(one.libraries, internal, covariance[np.ix_(places, places)], fit.freedom, excess, weight, fit)
+    return CandidateLaw(refit.forms, internal, covariance[np.ix_(indices, indices)], fit.freedom, criterion_difference, weight, fit)
 
 
-def _set(trend: TemperatureLaw, candidates: Sequence[Candidate], name: str) -> tuple[Form, ...]:
+def _plausible_forms_of_refits(temperature_law: TemperatureLaw, candidates: Sequence[CandidateLaw], name: str) -> tuple[FormWeight, ...]:
     """Forms that hold 95 % of the belief, then those not refitted whose nearest neighbour is among them."""
     weights: dict[str, float] = {}
-    for one in candidates:
-        weights[one.forms[name]] = weights.get(one.forms[name], 0.0) + one.weight
+    for candidate in candidates:
+        weights[candidate.forms[name]] = weights.get(candidate.forms[name], 0.0) + candidate.weight
     ranked = sorted(weights, key=lambda form: -weights[form])
-    before = np.cumsum([0.0, *(weights[form] for form in ranked)])
-    kept = [form for form, held in zip(ranked, before, strict=False) if held < CREDIBLE]
-    rest = [form.name for form in trend.sets[name] if form.name not in weights]
-    with_form = trend.combinations.with_form
+    cumulative_weight = np.cumsum([0.0, *(weights[form] for form in ranked)])
+    retained = [form for form, mass_before in zip(ranked, cumulative_weight, strict=False) if mass_before < CREDIBLE_MASS]
+    not_refitted = [form.name for form in temperature_law.plausible_forms[name] if form.name not in weights]
+    with_form = temperature_law.combinations.with_form
 
     def nearest(form: str) -> str:
-        return min(weights, key=lambda tried: between(trend, with_form(name, form), with_form(name, tried)))
+        return min(weights, key=lambda tried: curve_distance(temperature_law, with_form(name, form), with_form(name, tried)))
 
-    stood_for = [form for form in rest if nearest(form) in kept]
-    return tuple(Form(form, weights.get(form, 0.0), form in stood_for) for form in (*kept, *stood_for))
+    represented = [form for form in not_refitted if nearest(form) in retained]
+    return tuple(FormWeight(form, weights.get(form, 0.0), form in represented) for form in (*retained, *represented))

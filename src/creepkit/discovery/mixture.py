@@ -10,17 +10,17 @@ from scipy.stats import t as student
 
 from creepkit.arrays import Floats
 
-TAIL = 0.025
+TAIL_PROBABILITY = 0.025
 
 
-def mixture_interval(values: Floats, sd: Floats, weights: Floats, freedom: Sequence[float]) -> tuple[float, float]:
+def mixture_interval(values: Floats, standard_deviations: Floats, weights: Floats, degrees_of_freedom: Sequence[float]) -> tuple[float, float]:
     """The 95 % interval of a mixture of Student distributions, (candidates,) each; weights sum to 1."""
-    spread, free = np.maximum(sd, 1e-300), np.maximum(np.asarray(freedom, float), 1.0)
+    scales, freedom_of_each = np.maximum(standard_deviations, 1e-300), np.maximum(np.asarray(degrees_of_freedom, float), 1.0)
 
     def below(x: float) -> float:
-        return float(weights @ student.cdf((x - values) / spread, free))
+        return float(weights @ student.cdf((x - values) / scales, freedom_of_each))
 
-    reach = student.ppf(1 - TAIL / 100, free) * spread
-    ends = float((values - reach).min()), float((values + reach).max())
-    low, high = (float(brentq(lambda x, p=p: below(x) - p, *ends)) for p in (TAIL, 1 - TAIL))
+    half_widths = student.ppf(1 - TAIL_PROBABILITY / 100, freedom_of_each) * scales
+    bracket = float((values - half_widths).min()), float((values + half_widths).max())
+    low, high = (float(brentq(lambda x, p=p: below(x) - p, *bracket)) for p in (TAIL_PROBABILITY, 1 - TAIL_PROBABILITY))
     return low, high

@@ -10,106 +10,106 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.discovery.points import ENDLESS
-from creepkit.figures import blank, written
+from creepkit.discovery.points import INFINITE_FREEDOM
+from creepkit.figures import empty_figure, save_figure
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.uncertainty import band, quantile
+from creepkit.inverse.uncertainty import delta_method, interval_quantile
 from creepkit.language import Param
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from creepkit.discovery.trend import Candidate, TemperatureLaw
+    from creepkit.discovery.trend import CandidateLaw, TemperatureLaw
 
-COLUMNS = 3
-SHOWN = 0.02
+MAX_PANELS_PER_ROW = 3
+MIN_WEIGHT_SHOWN = 0.02
 """Combinations of less weight are not drawn, but those that a parameter's set names."""
 
 
-def figure_of(trend: TemperatureLaw, path: str | Path | None = None) -> Figure:
+def plot_temperature_law(temperature_law: TemperatureLaw, path: str | Path | None = None) -> Figure:
     """One panel a parameter: estimates with 95 % intervals, and curves; a coefficient is shown by its rate.
 
     The rate is that at the reference stress: coefficients themselves move with their exponents.
     """
-    coordinates = Coordinates(trend.base, trend.points.reference)
-    names = trend.base.names
-    across = min(COLUMNS, len(names))
-    down = -(-len(names) // across)
-    figure = blank(4.6 * across, 3.7 * down)
-    panels = figure.subplots(down, across, squeeze=False)
+    coordinates = Coordinates(temperature_law.isothermal_law, temperature_law.isothermal_estimates.reference)
+    names = temperature_law.isothermal_law.names
+    columns = min(MAX_PANELS_PER_ROW, len(names))
+    rows = -(-len(names) // columns)
+    figure = empty_figure(4.6 * columns, 3.7 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False)
     for k, name in enumerate(names):
-        _draw(panels.flat[k], trend, coordinates, k)
-        panels.flat[k].set_title(_title(trend, coordinates, k, name), fontsize=9)
-    for spare in list(panels.flat)[len(names) :]:
-        spare.set_visible(False)
-    figure.suptitle(f"{trend.law.title or trend.law.name}, judged by the {trend.judged_by}", fontsize=10)
-    return written(figure, path)
+        _plot_parameter(panels.flat[k], temperature_law, coordinates, k)
+        panels.flat[k].set_title(_panel_title(temperature_law, coordinates, k, name), fontsize=9)
+    for unused in list(panels.flat)[len(names) :]:
+        unused.set_visible(False)
+    figure.suptitle(f"{temperature_law.law.title or temperature_law.law.name}, judged by the {temperature_law.criterion_data}", fontsize=10)
+    return save_figure(figure, path)
 
 
-def _draw(axes: Any, trend: TemperatureLaw, coordinates: Coordinates, k: int) -> None:
-    points, name = trend.points, trend.base.names[k]
-    rate = k in coordinates.coefficients
-    scale = 1 / np.log(10.0) if rate or trend.base.table[name].scale == "log" else 1.0
+def _plot_parameter(axes: Any, temperature_law: TemperatureLaw, coordinates: Coordinates, k: int) -> None:
+    estimates, name = temperature_law.isothermal_estimates, temperature_law.isothermal_law.names[k]
+    is_rate_coefficient = k in coordinates.coefficients
+    scale = 1 / np.log(10.0) if is_rate_coefficient or temperature_law.isothermal_law.table[name].scale == "log" else 1.0
 
     def shown_of(theta: Floats) -> Floats:
-        return np.asarray((coordinates.u(theta) if rate else theta)[..., k] * scale)
+        return np.asarray((coordinates.u(theta) if is_rate_coefficient else theta)[..., k] * scale)
 
-    middle, half = shown_of(points.theta), quantile(ENDLESS) * _spread(shown_of, points.theta, points.covariance)
-    low, high = (-np.inf, np.inf) if rate else _ends(trend.base.table[name], scale)
-    arms = np.maximum([np.minimum(half, middle - low), np.minimum(half, high - middle)], 0.0)
-    axes.errorbar(points.temperatures, middle, arms, fmt="o", ms=4, color="0.25", capsize=2, lw=1)
-    seen = [middle]
-    T = np.linspace(*trend.range, 60)
-    drawn: set[str] = set()
-    for one in trend.candidates:
-        form = one.forms[name]
-        if form in drawn or (one.weight < SHOWN and drawn):
+    values, half_widths = shown_of(estimates.theta), interval_quantile(INFINITE_FREEDOM) * _standard_deviations(shown_of, estimates.theta, estimates.covariance)
+    low, high = (-np.inf, np.inf) if is_rate_coefficient else _plotted_bounds(temperature_law.isothermal_law.table[name], scale)
+    error_bars = np.maximum([np.minimum(half_widths, values - low), np.minimum(half_widths, high - values)], 0.0)
+    axes.errorbar(estimates.temperatures, values, error_bars, fmt="o", ms=4, color="0.25", capsize=2, lw=1)
+    plotted_values = [values]
+    T = np.linspace(*temperature_law.temperature_range, 60)
+    drawn_forms: set[str] = set()
+    for candidate in temperature_law.candidates:
+        form = candidate.forms[name]
+        if form in drawn_forms or (candidate.weight < MIN_WEIGHT_SHOWN and drawn_forms):
             continue
-        drawn.add(form)
-        curve = shown_of(one.theta(T))
-        seen.append(curve)
-        axes.plot(T, curve, lw=1.8 if len(drawn) == 1 else 1.0, label=f"{form} {_weight(trend, k, form):.2f}")
-        if len(drawn) == 1:
-            wide = _band(shown_of, one, T) * quantile(one.freedom)
-            axes.fill_between(T, curve - wide, curve + wide, color="C0", alpha=0.15, lw=0)
-    bottom, top = float(np.min(np.concatenate(seen))), float(np.max(np.concatenate(seen)))
-    room = max(0.15 * (top - bottom), min(1.2 * float(np.median(half)), top - bottom), 0.02 * abs(top) + 1e-9)
-    axes.set(xlabel="temperature, K", ylim=(bottom - room, top + room))
+        drawn_forms.add(form)
+        curve = shown_of(candidate.theta(T))
+        plotted_values.append(curve)
+        axes.plot(T, curve, lw=1.8 if len(drawn_forms) == 1 else 1.0, label=f"{form} {_form_weight(temperature_law, k, form):.2f}")
+        if len(drawn_forms) == 1:
+            half_width = _curve_standard_deviations(shown_of, candidate, T) * interval_quantile(candidate.degrees_of_freedom)
+            axes.fill_between(T, curve - half_width, curve + half_width, color="C0", alpha=0.15, lw=0)
+    lowest, highest = float(np.min(np.concatenate(plotted_values))), float(np.max(np.concatenate(plotted_values)))
+    margin = max(0.15 * (highest - lowest), min(1.2 * float(np.median(half_widths)), highest - lowest), 0.02 * abs(highest) + 1e-9)
+    axes.set(xlabel="temperature, K", ylim=(lowest - margin, highest + margin))
     axes.legend(fontsize=7)
     axes.grid(alpha=0.25)
 
 
-def _weight(trend: TemperatureLaw, k: int, form: str) -> float:
-    own = trend.sets[trend.base.names[k]]
-    return next((one.weight for one in own if one.name == form), 0.0)
+def _form_weight(temperature_law: TemperatureLaw, k: int, form: str) -> float:
+    forms = temperature_law.plausible_forms[temperature_law.isothermal_law.names[k]]
+    return next((form_weight.weight for form_weight in forms if form_weight.name == form), 0.0)
 
 
-def _title(trend: TemperatureLaw, coordinates: Coordinates, k: int, name: str) -> str:
-    param, r = trend.base.table[name], trend.points.reference
+def _panel_title(temperature_law: TemperatureLaw, coordinates: Coordinates, k: int, name: str) -> str:
+    param, reference = temperature_law.isothermal_law.table[name], temperature_law.isothermal_estimates.reference
     if k in coordinates.coefficients:
-        return f"log10 of the rate of {name} (1/s) at {r.stress:.3g} MPa, {r.time:.3g} s"
+        return f"log10 of the rate of {name} (1/s) at {reference.stress:.3g} MPa, {reference.time:.3g} s"
     unit = "" if param.unit == "1" else f", {param.unit}"
     return f"{'log10 of ' if param.scale == 'log' else ''}{name}: {param.meaning}{unit}"
 
 
-def _ends(param: Param, scale: float) -> tuple[float, float]:
+def _plotted_bounds(param: Param, scale: float) -> tuple[float, float]:
     """The bounds as they are drawn, beyond which no interval goes."""
     low, high = (param.to_internal(b) * scale for b in param.bounds)
     return low, high
 
 
-def _spread(function: Callable[[Floats], Floats], theta: Floats, covariance: Floats) -> Floats:
+def _standard_deviations(function: Callable[[Floats], Floats], theta: Floats, covariance: Floats) -> Floats:
     """(temperatures,) standard deviations of a function of theta at each point."""
-    own = [band(function, row, each)[1] for row, each in zip(theta, covariance, strict=True)]
-    return np.array(own, float)
+    deviations = [delta_method(function, row, covariance_of_row)[1] for row, covariance_of_row in zip(theta, covariance, strict=True)]
+    return np.array(deviations, float)
 
 
-def _band(function: Callable[[Floats], Floats], one: Candidate, T: Floats) -> Floats:
+def _curve_standard_deviations(function: Callable[[Floats], Floats], candidate: CandidateLaw, T: Floats) -> Floats:
     """(temperatures,) standard deviations of a function of theta along a candidate's curve."""
-    names = list(one.internal)
+    names = list(candidate.internal_values)
 
-    def along(numbers: Floats) -> Floats:
-        moved = replace(one, internal=dict(zip(names, map(float, numbers), strict=True)))
-        return function(moved.theta(T))
+    def along(values: Floats) -> Floats:
+        displaced = replace(candidate, internal_values=dict(zip(names, map(float, values), strict=True)))
+        return function(displaced.theta(T))
 
-    return band(along, np.array(list(one.internal.values())), one.covariance)[1]
+    return delta_method(along, np.array(list(candidate.internal_values.values())), candidate.covariance)[1]

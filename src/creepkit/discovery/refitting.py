@@ -15,9 +15,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.discovery.judging import Refitted, between, judged
-from creepkit.discovery.libraries import ARRHENIUS, Library, law_with
-from creepkit.discovery.points import Points, check_temperatures
+from creepkit.discovery.judging import RefittedCombination, curve_distance, weigh_refits
+from creepkit.discovery.libraries import ARRHENIUS, CandidateForm, law_with_forms
+from creepkit.discovery.points import IsothermalEstimates, check_temperatures
 from creepkit.discovery.regression import Regression, regress
 from creepkit.discovery.trend import TemperatureLaw
 from creepkit.errors import CreepkitError, FitError
@@ -25,27 +25,27 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection import rank
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
-Progress = Callable[[str, int, int], None]
+RefitProgress = Callable[[str, int, int], None]
 
-MOST = 6
+MAX_FORMS = 6
 """Forms of one parameter that are refitted."""
-ALIKE = 0.5
+SIMILAR_CHI_SQUARE = 0.5
 """chi^2 between the curves of two forms below which other forms are tried first."""
 
 
 def refit(
-    trend: TemperatureLaw,
+    temperature_law: TemperatureLaw,
     histories: Sequence[History],
     using: Predictor,
     *,
-    most: int = MOST,
-    settings: Settings | None = None,
-    confirm: bool = True,
-    progress: Progress | None = None,
+    max_forms: int = MAX_FORMS,
+    settings: IdentificationSettings | None = None,
+    search_again: bool = True,
+    progress: RefitProgress | None = None,
 ) -> TemperatureLaw:
     """Refit the forms that remain to the tests, and weigh them by how well they follow these.
 
@@ -56,70 +56,70 @@ def refit(
     confirm : whether the best law is searched for anew from the whole of its bounds.
     """
     check_temperatures([float(np.mean(h.temperature_program().values)) for h in histories])
-    work = _Work(trend.points, list(histories), using, _by_likelihood(settings or Settings()), progress)
-    choices = {name: _representatives(trend, name, most) for name in trend.base.names}
-    now = {one.parameter: one for one in trend.candidates[0].libraries}
-    plain = {name: _plain(trend, name) for name in trend.base.names}
-    work.total = 2 + sum(len(own) for own in choices.values())
-    work(list(plain.values()))
-    work(list(now.values()))
-    for name in sorted(choices, key=lambda n: -len(choices[n])):
-        now = work.tried(now, name, choices[name])
-    for name in [n for n in now if now[n].name != plain[n].name]:
-        now = work.tried(now, name, [plain[name]])
-    if not work.fitted:
-        raise FitError(f"no form could be refitted; the first said: {next(iter(work.failed.values()))}")
-    if confirm:
-        work.confirm()
-    return judged(trend, list(work.fitted.values()), work.failed)
+    cache = _RefitCache(temperature_law.isothermal_estimates, list(histories), using, _likelihood_settings(settings or IdentificationSettings()), progress)
+    forms_to_try = {name: _forms_to_try(temperature_law, name, max_forms) for name in temperature_law.isothermal_law.names}
+    current = {form.parameter: form for form in temperature_law.candidates[0].candidate_forms}
+    baseline = {name: _baseline_form(temperature_law, name) for name in temperature_law.isothermal_law.names}
+    cache.total = 2 + sum(len(forms) for forms in forms_to_try.values())
+    cache(list(baseline.values()))
+    cache(list(current.values()))
+    for name in sorted(forms_to_try, key=lambda n: -len(forms_to_try[n])):
+        current = cache.try_forms(current, name, forms_to_try[name])
+    for name in [n for n in current if current[n].name != baseline[n].name]:
+        current = cache.try_forms(current, name, [baseline[name]])
+    if not cache.fitted:
+        raise FitError(f"no form could be refitted; the first said: {next(iter(cache.failed.values()))}")
+    if search_again:
+        cache.search_again()
+    return weigh_refits(temperature_law, list(cache.fitted.values()), cache.failed)
 
 
-def _by_likelihood(settings: Settings) -> Settings:
+def _likelihood_settings(settings: IdentificationSettings) -> IdentificationSettings:
     return replace(settings, weights="likelihood") if settings.weights == "noise" else settings
 
 
 @dataclass(eq=False)
-class _Work:
+class _RefitCache:
     """Identifications of combinations from all tests, each made once."""
 
-    points: Points
+    estimates: IsothermalEstimates
     histories: list[History]
-    using: Predictor
-    settings: Settings
-    progress: Progress | None
-    fitted: dict[tuple[str, ...], Refitted] = field(default_factory=dict)
+    predictor: Predictor
+    settings: IdentificationSettings
+    progress: RefitProgress | None
+    fitted: dict[tuple[str, ...], RefittedCombination] = field(default_factory=dict)
     failed: dict[tuple[str, ...], str] = field(default_factory=dict)
     total: int = 0
 
-    def __call__(self, libraries: Sequence[Library]) -> None:
-        key = tuple(one.name for one in libraries)
+    def __call__(self, forms: Sequence[CandidateForm]) -> None:
+        key = tuple(form.name for form in forms)
         if key in self.fitted or key in self.failed:
             return
-        regression = regress(self.points, libraries)
-        law = law_with(self.points.law, libraries)
-        ends, told = [], ""
-        for start in self._starts(law, regression):
+        regression = regress(self.estimates, forms)
+        law = law_with_forms(self.estimates.law, forms)
+        fits, failure = [], ""
+        for start_values in self._starts(law, regression):
             try:
-                ends.append(self._identified(law, start))
+                fits.append(self._identify(law, start_values))
             except CreepkitError as error:
-                told = str(error)
-        if ends:
-            fit = max(ends, key=lambda end: end.log_likelihood)
-            self.fitted[key] = Refitted(tuple(libraries), regression, fit)
+                failure = str(error)
+        if fits:
+            fit = max(fits, key=lambda end: end.log_likelihood)
+            self.fitted[key] = RefittedCombination(tuple(forms), regression, fit)
         else:
-            self.failed[key] = told
+            self.failed[key] = failure
         if self.progress is not None:
             self.progress("form of temperature", min(len(self.fitted) + len(self.failed), self.total), self.total)
 
-    def tried(self, now: Mapping[str, Library], name: str, libraries: Sequence[Library]) -> dict[str, Library]:
+    def try_forms(self, current: Mapping[str, CandidateForm], name: str, forms: Sequence[CandidateForm]) -> dict[str, CandidateForm]:
         """Other forms of one parameter put in the place of its form now; returns the best combination so far."""
-        for library in libraries:
-            self(list({**now, name: library}.values()))
-        return {one.parameter: one for one in self.best.libraries} if self.fitted else dict(now)
+        for form in forms:
+            self(list({**current, name: form}.values()))
+        return {best_form.parameter: best_form for best_form in self.best.forms} if self.fitted else dict(current)
 
-    def _identified(self, law: CreepLaw, start: Floats | None) -> Identification:
+    def _identify(self, law: CreepLaw, start: Floats | None) -> Identification:
         return identify(
-            law, self.histories, self.using, settings=self.settings, start=start, reference=self.points.reference
+            law, self.histories, self.predictor, settings=self.settings, start=start, reference=self.estimates.reference
         )
 
     def _starts(self, law: CreepLaw, regression: Regression) -> list[Floats | None]:
@@ -128,64 +128,64 @@ class _Work:
         None stands for a search of the whole bounds: where the first law begins then, or where a start has no
         conditioned coordinates.
         """
-        starts: list[Floats | None] = [_inside(law, regression.values, self.points)]
-        if self.points.leaves_open() and not self.fitted:
+        starts: list[Floats | None] = [_coordinates_within_bounds(law, regression.values, self.estimates)]
+        if self.estimates.has_undetermined_parameters() and not self.fitted:
             starts.append(None)
-        elif self.points.leaves_open():
+        elif self.estimates.has_undetermined_parameters():
             fit = self.best.fit
-            known = dict(zip(fit.law.names, fit.coordinates.theta(fit.u), strict=True))
-            idle = {name: p.to_internal(p.center if p.off is None else p.off) for name, p in law.table.items()}
-            starts.append(_inside(law, {**idle, **known}, self.points))
-        return [one if one is not None and np.isfinite(one).all() else None for one in starts]
+            best_values = dict(zip(fit.law.names, fit.coordinates.theta(fit.u), strict=True))
+            inactive_values = {name: p.to_internal(p.center if p.off is None else p.off) for name, p in law.table.items()}
+            starts.append(_coordinates_within_bounds(law, {**inactive_values, **best_values}, self.estimates))
+        return [start if start is not None and np.isfinite(start).all() else None for start in starts]
 
     @property
-    def best(self) -> Refitted:
+    def best(self) -> RefittedCombination:
         """The combination of lowest BIC so far; odds of forms count at the end."""
-        ranking = rank([one.fit for one in self.fitted.values()])
+        ranking = rank([refit.fit for refit in self.fitted.values()])
         return next(one for one in self.fitted.values() if one.fit is ranking.best)
 
-    def confirm(self) -> None:
+    def search_again(self) -> None:
         """Search the best law anew, and keep the better of the two answers."""
-        one = self.best
-        anew = self._identified(one.fit.law, None)
-        if anew.log_likelihood > one.fit.log_likelihood:
-            key = tuple(library.name for library in one.libraries)
-            self.fitted[key] = replace(one, fit=anew)
+        best_refit = self.best
+        new_fit = self._identify(best_refit.fit.law, None)
+        if new_fit.log_likelihood > best_refit.fit.log_likelihood:
+            key = tuple(library.name for library in best_refit.forms)
+            self.fitted[key] = replace(best_refit, fit=new_fit)
 
 
-def _inside(law: CreepLaw, values: Mapping[str, float], points: Points) -> Floats:
+def _coordinates_within_bounds(law: CreepLaw, values: Mapping[str, float], estimates: IsothermalEstimates) -> Floats:
     """Conditioned coordinates of internal values, within the bounds."""
-    ends = [[p.to_internal(b) for b in p.bounds] for p in law.params.values()]
-    low, high = np.array(ends).T
+    bounds = [[p.to_internal(b) for b in p.bounds] for p in law.params.values()]
+    low, high = np.array(bounds).T
     theta = np.clip([values[name] for name in law.names], low, high)
-    return Coordinates(law, points.reference).u(theta)
+    return Coordinates(law, estimates.reference).u(theta)
 
 
-def _representatives(trend: TemperatureLaw, name: str, most: int) -> list[Library]:
+def _forms_to_try(temperature_law: TemperatureLaw, name: str, max_forms: int) -> list[CandidateForm]:
     """The forms of one parameter to try: first those that the points can tell apart, then their neighbours.
 
     Where points leave parameters open, they do not rule out a form that the tests may well ask for.
     """
-    taken: list[Regression] = []
-    forms = [form.name for form in trend.sets[name]]
-    if trend.points.leaves_open():
-        forms += dict.fromkeys(one.forms[name] for one in trend.combinations.tried if one.forms[name] not in forms)
-    remaining = [trend.combinations.with_form(name, form) for form in forms]
-    for one in remaining:
-        if all(between(trend, one, other) > ALIKE for other in taken):
-            taken.append(one)
-    taken += [one for one in remaining if one not in taken]
-    return [_library(one, name) for one in taken[:most]]
+    chosen: list[Regression] = []
+    forms = [form.name for form in temperature_law.plausible_forms[name]]
+    if temperature_law.isothermal_estimates.has_undetermined_parameters():
+        forms += dict.fromkeys(regression.forms[name] for regression in temperature_law.combinations.combinations if regression.forms[name] not in forms)
+    regressions = [temperature_law.combinations.with_form(name, form) for form in forms]
+    for one in regressions:
+        if all(curve_distance(temperature_law, one, other) > SIMILAR_CHI_SQUARE for other in chosen):
+            chosen.append(one)
+    chosen += [one for one in regressions if one not in chosen]
+    return [_form_of(one, name) for one in chosen[:max_forms]]
 
 
-def _plain(trend: TemperatureLaw, name: str) -> Library:
+def _baseline_form(temperature_law: TemperatureLaw, name: str) -> CandidateForm:
     """Arrhenius of a rate, else the constant, else the best."""
-    known = {one.forms[name]: one.regression for one in reversed(trend.combinations.tried)}
+    regressions = {one.forms[name]: one.regression for one in reversed(temperature_law.combinations.combinations)}
     for form in (ARRHENIUS, "constant"):
-        if form in known:
-            return _library(known[form], name)
-    return next(one for one in trend.candidates[0].libraries if one.parameter == name)
+        if form in regressions:
+            return _form_of(regressions[form], name)
+    return next(one for one in temperature_law.candidates[0].candidate_forms if one.parameter == name)
 
 
-def _library(regression: Regression, name: str) -> Library:
-    return next(one for one in regression.libraries if one.parameter == name)
+def _form_of(regression: Regression, name: str) -> CandidateForm:
+    return next(candidate for candidate in regression.candidate_forms if candidate.parameter == name)

@@ -13,13 +13,13 @@ from creepkit.discovery.trend import TemperatureLaw
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.moduli import FRAMES, Moduli, identify_moduli
-from creepkit.inverse.settings import Settings
-from creepkit.inverse.warmth import ONE_TEMPERATURE, reference_temperature, with_arrhenius
+from creepkit.inverse.moduli import FIRST_FRAMES, ModulusEstimates, identify_moduli
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.warmth import ISOTHERMAL_RANGE, reference_temperature, with_arrhenius
 from creepkit.language import CreepLaw, temperature
 from creepkit.records import History, Predictor
 
-Progress = Callable[[str, int, int], None]
+StudyProgress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,23 +32,23 @@ class TemperatureStudy:
     """
 
     tests: tuple[History, ...]
-    moduli: Moduli | None
-    joint: Identification
-    alone: tuple[Identification, ...]
-    trend: TemperatureLaw | None
+    moduli_fit: ModulusEstimates | None
+    joint_fit: Identification
+    isothermal_fits: tuple[Identification, ...]
+    temperature_law: TemperatureLaw | None
     notes: tuple[str, ...]
 
     def __str__(self) -> str:
-        parts = [self.moduli, self.joint, self.trend]
-        told = [str(part) for part in parts if part is not None]
-        return "\n\n".join([*told, *(f"note: {note}" for note in self.notes)])
+        parts = [self.moduli_fit, self.joint_fit, self.temperature_law]
+        texts = [str(part) for part in parts if part is not None]
+        return "\n\n".join([*texts, *(f"note: {note}" for note in self.notes)])
 
 
 def temperature_study(
-    law: CreepLaw, tests: Sequence[History], using: Predictor, *, moduli: bool | None = None,
-    within: float = ONE_TEMPERATURE, forms: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
+    law: CreepLaw, tests: Sequence[History], predictor: Predictor, *, moduli: bool | None = None,
+    within: float = ISOTHERMAL_RANGE, forms: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
     prior: Mapping[str, Mapping[str, float]] | None = None,
-    settings: Settings | None = None, progress: Progress | None = None,
+    settings: IdentificationSettings | None = None, progress: StudyProgress | None = None,
 ) -> TemperatureStudy:  # fmt: skip
     """Identify moduli, then the law times Arrhenius, then each temperature alone, and discover forms of temperature.
 
@@ -61,58 +61,58 @@ def temperature_study(
         raise FitError(f"law '{law.name}' depends on temperature already; give it without: forms are what is sought")
     if not tests:
         raise FitError("there are no histories to study")
-    settings, histories, notes = settings or Settings(), list(tests), []
-    stage = None
-    if moduli if moduli is not None else _has_moduli(histories, using):
-        stage = identify_moduli(with_arrhenius(law, histories), histories, using, frames=FRAMES)
-        if stage.elastic is not None:
-            histories = [h.replace(elastic=stage.elastic) for h in histories]
-    joint = identify(with_arrhenius(law, histories), histories, using, settings=settings, progress=progress)
-    alone, failed = _alone(law, histories, using, within, settings, progress)
-    notes += failed
-    trend = None
+    settings, histories, notes = settings or IdentificationSettings(), list(tests), []
+    moduli_fit = None
+    if moduli if moduli is not None else _can_identify_moduli(histories, predictor):
+        moduli_fit = identify_moduli(with_arrhenius(law, histories), histories, predictor, frames=FIRST_FRAMES)
+        if moduli_fit.elastic is not None:
+            histories = [h.replace(elastic=moduli_fit.elastic) for h in histories]
+    joint_fit = identify(with_arrhenius(law, histories), histories, predictor, settings=settings, progress=progress)
+    isothermal_fits, failures = _isothermal_fits(law, histories, predictor, within, settings, progress)
+    notes += failures
+    temperature_law = None
     try:
-        check_temperatures([fit.reference.temperature for fit in alone] or [reference_temperature(histories)])
+        check_temperatures([fit.reference.temperature for fit in isothermal_fits] or [reference_temperature(histories)])
     except FitError as error:
         notes.append(str(error))
     else:
-        trend = discover(
-            alone, forms=forms, prior=prior, histories=histories, using=using, settings=settings, progress=progress
+        temperature_law = discover(
+            isothermal_fits, forms=forms, prior=prior, histories=histories, using=predictor, settings=settings, progress=progress
         )
-    return TemperatureStudy(tuple(histories), stage, joint, tuple(alone), trend, tuple(notes))
+    return TemperatureStudy(tuple(histories), moduli_fit, joint_fit, tuple(isothermal_fits), temperature_law, tuple(notes))
 
 
-def grouped(tests: Sequence[History], within: float = ONE_TEMPERATURE) -> list[list[History]]:
+def group_by_temperature(tests: Sequence[History], temperature_tolerance: float = ISOTHERMAL_RANGE) -> list[list[History]]:
     """Tests by temperature, ascending; each within so many K of the coldest of its group."""
     groups: list[list[History]] = []
-    for test in sorted(tests, key=_warmth):
-        if groups and _warmth(test) - _warmth(groups[-1][0]) <= within:
+    for test in sorted(tests, key=_mean_temperature):
+        if groups and _mean_temperature(test) - _mean_temperature(groups[-1][0]) <= temperature_tolerance:
             groups[-1].append(test)
         else:
             groups.append([test])
     return groups
 
 
-def _alone(
-    law: CreepLaw, tests: Sequence[History], using: Predictor, within: float, settings: Settings,
-    progress: Progress | None,
+def _isothermal_fits(
+    law: CreepLaw, tests: Sequence[History], predictor: Predictor, temperature_tolerance: float, settings: IdentificationSettings,
+    progress: StudyProgress | None,
 ) -> tuple[list[Identification], list[str]]:  # fmt: skip
-    found, failed = [], []
-    groups = grouped(tests, within)
+    fits, failures = [], []
+    groups = group_by_temperature(tests, temperature_tolerance)
     for k, group in enumerate(groups):
         try:
-            found.append(identify(law, group, using, settings=settings))
+            fits.append(identify(law, group, predictor, settings=settings))
         except CreepkitError as error:
-            failed.append(f"at {_warmth(group[0]):.0f} K alone: {error}")
+            failures.append(f"at {_mean_temperature(group[0]):.0f} K alone: {error}")
         if progress is not None:
             progress("temperature", k + 1, len(groups))
-    return found, failed
+    return fits, failures
 
 
-def _has_moduli(tests: Sequence[History], using: Predictor) -> bool:
-    known = "modulus" in getattr(using, "effects", ())
-    return known and all(h.elastic is not None and "amplitude" in h.outputs for h in tests)
+def _can_identify_moduli(tests: Sequence[History], predictor: Predictor) -> bool:
+    has_modulus = "modulus" in getattr(predictor, "nuisances", ())
+    return has_modulus and all(h.elastic is not None and "amplitude" in h.outputs for h in tests)
 
 
-def _warmth(history: History) -> float:
+def _mean_temperature(history: History) -> float:
     return float(np.mean(history.temperature_program().values))

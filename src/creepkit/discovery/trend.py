@@ -10,53 +10,53 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
-from creepkit.discovery.combining import Combinations, Form
-from creepkit.discovery.libraries import Library, curves, law_with
+from creepkit.discovery.combining import RankedCombinations, FormWeight
+from creepkit.discovery.libraries import CandidateForm, evaluate_forms, law_with_forms
 from creepkit.discovery.mixture import mixture_interval
-from creepkit.discovery.points import ENDLESS, Points
+from creepkit.discovery.points import INFINITE_FREEDOM, IsothermalEstimates
 from creepkit.errors import FitError, nearest
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty import Estimate
 from creepkit.language import CreepLaw
-from creepkit.records import ValuedLaw
+from creepkit.records import LawWithValues
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NOTABLE = 1.5
+NOTED_OVERDISPERSION = 1.5
 """Inflation of covariances that is worth a word."""
-WIDE = 0.8
+UNDETERMINED_FRACTION = 0.8
 """Share of the bounds that an interval fills which says nothing."""
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class CandidateLaw:
     """One combination of forms with its numbers.
 
     internal : {name: value} of all numbers, the logarithm where the scale is log; covariance in the same order.
     excess : of the criterion over the best's; weight : share of belief. fit : the identification, once refitted.
     """
 
-    libraries: tuple[Library, ...]
-    internal: Mapping[str, float]
+    candidate_forms: tuple[CandidateForm, ...]
+    internal_values: Mapping[str, float]
     covariance: Floats
-    freedom: float
-    excess: float
+    degrees_of_freedom: float
+    criterion_difference: float
     weight: float
     fit: Identification | None = None
 
     @property
     def forms(self) -> dict[str, str]:
         """{parameter: name of its form}."""
-        return {one.parameter: one.name for one in self.libraries}
+        return {form.parameter: form.name for form in self.candidate_forms}
 
     def theta(self, T: Floats) -> Floats:
         """(temperatures, parameters) of internal parameters."""
-        return curves(self.libraries, self.internal, T)
+        return evaluate_forms(self.candidate_forms, self.internal_values, T)
 
-    def sd(self, name: str) -> float:
+    def standard_deviation(self, name: str) -> float:
         """Standard deviation of one number."""
-        k = list(self.internal).index(name)
+        k = list(self.internal_values).index(name)
         return float(np.sqrt(max(self.covariance[k, k], 0.0)))
 
 
@@ -74,16 +74,16 @@ class TemperatureLaw:
     """
 
     law: CreepLaw
-    base: CreepLaw
+    isothermal_law: CreepLaw
     T_ref: float
     estimates: tuple[Estimate, ...]
-    range: tuple[float, float]
-    judged_by: Literal["points", "histories"]
-    sets: Mapping[str, tuple[Form, ...]]
-    candidates: tuple[Candidate, ...]
-    odds: Mapping[str, Mapping[str, float]]
-    points: Points
-    combinations: Combinations
+    temperature_range: tuple[float, float]
+    criterion_data: Literal["points", "histories"]
+    plausible_forms: Mapping[str, tuple[FormWeight, ...]]
+    candidates: tuple[CandidateLaw, ...]
+    prior_odds: Mapping[str, Mapping[str, float]]
+    isothermal_estimates: IsothermalEstimates
+    combinations: RankedCombinations
     fit: Identification | None = None
     notes: tuple[str, ...] = ()
 
@@ -98,105 +98,105 @@ class TemperatureLaw:
         return self.candidates[0].forms
 
     @property
-    def valued(self) -> ValuedLaw:
+    def valued(self) -> LawWithValues:
         """The law with its numbers, intervals and range of validity: what every exporter takes."""
-        from creepkit.discovery.printing import comments_of
+        from creepkit.discovery.printing import export_notes
 
-        return ValuedLaw(self.law, self.values, tuple(comments_of(self)), ranges=self.points.ranges)
+        return LawWithValues(self.law, self.values, tuple(export_notes(self)), ranges=self.isothermal_estimates.ranges)
 
     def estimate(self, name: str) -> Estimate:
         """One number of the law, such as Q, with its interval."""
-        for one in self.estimates:
-            if one.name == name:
-                return one
+        for estimate in self.estimates:
+            if estimate.name == name:
+                return estimate
         raise FitError(f"law '{self.law.name}' has no parameter '{name}': {nearest(name, self.law.names)}")
 
-    def at(self, T: ArrayLike) -> dict[str, Floats]:
+    def parameters_at(self, T: ArrayLike) -> dict[str, Floats]:
         """{parameter of `base`: (temperatures,) its values} at temperatures in K; FitError outside the range."""
-        kelvin = np.atleast_1d(np.asarray(T, float))
-        low, high = self.range
-        if ((kelvin < low - 1e-6) | (kelvin > high + 1e-6)).any():
+        temperatures = np.atleast_1d(np.asarray(T, float))
+        low, high = self.temperature_range
+        if ((temperatures < low - 1e-6) | (temperatures > high + 1e-6)).any():
             raise FitError(f"law '{self.law.name}' holds between {low:.0f} and {high:.0f} K; it was asked beyond")
-        theta = self.candidates[0].theta(kelvin)
-        scale = [p.scale for p in self.base.params.values()]
-        found = np.where([s == "log" for s in scale], np.exp(np.minimum(theta, 700.0)), theta)
-        return dict(zip(self.base.names, found.T, strict=True))
+        theta = self.candidates[0].theta(temperatures)
+        scale = [p.scale for p in self.isothermal_law.params.values()]
+        values = np.where([s == "log" for s in scale], np.exp(np.minimum(theta, 700.0)), theta)
+        return dict(zip(self.isothermal_law.names, values.T, strict=True))
 
     def save(self, path: str | Path) -> Path:
         """Write the answer as JSON (to a temporary name, then renamed)."""
-        from creepkit.discovery.files import save
+        from creepkit.discovery.files import write_temperature_law
 
-        return save(self, Path(path))
+        return write_temperature_law(self, Path(path))
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Parameters against temperature, with intervals and the curves of the forms that remain."""
-        from creepkit.discovery.plotting import figure_of
+        from creepkit.discovery.plotting import plot_temperature_law
 
-        return figure_of(self, path)
+        return plot_temperature_law(self, path)
 
     def __str__(self) -> str:
-        from creepkit.discovery.printing import text_of
+        from creepkit.discovery.printing import temperature_law_text
 
-        return text_of(self)
+        return temperature_law_text(self)
 
 
-def of_combinations(points: Points, found: Combinations, odds: Mapping[str, Mapping[str, float]]) -> TemperatureLaw:
+def temperature_law_from_combinations(estimates: IsothermalEstimates, combinations: RankedCombinations, prior_odds: Mapping[str, Mapping[str, float]]) -> TemperatureLaw:
     """The answer that the points alone give."""
-    freedom = [ENDLESS if found.inflation == 1.0 else max(o.regression.rows - o.regression.size, 1)
-               for o in found.tried]  # fmt: skip
+    degrees_of_freedom = [INFINITE_FREEDOM if combinations.overdispersion == 1.0 else max(combination.regression.rows - combination.regression.parameter_count, 1)
+               for combination in combinations.combinations]  # fmt: skip
     candidates = tuple(
-        Candidate(
-            one.regression.libraries,
-            one.regression.values,
-            one.regression.covariance * found.inflation,
-            float(free),
-            one.excess,
-            one.weight,
+        CandidateLaw(
+            weighted.regression.candidate_forms,
+            weighted.regression.values,
+            weighted.regression.covariance * combinations.overdispersion,
+            float(freedom_of_one),
+            weighted.criterion_difference,
+            weighted.weight,
         )
-        for one, free in zip(found.tried, freedom, strict=True)
+        for weighted, freedom_of_one in zip(combinations.combinations, degrees_of_freedom, strict=True)
     )
-    law = law_with(points.law, candidates[0].libraries)
+    law = law_with_forms(estimates.law, candidates[0].candidate_forms)
     notes = []
-    if found.inflation > NOTABLE:
-        wider = np.sqrt(found.inflation)
-        notes.append(f"no form follows the points within their errors, which were taken {wider:.2g} times wider")
+    if combinations.overdispersion > NOTED_OVERDISPERSION:
+        widening = np.sqrt(combinations.overdispersion)
+        notes.append(f"no form follows the points within their errors, which were taken {widening:.2g} times wider")
     return TemperatureLaw(
         law=law,
-        base=points.law,
-        T_ref=points.reference.temperature,
-        estimates=estimates_of(law, candidates),
-        range=(float(points.temperatures.min()), float(points.temperatures.max())),
-        judged_by="points",
-        sets=found.sets,
+        isothermal_law=estimates.law,
+        T_ref=estimates.reference.temperature,
+        estimates=averaged_estimates(law, candidates),
+        temperature_range=(float(estimates.temperatures.min()), float(estimates.temperatures.max())),
+        criterion_data="points",
+        plausible_forms=combinations.plausible_forms,
         candidates=candidates,
-        odds=odds,
-        points=points,
-        combinations=found,
+        prior_odds=prior_odds,
+        isothermal_estimates=estimates,
+        combinations=combinations,
         notes=tuple(notes),
     )
 
 
-def estimates_of(law: CreepLaw, candidates: Sequence[Candidate]) -> tuple[Estimate, ...]:
+def averaged_estimates(law: CreepLaw, candidates: Sequence[CandidateLaw]) -> tuple[Estimate, ...]:
     """The best candidate's numbers; intervals over all that have the same form of the parameter concerned."""
-    best, found = candidates[0], {}
-    for library in best.libraries:
-        alike = [one for one in candidates if one.forms[library.parameter] == library.name]
-        for name in library.names:
-            found[name] = _estimate(name, library, alike)
-    return tuple(found[name] for name in law.names)
+    best, estimates = candidates[0], {}
+    for form in best.candidate_forms:
+        same_form = [candidate for candidate in candidates if candidate.forms[form.parameter] == form.name]
+        for name in form.parameter_names:
+            estimates[name] = _estimate(name, form, same_form)
+    return tuple(estimates[name] for name in law.names)
 
 
-def _estimate(name: str, library: Library, alike: Sequence[Candidate]) -> Estimate:
-    param, value = library.table[name], alike[0].internal[name]
-    weights = np.array([one.weight for one in alike])
-    middle, sd = (np.array(v) for v in zip(*[(one.internal[name], one.sd(name)) for one in alike], strict=True))
-    low, high = mixture_interval(middle, sd, weights / weights.sum(), [one.freedom for one in alike])
-    bottom, top = (param.to_internal(b) for b in param.bounds)
-    value, low, high = (float(np.clip(v, bottom, top)) for v in (value, low, high))
+def _estimate(name: str, form: CandidateForm, candidates: Sequence[CandidateLaw]) -> Estimate:
+    param, value = form.table[name], candidates[0].internal_values[name]
+    weights = np.array([candidate.weight for candidate in candidates])
+    values, standard_deviations = (np.array(v) for v in zip(*[(one.internal_values[name], one.standard_deviation(name)) for one in candidates], strict=True))
+    low, high = mixture_interval(values, standard_deviations, weights / weights.sum(), [one.degrees_of_freedom for one in candidates])
+    lower_bound, upper_bound = (param.to_internal(b) for b in param.bounds)
+    value, low, high = (float(np.clip(v, lower_bound, upper_bound)) for v in (value, low, high))
     verdict = "determined"
-    if high - low >= WIDE * (top - bottom):
+    if high - low >= UNDETERMINED_FRACTION * (upper_bound - lower_bound):
         verdict = "not determined"
-    elif min(value - bottom, top - value) <= 1e-4 * (top - bottom):
+    elif min(value - lower_bound, upper_bound - value) <= 1e-4 * (upper_bound - lower_bound):
         verdict = "at its bound"
-    outside = param.from_internal
-    return Estimate(name, outside(value), outside(low), outside(high), param.unit, verdict)
+    from_internal = param.from_internal
+    return Estimate(name, from_internal(value), from_internal(low), from_internal(high), param.unit, verdict)

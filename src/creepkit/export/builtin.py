@@ -7,7 +7,7 @@ from creepkit.export.cards.code_aster import CodeAsterMaterial
 from creepkit.export.cards.moose import MooseBlock
 from creepkit.export.cards.neml2 import Neml2Model
 from creepkit.export.document import JsonExporter
-from creepkit.export.fortran.creep import AbaqusCreep, CalculixCreep
+from creepkit.export.fortran.creep import AbaqusCreepSubroutine, CalculixCreepSubroutine
 from creepkit.export.latex import LatexExporter
 from creepkit.export.markdown import MarkdownExporter
 from creepkit.export.mathml import MathmlExporter
@@ -25,8 +25,8 @@ def creepkit_exporters() -> list[Exporter]:
         LatexExporter(),
         PythonExporter(),
         JsonExporter(),
-        AbaqusCreep(),
-        CalculixCreep(),
+        AbaqusCreepSubroutine(),
+        CalculixCreepSubroutine(),
         NumpyExporter(),
         CExporter(),
         MfrontExporter(),

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import sympy
 
-from creepkit.export.c_text import OWN_WORDS, assignments, block_comment, c_function, helpers_in, safe, text_of
+from creepkit.export.c_text import STABLE_FUNCTION_NAMES, c_assignments, c_block_comment, c_function_definition, stable_functions_in, comment_safe, c_expression
 from creepkit.export.c_words import C_RESERVED
-from creepkit.export.heading import comments, heading, printable
+from creepkit.export.heading import comment_lines, heading, printable_text
 from creepkit.export.identifiers import Identifiers
-from creepkit.export.program import Function, Program
-from creepkit.language.symbols import POINT, mean_stress, principal_stress, stress, time
-from creepkit.records import ValuedLaw
+from creepkit.export.program import CodeFunction, LawCode
+from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
+from creepkit.records import LawWithValues
 
-_WIDTH = 120
+_LINE_LENGTH = 120
 
 
 @dataclass(frozen=True)
@@ -26,38 +26,38 @@ class CExporter:
     title: str = "C99 file with the rate and its derivatives"
     suffix: str = ".c"
 
-    def text(self, source: ValuedLaw) -> str:
+    def text(self, source: LawWithValues) -> str:
         """Return the file's text; stress and time are converted on entry, rates on exit."""
-        return _File(source).text()
+        return _CFile(source).text()
 
 
-class _File:
+class _CFile:
     """One law as C."""
 
-    def __init__(self, source: ValuedLaw) -> None:
-        identifiers = Identifiers(C_RESERVED | OWN_WORDS | {"rates", "slopes"})
-        self.prefix = identifiers.name(source.name or source.law.name)
-        identifiers.names(f"{self.prefix}_{end}" for end in ("rate", "log_rate", "state_rates", "initial", "limit"))
-        self.program = Program(source, identifiers)
-        self.source, self.law, self.units = self.program.source, self.program.law, source.units
-        used = [k for k, s in enumerate(POINT) if s == stress or self.law.uses(s)]
-        self.columns = [*used, *(len(POINT) + k for k in range(len(self.law.states)))]
-        everything = (*self.program.point, *self.program.states)
-        self.arguments = [everything[k] for k in self.columns]
-        scales = dict.fromkeys((stress, principal_stress, mean_stress), self.units.megapascals)
-        scales[time] = self.units.seconds
-        self.scales = [scales.get(s, 1.0) for s in (*POINT, *self.law.states)]
-        self.rate, self.update = self.program.function("rate").only([0]), self.program.function("update")
+    def __init__(self, source: LawWithValues) -> None:
+        identifiers = Identifiers(C_RESERVED | STABLE_FUNCTION_NAMES | {"rates", "slopes"})
+        self.prefix = identifiers.unique(source.name or source.law.name)
+        identifiers.unique_names(f"{self.prefix}_{ending}" for ending in ("rate", "log_rate", "state_rates", "initial", "limit"))
+        self.code = LawCode(source, identifiers)
+        self.source, self.law, self.units = self.code.source, self.code.law, source.units
+        used = [k for k, s in enumerate(POINT_VARIABLES) if s == stress or self.law.uses(s)]
+        self.input_indices = [*used, *(len(POINT_VARIABLES) + k for k in range(len(self.law.states)))]
+        inputs = (*self.code.point, *self.code.states)
+        self.arguments = [inputs[k] for k in self.input_indices]
+        factors = dict.fromkeys((stress, principal_stress, mean_stress), self.units.megapascals)
+        factors[time] = self.units.seconds
+        self.unit_factors = [factors.get(s, 1.0) for s in (*POINT_VARIABLES, *self.law.states)]
+        self.rate, self.update = self.code.function("rate").with_outputs([0]), self.code.function("update")
 
     def text(self) -> str:
         """The whole file."""
-        functions = [self._rate(), self._log_rate(), *([self._state_rates()] if self.law.states else [])]
-        helpers = [c_function(name) for name in helpers_in([line for body in functions for line in body])]
+        functions = [self._rate_function(), self._log_rate_function(), *([self._state_rates_function()] if self.law.states else [])]
+        helpers = [c_function_definition(name) for name in stable_functions_in([line for body in functions for line in body])]
         blocks = [
-            self._head(),
+            self._header(),
             ["#include <math.h>"],
             ["/* The parameters, for stress as a ratio to 1 MPa and time to 1 s. */", *self._parameters()],
-            *([self._starts()] if self.law.states else []),
+            *([self._state_constants()] if self.law.states else []),
             *([helpers] if helpers else []),
             *functions,
         ]
@@ -65,31 +65,31 @@ class _File:
 
     # ---- what is told ----------------------------------------------------------------------------------------------
 
-    def _head(self) -> list[str]:
-        floors = any("log_floor" in line or "floored" in line for line in (*self._rate(), *self._log_rate()))
-        told = [*heading(self.source, floors=floors), *self.program.renamed(), "A result beyond 1.8e308 is INFINITY."]
+    def _header(self) -> list[str]:
+        mentions_floors = any("log_floor" in line or "floored" in line for line in (*self._rate_function(), *self._log_rate_function()))
+        header_lines = [*heading(self.source, mentions_floors=mentions_floors), *self.code.renaming_notes(), "A result beyond 1.8e308 is INFINITY."]
         declared = [
             "",
             "Declarations for the code that calls this file (exported by creepkit; link with -lm):",
             f"  {self._declaration('double', 'rate')};",
-            f"  {self._declaration('double', 'log_rate', self._slopes())};",
-            *([f"  {self._declaration('void', 'state_rates', *self._outputs())};"] if self.law.states else []),
+            f"  {self._declaration('double', 'log_rate', self._derivative_argument())};",
+            *([f"  {self._declaration('void', 'state_rates', *self._state_arguments())};"] if self.law.states else []),
             f"Slopes are derivatives to {', '.join(map(str, self.arguments))}, in this order.",
         ]
-        return block_comment([*comments(told, " *", _WIDTH), *comments(declared, " *")])
+        return c_block_comment([*comment_lines(header_lines, " *", _LINE_LENGTH), *comment_lines(declared, " *")])
 
     def _parameters(self) -> list[str]:
         lines = []
-        for (symbol, value), param in zip(self.program.parameters.items(), self.law.params.values(), strict=True):
+        for (symbol, value), param in zip(self.code.parameters.items(), self.law.params.values(), strict=True):
             unit = "" if param.unit == "1" else f"{param.unit}, "
-            lines.append(f"static const double {symbol} = {value!r}; /* {safe(unit + param.meaning)} */")
+            lines.append(f"static const double {symbol} = {value!r}; /* {comment_safe(unit + param.meaning)} */")
         return lines
 
-    def _starts(self) -> list[str]:
+    def _state_constants(self) -> list[str]:
         """Where internal variables start, and where the material has failed."""
         states, count = self.law.states.values(), len(self.law.states)
         limits = ["INFINITY" if state.limit is None else repr(state.limit) for state in states]
-        names = ", ".join(map(str, self.program.states))
+        names = ", ".join(map(str, self.code.states))
         return [
             f"/* Start of {names}, and the value at which the material has failed. */",
             f"const double {self.prefix}_initial[{count}] = {{{', '.join(repr(state.initial) for state in states)}}};",
@@ -98,70 +98,70 @@ class _File:
 
     # ---- the functions ---------------------------------------------------------------------------------------------
 
-    def _rate(self) -> list[str]:
-        labels = [safe(printable(label)) for label in self.law.terms]
-        about = f"/* Rate of equivalent creep strain, 1/{self.units.time}: {' + '.join(labels)}. */"
-        body = [f"return {self._per_time()}{_tight(self.rate.outputs[0], self.units.seconds)};"]
-        return self._function(about, self._declaration("double", "rate"), self.rate, body)
+    def _rate_function(self) -> list[str]:
+        labels = [comment_safe(printable_text(label)) for label in self.law.terms]
+        comment = f"/* Rate of equivalent creep strain, 1/{self.units.time}: {' + '.join(labels)}. */"
+        body = [f"return {self._time_factor()}{_factor_operand(self.rate.outputs[0], self.units.seconds)};"]
+        return self._function_definition(comment, self._declaration("double", "rate"), self.rate, body)
 
-    def _log_rate(self) -> list[str]:
-        part = self.update.only([0, *(self._place(0, k) for k in self.columns)])
-        about = f"/* ln of the rate in 1/{self.units.time}, and its derivatives. */"
+    def _log_rate_function(self) -> list[str]:
+        function = self.update.with_outputs([0, *(self._output_index(0, k) for k in self.input_indices)])
+        comment = f"/* ln of the rate in 1/{self.units.time}, and its derivatives. */"
         shift = "" if self.units.seconds == 1 else f"log({self.units.seconds!r}) + "
-        body = [*self._row("slopes", part.outputs[1:], 1.0), f"return {shift}{text_of(part.outputs[0])};"]
-        return self._function(about, self._declaration("double", "log_rate", self._slopes()), part, body)
+        body = [*self._derivative_lines("slopes", function.outputs[1:], 1.0), f"return {shift}{c_expression(function.outputs[0])};"]
+        return self._function_definition(comment, self._declaration("double", "log_rate", self._derivative_argument()), function, body)
 
-    def _state_rates(self) -> list[str]:
-        count, width = len(self.law.states), len(self.columns)
-        rows = [self._place(row, k) for row in range(1, count + 1) for k in self.columns]
-        part = self.update.only([*range(1, count + 1), *rows])
+    def _state_rates_function(self) -> list[str]:
+        count, width = len(self.law.states), len(self.input_indices)
+        rows = [self._output_index(row, k) for row in range(1, count + 1) for k in self.input_indices]
+        function = self.update.with_outputs([*range(1, count + 1), *rows])
         body = []
         for k in range(count):
-            slopes = part.outputs[count + k * width : count + (k + 1) * width]
-            body += [f"rates[{k}] = {self._per_time()}{_tight(part.outputs[k], self.units.seconds)};"]
-            body += self._row(f"slopes[{k}]", slopes, self.units.seconds)
-        about = f"/* Rates of internal variables, 1/{self.units.time}, and their derivatives, a row each. */"
-        return self._function(about, self._declaration("void", "state_rates", *self._outputs()), part, body)
+            derivatives = function.outputs[count + k * width : count + (k + 1) * width]
+            body += [f"rates[{k}] = {self._time_factor()}{_factor_operand(function.outputs[k], self.units.seconds)};"]
+            body += self._derivative_lines(f"slopes[{k}]", derivatives, self.units.seconds)
+        comment = f"/* Rates of internal variables, 1/{self.units.time}, and their derivatives, a row each. */"
+        return self._function_definition(comment, self._declaration("void", "state_rates", *self._state_arguments()), function, body)
 
-    def _function(self, about: str, declaration: str, part: Function, results: Sequence[str]) -> list[str]:
-        logs = [f"const double {ln} = log({plain});" for ln, plain in self.program.logarithms_in(part).items()]
-        idle = [f"(void){s};" for s in self.arguments if s not in part.read]
-        body = [*idle, *self._converted(part), *logs, *assignments(part.steps), *results]
-        return [about, declaration, "{", *(f"    {line}" for line in body), "}"]
+    def _function_definition(self, comment: str, declaration: str, function: CodeFunction, results: Sequence[str]) -> list[str]:
+        logs = [f"const double {ln} = log({plain});" for ln, plain in self.code.logarithms_used(function).items()]
+        unused = [f"(void){s};" for s in self.arguments if s not in function.inputs]
+        body = [*unused, *self._unit_conversions(function), *logs, *c_assignments(function.assignments), *results]
+        return [comment, declaration, "{", *(f"    {line}" for line in body), "}"]
 
-    def _converted(self, part: Function) -> list[str]:
+    def _unit_conversions(self, function: CodeFunction) -> list[str]:
         """Stress and time on entry, in the law's own units."""
-        pairs = [(s, self.scales[k]) for k, s in zip(self.columns, self.arguments, strict=True)]
-        return [f"{s} *= {scale!r};" for s, scale in pairs if scale != 1 and s in part.read]
+        pairs = [(s, self.unit_factors[k]) for k, s in zip(self.input_indices, self.arguments, strict=True)]
+        return [f"{s} *= {scale!r};" for s, scale in pairs if scale != 1 and s in function.inputs]
 
-    def _row(self, target: str, slopes: Sequence[sympy.Expr], factor: float) -> list[str]:
+    def _derivative_lines(self, target: str, derivatives: Sequence[sympy.Expr], factor: float) -> list[str]:
         """One row of derivatives, to the arguments in the units in which they come."""
-        factors = [self.scales[k] * factor for k in self.columns]
+        factors = [self.unit_factors[k] * factor for k in self.input_indices]
         texts = [
-            f"{'' if f == 1 or e == 0 else f'{f!r} * '}{_tight(e, f)}" for f, e in zip(factors, slopes, strict=True)
+            f"{'' if f == 1 or e == 0 else f'{f!r} * '}{_factor_operand(e, f)}" for f, e in zip(factors, derivatives, strict=True)
         ]
         return [f"{target}[{k}] = {text};" for k, text in enumerate(texts)]
 
-    def _place(self, row: int, column: int) -> int:
+    def _output_index(self, row: int, column: int) -> int:
         """Where a derivative stands in the update entry."""
         rows = 1 + len(self.law.states)
-        return rows + row * (len(POINT) + rows - 1) + column
+        return rows + row * (len(POINT_VARIABLES) + rows - 1) + column
 
     def _declaration(self, kind: str, name: str, *outputs: str) -> str:
         inputs = [f"double {s}" for s in self.arguments]
         return f"{kind} {self.prefix}_{name}({', '.join((*inputs, *outputs))})"
 
-    def _slopes(self) -> str:
-        return f"double slopes[{len(self.columns)}]"
+    def _derivative_argument(self) -> str:
+        return f"double slopes[{len(self.input_indices)}]"
 
-    def _outputs(self) -> tuple[str, str]:
+    def _state_arguments(self) -> tuple[str, str]:
         count = len(self.law.states)
-        return f"double rates[{count}]", f"double slopes[{count}][{len(self.columns)}]"
+        return f"double rates[{count}]", f"double slopes[{count}][{len(self.input_indices)}]"
 
-    def _per_time(self) -> str:
+    def _time_factor(self) -> str:
         return "" if self.units.seconds == 1 else f"{self.units.seconds!r} * "
 
 
-def _tight(expression: sympy.Expr, factor: float) -> str:
+def _factor_operand(expression: sympy.Expr, factor: float) -> str:
     """An expression after a factor, in brackets where that is needed."""
-    return f"({text_of(expression)})" if factor != 1 and expression.is_Add else text_of(expression)
+    return f"({c_expression(expression)})" if factor != 1 and expression.is_Add else c_expression(expression)

@@ -8,9 +8,9 @@ from typing import Any
 
 import sympy
 
-from creepkit.kernels.printing import FUNCTIONS, KernelPrinter
+from creepkit.kernels.printing import TARGET_FUNCTIONS, KernelPrinter
 
-HELPERS: dict[str, tuple[tuple[str, ...], str]] = {
+STABLE_FUNCTIONS: dict[str, tuple[tuple[str, ...], str]] = {
     "square": (("value",), "value * value"),
     "larger": (("value", "other"), "value >= other || value != value ? value : other"),
     "smaller": (("value", "other"), "value <= other || value != value ? value : other"),
@@ -31,7 +31,7 @@ HELPERS: dict[str, tuple[tuple[str, ...], str]] = {
 }
 """{name: (arguments, result)}, each after those it calls; the formulas are those of kernels.numba_functions."""
 
-OWN_WORDS = frozenset((*FUNCTIONS, *HELPERS, "value", "other", "least"))
+STABLE_FUNCTION_NAMES = frozenset((*TARGET_FUNCTIONS, *STABLE_FUNCTIONS, "value", "other", "least"))
 
 
 class CPrinter(KernelPrinter):
@@ -56,46 +56,46 @@ class CPrinter(KernelPrinter):
 _PRINTER = CPrinter({"standard": "python3"})
 
 
-def text_of(expression: sympy.Basic) -> str:
+def c_expression(expression: sympy.Basic) -> str:
     """An expression as C."""
     return str(_PRINTER.doprint(expression))
 
 
-def assignments(steps: Iterable[tuple[sympy.Symbol, sympy.Expr]], kind: str = "const double") -> list[str]:
+def c_assignments(definitions: Iterable[tuple[sympy.Symbol, sympy.Expr]], type_name: str = "const double") -> list[str]:
     """Steps as definitions."""
-    return [f"{kind} {symbol} = {text_of(expression)};" for symbol, expression in steps]
+    return [f"{type_name} {symbol} = {c_expression(expression)};" for symbol, expression in definitions]
 
 
-def helpers_in(texts: Sequence[str]) -> list[str]:
+def stable_functions_in(texts: Sequence[str]) -> list[str]:
     """The names of the helpers that texts call, and of those that they call in turn, in order."""
-    needed = _called(texts)
-    for name in reversed([*HELPERS]):
-        if name in needed:
-            needed |= _called([HELPERS[name][1]])
-    return [name for name in HELPERS if name in needed]
+    required = _called_names(texts)
+    for name in reversed([*STABLE_FUNCTIONS]):
+        if name in required:
+            required |= _called_names([STABLE_FUNCTIONS[name][1]])
+    return [name for name in STABLE_FUNCTIONS if name in required]
 
 
-def c_function(name: str) -> str:
+def c_function_definition(name: str) -> str:
     """A helper as a function of this file."""
-    arguments, result = HELPERS[name]
+    arguments, result = STABLE_FUNCTIONS[name]
     return f"static double {name}({', '.join(f'double {a}' for a in arguments)}) {{ return {result}; }}"
 
 
-def cpp_lambda(name: str) -> str:
+def cpp_lambda_definition(name: str) -> str:
     """A helper as a C++ lambda of MFront's `real`."""
-    arguments, result = HELPERS[name]
+    arguments, result = STABLE_FUNCTIONS[name]
     return f"const auto {name} = [&](const real {', const real '.join(arguments)}) -> real {{ return {result}; }};"
 
 
-def block_comment(lines: Iterable[str]) -> list[str]:
+def c_block_comment(lines: Iterable[str]) -> list[str]:
     """Lines, each made ` * ...`, between comment marks; whatever could end a comment is taken apart."""
-    return ["/*", *(safe(line) for line in lines), " */"]
+    return ["/*", *(comment_safe(line) for line in lines), " */"]
 
 
-def safe(text: str) -> str:
+def comment_safe(text: str) -> str:
     """Text in which no comment ends or starts, nor a trigraph."""
     return text.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
 
 
-def _called(texts: Iterable[str]) -> set[str]:
+def _called_names(texts: Iterable[str]) -> set[str]:
     return {name for text in texts for name in re.findall(r"(\w+)\(", text)}

@@ -18,7 +18,7 @@ std min max abs eval
 """
 """What C++20 has beside C99, and names that code for it calls unqualified."""
 
-_MATHS = """
+_MATH_FUNCTIONS = """
 acos asin atan atan2 cos sin tan acosh asinh atanh cosh sinh tanh exp exp2 expm1 frexp ilogb ldexp log log10 log1p log2
 logb modf scalbn scalbln cbrt fabs hypot pow sqrt erf erfc lgamma tgamma ceil floor nearbyint rint lrint llrint round
 lround llround trunc fmod remainder remquo copysign nan nextafter nexttoward fdim fmax fmin fma cabs cacos cacosh carg
@@ -27,7 +27,7 @@ y1 yn drem scalb significand exp10 pow10
 """
 """math.h and complex.h, with what Unix adds: compilers know these as functions, included or not; also with f and l."""
 
-_OTHERS = """
+_LIBRARY_NAMES = """
 fpclassify isfinite isinf isnan isnormal signbit isgreater isgreaterequal isless islessequal islessgreater isunordered
 signgam matherr math_errhandling float_t double_t INFINITY NAN HUGE_VAL abort atexit atof atoi atol atoll bsearch calloc
 div exit free getenv labs ldiv llabs lldiv malloc qsort rand realloc srand strtod strtol system isalnum isalpha isblank
@@ -40,6 +40,6 @@ towupper
 """
 """Macros and types of math.h, and functions of other headers that compilers know without them."""
 
-C_RESERVED = frozenset(f"{_KEYWORDS} {_CPP_KEYWORDS} {_OTHERS}".split()) | {
-    name + suffix for name in _MATHS.split() for suffix in ("", "f", "l")
+C_RESERVED = frozenset(f"{_KEYWORDS} {_CPP_KEYWORDS} {_LIBRARY_NAMES}".split()) | {
+    name + suffix for name in _MATH_FUNCTIONS.split() for suffix in ("", "f", "l")
 }

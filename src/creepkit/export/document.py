@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 from creepkit.errors import ExportError
 from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.language.tree import law_from_json, law_to_json
-from creepkit.records import ValuedLaw
+from creepkit.records import LawWithValues
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
 
-FORMAT = "creepkit-valued-law"
-VERSION = 2
-_KEYS = {"format", "version", "units", "gas_constant", "law", "values", "notes", "ranges"}
-_MEANT = {
+LAW_FORMAT = "creepkit-valued-law"
+LAW_FORMAT_VERSION = 2
+_REQUIRED_KEYS = {"format", "version", "units", "gas_constant", "law", "values", "notes", "ranges"}
+_FIXED_ENTRIES = {
     "units": {"stress": "MPa", "time": "s", "temperature": "K", "energy": "J/mol"},
     "gas_constant": GAS_CONSTANT,
 }
@@ -33,14 +33,14 @@ class JsonExporter:
     title: str = "JSON that creepkit reads back"
     suffix: str = ".json"
 
-    def text(self, source: ValuedLaw) -> str:
+    def text(self, source: LawWithValues) -> str:
         """Return the document as text, indented."""
-        if not source.units.native:
+        if not source.units.is_native:
             raise ExportError(f"law '{source.law.name}': JSON holds a law in MPa and s, as creepkit reads it back")
         document = {
-            "format": FORMAT,
-            "version": VERSION,
-            **_MEANT,
+            "format": LAW_FORMAT,
+            "version": LAW_FORMAT_VERSION,
+            **_FIXED_ENTRIES,
             "law": law_to_json(source.law),
             "values": dict(source.values),
             "notes": list(source.notes),
@@ -49,62 +49,62 @@ class JsonExporter:
         return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def read_valued_law(text: str, source: str = "exported law") -> ValuedLaw:
+def read_valued_law(text: str, source: str = "exported law") -> LawWithValues:
     """Return what JsonExporter wrote; ExportError or LawError, naming `source`, when it is anything else."""
-    data = _parsed(text, source)
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise ExportError(f"{source}: this is not a law that creepkit exported (format '{FORMAT}', version {VERSION})")
-    if data.get("version") != VERSION:
+    data = _parse_json(text, source)
+    if not isinstance(data, dict) or data.get("format") != LAW_FORMAT:
+        raise ExportError(f"{source}: this is not a law that creepkit exported (format '{LAW_FORMAT}', version {LAW_FORMAT_VERSION})")
+    if data.get("version") != LAW_FORMAT_VERSION:
         raise ExportError(
             f"{source}: written by another creepkit, in version {data.get('version')!r} of the format; "
-            f"this one reads version {VERSION}: export the law again"
+            f"this one reads version {LAW_FORMAT_VERSION}: export the law again"
         )
-    if set(data) != _KEYS:
-        odd = ", ".join(sorted(set(data) ^ _KEYS))
-        raise ExportError(f"{source}: the entries {odd} are missing or unknown; allowed are {', '.join(sorted(_KEYS))}")
-    for key, meant in _MEANT.items():
-        if data[key] != meant:
-            raise ExportError(f"{source}: '{key}' is {data[key]!r}; creepkit reads {meant!r} alone, convert the values")
+    if set(data) != _REQUIRED_KEYS:
+        unexpected = ", ".join(sorted(set(data) ^ _REQUIRED_KEYS))
+        raise ExportError(f"{source}: the entries {unexpected} are missing or unknown; allowed are {', '.join(sorted(_REQUIRED_KEYS))}")
+    for key, expected in _FIXED_ENTRIES.items():
+        if data[key] != expected:
+            raise ExportError(f"{source}: '{key}' is {data[key]!r}; creepkit reads {expected!r} alone, convert the values")
     values, notes = data["values"], data["notes"]
     if not isinstance(values, dict) or any(type(v) not in (int, float) for v in values.values()):
         raise ExportError(f"{source}: 'values' must be numbers by the names of parameters")
     if not isinstance(notes, list) or any(type(note) is not str for note in notes):
         raise ExportError(f"{source}: 'notes' must be a list of texts")
     law = law_from_json(data["law"], source)
-    return ValuedLaw(law, values, tuple(notes), ranges=_ranges(data["ranges"], source))
+    return LawWithValues(law, values, tuple(notes), ranges=_ranges(data["ranges"], source))
 
 
-def _ranges(found: Any, source: str) -> dict[str, tuple[float, float]]:
+def _ranges(data: Any, source: str) -> dict[str, tuple[float, float]]:
     """What tests covered: two numbers by name, the lower first."""
-    if not isinstance(found, dict) or not all(map(_is_range, found.values())):
+    if not isinstance(data, dict) or not all(map(_is_range, data.values())):
         raise ExportError(
             f"{source}: 'ranges' must be pairs of numbers, the lower first, by the names of what they are"
         )
-    return {str(name): (float(low), float(high)) for name, (low, high) in found.items()}
+    return {str(name): (float(low), float(high)) for name, (low, high) in data.items()}
 
 
-def _is_range(pair: Any) -> bool:
+def _is_range(value: Any) -> bool:
     return (
-        isinstance(pair, list) and [type(v) in (int, float) for v in pair] == [True, True] and bool(pair[0] <= pair[1])
+        isinstance(value, list) and [type(v) in (int, float) for v in value] == [True, True] and bool(value[0] <= value[1])
     )
 
 
-def read_source(path: str | Path) -> Identification | ValuedLaw:
+def read_law_file(path: str | Path) -> Identification | LawWithValues:
     """Return what a JSON file holds: an identification that was saved, or a law that was exported."""
     path = Path(path)
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ExportError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or 'not UTF-8 text'})") from None
-    data = _parsed(text, str(path))
-    if isinstance(data, dict) and data.get("format") == FORMAT:
+    data = _parse_json(text, str(path))
+    if isinstance(data, dict) and data.get("format") == LAW_FORMAT:
         return read_valued_law(text, str(path))
-    from creepkit.inverse.files import from_json
+    from creepkit.inverse.files import identification_from_json
 
-    return from_json(data, str(path))
+    return identification_from_json(data, str(path))
 
 
-def _parsed(text: str, source: str) -> Any:
+def _parse_json(text: str, source: str) -> Any:
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:

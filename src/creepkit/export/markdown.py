@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from creepkit.export import sheet
-from creepkit.export.conversion import converted
-from creepkit.export.latex import number
-from creepkit.language.printing import LawPrinter, equations_of
-from creepkit.records import ValuedLaw
+from creepkit.export.conversion import convert_values
+from creepkit.export.latex import latex_number
+from creepkit.language.printing import LatexLawPrinter, latex_equations
+from creepkit.records import LawWithValues
 
 
 @dataclass(frozen=True)
@@ -21,34 +21,34 @@ class MarkdownExporter:
     title: str = "Markdown with the equation, a table of values, notes and references"
     suffix: str = ".md"
 
-    def text(self, source: ValuedLaw) -> str:
+    def text(self, source: LawWithValues) -> str:
         """Return the section, under a heading of the first level."""
-        law, numbers, printer = source.law, converted(source), LawPrinter(source.law)
-        lines = [f"# {plain(source.title)}", "", "$$", r"\begin{aligned}"]
-        lines.append(" \\\\\n".join(_equation(*pair) for pair in equations_of(law, printer)))
+        law, converted_values, printer = source.law, convert_values(source), LatexLawPrinter(source.law)
+        lines = [f"# {markdown_escaped(source.title)}", "", "$$", r"\begin{aligned}"]
+        lines.append(" \\\\\n".join(_aligned_equation(*pair) for pair in latex_equations(law, printer)))
         lines += [r"\end{aligned}", "$$", "", "| Symbol | Meaning | Value | Unit |", "| --- | --- | --- | --- |"]
-        lines += [_row(row, printer) for row in sheet.rows(source, numbers)]
-        lines += ["", *(plain(sentence) for sentence in sheet.small_print(source, numbers))]
+        lines += [_markdown_row(row, printer) for row in sheet.parameter_rows(source, converted_values)]
+        lines += ["", *(markdown_escaped(sentence) for sentence in sheet.remarks(source, converted_values))]
         lines += [f"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
-        lines += _section("Notes", sheet.notes(source)) + _section("References", law.references)
+        lines += _markdown_section("Notes", sheet.note_lines(source)) + _markdown_section("References", law.references)
         return "\n".join(lines) + "\n"
 
 
-def plain(text: str) -> str:
+def markdown_escaped(text: str) -> str:
     """Text with Markdown's signs made plain."""
     return re.sub(r"([\\`*_\[\]<>#|$~])", r"\\\1", " ".join(text.split()))
 
 
-def _equation(left: str, summands: Sequence[str]) -> str:
+def _aligned_equation(left: str, summands: Sequence[str]) -> str:
     """One equation, a summand a row."""
     first, *rest = summands
     return " \\\\\n".join([f"{left} &= {first}", *(rf"&\quad + {summand}" for summand in rest)])
 
 
-def _row(row: sheet.Row, printer: LawPrinter) -> str:
-    symbol = f"{printer.doprint(row.symbol)}{'(0)' if row.start else ''}"
-    return f"| ${symbol}$ | {plain(row.meaning)} | ${number(row.value)}$ | {plain(row.unit)} |"
+def _markdown_row(row: sheet.ParameterRow, printer: LatexLawPrinter) -> str:
+    symbol = f"{printer.doprint(row.symbol)}{'(0)' if row.is_initial else ''}"
+    return f"| ${symbol}$ | {markdown_escaped(row.meaning)} | ${latex_number(row.value)}$ | {markdown_escaped(row.unit)} |"
 
 
-def _section(title: str, items: Sequence[str]) -> list[str]:
-    return ["", f"## {title}", "", *(f"- {plain(item)}" for item in items)] if items else []
+def _markdown_section(title: str, items: Sequence[str]) -> list[str]:
+    return ["", f"## {title}", "", *(f"- {markdown_escaped(item)}" for item in items)] if items else []

@@ -16,22 +16,22 @@ import sympy
 from sympy.printing.mathml import MathMLPresentationPrinter
 
 from creepkit.export import sheet
-from creepkit.export.conversion import converted
-from creepkit.export.heading import printable
-from creepkit.export.latex import number
+from creepkit.export.conversion import convert_values
+from creepkit.export.heading import printable_text
+from creepkit.export.latex import latex_number
 from creepkit.language.law import CreepLaw
-from creepkit.language.printing import Activation, activation_of
+from creepkit.language.printing import ArrheniusExponent, arrhenius_exponent
 from creepkit.language.symbols import mean_stress, principal_stress, strain, stress, temperature, time
-from creepkit.records import ValuedLaw
+from creepkit.records import LawWithValues
 
-NAMESPACE = "http://www.w3.org/1998/Math/MathML"
+MATHML_NAMESPACE = "http://www.w3.org/1998/Math/MathML"
 
-_POINT = {
+_VARIABLE_NAMES = {
     stress: ("σ", "e"), strain: ("ε", "cr"), time: ("t", ""), temperature: ("T", ""), principal_stress: ("σ", "1"),
     mean_stress: ("σ", "m"),
 }  # fmt: skip
 
-_KEPT = ("amp", "lt", "gt", "quot", "apos")
+_XML_ENTITIES = ("amp", "lt", "gt", "quot", "apos")
 """The names of characters that XML knows itself."""
 
 _STYLE = "table { border-collapse: collapse } td, th { border: 1px solid #999; padding: 0.2em 0.6em; text-align: left }"
@@ -45,10 +45,10 @@ class MathmlExporter:
     title: str = "MathML in a page of XHTML, with a table of values, notes and references"
     suffix: str = ".xhtml"
 
-    def text(self, source: ValuedLaw) -> str:
+    def text(self, source: LawWithValues) -> str:
         """Return the page."""
-        law, numbers, printer = source.law, converted(source), MathmlPrinter()
-        title = _plain(source.title)
+        law, converted_values, printer = source.law, convert_values(source), MathmlPrinter()
+        title = _xml_escaped(source.title)
         lines = [
             '<?xml version="1.0" encoding="UTF-8"?>',
             '<html xmlns="http://www.w3.org/1999/xhtml" lang="en">',
@@ -58,12 +58,12 @@ class MathmlExporter:
             *_equations(law, printer),
             "<table>",
             "<tr><th>Symbol</th><th>Meaning</th><th>Value</th><th>Unit</th></tr>",
-            *(_row(row, printer) for row in sheet.rows(source, numbers)),
+            *(_html_row(row, printer) for row in sheet.parameter_rows(source, converted_values)),
             "</table>",
-            *(f"<p>{_plain(sentence)}</p>" for sentence in sheet.small_print(source, numbers)),
-            *(f"<p>Valid where {_math(printer.doprint(relation))}.</p>" for relation in law.constraints),
-            *_section("Notes", sheet.notes(source)),
-            *_section("References", law.references),
+            *(f"<p>{_xml_escaped(sentence)}</p>" for sentence in sheet.remarks(source, converted_values)),
+            *(f"<p>Valid where {_math_element(printer.doprint(relation))}.</p>" for relation in law.constraints),
+            *_html_section("Notes", sheet.note_lines(source)),
+            *_html_section("References", law.references),
             "</body>",
             "</html>",
         ]
@@ -75,47 +75,47 @@ class MathmlPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__({"mul_symbol": None})
-        unescaped = self.dom.createTextNode  # sympy writes its texts as they are, the sign < of a relation among them
-        self.dom.createTextNode = lambda text: unescaped(text.replace("<", "&lt;").replace(">", "&gt;"))
+        create_text_node = self.dom.createTextNode  # sympy writes its texts as they are, the sign < of a relation among them
+        self.dom.createTextNode = lambda text: create_text_node(text.replace("<", "&lt;").replace(">", "&gt;"))
 
     def doprint(self, expr: sympy.Basic) -> str:
         """The expression as MathML without a root element."""
-        return re.sub(r"&(\w+);", _numeric, str(super().doprint(expr)))
+        return re.sub(r"&(\w+);", _character_reference, str(super().doprint(expr)))
 
     def _print_Symbol(self, sym: Any, style: str = "plain") -> Any:
-        if sym in _POINT:
-            base, below = _POINT[sym]
+        if sym in _VARIABLE_NAMES:
+            base, subscript = _VARIABLE_NAMES[sym]
             node = self._leaf("mi", base)
-            return self._node("msub", node, self._leaf("mtext", below)) if below else node
+            return self._node("msub", node, self._leaf("mtext", subscript)) if subscript else node
         if sym.name.endswith("_inf"):
             stem = super()._print_Symbol(sympy.Symbol(sym.name.removesuffix("_inf")), style)
             return self._node("msub", stem, self._leaf("mi", "∞"))
         return super()._print_Symbol(sym, style)
 
     def _print_exp(self, expr: Any) -> Any:
-        parts = {part: activation_of(part) for part in sympy.Add.make_args(expr.args[0])}
-        factors = [self._arrhenius(found) for found in parts.values() if found]
-        rest = sympy.Add(*(part for part, found in parts.items() if not found))
+        activations = {exponent: arrhenius_exponent(exponent) for exponent in sympy.Add.make_args(expr.args[0])}
+        factors = [self._arrhenius(activation) for activation in activations.values() if activation]
+        rest = sympy.Add(*(part for part, found in activations.items() if not found))
         if rest != 0:
             factors.append(self._exponential(self._print(rest)))
         return self._node("mrow", *factors)
 
-    def _arrhenius(self, found: Activation) -> Any:
+    def _arrhenius(self, activation: ArrheniusExponent) -> Any:
         """exp[-(Q/R)(1/T - 1/T_ref)]."""
-        falls = found.Q.could_extract_minus_sign()
-        energy = self._node("mfrac", self._print(-found.Q if falls else found.Q), self._leaf("mi", "R"))
-        start = self._node("mrow", self._leaf("mn", f"{found.T_ref:g}"), self._leaf("mtext", "\u00a0K"))
-        one = [self._leaf("mn", "1") for _ in range(2)]
-        fall = self._node(
+        is_negative = activation.Q.could_extract_minus_sign()
+        energy = self._node("mfrac", self._print(-activation.Q if is_negative else activation.Q), self._leaf("mi", "R"))
+        reference = self._node("mrow", self._leaf("mn", f"{activation.T_ref:g}"), self._leaf("mtext", "\u00a0K"))
+        ones = [self._leaf("mn", "1") for _ in range(2)]
+        difference = self._node(
             "mrow",
             self._leaf("mo", "("),
-            self._node("mfrac", one[0], self._leaf("mi", "T")),
+            self._node("mfrac", ones[0], self._leaf("mi", "T")),
             self._leaf("mo", "−"),
-            self._node("mfrac", one[1], start),
+            self._node("mfrac", ones[1], reference),
             self._leaf("mo", ")"),
         )
-        sign = [] if falls else [self._leaf("mo", "−")]
-        return self._exponential(self._node("mrow", *sign, energy, fall))
+        sign = [] if is_negative else [self._leaf("mo", "−")]
+        return self._exponential(self._node("mrow", *sign, energy, difference))
 
     def _exponential(self, argument: Any) -> Any:
         opening, closing = self._leaf("mo", "["), self._leaf("mo", "]")
@@ -131,11 +131,11 @@ class MathmlPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
         return self._node(tag, self.dom.createTextNode(text))
 
 
-def _numeric(name: re.Match[str]) -> str:
+def _character_reference(match: re.Match[str]) -> str:
     """A character by number where XML does not know its name."""
-    if name[1] in _KEPT:
-        return name[0]
-    return "".join(f"&#x{ord(c):X};" for c in html.entities.html5[f"{name[1]};"])
+    if match[1] in _XML_ENTITIES:
+        return match[0]
+    return "".join(f"&#x{ord(c):X};" for c in html.entities.html5[f"{match[1]};"])
 
 
 # ---- the page ------------------------------------------------------------------------------------------------------
@@ -143,12 +143,12 @@ def _numeric(name: re.Match[str]) -> str:
 
 def _equations(law: CreepLaw, printer: MathmlPrinter) -> Iterator[str]:
     """A display for the rate of strain, a summand a row, and one for each internal variable."""
-    yield _display(_dotted(printer.doprint(strain)), [printer.doprint(term) for term in law.terms.values()])
+    yield _equation_block(_with_dot(printer.doprint(strain)), [printer.doprint(term) for term in law.terms.values()])
     for symbol, state in law.states.items():
-        yield _display(_dotted(printer.doprint(symbol)), [printer.doprint(state.rate)])
+        yield _equation_block(_with_dot(printer.doprint(symbol)), [printer.doprint(state.rate)])
 
 
-def _dotted(name: str) -> str:
+def _with_dot(name: str) -> str:
     """The name of a rate: a dot over the letter, not over its index."""
     if name.startswith("<msub><mi>"):
         letter, _, rest = name.removeprefix("<msub>").partition("</mi>")
@@ -156,7 +156,7 @@ def _dotted(name: str) -> str:
     return f"<mover>{name}<mo>&#x2D9;</mo></mover>"
 
 
-def _display(left: str, summands: Sequence[str]) -> str:
+def _equation_block(left: str, summands: Sequence[str]) -> str:
     signs = ["=", *["+"] * (len(summands) - 1)]
     names = [left, *["<mrow/>"] * (len(summands) - 1)]
     rows = [
@@ -164,33 +164,33 @@ def _display(left: str, summands: Sequence[str]) -> str:
         f'<mtd style="text-align: left">{summand}</mtd></mtr>'
         for name, sign, summand in zip(names, signs, summands, strict=True)
     ]
-    return _math(f'<mtable displaystyle="true">{"".join(rows)}</mtable>', ' display="block"')
+    return _math_element(f'<mtable displaystyle="true">{"".join(rows)}</mtable>', ' display="block"')
 
 
-def _math(content: str, attributes: str = "") -> str:
-    return f'<math xmlns="{NAMESPACE}"{attributes}>{content}</math>'
+def _math_element(content: str, attributes: str = "") -> str:
+    return f'<math xmlns="{MATHML_NAMESPACE}"{attributes}>{content}</math>'
 
 
-def _row(row: sheet.Row, printer: MathmlPrinter) -> str:
-    start = "<mo>(</mo><mn>0</mn><mo>)</mo>" if row.start else ""
-    symbol, value = _math(f"<mrow>{printer.doprint(row.symbol)}{start}</mrow>"), _math(_number(row.value))
-    return f"<tr><td>{symbol}</td><td>{_plain(row.meaning)}</td><td>{value}</td><td>{_plain(row.unit)}</td></tr>"
+def _html_row(row: sheet.ParameterRow, printer: MathmlPrinter) -> str:
+    initial = "<mo>(</mo><mn>0</mn><mo>)</mo>" if row.is_initial else ""
+    symbol, value = _math_element(f"<mrow>{printer.doprint(row.symbol)}{initial}</mrow>"), _math_element(_mathml_number(row.value))
+    return f"<tr><td>{symbol}</td><td>{_xml_escaped(row.meaning)}</td><td>{value}</td><td>{_xml_escaped(row.unit)}</td></tr>"
 
 
-def _number(value: float) -> str:
+def _mathml_number(value: float) -> str:
     """A number as 4.2 x 10^5."""
-    mantissa, _, exponent = number(value).partition(r" \times 10^{")
-    sign, size = ("<mo>−</mo>", mantissa[1:]) if mantissa.startswith("-") else ("", mantissa)
+    mantissa, _, exponent = latex_number(value).partition(r" \times 10^{")
+    sign, magnitude = ("<mo>−</mo>", mantissa[1:]) if mantissa.startswith("-") else ("", mantissa)
     if not exponent:
-        return f"<mrow>{sign}<mn>{size}</mn></mrow>"
+        return f"<mrow>{sign}<mn>{magnitude}</mn></mrow>"
     power = exponent.rstrip("}").replace("-", "−")
-    return f"<mrow>{sign}<mn>{size}</mn><mo>×</mo><msup><mn>10</mn><mn>{power}</mn></msup></mrow>"
+    return f"<mrow>{sign}<mn>{magnitude}</mn><mo>×</mo><msup><mn>10</mn><mn>{power}</mn></msup></mrow>"
 
 
-def _section(title: str, items: Sequence[str]) -> list[str]:
-    return [f"<h2>{title}</h2>", "<ul>", *(f"<li>{_plain(item)}</li>" for item in items), "</ul>"] if items else []
+def _html_section(title: str, items: Sequence[str]) -> list[str]:
+    return [f"<h2>{title}</h2>", "<ul>", *(f"<li>{_xml_escaped(item)}</li>" for item in items), "</ul>"] if items else []
 
 
-def _plain(text: str) -> str:
+def _xml_escaped(text: str) -> str:
     """Text for XML, which allows no control characters."""
-    return html.escape(printable(text))
+    return html.escape(printable_text(text))

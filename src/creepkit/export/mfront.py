@@ -13,15 +13,15 @@ from dataclasses import dataclass
 import sympy
 
 from creepkit.errors import ExportError
-from creepkit.export.c_text import cpp_lambda, safe
-from creepkit.export.heading import comments, heading, printable
-from creepkit.export.mfront_integrator import Integrator
+from creepkit.export.c_text import cpp_lambda_definition, comment_safe
+from creepkit.export.heading import comment_lines, heading, printable_text
+from creepkit.export.mfront_integrator import IntegratorBlock
 from creepkit.language.elastic import Elastic
 from creepkit.language.symbols import temperature
-from creepkit.records import ValuedLaw
+from creepkit.records import LawWithValues
 
-_WIDTH = 120
-_PREDICTOR = [
+_LINE_LENGTH = 120
+_PREDICTOR_BLOCK = [
     "@Predictor {",
     "  // rates that are singular at zero strain need a first guess",
     "  if (p <= 0) {",
@@ -30,7 +30,7 @@ _PREDICTOR = [
     "}",
 ]
 
-_FORMULA = (sympy.Add, sympy.Mul, sympy.Pow, sympy.exp, sympy.log, sympy.Symbol, sympy.Number)
+_FORMULA_NODES = (sympy.Add, sympy.Mul, sympy.Pow, sympy.exp, sympy.log, sympy.Symbol, sympy.Number)
 """What the formulas of @ElasticMaterialProperties may hold."""
 
 
@@ -42,47 +42,47 @@ class MfrontExporter:
     title: str = "MFront behaviour (Implicit DSL) with its exact Jacobian"
     suffix: str = ".mfront"
 
-    def text(self, source: ValuedLaw) -> str:
+    def text(self, source: LawWithValues) -> str:
         """Return the file's text."""
-        law = Integrator(source)
-        blocks = [
-            list(_head(law)),
-            list(_scheme(law)),
-            list(_elasticity(law.source)),
-            list(_variables(law)),
-            list(_parameters(law)),
-            *([_PREDICTOR] if law.needs_strain else []),
-            list(_integrator(law)),
+        block_source = IntegratorBlock(source)
+        sections = [
+            list(_header(block_source)),
+            list(_behaviour_declaration(block_source)),
+            list(_mfront_elasticity(block_source.source)),
+            list(_state_variables(block_source)),
+            list(_parameters(block_source)),
+            *([_PREDICTOR_BLOCK] if block_source.needs_strain else []),
+            list(_integrator_block(block_source)),
         ]
-        if law.needs_time:
-            blocks.append(["@UpdateAuxiliaryStateVariables {", f"  {law.elapsed} += dt;", "}"])
-        return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+        if block_source.needs_time:
+            sections.append(["@UpdateAuxiliaryStateVariables {", f"  {block_source.elapsed} += dt;", "}"])
+        return "\n\n".join("\n".join(section) for section in sections) + "\n"
 
 
-def _head(law: Integrator) -> Iterator[str]:
-    units = law.source.units
-    told = [
-        *heading(law.source, floors=True),
-        *law.renamed(),
+def _header(behaviour: IntegratorBlock) -> Iterator[str]:
+    units = behaviour.source.units
+    header_lines = [
+        *heading(behaviour.source, mentions_floors=True),
+        *behaviour.renaming_notes(),
         "",
         f"Stress and Young's modulus are in {units.stress}, time in {units.time}, temperature in K.",
         "The creep strain p flows along the deviator of the stress; damage does not weaken the elasticity.",
         "The midpoint rule (theta = 0.5) is of second order; theta = 1 is of first order and damps more.",
         "Powers of time and strain stay finite at the start; if the rate falls steeply there, keep increments short.",
     ]
-    if law.needs_time:
-        told.append(f"Time is counted in {law.elapsed} from the first increment on, where the loading begins.")
-    for state, symbol in zip(law.source.law.states.values(), law.states, strict=True):
+    if behaviour.needs_time:
+        header_lines.append(f"Time is counted in {behaviour.elapsed} from the first increment on, where the loading begins.")
+    for state, symbol in zip(behaviour.source.law.states.values(), behaviour.states, strict=True):
         if state.initial:
-            told.append(f"{symbol} holds the internal variable less its start, {state.initial!r}, and starts at 0.")
-    return iter(comments(told, "//", _WIDTH))
+            header_lines.append(f"{symbol} holds the internal variable less its start, {state.initial!r}, and starts at 0.")
+    return iter(comment_lines(header_lines, "//", _LINE_LENGTH))
 
 
-def _scheme(law: Integrator) -> Iterator[str]:
-    title = printable(law.source.title).replace("\\", " ").replace('"', "'")
+def _behaviour_declaration(behaviour: IntegratorBlock) -> Iterator[str]:
+    title = printable_text(behaviour.source.title).replace("\\", " ").replace('"', "'")
     yield "@DSL Implicit;"
-    yield f"@Behaviour {law.behaviour};"
-    yield f'@Description{{ "{safe(title)}, exported by creepkit" }}'
+    yield f"@Behaviour {behaviour.behaviour};"
+    yield f'@Description{{ "{comment_safe(title)}, exported by creepkit" }}'
     yield ""
     yield '@ModellingHypotheses {".+"};'
     yield "@Brick StandardElasticity;"
@@ -92,7 +92,7 @@ def _scheme(law: Integrator) -> Iterator[str]:
     yield "@IterMax 100;"
 
 
-def _elasticity(source: ValuedLaw) -> Iterator[str]:
+def _mfront_elasticity(source: LawWithValues) -> Iterator[str]:
     """Numbers or formulas of the temperature where they are known, else properties that the solver gives."""
     if source.elastic is None:
         yield "@MaterialProperty stress young;"
@@ -100,60 +100,60 @@ def _elasticity(source: ValuedLaw) -> Iterator[str]:
         yield "@MaterialProperty real nu;"
         yield 'nu.setGlossaryName("PoissonRatio");'
     else:
-        young, nu = _moduli(source.elastic, source.units.megapascals)
+        young, nu = _elastic_formulas(source.elastic, source.units.megapascals)
         yield f"@ElasticMaterialProperties {{{young}, {nu}}};"
 
 
-def _moduli(elastic: Elastic, megapascals: float) -> tuple[str, str]:
-    return _modulus(sympy.sympify(elastic.E) / megapascals), _modulus(sympy.sympify(elastic.nu))
+def _elastic_formulas(elastic: Elastic, megapascals: float) -> tuple[str, str]:
+    return _formula(sympy.sympify(elastic.E) / megapascals), _formula(sympy.sympify(elastic.nu))
 
 
-def _modulus(expression: sympy.Expr) -> str:
+def _formula(expression: sympy.Expr) -> str:
     """A number, or a formula of T in quotes."""
     if not expression.free_symbols:
         return repr(float(expression))
-    odd = [node for node in sympy.preorder_traversal(expression) if not isinstance(node, _FORMULA)]
-    if odd:
+    unsupported = [node for node in sympy.preorder_traversal(expression) if not isinstance(node, _FORMULA_NODES)]
+    if unsupported:
         raise ExportError(
-            f"the elastic data hold {odd[0]}, which no formula of MFront can; export with Elastic at a temperature"
+            f"the elastic data hold {unsupported[0]}, which no formula of MFront can; export with Elastic at a temperature"
         )
     numbers = {n: sympy.Float(repr(float(n)), 17) for n in expression.atoms(sympy.Float)}
     text = sympy.sstr(expression.xreplace(numbers).xreplace({temperature: sympy.Symbol("T")}))
     return f'"{text}"'
 
 
-def _variables(law: Integrator) -> Iterator[str]:
+def _state_variables(behaviour: IntegratorBlock) -> Iterator[str]:
     yield "@StateVariable strain p;"
     yield 'p.setGlossaryName("EquivalentViscoplasticStrain");'
-    for symbol, state in zip(law.states, law.source.law.states.values(), strict=True):
-        yield from comments([state.meaning], f"@StateVariable real {symbol}; //")
+    for symbol, state in zip(behaviour.states, behaviour.source.law.states.values(), strict=True):
+        yield from comment_lines([state.meaning], f"@StateVariable real {symbol}; //")
         if state.limit is not None:
-            room = state.limit - state.initial
-            if room > 0:
-                yield f"@PhysicalBounds {symbol} in ]*:{room!r}]; // where the material has failed"
+            span = state.limit - state.initial
+            if span > 0:
+                yield f"@PhysicalBounds {symbol} in ]*:{span!r}]; // where the material has failed"
             else:
-                yield f"// the material has failed where {symbol} reaches {room!r}"
-    if law.needs_time:
-        yield f"@AuxiliaryStateVariable real {law.elapsed};"
-        yield f'{law.elapsed}.setEntryName("TimeUnderLoad");'
+                yield f"// the material has failed where {symbol} reaches {span!r}"
+    if behaviour.needs_time:
+        yield f"@AuxiliaryStateVariable real {behaviour.elapsed};"
+        yield f'{behaviour.elapsed}.setEntryName("TimeUnderLoad");'
 
 
-def _parameters(law: Integrator) -> Iterator[str]:
+def _parameters(behaviour: IntegratorBlock) -> Iterator[str]:
     yield "// for stress as a ratio to 1 MPa and time to 1 s"
-    table = law.source.law.params.values()
-    for (symbol, value), param in zip(law.program.parameters.items(), table, strict=True):
+    table = behaviour.source.law.params.values()
+    for (symbol, value), param in zip(behaviour.code.parameters.items(), table, strict=True):
         unit = "" if param.unit == "1" else f"{param.unit}, "
-        yield from comments([f"{unit}{param.meaning}"], f"@Parameter {symbol} = {value!r}; //")
+        yield from comment_lines([f"{unit}{param.meaning}"], f"@Parameter {symbol} = {value!r}; //")
 
 
-def _integrator(law: Integrator) -> Iterator[str]:
+def _integrator_block(behaviour: IntegratorBlock) -> Iterator[str]:
     parts = {
-        "stable functions": [cpp_lambda(name) for name in law.helpers()],
-        "stress and its direction, at t + theta dt": law.tensors(),
-        "the point, in MPa and s": law.point(),
-        "the law": law.rates(),
-        "the implicit system": law.residuals(),
-        "its Jacobian": law.jacobian(),
+        "stable functions": [cpp_lambda_definition(name) for name in behaviour.stable_functions()],
+        "stress and its direction, at t + theta dt": behaviour.tensor_lines(),
+        "the point, in MPa and s": behaviour.point_lines(),
+        "the law": behaviour.rate_lines(),
+        "the implicit system": behaviour.residual_lines(),
+        "its Jacobian": behaviour.jacobian_lines(),
     }
     yield "@Integrator {"
     for title, lines in parts.items():

@@ -13,14 +13,14 @@ from functools import cached_property
 
 import sympy
 
-from creepkit.export.c_text import OWN_WORDS, assignments, helpers_in, text_of
+from creepkit.export.c_text import STABLE_FUNCTION_NAMES, c_assignments, stable_functions_in, c_expression
 from creepkit.export.c_words import C_RESERVED
 from creepkit.export.identifiers import Identifiers
-from creepkit.export.program import Function, Program
-from creepkit.language.symbols import POINT, mean_stress, principal_stress, strain, stress, temperature, time
-from creepkit.records import ValuedLaw
+from creepkit.export.program import CodeFunction, LawCode
+from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, strain, stress, temperature, time
+from creepkit.records import LawWithValues
 
-_RESERVED = """
+_MFRONT_RESERVED = """
 D Dt D_tdt N Type T dT dt t theta epsilon iterMax eel deel feel eto deto sig young nu lambda mu young_tdt nu_tdt
 lambda_tdt mu_tdt p dp fp delta_dp delta_deel smt smflag zeros fzeros tzeros zeros_1 delta_zeros jacobian njacobian
 jacobian_invert partial_jacobian vect_e error error_1 error_p iter converged idx idx2 idx3 hypothesis policy
@@ -39,25 +39,25 @@ TimeUnderLoad
 """
 """Names that MFront or TFEL keep, entries of its glossary that a law may come upon, and this block's own names."""
 
-_BY = {stress: "stress", principal_stress: "principal", mean_stress: "mean", strain: "strain"}
+_DERIVATIVE_NAMES = {stress: "stress", principal_stress: "principal", mean_stress: "mean", strain: "strain"}
 """What a derivative of a rate is called after."""
 
 
-class Integrator:
+class IntegratorBlock:
     """The names and statements of one law.
 
     behaviour : the class's name. states : MFront's names of internal variables. elapsed : that of the time under load.
     """
 
-    def __init__(self, source: ValuedLaw) -> None:
-        reduced = source.reduced()
-        identifiers = Identifiers(C_RESERVED | OWN_WORDS | {*_RESERVED.split()} | _derived(reduced))
-        self.behaviour = identifiers.name(source.name or source.law.name)
-        self.elapsed = identifiers.name("elapsed")
-        self.states = identifiers.names(s.name for s in reduced.law.states)
-        called = {s.name: f"{s.name}_now" for s in (*POINT, *reduced.law.states)}
-        self.program = Program(reduced, identifiers, called)
-        self.source = self.program.source
+    def __init__(self, source: LawWithValues) -> None:
+        reduced = source.without_inactive_terms()
+        identifiers = Identifiers(C_RESERVED | STABLE_FUNCTION_NAMES | {*_MFRONT_RESERVED.split()} | _derived_names(reduced))
+        self.behaviour = identifiers.unique(source.name or source.law.name)
+        self.elapsed = identifiers.unique("elapsed")
+        self.states = identifiers.unique_names(s.name for s in reduced.law.states)
+        target_names = {s.name: f"{s.name}_now" for s in (*POINT_VARIABLES, *reduced.law.states)}
+        self.code = LawCode(reduced, identifiers, target_names)
+        self.source = self.code.source
         self._law, self._units = self.source.law, self.source.units
 
     @property
@@ -70,20 +70,20 @@ class Integrator:
         """Whether the law reads the creep strain."""
         return self._law.uses(strain)
 
-    def renamed(self) -> list[str]:
+    def renaming_notes(self) -> list[str]:
         """One line for each name of the author's that MFront cannot keep."""
-        named = dict(zip((s.name for s in self._law.states), self.states, strict=True))
-        told = [f"'{old}' is called {new} here" for old, new in named.items() if old != new]
-        own = [line for line in self.program.renamed() if not line.endswith("_now here")]
-        return [*told, *(line for line in own if line not in told)]
+        state_names = dict(zip((s.name for s in self._law.states), self.states, strict=True))
+        notes = [f"'{old}' is called {new} here" for old, new in state_names.items() if old != new]
+        code_notes = [line for line in self.code.renaming_notes() if not line.endswith("_now here")]
+        return [*notes, *(line for line in code_notes if line not in notes)]
 
-    def helpers(self) -> list[str]:
+    def stable_functions(self) -> list[str]:
         """The stable functions that the law calls."""
-        return helpers_in(self.rates())
+        return stable_functions_in(self.rate_lines())
 
     # ---- the statements --------------------------------------------------------------------------------------------
 
-    def tensors(self) -> list[str]:
+    def tensor_lines(self) -> list[str]:
         """The von Mises stress, the flow direction and, where needed, the first principal stress with its own."""
         lines = [
             "const auto seq = sigmaeq(sig);",
@@ -105,9 +105,9 @@ class Integrator:
             ]
         return lines
 
-    def point(self) -> list[str]:
+    def point_lines(self) -> list[str]:
         """The variables of the point and the internal ones at t + theta dt, in the law's own units."""
-        megapascals, seconds = self._factor(self._units.megapascals), self._factor(self._units.seconds)
+        megapascals, seconds = self._factor_text(self._units.megapascals), self._factor_text(self._units.seconds)
         texts = {
             stress: f"{megapascals}seq",
             strain: "p + theta * dp",
@@ -116,83 +116,83 @@ class Integrator:
             principal_stress: f"{megapascals}values[first]",
             mean_stress: f"{megapascals}trace(sig) / 3",
         }
-        pairs = list(zip(self.program.point, POINT, strict=True))
-        lines = [f"const real {symbol} = {texts[own]};" for symbol, own in pairs if symbol in self._update.read]
-        inner = zip(self.program.states, self.states, self._law.states.values(), strict=True)
-        for symbol, name, state in inner:
+        pairs = list(zip(self.code.point, POINT_VARIABLES, strict=True))
+        lines = [f"const real {symbol} = {texts[variable]};" for symbol, variable in pairs if symbol in self._update_function.inputs]
+        internal_variables = zip(self.code.states, self.states, self._law.states.values(), strict=True)
+        for symbol, name, state in internal_variables:
             start = f"{state.initial!r} + " if state.initial else ""
-            lines += [f"const real {symbol} = {start}{name} + theta * d{name};"] if symbol in self._update.read else []
+            lines += [f"const real {symbol} = {start}{name} + theta * d{name};"] if symbol in self._update_function.inputs else []
         return lines
 
-    def rates(self) -> list[str]:
+    def rate_lines(self) -> list[str]:
         """The rate and each internal variable's, per unit of time, and what they change with."""
-        program, update, scale = self.program, self._update, self._units.seconds
-        logs = [f"const real {ln} = log({plain});" for ln, plain in program.logarithms_in(update).items()]
-        lines = [*logs, *assignments(update.steps, "const real")]
-        lines.append(f"const real rate = {self._factor(scale)}exp({text_of(update.outputs[0])});")
-        for row, name in enumerate(self._rows[1:], 1):
-            lines.append(f"const real {name} = {self._factor(scale)}({text_of(update.outputs[row])});")
-        for row, name in enumerate(self._rows):
-            for k, label in self._columns(row):
-                weight = "rate * " if row == 0 else self._factor(scale)
-                unit = self._factor(self._units.megapascals) if k in (0, 4, 5) else ""
-                lines.append(f"const real {name}_by_{label} = {unit}{weight}({text_of(self._slope(row, k))});")
+        code, update, time_factor = self.code, self._update_function, self._units.seconds
+        logs = [f"const real {ln} = log({plain});" for ln, plain in code.logarithms_used(update).items()]
+        lines = [*logs, *c_assignments(update.assignments, "const real")]
+        lines.append(f"const real rate = {self._factor_text(time_factor)}exp({c_expression(update.outputs[0])});")
+        for row, name in enumerate(self._rate_names[1:], 1):
+            lines.append(f"const real {name} = {self._factor_text(time_factor)}({c_expression(update.outputs[row])});")
+        for row, name in enumerate(self._rate_names):
+            for k, label in self._derivative_columns(row):
+                weight = "rate * " if row == 0 else self._factor_text(time_factor)
+                unit = self._factor_text(self._units.megapascals) if k in (0, 4, 5) else ""
+                lines.append(f"const real {name}_by_{label} = {unit}{weight}({c_expression(self._derivative(row, k))});")
         return lines
 
-    def residuals(self) -> list[str]:
+    def residual_lines(self) -> list[str]:
         """The brick has set feel to deel - deto, the DSL every other residual to its increment."""
-        inner = zip(self.states, self._rows[1:], strict=True)
-        return ["feel += dp * flow;", "fp -= dt * rate;", *(f"f{name} -= dt * {rate};" for name, rate in inner)]
+        state_rates = zip(self.states, self._rate_names[1:], strict=True)
+        return ["feel += dp * flow;", "fp -= dt * rate;", *(f"f{name} -= dt * {rate};" for name, rate in state_rates)]
 
-    def jacobian(self) -> list[str]:
+    def jacobian_lines(self) -> list[str]:
         """The DSL has set the Jacobian to the identity."""
         lines = [
             "dfeel_ddeel += 2 * shear * theta * dp * inverse_seq * (Stensor4::M() - (flow ^ flow));",
             "dfeel_ddp = flow;",
         ]
-        for row, (own, rate) in enumerate(zip(("p", *self.states), self._rows, strict=True)):
-            found = dict(self._columns(row))
-            tensor = [text.format(f"{rate}_by_{found[k]}") for k, text in _BY_STRAIN.items() if k in found]
+        for row, (variable, rate) in enumerate(zip(("p", *self.states), self._rate_names, strict=True)):
+            derivative_names = dict(self._derivative_columns(row))
+            tensor = [text.format(f"{rate}_by_{derivative_names[k]}") for k, text in _ELASTIC_STRAIN_DERIVATIVES.items() if k in derivative_names]
             if tensor:
-                lines.append(f"df{own}_ddeel = -theta * dt * ({' + '.join(tensor)});")
-            for k, other in ((1, "p"), *enumerate(self.states, len(POINT))):
-                if k in found:
-                    sign = "-= " if other == own else "= -"
-                    lines.append(f"df{own}_dd{other} {sign}theta * dt * {rate}_by_{found[k]};")
+                lines.append(f"df{variable}_ddeel = -theta * dt * ({' + '.join(tensor)});")
+            for k, other in ((1, "p"), *enumerate(self.states, len(POINT_VARIABLES))):
+                if k in derivative_names:
+                    sign = "-= " if other == variable else "= -"
+                    lines.append(f"df{variable}_dd{other} {sign}theta * dt * {rate}_by_{derivative_names[k]};")
         return lines
 
     # ---- what they are made of -------------------------------------------------------------------------------------
 
     @cached_property
-    def _update(self) -> Function:
+    def _update_function(self) -> CodeFunction:
         """The update entry without the columns of time and temperature, which are known."""
-        full = self.program.function("update")
-        rows, width = len(self._rows), len(POINT) + len(self.states)
-        self._kept = [0, 1, 4, 5, *range(len(POINT), width)]
-        return full.only([*range(rows), *(rows + row * width + k for row in range(rows) for k in self._kept)])
+        full = self.code.function("update")
+        rows, width = len(self._rate_names), len(POINT_VARIABLES) + len(self.states)
+        self._kept_columns = [0, 1, 4, 5, *range(len(POINT_VARIABLES), width)]
+        return full.with_outputs([*range(rows), *(rows + row * width + k for row in range(rows) for k in self._kept_columns)])
 
     @property
-    def _rows(self) -> list[str]:
+    def _rate_names(self) -> list[str]:
         return ["rate", *(f"{name}_rate" for name in self.states)]
 
-    def _slope(self, row: int, column: int) -> sympy.Expr:
-        outputs, rows = self._update.outputs, len(self._rows)
-        return outputs[rows + row * len(self._kept) + self._kept.index(column)]
+    def _derivative(self, row: int, column: int) -> sympy.Expr:
+        outputs, rows = self._update_function.outputs, len(self._rate_names)
+        return outputs[rows + row * len(self._kept_columns) + self._kept_columns.index(column)]
 
-    def _columns(self, row: int) -> list[tuple[int, str]]:
+    def _derivative_columns(self, row: int) -> list[tuple[int, str]]:
         """The columns in which a rate has a derivative, and what they are called."""
         labels: Sequence[tuple[int, str]] = [
-            *((POINT.index(s), label) for s, label in _BY.items()),
-            *enumerate(self.states, len(POINT)),
+            *((POINT_VARIABLES.index(s), label) for s, label in _DERIVATIVE_NAMES.items()),
+            *enumerate(self.states, len(POINT_VARIABLES)),
         ]
-        return [(k, label) for k, label in labels if self._slope(row, k) != 0]
+        return [(k, label) for k, label in labels if self._derivative(row, k) != 0]
 
     @staticmethod
-    def _factor(factor: float) -> str:
+    def _factor_text(factor: float) -> str:
         return "" if factor == 1 else f"{factor!r} * "
 
 
-_BY_STRAIN = {
+_ELASTIC_STRAIN_DERIVATIVES = {
     0: "{} * 2 * shear * flow",
     4: "{} * (lame * Stensor::Id() + 2 * shear * normal)",
     5: "{} * (lame + 2 * shear / 3) * Stensor::Id()",
@@ -200,7 +200,7 @@ _BY_STRAIN = {
 """{column: derivative of a rate to the elastic strain through that stress, less theta}."""
 
 
-def _derived(source: ValuedLaw) -> set[str]:
+def _derived_names(source: LawWithValues) -> set[str]:
     """What MFront calls after an internal variable, and what this block does."""
     names = [f"{s.name}{more}" for s in source.law.states for more in ("", "_2")]
     ends = ("stress", "principal", "mean", "strain", *names)

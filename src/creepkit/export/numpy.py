@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from creepkit.export.python_text import Dialect, functions_of, module_text
-from creepkit.kernels.printing import FUNCTIONS, KernelPrinter
-from creepkit.records import ValuedLaw
+from creepkit.export.python_text import PythonDialect, kernel_functions, module_text
+from creepkit.kernels.printing import TARGET_FUNCTIONS, KernelPrinter
+from creepkit.records import LawWithValues
 
 
 @dataclass(frozen=True)
@@ -20,26 +20,26 @@ class NumpyExporter:
     title: str = "Python module for arrays that needs nothing but NumPy"
     suffix: str = ".py"
 
-    def text(self, source: ValuedLaw) -> str:
+    def text(self, source: LawWithValues) -> str:
         """Return the module's text; stress and time are converted on entry, rates on exit."""
-        return module_text(source, _arrays())
+        return module_text(source, _array_dialect())
 
 
-def _imports(names: set[str]) -> str:
+def _numpy_imports(names: set[str]) -> str:
     """The error function is the standard library's: NumPy has none."""
-    taken = sorted(name for name in names & {*FUNCTIONS, "errstate"} if hasattr(np, name))
-    lines = ["import numpy as np", *([f"from numpy import {', '.join(taken)}"] if taken else [])]
+    imported = sorted(name for name in names & {*TARGET_FUNCTIONS, "errstate"} if hasattr(np, name))
+    lines = ["import numpy as np", *([f"from numpy import {', '.join(imported)}"] if imported else [])]
     return "\n".join(["import math", "", *lines] if "math" in names else lines)
 
 
 @cache
-def _arrays() -> Dialect:
+def _array_dialect() -> PythonDialect:
     """Whole arrays; branches are evaluated everywhere, hence the guard against warnings of those not taken."""
-    return Dialect(
+    return PythonDialect(
         printer=KernelPrinter({"standard": "python3"}),
-        helpers=functions_of("numpy_functions.py") | {"erf": "erf = np.vectorize(math.erf, otypes=[float])"},
-        imports=_imports,
-        log=lambda name: f"log_or_off({name})",
-        guard='with errstate(over="ignore", divide="ignore", invalid="ignore")',
-        overflow="Arguments and parameters broadcast as arrays do. A result beyond 1.8e308 is inf.",
+        helpers=kernel_functions("numpy_functions.py") | {"erf": "erf = np.vectorize(math.erf, otypes=[float])"},
+        import_lines=_numpy_imports,
+        log_expression=lambda name: f"log_or_off({name})",
+        context_manager='with errstate(over="ignore", divide="ignore", invalid="ignore")',
+        overflow_sentence="Arguments and parameters broadcast as arrays do. A result beyond 1.8e308 is inf.",
     )

@@ -14,115 +14,115 @@ import sympy
 
 from creepkit.errors import ExportError, LawError
 from creepkit.export.identifiers import Identifiers
-from creepkit.kernels.entries import Entry, Lowered, entries
-from creepkit.kernels.leading import exponents
-from creepkit.language.symbols import POINT
-from creepkit.records import ValuedLaw
+from creepkit.kernels.entries import KernelFunction, SymbolicKernel, symbolic_kernel
+from creepkit.kernels.leading import leading_exponents
+from creepkit.language.symbols import POINT_VARIABLES
+from creepkit.records import LawWithValues
 
-Steps = tuple[tuple[sympy.Symbol, sympy.Expr], ...]
+Assignments = tuple[tuple[sympy.Symbol, sympy.Expr], ...]
 
-_entries = lru_cache(maxsize=128)(entries)
+_kernel_entries = lru_cache(maxsize=128)(symbolic_kernel)
 
 
 @dataclass(frozen=True)
-class Function:
+class CodeFunction:
     """One function to be printed, in names of the target.
 
     read : the variables of the point and states that it reads. steps : named subexpressions, each after those it needs.
     outputs : expressions, in the order of creepkit.kernels.interface.
     """
 
-    read: tuple[sympy.Symbol, ...]
-    steps: Steps
+    inputs: tuple[sympy.Symbol, ...]
+    assignments: Assignments
     outputs: tuple[sympy.Expr, ...]
 
-    def only(self, positions: Sequence[int]) -> Function:
+    def with_outputs(self, indices: Sequence[int]) -> CodeFunction:
         """The same for some of its outputs, with the steps that those need."""
-        outputs = tuple(self.outputs[k] for k in positions)
-        seen = set().union(*(e.free_symbols for e in outputs))
-        steps = []
-        for symbol, expression in reversed(self.steps):
-            if symbol in seen:
-                steps.append((symbol, expression))
-                seen |= expression.free_symbols
-        return Function(tuple(s for s in self.read if s in seen), tuple(reversed(steps)), outputs)
+        outputs = tuple(self.outputs[k] for k in indices)
+        used = set().union(*(e.free_symbols for e in outputs))
+        assignments = []
+        for symbol, expression in reversed(self.assignments):
+            if symbol in used:
+                assignments.append((symbol, expression))
+                used |= expression.free_symbols
+        return CodeFunction(tuple(s for s in self.inputs if s in used), tuple(reversed(assignments)), outputs)
 
 
-class Program:
+class LawCode:
     """A law with its values, reduced of what is off, as functions in names of a target's language.
 
     source : what is exported, reduced. point, states : symbols of the six variables of the point and of the states.
     parameters : {symbol: the author's value}; logarithms : {symbol: the parameter it is the logarithm of}.
     """
 
-    def __init__(self, source: ValuedLaw, identifiers: Identifiers, called: Mapping[str, str] | None = None) -> None:
+    def __init__(self, source: LawWithValues, identifiers: Identifiers, target_names: Mapping[str, str] | None = None) -> None:
         """called : {name of a variable of the point or of a state: what the target's code calls it}."""
-        self.source = source.reduced()
+        self.source = source.without_inactive_terms()
         self.law, self.identifiers = self.source.law, identifiers
         try:
-            self._lowered: Lowered = _entries(self.law)
+            self._lowered: SymbolicKernel = _kernel_entries(self.law)
         except LawError as error:
             raise ExportError(f"cannot be written as a program: {error}") from None
-        self._names: dict[sympy.Symbol, sympy.Symbol] = {}
-        inputs, size = self._lowered.rate.inputs, len(POINT) + len(self.law.states)
-        originals = [(called or {}).get(s.name, s.name) for s in (*POINT, *self.law.states)]
-        named = [self._named(symbol, wanted) for symbol, wanted in zip(inputs, originals, strict=False)]
-        self.point, self.states = tuple(named[: len(POINT)]), tuple(named[len(POINT) :])
+        self._symbols: dict[sympy.Symbol, sympy.Symbol] = {}
+        inputs, size = self._lowered.rate.inputs, len(POINT_VARIABLES) + len(self.law.states)
+        requested = [(target_names or {}).get(s.name, s.name) for s in (*POINT_VARIABLES, *self.law.states)]
+        input_symbols = [self._new_symbol(symbol, name_requested) for symbol, name_requested in zip(inputs, requested, strict=False)]
+        self.point, self.states = tuple(input_symbols[: len(POINT_VARIABLES)]), tuple(input_symbols[len(POINT_VARIABLES) :])
         self.parameters: dict[sympy.Symbol, float] = {}
         self.logarithms: dict[sympy.Symbol, sympy.Symbol] = {}
         for theta, (name, param) in zip(inputs[size:], self.law.table.items(), strict=True):
-            symbol = sympy.Symbol(identifiers.name(name), real=True)
+            symbol = sympy.Symbol(identifiers.unique(name), real=True)
             self.parameters[symbol] = self.source.values[name]
             if param.scale == "log":
-                self.logarithms[self._named(theta, f"ln_{name}")] = symbol
+                self.logarithms[self._new_symbol(theta, f"ln_{name}")] = symbol
             else:
-                self._names[theta] = symbol
-        self._plain = {sympy.exp(ln): symbol for ln, symbol in self.logarithms.items()}
+                self._symbols[theta] = symbol
+        self._parameter_of_exp = {sympy.exp(ln): symbol for ln, symbol in self.logarithms.items()}
 
-    def function(self, name: str) -> Function:
+    def function(self, entry_name: str) -> CodeFunction:
         """Return an entry of the kernel: rate, log_rate or update."""
-        entry: Entry = getattr(self._lowered, name)
-        return self._renamed((*entry.constants, *entry.steps), entry.outputs)
+        entry: KernelFunction = getattr(self._lowered, entry_name)
+        return self._in_target_names((*entry.constants, *entry.steps), entry.outputs)
 
-    def leading(self) -> float:
+    def leading_time_exponent(self) -> float:
         """The exponent beta of time in strain ~ t^beta as t -> 0+ from a virgin state; 1 where nothing is singular.
 
         Taken at 100 MPa and 1000 K where it varies with the point, as integrators do.
         """
-        at = dict(zip(POINT, (100.0, 0.0, 0.0, 1000.0, 100.0, 100.0 / 3.0), strict=True))
-        at |= {s: state.initial for s, state in self.law.states.items()}
+        point_values = dict(zip(POINT_VARIABLES, (100.0, 0.0, 0.0, 1000.0, 100.0, 100.0 / 3.0), strict=True))
+        point_values |= {s: state.initial for s, state in self.law.states.items()}
         values = {s: self.source.values[s.name] for s in self.law.params}
         logs = {ln: sympy.log(values[s]) for s, ln in self._lowered.form.logs.items()}
-        found = []
-        for time, strain in exponents(self._lowered.form):
-            a, b = (float(e.subs(logs).subs(values).subs(at)) for e in (time, strain))
-            found.append((1.0 + a) / (1.0 - b))
-        return min(found)
+        exponents_found = []
+        for time, strain in leading_exponents(self._lowered.form):
+            time_exponent, strain_exponent = (float(e.subs(logs).subs(values).subs(point_values)) for e in (time, strain))
+            exponents_found.append((1.0 + time_exponent) / (1.0 - strain_exponent))
+        return min(exponents_found)
 
-    def _named(self, symbol: sympy.Symbol, wanted: str) -> sympy.Symbol:
-        self._names[symbol] = sympy.Symbol(self.identifiers.name(wanted), real=True)
-        return self._names[symbol]
+    def _new_symbol(self, symbol: sympy.Symbol, requested: str) -> sympy.Symbol:
+        self._symbols[symbol] = sympy.Symbol(self.identifiers.unique(requested), real=True)
+        return self._symbols[symbol]
 
-    def _renamed(self, steps: Sequence[tuple[sympy.Symbol, sympy.Expr]], outputs: Sequence[sympy.Expr]) -> Function:
-        for symbol, expression in steps:
-            if symbol not in self._names:
-                known = self._plain.get(expression.xreplace(self._names))
-                if known is None:
-                    self._named(symbol, symbol.name)
+    def _in_target_names(self, assignments: Sequence[tuple[sympy.Symbol, sympy.Expr]], outputs: Sequence[sympy.Expr]) -> CodeFunction:
+        for symbol, expression in assignments:
+            if symbol not in self._symbols:
+                parameter = self._parameter_of_exp.get(expression.xreplace(self._symbols))
+                if parameter is None:
+                    self._new_symbol(symbol, symbol.name)
                 else:
-                    self._names[symbol] = known  # B = exp(ln_B) is the author's B, free of a logarithm's rounding
-        meanings = {self._names[s]: e.xreplace(self._names) for s, e in steps if self._names[s] not in self.parameters}
-        results = tuple(e.xreplace(self._names) for e in outputs)
-        seen = set().union(*(e.free_symbols for e in (*meanings.values(), *results)))
-        read = tuple(s for s in (*self.point, *self.states) if s in seen)
-        return Function(read, tuple(meanings.items()), results)
+                    self._symbols[symbol] = parameter  # B = exp(ln_B) is the author's B, free of a logarithm's rounding
+        definitions = {self._symbols[s]: e.xreplace(self._symbols) for s, e in assignments if self._symbols[s] not in self.parameters}
+        results = tuple(e.xreplace(self._symbols) for e in outputs)
+        used = set().union(*(e.free_symbols for e in (*definitions.values(), *results)))
+        inputs = tuple(s for s in (*self.point, *self.states) if s in used)
+        return CodeFunction(inputs, tuple(definitions.items()), results)
 
-    def logarithms_in(self, function: Function) -> dict[sympy.Symbol, sympy.Symbol]:
+    def logarithms_used(self, function: CodeFunction) -> dict[sympy.Symbol, sympy.Symbol]:
         """The logarithms of parameters that a function reads: {ln_A: A}."""
-        seen = set().union(*(e.free_symbols for e in (*(e for _, e in function.steps), *function.outputs)))
-        return {ln: symbol for ln, symbol in self.logarithms.items() if ln in seen}
+        used = set().union(*(e.free_symbols for e in (*(e for _, e in function.assignments), *function.outputs)))
+        return {ln: symbol for ln, symbol in self.logarithms.items() if ln in used}
 
-    def renamed(self) -> list[str]:
+    def renaming_notes(self) -> list[str]:
         """One line for each name of the author's that the target could not keep."""
-        own = {*self.law.names, *(s.name for s in (*POINT, *self.law.states))}
-        return self.identifiers.told(own)
+        original_names = {*self.law.names, *(s.name for s in (*POINT_VARIABLES, *self.law.states))}
+        return self.identifiers.renaming_notes(original_names)

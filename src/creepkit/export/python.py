@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from creepkit.export.python_text import Dialect, functions_of, module_text
+from creepkit.export.python_text import PythonDialect, kernel_functions, module_text
 from creepkit.kernels.printing import KernelPrinter
-from creepkit.records import ValuedLaw
+from creepkit.records import LawWithValues
 
 
 @dataclass(frozen=True)
@@ -20,12 +20,12 @@ class PythonExporter:
     title: str = "Python module that needs nothing but the standard library"
     suffix: str = ".py"
 
-    def text(self, source: ValuedLaw) -> str:
+    def text(self, source: LawWithValues) -> str:
         """Return the module's text; stress and time are converted on entry, rates on exit."""
-        return module_text(source, _plain())
+        return module_text(source, _scalar_dialect())
 
 
-class _Printer(KernelPrinter):
+class _ScalarPrinter(KernelPrinter):
     """Kernel text for one number at a time: branches are taken lazily, maxima are Python's."""
 
     def _print_Max(self, e: Any) -> str:
@@ -45,18 +45,18 @@ class _Printer(KernelPrinter):
         return f"({''.join(branches)}{self._print(e.args[-1].expr)})"
 
 
-def _imports(names: set[str]) -> str:
+def _math_imports(names: set[str]) -> str:
     return f"from math import {', '.join(sorted(name for name in names if hasattr(math, name)))}"
 
 
 @cache
-def _plain() -> Dialect:
+def _scalar_dialect() -> PythonDialect:
     """One number at a time."""
-    return Dialect(
-        printer=_Printer({"standard": "python3"}),
-        helpers=functions_of("numba_functions.py"),
-        imports=_imports,
-        log=lambda name: f"log({name}) if {name} != 0.0 else -inf",
-        guard="",
-        overflow="A result beyond 1.8e308 raises OverflowError.",
+    return PythonDialect(
+        printer=_ScalarPrinter({"standard": "python3"}),
+        helpers=kernel_functions("numba_functions.py"),
+        import_lines=_math_imports,
+        log_expression=lambda name: f"log({name}) if {name} != 0.0 else -inf",
+        context_manager="",
+        overflow_sentence="A result beyond 1.8e308 raises OverflowError.",
     )

@@ -15,23 +15,23 @@ from typing import Any
 import sympy
 
 from creepkit.errors import ExportError, LawError
-from creepkit.export.heading import comments, heading, printable
+from creepkit.export.heading import comment_lines, heading, printable_text
 from creepkit.export.identifiers import Identifiers
 from creepkit.kernels.logform import FLOOR, TIME_FLOOR, log_form
-from creepkit.kernels.printing import FUNCTIONS, KernelPrinter
-from creepkit.language.symbols import POINT, mean_stress, principal_stress, stress, time
-from creepkit.records import Units, ValuedLaw
+from creepkit.kernels.printing import TARGET_FUNCTIONS, KernelPrinter
+from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
+from creepkit.records import Units, LawWithValues
 
-STRESSES = (stress, principal_stress, mean_stress)
+STRESS_SYMBOLS = (stress, principal_stress, mean_stress)
 """The variables of a point that are in the units of stress."""
 
-_OWN = ("INITIAL", "LIMIT", "errstate", "inf", "max", "min", "np", "rate", "state_rates")
+_MODULE_NAMES = ("INITIAL", "LIMIT", "errstate", "inf", "max", "min", "np", "rate", "state_rates")
 
-Logs = Mapping[sympy.Symbol, sympy.Symbol]
+LogSymbols = Mapping[sympy.Symbol, sympy.Symbol]
 
 
 @dataclass(frozen=True)
-class Dialect:
+class PythonDialect:
     """What sets one kind of module apart.
 
     printer : of its expressions. helpers : {name: text} of the functions that the module takes along where needed.
@@ -42,66 +42,66 @@ class Dialect:
 
     printer: KernelPrinter
     helpers: Mapping[str, str]
-    imports: Callable[[set[str]], str]
-    log: Callable[[str], str]
-    guard: str
-    overflow: str
+    import_lines: Callable[[set[str]], str]
+    log_expression: Callable[[str], str]
+    context_manager: str
+    overflow_sentence: str
 
 
-def module_text(source: ValuedLaw, dialect: Dialect) -> str:
+def module_text(source: LawWithValues, dialect: PythonDialect) -> str:
     """Return the module of a law; ExportError when it holds what no kernel can evaluate."""
-    source = source.reduced()
+    source = source.without_inactive_terms()
     try:
-        functions = _Functions(source, dialect)
+        functions = _ModuleFunctions(source, dialect)
     except LawError as error:
         raise ExportError(f"cannot be written as Python: {error}") from None
     body = functions.text()
     floors = any(f"{floor!r})" in body for floor in (FLOOR, TIME_FLOOR))
-    lines = [*heading(source, floors=floors), *functions.renamed(), dialect.overflow]
-    head = ['"""A creep law with its values, exported by creepkit."""', "", *comments(lines, "#"), ""]
-    return "\n".join([*head, _with_helpers(body, dialect)]) + "\n"
+    lines = [*heading(source, mentions_floors=floors), *functions.renaming_notes(), dialect.overflow_sentence]
+    opening_lines = ['"""A creep law with its values, exported by creepkit."""', "", *comment_lines(lines, "#"), ""]
+    return "\n".join([*opening_lines, _with_helpers(body, dialect)]) + "\n"
 
 
 # ---- the functions -------------------------------------------------------------------------------------------------
 
 
-class _Functions:
+class _ModuleFunctions:
     """The code of one law: its log form, with the author's parameters wherever a logarithm is not needed."""
 
-    def __init__(self, source: ValuedLaw, dialect: Dialect) -> None:
+    def __init__(self, source: LawWithValues, dialect: PythonDialect) -> None:
         self.source, self.law, self.dialect = source, source.law, dialect
         form = log_form(self.law)
-        self._identifiers = Identifiers((*keyword.kwlist, *FUNCTIONS, *dialect.helpers, *_OWN))
-        own = (*POINT, *self.law.states, *self.law.params)
-        self.names = {s: self._symbol(s.name) for s in own}
+        self._identifiers = Identifiers((*keyword.kwlist, *TARGET_FUNCTIONS, *dialect.helpers, *_MODULE_NAMES))
+        symbols = (*POINT_VARIABLES, *self.law.states, *self.law.params)
+        self.names = {s: self._symbol(s.name) for s in symbols}
         self.logs = {self._symbol(theta.name): self.names[s] for s, theta in form.logs.items()}
         renamed = self.names | dict(zip(form.logs.values(), self.logs, strict=True))
-        self.terms = [_author_form(e.xreplace(renamed), self.logs) for e in form.terms]
-        self.state_rates = [_author_form(e.xreplace(renamed), self.logs) for e in form.state_rates]
+        self.terms = [_with_author_parameters(e.xreplace(renamed), self.logs) for e in form.terms]
+        self.state_rates = [_with_author_parameters(e.xreplace(renamed), self.logs) for e in form.state_rates]
 
-    def renamed(self) -> list[str]:
+    def renaming_notes(self) -> list[str]:
         """One line for each name of the author's that had to change."""
-        return self._identifiers.told([s.name for s in (*self.law.states, *self.law.params)])
+        return self._identifiers.renaming_notes([s.name for s in (*self.law.states, *self.law.params)])
 
     def text(self) -> str:
         """The functions, and where internal variables start and end."""
         title = f"Rate of equivalent creep strain, 1/{self.source.units.time}."
-        rate = self._function("rate", title, self._sum(), self.terms)
+        rate = self._function_text("rate", title, self._return_statement(), self.terms)
         if not self.law.states:
             return rate
-        factor = self._factor(self.source.units.seconds)
+        factor = self._factor_text(self.source.units.seconds)
         rates = [f"{factor}({text})" if factor else text for text in map(self._printed, self.state_rates)]
         lines = [f'    "{s.name}": {text},' for s, text in zip(self.law.states, rates, strict=True)]
         title = f"Rates of the internal variables, 1/{self.source.units.time}."
-        states = self._function("state_rates", title, ["return {", *lines, "}"], self.state_rates)
+        states = self._function_text("state_rates", title, ["return {", *lines, "}"], self.state_rates)
         initial = {symbol.name: state.initial for symbol, state in self.law.states.items()}
         limits = {symbol.name: state.limit for symbol, state in self.law.states.items()}
         return f"INITIAL = {initial!r}\nLIMIT = {limits!r}\n\n\n{rate}\n\n\n{states}"
 
-    def _sum(self) -> list[str]:
+    def _return_statement(self) -> list[str]:
         """The return statement, each term under its name."""
         texts = [self._printed(sympy.exp(term, evaluate=False)) for term in self.terms]
-        labels, factor = [printable(label) for label in self.law.terms], self._factor(self.source.units.seconds)
+        labels, factor = [printable_text(label) for label in self.law.terms], self._factor_text(self.source.units.seconds)
         if len(texts) == 1:
             return [f"# {labels[0]}", f"return {factor}{texts[0]}"]
         signs = ["", *["+ "] * (len(texts) - 1)]
@@ -109,57 +109,57 @@ class _Functions:
         lines = [line for sign, label, text in pairs for line in (f"    # {label}", f"    {sign}{text}")]
         return [f"return {factor}(", *lines, ")"]
 
-    def _function(self, name: str, title: str, result: list[str], expressions: Sequence[sympy.Expr]) -> str:
-        read = set().union(*(e.free_symbols for e in expressions))
-        logs = [f"{theta} = {self.dialect.log(s.name)}" for theta, s in self.logs.items() if theta in read]
-        body = [*self._converted(read), *logs, *result]
-        if self.dialect.guard:
-            body = [f"{self.dialect.guard}:", *(f"    {line}" for line in body)]
-        head = [f"def {name}(", *self._signature(), "):", f'    """{title}', "", *self._arguments(), '    """']
-        return "\n".join([*head, *(f"    {line}" for line in body)])
+    def _function_text(self, name: str, title: str, result: list[str], expressions: Sequence[sympy.Expr]) -> str:
+        used = set().union(*(e.free_symbols for e in expressions))
+        logs = [f"{theta} = {self.dialect.log_expression(s.name)}" for theta, s in self.logs.items() if theta in used]
+        body = [*self._unit_conversions(used), *logs, *result]
+        if self.dialect.context_manager:
+            body = [f"{self.dialect.context_manager}:", *(f"    {line}" for line in body)]
+        signature_lines = [f"def {name}(", *self._signature_lines(), "):", f'    """{title}', "", *self._argument_docs(), '    """']
+        return "\n".join([*signature_lines, *(f"    {line}" for line in body)])
 
-    def _converted(self, read: set[sympy.Basic]) -> list[str]:
+    def _unit_conversions(self, used: set[sympy.Basic]) -> list[str]:
         """Stress and time on entry, in the law's own units."""
         units = self.source.units
-        pairs = [*((s, units.megapascals) for s in STRESSES), (time, units.seconds)]
-        return [f"{s} = {factor!r} * {s}" for s, factor in pairs if factor != 1 and s in read]
+        pairs = [*((s, units.megapascals) for s in STRESS_SYMBOLS), (time, units.seconds)]
+        return [f"{s} = {factor!r} * {s}" for s, factor in pairs if factor != 1 and s in used]
 
-    def _signature(self) -> list[str]:
+    def _signature_lines(self) -> list[str]:
         """Variables of the point by keyword, needed where the law uses them; then parameters with their values."""
-        needed = [s for s in POINT[1:] if self.law.uses(s)] + list(self.law.states)
-        optional = [s for s in POINT[1:4] if not self.law.uses(s)]
+        required = [s for s in POINT_VARIABLES[1:] if self.law.uses(s)] + list(self.law.states)
+        optional = [s for s in POINT_VARIABLES[1:4] if not self.law.uses(s)]
         return [
             "    stress,",
             "    *,",
-            *(f"    {self.names[s]}," for s in needed),
+            *(f"    {self.names[s]}," for s in required),
             *(f"    {self.names[s]}=None," for s in optional),
             *(f"    {self.names[s]}={self.source.values[s.name]!r}," for s in self.law.params),
         ]
 
-    def _arguments(self) -> list[str]:
-        meanings = _meanings(self.source.units)
-        lines = [f"    {s.name} : {meanings[s.name]}" for s in POINT if self.law.uses(s)]
-        lines += [f"    {self.names[s]} : {_quiet(state.meaning)}" for s, state in self.law.states.items()]
-        idle = [s.name for s in POINT[:4] if not self.law.uses(s)]
-        return [*lines, f"    {', '.join(idle)} : not used by this law"] if idle else lines
+    def _argument_docs(self) -> list[str]:
+        meanings = _argument_meanings(self.source.units)
+        lines = [f"    {s.name} : {meanings[s.name]}" for s in POINT_VARIABLES if self.law.uses(s)]
+        lines += [f"    {self.names[s]} : {_docstring_safe(state.meaning)}" for s, state in self.law.states.items()]
+        unused = [s.name for s in POINT_VARIABLES[:4] if not self.law.uses(s)]
+        return [*lines, f"    {', '.join(unused)} : not used by this law"] if unused else lines
 
-    def _symbol(self, wanted: str) -> sympy.Symbol:
-        return sympy.Symbol(self._identifiers.name(wanted), real=True)
+    def _symbol(self, requested: str) -> sympy.Symbol:
+        return sympy.Symbol(self._identifiers.unique(requested), real=True)
 
     def _printed(self, expression: sympy.Expr) -> str:
         return str(self.dialect.printer.doprint(expression))
 
     @staticmethod
-    def _factor(factor: float) -> str:
+    def _factor_text(factor: float) -> str:
         return "" if factor == 1 else f"{factor!r} * "
 
 
-def _quiet(text: str) -> str:
+def _docstring_safe(text: str) -> str:
     """Text that neither ends a docstring nor escapes in it."""
-    return printable(text).replace("\\", "/").replace('"', "'")
+    return printable_text(text).replace("\\", "/").replace('"', "'")
 
 
-def _meanings(units: Units) -> dict[str, str]:
+def _argument_meanings(units: Units) -> dict[str, str]:
     return {
         "stress": f"von Mises stress, {units.stress}",
         "strain": "accumulated equivalent creep strain, logarithmic",
@@ -170,14 +170,14 @@ def _meanings(units: Units) -> dict[str, str]:
     }
 
 
-def _author_form(expression: sympy.Expr, logs: Logs) -> sympy.Expr:
+def _with_author_parameters(expression: sympy.Expr, logs: LogSymbols) -> sympy.Expr:
     """Write exp(ln_B) as B again, free of the rounding of a logarithm."""
 
     def factored(e: sympy.Expr) -> sympy.Expr:
         summands = sympy.Add.make_args(e.args[0])
-        found = {a: p for a in summands for t, s in logs.items() for sign, p in ((1, s), (-1, 1 / s)) if a == sign * t}
-        rest = sympy.Add(*(a for a in summands if a not in found))
-        return sympy.Mul(*found.values(), sympy.exp(rest))
+        powers_of_parameters = {a: p for a in summands for t, s in logs.items() for sign, p in ((1, s), (-1, 1 / s)) if a == sign * t}
+        rest = sympy.Add(*(a for a in summands if a not in powers_of_parameters))
+        return sympy.Mul(*powers_of_parameters.values(), sympy.exp(rest))
 
     return expression.replace(lambda e: isinstance(e, sympy.exp), factored)
 
@@ -185,32 +185,32 @@ def _author_form(expression: sympy.Expr, logs: Logs) -> sympy.Expr:
 # ---- imports and helpers -------------------------------------------------------------------------------------------
 
 
-def _with_helpers(code: str, dialect: Dialect) -> str:
+def _with_helpers(code: str, dialect: PythonDialect) -> str:
     """Put the imports and the functions that the code calls before it."""
-    helpers, needed = dialect.helpers, _names(code)
+    helpers, required = dialect.helpers, _free_names(code)
     for name in reversed([*helpers]):
-        if name in needed:
-            needed |= _names(helpers[name])
-    body = "\n\n\n".join([*(text for name, text in helpers.items() if name in needed), code])
-    return f"{dialect.imports(_names(body))}\n\n\n{body}"
+        if name in required:
+            required |= _free_names(helpers[name])
+    body = "\n\n\n".join([*(text for name, text in helpers.items() if name in required), code])
+    return f"{dialect.import_lines(_free_names(body))}\n\n\n{body}"
 
 
-def functions_of(file: str) -> dict[str, str]:
+def kernel_functions(file: str) -> dict[str, str]:
     """{name: text} of the functions that kernels call, from a file of creepkit.kernels, without annotations."""
     source = resources.files("creepkit.kernels").joinpath(file).read_text(encoding="utf-8")
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for node in ast.parse(source).body:
         if isinstance(node, ast.FunctionDef):
             node.decorator_list, node.returns = [], None
             for argument in node.args.args:
                 argument.annotation = None
-            found[node.name] = ast.unparse(node)
+            result[node.name] = ast.unparse(node)
         elif isinstance(node, ast.Assign):
-            found |= _assigned(node)
-    return found
+            result |= _assignments_of(node)
+    return result
 
 
-def _assigned(node: ast.Assign) -> dict[str, str]:
+def _assignments_of(node: ast.Assign) -> dict[str, str]:
     """{name: statement} of an assignment to a name, or to several at once."""
     target, value = node.targets[0], node.value
     if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
@@ -220,13 +220,13 @@ def _assigned(node: ast.Assign) -> dict[str, str]:
     return {t.id: f"{t.id} = {ast.unparse(v)}" for t, v in pairs if t.id != "__all__"}
 
 
-def _names(code: str) -> set[str]:
+def _free_names(code: str) -> set[str]:
     """Every name that top-level functions and statements read from outside themselves."""
-    return set().union(*(_read(node) for node in ast.parse(code).body))
+    return set().union(*(_free_names_of_statement(node) for node in ast.parse(code).body))
 
 
-def _read(node: ast.stmt) -> set[str]:
-    inner = list(ast.walk(node))
-    own = {n.arg for n in inner if isinstance(n, ast.arg)}
-    own |= {n.id for n in inner if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
-    return {n.id for n in inner if isinstance(n, ast.Name)} - own
+def _free_names_of_statement(node: ast.stmt) -> set[str]:
+    nodes = list(ast.walk(node))
+    bound_names = {n.arg for n in nodes if isinstance(n, ast.arg)}
+    bound_names |= {n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    return {n.id for n in nodes if isinstance(n, ast.Name)} - bound_names

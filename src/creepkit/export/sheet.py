@@ -7,35 +7,35 @@ from dataclasses import dataclass
 
 import sympy
 
-from creepkit.export.conversion import Converted
-from creepkit.export.heading import printable
+from creepkit.export.conversion import ConvertedValues
+from creepkit.export.heading import printable_text
 from creepkit.language.symbols import GAS_CONSTANT, temperature
-from creepkit.records import ValuedLaw
+from creepkit.records import LawWithValues
 
 
 @dataclass(frozen=True)
-class Row:
+class ParameterRow:
     """One line of the table: a parameter, or the start of an internal variable."""
 
     symbol: sympy.Symbol
     meaning: str
     value: float
     unit: str
-    start: bool = False
+    is_initial: bool = False
 
 
-def rows(source: ValuedLaw, numbers: Converted) -> Iterator[Row]:
+def parameter_rows(source: LawWithValues, converted_values: ConvertedValues) -> Iterator[ParameterRow]:
     """Parameters in the author's order, then internal variables at time zero; no unit is told as an empty text."""
     for symbol, param in source.law.params.items():
-        unit = numbers.units[symbol.name]
-        yield Row(symbol, param.meaning, numbers.values[symbol.name], "" if unit == "1" else unit)
+        unit = converted_values.units[symbol.name]
+        yield ParameterRow(symbol, param.meaning, converted_values.values[symbol.name], "" if unit == "1" else unit)
     for symbol, state in source.law.states.items():
-        yield Row(symbol, state.meaning, state.initial, "" if state.unit == "1" else state.unit, start=True)
+        yield ParameterRow(symbol, state.meaning, state.initial, "" if state.unit == "1" else state.unit, is_initial=True)
 
 
-def small_print(source: ValuedLaw, numbers: Converted) -> Iterator[str]:
+def remarks(source: LawWithValues, converted_values: ConvertedValues) -> Iterator[str]:
     """Sentences on units, temperature and failure."""
-    yield f"Here {numbers.reference}."
+    yield f"Here {converted_values.reference_sentence}."
     if source.law.uses(temperature):
         yield f"Temperature in K, R = {GAS_CONSTANT} J/(mol K)."
     for symbol, state in source.law.states.items():
@@ -43,7 +43,7 @@ def small_print(source: ValuedLaw, numbers: Converted) -> Iterator[str]:
             yield f"The material has failed when {symbol} reaches {state.limit:g}."
 
 
-def notes(source: ValuedLaw) -> list[str]:
+def note_lines(source: LawWithValues) -> list[str]:
     """The notes, a line each."""
-    lines = (printable(line).strip() for note in source.notes for line in note.splitlines())
+    lines = (printable_text(line).strip() for note in source.notes for line in note.splitlines())
     return [line for line in lines if line]

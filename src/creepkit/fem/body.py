@@ -12,7 +12,7 @@ from creepkit.fem.mesh import Mesh
 from creepkit.fem.shape import discretize
 
 
-class Body(NamedTuple):
+class FiniteElementModel(NamedTuple):
     """What compiled code knows of a mesh; displacements are kept as (2 nodes,) numbers, u_r and u_z in turn.
 
     nodes : (nodes, 2) mm. elements : (elements, 8). by_radius, by_height, over_radius : (elements, 4, 8), weights :
@@ -40,7 +40,7 @@ class Body(NamedTuple):
     top: Ints
 
 
-def body_of(mesh: Mesh) -> Body:
+def finite_element_model(mesh: Mesh) -> FiniteElementModel:
     """Prepare a mesh; refuse one that nothing holds or that is inverted."""
     at = discretize(mesh)
     free = ~mesh.held.ravel()
@@ -52,7 +52,7 @@ def body_of(mesh: Mesh) -> Body:
     width = _half_bandwidth(numbers.reshape(len(numbers), 16))
     sides = equations[np.stack([2 * mesh.pressed, 2 * mesh.pressed + 1], axis=1)]
     size = int(free.sum())
-    return Body(
+    return FiniteElementModel(
         nodes=mesh.nodes,
         elements=mesh.elements,
         by_radius=at.by_radius,

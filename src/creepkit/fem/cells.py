@@ -11,7 +11,7 @@ from creepkit.errors import SolveError
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", re.ASCII)
 
 
-def text_of(path: Path) -> str:
+def read_text(path: Path) -> str:
     """The text of a file in UTF-8, or SolveError."""
     try:
         return path.read_text(encoding="utf-8-sig")
@@ -21,7 +21,7 @@ def text_of(path: Path) -> str:
         raise SolveError(f"{path}: is not text in UTF-8; a mesh is read from text files only") from error
 
 
-def number(place: str, name: str, cell: str) -> float:
+def parse_number(place: str, name: str, cell: str) -> float:
     """A finite number; 1.5d0 as Fortran writes it is one too."""
     text = cell.strip()
     value = float(text.lower().replace("d", "e")) if _NUMBER.fullmatch(text) else math.nan
@@ -30,7 +30,7 @@ def number(place: str, name: str, cell: str) -> float:
     return value
 
 
-def whole(place: str, name: str, cell: str) -> int:
+def parse_index(place: str, name: str, cell: str) -> int:
     """A number of a node, an element or the like, from 1 on."""
     text = cell.strip()
     if not (text.isascii() and text.isdigit() and int(text) > 0):

@@ -8,19 +8,19 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.fem.body import Body
+from creepkit.fem.body import FiniteElementModel
 from creepkit.fem.record import (
     END,
     END_MODULUS,
     END_PRESSURE,
-    END_WARMTH,
+    FINAL_TEMPERATURE,
     MODULUS,
     PRESSURE,
     START,
-    WARMTH,
+    START_TEMPERATURE,
 )
-from creepkit.fem.steps import clock_of
-from creepkit.integration.clock import moment
+from creepkit.fem.steps import segment_transformation
+from creepkit.integration.clock import transformed_time
 
 LANES = 16
 """Right-hand sides are kept in multiples of this, the numbers that a processor takes at a time twice over."""
@@ -28,11 +28,11 @@ LANES = 16
 _NUDGE = 1e-4
 """Share of a segment's length by which its ends are moved to difference its clock."""
 
-BY_PRESSURE, BY_MOMENT, BY_WARMTH, BY_STIFFNESS, BY_WEIGHT = range(5)
+BY_PRESSURE, BY_MOMENT, BY_LOAD_TEMPERATURE, BY_STIFFNESS, BY_WEIGHT = range(5)
 """Rows of ChangeRoom.inputs: change of pressure, of time, of temperature, of ln E, and of ln weight."""
 
 
-class Columns(NamedTuple):
+class SensitivityDirections(NamedTuple):
     """What is differentiated to, C = P + D + G columns: P law parameters, then these.
 
     directions : (D, segments, 10) change of the load program.
@@ -46,7 +46,7 @@ class Columns(NamedTuple):
     velocities: Floats
 
 
-class ChangeRoom(NamedTuple):
+class SensitivityWorkspace(NamedTuple):
     """Working arrays; V = 4 + S, R = 1 + S.
 
     value : (points, V); change : (points, V, C); rates : (stages, points, V, C) changes of the slopes;
@@ -81,10 +81,10 @@ class ChangeRoom(NamedTuple):
     gradient_change: Floats
 
 
-def change_room(body: Body, states: int, stages: int, columns: int, directions: int) -> ChangeRoom:
+def sensitivity_workspace(body: FiniteElementModel, states: int, stages: int, columns: int, directions: int) -> SensitivityWorkspace:
     """Allocate the working arrays."""
     points, size = 4 * len(body.elements), 4 + states
-    return ChangeRoom(
+    return SensitivityWorkspace(
         value=np.zeros((points, size)),
         change=np.zeros((points, size, columns)),
         rates=np.zeros((stages, points, size, columns)),
@@ -111,13 +111,13 @@ def change_room(body: Body, states: int, stages: int, columns: int, directions: 
 
 
 @njit(cache=True, error_model="numpy")
-def set_inputs(
+def set_input_derivatives(
     segments: Floats, directions: Floats, n: int, beta: float, s: float, at_start: bool, inputs: Floats
 ) -> None:
     """Change of pressure, time, temperature, ln E and ln weight with each direction, at place `s` of segment `n`."""
     segment = segments[n]
     length = segment[END] - segment[START]
-    now = moment(clock_of(segment, beta), s) if not at_start else moment(clock_of(segment, 1.0), 1e-300)
+    now = transformed_time(segment_transformation(segment, beta), s) if not at_start else transformed_time(segment_transformation(segment, 1.0), 1e-300)
     share = 0.0 if at_start else (now.time - segment[START]) / length
     modulus = segment[MODULUS] + share * (segment[END_MODULUS] - segment[MODULUS])
     for d in range(directions.shape[0]):
@@ -126,17 +126,17 @@ def set_inputs(
         later, slower = change[START], 0.0
         if not at_start and (change[START] != 0.0 or longer != 0.0):
             step = _NUDGE * length
-            up = moment(clock_of(segment + step * change, beta), s)
-            down = moment(clock_of(segment - step * change, beta), s)
+            up = transformed_time(segment_transformation(segment + step * change, beta), s)
+            down = transformed_time(segment_transformation(segment - step * change, beta), s)
             later, slower = (up.time - down.time) / (2.0 * step), (up.log_pace - down.log_pace) / (2.0 * step)
         along = 0.0 if at_start else (later - change[START] - share * longer) / length
         inputs[BY_PRESSURE, d] = (
             change[PRESSURE] + share * (change[END_PRESSURE] - change[PRESSURE])
             + along * (segment[END_PRESSURE] - segment[PRESSURE])
         )  # fmt: skip
-        inputs[BY_WARMTH, d] = (
-            change[WARMTH] + share * (change[END_WARMTH] - change[WARMTH])
-            + along * (segment[END_WARMTH] - segment[WARMTH])
+        inputs[BY_LOAD_TEMPERATURE, d] = (
+            change[START_TEMPERATURE] + share * (change[FINAL_TEMPERATURE] - change[START_TEMPERATURE])
+            + along * (segment[FINAL_TEMPERATURE] - segment[START_TEMPERATURE])
         )  # fmt: skip
         stiffer = change[MODULUS] + share * (change[END_MODULUS] - change[MODULUS])
         inputs[BY_STIFFNESS, d] = (stiffer + along * (segment[END_MODULUS] - segment[MODULUS])) / modulus

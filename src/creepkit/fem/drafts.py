@@ -13,14 +13,14 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS, Mesh
 from creepkit.fem.mesh_checks import SIDES, half_bandwidth, outline
-from creepkit.fem.shape import POINTS, local_tangents
+from creepkit.fem.shape import GAUSS_POINTS, local_tangents
 
 _ON_AXIS = 1e-9
 """Nodes nearer to the axis, mm, are on it: programs write such numbers for zero."""
 
 
 @dataclass(frozen=True)
-class Element:
+class ElementNodes:
     """The nodes of one element by the file's numbers, four corners and perhaps four middles, and its 'file:line'."""
 
     nodes: tuple[int, ...]
@@ -28,7 +28,7 @@ class Element:
 
 
 @dataclass
-class Draft:
+class MeshBuilder:
     """What was read of a mesh.
 
     nodes : r and z, mm, and place of each node. held : whether u_r and u_z of a node are held.
@@ -37,7 +37,7 @@ class Draft:
 
     path: Path
     nodes: dict[int, tuple[float, float, str]] = field(default_factory=dict)
-    elements: dict[int, Element] = field(default_factory=dict)
+    elements: dict[int, ElementNodes] = field(default_factory=dict)
     held: dict[int, tuple[bool, bool]] = field(default_factory=dict)
     pressed: set[tuple[int, int]] = field(default_factory=set)
     top: set[int] = field(default_factory=set)
@@ -52,7 +52,7 @@ class Draft:
             raise SolveError(f"{place}: node {number} has a radius of {r:g} mm; allowed is 0, the axis, or more")
         self.nodes[number] = (r, z, place)
 
-    def add_element(self, number: int, element: Element) -> None:
+    def add_element(self, number: int, element: ElementNodes) -> None:
         """Add an element that must be new."""
         if number in self.elements:
             first = self.elements[number].place
@@ -96,7 +96,7 @@ def _inverse(order: Ints) -> Ints:
     return new
 
 
-def _build(draft: Draft) -> Mesh:
+def _build(draft: MeshBuilder) -> Mesh:
     if not draft.elements:
         raise SolveError(f"{draft.path}: the mesh has no elements; it needs quadrilaterals of four or eight nodes")
     turned = [_is_clockwise(draft, number) for number in draft.elements]
@@ -114,7 +114,7 @@ def _build(draft: Draft) -> Mesh:
     return renumbered(Mesh(nodes, elements, held, pressed, _top(draft, new, nodes, elements)))
 
 
-def _is_clockwise(draft: Draft, number: int) -> bool:
+def _is_clockwise(draft: MeshBuilder, number: int) -> bool:
     """Whether the corners go round clockwise; a quadrilateral that is not convex, or crosses itself, is refused."""
     element = draft.elements[number]
     for node in element.nodes:
@@ -158,16 +158,16 @@ def _completed(quad: Sequence[int], middles: Mapping[tuple[int, int], int]) -> S
     return quad if len(quad) == 8 else [*quad, *(middles[_side(quad, k)] for k in range(4))]
 
 
-def _place(draft: Draft, made: Mapping[int, tuple[int, int]], number: int) -> tuple[float, float]:
+def _place(draft: MeshBuilder, made: Mapping[int, tuple[int, int]], number: int) -> tuple[float, float]:
     if number >= 0:
         return draft.nodes[number][:2]
     (r, z, _), (other_r, other_z, _) = (draft.nodes[end] for end in made[number])
     return 0.5 * (r + other_r), 0.5 * (z + other_z)
 
 
-def _refuse_bent(draft: Draft, nodes: Floats, elements: Ints) -> None:
+def _refuse_bent(draft: MeshBuilder, nodes: Floats, elements: Ints) -> None:
     """Refuse an element whose middle nodes turn it inside out somewhere."""
-    areas = np.linalg.det(local_tangents(nodes[elements], np.vstack([CORNERS, POINTS])))
+    areas = np.linalg.det(local_tangents(nodes[elements], np.vstack([CORNERS, GAUSS_POINTS])))
     bad = np.flatnonzero((areas <= 0).any(axis=1))
     if bad.size:
         number = list(draft.elements)[bad[0]]
@@ -177,7 +177,7 @@ def _refuse_bent(draft: Draft, nodes: Floats, elements: Ints) -> None:
         )
 
 
-def _pressed(draft: Draft, elements: Ints, turned: Sequence[bool]) -> Ints:
+def _pressed(draft: MeshBuilder, elements: Ints, turned: Sequence[bool]) -> Ints:
     """Nodes (sides, 3) of the pressed sides, all of which must be on the outline."""
     row = {number: k for k, number in enumerate(draft.elements)}
     free = {(int(element), int(side)) for element, side in outline(elements)}
@@ -194,7 +194,7 @@ def _pressed(draft: Draft, elements: Ints, turned: Sequence[bool]) -> Ints:
     return np.array(pressed, dtype=np.int64).reshape(-1, 3)
 
 
-def _held(draft: Draft, new: Mapping[int, int], elements: Ints, made: int) -> Bools:
+def _held(draft: MeshBuilder, new: Mapping[int, int], elements: Ints, made: int) -> Bools:
     """What is held, (nodes, 2); a new middle on the outline is held where both ends of its side are."""
     held = np.zeros((len(new), 2), dtype=bool)
     for number, what in draft.held.items():
@@ -207,7 +207,7 @@ def _held(draft: Draft, new: Mapping[int, int], elements: Ints, made: int) -> Bo
     return held
 
 
-def _refuse_loose(draft: Draft, held: Bools, pressed: Ints) -> None:
+def _refuse_loose(draft: MeshBuilder, held: Bools, pressed: Ints) -> None:
     if not pressed.size:
         raise SolveError(f"{draft.path}: the mesh has no pressed side; say which sides of which elements are pressed")
     if not held[:, 1].any():
@@ -216,7 +216,7 @@ def _refuse_loose(draft: Draft, held: Bools, pressed: Ints) -> None:
         )
 
 
-def _top(draft: Draft, new: Mapping[int, int], nodes: Floats, elements: Ints) -> Ints:
+def _top(draft: MeshBuilder, new: Mapping[int, int], nodes: Floats, elements: Ints) -> Ints:
     """The sides of the outline between the nodes of the top, from the axis outwards."""
     chosen = {new[number] for number in draft.top if number in new}
     sides = [elements[element, SIDES[side]] for element, side in outline(elements)]

@@ -19,18 +19,18 @@ from creepkit.fem.blocks import (
     scatter_stiffness,
     set_products,
 )
-from creepkit.fem.body import Body, band_shape
+from creepkit.fem.body import FiniteElementModel, band_shape
 from creepkit.fem.material import (
     CREEP_COMPONENTS,
-    EQUIVALENT,
-    PointRoom,
-    Stage,
+    EQUIVALENT_STRAIN,
+    PointWorkspace,
+    StageConditions,
     axes_of,
-    creep_safely,
-    creep_slopes,
-    creep_slopes_with_states,
-    elastic_part,
-    following,
+    creep_increment,
+    creep_derivatives,
+    creep_derivatives_with_states,
+    elastic_predictor,
+    strain_derivatives,
     log_stress,
     problem_of,
     tangent_moduli,
@@ -49,14 +49,14 @@ from creepkit.fem.strain import (
 )
 from creepkit.integration.problem import NOT_FINITE, SOLVED, TOO_MANY
 from creepkit.integration.response import INPUTS
-from creepkit.integration.stage import solve_near
+from creepkit.integration.stage import solve_stage_near_guess
 from creepkit.kernels.interface import POINT_SIZE, TEMPERATURE, TIME
 
 BALANCED, INVERTED, POINT_FAILED, RATE_UNDEFINED = range(4)
 """Flags of an assembly."""
 
 
-class Points(NamedTuple):
+class PointStates(NamedTuple):
     """The state of all points, element by element; V = 3 + 1 + S.
 
     value : (points, V) creep components, equivalent creep strain, states, at the start of the step.
@@ -78,7 +78,7 @@ class Points(NamedTuple):
     trials: Floats
 
 
-class Forces(NamedTuple):
+class ForceWorkspace(NamedTuple):
     """residual : (size + width + 4,) internal less external forces; band, flat : the tangent, as rows and laid flat.
 
     block : room of the factorisation; element : (3, 8, 8) rr, rz, zz; local : (2, 8) displacements;
@@ -98,10 +98,10 @@ class Forces(NamedTuple):
     ends: Floats
 
 
-def point_room(states: int, parameters: int) -> PointRoom:
+def point_workspace(states: int, parameters: int) -> PointWorkspace:
     """Working arrays for one point."""
     size, width = 1 + states, POINT_SIZE + states
-    return PointRoom(
+    return PointWorkspace(
         np.zeros(width),
         np.zeros(size * (1 + width + parameters)),
         np.zeros((size, width)),
@@ -111,10 +111,10 @@ def point_room(states: int, parameters: int) -> PointRoom:
     )
 
 
-def points_of(count: int, states: int, stages: int) -> Points:
+def virgin_points(count: int, states: int, stages: int) -> PointStates:
     """Virgin points."""
-    size = EQUIVALENT + 1 + states
-    return Points(
+    size = EQUIVALENT_STRAIN + 1 + states
+    return PointStates(
         np.zeros((count, size)),
         np.zeros((count, size)),
         np.zeros(count),
@@ -127,11 +127,11 @@ def points_of(count: int, states: int, stages: int) -> Points:
     )
 
 
-def forces_of(body: Body) -> Forces:
+def force_workspace(body: FiniteElementModel) -> ForceWorkspace:
     """Room for forces and tangent."""
     rows, columns = band_shape(body.size, body.width)
     flat = np.zeros(rows * columns + 1)
-    return Forces(
+    return ForceWorkspace(
         residual=np.zeros(body.size + body.width + 4),
         band=flat[:-1].reshape(rows, columns),
         flat=flat,
@@ -150,12 +150,12 @@ def forces_of(body: Body) -> Forces:
 def assemble(
     update: Any,
     theta: Floats,
-    body: Body,
-    stage: Stage,
+    body: FiniteElementModel,
+    stage: StageConditions,
     displacement: Floats,
-    points: Points,
-    room: PointRoom,
-    forces: Forces,
+    points: PointStates,
+    room: PointWorkspace,
+    forces: ForceWorkspace,
     stiff: bool,
     tolerance: float,
 ) -> int:
@@ -187,9 +187,9 @@ def assemble(
             at = kinematics(deformation(by_radius, by_height, over_radius, e, g, local))
             if not at.volume > 0.0:
                 return INVERTED
-            elastic = elastic_part(stage, at, base, k)
+            elastic = elastic_predictor(stage, at, base, k)
             increment, axes = 0.0, axes_of(elastic)
-            problem = problem_of(stage, elastic, base[k, EQUIVALENT])
+            problem = problem_of(stage, elastic, base[k, EQUIVALENT_STRAIN])
             if creeps and elastic.equivalent > 0.0:
                 flag = TOO_MANY
                 for i in range(count):
@@ -198,9 +198,9 @@ def assemble(
                     guess = increments[k] + trials[k, 1] * (problem.trial - trials[k, 0])
                     increments[k] = guess if guess > 0.0 else increments[k]
                 if count == 0:
-                    increment, flag = solve_near(update, theta, axes, problem, row, out, increments[k], tolerance)
+                    increment, flag = solve_stage_near_guess(update, theta, axes, problem, row, out, increments[k], tolerance)
                 if flag != SOLVED:
-                    increment, flag = creep_safely(
+                    increment, flag = creep_increment(
                         update, theta, axes, problem, base, k, row, out, increments[k], tolerance
                     )
                 if flag != SOLVED:
@@ -219,11 +219,11 @@ def assemble(
                 continue
             by = (0.0, 0.0, 0.0)
             if increment > 0.0 and count == 0:
-                by = creep_slopes(axes, problem, increment, out)
+                by = creep_derivatives(axes, problem, increment, out)
             elif increment > 0.0:
-                by = creep_slopes_with_states(axes, problem, increment, out, gradient, matrix, response)
+                by = creep_derivatives_with_states(axes, problem, increment, out, gradient, matrix, response)
             trials[k, 1] = by[0]
-            moduli = tangent_moduli(stage, elastic, increment, following(stage, elastic, increment, by), True)
+            moduli = tangent_moduli(stage, elastic, increment, strain_derivatives(stage, elastic, increment, by), True)
             keep_deviator(moduli, deviator, k)
             piola_tangent(at, moduli, stress, slopes, tangent)
             set_products(by_radius, by_height, over_radius, e, g, tangent, weights[e, g], products)
@@ -248,7 +248,7 @@ def keep_deviator(moduli: tuple[Four, Four, Four, Four], kept: Floats, k: int) -
 
 @njit(cache=True, error_model="numpy")
 def error_forces(
-    body: Body, stage: Stage, displacement: Floats, points: Points, weights: Floats, forces: Forces
+    body: FiniteElementModel, stage: StageConditions, displacement: Floats, points: PointStates, weights: Floats, forces: ForceWorkspace
 ) -> None:
     """Out-of-balance forces of a change of all creep strains by sum weights_i slopes_i, into the residual.
 
@@ -282,7 +282,7 @@ def error_forces(
 
 
 @njit(cache=True, error_model="numpy")
-def _press(body: Body, pressure: float, displacement: Floats, forces: Forces, stiff: bool) -> None:
+def _press(body: FiniteElementModel, pressure: float, displacement: Floats, forces: ForceWorkspace, stiff: bool) -> None:
     """Take the pressure's force off the internal one, and its stiffness (made symmetric) off the tangent."""
     if pressure == 0.0:
         return
@@ -303,7 +303,7 @@ def _press(body: Body, pressure: float, displacement: Floats, forces: Forces, st
 
 
 @njit(cache=True, error_model="numpy")
-def _scatter_side(body: Body, k: int, pressure: float, forces: Forces) -> None:
+def _scatter_side(body: FiniteElementModel, k: int, pressure: float, forces: ForceWorkspace) -> None:
     rr, rz, zr = forces.sides[0], forces.sides[1], forces.sides[2]
     places, flat = body.pressed_places[k], forces.flat
     for a in range(3):

@@ -9,11 +9,11 @@ from numba import njit
 
 from creepkit.arrays import Floats
 from creepkit.fem.band import factorize, solve_factorized
-from creepkit.fem.body import Body
-from creepkit.fem.element import BALANCED, RATE_UNDEFINED, Forces, Points, assemble
-from creepkit.fem.material import PointRoom, Stage
+from creepkit.fem.body import FiniteElementModel
+from creepkit.fem.element import BALANCED, RATE_UNDEFINED, ForceWorkspace, PointStates, assemble
+from creepkit.fem.material import PointWorkspace, StageConditions
 
-FOUND, NO_STRESS, UNSTABLE, TOO_FAR, TOO_MANY, UNDEFINED = range(6)
+CONVERGED, NO_STRESS, UNSTABLE, TOO_FAR, TOO_MANY, UNDEFINED = range(6)
 """Flags: found; a point had no solution; the tangent is not positive definite; corrections grow; too many of them; the
 law gave no finite rate."""
 
@@ -24,7 +24,7 @@ _KEEP = 0.3
 """The tangent is kept while each correction is at most this share of the one before."""
 
 
-class Outcome(NamedTuple):
+class EquilibriumResult(NamedTuple):
     """Flag, and how many passes with and without a new tangent it took."""
 
     flag: int
@@ -33,19 +33,19 @@ class Outcome(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def balance(
+def solve_equilibrium(
     update: Any,
     theta: Floats,
-    body: Body,
-    stage: Stage,
+    body: FiniteElementModel,
+    stage: StageConditions,
     displacement: Floats,
-    points: Points,
-    room: PointRoom,
-    forces: Forces,
+    points: PointStates,
+    room: PointWorkspace,
+    forces: ForceWorkspace,
     tolerance: float,
     longest: float,
     tight: float,
-) -> Outcome:
+) -> EquilibriumResult:
     """Bring `displacement` (2 nodes,) to equilibrium; corrections below `tolerance`, mm, end the search.
 
     longest : mm, corrections are cut to this. tight : tolerance of the points' own equations once near.
@@ -56,25 +56,25 @@ def balance(
         local = max(tight, _LOOSE) if iteration == 0 else tight
         flag = assemble(update, theta, body, stage, displacement, points, room, forces, stiff, local)
         if flag != BALANCED:
-            return Outcome(UNDEFINED if flag == RATE_UNDEFINED and iteration < 2 else NO_STRESS, full, light)
+            return EquilibriumResult(UNDEFINED if flag == RATE_UNDEFINED and iteration < 2 else NO_STRESS, full, light)
         if stiff:
             full += 1
             if not factorize(forces.band, body.size, body.width, forces.block):
-                return Outcome(UNSTABLE, full, light)
+                return EquilibriumResult(UNSTABLE, full, light)
         else:
             light += 1
         solve_factorized(forces.band, body.size, body.width, forces.residual)
         before, size = size, _largest(forces.residual, body.size)
         if not isfinite(size) or (iteration > 6 and size > before):
-            return Outcome(TOO_FAR, full, light)
+            return EquilibriumResult(TOO_FAR, full, light)
         factor = min(1.0, longest / size) if size > 0.0 else 1.0
         for k in range(displacement.size):
             equation = body.equations[k]
             if equation >= 0:
                 displacement[k] -= factor * forces.residual[equation]
         if size <= tolerance:
-            return Outcome(FOUND, full, light)
-    return Outcome(TOO_MANY, full, light)
+            return EquilibriumResult(CONVERGED, full, light)
+    return EquilibriumResult(TOO_MANY, full, light)
 
 
 @njit(cache=True, error_model="numpy")

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TypeVar
 
 from creepkit.errors import SolveError, nearest
-from creepkit.fem.cells import number, text_of, whole
-from creepkit.fem.drafts import Draft, Element
+from creepkit.fem.cells import parse_number, read_text, parse_index
+from creepkit.fem.drafts import MeshBuilder, ElementNodes
 
 T = TypeVar("T")
 
-TYPES = {"CAX4": 4, "CAX4R": 4, "CAX8": 8, "CAX8R": 8}
+ELEMENT_TYPES = {"CAX4": 4, "CAX4R": 4, "CAX8": 8, "CAX8R": 8}
 """Nodes of the element types that are read."""
 
 NAMED_SUPPORTS = {"ENCASTRE": (True, True), "PINNED": (True, True), "XSYMM": (True, False), "YSYMM": (False, True)}
@@ -21,7 +21,7 @@ NAMED_SUPPORTS = {"ENCASTRE": (True, True), "PINNED": (True, True), "XSYMM": (Tr
 
 
 @dataclass
-class Card:
+class KeywordCard:
     """One *KEYWORD with its options in capitals and its data lines as (place, cells)."""
 
     name: str
@@ -37,10 +37,10 @@ class Card:
 
 
 @dataclass
-class Deck:
+class InputDeck:
     """A draft and the sets and surfaces of its deck, by name in capitals."""
 
-    draft: Draft
+    draft: MeshBuilder
     node_sets: dict[str, dict[int, None]] = field(default_factory=dict)
     element_sets: dict[str, dict[int, None]] = field(default_factory=dict)
     surfaces: dict[str, set[tuple[int, int]]] = field(default_factory=dict)
@@ -54,10 +54,10 @@ class Deck:
         return _members(place, cell, self.element_sets, self.draft.elements, "element")
 
 
-def read_deck(path: Path, pressed: str | None, top: str | None) -> Draft:
+def builder_from_deck(path: Path, pressed: str | None, top: str | None) -> MeshBuilder:
     """The mesh of a deck as a draft."""
     cards = list(_cards(path))
-    deck = Deck(Draft(path))
+    deck = InputDeck(MeshBuilder(path))
     for steps in (_MESH, _USES):
         for card in cards:
             if card.name in steps:
@@ -69,11 +69,11 @@ def read_deck(path: Path, pressed: str | None, top: str | None) -> Draft:
     return deck.draft
 
 
-def _cards(path: Path) -> Iterator[Card]:
+def _cards(path: Path) -> Iterator[KeywordCard]:
     """The cards of a deck; a keyword line that ends in a comma goes on in the next line."""
-    card: Card | None = None
+    card: KeywordCard | None = None
     head = ""
-    for line, text in enumerate(text_of(path).splitlines(), 1):
+    for line, text in enumerate(read_text(path).splitlines(), 1):
         text, place = text.strip(), f"{path}:{line}"
         if not text or text.startswith("**"):
             continue
@@ -92,75 +92,75 @@ def _cards(path: Path) -> Iterator[Card]:
         yield card
 
 
-def _card(place: str, head: str) -> Card:
+def _card(place: str, head: str) -> KeywordCard:
     name, *words = (word.strip() for word in head[1:].split(","))
     pairs = (word.partition("=") for word in words)
     options = {key.strip().upper(): value.strip().strip('"').upper() for key, _, value in pairs}
-    return Card(" ".join(name.upper().split()), options, place)
+    return KeywordCard(" ".join(name.upper().split()), options, place)
 
 
-def _node(deck: Deck, card: Card) -> None:
+def _node(deck: InputDeck, card: KeywordCard) -> None:
     for place, cells in card.rows:
-        label = whole(place, "node", cells[0])
-        r, z = (number(place, name, cell or "0") for name, cell in zip("rz", [*cells[1:], "", ""], strict=False))
+        label = parse_index(place, "node", cells[0])
+        r, z = (parse_number(place, name, cell or "0") for name, cell in zip("rz", [*cells[1:], "", ""], strict=False))
         deck.draft.add_node(label, r, z, place)
         _collect(deck.node_sets, card.options.get("NSET"), [label])
 
 
-def _element(deck: Deck, card: Card) -> None:
+def _element(deck: InputDeck, card: KeywordCard) -> None:
     kind = card.option("TYPE")
-    if kind not in TYPES:
-        raise SolveError(f"{card.place}: element type {kind} is not supported; allowed are {', '.join(TYPES)}")
+    if kind not in ELEMENT_TYPES:
+        raise SolveError(f"{card.place}: element type {kind} is not supported; allowed are {', '.join(ELEMENT_TYPES)}")
     cells: list[str] = []
     for place, row in card.rows:
         cells += [cell for cell in row if cell]
-        if len(cells) <= TYPES[kind] and row[-1] == "":
+        if len(cells) <= ELEMENT_TYPES[kind] and row[-1] == "":
             continue
-        if len(cells) != TYPES[kind] + 1:
+        if len(cells) != ELEMENT_TYPES[kind] + 1:
             raise SolveError(
-                f"{place}: an element {kind} has a number and {TYPES[kind]} nodes, found {len(cells)} cells"
+                f"{place}: an element {kind} has a number and {ELEMENT_TYPES[kind]} nodes, found {len(cells)} cells"
             )
-        label, *nodes = (whole(place, "element or node", cell) for cell in cells)
-        deck.draft.add_element(label, Element(tuple(nodes), place))
+        label, *nodes = (parse_index(place, "element or node", cell) for cell in cells)
+        deck.draft.add_element(label, ElementNodes(tuple(nodes), place))
         _collect(deck.element_sets, card.options.get("ELSET"), [label])
         cells = []
 
 
-def _set(deck: Deck, card: Card) -> None:
+def _set(deck: InputDeck, card: KeywordCard) -> None:
     sets, members = (deck.node_sets, deck.nodes) if card.name == "NSET" else (deck.element_sets, deck.elements)
     name = card.option(card.name)
     sets.setdefault(name, {})
     for place, cells in card.rows:
         if "GENERATE" in card.options:
-            first, last, step = (whole(place, "range", cell) for cell in [*[c for c in cells if c], "1"][:3])
+            first, last, step = (parse_index(place, "range", cell) for cell in [*[c for c in cells if c], "1"][:3])
             cells = [str(label) for label in range(first, last + 1, step)]
         for cell in cells:
             _collect(sets, name, members(place, cell) if cell else [])
 
 
-def _surface(deck: Deck, card: Card) -> None:
+def _surface(deck: InputDeck, card: KeywordCard) -> None:
     sides = deck.surfaces.setdefault(card.option("NAME"), set())
     if card.options.get("TYPE", "ELEMENT") == "ELEMENT":
         for place, cells in card.rows:
             sides |= {(element, _face(place, cells, "S")) for element in deck.elements(place, cells[0])}
 
 
-def _boundary(deck: Deck, card: Card) -> None:
+def _boundary(deck: InputDeck, card: KeywordCard) -> None:
     for place, cells in card.rows:
         what = cells[1].upper() if len(cells) > 1 else ""
         if what in NAMED_SUPPORTS:
             r, z = NAMED_SUPPORTS[what]
         else:
             first, last, motion = ([*cells[1:], "", "", ""])[:3]
-            begin = whole(place, "first direction", first)
-            directions = range(begin, whole(place, "last direction", last or first) + 1)
-            if motion and number(place, "motion", motion) != 0:
+            begin = parse_index(place, "first direction", first)
+            directions = range(begin, parse_index(place, "last direction", last or first) + 1)
+            if motion and parse_number(place, "motion", motion) != 0:
                 raise SolveError(f"{place}: a motion of {motion} mm is prescribed; only nodes at rest are read, with 0")
             r, z = 1 in directions, 2 in directions
         deck.draft.hold(deck.nodes(place, cells[0]), r, z)
 
 
-def _distributed(deck: Deck, card: Card) -> None:
+def _distributed(deck: InputDeck, card: KeywordCard) -> None:
     for place, cells in card.rows:
         label = cells[1].upper() if len(cells) > 1 else ""
         if card.name == "DSLOAD" and label == "P":
@@ -170,18 +170,18 @@ def _distributed(deck: Deck, card: Card) -> None:
             deck.draft.pressed |= {(element, side) for element in deck.elements(place, cells[0])}
 
 
-def _include(deck: Deck, card: Card) -> None:
+def _include(deck: InputDeck, card: KeywordCard) -> None:
     raise SolveError(f"{card.place}: *INCLUDE is not followed; put the included lines into {deck.draft.path.name}")
 
 
-_MESH: Mapping[str, Callable[[Deck, Card], None]] = {
+_MESH: Mapping[str, Callable[[InputDeck, KeywordCard], None]] = {
     "INCLUDE": _include,
     "NODE": _node,
     "ELEMENT": _element,
     "NSET": _set,
     "ELSET": _set,
 }
-_USES: Mapping[str, Callable[[Deck, Card], None]] = {
+_USES: Mapping[str, Callable[[InputDeck, KeywordCard], None]] = {
     "SURFACE": _surface,
     "BOUNDARY": _boundary,
     "DLOAD": _distributed,

@@ -9,10 +9,10 @@ from numba import njit
 
 from creepkit.arrays import Floats
 from creepkit.fem.blocks import clear
-from creepkit.fem.body import Body
-from creepkit.fem.element import Points
-from creepkit.fem.equilibrium import FOUND, UNDEFINED, balance
-from creepkit.fem.material import EQUIVALENT, Stage
+from creepkit.fem.body import FiniteElementModel
+from creepkit.fem.element import PointStates
+from creepkit.fem.equilibrium import CONVERGED, UNDEFINED, solve_equilibrium
+from creepkit.fem.material import EQUIVALENT_STRAIN, StageConditions
 from creepkit.fem.record import (
     DEFLECTION_LIMIT,
     END,
@@ -30,17 +30,17 @@ from creepkit.fem.record import (
     STATE_LIMIT,
     STRAIN_LIMIT,
     TOO_MANY_STEPS,
-    Ended,
-    Record,
-    Rooms,
-    Settings,
+    Termination,
+    StepRecord,
+    SolverWorkspace,
+    SolverSettings,
     copy,
-    keep,
+    record_step,
     make_virgin,
 )
-from creepkit.fem.steps import clock_of, finish, hold, largest_rise, stage_at, try_step
+from creepkit.fem.steps import segment_transformation, finish_step, prescribe_motion, largest_displacement, stage_at, attempt_step
 from creepkit.fem.strain import Three
-from creepkit.integration.clock import Clock, moment, position
+from creepkit.integration.clock import TimeTransformation, transformed_time, position
 from creepkit.integration.tableau import Tableau
 
 _SMALLEST = 1e-9
@@ -48,22 +48,22 @@ _SMALLEST = 1e-9
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def march(
+def integrate_program(
     update: Any,
     theta: Floats,
     beta: float,
     poisson: float,
-    body: Body,
+    body: FiniteElementModel,
     segments: Floats,
     pattern: Floats,
     initial: Floats,
     limits: Floats,
-    settings: Settings,
+    settings: SolverSettings,
     tableau: Tableau,
-    rooms: Rooms,
+    rooms: SolverWorkspace,
     script: Floats,
-    record: Record,
-) -> Ended:
+    record: StepRecord,
+) -> Termination:
     """Run the program; fill `record` from its first row on, which holds the body at rest.
 
     segments : (segments, 10). pattern : (2 nodes,) displacement of held nodes for a unit of motion, mm.
@@ -72,7 +72,7 @@ def march(
     """
     make_virgin(rooms.points, initial)
     clear(rooms.displacement)
-    ended = Ended(1, REACHED_END, 0.0)
+    ended = Termination(1, REACHED_END, 0.0)
     before = (0.0, 0.0, 0.0)
     for n in range(segments.shape[0]):
         segment = segments[n]
@@ -81,7 +81,7 @@ def march(
             if ended.code != REACHED_END:
                 return ended
         ended = _segment(
-            update, theta, clock_of(segment, beta), poisson, body, segment, n, pattern, limits, initial, settings,
+            update, theta, segment_transformation(segment, beta), poisson, body, segment, n, pattern, limits, initial, settings,
             tableau, rooms, script, record, ended,
         )  # fmt: skip
         if ended.code != REACHED_END:
@@ -100,9 +100,9 @@ def _jumps(before: Three, segment: Floats) -> bool:
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _jump(
-    update: Any, theta: Floats, poisson: float, body: Body, segment: Floats, n: int, pattern: Floats, before: Three,
-    settings: Settings, rooms: Rooms, record: Record, ended: Ended,
-) -> Ended:  # fmt: skip
+    update: Any, theta: Floats, poisson: float, body: FiniteElementModel, segment: Floats, n: int, pattern: Floats, before: Three,
+    settings: SolverSettings, rooms: SolverWorkspace, record: StepRecord, ended: Termination,
+) -> Termination:  # fmt: skip
     """The elastic change at a sudden change of load, in as many parts as it needs; recorded at the segment's start."""
     points, u, start = rooms.points, rooms.displacement, rooms.start
     done, part = 0.0, 1.0
@@ -114,32 +114,32 @@ def _jump(
     for _ in range(60):
         now = min(1.0, done + part)
         pressure = before[0] + now * (target.pressure - before[0])
-        stage = Stage(0.0, target.time, target.temperature, target.bulk, target.shear, pressure)
+        stage = StageConditions(0.0, target.time, target.temperature, target.bulk, target.shear, pressure)
         motion = before[2] + now * (segment[MOTION] - before[2])
-        hold(body, pattern, motion, u)
-        newton = settings.newton * (0.01 + largest_rise(body, u))
-        outcome = balance(update, theta, body, stage, u, points, rooms.point, rooms.forces, newton, 1.0, 1e-3)
+        prescribe_motion(body, pattern, motion, u)
+        newton = settings.newton * (0.01 + largest_displacement(body, u))
+        outcome = solve_equilibrium(update, theta, body, stage, u, points, rooms.point, rooms.forces, newton, 1.0, 1e-3)
         record.counts[2] += outcome.full
         record.counts[3] += outcome.light
-        if outcome.flag == FOUND:
+        if outcome.flag == CONVERGED:
             done = now
             copy(u, start)
             if done == 1.0:
-                return keep(record, ended, segment[START], n, u, points)
+                return record_step(record, ended, segment[START], n, u, points)
         else:
             copy(start, u)
             part *= 0.25
             if part < 1e-5:
                 break
-    return Ended(ended.records, LIMIT_LOAD, segment[START])
+    return Termination(ended.records, LIMIT_LOAD, segment[START])
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _segment(
-    update: Any, theta: Floats, clock: Clock, poisson: float, body: Body, segment: Floats, n: int, pattern: Floats,
-    limits: Floats, initial: Floats, settings: Settings, tableau: Tableau, rooms: Rooms, script: Floats, record: Record,
-    ended: Ended,
-) -> Ended:  # fmt: skip
+    update: Any, theta: Floats, clock: TimeTransformation, poisson: float, body: FiniteElementModel, segment: Floats, n: int, pattern: Floats,
+    limits: Floats, initial: Floats, settings: SolverSettings, tableau: Tableau, rooms: SolverWorkspace, script: Floats, record: StepRecord,
+    ended: Termination,
+) -> Termination:  # fmt: skip
     """March over one segment in the position s of its clock, from 0 to 1."""
     s, elapsed, length = 0.0, 0.0, segment[END] - segment[START]
     h = position(clock, segment[START] + min(settings.first, length))
@@ -155,24 +155,24 @@ def _segment(
         if told:
             h = min(script[ended.records, 1], 1.0 - s)
         if record.counts[0] + record.counts[1] >= settings.max_steps:
-            return Ended(ended.records, TOO_MANY_STEPS, ended.time)
-        outcome, error = try_step(
+            return Termination(ended.records, TOO_MANY_STEPS, ended.time)
+        outcome, error = attempt_step(
             update, theta, clock, poisson, body, segment, pattern, settings, tableau, rooms, record,
             first if failures == 0 else ended.records, ended.records, s, h,
         )  # fmt: skip
-        if outcome != FOUND or not (error <= 1.0 or told):
+        if outcome != CONVERGED or not (error <= 1.0 or told):
             copy(start, u)
             record.counts[1] += 1
             failures += 1
-            h *= 0.25 if outcome != FOUND else max(0.2, 0.9 / sqrt(error))
+            h *= 0.25 if outcome != CONVERGED else max(0.2, 0.9 / sqrt(error))
             if failures > 12 or h < _SMALLEST * s:
                 code = LIMIT_LOAD if _rises(segment) else LOST_CONVERGENCE
                 code = LAW_FAILED if outcome == UNDEFINED else code
-                return Ended(ended.records, code, ended.time)
+                return Termination(ended.records, code, ended.time)
             continue
         failures = 0
         record.counts[0] += 1
-        worst, _ = finish(points, tableau, h)
+        worst, _ = finish_step(points, tableau, h)
         row = ended.records
         record.places[row, 0], record.places[row, 1] = s, h
         if record.stages.shape[0] > 0:
@@ -181,16 +181,16 @@ def _segment(
                 for k in range(points.value.shape[0]):
                     copy(points.slopes[i, k], record.slopes[row, i, k])
         s = 1.0 if h == 1.0 - s else s + h
-        time = segment[END] if s == 1.0 else moment(clock, s).time
+        time = segment[END] if s == 1.0 else transformed_time(clock, s).time
         elapsed = time - segment[START]
-        ended = keep(record, ended, time, n, u, points)
+        ended = record_step(record, ended, time, n, u, points)
         copy(u, start)
-        if largest_rise(body, u) >= settings.deflection_limit:
-            return Ended(ended.records, DEFLECTION_LIMIT, time)
+        if largest_displacement(body, u) >= settings.deflection_limit:
+            return Termination(ended.records, DEFLECTION_LIMIT, time)
         if worst >= settings.strain_limit:
-            return Ended(ended.records, STRAIN_LIMIT, time)
+            return Termination(ended.records, STRAIN_LIMIT, time)
         if _failed(points, limits, initial):
-            return Ended(ended.records, STATE_LIMIT, time)
+            return Termination(ended.records, STATE_LIMIT, time)
         h *= min(4.0, max(0.3, 0.9 / sqrt(max(error, 1e-12))))
     return ended
 
@@ -201,12 +201,12 @@ def _rises(segment: Floats) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def _failed(points: Points, limits: Floats, initial: Floats) -> bool:
+def _failed(points: PointStates, limits: Floats, initial: Floats) -> bool:
     """Whether a state of any point has passed its limit."""
     for i in range(limits.size):
         up = limits[i] > initial[i]
         for k in range(points.value.shape[0]):
-            value = points.value[k, EQUIVALENT + 1 + i]
+            value = points.value[k, EQUIVALENT_STRAIN + 1 + i]
             if (up and value >= limits[i]) or (not up and value <= limits[i]):
                 return True
     return False

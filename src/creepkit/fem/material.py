@@ -21,23 +21,23 @@ from numba import njit
 
 from creepkit.arrays import Floats
 from creepkit.fem.strain import DIFFERENCE, HOOP, SHEAR, SUM, Four, Kinematics, Three
-from creepkit.integration.problem import Axes, Problem, along_stress
+from creepkit.integration.problem import Axes, StageProblem, stress_derivative
 from creepkit.integration.response import (
     BY_MEAN,
     BY_PRINCIPAL,
     BY_TRIAL,
     gradient_of_update,
-    respond,
+    differentiate_stage,
 )
-from creepkit.integration.stage import solve
-from creepkit.kernels.interface import MEAN, PRINCIPAL, STRAIN
+from creepkit.integration.stage import solve_stage
+from creepkit.kernels.interface import MEAN_STRESS, PRINCIPAL_STRESS, STRAIN
 
 CREEP_COMPONENTS = 3
-EQUIVALENT = 3
+EQUIVALENT_STRAIN = 3
 """Place of the equivalent creep strain in a point's history: three components, this, then the states."""
 
 
-class Stage(NamedTuple):
+class StageConditions(NamedTuple):
     """What all points of a stage share.
 
     weight : gamma h dt/ds, s; 0 for a purely elastic change. time : s. temperature : K. bulk, shear : K and G, MPa.
@@ -52,7 +52,7 @@ class Stage(NamedTuple):
     pressure: float
 
 
-class Elastic(NamedTuple):
+class ElasticPredictor(NamedTuple):
     """The elastic predictor of a point: w (three numbers), e, tr E, J, the largest principal direction, the mean.
 
     top : largest principal value of the unit deviator over its von Mises stress.
@@ -68,7 +68,7 @@ class Elastic(NamedTuple):
     mean: float
 
 
-class PointRoom(NamedTuple):
+class PointWorkspace(NamedTuple):
     """Working arrays for one point with S states: kernel row and output; gradient, matrix, response; dP/dF (5, 5)."""
 
     row: Floats
@@ -80,7 +80,7 @@ class PointRoom(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def elastic_part(stage: Stage, at: Kinematics, base: Floats, k: int) -> Elastic:
+def elastic_predictor(stage: StageConditions, at: Kinematics, base: Floats, k: int) -> ElasticPredictor:
     """The elastic predictor of point `k` from the total strain and the history (points, 3 + 1 + S)."""
     strain, volume = at.strain, at.volume
     trace = strain[SUM] + strain[HOOP]
@@ -89,28 +89,28 @@ def elastic_part(stage: Stage, at: Kinematics, base: Floats, k: int) -> Elastic:
     radius2 = difference * difference + shear * shear
     equivalent = sqrt(hoop * hoop + radius2 / 3.0)
     top = max(2.0 * hoop, sqrt(radius2) - hoop) / (3.0 * equivalent) if equivalent > 0.0 else 0.0
-    return Elastic(hoop, difference, shear, equivalent, trace, volume, top, stage.bulk * trace / volume)
+    return ElasticPredictor(hoop, difference, shear, equivalent, trace, volume, top, stage.bulk * trace / volume)
 
 
 @njit(cache=True, error_model="numpy")
-def axes_of(elastic: Elastic) -> Axes:
+def axes_of(elastic: ElasticPredictor) -> Axes:
     """Largest principal and mean Cauchy stress along the equivalent one."""
     return Axes(elastic.mean, elastic.top, elastic.mean, 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def problem_of(stage: Stage, elastic: Elastic, strain: float) -> Problem:
+def problem_of(stage: StageConditions, elastic: ElasticPredictor, strain: float) -> StageProblem:
     """The stage of `integration.stage` at this point; strain : equivalent creep strain so far."""
     stiffness = 3.0 * stage.shear / elastic.volume
-    return Problem(stiffness * elastic.equivalent, stiffness, 0.0, stage.weight, strain)
+    return StageProblem(stiffness * elastic.equivalent, stiffness, 0.0, stage.weight, strain)
 
 
 @njit(cache=True, error_model="numpy")
-def creep_safely(
+def creep_increment(
     update: Any,
     theta: Floats,
     axes: Axes,
-    problem: Problem,
+    problem: StageProblem,
     base: Floats,
     k: int,
     row: Floats,
@@ -121,11 +121,11 @@ def creep_safely(
     """Creep increment D of point `k` and a flag, from any guess and for any law; base : (points, 3 + 1 + S)."""
     if not guess > 0.0:  # the point was at rest; a logarithm of nothing lies too far from any answer
         guess = 1e-6 * problem.trial / problem.stiffness
-    return solve(update, theta, axes, problem, base[k, EQUIVALENT + 1 :], row, out, guess, tolerance)
+    return solve_stage(update, theta, axes, problem, base[k, EQUIVALENT_STRAIN + 1 :], row, out, guess, tolerance)
 
 
 @njit(cache=True, error_model="numpy")
-def log_stress(stage: Stage, elastic: Elastic, increment: float) -> Four:
+def log_stress(stage: StageConditions, elastic: ElasticPredictor, increment: float) -> Four:
     """The log-conjugate stress."""
     left = 1.0 - increment / elastic.equivalent if increment > 0.0 else 1.0
     pressure, shear = stage.bulk * elastic.trace, stage.shear * left
@@ -134,31 +134,31 @@ def log_stress(stage: Stage, elastic: Elastic, increment: float) -> Four:
 
 
 @njit(cache=True, error_model="numpy")
-def creep_slopes(axes: Axes, problem: Problem, increment: float, out: Floats) -> Three:
+def creep_derivatives(axes: Axes, problem: StageProblem, increment: float, out: Floats) -> Three:
     """Derivatives of D to the trial stress, and to shifts of the largest principal and of the mean stress.
 
     out : output of the entry `update` of a law without states, at the solution.
     """
-    by_stress = increment * along_stress(out, 1, axes)
+    by_stress = increment * stress_derivative(out, 1, axes)
     divisor = 1.0 / (1.0 + by_stress * problem.stiffness - increment * out[1 + STRAIN])
-    return by_stress * divisor, increment * out[1 + PRINCIPAL] * divisor, increment * out[1 + MEAN] * divisor
+    return by_stress * divisor, increment * out[1 + PRINCIPAL_STRESS] * divisor, increment * out[1 + MEAN_STRESS] * divisor
 
 
 @njit(cache=True, error_model="numpy")
-def creep_slopes_with_states(
-    axes: Axes, problem: Problem, increment: float, out: Floats, gradient: Floats, matrix: Floats, response: Floats
+def creep_derivatives_with_states(
+    axes: Axes, problem: StageProblem, increment: float, out: Floats, gradient: Floats, matrix: Floats, response: Floats
 ) -> Three:
     """The same for a law with states; zero where the equations are singular."""
     size = matrix.shape[0]
     gradient_of_update(out, problem, increment, gradient)
     stress = problem.trial - problem.stiffness * increment
-    if not respond(axes, problem, increment, stress, out[1:size], gradient, matrix, response):
+    if not differentiate_stage(axes, problem, increment, stress, out[1:size], gradient, matrix, response):
         return 0.0, 0.0, 0.0
     return response[0, BY_TRIAL], response[0, BY_PRINCIPAL], response[0, BY_MEAN]
 
 
 @njit(cache=True, error_model="numpy")
-def following(stage: Stage, elastic: Elastic, increment: float, by: Three) -> Four:
+def strain_derivatives(stage: StageConditions, elastic: ElasticPredictor, increment: float, by: Three) -> Four:
     """Derivatives of D to w (three) and to tr E, from those `by` trial, largest principal and mean stress."""
     if increment == 0.0:
         return 0.0, 0.0, 0.0, 0.0
@@ -187,7 +187,7 @@ def following(stage: Stage, elastic: Elastic, increment: float, by: Three) -> Fo
 
 @njit(cache=True, error_model="numpy")
 def tangent_moduli(
-    stage: Stage, elastic: Elastic, increment: float, follow: Four, symmetric: bool
+    stage: StageConditions, elastic: ElasticPredictor, increment: float, follow: Four, symmetric: bool
 ) -> tuple[Four, Four, Four, Four]:
     """Consistent tangent dT/dE, exact or its symmetric part; rows and columns in the order of the strains.
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.fem.mesh import CORNERS, Mesh
-from creepkit.fem.shape import POINTS, local_tangents
+from creepkit.fem.shape import GAUSS_POINTS, local_tangents
 
 SIDES = np.array([[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]])
 """First, middle and last node of each side of an element."""
 
 
-class Quality(NamedTuple):
+class MeshQuality(NamedTuple):
     """The worst of each element over its corners and integration points, 1 for a rectangle and 0 for a collapsed one.
 
     sine : (elements,) sine of the angle between its two local directions.
@@ -25,12 +25,12 @@ class Quality(NamedTuple):
     evenness: Floats
 
 
-def quality(mesh: Mesh) -> Quality:
+def mesh_quality(mesh: Mesh) -> MeshQuality:
     """How far the elements of a mesh are from parallelograms with right angles."""
-    tangents = local_tangents(mesh.nodes[mesh.elements], np.vstack([CORNERS, POINTS]))
+    tangents = local_tangents(mesh.nodes[mesh.elements], np.vstack([CORNERS, GAUSS_POINTS]))
     areas = np.linalg.det(tangents)
     lengths = np.linalg.norm(tangents, axis=3).prod(axis=2)
-    return Quality((areas / lengths).min(axis=1), areas.min(axis=1) / areas.max(axis=1))
+    return MeshQuality((areas / lengths).min(axis=1), areas.min(axis=1) / areas.max(axis=1))
 
 
 def half_bandwidth(elements: Ints) -> int:

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from creepkit.errors import SolveError, nearest
-from creepkit.fem.cells import number, text_of, whole
-from creepkit.fem.drafts import Draft, Element
-from creepkit.fem.input_decks import read_deck
+from creepkit.fem.cells import parse_number, read_text, parse_index
+from creepkit.fem.drafts import MeshBuilder, ElementNodes
+from creepkit.fem.input_decks import builder_from_deck
 from creepkit.fem.mesh import Mesh
 
 
@@ -35,12 +35,12 @@ def read_mesh(
         side 1 joins nodes 1 and 2, side 4 nodes 4 and 1.
     top : set of nodes of the observed surface, None for none.
     """
-    draft = Draft(Path(sets))
+    draft = MeshBuilder(Path(sets))
     for place, label, row in _rows(Path(nodes), ("r_mm", "z_mm")):
-        r, z = (number(place, name, cell) for name, cell in row.items())
+        r, z = (parse_number(place, name, cell) for name, cell in row.items())
         draft.add_node(label, r, z, place)
     for place, label, row in _rows(Path(elements), _CORNERS, _MIDDLES):
-        draft.add_element(label, Element(tuple(whole(place, name, cell) for name, cell in row.items()), place))
+        draft.add_element(label, ElementNodes(tuple(parse_index(place, name, cell) for name, cell in row.items()), place))
     groups = _Sets(Path(sets), draft)
     for name in held:
         draft.hold(groups.nodes(name), r=True, z=True)
@@ -56,7 +56,7 @@ def read_input_deck(path: str | Path, *, pressed: str | None = None, top: str | 
     *NODE, *ELEMENT, *NSET, *ELSET, *SURFACE and *BOUNDARY make the mesh. The pressed sides are those of the *SURFACE
     called `pressed`, or else all that *DLOAD and *DSLOAD press. `top` is the node set of the observed surface.
     """
-    return read_deck(Path(path), pressed, top).mesh()
+    return builder_from_deck(Path(path), pressed, top).mesh()
 
 
 _CORNERS = ("n1", "n2", "n3", "n4")
@@ -66,10 +66,10 @@ _MIDDLES = ("n5", "n6", "n7", "n8")
 class _Sets:
     """Named lists of nodes and elements in a JSON file."""
 
-    def __init__(self, path: Path, draft: Draft) -> None:
+    def __init__(self, path: Path, draft: MeshBuilder) -> None:
         self.path, self.draft = path, draft
         try:
-            content = json.loads(text_of(path))
+            content = json.loads(read_text(path))
         except json.JSONDecodeError as error:
             raise SolveError(
                 f"{path}:{error.lineno}: not a JSON file ({error.msg}); write an object of lists"
@@ -102,7 +102,7 @@ class _Sets:
 
 def _rows(path: Path, columns: Sequence[str], more: Sequence[str] = ()) -> Iterator[tuple[str, int, dict[str, str]]]:
     """Place, number and cells of each row; the columns `more` belong to it when all of them are there."""
-    lines = csv.reader(text_of(path).splitlines())
+    lines = csv.reader(read_text(path).splitlines())
     names = [name.strip() for name in next(lines, [])]
     for name in ("id", *columns):
         if name not in names:
@@ -114,4 +114,4 @@ def _rows(path: Path, columns: Sequence[str], more: Sequence[str] = ()) -> Itera
             raise SolveError(f"{place}: number of cells {len(cells)}, of columns {len(names)}; write one cell a column")
         if cells:
             row = dict(zip(names, cells, strict=True))
-            yield place, whole(place, "id", row["id"]), {name: row[name] for name in wanted}
+            yield place, parse_index(place, "id", row["id"]), {name: row[name] for name in wanted}

@@ -7,10 +7,10 @@ from typing import Any
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.fem.columns import BY_MOMENT, BY_STIFFNESS, BY_WARMTH, BY_WEIGHT, ChangeRoom, Columns
-from creepkit.fem.material import EQUIVALENT, Elastic, PointRoom, Stage, axes_of, following, problem_of
+from creepkit.fem.columns import BY_MOMENT, BY_STIFFNESS, BY_LOAD_TEMPERATURE, BY_WEIGHT, SensitivityWorkspace, SensitivityDirections
+from creepkit.fem.material import EQUIVALENT_STRAIN, ElasticPredictor, PointWorkspace, StageConditions, axes_of, strain_derivatives, problem_of
 from creepkit.fem.strain import DIFFERENCE, HOOP, SHEAR, SUM, Five, Four, Kinematics
-from creepkit.integration.problem import place
+from creepkit.integration.problem import write_point
 from creepkit.integration.response import (
     BY_LOG_WEIGHT,
     BY_MEAN,
@@ -21,14 +21,14 @@ from creepkit.integration.response import (
     BY_TRIAL,
     INPUTS,
     gradient_of_sensitivity,
-    respond,
+    differentiate_stage,
 )
 from creepkit.integration.tableau import Tableau
-from creepkit.kernels.interface import POINT_SIZE, TEMPERATURE, TIME, pointer
+from creepkit.kernels.interface import POINT_SIZE, TEMPERATURE, TIME, data_pointer
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def history_of(
+def stage_history(
     slopes: Floats, row: int, i: int, k: int, h: float, tableau: Tableau, value: Floats, change: Floats, rates: Floats,
     history: Floats, base: Floats,
 ) -> None:  # fmt: skip
@@ -46,11 +46,11 @@ def history_of(
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def answer(
+def creep_response(
     sensitivity: Any,
     theta: Floats,
-    stage: Stage,
-    elastic: Elastic,
+    stage: StageConditions,
+    elastic: ElasticPredictor,
     slopes: Floats,
     row: int,
     i: int,
@@ -58,8 +58,8 @@ def answer(
     share: float,
     increment: float,
     creeps: bool,
-    point: PointRoom,
-    room: ChangeRoom,
+    point: PointWorkspace,
+    room: SensitivityWorkspace,
 ) -> None:
     """How D and the states of point `k` answer: to w and tr E (room.follow), and to all else (room.own)."""
     own, follow, base, history = room.own, room.follow, room.base, room.history
@@ -68,51 +68,51 @@ def answer(
         for j in range(4):
             follow[k, v, j] = 0.0
         for c in range(columns):
-            own[k, v, c] = base[k, EQUIVALENT + v, c] if v > 0 else 0.0
+            own[k, v, c] = base[k, EQUIVALENT_STRAIN + v, c] if v > 0 else 0.0
     if not creeps or not (increment > 0.0 or states > 0):
         return
-    axes, problem = axes_of(elastic), problem_of(stage, elastic, history[EQUIVALENT])
+    axes, problem = axes_of(elastic), problem_of(stage, elastic, history[EQUIVALENT_STRAIN])
     line, full, response = point.row, point.out, point.response
     line[TIME], line[TEMPERATURE] = stage.time, stage.temperature
     for v in range(states):
-        line[POINT_SIZE + v] = history[EQUIVALENT + 1 + v] + share * slopes[row, i, k, EQUIVALENT + 1 + v]
+        line[POINT_SIZE + v] = history[EQUIVALENT_STRAIN + 1 + v] + share * slopes[row, i, k, EQUIVALENT_STRAIN + 1 + v]
     stress = problem.trial - problem.stiffness * increment
-    place(line, axes, stress, problem.strain + increment)
-    sensitivity(1, pointer(line), pointer(theta), pointer(full))
+    write_point(line, axes, stress, problem.strain + increment)
+    sensitivity(1, data_pointer(line), data_pointer(theta), data_pointer(full))
     gradient_of_sensitivity(full, problem, increment, point.gradient)
     start = (1 + states) * (1 + line.size)
     for v in range(1 + states):
         for p in range(parameters):
             slope = full[start + v * parameters + p]
             response[v, INPUTS + states + p] = problem.weight * slope if increment > 0.0 or v > 0 else 0.0
-    if not respond(axes, problem, increment, stress, full[1 : 1 + states], point.gradient, point.matrix, response):
+    if not differentiate_stage(axes, problem, increment, stress, full[1 : 1 + states], point.gradient, point.matrix, response):
         return
     for v in range(1 + states):
         by = (response[v, BY_TRIAL], response[v, BY_PRINCIPAL], response[v, BY_MEAN])
-        along = following(stage, elastic, increment, by)
+        along = strain_derivatives(stage, elastic, increment, by)
         follow[k, v, 0], follow[k, v, 1], follow[k, v, 2], follow[k, v, 3] = along
         by_strain = response[v, BY_STRAIN]
         for c in range(columns):
-            own[k, v, c] = by_strain * base[k, EQUIVALENT, c]
+            own[k, v, c] = by_strain * base[k, EQUIVALENT_STRAIN, c]
         for z in range(states):
             by_state = response[v, INPUTS + z]
             for c in range(columns):
-                own[k, v, c] += by_state * base[k, EQUIVALENT + 1 + z, c]
+                own[k, v, c] += by_state * base[k, EQUIVALENT_STRAIN + 1 + z, c]
         for p in range(parameters):
             own[k, v, p] += response[v, INPUTS + states + p]
         stiffer = response[v, BY_TRIAL] * stress + (response[v, BY_MEAN] + response[v, BY_PRINCIPAL]) * elastic.mean
         for d in range(room.inputs.shape[1]):
             own[k, v, parameters + d] += (
                 response[v, BY_TIME] * room.inputs[BY_MOMENT, d]
-                + response[v, BY_TEMPERATURE] * room.inputs[BY_WARMTH, d]
+                + response[v, BY_TEMPERATURE] * room.inputs[BY_LOAD_TEMPERATURE, d]
                 + response[v, BY_LOG_WEIGHT] * room.inputs[BY_WEIGHT, d]
                 + stiffer * room.inputs[BY_STIFFNESS, d]
             )
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def stress_changes(
-    stage: Stage, elastic: Elastic, moduli: tuple[Four, Four, Four, Four], increment: float, base: Floats, own: Floats,
+def stress_sensitivities(
+    stage: StageConditions, elastic: ElasticPredictor, moduli: tuple[Four, Four, Four, Four], increment: float, base: Floats, own: Floats,
     k: int, dy: Floats,
 ) -> None:  # fmt: skip
     """Changes (3, C) of y, conjugate to w, at fixed strain: w falls as the history rises, D changes on its own."""
@@ -133,7 +133,7 @@ def stress_changes(
 
 
 @njit(cache=True, error_model="numpy")
-def gradient_shift(columns: Columns, q: int, e: int, g: int, F: Five) -> Five:
+def gradient_sensitivity(columns: SensitivityDirections, q: int, e: int, g: int, F: Five) -> Five:
     """Change of F as the nodes move with geometry number `q` and keep their displacements: -(F - 1) grad V."""
     V = columns.gradients
     v11, v12, v21, v22 = V[q, e, g, 0, 0], V[q, e, g, 0, 1], V[q, e, g, 1, 0], V[q, e, g, 1, 1]
@@ -148,9 +148,9 @@ def gradient_shift(columns: Columns, q: int, e: int, g: int, F: Five) -> Five:
 
 
 @njit(cache=True, error_model="numpy")
-def shape_change(columns: Columns, q: int, e: int, g: int, at: Kinematics, P: Five, tangent: Floats) -> Five:
+def shape_sensitivity(columns: SensitivityDirections, q: int, e: int, g: int, at: Kinematics, P: Five, tangent: Floats) -> Five:
     """Change of the stress that a point's nodal forces are made of, volume and gradients of the shape included."""
-    F = gradient_shift(columns, q, e, g, at.F)
+    F = gradient_sensitivity(columns, q, e, g, at.F)
     V = columns.gradients
     v11, v12, v21, v22 = V[q, e, g, 0, 0], V[q, e, g, 0, 1], V[q, e, g, 1, 0], V[q, e, g, 1, 1]
     hoop = columns.hoops[q, e, g]

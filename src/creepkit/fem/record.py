@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats, Ints
-from creepkit.fem.body import Body
-from creepkit.fem.element import Forces, Points, forces_of, point_room, points_of
-from creepkit.fem.material import EQUIVALENT, PointRoom
+from creepkit.fem.body import FiniteElementModel
+from creepkit.fem.element import ForceWorkspace, PointStates, force_workspace, point_workspace, virgin_points
+from creepkit.fem.material import EQUIVALENT_STRAIN, PointWorkspace
 
 (
     REACHED_END,
@@ -24,11 +24,11 @@ from creepkit.fem.material import EQUIVALENT, PointRoom
 ) = range(8)
 """Codes of an ending; whatever it is, the history so far is kept."""
 
-START, END, PRESSURE, END_PRESSURE, WARMTH, END_WARMTH, MODULUS, END_MODULUS, MOTION, END_MOTION = range(10)
+START, END, PRESSURE, END_PRESSURE, START_TEMPERATURE, FINAL_TEMPERATURE, MODULUS, END_MODULUS, MOTION, END_MOTION = range(10)
 """Columns of a segment: times s, pressures MPa, temperatures K, moduli E MPa, motion of held nodes, at both ends."""
 
 
-class Settings(NamedTuple):
+class SolverSettings(NamedTuple):
     """How accurately, and how far, to march.
 
     tolerance : estimated error of a step's displacements over (0.01 mm + the largest of them).
@@ -46,7 +46,7 @@ class Settings(NamedTuple):
     max_steps: int = 1000
 
 
-class Record(NamedTuple):
+class StepRecord(NamedTuple):
     """Accepted steps: (records,) times s, segment of each; displacements (records, 2 nodes); and if kept, the points.
 
     values : (records or 0, points, V). mises : (records, points) MPa. counts : (4,) accepted, rejected, full and light
@@ -66,20 +66,20 @@ class Record(NamedTuple):
     slopes: Floats
 
 
-class Rooms(NamedTuple):
+class SolverWorkspace(NamedTuple):
     """Working arrays of a march: points, one point, forces; displacements (2 nodes,) now, at the start of the step, and
     (stages, 2 nodes) at the stages.
     """
 
-    points: Points
-    point: PointRoom
-    forces: Forces
+    points: PointStates
+    point: PointWorkspace
+    forces: ForceWorkspace
     displacement: Floats
     start: Floats
     stages: Floats
 
 
-class Ended(NamedTuple):
+class Termination(NamedTuple):
     """Number of records, code, time s."""
 
     records: int
@@ -87,13 +87,13 @@ class Ended(NamedTuple):
     time: float
 
 
-def rooms_of(body: Body, states: int, stages: int) -> Rooms:
+def solver_workspace(body: FiniteElementModel, states: int, stages: int) -> SolverWorkspace:
     """Allocate the working arrays."""
     size = body.equations.size
-    return Rooms(
-        points_of(4 * len(body.elements), states, stages),
-        point_room(states, 0),
-        forces_of(body),
+    return SolverWorkspace(
+        virgin_points(4 * len(body.elements), states, stages),
+        point_workspace(states, 0),
+        force_workspace(body),
         np.zeros(size),
         np.zeros(size),
         np.zeros((stages, size)),
@@ -101,13 +101,13 @@ def rooms_of(body: Body, states: int, stages: int) -> Rooms:
 
 
 @njit(cache=True, error_model="numpy")
-def make_virgin(points: Points, initial: Floats) -> None:
+def make_virgin(points: PointStates, initial: Floats) -> None:
     """Virgin points."""
     for k in range(points.value.shape[0]):
         points.increments[k] = 0.0
         points.mises[k] = 0.0
         for v in range(points.value.shape[1]):
-            points.value[k, v] = initial[v - EQUIVALENT - 1] if v > EQUIVALENT else 0.0
+            points.value[k, v] = initial[v - EQUIVALENT_STRAIN - 1] if v > EQUIVALENT_STRAIN else 0.0
             for i in range(points.slopes.shape[0]):
                 points.slopes[i, k, v] = 0.0
         for i in range(initial.size):
@@ -122,7 +122,7 @@ def copy(source: Floats, target: Floats) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def keep(record: Record, ended: Ended, time: float, n: int, u: Floats, points: Points) -> Ended:
+def record_step(record: StepRecord, ended: Termination, time: float, n: int, u: Floats, points: PointStates) -> Termination:
     """Write a row of the record."""
     row = ended.records
     record.times[row], record.segments[row] = time, n
@@ -133,4 +133,4 @@ def keep(record: Record, ended: Ended, time: float, n: int, u: Floats, points: P
     if record.values.shape[0] > 0:
         for k in range(points.value.shape[0]):
             copy(points.value[k], record.values[row, k])
-    return Ended(row + 1, REACHED_END, time)
+    return Termination(row + 1, REACHED_END, time)

@@ -16,14 +16,14 @@ from numba import njit
 
 from creepkit.arrays import Floats
 from creepkit.fem.band import eliminate_rows, solve_rows
-from creepkit.fem.body import Body
-from creepkit.fem.columns import BY_MOMENT, ChangeRoom, Columns, set_inputs
-from creepkit.fem.material import EQUIVALENT, PointRoom, Stage
-from creepkit.fem.record import START, Record
-from creepkit.fem.slope_changes import follow_displacements
-from creepkit.fem.stage_changes import assemble_changes, clear_rows, press_changes
-from creepkit.fem.steps import clock_of, stage_at
-from creepkit.integration.clock import moment
+from creepkit.fem.body import FiniteElementModel
+from creepkit.fem.columns import BY_MOMENT, SensitivityWorkspace, SensitivityDirections, set_input_derivatives
+from creepkit.fem.material import EQUIVALENT_STRAIN, PointWorkspace, StageConditions
+from creepkit.fem.record import START, StepRecord
+from creepkit.fem.slope_changes import rate_sensitivities
+from creepkit.fem.stage_changes import assemble_sensitivities, clear_rows, pressure_sensitivities
+from creepkit.fem.steps import segment_transformation, stage_at
+from creepkit.integration.clock import transformed_time
 from creepkit.integration.tableau import Tableau
 
 DONE, SINGULAR = range(2)
@@ -31,20 +31,20 @@ DONE, SINGULAR = range(2)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def differentiate(
+def differentiate_program(
     sensitivity: Any,
     theta: Floats,
     beta: float,
     poisson: float,
-    body: Body,
+    body: FiniteElementModel,
     segments: Floats,
-    columns: Columns,
+    columns: SensitivityDirections,
     tableau: Tableau,
     initial: Floats,
-    record: Record,
+    record: StepRecord,
     count: int,
-    point: PointRoom,
-    room: ChangeRoom,
+    point: PointWorkspace,
+    room: SensitivityWorkspace,
     surface: Floats,
     times: Floats,
 ) -> int:
@@ -53,7 +53,7 @@ def differentiate(
     record : of a march that kept its stages; count : its rows. The first row is the body at rest; a row whose step has
     no length is a sudden change of load, with one stage.
     """
-    _start(room, initial)
+    _start_sensitivities(room, initial)
     for row in range(1, count):
         n = record.segments[row]
         segment, s, h = segments[n], record.places[row, 0], record.places[row, 1]
@@ -61,16 +61,16 @@ def differentiate(
         for i in range(1 if sudden else tableau.c.size):
             at, time, weight = s + tableau.c[i] * h, segment[START], 0.0
             if not sudden:
-                now = moment(clock_of(segment, beta), at)
+                now = transformed_time(segment_transformation(segment, beta), at)
                 time, weight = now.time, tableau.a[i, i] * h * exp(now.log_pace)
             stage = stage_at(segment, poisson, time, weight)
-            set_inputs(segments, columns.directions, n, beta, at, sudden, room.inputs)
-            if not _stage(sensitivity, theta, stage, body, columns, tableau, record, row, i, h, point, room):
+            set_input_derivatives(segments, columns.directions, n, beta, at, sudden, room.inputs)
+            if not _stage_sensitivities(sensitivity, theta, stage, body, columns, tableau, record, row, i, h, point, room):
                 return SINGULAR
         for d in range(times.shape[1]):
             times[row, d] = room.inputs[BY_MOMENT, d]
         if not sudden:
-            _advance(record, row, tableau, h, room)
+            _advance_sensitivities(record, row, tableau, h, room)
         for k in range(body.top.size):
             equation = body.equations[2 * body.top[k] + 1]
             for c in range(surface.shape[2]):
@@ -79,16 +79,16 @@ def differentiate(
 
 
 @njit(cache=True, error_model="numpy")
-def _start(room: ChangeRoom, initial: Floats) -> None:
+def _start_sensitivities(room: SensitivityWorkspace, initial: Floats) -> None:
     for k in range(room.value.shape[0]):
         for v in range(room.value.shape[1]):
-            room.value[k, v] = initial[v - EQUIVALENT - 1] if v > EQUIVALENT else 0.0
+            room.value[k, v] = initial[v - EQUIVALENT_STRAIN - 1] if v > EQUIVALENT_STRAIN else 0.0
             for c in range(room.change.shape[2]):
                 room.change[k, v, c] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def _advance(record: Record, row: int, tableau: Tableau, h: float, room: ChangeRoom) -> None:
+def _advance_sensitivities(record: StepRecord, row: int, tableau: Tableau, h: float, room: SensitivityWorkspace) -> None:
     """Move history and its changes to the end of the step."""
     last = tableau.c.size - 1
     value, change, rates = room.value, room.change, room.rates
@@ -102,34 +102,34 @@ def _advance(record: Record, row: int, tableau: Tableau, h: float, room: ChangeR
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _stage(
+def _stage_sensitivities(
     sensitivity: Any,
     theta: Floats,
-    stage: Stage,
-    body: Body,
-    columns: Columns,
+    stage: StageConditions,
+    body: FiniteElementModel,
+    columns: SensitivityDirections,
     tableau: Tableau,
-    record: Record,
+    record: StepRecord,
     row: int,
     i: int,
     h: float,
-    point: PointRoom,
-    room: ChangeRoom,
+    point: PointWorkspace,
+    room: SensitivityWorkspace,
 ) -> bool:
     """Changes of the displacements (left in room.right) and of the slopes of stage `i`; False when singular."""
     share, displacement = tableau.a[i, i] * h, record.stages[row, i]
     clear_rows(room.rows)
     clear_rows(room.right)
-    assemble_changes(
+    assemble_sensitivities(
         sensitivity, theta, stage, body, columns, tableau, record.slopes, row, i, h, share, point, room, displacement
     )
-    press_changes(body, stage.pressure, columns, theta.size, displacement, room)
+    pressure_sensitivities(body, stage.pressure, columns, theta.size, displacement, room)
     size, width = body.size, body.width
     if not eliminate_rows(room.rows, size, width):
         return False
     solve_rows(room.rows, size, width, room.right)
     if h > 0.0:
-        follow_displacements(
+        rate_sensitivities(
             body, stage, columns, theta.size, record.slopes, row, i, h, share, tableau, room, displacement
         )
     return True

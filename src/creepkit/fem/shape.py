@@ -14,7 +14,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS, Mesh
 
-POINTS = CORNERS / np.sqrt(3.0)
+GAUSS_POINTS = CORNERS / np.sqrt(3.0)
 """The 2 x 2 Gauss points (4, 2) of the reference element, each near the corner of its number; all weights are 1."""
 
 
@@ -34,7 +34,7 @@ class Discretization(NamedTuple):
     points: Floats
 
 
-class GeometryChange(NamedTuple):
+class GeometryDerivative(NamedTuple):
     """How the points move with a number of the geometry, for each unit of it.
 
     gradient : (elements, 4, 2, 2) derivative of the velocity's component (first of the two) to r and z.
@@ -71,10 +71,10 @@ def discretize(mesh: Mesh) -> Discretization:
     """Everything an integral over the mesh needs; an inverted element is refused."""
     refuse_inverted(mesh)
     nodes = mesh.nodes[mesh.elements]
-    values = shape_functions(POINTS)
+    values = shape_functions(GAUSS_POINTS)
     points = np.einsum("pa,eai->epi", values, nodes)
-    tangents = local_tangents(nodes, POINTS)
-    slopes = np.einsum("epji,pai->epja", np.linalg.inv(tangents), shape_gradients(POINTS))
+    tangents = local_tangents(nodes, GAUSS_POINTS)
+    slopes = np.einsum("epji,pai->epja", np.linalg.inv(tangents), shape_gradients(GAUSS_POINTS))
     return Discretization(
         by_radius=np.ascontiguousarray(slopes[:, :, 0]),
         by_height=np.ascontiguousarray(slopes[:, :, 1]),
@@ -84,12 +84,12 @@ def discretize(mesh: Mesh) -> Discretization:
     )
 
 
-def geometry_change(mesh: Mesh, velocity: Floats) -> GeometryChange:
+def geometry_derivative(mesh: Mesh, velocity: Floats) -> GeometryDerivative:
     """What exact shape derivatives need when the nodes move with `velocity` (nodes, 2), mm a unit of the number."""
     at = discretize(mesh)
     moves = velocity[mesh.elements]
     gradient = np.stack([np.einsum("epa,eai->epi", slopes, moves) for slopes in (at.by_radius, at.by_height)], axis=3)
-    return GeometryChange(gradient, np.einsum("epa,ea->ep", at.over_radius, moves[:, :, 0]))
+    return GeometryDerivative(gradient, np.einsum("epa,ea->ep", at.over_radius, moves[:, :, 0]))
 
 
 def local_tangents(nodes: Floats, places: Floats) -> Floats:
@@ -99,7 +99,7 @@ def local_tangents(nodes: Floats, places: Floats) -> Floats:
 
 def refuse_inverted(mesh: Mesh) -> None:
     """Raise SolveError when an element is turned inside out at a corner or at an integration point."""
-    places = np.vstack([CORNERS, POINTS])
+    places = np.vstack([CORNERS, GAUSS_POINTS])
     areas = np.linalg.det(local_tangents(mesh.nodes[mesh.elements], places))
     bad = np.flatnonzero(~(areas > 0).all(axis=1))
     if bad.size:

@@ -10,10 +10,10 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
-from creepkit.fem.body import Body
-from creepkit.fem.columns import Columns, change_room
-from creepkit.fem.element import point_room
-from creepkit.fem.march import march
+from creepkit.fem.body import FiniteElementModel
+from creepkit.fem.columns import SensitivityDirections, sensitivity_workspace
+from creepkit.fem.element import point_workspace
+from creepkit.fem.march import integrate_program
 from creepkit.fem.record import (
     DEFLECTION_LIMIT,
     LAW_FAILED,
@@ -23,15 +23,15 @@ from creepkit.fem.record import (
     STATE_LIMIT,
     STRAIN_LIMIT,
     TOO_MANY_STEPS,
-    Record,
-    Settings,
-    rooms_of,
+    StepRecord,
+    SolverSettings,
+    solver_workspace,
 )
 from creepkit.fem.sensitivity import DONE
-from creepkit.fem.sensitivity import differentiate as replay
-from creepkit.fem.shape import GeometryChange
-from creepkit.fem.timeline import Timeline
-from creepkit.integration.segments import segments_of
+from creepkit.fem.sensitivity import differentiate_program as replay
+from creepkit.fem.shape import GeometryDerivative
+from creepkit.fem.timeline import TimeInterpolation
+from creepkit.integration.segments import merge_programs
 from creepkit.integration.tableau import SDIRK2
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.records import Program, Status
@@ -50,15 +50,15 @@ REASONS = {
 
 _STATUS = {
     REACHED_END: Status.COMPLETE,
-    DEFLECTION_LIMIT: Status.BURST,
-    STRAIN_LIMIT: Status.BURST,
-    STATE_LIMIT: Status.BURST,
-    LIMIT_LOAD: Status.BURST,
+    DEFLECTION_LIMIT: Status.RUPTURED,
+    STRAIN_LIMIT: Status.RUPTURED,
+    STATE_LIMIT: Status.RUPTURED,
+    LIMIT_LOAD: Status.RUPTURED,
 }
 
 
 @dataclass(frozen=True)
-class Course:
+class LoadHistory:
     """What a body goes through: programs of pressure MPa, temperature K, modulus E MPa, and motion of held nodes.
 
     pattern : (nodes, 2) mm of displacement of the held nodes for a unit of motion; None holds them still.
@@ -76,7 +76,7 @@ class Course:
     @cached_property
     def segments(self) -> Floats:
         """The programs merged, (segments, 10)."""
-        return segments_of(self.pressure, self.temperature, self.modulus, self.motion, end=self.end)
+        return merge_programs(self.pressure, self.temperature, self.modulus, self.motion, end=self.end)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,11 +97,11 @@ class Simulation:
     status: Status
     end_time: float
     reason: str
-    counts: Ints
-    timeline: Timeline
+    iterations: Ints
+    timeline: TimeInterpolation
     beta: float
-    places: Floats
-    record: Record | None = None
+    positions: Floats
+    record: StepRecord | None = None
 
     def at(self, values: Floats, times: Floats) -> Floats:
         """Values (steps, ...) of the accepted steps at other times, (times, ...); NaN after the end."""
@@ -109,25 +109,25 @@ class Simulation:
 
 
 def simulate(
-    law: CompiledLaw, theta: Floats, body: Body, course: Course, *, settings: Settings | None = None,
-    keep_points: bool = False, keep_stages: bool = False, like: Simulation | None = None,
+    law: CompiledLaw, theta: Floats, model: FiniteElementModel, load_history: LoadHistory, *, settings: SolverSettings | None = None,
+    keep_points: bool = False, keep_stages: bool = False, same_steps_as: Simulation | None = None,
 ) -> Simulation:  # fmt: skip
     """March one body through its course; theta : (P,) internal parameters.
 
     keep_points : keep strains and states of all points; keep_stages : keep what `differentiate` needs.
     like : make the very steps of another simulation, so that the two may be differenced.
     """
-    settings = settings or Settings()
+    settings = settings or SolverSettings()
     theta = np.ascontiguousarray(theta, dtype=float)
-    beta = float(np.asarray(law.leading(theta))) if like is None else like.beta
-    script = np.zeros((0, 2)) if like is None else like.places
-    record = _record(law, body, course, settings, keep_points, keep_stages)
-    pattern = np.zeros(body.equations.size)
-    if course.pattern is not None:
-        pattern[:] = np.ravel(course.pattern)
-    ended = march(
-        law.update, theta, beta, course.poisson, body, course.segments, pattern, np.array(law.initial),
-        np.array(law.limits), settings, SDIRK2, rooms_of(body, law.states, SDIRK2.stages), script, record,
+    beta = float(np.asarray(law.leading_exponent(theta))) if same_steps_as is None else same_steps_as.beta
+    script = np.zeros((0, 2)) if same_steps_as is None else same_steps_as.positions
+    record = _record(law, model, load_history, settings, keep_points, keep_stages)
+    pattern = np.zeros(model.equations.size)
+    if load_history.pattern is not None:
+        pattern[:] = np.ravel(load_history.pattern)
+    ended = integrate_program(
+        law.update, theta, beta, load_history.poisson, model, load_history.segments, pattern, np.array(law.initial),
+        np.array(law.limits), settings, SDIRK2, solver_workspace(model, law.states, SDIRK2.stages), script, record,
     )  # fmt: skip
     n = ended.records
     return Simulation(
@@ -138,21 +138,21 @@ def simulate(
         status=_STATUS.get(ended.code, Status.NOT_CONVERGED),
         end_time=float(ended.time),
         reason=REASONS[int(ended.code)],
-        counts=record.counts,
-        timeline=Timeline.of(record.times[:n], record.segments[:n], course.segments, beta),
+        iterations=record.counts,
+        timeline=TimeInterpolation.from_steps(record.times[:n], record.segments[:n], load_history.segments, beta),
         beta=beta,
-        places=record.places[:n].copy(),
+        positions=record.places[:n].copy(),
         record=record if keep_stages else None,
     )
 
 
 def _record(
-    law: CompiledLaw, body: Body, course: Course, settings: Settings, keep_points: bool, keep_stages: bool
-) -> Record:
+    law: CompiledLaw, body: FiniteElementModel, load_history: LoadHistory, settings: SolverSettings, keep_points: bool, keep_stages: bool
+) -> StepRecord:
     """Room for as many steps as the settings allow; memory is only taken where it is written."""
-    rows, size, points = settings.max_steps + len(course.segments) + 2, body.equations.size, 4 * len(body.elements)
+    rows, size, points = settings.max_steps + len(load_history.segments) + 2, body.equations.size, 4 * len(body.elements)
     kept, values = rows if keep_stages else 0, 4 + law.states
-    return Record(
+    return StepRecord(
         times=np.zeros(rows),
         segments=np.zeros(rows, np.int64),
         displacements=np.zeros((rows, size)),
@@ -166,7 +166,7 @@ def _record(
 
 
 @dataclass(frozen=True, eq=False)
-class Change:
+class SurfaceSensitivities:
     """Derivatives of a march.
 
     surface : (steps, top, C) of u_z of the observed nodes, to the law's internal parameters, then to the directions
@@ -178,34 +178,34 @@ class Change:
     times: Floats
 
 
-def differentiate(
-    law: CompiledLaw, theta: Floats, body: Body, course: Course, made: Simulation, *,
-    directions: Floats | None = None, velocities: Sequence[tuple[GeometryChange, Floats]] = (),
-) -> Change:  # fmt: skip
+def sensitivities(
+    law: CompiledLaw, theta: Floats, model: FiniteElementModel, load_history: LoadHistory, simulation: Simulation, *,
+    directions: Floats | None = None, velocities: Sequence[tuple[GeometryDerivative, Floats]] = (),
+) -> SurfaceSensitivities:  # fmt: skip
     """Exact derivatives of a march that kept its stages.
 
     directions : (D, segments, 10) derivatives of `course.segments`.
     velocities : for each number of the geometry its GeometryChange and the velocities (nodes, 2) of the nodes.
     """
-    if made.record is None:
+    if simulation.record is None:
         raise SolveError("this simulation kept no stages; simulate with keep_stages=True to differentiate it")
     theta = np.ascontiguousarray(theta, dtype=float)
-    segments = course.segments
+    segments = load_history.segments
     along = np.zeros((0, *segments.shape)) if directions is None else np.ascontiguousarray(directions, dtype=float)
-    points = (len(velocities), *body.weights.shape)
-    columns = Columns(
+    points = (len(velocities), *model.weights.shape)
+    columns = SensitivityDirections(
         along,
         np.array([g.gradient for g, _ in velocities]).reshape(*points, 2, 2),
         np.array([g.hoop for g, _ in velocities]).reshape(points),
-        np.array([np.ravel(v) for _, v in velocities]).reshape(len(velocities), body.equations.size),
+        np.array([np.ravel(v) for _, v in velocities]).reshape(len(velocities), model.equations.size),
     )
-    count, total = made.times.size, theta.size + len(along) + len(velocities)
-    surface, times = np.zeros((count, body.top.size, total)), np.zeros((count, len(along)))
+    count, total = simulation.times.size, theta.size + len(along) + len(velocities)
+    surface, times = np.zeros((count, model.top.size, total)), np.zeros((count, len(along)))
     flag = replay(
-        law.sensitivity, theta, made.beta, course.poisson, body, segments, columns, SDIRK2,
-        np.array(law.initial), made.record, count, point_room(law.states, theta.size),
-        change_room(body, law.states, SDIRK2.stages, total, len(along)), surface, times,
+        law.sensitivity, theta, simulation.beta, load_history.poisson, model, segments, columns, SDIRK2,
+        np.array(law.initial), simulation.record, count, point_workspace(law.states, theta.size),
+        sensitivity_workspace(model, law.states, SDIRK2.stages, total, len(along)), surface, times,
     )  # fmt: skip
     if flag != DONE:
         surface[:] = np.nan
-    return Change(surface, times)
+    return SurfaceSensitivities(surface, times)

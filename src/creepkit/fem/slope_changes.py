@@ -6,19 +6,19 @@ from numba import njit
 
 from creepkit.arrays import Floats, Ints
 from creepkit.fem.blocks import deformation, gather
-from creepkit.fem.body import Body
-from creepkit.fem.columns import ChangeRoom, Columns
-from creepkit.fem.material import EQUIVALENT, Stage, elastic_part
-from creepkit.fem.point_changes import gradient_shift
+from creepkit.fem.body import FiniteElementModel
+from creepkit.fem.columns import SensitivityWorkspace, SensitivityDirections
+from creepkit.fem.material import EQUIVALENT_STRAIN, StageConditions, elastic_predictor
+from creepkit.fem.point_changes import gradient_sensitivity
 from creepkit.fem.strain import DIFFERENCE, HOOP, SHEAR, SUM, Kinematics, kinematics, strain_change
 from creepkit.integration.tableau import Tableau
 
 
 @njit(cache=True, error_model="numpy")
-def follow_displacements(
-    body: Body,
-    stage: Stage,
-    columns: Columns,
+def rate_sensitivities(
+    body: FiniteElementModel,
+    stage: StageConditions,
+    columns: SensitivityDirections,
     parameters: int,
     slopes: Floats,
     row: int,
@@ -26,7 +26,7 @@ def follow_displacements(
     h: float,
     share: float,
     tableau: Tableau,
-    room: ChangeRoom,
+    room: SensitivityWorkspace,
     displacement: Floats,
 ) -> None:
     """Changes of the slopes of stage `i`, now that the changes of the displacements are known."""
@@ -47,14 +47,14 @@ def follow_displacements(
                 for j in range(i):
                     history[v] += h * tableau.a[i, j] * slopes[row, j, k, v]
             at = kinematics(deformation(by_radius, by_height, over_radius, e, g, local))
-            elastic = elastic_part(stage, at, wide, 0)
+            elastic = elastic_predictor(stage, at, wide, 0)
             _gradient_changes(by_radius, by_height, over_radius, e, g, moved, dF)
             for q in range(columns.gradients.shape[0]):
-                shift = gradient_shift(columns, q, e, g, at.F)
+                shift = gradient_sensitivity(columns, q, e, g, at.F)
                 for j in range(5):
                     dF[j, first + q] += shift[j]
             _strain_matrix(at, by_strain)
-            increment = share * slopes[row, i, k, EQUIVALENT]
+            increment = share * slopes[row, i, k, EQUIVALENT_STRAIN]
             unit = 1.0 / elastic.equivalent if elastic.equivalent > 0.0 else 0.0
             n0, n1, n2 = elastic.hoop * unit, elastic.difference * unit, elastic.shear * unit
             left = increment * unit
@@ -73,11 +73,11 @@ def follow_displacements(
                 rates[i, k, 0, c] = inverse * (creep * n0 + left * (w0 - n0 * stretched))
                 rates[i, k, 1, c] = inverse * (creep * n1 + left * (w1 - n1 * stretched))
                 rates[i, k, 2, c] = inverse * (creep * n2 + left * (w2 - n2 * stretched))
-                rates[i, k, EQUIVALENT, c] = inverse * creep
+                rates[i, k, EQUIVALENT_STRAIN, c] = inverse * creep
                 for z in range(1, own.shape[1]):
                     state = own[k, z, c] + follow[k, z, 0] * w0 + follow[k, z, 1] * w1 + follow[k, z, 2] * w2
-                    state += follow[k, z, 3] * trace - base[k, EQUIVALENT + z, c]
-                    rates[i, k, EQUIVALENT + z, c] = inverse * state
+                    state += follow[k, z, 3] * trace - base[k, EQUIVALENT_STRAIN + z, c]
+                    rates[i, k, EQUIVALENT_STRAIN + z, c] = inverse * state
 
 
 @njit(cache=True, error_model="numpy")

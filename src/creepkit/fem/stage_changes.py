@@ -8,10 +8,10 @@ from numba import njit
 
 from creepkit.arrays import Floats, Ints
 from creepkit.fem.blocks import deformation, gather
-from creepkit.fem.body import Body
-from creepkit.fem.columns import BY_PRESSURE, BY_STIFFNESS, ChangeRoom, Columns
-from creepkit.fem.material import EQUIVALENT, PointRoom, Stage, elastic_part, log_stress, tangent_moduli
-from creepkit.fem.point_changes import answer, history_of, shape_change, stress_changes
+from creepkit.fem.body import FiniteElementModel
+from creepkit.fem.columns import BY_PRESSURE, BY_STIFFNESS, SensitivityWorkspace, SensitivityDirections
+from creepkit.fem.material import EQUIVALENT_STRAIN, PointWorkspace, StageConditions, elastic_predictor, log_stress, tangent_moduli
+from creepkit.fem.point_changes import creep_response, stage_history, shape_sensitivity, stress_sensitivities
 from creepkit.fem.pressure import side_force, side_stiffness
 from creepkit.fem.strain import Five, Kinematics, energy_slopes, kinematics, piola_tangent, to_gradient
 from creepkit.integration.tableau import Tableau
@@ -20,20 +20,20 @@ _FAST = {"reassoc", "contract", "nsz"}
 
 
 @njit(cache=True, error_model="numpy")
-def assemble_changes(
+def assemble_sensitivities(
     sensitivity: Any,
     theta: Floats,
-    stage: Stage,
-    body: Body,
-    columns: Columns,
+    stage: StageConditions,
+    body: FiniteElementModel,
+    columns: SensitivityDirections,
     tableau: Tableau,
     slopes: Floats,
     row: int,
     i: int,
     h: float,
     share: float,
-    point: PointRoom,
-    room: ChangeRoom,
+    point: PointWorkspace,
+    room: SensitivityWorkspace,
     displacement: Floats,
 ) -> None:
     """Exact tangent, and minus the out-of-balance forces of every column at fixed displacements."""
@@ -60,11 +60,11 @@ def assemble_changes(
         clear_rows(element_right)
         for g in range(4):
             k = 4 * e + g
-            history_of(slopes, row, i, k, h, tableau, value, change, rates, history, base)
+            stage_history(slopes, row, i, k, h, tableau, value, change, rates, history, base)
             at = kinematics(deformation(by_radius, by_height, over_radius, e, g, local))
-            elastic = elastic_part(stage, at, wide, 0)
-            increment = share * slopes[row, i, k, EQUIVALENT] if h > 0.0 else 0.0
-            answer(sensitivity, theta, stage, elastic, slopes, row, i, k, share, increment, h > 0.0, point, room)
+            elastic = elastic_predictor(stage, at, wide, 0)
+            increment = share * slopes[row, i, k, EQUIVALENT_STRAIN] if h > 0.0 else 0.0
+            creep_response(sensitivity, theta, stage, elastic, slopes, row, i, k, share, increment, h > 0.0, point, room)
             by = (follow[k, 0, 0], follow[k, 0, 1], follow[k, 0, 2], follow[k, 0, 3])
             moduli = tangent_moduli(stage, elastic, increment, by, False)
             stress = log_stress(stage, elastic, increment)
@@ -72,7 +72,7 @@ def assemble_changes(
             piola_tangent(at, moduli, stress, energy, tangent)
             weight = weights[e, g]
             add_full_stiffness(by_radius, by_height, over_radius, e, g, tangent, weight, products, element)
-            stress_changes(stage, elastic, moduli, increment, base, own, k, dy)
+            stress_sensitivities(stage, elastic, moduli, increment, base, own, k, dy)
             unit_forces(at, by_radius, by_height, over_radius, e, g, weight, force)
             for a in range(16):
                 fa, fb, fc = force[a, 0], force[a, 1], force[a, 2]
@@ -86,11 +86,11 @@ def assemble_changes(
                         by_radius, by_height, over_radius, e, g, P, -weight * stiffer, parameters + d, element_right
                     )
             for q in range(columns.gradients.shape[0]):
-                moved = shape_change(columns, q, e, g, at, P, tangent)
+                moved = shape_sensitivity(columns, q, e, g, at, P, tangent)
                 add_column(
                     by_radius, by_height, over_radius, e, g, moved, -weight, parameters + directions + q, element_right
                 )
-        scatter(elements, equations, e, body.width, element, room.rows, element_right, right)
+        scatter_sensitivities(elements, equations, e, body.width, element, room.rows, element_right, right)
 
 
 @njit(cache=True, error_model="numpy")
@@ -144,7 +144,7 @@ def add_full_stiffness(
 
 
 @njit(cache=True, error_model="numpy")
-def scatter(
+def scatter_sensitivities(
     elements: Ints, equations: Ints, e: int, width: int, element: Floats, rows: Floats, element_right: Floats,
     right: Floats,
 ) -> None:  # fmt: skip
@@ -164,8 +164,8 @@ def scatter(
 
 
 @njit(cache=True, error_model="numpy")
-def press_changes(
-    body: Body, pressure: float, columns: Columns, parameters: int, displacement: Floats, room: ChangeRoom
+def pressure_sensitivities(
+    body: FiniteElementModel, pressure: float, columns: SensitivityDirections, parameters: int, displacement: Floats, room: SensitivityWorkspace
 ) -> None:
     """The pressure's exact load stiffness, and its forces in the columns that change it or move the surface."""
     directions = columns.directions.shape[0]

@@ -9,39 +9,39 @@ from numba import njit
 
 from creepkit.arrays import Floats
 from creepkit.fem.band import solve_factorized
-from creepkit.fem.body import Body
-from creepkit.fem.element import Points, error_forces
-from creepkit.fem.equilibrium import FOUND, balance
-from creepkit.fem.material import EQUIVALENT, Stage
+from creepkit.fem.body import FiniteElementModel
+from creepkit.fem.element import PointStates, error_forces
+from creepkit.fem.equilibrium import CONVERGED, solve_equilibrium
+from creepkit.fem.material import EQUIVALENT_STRAIN, StageConditions
 from creepkit.fem.record import (
     END,
     END_MODULUS,
     END_MOTION,
     END_PRESSURE,
-    END_WARMTH,
+    FINAL_TEMPERATURE,
     MODULUS,
     MOTION,
     PRESSURE,
     START,
-    WARMTH,
-    Record,
-    Rooms,
-    Settings,
+    START_TEMPERATURE,
+    StepRecord,
+    SolverWorkspace,
+    SolverSettings,
     copy,
 )
-from creepkit.integration.clock import Clock, moment, plain, position, virgin
+from creepkit.integration.clock import TimeTransformation, transformed_time, linear_time, position, power_law_time
 from creepkit.integration.tableau import Tableau
 
 
 @njit(cache=True, error_model="numpy")
-def stage_at(segment: Floats, poisson: float, time: float, weight: float) -> Stage:
+def stage_at(segment: Floats, poisson: float, time: float, weight: float) -> StageConditions:
     """What all points share at a time of a segment."""
     share = (time - segment[START]) / (segment[END] - segment[START])
     modulus = segment[MODULUS] + share * (segment[END_MODULUS] - segment[MODULUS])
-    return Stage(
+    return StageConditions(
         weight,
         time,
-        segment[WARMTH] + share * (segment[END_WARMTH] - segment[WARMTH]),
+        segment[START_TEMPERATURE] + share * (segment[FINAL_TEMPERATURE] - segment[START_TEMPERATURE]),
         modulus / (3.0 * (1.0 - 2.0 * poisson)),
         modulus / (2.0 * (1.0 + poisson)),
         segment[PRESSURE] + share * (segment[END_PRESSURE] - segment[PRESSURE]),
@@ -49,18 +49,18 @@ def stage_at(segment: Floats, poisson: float, time: float, weight: float) -> Sta
 
 
 @njit(cache=True, error_model="numpy")
-def clock_of(segment: Floats, beta: float) -> Clock:
+def segment_transformation(segment: Floats, beta: float) -> TimeTransformation:
     """t^beta from time zero, for a law whose strain begins as t^beta; plain time while the load rises from nothing."""
     start, length = segment[START], segment[END] - segment[START]
     if beta >= 1.0 or (start == 0.0 and segment[PRESSURE] == 0.0):
-        return plain(start, length)
+        return linear_time(start, length)
     if start == 0.0:
-        return virgin(start, length, beta)
-    return Clock(start, length, max(beta, 0.05), start)
+        return power_law_time(start, length, beta)
+    return TimeTransformation(start, length, max(beta, 0.05), start)
 
 
 @njit(cache=True, error_model="numpy")
-def set_base(points: Points, tableau: Tableau, h: float, i: int) -> None:
+def set_stage_history(points: PointStates, tableau: Tableau, h: float, i: int) -> None:
     """Write the history of stage `i`."""
     for k in range(points.value.shape[0]):
         for v in range(points.value.shape[1]):
@@ -71,21 +71,21 @@ def set_base(points: Points, tableau: Tableau, h: float, i: int) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def set_slopes(points: Points, share: float, i: int) -> None:
+def set_slopes(points: PointStates, share: float, i: int) -> None:
     """Write the slopes of stage `i` from its increments; share : gamma h."""
     inverse = 1.0 / share
     for k in range(points.value.shape[0]):
         rate = points.increments[k] * inverse
         slopes, direction = points.slopes[i, k], points.directions[k]
-        for v in range(EQUIVALENT):
+        for v in range(EQUIVALENT_STRAIN):
             slopes[v] = rate * direction[v]
-        slopes[EQUIVALENT] = rate
-        for v in range(EQUIVALENT + 1, slopes.size):
-            slopes[v] = (points.states[k, v - EQUIVALENT - 1] - points.base[k, v]) * inverse
+        slopes[EQUIVALENT_STRAIN] = rate
+        for v in range(EQUIVALENT_STRAIN + 1, slopes.size):
+            slopes[v] = (points.states[k, v - EQUIVALENT_STRAIN - 1] - points.base[k, v]) * inverse
 
 
 @njit(cache=True, error_model="numpy")
-def finish(points: Points, tableau: Tableau, h: float) -> tuple[float, float]:
+def finish_step(points: PointStates, tableau: Tableau, h: float) -> tuple[float, float]:
     """Move the points to the end of the step; return the largest equivalent creep strain."""
     last, worst = tableau.c.size - 1, 0.0
     for k in range(points.value.shape[0]):
@@ -94,12 +94,12 @@ def finish(points: Points, tableau: Tableau, h: float) -> tuple[float, float]:
             for i in range(tableau.c.size):
                 total += h * tableau.a[last, i] * points.slopes[i, k, v]
             points.value[k, v] = total
-        worst = max(worst, points.value[k, EQUIVALENT])
+        worst = max(worst, points.value[k, EQUIVALENT_STRAIN])
     return worst, 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def largest_rise(body: Body, u: Floats) -> float:
+def largest_displacement(body: FiniteElementModel, u: Floats) -> float:
     """Largest displacement of the observed surface, or of the whole body if none is observed, mm."""
     worst = 0.0
     if body.top.size > 0:
@@ -112,7 +112,7 @@ def largest_rise(body: Body, u: Floats) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def hold(body: Body, pattern: Floats, motion: float, u: Floats) -> None:
+def prescribe_motion(body: FiniteElementModel, pattern: Floats, motion: float, u: Floats) -> None:
     """Put held nodes where the motion takes them."""
     for k in range(pattern.size):
         if body.equations[k] < 0:
@@ -120,9 +120,9 @@ def hold(body: Body, pattern: Floats, motion: float, u: Floats) -> None:
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def try_step(
-    update: Any, theta: Floats, clock: Clock, poisson: float, body: Body, segment: Floats, pattern: Floats,
-    settings: Settings, tableau: Tableau, rooms: Rooms, record: Record, first: int, rows: int, s: float, h: float,
+def attempt_step(
+    update: Any, theta: Floats, clock: TimeTransformation, poisson: float, body: FiniteElementModel, segment: Floats, pattern: Floats,
+    settings: SolverSettings, tableau: Tableau, rooms: SolverWorkspace, record: StepRecord, first: int, rows: int, s: float, h: float,
 ) -> tuple[int, float]:  # fmt: skip
     """Try one step from `s`; the displacement ends where the last stage does.
 
@@ -130,24 +130,24 @@ def try_step(
     """
     points, forces, u, start, stage_u = rooms.points, rooms.forces, rooms.displacement, rooms.start, rooms.stages
     last = tableau.c.size - 1
-    scale = 0.01 + largest_rise(body, start)
+    scale = 0.01 + largest_displacement(body, start)
     tight = min(1e-3, sqrt(settings.newton))
     stage = stage_at(segment, poisson, segment[START], 0.0)
     for i in range(tableau.c.size):
-        now = moment(clock, s + tableau.c[i] * h)
+        now = transformed_time(clock, s + tableau.c[i] * h)
         share = tableau.a[i, i] * h
         stage = stage_at(segment, poisson, now.time, share * exp(now.log_pace))
-        set_base(points, tableau, h, i)
+        set_stage_history(points, tableau, h, i)
         _guess(points, share, i, last)
         _predict(record, first, rows, stage_u, i, start, clock, segment, s, tableau, h, u)
         motion = segment[MOTION] + (segment[END_MOTION] - segment[MOTION]) * (now.time - clock.start) / clock.length
-        hold(body, pattern, motion, u)
-        outcome = balance(
+        prescribe_motion(body, pattern, motion, u)
+        outcome = solve_equilibrium(
             update, theta, body, stage, u, points, rooms.point, forces, settings.newton * scale, 1.0, tight
         )
         record.counts[2] += outcome.full
         record.counts[3] += outcome.light
-        if outcome.flag != FOUND:
+        if outcome.flag != CONVERGED:
             return outcome.flag, 0.0
         set_slopes(points, share, i)
         copy(u, stage_u[i])
@@ -156,24 +156,24 @@ def try_step(
     error = 0.0
     for k in range(body.size):
         error = max(error, abs(forces.residual[k]))
-    return FOUND, error / (settings.tolerance * scale)
+    return CONVERGED, error / (settings.tolerance * scale)
 
 
 @njit(cache=True, error_model="numpy")
-def _guess(points: Points, share: float, i: int, last: int) -> None:
+def _guess(points: PointStates, share: float, i: int, last: int) -> None:
     """Guess increments and states of stage `i` from the stage (or the step) before."""
     before = i - 1 if i > 0 else last
     for k in range(points.value.shape[0]):
-        increment = points.slopes[before, k, EQUIVALENT] * share
+        increment = points.slopes[before, k, EQUIVALENT_STRAIN] * share
         points.increments[k], points.trials[k, 0] = increment if increment > 0.0 else 1e-6, -1.0
         for v in range(points.states.shape[1]):
-            at = EQUIVALENT + 1 + v
+            at = EQUIVALENT_STRAIN + 1 + v
             points.states[k, v] = points.base[k, at] + share * points.slopes[before, k, at]
 
 
 @njit(cache=True, error_model="numpy")
 def _predict(
-    record: Record, first: int, rows: int, stage_u: Floats, i: int, start: Floats, clock: Clock, segment: Floats,
+    record: StepRecord, first: int, rows: int, stage_u: Floats, i: int, start: Floats, clock: TimeTransformation, segment: Floats,
     s: float, tableau: Tableau, h: float, u: Floats,
 ) -> None:  # fmt: skip
     """Guess the displacements of stage `i` along a straight line through what was found last."""

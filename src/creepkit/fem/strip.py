@@ -9,7 +9,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 
 
-class Strip(NamedTuple):
+class StripMesh(NamedTuple):
     """Nodes and elements of a strip, and its four sides as node numbers.
 
     nodes : (nodes, 2) mm. elements : (elements, 8), in the order that `Mesh` asks for.
@@ -28,7 +28,7 @@ class Strip(NamedTuple):
     outer_line: Ints
 
 
-def strip(inner: Floats, outer: Floats, breaks: Floats) -> Strip:
+def strip_mesh(inner: Floats, outer: Floats, breaks: Floats) -> StripMesh:
     """The strip whose column lines run straight from `inner` to `outer`.
 
     inner, outer : (2 columns + 1, 2) ends of the column lines, those of mid-columns included; each lies on its curve,
@@ -43,9 +43,9 @@ def strip(inner: Floats, outer: Floats, breaks: Floats) -> Strip:
     corners = [a + 2 * j, b + 2 * j, b + 2 * j + 2, a + 2 * j + 2]
     middles = [middle[:, None] + j, b + 2 * j + 1, middle[:, None] + j + 1, a + 2 * j + 1]
     elements = np.stack(corners + middles, axis=2)
-    inner_line = _in_turn(start, middle)
-    outer_line = _in_turn(start + 2 * layers, middle + layers)
-    return Strip(
+    inner_line = _interleaved(start, middle)
+    outer_line = _interleaved(start + 2 * layers, middle + layers)
+    return StripMesh(
         nodes=strip_nodes(inner, outer, breaks),
         elements=elements.reshape(-1, 8),
         inner=elements[:, 0, [0, 4, 1]],
@@ -61,15 +61,15 @@ def strip_nodes(inner: Floats, outer: Floats, breaks: Floats) -> Floats:
     """The nodes of a strip, (nodes, 2); linear in the two sides, so velocities of the sides give those of the nodes."""
     fine = np.empty(2 * len(breaks) - 1)
     fine[::2], fine[1::2] = breaks, 0.5 * (breaks[:-1] + breaks[1:])
-    lines = [_across(inner[k], outer[k], breaks if k % 2 else fine) for k in range(len(inner))]
+    lines = [_points_across(inner[k], outer[k], breaks if k % 2 else fine) for k in range(len(inner))]
     return np.concatenate(lines)
 
 
-def _across(inner: Floats, outer: Floats, breaks: Floats) -> Floats:
+def _points_across(inner: Floats, outer: Floats, breaks: Floats) -> Floats:
     return np.asarray((1 - breaks[:, None]) * inner + breaks[:, None] * outer)
 
 
-def _in_turn(corners: Ints, middles: Ints) -> Ints:
+def _interleaved(corners: Ints, middles: Ints) -> Ints:
     line = np.empty(corners.size + middles.size, dtype=np.int64)
     line[::2], line[1::2] = corners, middles
     return line

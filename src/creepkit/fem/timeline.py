@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.fem.record import PRESSURE, START
-from creepkit.integration.clock import SMALLEST_BETA
+from creepkit.integration.clock import SMALLEST_EXPONENT
 
 OFFSET = 20.0
 """s; twice the first step after a change of load."""
@@ -25,7 +25,7 @@ SHORT = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Timeline:
+class TimeInterpolation:
     """The accepted steps of a march.
 
     times : (steps,) s. starts : (segments reached,) s. rows : first and last step of each segment; without a jump of
@@ -40,7 +40,7 @@ class Timeline:
     exponents: Floats
 
     @classmethod
-    def of(cls, times: Floats, segments: Ints, program: Floats, beta: float = 1.0) -> Timeline:
+    def from_steps(cls, times: Floats, segments: Ints, program: Floats, beta: float = 1.0) -> TimeInterpolation:
         """From the rows of a record and the program (segments, 10); beta : the law's leading exponent of time."""
         rows = []
         reached = program[: int(segments[-1]) + 1]
@@ -52,7 +52,7 @@ class Timeline:
             rows.append((first, int(mine[-1])))
         # a pressure that rises from nothing gives no power of time; long after zero only the change of load matters
         young = np.where(starts == 0.0, reached[:, PRESSURE] != 0.0, starts <= OFFSET) & (beta < 1.0)
-        exponents = np.where(young, max(beta, SMALLEST_BETA), 1.0)
+        exponents = np.where(young, max(beta, SMALLEST_EXPONENT), 1.0)
         return cls(np.array(times), starts, tuple(rows), np.where(young, 0.0, starts), exponents)
 
     def interpolate(self, values: Floats, times: Floats) -> Floats:
@@ -67,11 +67,11 @@ class Timeline:
             mine = (which == n) & (times <= self.times[-1] * (1 + 1e-12))
             if mine.any():
                 before, after = self._variable(n, self.times[first : last + 1]), self._variable(n, times[mine])
-                kept = _kept(before)
+                kept = _spline_knots(before)
                 out[mine] = _spline(before[kept], values[first : last + 1][kept], after)
         return out
 
-    def moved(self, times: Floats, starts: Floats) -> Timeline:
+    def moved(self, times: Floats, starts: Floats) -> TimeInterpolation:
         """The same steps at other times, the segments beginning at others too."""
         origins = np.where(self.origins == self.starts, self.origins + starts, self.origins)
         return replace(self, times=self.times + times, starts=self.starts + starts, origins=origins)
@@ -85,7 +85,7 @@ class Timeline:
         return np.asarray(np.log1p((elapsed / OFFSET) ** self.exponents[n]))
 
 
-def _kept(places: Floats) -> Bools:
+def _spline_knots(places: Floats) -> Bools:
     """All knots, less the last but one where a short last step, cut off by the end, would make a slope of its error."""
     kept = np.ones(places.size, bool)
     if places.size > 3:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from creepkit.integration.batch import REASONS, Integration, PointTest, integrate
-    from creepkit.integration.control import Settings
+    from creepkit.integration.control import IntegrationSettings
 
-__all__ = ["REASONS", "Integration", "PointTest", "Settings", "integrate"]
+__all__ = ["REASONS", "Integration", "PointTest", "IntegrationSettings", "integrate"]
 
 
 def __getattr__(name: str) -> Any:

@@ -12,15 +12,15 @@ from typing import NamedTuple
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.integration.clock import Clock, moment
-from creepkit.integration.dense import dense_change, dense_slope, dense_value
-from creepkit.integration.step import Room
+from creepkit.integration.clock import TimeTransformation, transformed_time
+from creepkit.integration.dense import dense_sensitivity, dense_slope, dense_value
+from creepkit.integration.step import StepWorkspace
 from creepkit.integration.tableau import Tableau
 
 _BISECTIONS = 50
 
 
-class Arrivals(NamedTuple):
+class LevelEvents(NamedTuple):
     """Creep strains to arrive at, and what becomes of them; P parameters.
 
     levels : (levels,) increasing. times, slopes : (levels,) s, and dp/d(ln t) there; untouched where never reached.
@@ -36,8 +36,8 @@ class Arrivals(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def arrive(
-    clock: Clock, tableau: Tableau, work: Room, s: float, h: float, share: float, arrivals: Arrivals, reached: int
+def locate_levels(
+    clock: TimeTransformation, tableau: Tableau, work: StepWorkspace, s: float, h: float, share: float, arrivals: LevelEvents, reached: int
 ) -> int:
     """Write the arrivals within the step, up to its `share`; return how many levels are reached."""
     end = dense_value(tableau, work, h, share, 0)
@@ -49,30 +49,30 @@ def arrive(
                 low = middle
             else:
                 high = middle
-        arrivals.times[reached] = moment(clock, s + high * h).time
-        arrivals.slopes[reached] = pace_of(clock, tableau, work, s, h, high, 0)
+        arrivals.times[reached] = transformed_time(clock, s + high * h).time
+        arrivals.slopes[reached] = log_time_rate(clock, tableau, work, s, h, high, 0)
         if arrivals.changes.shape[0] > 0:
-            log_time_change(clock, tableau, work, s, h, high, 0, arrivals.changes[reached])
+            log_time_sensitivity(clock, tableau, work, s, h, high, 0, arrivals.changes[reached])
         reached += 1
     return reached
 
 
 @njit(cache=True, error_model="numpy")
-def pace_of(clock: Clock, tableau: Tableau, work: Room, s: float, h: float, x: float, v: int) -> float:
+def log_time_rate(clock: TimeTransformation, tableau: Tableau, work: StepWorkspace, s: float, h: float, x: float, v: int) -> float:
     """dv/d(ln t) at the share `x` of the step."""
     slope = 0.0
     for i in range(tableau.c.size):
         slope += dense_slope(tableau, i, x) * work.slopes[i, v]
-    now = moment(clock, s + x * h)
+    now = transformed_time(clock, s + x * h)
     return float(slope * now.time / exp(now.log_pace))
 
 
 @njit(cache=True, error_model="numpy")
-def log_time_change(
-    clock: Clock, tableau: Tableau, work: Room, s: float, h: float, x: float, v: int, change: Floats
+def log_time_sensitivity(
+    clock: TimeTransformation, tableau: Tableau, work: StepWorkspace, s: float, h: float, x: float, v: int, change: Floats
 ) -> None:
     """Derivatives (P,), into `change`, of the ln of the time at which unknown `v` has the value it has at `x`."""
-    dense_change(clock, tableau, work, s, h, x, v, change)
-    pace = pace_of(clock, tableau, work, s, h, x, v)
+    dense_sensitivity(clock, tableau, work, s, h, x, v, change)
+    pace = log_time_rate(clock, tableau, work, s, h, x, v)
     for p in range(change.size):
         change[p] = -change[p] / pace

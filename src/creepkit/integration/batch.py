@@ -12,8 +12,8 @@ from numba import njit
 
 from creepkit.arrays import Floats, Ints, frozen
 from creepkit.errors import SolveError
-from creepkit.integration.arrivals import Arrivals
-from creepkit.integration.control import Settings
+from creepkit.integration.arrivals import LevelEvents
+from creepkit.integration.control import IntegrationSettings
 from creepkit.integration.endings import (
     DIVERGED,
     REACHED_END,
@@ -21,12 +21,12 @@ from creepkit.integration.endings import (
     STEP_TOO_SMALL,
     STRAIN_LIMIT,
     TOO_MANY_STEPS,
-    Limits,
+    TerminationLimits,
 )
-from creepkit.integration.point import Kernel, integrate_point
+from creepkit.integration.point import CandidateParameters, integrate_point
 from creepkit.integration.problem import UNIAXIAL, Axes
-from creepkit.integration.segments import segments_of
-from creepkit.integration.step import Drive, room
+from creepkit.integration.segments import merge_programs
+from creepkit.integration.step import StressControl, step_workspace
 from creepkit.integration.tableau import SDIRK4, Tableau
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.records import Program, Status
@@ -43,7 +43,7 @@ REASONS = {
 
 _STATUS = np.full(len(REASONS), int(Status.NOT_CONVERGED))
 _STATUS[REACHED_END] = Status.COMPLETE
-_STATUS[[STRAIN_LIMIT, STATE_LIMIT, DIVERGED]] = Status.BURST
+_STATUS[[STRAIN_LIMIT, STATE_LIMIT, DIVERGED]] = Status.RUPTURED
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class PointTest:
     @cached_property
     def segments(self) -> Floats:
         """The programs merged, (segments, 6); kept, for a fit asks for them a thousand times."""
-        return segments_of(self.driving, self.temperature, end=self.end)
+        return merge_programs(self.driving, self.temperature, end=self.end)
 
     @property
     def end(self) -> float:
@@ -102,18 +102,18 @@ class Integration:
     strain: Floats
     starts: Ints
     jacobian: Floats | None
-    endings: Ints
+    terminations: Ints
     end_times: Floats
     steps: Ints
     end_jacobian: Floats | None
-    arrivals: Floats
-    arrival_slopes: Floats
-    arrival_jacobian: Floats | None
+    level_times: Floats
+    level_rates: Floats
+    level_time_jacobian: Floats | None
 
     @property
     def status(self) -> Ints:
         """Status of each row, (candidates, tests)."""
-        return np.asarray(_STATUS[self.endings])
+        return np.asarray(_STATUS[self.terminations])
 
     def of(self, test: int) -> Floats:
         """Strain of one test, (candidates, times)."""
@@ -125,7 +125,7 @@ def integrate(
     theta: Floats,
     tests: Sequence[PointTest],
     *,
-    settings: Settings | None = None,
+    settings: IntegrationSettings | None = None,
     jacobian: bool = False,
     axes: Axes = UNIAXIAL,
     tableau: Tableau = SDIRK4,
@@ -135,50 +135,50 @@ def integrate(
     candidates, parameters = theta.shape
     segments = [t.segments for t in tests]
     starts = np.concatenate([[0], np.cumsum([t.times.size for t in tests], dtype=np.int64)])
-    rungs = np.concatenate([[0], np.cumsum([t.levels.size for t in tests], dtype=np.int64)])
-    cuts = np.concatenate([[0], np.cumsum([s.shape[0] for s in segments], dtype=np.int64)])
+    level_offsets = np.concatenate([[0], np.cumsum([t.levels.size for t in tests], dtype=np.int64)])
+    segment_offsets = np.concatenate([[0], np.cumsum([s.shape[0] for s in segments], dtype=np.int64)])
     frames, rows = int(starts[-1]), candidates if jacobian else 0
     strain = np.full((candidates, frames), np.nan)
-    changes = np.full((rows, frames, parameters), np.nan)
-    endings = np.zeros((candidates, len(tests)), dtype=np.int64)
+    jacobian_values = np.full((rows, frames, parameters), np.nan)
+    terminations = np.zeros((candidates, len(tests)), dtype=np.int64)
     end_times = np.zeros((candidates, len(tests)))
     steps = np.zeros((candidates, len(tests), 2), dtype=np.int64)
-    end_changes = np.full((rows, len(tests), parameters), np.nan)
-    levels = int(rungs[-1])
-    arrivals, slopes = (np.full((candidates, levels), np.nan) for _ in range(2))
-    arrival_changes = np.full((rows, levels, parameters), np.nan)
-    drives = np.array([[t.stiffness, float(t.constant_load)] for t in tests]).reshape(-1, 2)
+    end_jacobian = np.full((rows, len(tests), parameters), np.nan)
+    levels = int(level_offsets[-1])
+    level_times, level_rates = (np.full((candidates, levels), np.nan) for _ in range(2))
+    level_time_jacobian = np.full((rows, levels, parameters), np.nan)
+    stress_controls = np.array([[t.stiffness, float(t.constant_load)] for t in tests]).reshape(-1, 2)
     integrate_batch(
         law.update,
         law.sensitivity,
         theta,
-        np.array(law.leading(theta), dtype=float).reshape(candidates),
+        np.array(law.leading_exponent(theta), dtype=float).reshape(candidates),
         np.array(law.initial),
         np.array(law.limits),
-        drives,
+        stress_controls,
         axes,
         np.concatenate([*segments, np.zeros((0, 6))]),
-        cuts,
+        segment_offsets,
         np.concatenate([*(t.times for t in tests), np.zeros(0)]),
         starts,
-        settings or Settings(),
+        settings or IntegrationSettings(),
         tableau,
         strain,
-        changes,
-        endings,
+        jacobian_values,
+        terminations,
         end_times,
         steps,
-        end_changes,
+        end_jacobian,
         np.concatenate([*(t.levels for t in tests), np.zeros(0)]),
-        rungs,
-        arrivals,
-        slopes,
-        arrival_changes,
+        level_offsets,
+        level_times,
+        level_rates,
+        level_time_jacobian,
     )
     if not jacobian:
-        return Integration(strain, starts, None, endings, end_times, steps, None, arrivals, slopes, None)
+        return Integration(strain, starts, None, terminations, end_times, steps, None, level_times, level_rates, None)
     return Integration(
-        strain, starts, changes, endings, end_times, steps, end_changes, arrivals, slopes, arrival_changes
+        strain, starts, jacobian_values, terminations, end_times, steps, end_jacobian, level_times, level_rates, level_time_jacobian
     )
 
 
@@ -190,13 +190,13 @@ def integrate_batch(
     beta: Floats,
     initial: Floats,
     limits: Floats,
-    drives: Floats,
+    stress_controls: Floats,
     axes: Axes,
     segments: Floats,
-    cuts: Ints,
+    segment_offsets: Ints,
     times: Floats,
     starts: Ints,
-    settings: Settings,
+    settings: IntegrationSettings,
     tableau: Tableau,
     strain: Floats,
     jacobian: Floats,
@@ -205,23 +205,23 @@ def integrate_batch(
     steps: Ints,
     end_jacobian: Floats,
     levels: Floats,
-    rungs: Ints,
+    level_offsets: Ints,
     arrivals: Floats,
     arrival_slopes: Floats,
     arrival_jacobian: Floats,
 ) -> None:
     """Integrate candidates x tests without returning to Python; arrays as in Integration, tests laid end to end."""
-    work = room(initial.size, theta.shape[1], tableau.c.size)
+    work = step_workspace(initial.size, theta.shape[1], tableau.c.size)
     nothing, unused = np.zeros((0, theta.shape[1])), np.zeros(theta.shape[1])
     for c in range(theta.shape[0]):
-        kernel = Kernel(theta[c], beta[c], Limits(settings.strain_limit, initial, limits))
-        for k in range(drives.shape[0]):
-            drive = Drive(drives[k, 0], drives[k, 1], axes)
+        kernel = CandidateParameters(theta[c], beta[c], TerminationLimits(settings.strain_limit, initial, limits))
+        for k in range(stress_controls.shape[0]):
+            drive = StressControl(stress_controls[k, 0], stress_controls[k, 1], axes)
             first, last = starts[k], starts[k + 1]
-            low, high = rungs[k], rungs[k + 1]
+            low, high = level_offsets[k], level_offsets[k + 1]
             exact = jacobian.shape[0] > 0
             changes = jacobian[c, first:last] if exact else nothing
-            goal = Arrivals(
+            goal = LevelEvents(
                 levels[low:high],
                 arrivals[c, low:high],
                 arrival_slopes[c, low:high],
@@ -233,7 +233,7 @@ def integrate_batch(
                 sensitivity,
                 kernel,
                 drive,
-                segments[cuts[k] : cuts[k + 1]],
+                segments[segment_offsets[k] : segment_offsets[k + 1]],
                 times[first:last],
                 settings,
                 tableau,

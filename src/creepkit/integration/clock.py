@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from numba import njit
 
-SMALLEST_BETA = 0.05
+SMALLEST_EXPONENT = 0.05
 """Exponents of time are not taken below this: t^m with m = -0.95, where the laws' bounds stop."""
 
 _LARGEST_POWER = 12.0
@@ -27,7 +27,7 @@ _LONGEST_TAU = 1e6
 """A shift this much longer than the segment bends nothing within it."""
 
 
-class Clock(NamedTuple):
+class TimeTransformation(NamedTuple):
     """start and length of the segment, s; beta, and tau in s (0: from a virgin state)."""
 
     start: float
@@ -36,7 +36,7 @@ class Clock(NamedTuple):
     tau: float
 
 
-class Moment(NamedTuple):
+class TransformedTime(NamedTuple):
     """A time, s, and ln(dt/ds) there."""
 
     time: float
@@ -44,21 +44,21 @@ class Moment(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def moment(clock: Clock, s: float) -> Moment:
+def transformed_time(clock: TimeTransformation, s: float) -> TransformedTime:
     """Time and pace at position `s` > 0."""
     if clock.tau == 0.0:
         logarithm = log(s) / clock.beta
         elapsed = clock.length * exp(logarithm)
-        return Moment(clock.start + elapsed, log(clock.length / clock.beta) + logarithm - log(s))
+        return TransformedTime(clock.start + elapsed, log(clock.length / clock.beta) + logarithm - log(s))
     reach = expm1(clock.beta * log1p(clock.length / clock.tau))
     grown = log1p(s * reach)
     power = grown / clock.beta
     elapsed = clock.tau * expm1(power)
-    return Moment(clock.start + elapsed, log(clock.tau * reach / clock.beta) + power - grown)
+    return TransformedTime(clock.start + elapsed, log(clock.tau * reach / clock.beta) + power - grown)
 
 
 @njit(cache=True, error_model="numpy")
-def position(clock: Clock, time: float) -> float:
+def position(clock: TimeTransformation, time: float) -> float:
     """Position of a time in the segment."""
     elapsed = time - clock.start
     if elapsed <= 0.0:
@@ -70,13 +70,13 @@ def position(clock: Clock, time: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def velocity(clock: Clock, s: float) -> tuple[Moment, Moment]:
+def transformation_derivatives(clock: TimeTransformation, s: float) -> tuple[TransformedTime, TransformedTime]:
     """Derivatives of `moment` with respect to beta and to tau at a fixed position."""
     beta, tau, length = clock.beta, clock.tau, clock.length
     if tau == 0.0:
         slope = -log(s) / beta**2
         elapsed = length * exp(log(s) / beta)
-        return Moment(elapsed * slope, slope - 1.0 / beta), Moment(0.0, 0.0)
+        return TransformedTime(elapsed * slope, slope - 1.0 / beta), TransformedTime(0.0, 0.0)
     ratio = log1p(length / tau)
     reach = expm1(beta * ratio)
     inner = 1.0 + s * reach
@@ -86,44 +86,44 @@ def velocity(clock: Clock, s: float) -> tuple[Moment, Moment]:
     by_tau = _through(tau, beta, s, reach, inner, power, beta * (1.0 + reach) * fall)
     shrink = power / beta
     return (
-        Moment(by_beta.time - tau * exp(power) * shrink, by_beta.log_pace - shrink - 1.0 / beta),
-        Moment(by_tau.time + expm1(power), by_tau.log_pace + 1.0 / tau),
+        TransformedTime(by_beta.time - tau * exp(power) * shrink, by_beta.log_pace - shrink - 1.0 / beta),
+        TransformedTime(by_tau.time + expm1(power), by_tau.log_pace + 1.0 / tau),
     )
 
 
 @njit(cache=True, error_model="numpy")
-def _through(tau: float, beta: float, s: float, reach: float, inner: float, power: float, change: float) -> Moment:
+def _through(tau: float, beta: float, s: float, reach: float, inner: float, power: float, change: float) -> TransformedTime:
     """The part of a derivative of `moment` that goes through `reach`, which changes by `change`."""
     rise = s * change / (beta * inner)
-    return Moment(tau * exp(power) * rise, rise + change / reach - s * change / inner)
+    return TransformedTime(tau * exp(power) * rise, rise + change / reach - s * change / inner)
 
 
 @njit(cache=True, error_model="numpy")
-def plain(start: float, length: float) -> Clock:
+def linear_time(start: float, length: float) -> TimeTransformation:
     """Plain time: s proportional to it."""
-    return Clock(start, length, 1.0, length)
+    return TimeTransformation(start, length, 1.0, length)
 
 
 @njit(cache=True, error_model="numpy")
-def virgin(start: float, length: float, beta: float) -> Clock:
+def power_law_time(start: float, length: float, beta: float) -> TimeTransformation:
     """The clock of a segment that begins without creep strain; `beta` is the leading exponent of time."""
-    return Clock(start, length, min(max(beta, SMALLEST_BETA), 1.0), 0.0)
+    return TimeTransformation(start, length, min(max(beta, SMALLEST_EXPONENT), 1.0), 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def shifted(start: float, length: float, bend: float, bend_rate: float) -> Clock:
+def shifted_power_law_time(start: float, length: float, bend: float, bend_rate: float) -> TimeTransformation:
     """The clock of a segment that begins after some creep.
 
     With p'' = r p', a curve (1 + y/tau)^beta has r = (beta - 1)/(tau + y), so r and its rate give beta and tau.
     """
     if not (isfinite(bend) and isfinite(bend_rate)) or bend >= 0.0 or bend_rate <= 0.0:
-        return plain(start, length)
+        return linear_time(start, length)
     tau = -bend / bend_rate
     beta = 1.0 + bend * tau
     if not 1e-30 * length < tau < _LONGEST_TAU * length:
-        return plain(start, length)
+        return linear_time(start, length)
     bound = _LARGEST_POWER / log1p(length / tau)
     beta = min(max(beta, -bound), bound)
     if abs(beta) < 1e-3:
         beta = 1e-3
-    return Clock(start, length, beta, tau)
+    return TimeTransformation(start, length, beta, tau)

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from numba import njit
 
-from creepkit.integration.dense import dense_value, error_of
+from creepkit.integration.dense import dense_value, local_error
 from creepkit.integration.segments import Segment
-from creepkit.integration.step import Drive, Room
+from creepkit.integration.step import StressControl, StepWorkspace
 from creepkit.integration.tableau import Tableau
 
 _SAFETY, _LEAST, _MOST = 0.9, 0.1, 8.0
@@ -17,12 +17,12 @@ _SAFETY, _LEAST, _MOST = 0.9, 0.1, 8.0
 _SENSITIVITY_SLACK = 10.0
 """Sensitivities are of the order of ten strains: d(strain)/d(exponent) = strain ln(stress)."""
 
-VIRGIN_CAUTION = 10.0
+INITIAL_ERROR_FACTOR = 10.0
 """From a virgin state strain is a sum of broken powers of s, on which the first step is of order 1 and its error is up
 to 2.5 times the estimate; afterwards the estimate exceeds the error some twenty times."""
 
 
-class Settings(NamedTuple):
+class IntegrationSettings(NamedTuple):
     """How accurately, and how far, to integrate.
 
     rtol : local error allowed in a step, relative to strain and to each state.
@@ -41,7 +41,7 @@ class Settings(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def newton_tolerance(settings: Settings) -> float:
+def newton_tolerance(settings: IntegrationSettings) -> float:
     """Newton's last correction; its square, the error left, is a thousandth of the step's tolerance."""
     return min(sqrt(1e-3 * settings.rtol), 1e-3)
 
@@ -49,10 +49,10 @@ def newton_tolerance(settings: Settings) -> float:
 @njit(cache=True, error_model="numpy")
 def strain_error(
     tableau: Tableau,
-    drive: Drive,
+    drive: StressControl,
     segment: Segment,
-    work: Room,
-    settings: Settings,
+    work: StepWorkspace,
+    settings: IntegrationSettings,
     h: float,
     ahead: float,
     slope: float,
@@ -69,19 +69,19 @@ def strain_error(
     if drive.stiffness > 0.0:
         stress = segment.end_stress - drive.stiffness * work.new_value[0]
         reach = min(reach, abs(stress) / drive.stiffness)
-    worst = error_of(tableau, work, h, 0)
+    worst = local_error(tableau, work, h, 0)
     if not isnan(slope):
         hermite = work.value[0] + work.new_value[0] + 0.25 * h * (slope - work.slopes[tableau.c.size - 1, 0])
         worst = max(worst, abs(dense_value(tableau, work, h, 0.5, 0) - 0.5 * hermite))
     worst /= settings.rtol * (reach + settings.smallest)
     for v in range(1, work.value.size):
         reach = max(abs(work.value[v]), abs(work.new_value[v])) + settings.smallest
-        worst = max(worst, error_of(tableau, work, h, v) / (settings.rtol * reach))
+        worst = max(worst, local_error(tableau, work, h, v) / (settings.rtol * reach))
     return worst if isfinite(worst) else inf
 
 
 @njit(cache=True, error_model="numpy")
-def change_error(tableau: Tableau, work: Room, settings: Settings, h: float, ahead: float) -> float:
+def sensitivity_error(tableau: Tableau, work: StepWorkspace, settings: IntegrationSettings, h: float, ahead: float) -> float:
     """Largest local error of the sensitivities of strain over what is allowed: of ten strains, or of themselves.
 
     Before a rupture they grow without end, for there strain is vertical over time.
@@ -96,7 +96,7 @@ def change_error(tableau: Tableau, work: Room, settings: Settings, h: float, ahe
 
 
 @njit(cache=True, error_model="numpy")
-def stretch(tableau: Tableau, error: float, growing: bool) -> float:
+def step_factor(tableau: Tableau, error: float, growing: bool) -> float:
     """Factor on the step after an error; a step that follows a rejection does not grow."""
     if not isfinite(error):
         return _LEAST
@@ -104,7 +104,7 @@ def stretch(tableau: Tableau, error: float, growing: bool) -> float:
     return float(min(max(factor, _LEAST), _MOST if growing else 1.0))
 
 
-class Pace(NamedTuple):
+class AcceptedStep(NamedTuple):
     """The last accepted step: its length (0: none yet), and its error over what was allowed."""
 
     length: float
@@ -112,7 +112,7 @@ class Pace(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def shortened(tableau: Tableau, before: Pace, h: float, error: float) -> float:
+def predictive_step_factor(tableau: Tableau, before: AcceptedStep, h: float, error: float) -> float:
     """Factor, at most one, on the step after one that had to be tried again.
 
     On the way to a singularity every step must be shorter than the last. That goes on: predictive control, Gustafsson
@@ -125,7 +125,7 @@ def shortened(tableau: Tableau, before: Pace, h: float, error: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def fitted(s: float, h: float, longest: float) -> float:
+def bounded_step(s: float, h: float, longest: float) -> float:
     """The step, not too long, and ending at 1 rather than just before it."""
     h = min(h, longest)
     return 1.0 - s if s + 1.001 * h > 1.0 else h

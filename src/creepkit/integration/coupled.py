@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.integration.elimination import eliminate
+from creepkit.integration.elimination import solve_dense
 from creepkit.integration.problem import (
     NO_RATE,
     NO_SOLUTION,
@@ -17,26 +17,26 @@ from creepkit.integration.problem import (
     SOLVED,
     TOO_MANY,
     Axes,
-    Problem,
-    Unfolded,
-    along_stress,
-    fold,
-    place,
-    unfold,
+    StageProblem,
+    StageIterate,
+    stress_derivative,
+    unknown_of_increment,
+    write_point,
+    increment_and_stress,
 )
-from creepkit.kernels.interface import POINT_SIZE, STRAIN, pointer
+from creepkit.kernels.interface import POINT_SIZE, STRAIN, data_pointer
 
-_ITERATIONS = 80
+_COUPLED_ITERATIONS = 80
 _HALVINGS = 12
 _LONGEST_CORRECTION = 5.0
 
 
 @njit(cache=True, error_model="numpy")
-def solve_coupled(
+def solve_stage_with_states(
     update: Any,
     theta: Floats,
     axes: Axes,
-    problem: Problem,
+    problem: StageProblem,
     states: Floats,
     row: Floats,
     out: Floats,
@@ -48,12 +48,12 @@ def solve_coupled(
         return 0.0, NO_SOLUTION
     size = 1 + states.size
     matrix, step = np.empty((size, size)), np.empty((size, 1))
-    x, creeps = fold(problem, guess), problem.trial > 0.0
+    x, creeps = unknown_of_increment(problem, guess), problem.trial > 0.0
     last, halvings = np.zeros(size), 0
-    for _ in range(_ITERATIONS):
-        now = unfold(problem, x) if creeps else Unfolded(0.0, 0.0, 0.0, 0.0, 0.0)
-        place(row, axes, now.stress, problem.strain + now.increment)
-        update(1, pointer(row), pointer(theta), pointer(out))
+    for _ in range(_COUPLED_ITERATIONS):
+        now = increment_and_stress(problem, x) if creeps else StageIterate(0.0, 0.0, 0.0, 0.0, 0.0)
+        write_point(row, axes, now.stress, problem.strain + now.increment)
+        update(1, data_pointer(row), data_pointer(theta), data_pointer(out))
         creeps = creeps and not out[0] < NO_RATE
         if not _finite(out, size, creeps):
             halvings += 1
@@ -64,7 +64,7 @@ def solve_coupled(
                 last[i] *= 0.5
             continue
         _newton_system(axes, problem, states, row, out, now, creeps, matrix, step)
-        if not eliminate(matrix, step):
+        if not solve_dense(matrix, step):
             return 0.0, NO_SOLUTION
         damping = min(1.0, _LONGEST_CORRECTION / max(abs(step[0, 0]), 1e-300))
         for i in range(size):
@@ -72,8 +72,8 @@ def solve_coupled(
         x = _correct(x, row, last, 1.0)
         halvings = 0
         if _small(last, row, tolerance):
-            now = unfold(problem, x) if creeps else now
-            place(row, axes, now.stress, problem.strain + now.increment)
+            now = increment_and_stress(problem, x) if creeps else now
+            write_point(row, axes, now.stress, problem.strain + now.increment)
             return now.increment, SOLVED
     return 0.0, TOO_MANY
 
@@ -109,11 +109,11 @@ def _small(step: Floats, row: Floats, tolerance: float) -> bool:
 @njit(cache=True, error_model="numpy")
 def _newton_system(
     axes: Axes,
-    problem: Problem,
+    problem: StageProblem,
     states: Floats,
     row: Floats,
     out: Floats,
-    now: Unfolded,
+    now: StageIterate,
     creeps: bool,
     matrix: Floats,
     right: Floats,
@@ -125,7 +125,7 @@ def _newton_system(
         start = size + i * width
         factor = problem.weight if i > 0 else 1.0 if creeps else 0.0
         by_strain = now.increment * now.increment_slope * out[start + STRAIN]
-        by_stress = now.stress * now.stress_slope * along_stress(out, start, axes)
+        by_stress = now.stress * now.stress_slope * stress_derivative(out, start, axes)
         matrix[i, 0] = -factor * (by_strain + by_stress) if creeps else 0.0
         for j in range(1, size):
             matrix[i, j] = -factor * out[start + POINT_SIZE + j - 1] if factor > 0.0 else 0.0

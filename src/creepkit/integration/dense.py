@@ -7,13 +7,13 @@ from math import exp
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.integration.clock import Clock, moment, velocity
-from creepkit.integration.step import Room
+from creepkit.integration.clock import TimeTransformation, transformed_time, transformation_derivatives
+from creepkit.integration.step import StepWorkspace
 from creepkit.integration.tableau import Tableau
 
 
 @njit(cache=True, error_model="numpy")
-def error_of(tableau: Tableau, work: Room, h: float, v: int) -> float:
+def local_error(tableau: Tableau, work: StepWorkspace, h: float, v: int) -> float:
     """Estimated local error of unknown `v`."""
     total = 0.0
     for i in range(tableau.c.size):
@@ -40,7 +40,7 @@ def dense_slope(tableau: Tableau, i: int, x: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def dense_value(tableau: Tableau, work: Room, h: float, x: float, v: int) -> float:
+def dense_value(tableau: Tableau, work: StepWorkspace, h: float, x: float, v: int) -> float:
     """Unknown `v` at the share `x` of the step."""
     total = 0.0
     for i in range(tableau.c.size):
@@ -49,8 +49,8 @@ def dense_value(tableau: Tableau, work: Room, h: float, x: float, v: int) -> flo
 
 
 @njit(cache=True, error_model="numpy")
-def dense_change(
-    clock: Clock, tableau: Tableau, work: Room, s: float, h: float, x: float, v: int, change: Floats
+def dense_sensitivity(
+    clock: TimeTransformation, tableau: Tableau, work: StepWorkspace, s: float, h: float, x: float, v: int, change: Floats
 ) -> None:
     """Derivatives of unknown `v` at a fixed time with respect to the parameters, into `change` (P,)."""
     slope = 0.0
@@ -62,8 +62,8 @@ def dense_change(
         for p in range(change.size):
             change[p] += weight * work.slope_changes[i, v, p]
     place_now = s + x * h
-    by_beta, by_tau = velocity(clock, place_now)
-    pace = exp(moment(clock, place_now).log_pace)
+    by_beta, by_tau = transformation_derivatives(clock, place_now)
+    pace = exp(transformed_time(clock, place_now).log_pace)
     for p in range(change.size):
         later = by_beta.time * work.clock_change[0, p] + by_tau.time * work.clock_change[1, p]
         change[p] -= slope * later / pace

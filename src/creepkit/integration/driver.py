@@ -12,11 +12,11 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats, frozen
 from creepkit.errors import SolveError
 from creepkit.integration.batch import REASONS
-from creepkit.integration.control import Settings
+from creepkit.integration.control import IntegrationSettings
 from creepkit.integration.endings import DIVERGED, REACHED_END, STATE_LIMIT, STRAIN_LIMIT
 from creepkit.integration.tableau import SDIRK2, Tableau
-from creepkit.integration.tensor_march import March, segments_along
-from creepkit.integration.tensor_point import EQUIVALENT, TensorPoint
+from creepkit.integration.tensor_march import TensorIntegrator, tensor_segments
+from creepkit.integration.tensor_point import EQUIVALENT_STRAIN, TensorPoint
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.records import COMPONENTS, Program, Status
 
@@ -24,25 +24,25 @@ _BURST = (STRAIN_LIMIT, STATE_LIMIT, DIVERGED)
 
 
 @dataclass(frozen=True)
-class Control:
+class ComponentControl:
     """What is prescribed in one component: stress in MPa, or total strain (of the tensor), over time."""
 
     quantity: Literal["stress", "strain"]
     program: Program
 
 
-def by_stress(value: float | Program) -> Control:
+def prescribed_stress(value: float | Program) -> ComponentControl:
     """A component whose stress is prescribed, MPa."""
-    return Control("stress", value if isinstance(value, Program) else Program.constant(value))
+    return ComponentControl("stress", value if isinstance(value, Program) else Program.constant(value))
 
 
-def by_strain(value: float | Program) -> Control:
+def prescribed_strain(value: float | Program) -> ComponentControl:
     """A component whose total strain is prescribed."""
-    return Control("strain", value if isinstance(value, Program) else Program.constant(value))
+    return ComponentControl("strain", value if isinstance(value, Program) else Program.constant(value))
 
 
 @dataclass(frozen=True, eq=False)
-class Driven:
+class PointTrajectory:
     """What a driven point went through, at the output times that it reached.
 
     times : (times,) s. stress, strain, creep_strain : (times, 6) MPa and tensor strains, in the order of COMPONENTS.
@@ -62,17 +62,17 @@ class Driven:
     steps: int
 
 
-def drive(
+def integrate_tensor_point(
     law: CompiledLaw,
     theta: ArrayLike,
     elastic: tuple[float, float],
-    controls: Mapping[str, Control],
+    controls: Mapping[str, ComponentControl],
     temperature: float | Program,
     times: ArrayLike,
     *,
-    settings: Settings | None = None,
+    settings: IntegrationSettings | None = None,
     tableau: Tableau = SDIRK2,
-) -> Driven:
+) -> PointTrajectory:
     """Drive a virgin point from time zero.
 
     theta : (P,) internal parameters, see CompiledLaw. elastic : E in MPa, and nu.
@@ -80,34 +80,34 @@ def drive(
     """
     outputs = np.atleast_1d(np.asarray(times, dtype=float))
     _check(law, np.size(theta), elastic, controls, outputs)
-    chosen = [controls.get(name, by_stress(0.0)) for name in COMPONENTS]
-    held = np.array([control.quantity == "strain" for control in chosen])
-    point = TensorPoint(law, np.array(theta, dtype=float).reshape(-1), elastic, held)
-    programs = [*(c.program for c in chosen), by_stress(temperature).program]
-    march = March(point, settings or Settings(), tableau, outputs)
-    code = march.along(segments_along(programs, float(outputs.max(initial=0.0))))
-    rows = np.array(march.history).reshape(-1, EQUIVALENT + 1 + law.states)
+    component_controls = [controls.get(name, prescribed_stress(0.0)) for name in COMPONENTS]
+    strain_controlled = np.array([control.quantity == "strain" for control in component_controls])
+    point = TensorPoint(law, np.array(theta, dtype=float).reshape(-1), elastic, strain_controlled)
+    programs = [*(c.program for c in component_controls), prescribed_stress(temperature).program]
+    integrator = TensorIntegrator(point, settings or IntegrationSettings(), tableau, outputs)
+    code = integrator.integrate(tensor_segments(programs, float(outputs.max(initial=0.0))))
+    rows = np.array(integrator.history).reshape(-1, EQUIVALENT_STRAIN + 1 + law.states)
     reached = outputs[: len(rows)]
-    imposed = np.stack([c.program.at(reached) for c in chosen], axis=-1)
-    answers = [point.elastic_answer(i, row[:6]) for i, row in zip(imposed, rows, strict=True)]
-    stress, strain = np.array(answers).reshape(-1, 2, 6).swapaxes(0, 1)
-    status = Status.COMPLETE if code == REACHED_END else Status.BURST if code in _BURST else Status.NOT_CONVERGED
-    return Driven(
+    imposed = np.stack([c.program.at(reached) for c in component_controls], axis=-1)
+    elastic_responses = [point.elastic_response(i, row[:6]) for i, row in zip(imposed, rows, strict=True)]
+    stress, strain = np.array(elastic_responses).reshape(-1, 2, 6).swapaxes(0, 1)
+    status = Status.COMPLETE if code == REACHED_END else Status.RUPTURED if code in _BURST else Status.NOT_CONVERGED
+    return PointTrajectory(
         times=frozen(reached),
         stress=frozen(stress),
         strain=frozen(strain),
         creep_strain=frozen(rows[:, :6]),
-        equivalent=frozen(rows[:, EQUIVALENT]),
-        states=frozen(rows[:, EQUIVALENT + 1 :]),
+        equivalent=frozen(rows[:, EQUIVALENT_STRAIN]),
+        states=frozen(rows[:, EQUIVALENT_STRAIN + 1 :]),
         status=status,
-        end_time=float(march.time),
+        end_time=float(integrator.time),
         reason=REASONS[code],
-        steps=march.steps,
+        steps=integrator.steps,
     )
 
 
 def _check(
-    law: CompiledLaw, parameters: int, elastic: tuple[float, float], controls: Mapping[str, Control], outputs: Floats
+    law: CompiledLaw, parameters: int, elastic: tuple[float, float], controls: Mapping[str, ComponentControl], outputs: Floats
 ) -> None:
     """One sentence for what cannot be driven."""
     if not np.isfinite(outputs).all() or (np.diff(outputs) < 0).any() or (outputs < 0).any():

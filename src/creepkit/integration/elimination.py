@@ -8,7 +8,7 @@ from creepkit.arrays import Floats
 
 
 @njit(cache=True, error_model="numpy")
-def eliminate(matrix: Floats, right: Floats) -> bool:
+def solve_dense(matrix: Floats, right: Floats) -> bool:
     """Solve ``matrix x = right`` in place, x left in `right`; False when the matrix is singular.
 
     matrix : (n, n), destroyed; right : (n, columns). Gauss elimination with row pivoting.

@@ -9,18 +9,18 @@ from numba import njit
 
 from creepkit.arrays import Floats
 from creepkit.integration.dense import dense_value
-from creepkit.integration.step import Room
+from creepkit.integration.step import StepWorkspace
 from creepkit.integration.tableau import Tableau
 
 REACHED_END, STRAIN_LIMIT, STATE_LIMIT, DIVERGED, STEP_TOO_SMALL, TOO_MANY_STEPS = range(6)
 """Codes of an ending; whatever it is, the history so far is kept."""
 
 
-UNRESOLVED = 1e-7
+TERMINATION_MARGIN = 1e-7
 """Share of the time passed, within which a limit ahead is the end of a march whose steps have shrunk to nothing."""
 
 
-class Limits(NamedTuple):
+class TerminationLimits(NamedTuple):
     """Creep strain at which the point has burst; initial states and the values at which it has failed, (S,)."""
 
     strain: float
@@ -29,7 +29,7 @@ class Limits(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _passed(limits: Limits, i: int, value: float) -> bool:
+def _passed(limits: TerminationLimits, i: int, value: float) -> bool:
     """Whether state `i` has passed its limit, coming from its initial value."""
     if not isfinite(limits.states[i]):
         return False
@@ -37,7 +37,7 @@ def _passed(limits: Limits, i: int, value: float) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def first_passed(limits: Limits, tableau: Tableau, work: Room, h: float, x: float) -> int:
+def first_limit_passed(limits: TerminationLimits, tableau: Tableau, work: StepWorkspace, h: float, x: float) -> int:
     """Which unknown is at its limit at the share `x` of the step: 0 is strain, then the states."""
     for i in range(limits.states.size):
         if _passed(limits, i, dense_value(tableau, work, h, x, 1 + i)):
@@ -46,7 +46,7 @@ def first_passed(limits: Limits, tableau: Tableau, work: Room, h: float, x: floa
 
 
 @njit(cache=True, error_model="numpy")
-def limit_reached(limits: Limits, work: Room) -> int:
+def limit_reached(limits: TerminationLimits, work: StepWorkspace) -> int:
     """STATE_LIMIT or STRAIN_LIMIT when the new value has passed one, else REACHED_END."""
     for i in range(limits.states.size):
         if _passed(limits, i, work.new_value[1 + i]):
@@ -55,7 +55,7 @@ def limit_reached(limits: Limits, work: Room) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def about_to_pass(limits: Limits, work: Room, pace: float, margin: float) -> int:
+def approaching_limit(limits: TerminationLimits, work: StepWorkspace, pace: float, margin: float) -> int:
     """Which unknown, growing ever faster, will pass its limit within the share `margin` of the time; -1 is none.
 
     pace : d(ln t)/ds at the step's end. Where a rate diverges at the limit, the last millionth of a life takes as many
@@ -73,7 +73,7 @@ def about_to_pass(limits: Limits, work: Room, pace: float, margin: float) -> int
 
 
 @njit(cache=True, error_model="numpy")
-def crossing(limits: Limits, tableau: Tableau, work: Room, h: float) -> float:
+def limit_crossing(limits: TerminationLimits, tableau: Tableau, work: StepWorkspace, h: float) -> float:
     """Share of the step at which the first limit is passed, by bisection of the dense output."""
     low, high = 0.0, 1.0
     for _ in range(60):

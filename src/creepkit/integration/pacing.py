@@ -8,49 +8,49 @@ from typing import Any
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.integration.clock import SMALLEST_BETA, Clock, plain, shifted, virgin
-from creepkit.integration.problem import along_stress, place
+from creepkit.integration.clock import SMALLEST_EXPONENT, TimeTransformation, linear_time, shifted_power_law_time, power_law_time
+from creepkit.integration.problem import stress_derivative, write_point
 from creepkit.integration.segments import Segment, stress_rate, temperature_rate
-from creepkit.integration.step import Drive, Room
-from creepkit.kernels.interface import POINT_SIZE, STRAIN, TEMPERATURE, TIME, pointer
+from creepkit.integration.step import StressControl, StepWorkspace
+from creepkit.kernels.interface import POINT_SIZE, STRAIN, TEMPERATURE, TIME, data_pointer
 
-_VIRGIN = 1e-25
+_ZERO_STRAIN = 1e-25
 """Creep strain below this is none."""
 
 _NUDGE = 1e-6
 
 
 @njit(cache=True, error_model="numpy")
-def choose_clock(
-    update: Any, theta: Floats, beta: float, drive: Drive, segment: Segment, value: Floats, work: Room
-) -> tuple[Clock, float]:
+def choose_time_transformation(
+    update: Any, theta: Floats, beta: float, drive: StressControl, segment: Segment, value: Floats, work: StepWorkspace
+) -> tuple[TimeTransformation, float]:
     """The clock of a segment that begins with `value` (strain, states), and the rate there (0: not known)."""
     length = segment.end - segment.start
     strain = value[0]
-    if strain < _VIRGIN and beta < 1.0:
-        return virgin(segment.start, length, beta), 0.0
+    if strain < _ZERO_STRAIN and beta < 1.0:
+        return power_law_time(segment.start, length, beta), 0.0
     row, out, size = work.row, work.out, value.size
     stress = (segment.stress - drive.stiffness * strain) * exp(drive.load * strain)
     if not stress > 0.0:
-        return plain(segment.start, length), 0.0
+        return linear_time(segment.start, length), 0.0
     row[TIME], row[TEMPERATURE] = segment.start, segment.temperature
     for v in range(1, size):
         row[POINT_SIZE + v - 1] = value[v]
-    place(row, drive.axes, stress, strain)
-    update(1, pointer(row), pointer(theta), pointer(out))
+    write_point(row, drive.axes, stress, strain)
+    update(1, data_pointer(row), data_pointer(theta), data_pointer(out))
     rate = exp(min(out[0], 600.0))
     if not isfinite(rate) or rate <= 0.0:
-        return plain(segment.start, length), 0.0
+        return linear_time(segment.start, length), 0.0
     bend, bend_rate = _bends(drive, segment, stress, rate, row, out, size)
-    return shifted(segment.start, length, bend, bend_rate), rate
+    return shifted_power_law_time(segment.start, length, bend, bend_rate), rate
 
 
 @njit(cache=True, error_model="numpy")
 def _bends(
-    drive: Drive, segment: Segment, stress: float, rate: float, row: Floats, out: Floats, size: int
+    drive: StressControl, segment: Segment, stress: float, rate: float, row: Floats, out: Floats, size: int
 ) -> tuple[float, float]:
     """r in p'' = r p' and its rate, if ln f kept its logarithmic slopes to time, strain and stress."""
-    by_stress = along_stress(out, size, drive.axes)
+    by_stress = stress_derivative(out, size, drive.axes)
     strain, time = row[STRAIN], row[TIME]
     aging = out[size + TIME]
     hardening = rate * out[size + STRAIN] if strain > 0.0 else 0.0
@@ -71,7 +71,7 @@ def _bends(
 
 @njit(cache=True, error_model="numpy")
 def local_exponent(
-    update: Any, theta: Floats, beta: float, drive: Drive, segment: Segment, time: float, work: Room
+    update: Any, theta: Floats, beta: float, drive: StressControl, segment: Segment, time: float, work: StepWorkspace
 ) -> float:
     """Exponent of time of the curve p ~ t^b that a virgin state follows about `time`, s."""
     row, out = work.row, work.out
@@ -83,8 +83,8 @@ def local_exponent(
     stress = segment.stress + stress_rate(segment) * elapsed
     log_strain, exponent = -7.0, beta
     for _ in range(30):
-        place(row, drive.axes, stress, exp(log_strain))
-        update(1, pointer(row), pointer(theta), pointer(out))
+        write_point(row, drive.axes, stress, exp(log_strain))
+        update(1, data_pointer(row), data_pointer(theta), data_pointer(out))
         softening = 1.0 - out[work.value.size + STRAIN] * row[STRAIN]
         exponent = (1.0 + elapsed * out[work.value.size + TIME]) / softening
         step = (log(elapsed / beta) + out[0] - log_strain) / softening
@@ -95,8 +95,8 @@ def local_exponent(
 
 
 @njit(cache=True, error_model="numpy")
-def move_clock(
-    update: Any, theta: Floats, beta: float, drive: Drive, segment: Segment, clock: Clock, first: float, work: Room
+def differentiate_time_transformation(
+    update: Any, theta: Floats, beta: float, drive: StressControl, segment: Segment, clock: TimeTransformation, first: float, work: StepWorkspace
 ) -> None:
     """Write into the room how the clock moves with each parameter, (2, P); `first` is the first output time, s.
 
@@ -106,7 +106,7 @@ def move_clock(
     for p in range(theta.size):
         work.clock_change[0, p] = work.clock_change[1, p] = 0.0
     from_virgin = clock.tau == 0.0
-    if from_virgin and not SMALLEST_BETA < beta < 1.0:
+    if from_virgin and not SMALLEST_EXPONENT < beta < 1.0:
         return
     here = local_exponent(update, theta, beta, drive, segment, first, work) if from_virgin else 0.0
     nudged, value = theta.copy(), work.value.copy()
@@ -122,7 +122,7 @@ def move_clock(
         else:
             for v in range(value.size):
                 value[v] = work.value[v] + step * work.change[v, p]
-            moved, _ = choose_clock(update, nudged, beta, drive, segment, value, work)
+            moved, _ = choose_time_transformation(update, nudged, beta, drive, segment, value, work)
             if moved.tau > 0.0 and moved.beta != 1.0 and clock.beta != 1.0:
                 work.clock_change[0, p] = (moved.beta - clock.beta) / step
                 work.clock_change[1, p] = (moved.tau - clock.tau) / step

@@ -8,37 +8,37 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.integration.arrivals import Arrivals, arrive, log_time_change
-from creepkit.integration.clock import Clock, moment, position
+from creepkit.integration.arrivals import LevelEvents, locate_levels, log_time_sensitivity
+from creepkit.integration.clock import TimeTransformation, transformed_time, position
 from creepkit.integration.control import (
-    VIRGIN_CAUTION,
-    Pace,
-    Settings,
-    change_error,
-    fitted,
+    INITIAL_ERROR_FACTOR,
+    AcceptedStep,
+    IntegrationSettings,
+    sensitivity_error,
+    bounded_step,
     newton_tolerance,
-    shortened,
+    predictive_step_factor,
     strain_error,
-    stretch,
+    step_factor,
 )
-from creepkit.integration.dense import dense_change, dense_value
+from creepkit.integration.dense import dense_sensitivity, dense_value
 from creepkit.integration.endings import (
     DIVERGED,
     REACHED_END,
     STATE_LIMIT,
     STEP_TOO_SMALL,
     TOO_MANY_STEPS,
-    UNRESOLVED,
-    Limits,
-    about_to_pass,
-    crossing,
-    first_passed,
+    TERMINATION_MARGIN,
+    TerminationLimits,
+    approaching_limit,
+    limit_crossing,
+    first_limit_passed,
     limit_reached,
 )
-from creepkit.integration.pacing import choose_clock, move_clock
+from creepkit.integration.pacing import choose_time_transformation, differentiate_time_transformation
 from creepkit.integration.problem import SOLVED
-from creepkit.integration.segments import Segment, segment_of
-from creepkit.integration.step import Drive, Room, advance, differentiate
+from creepkit.integration.segments import Segment, segment_from_row
+from creepkit.integration.step import StressControl, StepWorkspace, advance, differentiate
 from creepkit.integration.tableau import Tableau
 
 _SMALLEST_STEP = 1e-13
@@ -47,15 +47,15 @@ _NEGLIGIBLE = 0.01
 """Share of the tolerance within which a time need not be known better."""
 
 
-class Kernel(NamedTuple):
+class CandidateParameters(NamedTuple):
     """One candidate's numbers: theta (P,); beta, the leading exponent of time; its limits."""
 
     theta: Floats
     beta: float
-    limits: Limits
+    limits: TerminationLimits
 
 
-class Progress(NamedTuple):
+class IntegrationProgress(NamedTuple):
     """done, reached : output times filled, levels reached; steps, rejected : how many; code, time : its end, s."""
 
     done: int
@@ -70,25 +70,25 @@ class Progress(NamedTuple):
 def integrate_point(
     update: Any,
     sensitivity: Any,
-    kernel: Kernel,
-    drive: Drive,
+    kernel: CandidateParameters,
+    drive: StressControl,
     segments: Floats,
     times: Floats,
-    settings: Settings,
+    settings: IntegrationSettings,
     tableau: Tableau,
-    work: Room,
+    work: StepWorkspace,
     strain: Floats,
     jacobian: Floats,
-    arrivals: Arrivals,
-) -> Progress:
+    arrivals: LevelEvents,
+) -> IntegrationProgress:
     """Integrate from time zero; fill `strain` (times,), `jacobian` (times, P), `arrivals` up to the end reached.
 
     segments : (segments, 6); times : (times,) s, non-decreasing, none beyond the last segment.
     jacobian : (times, P), or (0, P) to do without.
     """
-    progress = Progress(_start(kernel, times, work, strain, jacobian), 0, 0, 0, REACHED_END, 0.0)
+    progress = IntegrationProgress(_start(kernel, times, work, strain, jacobian), 0, 0, 0, REACHED_END, 0.0)
     for k in range(segments.shape[0]):
-        segment = segment_of(segments[k])
+        segment = segment_from_row(segments[k])
         progress = _integrate_segment(
             update,
             sensitivity,
@@ -110,7 +110,7 @@ def integrate_point(
 
 
 @njit(cache=True, error_model="numpy")
-def _start(kernel: Kernel, times: Floats, work: Room, strain: Floats, jacobian: Floats) -> int:
+def _start(kernel: CandidateParameters, times: Floats, work: StepWorkspace, strain: Floats, jacobian: Floats) -> int:
     """Return to a virgin state; fill the outputs at time zero and return their number."""
     for v in range(work.value.size):
         work.value[v] = kernel.limits.initial[v - 1] if v > 0 else 0.0
@@ -129,84 +129,84 @@ def _start(kernel: Kernel, times: Floats, work: Room, strain: Floats, jacobian: 
 def _integrate_segment(
     update: Any,
     sensitivity: Any,
-    kernel: Kernel,
-    drive: Drive,
+    kernel: CandidateParameters,
+    drive: StressControl,
     segment: Segment,
     times: Floats,
-    settings: Settings,
+    settings: IntegrationSettings,
     tableau: Tableau,
-    work: Room,
+    work: StepWorkspace,
     strain: Floats,
     jacobian: Floats,
-    arrivals: Arrivals,
-    progress: Progress,
-) -> Progress:
+    arrivals: LevelEvents,
+    progress: IntegrationProgress,
+) -> IntegrationProgress:
     """March over one segment in the position s of its clock, from 0 to 1."""
     done, reached, steps, rejected = progress.done, progress.reached, progress.steps, progress.rejected
-    clock, rate = choose_clock(update, kernel.theta, kernel.beta, drive, segment, work.value, work)
+    clock, rate = choose_time_transformation(update, kernel.theta, kernel.beta, drive, segment, work.value, work)
     if jacobian.shape[0] > 0:
         due = min(times[done], segment.end) if done < times.size else segment.end
-        move_clock(update, kernel.theta, kernel.beta, drive, segment, clock, due, work)
+        differentiate_time_transformation(update, kernel.theta, kernel.beta, drive, segment, clock, due, work)
     first = min(position(clock, times[done]), 1.0) if done < times.size else 1.0
-    slope = rate * exp(moment(clock, 1e-12).log_pace) if rate > 0.0 else nan
+    slope = rate * exp(transformed_time(clock, 1e-12).log_pace) if rate > 0.0 else nan
     s, h, growing = 0.0, min(settings.first, first), True
-    before = Pace(0.0, 1.0)
+    before = AcceptedStep(0.0, 1.0)
     near, steep = -1, slope
     while s < 1.0:
-        h = fitted(s, h, settings.longest)
+        h = bounded_step(s, h, settings.longest)
         if steps + rejected >= settings.max_steps:
-            return Progress(done, reached, steps, rejected, TOO_MANY_STEPS, _time_at(clock, s))
+            return IntegrationProgress(done, reached, steps, rejected, TOO_MANY_STEPS, _time_at(clock, s))
         if not (h >= _SMALLEST_STEP * s and h >= _SMALLEST_FIRST_STEP):
             code = STATE_LIMIT if near > 0 else _why_small(s, slope, settings)
             if code != STEP_TOO_SMALL and jacobian.shape[0] > 0:
                 _steep_end(clock, work, s, max(near, 0), steep, arrivals)
-            return Progress(done, reached, steps, rejected, code, _time_at(clock, s))
+            return IntegrationProgress(done, reached, steps, rejected, code, _time_at(clock, s))
         error = _attempt(
             update, sensitivity, kernel, drive, segment, clock, settings, tableau, work, s, h, slope, first, jacobian
         )
         if not error <= 1.0:
-            h, growing = h * stretch(tableau, error, False), False
+            h, growing = h * step_factor(tableau, error, False), False
             rejected += 1
             continue
         steps += 1
         code = limit_reached(kernel.limits, work)
-        share = 1.0 if code == REACHED_END else crossing(kernel.limits, tableau, work, h)
-        ended = first_passed(kernel.limits, tableau, work, h, share) if code != REACHED_END else -1
+        share = 1.0 if code == REACHED_END else limit_crossing(kernel.limits, tableau, work, h)
+        ended = first_limit_passed(kernel.limits, tableau, work, h, share) if code != REACHED_END else -1
         if code == REACHED_END:
-            now = moment(clock, s + h)
+            now = transformed_time(clock, s + h)
             pace = exp(now.log_pace) / now.time if now.time > 0.0 else inf
-            ended = about_to_pass(kernel.limits, work, pace, _NEGLIGIBLE * settings.rtol)
+            ended = approaching_limit(kernel.limits, work, pace, _NEGLIGIBLE * settings.rtol)
             code = REACHED_END if ended < 0 else STATE_LIMIT if ended > 0 else DIVERGED
-            near = about_to_pass(kernel.limits, work, pace, UNRESOLVED)
+            near = approaching_limit(kernel.limits, work, pace, TERMINATION_MARGIN)
             steep = work.slopes[tableau.c.size - 1, max(near, 0)]
         done = _fill(clock, tableau, work, s, h, share, times, done, strain, jacobian)
-        reached = arrive(clock, tableau, work, s, h, share, arrivals, reached)
+        reached = locate_levels(clock, tableau, work, s, h, share, arrivals, reached)
         if code != REACHED_END:
             if jacobian.shape[0] > 0:
-                log_time_change(clock, tableau, work, s, h, share, ended, arrivals.end_change)
-            return Progress(done, reached, steps, rejected, code, _time_at(clock, s + share * h))
+                log_time_sensitivity(clock, tableau, work, s, h, share, ended, arrivals.end_change)
+            return IntegrationProgress(done, reached, steps, rejected, code, _time_at(clock, s + share * h))
         _accept(work)
         slope = work.slopes[tableau.c.size - 1, 0]
         s = 1.0 if h == 1.0 - s else s + h
-        longer = stretch(tableau, error, growing)
+        longer = step_factor(tableau, error, growing)
         if not growing:
-            longer *= shortened(tableau, before, h, error)
-        before = Pace(h, error)
+            longer *= predictive_step_factor(tableau, before, h, error)
+        before = AcceptedStep(h, error)
         h, growing = h * longer, True
-    return Progress(done, reached, steps, rejected, REACHED_END, segment.end)
+    return IntegrationProgress(done, reached, steps, rejected, REACHED_END, segment.end)
 
 
 @njit(cache=True, error_model="numpy")
 def _attempt(
     update: Any,
     sensitivity: Any,
-    kernel: Kernel,
-    drive: Drive,
+    kernel: CandidateParameters,
+    drive: StressControl,
     segment: Segment,
-    clock: Clock,
-    settings: Settings,
+    clock: TimeTransformation,
+    settings: IntegrationSettings,
     tableau: Tableau,
-    work: Room,
+    work: StepWorkspace,
     s: float,
     h: float,
     slope: float,
@@ -219,17 +219,17 @@ def _attempt(
     if advance(update, kernel.theta, drive, segment, clock, tableau, work, s, h, guess, tolerance) != SOLVED:
         return inf
     ahead = max(1.0, first / (s + h))
-    caution = VIRGIN_CAUTION if s == 0.0 and clock.tau == 0.0 else 1.0
+    caution = INITIAL_ERROR_FACTOR if s == 0.0 and clock.tau == 0.0 else 1.0
     error = caution * strain_error(tableau, drive, segment, work, settings, h, ahead, slope)
     if error <= 1.0 and jacobian.shape[0] > 0:
         if differentiate(sensitivity, kernel.theta, drive, segment, clock, tableau, work, s, h) != SOLVED:
             return inf
-        error = max(error, caution * change_error(tableau, work, settings, h, ahead))
+        error = max(error, caution * sensitivity_error(tableau, work, settings, h, ahead))
     return float(error)
 
 
 @njit(cache=True, error_model="numpy")
-def _accept(work: Room) -> None:
+def _accept(work: StepWorkspace) -> None:
     """Make the end of the step the start of the next."""
     for v in range(work.value.size):
         work.value[v] = work.new_value[v]
@@ -238,20 +238,20 @@ def _accept(work: Room) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _time_at(clock: Clock, s: float) -> float:
-    return moment(clock, s).time if s > 0.0 else clock.start
+def _time_at(clock: TimeTransformation, s: float) -> float:
+    return transformed_time(clock, s).time if s > 0.0 else clock.start
 
 
 @njit(cache=True, error_model="numpy")
-def _why_small(s: float, slope: float, settings: Settings) -> int:
+def _why_small(s: float, slope: float, settings: IntegrationSettings) -> int:
     """A step that shrinks to nothing while the rate would burst the point at once: the rate diverges."""
     return DIVERGED if slope * max(s, 1e-6) > settings.strain_limit else STEP_TOO_SMALL
 
 
 @njit(cache=True, error_model="numpy")
-def _steep_end(clock: Clock, work: Room, s: float, v: int, slope: float, arrivals: Arrivals) -> None:
+def _steep_end(clock: TimeTransformation, work: StepWorkspace, s: float, v: int, slope: float, arrivals: LevelEvents) -> None:
     """The derivative of the end where unknown `v` is vertical over time: a rate that diverges, a limit just ahead."""
-    now = moment(clock, s)
+    now = transformed_time(clock, s)
     pace = slope * now.time / exp(now.log_pace)
     for p in range(arrivals.end_change.size):
         arrivals.end_change[p] = -work.change[v, p] / pace
@@ -259,9 +259,9 @@ def _steep_end(clock: Clock, work: Room, s: float, v: int, slope: float, arrival
 
 @njit(cache=True, error_model="numpy")
 def _fill(
-    clock: Clock,
+    clock: TimeTransformation,
     tableau: Tableau,
-    work: Room,
+    work: StepWorkspace,
     s: float,
     h: float,
     share: float,
@@ -278,6 +278,6 @@ def _fill(
         x = min(max(x, 0.0), 1.0)
         strain[done] = dense_value(tableau, work, h, x, 0)
         if jacobian.shape[0] > 0:
-            dense_change(clock, tableau, work, s, h, x, 0, jacobian[done])
+            dense_sensitivity(clock, tableau, work, s, h, x, 0, jacobian[done])
         done += 1
     return done

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.kernels.interface import MEAN, PRINCIPAL, STRAIN, STRESS
+from creepkit.kernels.interface import MEAN_STRESS, PRINCIPAL_STRESS, STRAIN, STRESS
 
 SOLVED, NOT_FINITE, NO_SOLUTION, TOO_MANY = range(4)
 """Flags of a stage: solved; the rate is not finite; no increment satisfies the equation; iterations used up."""
@@ -30,7 +30,7 @@ UNIAXIAL = Axes(0.0, 1.0, 0.0, 1.0 / 3.0)
 """Uniaxial tension: the largest principal stress is the stress, the mean stress a third of it."""
 
 
-class Problem(NamedTuple):
+class StageProblem(NamedTuple):
     """What a stage is solved for: trial stress and k in MPa, load 0 or 1, weight w in s, strain p0 so far."""
 
     trial: float
@@ -40,7 +40,7 @@ class Problem(NamedTuple):
     strain: float
 
 
-class Unfolded(NamedTuple):
+class StageIterate(NamedTuple):
     """An iterate x in plain terms: D, ln D, stress in MPa, and d(ln D)/dx, d(ln sigma)/dx."""
 
     increment: float
@@ -51,19 +51,19 @@ class Unfolded(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def unfold(problem: Problem, x: float) -> Unfolded:
+def increment_and_stress(problem: StageProblem, x: float) -> StageIterate:
     """Turn the unknown x into increment and stress."""
     amount = exp(min(x, 700.0))
     if problem.stiffness > 0.0:
         ratio = problem.stiffness * amount / problem.trial
         elastic = 1.0 / (1.0 + ratio)
-        return Unfolded(amount * elastic, x - log1p(ratio), problem.trial * elastic, elastic, elastic - 1.0)
+        return StageIterate(amount * elastic, x - log1p(ratio), problem.trial * elastic, elastic, elastic - 1.0)
     stress = problem.trial * exp(problem.load * min(amount, 700.0)) if problem.load > 0.0 else problem.trial
-    return Unfolded(amount, x, stress, 1.0, problem.load * amount)
+    return StageIterate(amount, x, stress, 1.0, problem.load * amount)
 
 
 @njit(cache=True, error_model="numpy")
-def fold(problem: Problem, increment: float) -> float:
+def unknown_of_increment(problem: StageProblem, increment: float) -> float:
     """The unknown x of a guessed increment, kept off the ends of its range."""
     guess = max(increment, 1e-300)
     if problem.stiffness == 0.0:
@@ -73,19 +73,19 @@ def fold(problem: Problem, increment: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def place(row: Floats, axes: Axes, stress: float, strain: float) -> None:
+def write_point(row: Floats, axes: Axes, stress: float, strain: float) -> None:
     """Write stress and strain into a kernel's row; time, temperature and states are there already."""
     row[STRESS] = stress
     row[STRAIN] = strain
-    row[PRINCIPAL] = axes.principal + axes.principal_slope * stress
-    row[MEAN] = axes.mean + axes.mean_slope * stress
+    row[PRINCIPAL_STRESS] = axes.principal + axes.principal_slope * stress
+    row[MEAN_STRESS] = axes.mean + axes.mean_slope * stress
 
 
 @njit(cache=True, error_model="numpy")
-def along_stress(slopes: Floats, start: int, axes: Axes) -> float:
+def stress_derivative(slopes: Floats, start: int, axes: Axes) -> float:
     """Derivative to the equivalent stress, principal and mean stress following it; a gradient begins at `start`."""
     return float(
         slopes[start + STRESS]
-        + axes.principal_slope * slopes[start + PRINCIPAL]
-        + axes.mean_slope * slopes[start + MEAN]
+        + axes.principal_slope * slopes[start + PRINCIPAL_STRESS]
+        + axes.mean_slope * slopes[start + MEAN_STRESS]
     )

@@ -11,9 +11,9 @@ from math import exp
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.integration.elimination import eliminate
-from creepkit.integration.problem import Axes, Problem, along_stress
-from creepkit.kernels.interface import MEAN, POINT_SIZE, PRINCIPAL, STRAIN, TEMPERATURE, TIME
+from creepkit.integration.elimination import solve_dense
+from creepkit.integration.problem import Axes, StageProblem, stress_derivative
+from creepkit.kernels.interface import MEAN_STRESS, POINT_SIZE, PRINCIPAL_STRESS, STRAIN, TEMPERATURE, TIME
 
 INPUTS = 7
 BY_TRIAL, BY_STRAIN, BY_TIME, BY_TEMPERATURE, BY_LOG_WEIGHT, BY_PRINCIPAL, BY_MEAN = range(INPUTS)
@@ -21,7 +21,7 @@ BY_TRIAL, BY_STRAIN, BY_TIME, BY_TEMPERATURE, BY_LOG_WEIGHT, BY_PRINCIPAL, BY_ME
 
 
 @njit(cache=True, error_model="numpy")
-def gradient_of_update(out: Floats, problem: Problem, increment: float, gradient: Floats) -> None:
+def gradient_of_update(out: Floats, problem: StageProblem, increment: float, gradient: Floats) -> None:
     """Derivatives of [w f, w g] with respect to a kernel's row, (1 + S, 6 + S), from the output of `update`."""
     size, width = gradient.shape
     for i in range(size):
@@ -32,7 +32,7 @@ def gradient_of_update(out: Floats, problem: Problem, increment: float, gradient
 
 
 @njit(cache=True, error_model="numpy")
-def gradient_of_sensitivity(full: Floats, problem: Problem, increment: float, gradient: Floats) -> None:
+def gradient_of_sensitivity(full: Floats, problem: StageProblem, increment: float, gradient: Floats) -> None:
     """The same from the output of `sensitivity`."""
     size, width = gradient.shape
     for i in range(size):
@@ -43,9 +43,9 @@ def gradient_of_sensitivity(full: Floats, problem: Problem, increment: float, gr
 
 
 @njit(cache=True, error_model="numpy")
-def respond(
+def differentiate_stage(
     axes: Axes,
-    problem: Problem,
+    problem: StageProblem,
     increment: float,
     stress: float,
     state_rates: Floats,
@@ -63,7 +63,7 @@ def respond(
     growth = exp(problem.load * increment)
     by_increment = problem.load * stress - problem.stiffness * growth
     for i in range(size):
-        by_stress = along_stress(gradient[i], 0, axes)
+        by_stress = stress_derivative(gradient[i], 0, axes)
         matrix[i, 0] = -gradient[i, STRAIN] - by_stress * by_increment
         for j in range(1, size):
             matrix[i, j] = -gradient[i, POINT_SIZE + j - 1]
@@ -74,6 +74,6 @@ def respond(
         response[i, BY_TIME] = gradient[i, TIME]
         response[i, BY_TEMPERATURE] = gradient[i, TEMPERATURE]
         response[i, BY_LOG_WEIGHT] = increment if i == 0 else problem.weight * state_rates[i - 1]
-        response[i, BY_PRINCIPAL] = gradient[i, PRINCIPAL]
-        response[i, BY_MEAN] = gradient[i, MEAN]
-    return eliminate(matrix, response)
+        response[i, BY_PRINCIPAL] = gradient[i, PRINCIPAL_STRESS]
+        response[i, BY_MEAN] = gradient[i, MEAN_STRESS]
+    return solve_dense(matrix, response)

@@ -23,7 +23,7 @@ class Segment(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def segment_of(row: Floats) -> Segment:
+def segment_from_row(row: Floats) -> Segment:
     """A segment from its row of six numbers."""
     return Segment(row[0], row[1], row[2], row[3], row[4], row[5])
 
@@ -40,7 +40,7 @@ def temperature_rate(segment: Segment) -> float:
     return (segment.end_temperature - segment.temperature) / (segment.end - segment.start)
 
 
-def segments_of(*programs: Program, end: float) -> Floats:
+def merge_programs(*programs: Program, end: float) -> Floats:
     """Merge programs from 0 to `end` (s) into segments, (segments, 2 + 2 programs); every breakpoint is a boundary.
 
     Columns: start and end, s, then the values of each program at both.

@@ -21,7 +21,7 @@ from typing import Any
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.integration.coupled import solve_coupled
+from creepkit.integration.coupled import solve_stage_with_states
 from creepkit.integration.problem import (
     NO_RATE,
     NO_SOLUTION,
@@ -29,25 +29,25 @@ from creepkit.integration.problem import (
     SOLVED,
     TOO_MANY,
     Axes,
-    Problem,
-    Unfolded,
-    along_stress,
-    fold,
-    place,
-    unfold,
+    StageProblem,
+    StageIterate,
+    stress_derivative,
+    unknown_of_increment,
+    write_point,
+    increment_and_stress,
 )
-from creepkit.kernels.interface import STRAIN, pointer
+from creepkit.kernels.interface import STRAIN, data_pointer
 
 _ITERATIONS = 80
-_NEAR = 4
+_NEAR_ITERATIONS = 4
 
 
 @njit(cache=True, error_model="numpy")
-def solve(
+def solve_stage(
     update: Any,
     theta: Floats,
     axes: Axes,
-    problem: Problem,
+    problem: StageProblem,
     states: Floats,
     row: Floats,
     out: Floats,
@@ -63,9 +63,9 @@ def solve(
     tolerance : on the last Newton correction of ln D (and of the states, relative); the error left is its square.
     """
     if states.size > 0:
-        return solve_coupled(update, theta, axes, problem, states, row, out, guess, tolerance)
+        return solve_stage_with_states(update, theta, axes, problem, states, row, out, guess, tolerance)
     if problem.trial <= 0.0:
-        place(row, axes, 0.0, problem.strain)
+        write_point(row, axes, 0.0, problem.strain)
         return 0.0, SOLVED if problem.trial == 0.0 else NO_SOLUTION
     return _solve_scalar(update, theta, axes, problem, row, out, guess, tolerance)
 
@@ -75,22 +75,22 @@ def _solve_scalar(
     update: Any,
     theta: Floats,
     axes: Axes,
-    problem: Problem,
+    problem: StageProblem,
     row: Floats,
     out: Floats,
     guess: float,
     tolerance: float,
 ) -> tuple[float, int]:
     """Newton's method in x, bracketed: it cannot fail where the rate falls with strain and rises with stress."""
-    x, low, high, before = fold(problem, guess), -inf, inf, inf
+    x, low, high, before = unknown_of_increment(problem, guess), -inf, inf, inf
     log_weight = log(problem.weight)
     for _ in range(_ITERATIONS):
-        now = unfold(problem, x)
-        place(row, axes, now.stress, problem.strain + now.increment)
-        update(1, pointer(row), pointer(theta), pointer(out))
+        now = increment_and_stress(problem, x)
+        write_point(row, axes, now.stress, problem.strain + now.increment)
+        update(1, data_pointer(row), data_pointer(theta), data_pointer(out))
         nothing = out[0] < NO_RATE
         if nothing and now.stress > 0.99 * problem.trial:
-            place(row, axes, problem.trial, problem.strain)
+            write_point(row, axes, problem.trial, problem.strain)
             return 0.0, SOLVED
         residual = inf if nothing else now.log_increment - log_weight - out[0]
         if not isfinite(residual) and not nothing:
@@ -104,8 +104,8 @@ def _solve_scalar(
             return 0.0, NO_SOLUTION
         step = -residual / slope if slope > 0.0 else inf
         if abs(step) <= tolerance:
-            now = unfold(problem, x + step)
-            place(row, axes, now.stress, problem.strain + now.increment)
+            now = increment_and_stress(problem, x + step)
+            write_point(row, axes, now.stress, problem.strain + now.increment)
             return now.increment, SOLVED
         if not low < x + step < high or abs(step) > 0.5 * before:
             step = _cautious(x, step, low, high)
@@ -115,10 +115,10 @@ def _solve_scalar(
 
 
 @njit(cache=True, error_model="numpy")
-def _slope(now: Unfolded, out: Floats, axes: Axes) -> float:
+def _slope(now: StageIterate, out: Floats, axes: Axes) -> float:
     """d(ln D - ln w - ln f)/dx; between 1 and the stress exponent for a hardening law under prescribed strain."""
     by_strain = now.increment * now.increment_slope * out[1 + STRAIN]
-    by_stress = now.stress * now.stress_slope * along_stress(out, 1, axes)
+    by_stress = now.stress * now.stress_slope * stress_derivative(out, 1, axes)
     return float(now.increment_slope - by_strain - by_stress)
 
 
@@ -131,11 +131,11 @@ def _cautious(x: float, step: float, low: float, high: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def solve_near(
+def solve_stage_near_guess(
     update: Any,
     theta: Floats,
     axes: Axes,
-    problem: Problem,
+    problem: StageProblem,
     row: Floats,
     out: Floats,
     guess: float,
@@ -148,17 +148,17 @@ def solve_near(
     """
     increment, log_weight = guess, log(problem.weight)
     share = problem.stiffness * increment / problem.trial
-    for _ in range(_NEAR):
+    for _ in range(_NEAR_ITERATIONS):
         if not 1e-280 < share < 0.9999:
             break
         elastic = 1.0 - share
         stress = problem.trial * elastic
-        place(row, axes, stress, problem.strain + increment)
-        update(1, pointer(row), pointer(theta), pointer(out))
+        write_point(row, axes, stress, problem.strain + increment)
+        update(1, data_pointer(row), data_pointer(theta), data_pointer(out))
         if out[0] < NO_RATE:
             break
         residual = log(increment) - log_weight - out[0]
-        slope = elastic * (1.0 - increment * out[1 + STRAIN]) + share * stress * along_stress(out, 1, axes)
+        slope = elastic * (1.0 - increment * out[1 + STRAIN]) + share * stress * stress_derivative(out, 1, axes)
         step = -residual / slope
         if not (slope > 0.0 and abs(step) < 1.0):
             break
@@ -166,6 +166,6 @@ def solve_near(
         share = ratio / (1.0 + ratio)
         increment = problem.trial / problem.stiffness * share
         if abs(step) <= tolerance:
-            place(row, axes, problem.trial * (1.0 - share), problem.strain + increment)
+            write_point(row, axes, problem.trial * (1.0 - share), problem.strain + increment)
             return increment, SOLVED
     return 0.0, TOO_MANY

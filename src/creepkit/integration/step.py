@@ -14,8 +14,8 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.integration.clock import Clock, moment, velocity
-from creepkit.integration.problem import NO_SOLUTION, SOLVED, Axes, Problem, place
+from creepkit.integration.clock import TimeTransformation, transformed_time, transformation_derivatives
+from creepkit.integration.problem import NO_SOLUTION, SOLVED, Axes, StageProblem, write_point
 from creepkit.integration.response import (
     BY_LOG_WEIGHT,
     BY_STRAIN,
@@ -24,15 +24,15 @@ from creepkit.integration.response import (
     BY_TRIAL,
     INPUTS,
     gradient_of_sensitivity,
-    respond,
+    differentiate_stage,
 )
 from creepkit.integration.segments import Segment, stress_rate, temperature_rate
-from creepkit.integration.stage import solve
+from creepkit.integration.stage import solve_stage
 from creepkit.integration.tableau import Tableau
-from creepkit.kernels.interface import POINT_SIZE, TEMPERATURE, TIME, pointer
+from creepkit.kernels.interface import POINT_SIZE, TEMPERATURE, TIME, data_pointer
 
 
-class Drive(NamedTuple):
+class StressControl(NamedTuple):
     """How stress follows strain: sigma = (driving stress - stiffness p) exp(load p); MPa, and load 0 or 1."""
 
     stiffness: float
@@ -40,7 +40,7 @@ class Drive(NamedTuple):
     axes: Axes
 
 
-class Room(NamedTuple):
+class StepWorkspace(NamedTuple):
     """Working arrays of one point: V = 1 + S unknowns (strain, then states), P parameters.
 
     value, change : (V,), (V, P) at the start of the step and its derivatives; new_value, new_change : at its end.
@@ -67,10 +67,10 @@ class Room(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def room(states: int, parameters: int, stages: int) -> Room:
+def step_workspace(states: int, parameters: int, stages: int) -> StepWorkspace:
     """Allocate the working arrays."""
     size, width = 1 + states, POINT_SIZE + states
-    return Room(
+    return StepWorkspace(
         np.zeros(size),
         np.zeros((size, parameters)),
         np.zeros(size),
@@ -91,8 +91,8 @@ def room(states: int, parameters: int, stages: int) -> Room:
 
 @njit(cache=True, error_model="numpy")
 def _set_stage(
-    drive: Drive, segment: Segment, clock: Clock, tableau: Tableau, work: Room, s: float, h: float, i: int
-) -> Problem:
+    drive: StressControl, segment: Segment, clock: TimeTransformation, tableau: Tableau, work: StepWorkspace, s: float, h: float, i: int
+) -> StageProblem:
     """Write history, time and temperature of stage `i` into the room; return its problem.
 
     Where strain starts as a high power of s, weights below zero can make its history negative: laws never see that.
@@ -102,25 +102,25 @@ def _set_stage(
         for j in range(i):
             total += tableau.a[i, j] * work.slopes[j, v]
         work.base[v] = work.value[v] + h * total
-    now = moment(clock, s + tableau.c[i] * h)
+    now = transformed_time(clock, s + tableau.c[i] * h)
     elapsed = now.time - segment.start
     work.row[TIME] = now.time
     work.row[TEMPERATURE] = segment.temperature + temperature_rate(segment) * elapsed
     strain = max(work.base[0], 0.0)
     driving = segment.stress + stress_rate(segment) * elapsed
     trial = (driving - drive.stiffness * strain) * exp(drive.load * strain)
-    return Problem(trial, drive.stiffness, drive.load, tableau.a[i, i] * h * exp(now.log_pace), strain)
+    return StageProblem(trial, drive.stiffness, drive.load, tableau.a[i, i] * h * exp(now.log_pace), strain)
 
 
 @njit(cache=True, error_model="numpy")
 def advance(
     update: Any,
     theta: Floats,
-    drive: Drive,
+    drive: StressControl,
     segment: Segment,
-    clock: Clock,
+    clock: TimeTransformation,
     tableau: Tableau,
-    work: Room,
+    work: StepWorkspace,
     s: float,
     h: float,
     slope: float,
@@ -133,7 +133,7 @@ def advance(
         for v in range(1, work.base.size):
             work.row[POINT_SIZE + v - 1] = work.base[v] + (share * work.slopes[i - 1, v] if i > 0 else 0.0)
         guess = share * (work.slopes[i - 1, 0] if i > 0 else slope)
-        increment, flag = solve(update, theta, drive.axes, problem, work.base[1:], work.row, work.out, guess, tolerance)
+        increment, flag = solve_stage(update, theta, drive.axes, problem, work.base[1:], work.row, work.out, guess, tolerance)
         if flag != SOLVED:
             return flag
         work.slopes[i, 0] = increment / share
@@ -148,11 +148,11 @@ def advance(
 def differentiate(
     sensitivity: Any,
     theta: Floats,
-    drive: Drive,
+    drive: StressControl,
     segment: Segment,
-    clock: Clock,
+    clock: TimeTransformation,
     tableau: Tableau,
-    work: Room,
+    work: StepWorkspace,
     s: float,
     h: float,
 ) -> int:
@@ -166,8 +166,8 @@ def differentiate(
             work.row[POINT_SIZE + v - 1] = work.base[v] + share * work.slopes[i, v]
         growth = exp(drive.load * increment)
         stress = (problem.trial - problem.stiffness * increment) * growth
-        place(work.row, drive.axes, stress, problem.strain + increment)
-        sensitivity(1, pointer(work.row), pointer(theta), pointer(work.full))
+        write_point(work.row, drive.axes, stress, problem.strain + increment)
+        sensitivity(1, data_pointer(work.row), data_pointer(theta), data_pointer(work.full))
         gradient_of_sensitivity(work.full, problem, increment, work.gradient)
         start = size + size * work.row.size
         for v in range(size):
@@ -175,7 +175,7 @@ def differentiate(
                 slope = work.full[start + v * parameters + p]
                 work.response[v, INPUTS + size - 1 + p] = problem.weight * slope if stress > 0.0 or v > 0 else 0.0
         rates = work.full[1:size]
-        if not respond(drive.axes, problem, increment, stress, rates, work.gradient, work.matrix, work.response):
+        if not differentiate_stage(drive.axes, problem, increment, stress, rates, work.gradient, work.matrix, work.response):
             return NO_SOLUTION
         _stage_change(drive, segment, clock, tableau, work, problem, s, h, i)
     for v in range(size):
@@ -189,12 +189,12 @@ def differentiate(
 
 @njit(cache=True, error_model="numpy")
 def _stage_change(
-    drive: Drive,
+    drive: StressControl,
     segment: Segment,
-    clock: Clock,
+    clock: TimeTransformation,
     tableau: Tableau,
-    work: Room,
-    problem: Problem,
+    work: StepWorkspace,
+    problem: StageProblem,
     s: float,
     h: float,
     i: int,
@@ -207,7 +207,7 @@ def _stage_change(
             for j in range(i):
                 total += tableau.a[i, j] * work.slope_changes[j, v, p]
             work.base_change[v, p] = work.change[v, p] + h * total
-    by_beta, by_tau = velocity(clock, s + tableau.c[i] * h)
+    by_beta, by_tau = transformation_derivatives(clock, s + tableau.c[i] * h)
     strain = problem.strain
     trial_by_strain = drive.load * problem.trial - drive.stiffness * exp(drive.load * strain)
     trial_by_time = stress_rate(segment) * exp(drive.load * strain)

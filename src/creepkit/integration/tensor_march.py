@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.integration.clock import Clock, moment, plain, position, virgin
-from creepkit.integration.control import VIRGIN_CAUTION, Settings, stretch
+from creepkit.integration.clock import TimeTransformation, transformed_time, linear_time, position, power_law_time
+from creepkit.integration.control import INITIAL_ERROR_FACTOR, IntegrationSettings, step_factor
 from creepkit.integration.endings import (
     DIVERGED,
     REACHED_END,
@@ -17,17 +17,17 @@ from creepkit.integration.endings import (
     STEP_TOO_SMALL,
     STRAIN_LIMIT,
     TOO_MANY_STEPS,
-    UNRESOLVED,
+    TERMINATION_MARGIN,
 )
-from creepkit.integration.segments import segments_of
+from creepkit.integration.segments import merge_programs
 from creepkit.integration.tableau import Tableau
-from creepkit.integration.tensor_point import EQUIVALENT, TensorPoint
+from creepkit.integration.tensor_point import EQUIVALENT_STRAIN, TensorPoint
 from creepkit.records import Program
 
 _SMALLEST_STEP, _SMALLEST_FIRST_STEP = 1e-13, 1e-60
 
 
-class Segment(NamedTuple):
+class TensorSegment(NamedTuple):
     """start and end, s; the six imposed quantities and the temperature at both, (7,)."""
 
     start: float
@@ -40,24 +40,24 @@ class Segment(NamedTuple):
         return np.asarray(self.first + (time - self.start) / (self.end - self.start) * (self.last - self.first))
 
 
-def segments_along(programs: list[Program], end: float) -> list[Segment]:
+def tensor_segments(programs: list[Program], end: float) -> list[TensorSegment]:
     """Merge the programs from 0 to `end`, so that each is a straight line in every segment."""
-    rows = segments_of(*programs, end=end)
-    return [Segment(row[0], row[1], row[2::2], row[3::2]) for row in rows]
+    rows = merge_programs(*programs, end=end)
+    return [TensorSegment(row[0], row[1], row[2::2], row[3::2]) for row in rows]
 
 
-class March:
+class TensorIntegrator:
     """A march of a virgin point from time zero; `history` holds its vectors at the output times reached."""
 
-    def __init__(self, point: TensorPoint, settings: Settings, tableau: Tableau, outputs: Floats) -> None:
+    def __init__(self, point: TensorPoint, settings: IntegrationSettings, tableau: Tableau, outputs: Floats) -> None:
         self.point, self.settings, self.tableau, self.outputs = point, settings, tableau, outputs
-        self.value = np.concatenate([np.zeros(EQUIVALENT + 1), point.law.initial])
+        self.value = np.concatenate([np.zeros(EQUIVALENT_STRAIN + 1), point.law.initial])
         self.slopes = np.zeros((tableau.stages, self.value.size))
         self.history: list[Floats] = []
-        self.time, self.steps, self.tried = 0.0, 0, 0
+        self.time, self.steps, self.attempts = 0.0, 0, 0
         self._record()
 
-    def along(self, segments: list[Segment]) -> int:
+    def integrate(self, segments: list[TensorSegment]) -> int:
         """Go through the segments; return the code of the ending."""
         for segment in segments:
             code = self._through(segment)
@@ -69,7 +69,7 @@ class March:
         while len(self.history) < self.outputs.size and self.outputs[len(self.history)] <= self.time:
             self.history.append(self.value)
 
-    def _through(self, segment: Segment) -> int:
+    def _through(self, segment: TensorSegment) -> int:
         """March over one segment in the position s of its clock, from 0 to 1."""
         clock = self._clock(segment)
         s, h = 0.0, self.settings.first
@@ -78,80 +78,80 @@ class March:
             h = min(h, self.settings.longest)
             last = s + 1.001 * h > goal
             step = goal - s if last else h
-            if self.tried >= self.settings.max_steps:
+            if self.attempts >= self.settings.max_steps:
                 return TOO_MANY_STEPS
             if not (step >= _SMALLEST_STEP * s and step >= _SMALLEST_FIRST_STEP):
                 return self._why_small(clock, s)
-            self.tried += 1
+            self.attempts += 1
             new, error = self._attempt(segment, clock, s, step)
             if not error <= 1.0:
-                h = step * stretch(self.tableau, error, False)
+                h = step * step_factor(self.tableau, error, False)
                 continue
-            grown = step * stretch(self.tableau, error, True)
+            grown = step * step_factor(self.tableau, error, True)
             h = max(h, grown) if last else grown
             code = self._limit(new)
             if code != REACHED_END:
-                self.time = moment(clock, s + step * self._crossing(new, step)).time
+                self.time = transformed_time(clock, s + step * self._crossing(new, step)).time
                 return code
             s, self.value, self.steps = (goal if last else s + step), new, self.steps + 1
-            self.time = time if last else moment(clock, s).time
+            self.time = time if last else transformed_time(clock, s).time
             self._record()
         return REACHED_END
 
-    def _clock(self, segment: Segment) -> Clock:
+    def _clock(self, segment: TensorSegment) -> TimeTransformation:
         """A clock in which a virgin point creeps evenly, else plain time."""
         length = segment.end - segment.start
-        if self.value[EQUIVALENT] > 0.0:
-            return plain(segment.start, length)
-        beta = float(np.reshape(self.point.law.leading(self.point.theta[None]), -1)[0])
-        return virgin(segment.start, length, beta)
+        if self.value[EQUIVALENT_STRAIN] > 0.0:
+            return linear_time(segment.start, length)
+        beta = float(np.reshape(self.point.law.leading_exponent(self.point.theta[None]), -1)[0])
+        return power_law_time(segment.start, length, beta)
 
-    def _goal(self, clock: Clock, segment: Segment) -> tuple[float, float]:
+    def _goal(self, clock: TimeTransformation, segment: TensorSegment) -> tuple[float, float]:
         """Position and time of the next output, or of the segment's end."""
         done = len(self.history)
         if done < self.outputs.size and self.outputs[done] < segment.end:
             return position(clock, self.outputs[done]), float(self.outputs[done])
         return 1.0, segment.end
 
-    def _attempt(self, segment: Segment, clock: Clock, s: float, h: float) -> tuple[Floats, float]:
+    def _attempt(self, segment: TensorSegment, clock: TimeTransformation, s: float, h: float) -> tuple[Floats, float]:
         """The vector after a step and its error over what is allowed, infinite when a stage has no solution."""
         tableau, slopes = self.tableau, np.zeros_like(self.slopes)
         slope = self.slopes[-1] if s > 0.0 else np.zeros_like(self.value)
         for i in range(tableau.stages):
             base = self.value + h * tableau.a[i, :i] @ slopes[:i]
-            now, share = moment(clock, s + tableau.c[i] * h), tableau.a[i, i] * h
+            now, share = transformed_time(clock, s + tableau.c[i] * h), tableau.a[i, i] * h
             imposed = segment.at(now.time)
-            answer = self.point.stage(
+            answer = self.point.solve_stage(
                 base, base + share * slope, imposed[:6], now.time, float(imposed[6]), share * exp(now.log_pace)
             )
             if answer is None:
                 return self.value, inf
             slopes[i] = slope = (answer - base) / share
         new = self.value + h * tableau.a[-1] @ slopes
-        error = self._error(new, h * tableau.error @ slopes) * (VIRGIN_CAUTION if s == 0.0 and clock.tau == 0.0 else 1)
+        error = self._error(new, h * tableau.error @ slopes) * (INITIAL_ERROR_FACTOR if s == 0.0 and clock.tau == 0.0 else 1)
         if error <= 1.0:
             self.slopes = slopes
         return new, error
 
     def _error(self, new: Floats, errors: Floats) -> float:
         """Largest local error over what is allowed; under prescribed strain the elastic strain counts as well."""
-        if new[EQUIVALENT] < self.value[EQUIVALENT]:
+        if new[EQUIVALENT_STRAIN] < self.value[EQUIVALENT_STRAIN]:
             return inf
         reach = np.maximum(np.abs(new), np.abs(self.value))
-        reach[:EQUIVALENT] = reach[EQUIVALENT]
+        reach[:EQUIVALENT_STRAIN] = reach[EQUIVALENT_STRAIN]
         if not self.point.free.all():
             elastic = self.point.equivalent_stress / (3 * self.point.shear)
-            reach[: EQUIVALENT + 1] = np.minimum(reach[: EQUIVALENT + 1], elastic)
+            reach[: EQUIVALENT_STRAIN + 1] = np.minimum(reach[: EQUIVALENT_STRAIN + 1], elastic)
         worst = float(np.max(np.abs(errors) / (self.settings.rtol * (reach + self.settings.smallest))))
         return worst if isfinite(worst) else inf
 
     def _limit(self, new: Floats) -> int:
         """STATE_LIMIT or STRAIN_LIMIT when a vector has passed one, else REACHED_END."""
-        limits, initial, states = self.point.law.limits, self.point.law.initial, new[EQUIVALENT + 1 :]
+        limits, initial, states = self.point.law.limits, self.point.law.initial, new[EQUIVALENT_STRAIN + 1 :]
         passed = np.where(limits > initial, states >= limits, states <= limits) & np.isfinite(limits)
         if passed.any():
             return STATE_LIMIT
-        return STRAIN_LIMIT if new[EQUIVALENT] >= self.settings.strain_limit else REACHED_END
+        return STRAIN_LIMIT if new[EQUIVALENT_STRAIN] >= self.settings.strain_limit else REACHED_END
 
     def _crossing(self, new: Floats, h: float) -> float:
         """Share of the step at which the first limit is passed, by bisection of the dense output."""
@@ -162,18 +162,18 @@ class March:
             low, high = (low, middle) if self._limit(between) != REACHED_END else (middle, high)
         return high
 
-    def _why_small(self, clock: Clock, s: float) -> int:
+    def _why_small(self, clock: TimeTransformation, s: float) -> int:
         """A step that shrinks to nothing: at a limit just ahead, or while the rate would burst the point at once."""
         if s > 0.0 and self._limit_ahead(clock, s):
             return STATE_LIMIT
-        rate = self.slopes[-1, EQUIVALENT] * max(s, 1e-6)
+        rate = self.slopes[-1, EQUIVALENT_STRAIN] * max(s, 1e-6)
         return DIVERGED if rate > self.settings.strain_limit else STEP_TOO_SMALL
 
-    def _limit_ahead(self, clock: Clock, s: float) -> bool:
+    def _limit_ahead(self, clock: TimeTransformation, s: float) -> bool:
         """Whether a state that moves ever faster will pass its limit before the time has grown by UNRESOLVED of it."""
-        gap = self.point.law.limits - self.value[EQUIVALENT + 1 :]
-        first, last = self.slopes[[0, -1], EQUIVALENT + 1 :]
-        now = moment(clock, s)
-        reach = UNRESOLVED * np.abs(last) * now.time / exp(now.log_pace)
+        gap = self.point.law.limits - self.value[EQUIVALENT_STRAIN + 1 :]
+        first, last = self.slopes[[0, -1], EQUIVALENT_STRAIN + 1 :]
+        now = transformed_time(clock, s)
+        reach = TERMINATION_MARGIN * np.abs(last) * now.time / exp(now.log_pace)
         faster = (last * gap > 0.0) & (np.abs(last) > np.abs(first))
         return bool((faster & (np.abs(gap) < reach)).any())

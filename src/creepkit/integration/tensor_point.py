@@ -18,13 +18,13 @@ from typing import NamedTuple
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.integration.problem import SOLVED, Axes, Problem
-from creepkit.integration.response import BY_MEAN, BY_PRINCIPAL, BY_TRIAL, INPUTS, gradient_of_update, respond
-from creepkit.integration.stage import solve
-from creepkit.kernels.calling import call
+from creepkit.integration.problem import SOLVED, Axes, StageProblem
+from creepkit.integration.response import BY_MEAN, BY_PRINCIPAL, BY_TRIAL, INPUTS, gradient_of_update, differentiate_stage
+from creepkit.integration.stage import solve_stage
+from creepkit.kernels.calling import call_entry
 from creepkit.kernels.interface import POINT_SIZE, STRESS, TEMPERATURE, TIME, CompiledLaw
 
-EQUIVALENT = 6
+EQUIVALENT_STRAIN = 6
 """Place of the equivalent creep strain in a point's vector: six creep strains, then this, then the states."""
 
 _UNIT = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
@@ -38,7 +38,7 @@ _LAST_CORRECTION = 1e-8
 _FIRST_INCREMENT = 1e-6
 
 
-class Trial(NamedTuple):
+class TrialStress(NamedTuple):
     """The stress if nothing crept: mean stress, deviator (6,), von Mises stress q, in MPa, and the axes it fixes.
 
     along : (6,) derivative of the deviator's largest principal stress to the deviator.
@@ -51,7 +51,7 @@ class Trial(NamedTuple):
     along: Floats
 
 
-class Answer(NamedTuple):
+class ConstitutiveResponse(NamedTuple):
     """The vector after a stage, (7 + S,), the stress, (6,), and its consistent tangent to the strain, (6, 6)."""
 
     vector: Floats
@@ -59,7 +59,7 @@ class Answer(NamedTuple):
     tangent: Floats
 
 
-def trial_of(stress: Floats) -> Trial:
+def trial_stress(stress: Floats) -> TrialStress:
     """Take a stress apart."""
     mean = float(stress[:3].mean())
     s = stress - mean * _UNIT
@@ -69,7 +69,7 @@ def trial_of(stress: Floats) -> Trial:
     values, vectors = np.linalg.eigh(tensor)
     axis = vectors[:, -1]
     slope = float(values[-1]) / q if q > 0.0 else 0.0
-    return Trial(mean, s, q, Axes(mean, slope, mean, 0.0), _TWICE * axis[_ROWS] * axis[_COLUMNS])
+    return TrialStress(mean, s, q, Axes(mean, slope, mean, 0.0), _TWICE * axis[_ROWS] * axis[_COLUMNS])
 
 
 class TensorPoint:
@@ -88,22 +88,22 @@ class TensorPoint:
         """The von Mises stress at the end of the last stage, MPa."""
         return float(self.row[STRESS])
 
-    def elastic_answer(self, imposed: Floats, creep: Floats) -> tuple[Floats, Floats]:
+    def elastic_response(self, imposed: Floats, creep: Floats) -> tuple[Floats, Floats]:
         """Stress and strain when creep strains are known; `imposed` mixes stresses and strains."""
         free, strain = self.free, np.where(self.free, 0.0, imposed)
         known = self.stiffness @ (strain - creep)
         strain[free] = np.linalg.solve(self.stiffness[np.ix_(free, free)], (imposed - known)[free])
         return np.where(free, imposed, self.stiffness @ (strain - creep)), strain
 
-    def stage(
+    def solve_stage(
         self, base: Floats, guess: Floats, imposed: Floats, time: float, temperature: float, weight: float
     ) -> Floats | None:
         """The vector at the end of a stage that starts from `base` with a weight in s; None when there is none."""
         free = self.free
-        _, strain = self.elastic_answer(imposed, guess[:6])
+        _, strain = self.elastic_response(imposed, guess[:6])
         self.row[TIME], self.row[TEMPERATURE] = time, temperature
         for _ in range(_ITERATIONS):
-            answer = self.answer(strain, base, guess, weight)
+            answer = self.constitutive_response(strain, base, guess, weight)
             if answer is None:
                 return None
             residual = (answer.stress - imposed)[free]
@@ -112,37 +112,37 @@ class TensorPoint:
             strain[free] -= np.linalg.solve(answer.tangent[np.ix_(free, free)], residual)
         return None
 
-    def answer(self, strain: Floats, base: Floats, guess: Floats, weight: float) -> Answer | None:
+    def constitutive_response(self, strain: Floats, base: Floats, guess: Floats, weight: float) -> ConstitutiveResponse | None:
         """What follows from a strain at the end of the stage whose time and temperature stand in the row."""
-        trial = trial_of(self.stiffness @ (strain - base[:6]))
+        trial = trial_stress(self.stiffness @ (strain - base[:6]))
         if not isfinite(trial.q):
             return None
-        problem = Problem(trial.q, 3 * self.shear, 0.0, weight, max(float(base[EQUIVALENT]), 0.0))
+        problem = StageProblem(trial.q, 3 * self.shear, 0.0, weight, max(float(base[EQUIVALENT_STRAIN]), 0.0))
         vector = self._creep(base, guess, trial, problem)
         if vector is None:
             return None
-        tangent = self._tangent(trial, problem, float(vector[EQUIVALENT] - base[EQUIVALENT]))
+        tangent = self._tangent(trial, problem, float(vector[EQUIVALENT_STRAIN] - base[EQUIVALENT_STRAIN]))
         stress = trial.mean * _UNIT + self._share(trial) * trial.s
-        return None if tangent is None else Answer(vector, stress, tangent)
+        return None if tangent is None else ConstitutiveResponse(vector, stress, tangent)
 
-    def _share(self, trial: Trial) -> float:
+    def _share(self, trial: TrialStress) -> float:
         """What creep leaves of the deviator."""
         return float(self.row[STRESS]) / trial.q if trial.q > 0.0 else 1.0
 
-    def _creep(self, base: Floats, guess: Floats, trial: Trial, problem: Problem) -> Floats | None:
+    def _creep(self, base: Floats, guess: Floats, trial: TrialStress, problem: StageProblem) -> Floats | None:
         """The vector after the creep that a trial stress brings about; the law's row is left at the solution."""
-        states = base[EQUIVALENT + 1 :].copy()
-        self.row[POINT_SIZE:] = guess[EQUIVALENT + 1 :]
-        first = float(guess[EQUIVALENT] - base[EQUIVALENT])
+        states = base[EQUIVALENT_STRAIN + 1 :].copy()
+        self.row[POINT_SIZE:] = guess[EQUIVALENT_STRAIN + 1 :]
+        first = float(guess[EQUIVALENT_STRAIN] - base[EQUIVALENT_STRAIN])
         first = first if first > 0.0 else _FIRST_INCREMENT
-        increment, flag = solve(
+        increment, flag = solve_stage(
             self.law.update, self.theta, trial.axes, problem, states, self.row, self.out, first, _LAST_CORRECTION
         )
         flow = 1.5 * increment * trial.s / trial.q if trial.q > 0.0 else np.zeros(6)
         change = np.concatenate([flow, [increment], self.row[POINT_SIZE:] - states])
         return base + change if flag == SOLVED else None
 
-    def _tangent(self, trial: Trial, problem: Problem, increment: float) -> Floats | None:
+    def _tangent(self, trial: TrialStress, problem: StageProblem, increment: float) -> Floats | None:
         """Derivative of stress to strain after `_creep`, (6, 6); None when it has none."""
         if trial.q == 0.0:
             return self.stiffness
@@ -158,12 +158,12 @@ class TensorPoint:
         d_share = ((1 - share) * d_q - problem.stiffness * d_increment) / trial.q
         return np.outer(_UNIT, d_mean) + 2 * G * share * _DEVIATOR + np.outer(trial.s, d_share)
 
-    def _response(self, axes: Axes, problem: Problem, increment: float) -> Floats | None:
+    def _response(self, axes: Axes, problem: StageProblem, increment: float) -> Floats | None:
         """Derivatives of the creep increment to the inputs of the stage."""
         size = 1 + self.law.states
-        out, _ = call(self.law, "update", self.row[None], self.theta)
+        out, _ = call_entry(self.law, "update", self.row[None], self.theta)
         gradient, response = np.zeros((size, self.row.size)), np.zeros((size, INPUTS + size - 1))
         gradient_of_update(out[0], problem, increment, gradient)
         rates, stress = out[0, 1:size].copy(), float(self.row[STRESS])
-        regular = respond(axes, problem, increment, stress, rates, gradient, np.zeros((size, size)), response)
+        regular = differentiate_stage(axes, problem, increment, stress, rates, gradient, np.zeros((size, size)), response)
         return response[0] if regular and np.isfinite(response[0]).all() else None

@@ -15,18 +15,18 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.findings import OutputMisfit
+from creepkit.inverse.findings import OutputFit
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.measures import Errors, errors
-from creepkit.inverse.scales import noise_of, usable
-from creepkit.inverse.together import Together
+from creepkit.inverse.measures import OutputErrors, output_errors
+from creepkit.inverse.scales import noise_standard_deviation, usable_frames
+from creepkit.inverse.together import CompositePredictor
 from creepkit.records import History, Prediction, Predictor, Status
 
-AGREE = 1.0
+AGREEMENT_LIMIT = 1.0
 """Largest rms difference to what the fit predicts, in standard deviations of the noise, that confirms it."""
-FOLLOWED = 2.0
+ACCEPTABLE_CHI_SQUARE = 2.0
 """Mean chi-square above which a law does not follow a test, whoever predicts it."""
-CUT_SHORT = {Status.BURST: "the specimen bursts", Status.NOT_CONVERGED: "the simulation stops"}
+INCOMPLETE_STATUS = {Status.RUPTURED: "the specimen bursts", Status.NOT_CONVERGED: "the simulation stops"}
 
 
 @dataclass(frozen=True)
@@ -40,16 +40,16 @@ class ConfirmedOutput:
     """
 
     output: str
-    simulated: Errors
-    fitted: Errors | None
-    difference: float
+    simulation_errors: OutputErrors
+    fit_errors: OutputErrors | None
+    rms_difference: float
 
     @property
-    def distance(self) -> float:
+    def noise_ratio(self) -> float:
         """How far the simulation is from the fit, in noise: the difference, or what chi-square says it must be."""
-        if np.isfinite(self.difference) or self.fitted is None:
-            return self.difference
-        return float(np.sqrt(max(self.simulated.chi_square - self.fitted.chi_square, 0.0)))
+        if np.isfinite(self.rms_difference) or self.fit_errors is None:
+            return self.rms_difference
+        return float(np.sqrt(max(self.simulation_errors.chi_square - self.fit_errors.chi_square, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -67,42 +67,42 @@ class Confirmation:
     """The answer of confirm(). law, using : names of what was simulated, and by what."""
 
     law: str
-    using: str
+    predictor_name: str
     tests: tuple[ConfirmedTest, ...]
 
     @property
-    def holds(self) -> bool:
+    def confirmed(self) -> bool:
         """Whether the simulation reaches the end of each test and says of it what the fit says."""
-        return not self._ended and not self.distance > AGREE
+        return not self._incomplete_tests and not self.noise_ratio > AGREEMENT_LIMIT
 
     @property
-    def distance(self) -> float:
+    def noise_ratio(self) -> float:
         """The largest distance of simulation and fit, in noise; NaN where nothing is known of it."""
-        known = [o.distance for t in self.tests for o in t.outputs if np.isfinite(o.distance)]
+        known = [o.noise_ratio for t in self.tests for o in t.outputs if np.isfinite(o.noise_ratio)]
         return max(known, default=float("nan"))
 
     @property
     def verdict(self) -> str:
         """One sentence: whether the simulation confirms the fit, and whether the law follows the tests."""
-        if self._ended:
-            test = self._ended[0]
-            how = f"{CUT_SHORT[test.status]} at {test.end_time:g} s of test '{test.name}'"
-            return f"not confirmed: by {self.using}, {how}; identify again with using= this specimen"
-        if not self.holds:
-            test_name, output = self._place(lambda o: o.distance)
+        if self._incomplete_tests:
+            test = self._incomplete_tests[0]
+            how = f"{INCOMPLETE_STATUS[test.status]} at {test.end_time:g} s of test '{test.name}'"
+            return f"not confirmed: by {self.predictor_name}, {how}; identify again with using= this specimen"
+        if not self.confirmed:
+            test_name, output = self._largest(lambda o: o.noise_ratio)
             return (
-                f"not confirmed: {self.using} differs from the fit by {self.distance:.2g} times the noise ({output} of "
+                f"not confirmed: {self.predictor_name} differs from the fit by {self.noise_ratio:.2g} times the noise ({output} of "
                 f"'{test_name}'); identify again with using= this specimen"
             )
-        test_name, output = self._place(lambda o: o.simulated.chi_square)
-        worst = self[test_name, output].simulated.chi_square
-        if worst > FOLLOWED:
+        test_name, output = self._largest(lambda o: o.simulation_errors.chi_square)
+        worst = self[test_name, output].simulation_errors.chi_square
+        if worst > ACCEPTABLE_CHI_SQUARE:
             return (
                 f"confirmed, but the law does not follow the tests: chi-square {worst:.3g} in {output} of "
                 f"'{test_name}'; try another law"
             )
-        apart = f", {self.distance:.2g} times the noise from the fit" if np.isfinite(self.distance) else ""
-        return f"confirmed by {self.using}: chi-square at most {worst:.3g}{apart}"
+        difference_text = f", {self.noise_ratio:.2g} times the noise from the fit" if np.isfinite(self.noise_ratio) else ""
+        return f"confirmed by {self.predictor_name}: chi-square at most {worst:.3g}{difference_text}"
 
     def __getitem__(self, place: tuple[str, str]) -> ConfirmedOutput:
         for test in self.tests:
@@ -115,19 +115,19 @@ class Confirmation:
         rows = [f"{self.law}: {self.verdict}"]
         for test in self.tests:
             for o in test.outputs:
-                own = "" if o.fitted is None else f", of the fit {o.fitted.chi_square:.3g}"
-                apart = f"; apart {o.difference:.2g} noise" if np.isfinite(o.difference) else ""
-                rows.append(f"  {test.name}, {o.output}: chi-square {o.simulated.chi_square:.3g}{own}{apart}")
+                fit_text = "" if o.fit_errors is None else f", of the fit {o.fit_errors.chi_square:.3g}"
+                difference_text = f"; apart {o.rms_difference:.2g} noise" if np.isfinite(o.rms_difference) else ""
+                rows.append(f"  {test.name}, {o.output}: chi-square {o.simulation_errors.chi_square:.3g}{fit_text}{difference_text}")
         return "\n".join(rows)
 
     @property
-    def _ended(self) -> list[ConfirmedTest]:
-        return [t for t in self.tests if t.status in CUT_SHORT]
+    def _incomplete_tests(self) -> list[ConfirmedTest]:
+        return [t for t in self.tests if t.status in INCOMPLETE_STATUS]
 
-    def _place(self, size: Callable[[ConfirmedOutput], float]) -> tuple[str, str]:
+    def _largest(self, measure: Callable[[ConfirmedOutput], float]) -> tuple[str, str]:
         """Test and output of the largest size."""
-        sized = [(size(o), t.name, o.output) for t in self.tests for o in t.outputs]
-        _, test, output = max(sized, key=lambda s: -np.inf if np.isnan(s[0]) else s[0])
+        measured = [(measure(o), t.name, o.output) for t in self.tests for o in t.outputs]
+        _, test, output = max(measured, key=lambda s: -np.inf if np.isnan(s[0]) else s[0])
         return test, output
 
 
@@ -139,39 +139,39 @@ def confirm(fit: Identification, tests: Sequence[History], using: Predictor | Ma
     """
     if not tests:
         raise FitError(f"law '{fit.law.name}': there are no tests to confirm it with")
-    predictor = Together(dict(using)) if isinstance(using, Mapping) else using
-    found = fit.predict(tests, predictor)
-    own = None if fit.using is None else fit.predict(tests)
+    predictor = CompositePredictor(dict(using)) if isinstance(using, Mapping) else using
+    prediction = fit.predict(tests, predictor)
+    fit_prediction = None if fit.predictor is None else fit.predict(tests)
     name = getattr(predictor, "name", type(predictor).__name__)
-    return Confirmation(fit.law.name, name, tuple(_test(fit, found, own, k, h) for k, h in enumerate(tests)))
+    return Confirmation(fit.law.name, name, tuple(_confirmed_test(fit, prediction, fit_prediction, k, h) for k, h in enumerate(tests)))
 
 
-def doubtful(fit: Identification) -> bool:
+def outside_domain(fit: Identification) -> bool:
     """Whether the guard of a surrogate doubts what it said of some test at the identified values."""
-    return fit.using is not None and bool((fit.predict().status == Status.OUTSIDE_DOMAIN).any())
+    return fit.predictor is not None and bool((fit.predict().status == Status.OUTSIDE_DOMAIN).any())
 
 
-def _test(fit: Identification, found: Prediction, own: Prediction | None, k: int, history: History) -> ConfirmedTest:
-    told = {o.output: o for m in fit.misfits if m.name == history.name for o in m.outputs}
-    names = [name for name in found.outputs if name in history.outputs and usable(history, name).any()]
-    fitted = {} if own is None else {name: _row(own, k, name) for name in names}
-    outputs = tuple(_output(history, name, _row(found, k, name), fitted.get(name), told.get(name)) for name in names)
-    return ConfirmedTest(history.name, Status(int(found.status[0, k])), float(found.end_times[0, k]), outputs)
+def _confirmed_test(fit: Identification, prediction: Prediction, fit_prediction: Prediction | None, k: int, history: History) -> ConfirmedTest:
+    reported = {o.output: o for m in fit.tests if m.name == history.name for o in m.outputs}
+    names = [name for name in prediction.outputs if name in history.outputs and usable_frames(history, name).any()]
+    fitted = {} if fit_prediction is None else {name: _output_column(fit_prediction, k, name) for name in names}
+    outputs = tuple(_confirmed_output(history, name, _output_column(prediction, k, name), fitted.get(name), reported.get(name)) for name in names)
+    return ConfirmedTest(history.name, Status(int(prediction.status[0, k])), float(prediction.end_times[0, k]), outputs)
 
 
-def _row(found: Prediction, k: int, name: str) -> Floats:
-    return found.of(k)[:, found.outputs.index(name)]
+def _output_column(prediction: Prediction, k: int, name: str) -> Floats:
+    return prediction.of(k)[:, prediction.outputs.index(name)]
 
 
-def _output(
-    history: History, name: str, simulated: Floats, fitted: Floats | None, told: OutputMisfit | None
+def _confirmed_output(
+    history: History, name: str, simulated: Floats, fitted: Floats | None, reported: OutputFit | None
 ) -> ConfirmedOutput:
-    used, noise = usable(history, name), noise_of(history, name)
+    used, noise = usable_frames(history, name), noise_standard_deviation(history, name)
     measured, sd = history.outputs[name][used], noise[used]
-    met = errors(measured, simulated[used], sd)
+    simulation_errors = output_errors(measured, simulated[used], sd)
     if fitted is None:
-        return ConfirmedOutput(name, met, None if told is None else told.errors, float("nan"))
+        return ConfirmedOutput(name, simulation_errors, None if reported is None else reported.errors, float("nan"))
     known = sd > 0
-    apart = ((simulated - fitted)[used] / np.where(known, sd, np.nan))[known]
-    rms = float(np.sqrt(np.mean(apart**2))) if apart.size else float("nan")
-    return ConfirmedOutput(name, met, errors(measured, fitted[used], sd), rms)
+    difference = ((simulated - fitted)[used] / np.where(known, sd, np.nan))[known]
+    rms = float(np.sqrt(np.mean(difference**2))) if difference.size else float("nan")
+    return ConfirmedOutput(name, simulation_errors, output_errors(measured, fitted[used], sd), rms)

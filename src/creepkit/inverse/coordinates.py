@@ -18,14 +18,14 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import LawError
 from creepkit.inverse.local_exponents import local_exponents
-from creepkit.inverse.nominal import end_strain, stresses
-from creepkit.kernels import Kernel, lower
+from creepkit.inverse.nominal import reference_end_strain, reference_stresses
+from creepkit.kernels import ArrayKernel, lower
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferencePoint:
     """The point at which term rates are stated: stress MPa, strain, time s, temperature K."""
 
     stress: float
@@ -34,65 +34,65 @@ class Reference:
     temperature: float
 
     @classmethod
-    def of(cls, histories: Sequence[History], using: Predictor | None = None) -> Reference:
+    def from_histories(cls, histories: Sequence[History], predictor: Predictor | None = None) -> ReferencePoint:
         """The middle of what was measured: geometric means of stress and time, of half the end strain; median T.
 
         using : where it states reference stresses, they count (see inverse.nominal).
         """
-        levels = [float(np.exp(np.mean(np.log(np.maximum(stresses(h, using), 1e-6))))) for h in histories]
+        mean_stresses = [float(np.exp(np.mean(np.log(np.maximum(reference_stresses(h, predictor), 1e-6))))) for h in histories]
         times = [float(h.times[h.used][-1]) for h in histories]
-        strains = [end_strain(h, using) for h in histories]
-        warmth = [float(np.mean(h.temperature_program().values)) for h in histories]
-        middle = [float(np.exp(np.mean(np.log(v)))) for v in (levels, strains, times)]
-        return cls(middle[0], 0.5 * middle[1], 0.5 * middle[2], float(np.median(warmth)))
+        strains = [reference_end_strain(h, predictor) for h in histories]
+        temperatures = [float(np.mean(h.temperature_program().values)) for h in histories]
+        central_values = [float(np.exp(np.mean(np.log(v)))) for v in (mean_stresses, strains, times)]
+        return cls(central_values[0], 0.5 * central_values[1], 0.5 * central_values[2], float(np.median(temperatures)))
 
 
 class Coordinates:
     """The map between internal parameters theta and conditioned coordinates u, both (..., parameters)."""
 
-    def __init__(self, law: CreepLaw, reference: Reference) -> None:
+    def __init__(self, law: CreepLaw, reference: ReferencePoint) -> None:
         self.law, self.reference = law, reference
         self.names = law.names
-        self._terms: list[tuple[int, list[int], Kernel]] = []
+        self._rate_kernels: list[tuple[int, list[int], ArrayKernel]] = []
         for label in law.terms:
-            single = law.only(label)
-            k = _coefficient(law, single)
-            if k is not None:
-                self._terms.append((k, [law.names.index(n) for n in single.names], lower(single, "numpy")))
+            single_term = law.only(label)
+            position = _coefficient_position(law, single_term)
+            if position is not None:
+                self._rate_kernels.append((position, [law.names.index(n) for n in single_term.names], lower(single_term, "numpy")))
         self.exponents = local_exponents(law)
         """Parameters whose place the local exponent of their term takes."""
-        self.rates = tuple(k for k, _, _ in self._terms)
+        self.term_rates = tuple(k for k, _, _ in self._rate_kernels)
         """Positions of the coordinates that are log rates of terms."""
-        for growth in _growths(law):
-            k = _coefficient(law, growth)
-            kernel = lower(growth, "numpy")
-            positions = [law.names.index(n) for n in growth.names]
-            if k is not None and k not in self.rates and self._is_finite(kernel, growth):
-                self._terms.append((k, positions, kernel))
-        self.growths = tuple(k for k, _, _ in self._terms if k not in self.rates)
+        for rate_law in _state_rate_laws(law):
+            position = _coefficient_position(law, rate_law)
+            kernel = lower(rate_law, "numpy")
+            positions = [law.names.index(n) for n in rate_law.names]
+            if position is not None and position not in self.term_rates and self._has_finite_rate(kernel, rate_law):
+                self._rate_kernels.append((position, positions, kernel))
+        self.state_rates = tuple(k for k, _, _ in self._rate_kernels if k not in self.term_rates)
         """Positions of the coordinates that are log rates of internal variables."""
 
     @property
-    def walled(self) -> tuple[int, ...]:
+    def penalised(self) -> tuple[int, ...]:
         """Positions of the parameters that are no coordinates themselves, so that walls must hold their bounds."""
-        return (*self.coefficients, *(local.p for local in self.exponents))
+        return (*self.coefficients, *(local.position for local in self.exponents))
 
     @property
     def coefficients(self) -> tuple[int, ...]:
         """Positions of all of them."""
-        return self.rates + self.growths
+        return self.term_rates + self.state_rates
 
     def theta(self, u: Floats) -> Floats:
         """Internal parameters of conditioned coordinates."""
         theta = np.array(u, float)
         for local in self.exponents:
-            a, b, _, _ = local.at(self._point(self.law), theta)
-            theta[..., local.p] = (theta[..., local.p] - a) / b
-        inner = theta.copy()
-        for k, positions, kernel in self._terms:
-            part = inner.copy()
-            part[..., k] = 0.0
-            theta[..., k] = u[..., k] - self._log_rate(kernel, part[..., positions])
+            a, b, _, _ = local.evaluate(self._point(self.law), theta)
+            theta[..., local.position] = (theta[..., local.position] - a) / b
+        internal = theta.copy()
+        for k, positions, kernel in self._rate_kernels:
+            without_coefficient = internal.copy()
+            without_coefficient[..., k] = 0.0
+            theta[..., k] = u[..., k] - self._log_rate(kernel, without_coefficient[..., positions])
         return theta
 
     def values(self, u: Floats) -> dict[str, float]:
@@ -106,9 +106,9 @@ class Coordinates:
         """Conditioned coordinates of internal parameters."""
         u = np.array(theta, float)
         for local in self.exponents:
-            a, b, _, _ = local.at(self._point(self.law), u)
-            u[..., local.p] = a + b * u[..., local.p]
-        for k, positions, kernel in self._terms:
+            a, b, _, _ = local.evaluate(self._point(self.law), u)
+            u[..., local.position] = a + b * u[..., local.position]
+        for k, positions, kernel in self._rate_kernels:
             u[..., k] = self._log_rate(kernel, theta[..., positions])
         return u
 
@@ -116,22 +116,22 @@ class Coordinates:
         """d theta / d u at u (..., parameters): (..., parameters, parameters)."""
         theta = self.theta(u)
         matrix = np.zeros((*theta.shape, theta.shape[-1])) + np.eye(theta.shape[-1])
-        for k, positions, kernel in self._terms:
-            own = np.moveaxis(theta[..., positions], -1, 0)
-            found = kernel.internal_derivatives(*self._point(kernel.law), *own)
+        for k, positions, kernel in self._rate_kernels:
+            internal = np.moveaxis(theta[..., positions], -1, 0)
+            derivatives = kernel.internal_derivatives(*self._point(kernel.law), *internal)
             for name, position in zip(kernel.law.names, positions, strict=True):
                 if position != k:
-                    matrix[..., k, position] = -np.asarray(found.params[name]) / np.asarray(found.rate)
+                    matrix[..., k, position] = -np.asarray(derivatives.params[name]) / np.asarray(derivatives.rate)
         return matrix @ self._exponents_jacobian(theta) if self.exponents else matrix
 
     def _exponents_jacobian(self, theta: Floats) -> Floats:
         """Derivatives of the parameters that local exponents stand for, (..., parameters, parameters)."""
         matrix = np.zeros((*theta.shape, theta.shape[-1])) + np.eye(theta.shape[-1])
         for local in self.exponents:
-            _, b, da, db = local.at(self._point(self.law), theta)
-            matrix[..., local.p, local.p] = 1.0 / b
+            _, b, da, db = local.evaluate(self._point(self.law), theta)
+            matrix[..., local.position, local.position] = 1.0 / b
             for k, position in enumerate(local.others):
-                matrix[..., local.p, position] = -(da[..., k] + db[..., k] * theta[..., local.p]) / b
+                matrix[..., local.position, position] = -(da[..., k] + db[..., k] * theta[..., local.position]) / b
         return matrix
 
     def _point(self, law: CreepLaw) -> list[float]:
@@ -146,46 +146,46 @@ class Coordinates:
             *(z.initial for z in law.states.values()),
         ]
 
-    def _is_finite(self, kernel: Kernel, growth: CreepLaw) -> bool:
+    def _has_finite_rate(self, kernel: ArrayKernel, rate_law: CreepLaw) -> bool:
         """Whether a virgin internal variable grows at all in the middle of the bounds."""
-        middle = [0.5 * (p.to_internal(p.bounds[0]) + p.to_internal(p.bounds[1])) for p in growth.params.values()]
-        return bool(np.isfinite(self._log_rate(kernel, np.array(middle))))
+        central_theta = [0.5 * (p.to_internal(p.bounds[0]) + p.to_internal(p.bounds[1])) for p in rate_law.params.values()]
+        return bool(np.isfinite(self._log_rate(kernel, np.array(central_theta))))
 
-    def _log_rate(self, kernel: Kernel, theta: Floats) -> Floats:
+    def _log_rate(self, kernel: ArrayKernel, theta: Floats) -> Floats:
         return np.asarray(kernel.internal_log_rate(*self._point(kernel.law), *np.moveaxis(theta, -1, 0)), float)
 
 
-def _growths(law: CreepLaw) -> list[CreepLaw]:
+def _state_rate_laws(law: CreepLaw) -> list[CreepLaw]:
     """A law for each internal variable, its rate being how fast that one moves; none where that has no logarithm.
 
     Only the coefficient's coordinate hangs on it: without, the coefficient is a coordinate itself.
     """
-    found, inner = [], {p for state in law.states.values() for p in state.rate.free_symbols}
-    own = {p: param for p, param in law.params.items() if p in inner}
+    rate_laws, rate_parameters = [], {p for state in law.states.values() for p in state.rate.free_symbols}
+    state_parameters = {p: param for p, param in law.params.items() if p in rate_parameters}
     for symbol, state in law.states.items():
-        label = f"rate of {symbol}"
-        grown = (replace(law, terms={label: sign * state.rate}, params=own, constraints=()) for sign in (1, -1))
-        found += list(filter(_has_logarithm, grown))[:1]
-    return found
+        term_name = f"rate of {symbol}"
+        signed_rate_laws = (replace(law, terms={term_name: sign * state.rate}, params=state_parameters, constraints=()) for sign in (1, -1))
+        rate_laws += list(filter(_has_log_form, signed_rate_laws))[:1]
+    return rate_laws
 
 
-def _has_logarithm(growth: CreepLaw) -> bool:
+def _has_log_form(rate_law: CreepLaw) -> bool:
     from creepkit.kernels.logform import log_form
 
     try:
-        log_form(growth)
+        log_form(rate_law)
     except LawError:
         return False
     return True
 
 
-def _coefficient(law: CreepLaw, single: CreepLaw) -> int | None:
+def _coefficient_position(law: CreepLaw, single_term: CreepLaw) -> int | None:
     """Position of the one log-scale parameter that multiplies this rate and stands in no other, if there is one."""
     from creepkit.kernels.logform import log_form
 
-    (own,) = log_form(single).coefficients
-    names = [single.names[k] for k in own]
-    everything = [*law.terms.values(), *(state.rate for state in law.states.values())]
-    shared = [sum(symbol in each.free_symbols for each in everything) for symbol in (law.symbol(n) for n in names)]
-    alone = [n for n, count in zip(names, shared, strict=True) if count == 1]
-    return law.names.index(alone[0]) if alone else None
+    (coefficients,) = log_form(single_term).coefficients
+    names = [single_term.names[k] for k in coefficients]
+    expressions = [*law.terms.values(), *(state.rate for state in law.states.values())]
+    occurrences = [sum(symbol in each.free_symbols for each in expressions) for symbol in (law.symbol(n) for n in names)]
+    unshared = [n for n, count in zip(names, occurrences, strict=True) if count == 1]
+    return law.names.index(unshared[0]) if unshared else None

@@ -23,74 +23,74 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.residuals import Residuals
-from creepkit.inverse.scatter import Scatter
+from creepkit.inverse.scatter import NoiseModel
 
 _JITTER = 1e-10
 
 
-def covariance(residuals: Residuals, scatter: Scatter) -> Floats:
+def covariance(residuals: Residuals, noise_model: NoiseModel) -> Floats:
     """(tests, entries, entries); absent entries have unit variance and no company."""
-    s, d, present, output = residuals.slopes, residuals.rate_effect, residuals.present, residuals.output
-    drift, offset = scatter.at(output, "drift"), scatter.at(output, "offset") * s
-    c = (drift**2)[:, :, None] * np.exp(-lags(residuals) / scatter.at(output, "reach")[:, :, None])
+    s, d, present, output = residuals.transform_derivatives, residuals.log_rate_sensitivity, residuals.present, residuals.output_index
+    drift, offset = noise_model.per_observation(output, "drift"), noise_model.per_observation(output, "offset") * s
+    c = (drift**2)[:, :, None] * np.exp(-time_lags(residuals) / noise_model.per_observation(output, "reach")[:, :, None])
     c += offset[:, :, None] * offset[:, None, :]
-    c = np.where(company(residuals), c, 0.0) if len(scatter.outputs) > 1 else c
-    c += scatter.rate**2 * d[:, :, None] * d[:, None, :]
-    if residuals.known is not None:
-        c += residuals.known @ np.swapaxes(residuals.known, 1, 2)
+    c = np.where(same_output(residuals), c, 0.0) if len(noise_model.outputs) > 1 else c
+    c += noise_model.rate**2 * d[:, :, None] * d[:, None, :]
+    if residuals.random_effect_sensitivities is not None:
+        c += residuals.random_effect_sensitivities @ np.swapaxes(residuals.random_effect_sensitivities, 1, 2)
     k = np.arange(s.shape[1])
-    noise = scatter.at(output, "noise") * residuals.loudness
-    c[:, k, k] = c[:, k, k] * (1 + 1e-9) + (noise * s) ** 2 + scatter.at(output, "misfit") ** 2 + _JITTER
-    both = present[:, :, None] & present[:, None, :]
-    c = np.where(both, c / residuals.trust[:, None, None], 0.0)
+    noise = noise_model.per_observation(output, "noise") * residuals.relative_noise
+    c[:, k, k] = c[:, k, k] * (1 + 1e-9) + (noise * s) ** 2 + noise_model.per_observation(output, "misfit") ** 2 + _JITTER
+    present_pairs = present[:, :, None] & present[:, None, :]
+    c = np.where(present_pairs, c / residuals.test_weights[:, None, None], 0.0)
     c[:, k, k] = np.where(present, c[:, k, k], 1.0)
     return np.asarray(c)
 
 
-def lags(residuals: Residuals) -> Floats:
+def time_lags(residuals: Residuals) -> Floats:
     """(tests, entries, entries) distances on the clock."""
-    t = residuals.clock
+    t = residuals.correlation_time
     return np.abs(t[:, :, None] - t[:, None, :])
 
 
-def company(residuals: Residuals) -> Bools:
+def same_output(residuals: Residuals) -> Bools:
     """(tests, entries, entries) whether two entries are of one output."""
-    return np.asarray(residuals.output[:, :, None] == residuals.output[:, None, :])
+    return np.asarray(residuals.output_index[:, :, None] == residuals.output_index[:, None, :])
 
 
-def whitener(residuals: Residuals, scatter: Scatter) -> Floats:
+def cholesky_factors(residuals: Residuals, noise_model: NoiseModel) -> Floats:
     """Lower Cholesky factors L of the covariance, (tests, entries, entries); L^-1 r is white."""
-    return np.asarray(np.linalg.cholesky(covariance(residuals, scatter)))
+    return np.asarray(np.linalg.cholesky(covariance(residuals, noise_model)))
 
 
-def log_likelihood(residuals: Residuals, scatter: Scatter) -> float:
+def log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:
     """Gaussian log-likelihood of the residuals given the scatter."""
-    factor = whitener(residuals, scatter)
-    white = np.linalg.solve(factor, residuals.values[..., None])[..., 0]
-    k = np.arange(factor.shape[1])
-    log_det = 2.0 * np.log(factor[:, k, k]).sum()
+    covariance_factor = cholesky_factors(residuals, noise_model)
+    whitened = np.linalg.solve(covariance_factor, residuals.values[..., None])[..., 0]
+    k = np.arange(covariance_factor.shape[1])
+    log_det = 2.0 * np.log(covariance_factor[:, k, k]).sum()
     count = int(residuals.present.sum())
-    return float(-0.5 * ((white**2).sum() + log_det + count * np.log(2 * np.pi)))
+    return float(-0.5 * ((whitened**2).sum() + log_det + count * np.log(2 * np.pi)))
 
 
-def expected_effects(residuals: Residuals, scatter: Scatter) -> tuple[Floats, Floats]:
+def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> tuple[Floats, Floats]:
     """Best linear prediction of each test's own offsets, (tests, outputs), and ln rate factor, (tests,)."""
-    plain = residuals.trusting(np.ones(len(residuals.values)))
-    weighted = np.linalg.solve(covariance(plain, scatter), -residuals.values[..., None])[..., 0]
-    pull = residuals.slopes * weighted
+    unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
+    weighted = np.linalg.solve(covariance(unweighted, noise_model), -residuals.values[..., None])[..., 0]
+    weighted_sensitivity = residuals.transform_derivatives * weighted
     offsets = [
-        s.offset**2 * np.where(residuals.output == k, pull, 0.0).sum(axis=1)
-        for k, s in enumerate(scatter.outputs.values())
+        s.offset**2 * np.where(residuals.output_index == k, weighted_sensitivity, 0.0).sum(axis=1)
+        for k, s in enumerate(noise_model.outputs.values())
     ]
-    return np.stack(offsets, axis=1), scatter.rate**2 * (residuals.rate_effect * weighted).sum(axis=1)
+    return np.stack(offsets, axis=1), noise_model.rate**2 * (residuals.log_rate_sensitivity * weighted).sum(axis=1)
 
 
-def effective_size(residuals: Residuals, scatter: Scatter) -> float:
+def effective_sample_size(residuals: Residuals, noise_model: NoiseModel) -> float:
     """Number of independent observations that carry the same information on a common mean as all frames together."""
-    quiet = scatter
-    for output in scatter.outputs:
-        quiet = quiet.changed(output, offset=0.0)
-    c = covariance(residuals, quiet)
+    without_offset = noise_model
+    for output in noise_model.outputs:
+        without_offset = without_offset.with_output(output, offset=0.0)
+    c = covariance(residuals, without_offset)
     k = np.arange(c.shape[1])
     sd = np.sqrt(c[:, k, k])
     correlation = c / (sd[:, :, None] * sd[:, None, :])

@@ -22,30 +22,30 @@ import numpy as np
 
 from creepkit.arrays import Floats
 
-_NEAR = 1e-7
+_SMALL_DISTANCE = 1e-7
 """Below this distance the ratio of a to b is the slope of the curve."""
 
 
 @dataclass(frozen=True, eq=False)
-class Distance:
+class OrthogonalDistance:
     """values : (...,) r; by_strain, by_time : (...,) its derivatives to a and to b."""
 
     values: Floats
-    by_strain: Floats
-    by_time: Floats
+    strain_derivative: Floats
+    time_derivative: Floats
 
 
-def distance(strain: Floats, time: Floats, slope: Floats) -> Distance:
+def orthogonal_distance(strain_residual: Floats, time_residual: Floats, curve_slope: Floats) -> OrthogonalDistance:
     """The distance of points whose errors are a (`strain`) and b (`time`).
 
     Either may be infinite, and not both. slope : (...,) of the predicted curve, d(compared strain)/d(ln time), infinite
     at rupture.
     """
-    a, b = np.abs(strain), np.abs(time)
+    a, b = np.abs(strain_residual), np.abs(time_residual)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        ratio = np.where(np.maximum(np.minimum(a, b), 0.0) > _NEAR, a / b, np.maximum(slope, 0.0))
+        ratio = np.where(np.maximum(np.minimum(a, b), 0.0) > _SMALL_DISTANCE, a / b, np.maximum(curve_slope, 0.0))
         ratio = np.where(np.isinf(b), 0.0, np.where(np.isinf(a), np.inf, ratio))
-        flat, steep = 1.0 / np.hypot(1.0, ratio), 1.0 / np.hypot(1.0, 1.0 / ratio)
-    signed = np.where(np.isinf(a), np.sign(time), np.sign(strain))
-    size = np.where(flat >= steep, np.where(np.isinf(a), 0.0, a) * flat, np.where(np.isinf(b), 0.0, b) * steep)
-    return Distance(np.sqrt(2.0) * signed * size, np.sqrt(2.0) * flat**3, np.sqrt(2.0) * steep**3)
+        strain_weight, time_weight = 1.0 / np.hypot(1.0, ratio), 1.0 / np.hypot(1.0, 1.0 / ratio)
+    sign = np.where(np.isinf(a), np.sign(time_residual), np.sign(strain_residual))
+    magnitude = np.where(strain_weight >= time_weight, np.where(np.isinf(a), 0.0, a) * strain_weight, np.where(np.isinf(b), 0.0, b) * time_weight)
+    return OrthogonalDistance(np.sqrt(2.0) * sign * magnitude, np.sqrt(2.0) * strain_weight**3, np.sqrt(2.0) * time_weight**3)

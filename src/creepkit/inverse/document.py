@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from creepkit.records.prediction import Kind
+from creepkit.records.prediction import NuisanceKind
 
 KIND = "creepkit identification"
 VERSION = 4
@@ -14,13 +14,13 @@ VERSION = 4
 exponents in the place of local exponents among its coordinates, and no sparsity."""
 
 
-class Strict(BaseModel):
+class StrictSchema(BaseModel):
     """What no part of a file may have: unknown fields, or numbers without end."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
-class EstimatePart(Strict):
+class EstimateSchema(StrictSchema):
     """One parameter."""
 
     name: str
@@ -31,7 +31,7 @@ class EstimatePart(Strict):
     verdict: Literal["determined", "at its bound", "not determined"]
 
 
-class ReferencePart(Strict):
+class ReferencePointSchema(StrictSchema):
     """The point of the coordinates."""
 
     stress: float = Field(gt=0)
@@ -40,71 +40,71 @@ class ReferencePart(Strict):
     temperature: float = Field(gt=0)
 
 
-class OutputScatterPart(Strict):
+class OutputNoiseSchema(StrictSchema):
     """Scatter of one output."""
 
     noise: float = Field(ge=0)
     misfit: float = Field(ge=0)
     offset: float = Field(ge=0)
     drift: float = Field(ge=0)
-    reach: float = Field(gt=0)
+    correlation_length: float = Field(gt=0)
 
 
-class ScatterPart(Strict):
+class NoiseModelSchema(StrictSchema):
     """Scatter of all outputs, and of the rate."""
 
     rate: float = Field(ge=0)
-    outputs: dict[str, OutputScatterPart]
+    outputs: dict[str, OutputNoiseSchema]
 
 
-class ErrorsPart(Strict):
+class OutputErrorsSchema(StrictSchema):
     """Errors of one output."""
 
     frames: int = Field(ge=0)
-    rse: float | None
-    mse: float | None
-    mae: float | None
-    relative: float | None
+    relative_squared_error: float | None
+    mean_squared_error: float | None
+    mean_absolute_error: float | None
+    relative_rms_error: float | None
     chi_square: float | None
 
 
-class OutputPart(Strict):
+class OutputFitSchema(StrictSchema):
     """One output of one test."""
 
     output: str
-    errors: ErrorsPart
+    errors: OutputErrorsSchema
     offset: float
     noise: float = Field(ge=0)
 
 
-class RupturePart(Strict):
+class RuptureSchema(StrictSchema):
     """The end of one test."""
 
     measured: float = Field(gt=0)
-    stopped: bool
+    censored: bool
     predicted: float | Literal["inf"]
     low: float | Literal["inf"]
     high: float | Literal["inf"]
 
 
-class TestPart(Strict):
+class TestFitSchema(StrictSchema):
     """One test."""
 
     name: str
     condition: str
     frames: int = Field(ge=0)
-    rms: float | None
-    bias: float | None
+    log_strain_rms: float | None
+    log_strain_bias: float | None
     rate_factor: float
     weight: float = Field(gt=0)
-    outputs: list[OutputPart]
-    rupture: RupturePart | None
+    outputs: list[OutputFitSchema]
+    rupture: RuptureSchema | None
 
 
-class NuisancePart(Strict):
+class NuisanceSchema(StrictSchema):
     """One nuisance, as it was asked for; bounds without end are null."""
 
-    kind: Kind
+    kind: NuisanceKind
     scope: Literal["test", "alloy", "all"]
     output: str
     mean: float
@@ -112,41 +112,41 @@ class NuisancePart(Strict):
     bounds: tuple[float | None, float | None]
 
 
-class NuisanceEstimatePart(Strict):
+class NuisanceEstimateSchema(StrictSchema):
     """What was found of one unknown."""
 
-    kind: Kind
+    kind: NuisanceKind
     scope: Literal["test", "alloy", "all"]
-    member: str
+    owner: str
     value: float
     sd: float = Field(ge=0)
-    mean: float
-    spread: float | Literal["inf"]
+    prior_mean: float
+    prior_sd: float | Literal["inf"]
 
 
-class SettingsPart(Strict):
+class SettingsSchema(StrictSchema):
     """What the run can be repeated from."""
 
     starts: int = Field(ge=1)
-    draws: int = Field(ge=1)
+    sobol_points: int = Field(ge=1)
     frames: int = Field(ge=2)
     seed: int
     loss: str
-    nuisances: list[NuisancePart]
+    nuisances: list[NuisanceSchema]
     weights: Literal["noise", "likelihood", "equal", "paper"] | dict[str, float]
     test_loss: str
 
 
-class MisfitPart(Strict):
+class FitStatisticsSchema(StrictSchema):
     """How well a sum, or what was left of it, fits."""
 
     chi_square: float
     parameters: int = Field(ge=0)
     bic: float
-    errors: dict[str, ErrorsPart]
+    errors: dict[str, OutputErrorsSchema]
 
 
-class SparsityPart(Strict):
+class SparsitySchema(StrictSchema):
     """How a sum was reduced to the law."""
 
     law: str
@@ -159,32 +159,32 @@ class SparsityPart(Strict):
     shares_without: dict[str, float]
     shares_with: dict[str, float]
     shares_after: dict[str, float]
-    whole: MisfitPart
-    reduced: MisfitPart
+    whole: FitStatisticsSchema
+    reduced: FitStatisticsSchema
     frames: int = Field(ge=0)
 
 
-class Document(Strict):
+class IdentificationSchema(StrictSchema):
     """The file."""
 
     kind: Literal["creepkit identification"]
     version: Literal[4]
     law: dict[str, Any]
-    estimates: list[EstimatePart]
+    estimates: list[EstimateSchema]
     u: list[float]
     covariance: list[list[float]]
-    reference: ReferencePart
-    scatter: ScatterPart
+    reference: ReferencePointSchema
+    noise_model: NoiseModelSchema
     rms: float | None
     log_likelihood: float
-    size: float = Field(gt=0)
+    effective_frames: float = Field(gt=0)
     freedom: float = Field(gt=0)
-    tests: list[TestPart]
-    errors: dict[str, ErrorsPart]
-    nuisances: list[NuisanceEstimatePart]
+    tests: list[TestFitSchema]
+    errors: dict[str, OutputErrorsSchema]
+    nuisances: list[NuisanceEstimateSchema]
     ranges: dict[str, tuple[float, float]]
-    settings: SettingsPart
+    settings: SettingsSchema
     provenance: dict[str, str | int | float | list[str]]
     converged: bool
     notes: list[str]
-    sparsity: SparsityPart | None = None
+    sparsity: SparsitySchema | None = None

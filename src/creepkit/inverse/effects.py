@@ -14,19 +14,19 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.residuals import Residuals
-from creepkit.inverse.together import offers, predictor_of
-from creepkit.records import ABSOLUTE, EXPLICIT, History, Nuisance, Predictor
+from creepkit.inverse.together import supports_nuisance, predictor_for
+from creepkit.records import LENGTH_NUISANCES, SIMULATED_NUISANCES, History, Nuisance, Predictor
 
-SPREAD = {"thickness": 0.03, "window": 0.3, "modulus": 0.05, "temperature": 5.0}
+INITIAL_PRIOR_SD = {"thickness": 0.03, "window": 0.3, "modulus": 0.05, "temperature": 5.0}
 """Where the estimate of an unknown spread begins: mm, mm, relative, K."""
 LIMITS = {"thickness": (0.3, 3.0), "window": (0.3, 3.0), "modulus": (-0.7, 2.0), "temperature": (-150.0, 150.0)}
 """Where an unknown may go at most; thickness and window as multiples of their mean."""
-LEAST = 1e-3
+SMALLEST_PRIOR_SD = 1e-3
 """Of the first spread: below this an estimated spread is zero."""
 
 
 @dataclass(frozen=True, eq=False)
-class Unknowns:
+class NuisanceParameters:
     """The unknowns e of explicit nuisances.
 
     nuisances, members : of each unknown, its nuisance and whose it is (a test, an alloy, or "all").
@@ -36,94 +36,94 @@ class Unknowns:
     """
 
     nuisances: tuple[Nuisance, ...]
-    members: tuple[str, ...]
-    place: Mapping[str, Ints]
+    owners: tuple[str, ...]
+    test_index: Mapping[str, Ints]
     mean: Floats
     sd: Floats
     low: Floats
     high: Floats
-    held: bool = False
+    fixed: bool = False
 
     @classmethod
-    def of(cls, nuisances: Sequence[Nuisance], histories: Sequence[History], using: Predictor) -> Unknowns:
+    def from_histories(cls, nuisances: Sequence[Nuisance], histories: Sequence[History], predictor: Predictor) -> NuisanceParameters:
         """One unknown for each test, alloy or all tests that a kind is known to matter for."""
-        owners: list[tuple[Nuisance, str]] = []
-        place: dict[str, Ints] = {}
-        for nuisance in (n for n in nuisances if n.kind in EXPLICIT):
-            known = [offers(predictor_of(using, h), nuisance.kind) for h in histories]
-            if not any(known):
+        parameters: list[tuple[Nuisance, str]] = []
+        test_index: dict[str, Ints] = {}
+        for nuisance in (n for n in nuisances if n.kind in SIMULATED_NUISANCES):
+            offered = [supports_nuisance(predictor_for(predictor, h), nuisance.kind) for h in histories]
+            if not any(offered):
                 raise FitError(
                     f"nuisance '{nuisance.kind}' means nothing to the predictor of these histories; leave it out"
                 )
-            members = [member_of(nuisance, h) for h in histories]
-            mine = list(dict.fromkeys(m for m, k in zip(members, known, strict=True) if k))
-            first = len(owners)
-            place[nuisance.kind] = np.array(
-                [first + mine.index(m) if k else -1 for m, k in zip(members, known, strict=True)], np.int64
+            owners_of_tests = [owner_of(nuisance, h) for h in histories]
+            distinct_owners = list(dict.fromkeys(m for m, k in zip(owners_of_tests, offered, strict=True) if k))
+            first = len(parameters)
+            test_index[nuisance.kind] = np.array(
+                [first + distinct_owners.index(m) if k else -1 for m, k in zip(owners_of_tests, offered, strict=True)], np.int64
             )
-            if nuisance.sd is None and len(mine) < 2:
+            if nuisance.sd is None and len(distinct_owners) < 2:
                 raise FitError(
                     f"nuisance '{nuisance.kind}': a spread cannot be estimated from a single unknown; give its sd="
                 )
-            owners += [(nuisance, member) for member in mine]
-        kinds, by_name = [n for n, _ in owners], {h.name: h for h in histories}
-        means = [prior_mean(n, by_name.get(member), using) for n, member in owners]
-        ends = [_limits(n, mean) for n, mean in zip(kinds, means, strict=True)]
+            parameters += [(nuisance, member) for member in distinct_owners]
+        nuisance_of_parameter, by_name = [n for n, _ in parameters], {h.name: h for h in histories}
+        means = [prior_mean(n, by_name.get(member), predictor) for n, member in parameters]
+        limits = [_bounds_of(n, mean) for n, mean in zip(nuisance_of_parameter, means, strict=True)]
         return cls(
-            tuple(kinds), tuple(m for _, m in owners), place, np.array(means, float),
-            np.array([SPREAD[n.kind] if n.sd is None else n.sd for n in kinds], float),
-            np.array([low for low, _ in ends], float), np.array([high for _, high in ends], float),
+            tuple(nuisance_of_parameter), tuple(m for _, m in parameters), test_index, np.array(means, float),
+            np.array([INITIAL_PRIOR_SD[n.kind] if n.sd is None else n.sd for n in nuisance_of_parameter], float),
+            np.array([low for low, _ in limits], float), np.array([high for _, high in limits], float),
         )  # fmt: skip
 
     @property
     def size(self) -> int:
         """How many a fit looks for."""
-        return 0 if self.held else self.mean.size
+        return 0 if self.fixed else self.mean.size
 
     @property
     def precision(self) -> Floats:
         """(unknowns,) of the priors."""
         return 1.0 / self.sd[: self.size] ** 2
 
-    def effects(self, e: Floats) -> dict[str, Floats]:
+    def predictor_values(self, e: Floats) -> dict[str, Floats]:
         """{kind: (1, tests)} as predictors take them."""
-        values = self.mean if self.held else e
-        return {kind: values[np.maximum(own, 0)][None] for kind, own in self.place.items()}
+        values = self.mean if self.fixed else e
+        return {kind: values[np.maximum(index, 0)][None] for kind, index in self.test_index.items()}
 
-    def columns(self, slopes: Mapping[str, Floats]) -> Floats:
-        """Derivatives to each unknown, (tests, entries, unknowns), from those to each test's own effects."""
-        out = np.zeros((*next(iter(slopes.values())).shape, self.size))
-        for kind, own in self.place.items():
-            for test, unknown in enumerate(own):
-                if unknown >= 0:
-                    out[test, :, unknown] = slopes[kind][test]
-        return out
+    def jacobian(self, sensitivities: Mapping[str, Floats]) -> Floats:
+        """Derivatives to each unknown, (tests, entries, unknowns), from those to each test's own nuisances."""
+        jacobian_matrix = np.zeros((*next(iter(sensitivities.values())).shape, self.size))
+        for kind, index in self.test_index.items():
+            for test, position in enumerate(index):
+                if position >= 0:
+                    jacobian_matrix[test, :, position] = sensitivities[kind][test]
+        return jacobian_matrix
 
-    def integrated(self, residuals: Residuals, e: Floats) -> Residuals:
+    def integrate_out(self, residuals: Residuals, e: Floats) -> Residuals:
         """The residuals that tests would leave at their prior means, with the priors as part of the scatter.
 
         To first order. At its estimate an unknown has taken up what scatter between tests it can, so that the size of
         that scatter cannot be read off the residuals there. Unknowns that tests share stay as estimated.
         """
-        own = [k for k, n in enumerate(self.nuisances) if n.scope == "test" and np.isfinite(self.sd[k])]
-        if not own or residuals.jacobian is None:
+        test_parameters = [k for k, n in enumerate(self.nuisances) if n.scope == "test" and np.isfinite(self.sd[k])]
+        if not test_parameters or residuals.jacobian is None:
             return residuals
-        slopes = residuals.jacobian[..., -self.size :][..., own]
-        values = residuals.values - slopes @ (e - self.mean)[own]
-        return replace(residuals, values=values, known=slopes * self.sd[own])
+        sensitivities = residuals.jacobian[..., -self.size :][..., test_parameters]
+        values = residuals.values - sensitivities @ (e - self.mean)[test_parameters]
+        return replace(residuals, values=values, random_effect_sensitivities=sensitivities * self.sd[test_parameters])
 
-    def with_spread(self, e: Floats, variance: Floats) -> Unknowns:
+    def with_prior_sd(self, e: Floats, variance: Floats) -> NuisanceParameters:
         """The spreads to be estimated, as the unknowns show them: mean of (e - mean)^2 and their own variance."""
         sd = self.sd.copy()
         for nuisance in dict.fromkeys(self.nuisances):
             if nuisance.sd is None:
-                mine = np.array([n is nuisance for n in self.nuisances])
-                spread = np.sqrt(np.mean((e - self.mean)[mine] ** 2 + variance[mine]))
-                sd[mine] = max(float(spread), LEAST * SPREAD[nuisance.kind])
+                mask = np.array([n is nuisance for n in self.nuisances])
+                estimated_sd = np.sqrt(np.mean((e - self.mean)[mask] ** 2 + variance[mask]))
+                sd[mask] = max(float(estimated_sd), SMALLEST_PRIOR_SD * INITIAL_PRIOR_SD[nuisance.kind])
         return replace(self, sd=sd)
 
 
-def member_of(nuisance: Nuisance, history: History) -> str:
+def owner_of(nuisance: Nuisance, history: History) -> str:
     """Whose unknown it is that a history has."""
     return {"test": history.name, "alloy": history.alloy, "all": "all"}[nuisance.scope]
 
@@ -135,17 +135,17 @@ def prior_mean(nuisance: Nuisance, history: History | None, using: Predictor) ->
     """
     if nuisance.kind != "thickness" or nuisance.mean > 0 or history is None:
         return nuisance.mean
-    made = predictor_of(using, history)
-    geometry = getattr(getattr(made, "specimen", made), "geometry", None)
+    predictor = predictor_for(using, history)
+    geometry = getattr(getattr(predictor, "specimen", predictor), "geometry", None)
     stated = history.geometry.get("apex_thickness", getattr(geometry, "apex_thickness", None))
     if stated is None:
-        told = f"nuisance 'thickness' has no mean, and test '{history.name}' states no apex_thickness"
-        raise FitError(f"{told}; give mean=")
+        problem = f"nuisance 'thickness' has no mean, and test '{history.name}' states no apex_thickness"
+        raise FitError(f"{problem}; give mean=")
     return float(stated)
 
 
-def _limits(nuisance: Nuisance, mean: float) -> tuple[float, float]:
+def _bounds_of(nuisance: Nuisance, mean: float) -> tuple[float, float]:
     low, high = LIMITS[nuisance.kind]
-    if nuisance.kind in ABSOLUTE:
+    if nuisance.kind in LENGTH_NUISANCES:
         low, high = low * mean, high * mean
     return max(low, nuisance.bounds[0]), min(high, nuisance.bounds[1])

@@ -14,16 +14,16 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
-from creepkit.inverse.scales import LOGARITHMIC, RUPTURE, Scale, noise_of, scale_for, usable
-from creepkit.inverse.together import lasts, outputs_of
+from creepkit.inverse.scales import LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT, OutputTransform, noise_standard_deviation, transform_for, usable_frames
+from creepkit.inverse.together import predicts_rupture, compared_outputs
 from creepkit.records import History, Prediction, Predictor
 
-WHOLE = 5.0
+LINEAR_TEST_DURATION = 5.0
 """Length of a test on the clock of outputs that are compared as they are, about that of a decade and a half of ln t."""
 
 
 @dataclass(frozen=True, eq=False)
-class Entries:
+class ObservationVector:
     """Measured values of all tests, (tests, entries) each.
 
     outputs, scales : names of what is compared, and on which scale.
@@ -38,59 +38,59 @@ class Entries:
     """
 
     outputs: tuple[str, ...]
-    scales: tuple[Scale, ...]
-    output: Ints
-    frame: Ints
+    transforms: tuple[OutputTransform, ...]
+    output_index: Ints
+    frame_index: Ints
     present: Bools
-    leading: Bools
-    measured: Floats
+    leading_output: Bools
+    values: Floats
     times: Floats
     noise: Floats
-    loudness: Floats
-    whole: Bools
+    relative_noise: Floats
+    followed_to_rupture: Bools
     censored: Bools
 
     @classmethod
-    def of(cls, histories: Sequence[History], using: Predictor, full: Sequence[History] | None = None) -> Entries:
+    def from_histories(cls, histories: Sequence[History], predictor: Predictor, full: Sequence[History] | None = None) -> ObservationVector:
         """The entries of histories; their noise is read off `full`, the same histories before frames were left out."""
         full = histories if full is None else full
-        whole = np.array([h.ended and lasts(using, h) for h in histories])
-        own = [(*_outputs(h, using), *[RUPTURE][: int(w)]) for h, w in zip(histories, whole, strict=True)]
-        outputs = tuple(dict.fromkeys(name for names in own for name in names))
-        having = {name: [k for k, names in enumerate(own) if name in names] for name in outputs}
-        scales = tuple(scale_for([histories[k] for k in having[name]], name) for name in outputs)
-        noise, levels = np.zeros(len(outputs)), {}
-        for position, name in ((k, n) for k, n in enumerate(outputs) if n != RUPTURE):
-            of_tests = [_noise(full[k], histories[k], name) for k in having[name]]
-            noise[position] = np.median([np.median(v) for v in of_tests])
-            levels.update({(k, name): v for k, v in zip(having[name], of_tests, strict=True)})
-        rows = [[(n, _frames(h, n)) for n in names] for h, names in zip(histories, own, strict=True)]
+        followed_to_rupture = np.array([h.end_known and predicts_rupture(predictor, h) for h in histories])
+        outputs_by_test = [(*_observed_outputs(h, predictor), *[RUPTURE_OUTPUT][: int(w)]) for h, w in zip(histories, followed_to_rupture, strict=True)]
+        outputs = tuple(dict.fromkeys(name for names in outputs_by_test for name in names))
+        tests_by_output = {name: [k for k, names in enumerate(outputs_by_test) if name in names] for name in outputs}
+        transforms = tuple(transform_for([histories[k] for k in tests_by_output[name]], name) for name in outputs)
+        noise, noise_levels = np.zeros(len(outputs)), {}
+        for position, name in ((k, n) for k, n in enumerate(outputs) if n != RUPTURE_OUTPUT):
+            noise_by_test = [_noise_at_frames(full[k], histories[k], name) for k in tests_by_output[name]]
+            noise[position] = np.median([np.median(v) for v in noise_by_test])
+            noise_levels.update({(k, name): v for k, v in zip(tests_by_output[name], noise_by_test, strict=True)})
+        rows = [[(n, _observed_frames(h, n)) for n in names] for h, names in zip(histories, outputs_by_test, strict=True)]
         shape = len(histories), max(sum(f.size for _, f in row) for row in rows)
-        blank = cls(
-            outputs, scales, np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros(shape, bool),
+        observations = cls(
+            outputs, transforms, np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros(shape, bool),
             np.zeros(shape, bool), np.zeros(shape), np.ones(shape), noise, np.ones(shape),
-            whole, whole & np.array([h.unruptured for h in histories]),
+            followed_to_rupture, followed_to_rupture & np.array([h.unruptured for h in histories]),
         )  # fmt: skip
         for k, (history, row) in enumerate(zip(histories, rows, strict=True)):
-            blank._fill(k, history, row, levels)
-        return blank
+            observations._fill_test(k, history, row, noise_levels)
+        return observations
 
-    def _fill(
-        self, k: int, history: History, row: Sequence[tuple[str, Ints]], levels: dict[tuple[int, str], Floats]
+    def _fill_test(
+        self, k: int, history: History, row: Sequence[tuple[str, Ints]], noise_levels: dict[tuple[int, str], Floats]
     ) -> None:
         start = 0
-        for place, (name, frames) in enumerate(row):
-            reach, position = slice(start, start + frames.size), self.outputs.index(name)
-            self.output[k, reach], self.frame[k, reach], self.present[k, reach] = position, frames, True
-            self.leading[k, reach] = place == 0
-            if name == RUPTURE:
-                self.measured[k, reach] = self.times[k, reach] = history.rupture_time or history.times[-1]
+        for rank, (name, frames) in enumerate(row):
+            columns, position = slice(start, start + frames.size), self.outputs.index(name)
+            self.output_index[k, columns], self.frame_index[k, columns], self.present[k, columns] = position, frames, True
+            self.leading_output[k, columns] = rank == 0
+            if name == RUPTURE_OUTPUT:
+                self.values[k, columns] = self.times[k, columns] = history.rupture_time or history.times[-1]
                 continue
-            self.measured[k, reach], self.times[k, reach] = history.outputs[name][frames], history.times[frames]
-            level = levels[k, name][frames]
-            if name not in LOGARITHMIC or name in history.standard_deviation:
-                typical = self.noise[position]
-                self.loudness[k, reach] = np.where(level > 0, level, typical) / typical if typical > 0 else 1.0
+            self.values[k, columns], self.times[k, columns] = history.outputs[name][frames], history.times[frames]
+            noise = noise_levels[k, name][frames]
+            if name not in LOGARITHMIC_OUTPUTS or name in history.standard_deviation:
+                typical_noise = self.noise[position]
+                self.relative_noise[k, columns] = np.where(noise > 0, noise, typical_noise) / typical_noise if typical_noise > 0 else 1.0
             start += frames.size
 
     @property
@@ -99,63 +99,63 @@ class Entries:
         return np.log(self.times)
 
     @property
-    def clock(self) -> Floats:
+    def correlation_time(self) -> Floats:
         """(tests, entries) ln of time where an output is compared by its logarithm, else WHOLE t / its last time."""
-        last = np.where(self.present, self.times, 0.0).max(axis=1, keepdims=True)
-        logarithmic = self.spread([float(name in (*LOGARITHMIC, RUPTURE)) for name in self.outputs]) > 0
-        return np.where(logarithmic, self.log_times, WHOLE * self.times / np.maximum(last, 1e-300))
+        last_times = np.where(self.present, self.times, 0.0).max(axis=1, keepdims=True)
+        logarithmic = self.per_observation([float(name in (*LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT)) for name in self.outputs]) > 0
+        return np.where(logarithmic, self.log_times, LINEAR_TEST_DURATION * self.times / np.maximum(last_times, 1e-300))
 
     def forward(self, y: Floats) -> Floats:
         """What is compared, of outputs (..., tests, entries)."""
-        return self._scaled(y, lambda scale: scale.forward)
+        return self._transformed(y, lambda scale: scale.forward)
 
-    def backward(self, g: Floats) -> Floats:
+    def inverse(self, g: Floats) -> Floats:
         """Outputs, of what is compared (..., tests, entries)."""
-        return self._scaled(g, lambda scale: scale.backward)
+        return self._transformed(g, lambda scale: scale.inverse)
 
-    def slope(self, y: Floats) -> Floats:
+    def derivative(self, y: Floats) -> Floats:
         """Derivative of what is compared to the output, (..., tests, entries)."""
-        return self._scaled(y, lambda scale: scale.slope)
+        return self._transformed(y, lambda scale: scale.derivative)
 
-    def spread(self, of_outputs: Sequence[float] | Floats) -> Floats:
+    def per_observation(self, values: Sequence[float] | Floats) -> Floats:
         """(outputs,) numbers at each entry, (tests, entries)."""
-        return np.asarray(of_outputs, float)[self.output]
+        return np.asarray(values, float)[self.output_index]
 
     @property
-    def ruptures(self) -> Bools:
+    def rupture_mask(self) -> Bools:
         """(tests, entries) which entries are rupture times, or times lasted."""
-        return np.asarray(self.present & self.spread([float(n == RUPTURE) for n in self.outputs]).astype(bool))
+        return np.asarray(self.present & self.per_observation([float(n == RUPTURE_OUTPUT) for n in self.outputs]).astype(bool))
 
-    def taken(self, array: Floats, found: Prediction) -> Floats:
+    def select_outputs(self, array: Floats, prediction: Prediction) -> Floats:
         """The entries out of an array like found.values: (candidates, tests, times, outputs, ...).
 
         Those of ruptures hold what stands first in the test: they are not among the outputs.
         """
-        observed = [name for name in self.outputs if name != RUPTURE]
-        missing = [name for name in observed if name not in found.outputs]
+        observed = [name for name in self.outputs if name != RUPTURE_OUTPUT]
+        missing = [name for name in observed if name not in prediction.outputs]
         if missing:
             raise SolveError(
                 f"the predictor gave no output '{missing[0]}', which the histories have; it gave "
-                f"{', '.join(found.outputs)}"
+                f"{', '.join(prediction.outputs)}"
             )
-        places = [found.outputs.index(name) if name != RUPTURE else 0 for name in self.outputs]
-        columns = np.array(places)[self.output]
-        return np.asarray(array[:, np.arange(len(columns))[:, None], self.frame, columns])
+        places = [prediction.outputs.index(name) if name != RUPTURE_OUTPUT else 0 for name in self.outputs]
+        columns = np.array(places)[self.output_index]
+        return np.asarray(array[:, np.arange(len(columns))[:, None], self.frame_index, columns])
 
-    def at_frames(self, array: Floats) -> Floats:
+    def select_frames(self, array: Floats) -> Floats:
         """The entries out of an array (candidates, tests, times, ...) that knows no outputs."""
-        return np.asarray(array[:, np.arange(len(self.frame))[:, None], self.frame])
+        return np.asarray(array[:, np.arange(len(self.frame_index))[:, None], self.frame_index])
 
-    def _scaled(self, y: Floats, method: Callable[[Scale], Callable[[Floats], Floats]]) -> Floats:
+    def _transformed(self, y: Floats, method: Callable[[OutputTransform], Callable[[Floats], Floats]]) -> Floats:
         out = np.empty_like(y)
-        for position, scale in enumerate(self.scales):
-            mine = self.output == position
-            out[..., mine] = method(scale)(y[..., mine])
+        for position, transform in enumerate(self.transforms):
+            mask = self.output_index == position
+            out[..., mask] = method(transform)(y[..., mask])
         return out
 
 
-def _outputs(history: History, using: Predictor) -> tuple[str, ...]:
-    names = tuple(n for n in outputs_of(using, history) if usable(history, n).any())
+def _observed_outputs(history: History, predictor: Predictor) -> tuple[str, ...]:
+    names = tuple(n for n in compared_outputs(predictor, history) if usable_frames(history, n).any())
     if not names:
         raise FitError(
             f"history '{history.name}' has no output that is predicted; it has {', '.join(history.outputs) or 'none'}"
@@ -163,11 +163,11 @@ def _outputs(history: History, using: Predictor) -> tuple[str, ...]:
     return names
 
 
-def _frames(history: History, name: str) -> Ints:
-    return np.zeros(1, np.int64) if name == RUPTURE else np.flatnonzero(usable(history, name))
+def _observed_frames(history: History, name: str) -> Ints:
+    return np.zeros(1, np.int64) if name == RUPTURE_OUTPUT else np.flatnonzero(usable_frames(history, name))
 
 
-def _noise(full: History, seen: History, name: str) -> Floats:
+def _noise_at_frames(full: History, thinned: History, name: str) -> Floats:
     """(frames of `seen`,) noise as the whole history shows it."""
-    level = noise_of(full, name)
-    return level[np.searchsorted(full.times, seen.times)]
+    noise = noise_standard_deviation(full, name)
+    return noise[np.searchsorted(full.times, thinned.times)]

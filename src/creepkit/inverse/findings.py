@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from creepkit.errors import FitError
-from creepkit.inverse.measures import Errors
+from creepkit.inverse.measures import OutputErrors
 
 
 @dataclass(frozen=True)
-class OutputMisfit:
+class OutputFit:
     """One output of one test.
 
     errors : over all used frames of the history, with the test's own offset and nuisances.
@@ -18,13 +18,13 @@ class OutputMisfit:
     """
 
     output: str
-    errors: Errors
+    errors: OutputErrors
     offset: float = 0.0
     noise: float = 0.0
 
 
 @dataclass(frozen=True)
-class RuptureMisfit:
+class RuptureComparison:
     """The end of one test.
 
     measured : s, when it ruptured, or how long it lasted where it was `stopped` before.
@@ -33,7 +33,7 @@ class RuptureMisfit:
     """
 
     measured: float
-    stopped: bool
+    censored: bool
     predicted: float
     low: float
     high: float
@@ -45,7 +45,7 @@ class RuptureMisfit:
 
 
 @dataclass(frozen=True)
-class TestMisfit:
+class TestFit:
     """One test in the fit.
 
     frames : how many entries count (strains above twice the floor of their scale, all frames of other outputs).
@@ -61,14 +61,14 @@ class TestMisfit:
     name: str
     condition: str
     frames: int
-    rms: float
-    bias: float
+    log_strain_rms: float
+    log_strain_bias: float
     rate_factor: float = 1.0
     weight: float = 1.0
-    outputs: tuple[OutputMisfit, ...] = ()
-    rupture: RuptureMisfit | None = None
+    outputs: tuple[OutputFit, ...] = ()
+    rupture: RuptureComparison | None = None
 
-    def __getitem__(self, output: str) -> OutputMisfit:
+    def __getitem__(self, output: str) -> OutputFit:
         for one in self.outputs:
             if one.output == output:
                 return one
@@ -92,8 +92,8 @@ class NuisanceEstimate:
 
     kind: str
     scope: str
-    member: str
+    owner: str
     value: float
     sd: float
-    mean: float
-    spread: float
+    prior_mean: float
+    prior_sd: float

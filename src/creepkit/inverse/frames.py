@@ -10,30 +10,30 @@ from creepkit.arrays import Bools, Ints
 from creepkit.records import History
 
 
-def chosen_frames(history: History, count: int) -> Ints:
+def selected_frames(history: History, count: int) -> Ints:
     """Indices of at most `count` used frames after time zero, half spread in ln t and half in t."""
-    usable = np.flatnonzero(history.used & (history.times > 0) & measured(history))
-    if usable.size <= count:
-        return usable
-    t = history.times[usable]
-    targets = np.concatenate([np.geomspace(t[0], t[-1], count - count // 2), np.linspace(t[0], t[-1], count // 2)])
-    nearest = np.abs(t[:, None] - targets[None, :]).argmin(axis=0)
-    return np.asarray(usable[np.unique(nearest)])
+    candidates = np.flatnonzero(history.used & (history.times > 0) & frames_with_data(history))
+    if candidates.size <= count:
+        return candidates
+    times = history.times[candidates]
+    targets = np.concatenate([np.geomspace(times[0], times[-1], count - count // 2), np.linspace(times[0], times[-1], count // 2)])
+    nearest = np.abs(times[:, None] - targets[None, :]).argmin(axis=0)
+    return np.asarray(candidates[np.unique(nearest)])
 
 
-def measured(history: History) -> Bools:
+def frames_with_data(history: History) -> Bools:
     """(frames,) whether any output has a number there."""
-    present = [np.isfinite(values) for values in history.outputs.values()]
-    return np.asarray(np.any(present, axis=0)) if present else np.zeros(history.times.size, bool)
+    finite = [np.isfinite(values) for values in history.outputs.values()]
+    return np.asarray(np.any(finite, axis=0)) if finite else np.zeros(history.times.size, bool)
 
 
-def thinned(history: History, count: int) -> History:
+def thinned_history(history: History, count: int) -> History:
     """The history at its chosen frames only, all outputs of a frame together."""
-    k = chosen_frames(history, count)
+    selected = selected_frames(history, count)
     return replace(
         history,
-        times=history.times[k],
-        outputs={name: values[k] for name, values in history.outputs.items()},
-        standard_deviation={name: values[k] for name, values in history.standard_deviation.items()},
-        used=np.ones(k.size, bool),
+        times=history.times[selected],
+        outputs={name: values[selected] for name, values in history.outputs.items()},
+        standard_deviation={name: values[selected] for name, values in history.standard_deviation.items()},
+        used=np.ones(selected.size, bool),
     )

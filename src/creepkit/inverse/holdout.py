@@ -11,15 +11,15 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
-from creepkit.inverse.measures import Errors, errors
-from creepkit.inverse.scales import noise_of, usable
-from creepkit.inverse.search.refining import Progress
-from creepkit.inverse.together import outputs_of
+from creepkit.inverse.measures import OutputErrors, output_errors
+from creepkit.inverse.scales import noise_standard_deviation, usable_frames
+from creepkit.inverse.search.refining import IterationCallback
+from creepkit.inverse.together import compared_outputs
 from creepkit.records import History, Prediction
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutTest:
     """One test that the fit did not see, as any new test: nuisances at their prior means and no offset.
 
     errors : {output: Errors}, relative squared errors about the test's own mean.
@@ -28,46 +28,46 @@ class HeldOut:
     name: str
     condition: str
     fit: Identification = field(repr=False)
-    errors: Mapping[str, Errors]
+    errors: Mapping[str, OutputErrors]
 
 
 def leave_one_test_out(
-    fit: Identification, histories: Sequence[History] | None = None, progress: Progress | None = None
-) -> tuple[HeldOut, ...]:
+    fit: Identification, histories: Sequence[History] | None = None, progress: IterationCallback | None = None
+) -> tuple[HeldOutTest, ...]:
     """Predict each test from a refit to all the others, which starts where `fit` ended."""
     tests = list(fit.histories if histories is None else histories)
     if len(tests) < 2:
         raise FitError("a test can only be held out of several, found one")
-    found = []
-    for k, held in enumerate(tests):
-        partial = refit(fit, [h for h in tests if h is not held])
-        found.append(HeldOut(held.name, held.condition, partial, prediction_errors(partial, held)))
+    results = []
+    for k, test in enumerate(tests):
+        training_fit = refit(fit, [h for h in tests if h is not test])
+        results.append(HeldOutTest(test.name, test.condition, training_fit, prediction_errors(training_fit, test)))
         if progress is not None:
             progress("test", k + 1, len(tests))
-    return tuple(found)
+    return tuple(results)
 
 
-def prediction_errors(fit: Identification, history: History) -> dict[str, Errors]:
+def prediction_errors(fit: Identification, history: History) -> dict[str, OutputErrors]:
     """{output: Errors} of one history that the fit predicts as a new test."""
-    assert fit.using is not None
-    found = fit.predict([history], own=False)
+    assert fit.predictor is not None
+    prediction = fit.predict([history], own_nuisances=False)
     return {
-        name: errors(*_compared(history, found, name))
-        for name in outputs_of(fit.using, history)
-        if usable(history, name).any()
+        name: output_errors(*_used_values(history, prediction, name))
+        for name in compared_outputs(fit.predictor, history)
+        if usable_frames(history, name).any()
     }
 
 
-def pooled_error(held: Sequence[HeldOut], histories: Sequence[History], output: str) -> float:
+def pooled_relative_squared_error(held_out: Sequence[HeldOutTest], histories: Sequence[History], output: str) -> float:
     """Relative squared error of one output over all held-out tests, about the mean of all their frames."""
     by_name = {h.name: h for h in histories}
-    rows = [(one.errors[output], by_name[one.name].outputs[output][usable(by_name[one.name], output)]) for one in held]
-    squares = sum(e.mse * e.frames for e, _ in rows)
-    measured = np.concatenate([m for _, m in rows])
-    return float(squares / ((measured - measured.mean()) ** 2).sum())
+    errors_and_values = [(held_out_test.errors[output], by_name[held_out_test.name].outputs[output][usable_frames(by_name[held_out_test.name], output)]) for held_out_test in held_out]
+    sum_of_squares = sum(e.mean_squared_error * e.frames for e, _ in errors_and_values)
+    measured = np.concatenate([m for _, m in errors_and_values])
+    return float(sum_of_squares / ((measured - measured.mean()) ** 2).sum())
 
 
-def _compared(history: History, found: Prediction, name: str) -> tuple[Floats, Floats, Floats]:
-    used = usable(history, name)
-    predicted = found.of(0)[used, found.outputs.index(name)]
-    return history.outputs[name][used], predicted, noise_of(history, name)[used]
+def _used_values(history: History, prediction: Prediction, name: str) -> tuple[Floats, Floats, Floats]:
+    used = usable_frames(history, name)
+    predicted = prediction.of(0)[used, prediction.outputs.index(name)]
+    return history.outputs[name][used], predicted, noise_standard_deviation(history, name)[used]

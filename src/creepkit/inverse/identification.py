@@ -11,30 +11,30 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
-from creepkit.inverse.coordinates import Coordinates, Reference
-from creepkit.inverse.effects import member_of, prior_mean
-from creepkit.inverse.findings import NuisanceEstimate, OutputMisfit, TestMisfit
-from creepkit.inverse.measures import Errors
-from creepkit.inverse.scatter import Scatter
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.coordinates import Coordinates, ReferencePoint
+from creepkit.inverse.effects import owner_of, prior_mean
+from creepkit.inverse.findings import NuisanceEstimate, OutputFit, TestFit
+from creepkit.inverse.measures import OutputErrors
+from creepkit.inverse.scatter import NoiseModel
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.together import predict
-from creepkit.inverse.uncertainty import Estimate, band, quantile
+from creepkit.inverse.uncertainty import Estimate, delta_method, interval_quantile
 from creepkit.language import CreepLaw
-from creepkit.records import EXPLICIT, History, Nuisance, Prediction, Predictor
+from creepkit.records import SIMULATED_NUISANCES, History, Nuisance, Prediction, Predictor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.inverse.intervals.correlation import Correlation
-    from creepkit.inverse.intervals.profile import Profile
-    from creepkit.inverse.intervals.quantities import Quantity
-    from creepkit.inverse.intervals.sampling import Samples
-    from creepkit.inverse.restricted import Linear
-    from creepkit.inverse.search.trace import Trace
+    from creepkit.inverse.intervals.profile import ProfileLikelihood
+    from creepkit.inverse.intervals.quantities import DerivedQuantity
+    from creepkit.inverse.intervals.sampling import PosteriorSamples
+    from creepkit.inverse.restricted import LinearisedProblem
+    from creepkit.inverse.search.trace import SearchTrace
     from creepkit.inverse.sparsity.record import Sparsity
 
 
-__all__ = ["Identification", "NuisanceEstimate", "OutputMisfit", "Settings", "TestMisfit"]
+__all__ = ["Identification", "NuisanceEstimate", "OutputFit", "IdentificationSettings", "TestFit"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,24 +62,24 @@ class Identification:
     estimates: tuple[Estimate, ...]
     u: Floats
     covariance: Floats
-    reference: Reference
-    scatter: Scatter
+    reference: ReferencePoint
+    noise_model: NoiseModel
     rms: float
     log_likelihood: float
-    size: float
+    effective_frames: float
     freedom: float
-    misfits: tuple[TestMisfit, ...]
+    tests: tuple[TestFit, ...]
     ranges: Mapping[str, tuple[float, float]]
-    settings: Settings
+    settings: IdentificationSettings
     provenance: Mapping[str, Any]
-    errors: Mapping[str, Errors] = field(default_factory=dict)
+    errors: Mapping[str, OutputErrors] = field(default_factory=dict)
     nuisances: tuple[NuisanceEstimate, ...] = ()
     converged: bool = True
     notes: tuple[str, ...] = ()
     histories: tuple[History, ...] = ()
-    using: Predictor | None = None
-    trace: Trace | None = field(default=None, repr=False)
-    linear: Linear | None = field(default=None, repr=False)
+    predictor: Predictor | None = None
+    search_trace: SearchTrace | None = field(default=None, repr=False)
+    linearised: LinearisedProblem | None = field(default=None, repr=False)
     sparsity: Sparsity | None = field(default=None, repr=False)
 
     @property
@@ -102,10 +102,10 @@ class Identification:
         """
         from creepkit.inverse.intervals.quantities import log_rate
 
-        asked = log_rate(self.coordinates, stress, temperature, strain, time)
-        middle, sd = band(asked, self.u, self.covariance)
-        half = self._quantile * sd
-        return np.exp(middle), np.exp(middle - half), np.exp(middle + half)
+        function = log_rate(self.coordinates, stress, temperature, strain, time)
+        log_rate_value, sd = delta_method(function, self.u, self.covariance)
+        half_width = self._quantile * sd
+        return np.exp(log_rate_value), np.exp(log_rate_value - half_width), np.exp(log_rate_value + half_width)
 
     def local_exponent(
         self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
@@ -114,14 +114,14 @@ class Identification:
         """Local stress exponent d ln rate / d ln stress with its 95 % interval."""
         from creepkit.inverse.intervals.quantities import local_exponent
 
-        asked = local_exponent(self.coordinates, stress, temperature, strain, time)
-        middle, sd = band(asked, self.u, self.covariance)
-        half = self._quantile * sd
-        return middle, middle - half, middle + half
+        function = local_exponent(self.coordinates, stress, temperature, strain, time)
+        exponent, sd = delta_method(function, self.u, self.covariance)
+        half_width = self._quantile * sd
+        return exponent, exponent - half_width, exponent + half_width
 
     def rupture_time(
         self, stress: ArrayLike, temperature: ArrayLike | None = None, *, control: Literal["load", "stress"] = "load",
-        scatter: bool = True, using: Predictor | None = None,
+        test_scatter: bool = True, using: Predictor | None = None,
     ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
         """When a bar will break, s, with its 95 % interval: (time, low, high), each of the broadcast shape.
 
@@ -129,78 +129,78 @@ class Identification:
         scatter : whether the interval is that of a single test, which has its own rate, or that of the law alone.
         Infinite where nothing breaks within some thousand times the longest test.
         """
-        from creepkit.inverse.rupture import planned
+        from creepkit.inverse.rupture import constant_stress_tests
 
         T = self.reference.temperature if temperature is None else temperature
-        tests, shape = planned(stress, T, self.ranges["time"][1], control)
-        time, low, high = self.rupture_times(tests, scatter=scatter, using=using)
+        tests, shape = constant_stress_tests(stress, T, self.ranges["time"][1], control)
+        time, low, high = self.rupture_times(tests, test_scatter=test_scatter, using=using)
         return time.reshape(shape), low.reshape(shape), high.reshape(shape)
 
     def rupture_times(
-        self, histories: Sequence[History] | None = None, *, scatter: bool = True, using: Predictor | None = None
+        self, histories: Sequence[History] | None = None, *, test_scatter: bool = True, using: Predictor | None = None
     ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
         """The same for histories (by default those that were fitted), whatever their loading: (tests,) each."""
-        from creepkit.inverse.rupture import rupture_times
+        from creepkit.inverse.rupture import predict_rupture_times
 
-        predictor = using or self.using
+        predictor = using or self.predictor
         if predictor is None:
             raise FitError("this identification was loaded from a file: give using=, the specimen it was made with")
-        tests, own = list(histories or self.histories), self.scatter if scatter else None
-        return rupture_times(self.coordinates, self.u, self.covariance, own, self._quantile, tests, predictor)
+        tests, noise_model = list(histories or self.histories), self.noise_model if test_scatter else None
+        return predict_rupture_times(self.coordinates, self.u, self.covariance, noise_model, self._quantile, tests, predictor)
 
     def predict(
-        self, histories: Sequence[History] | None = None, using: Predictor | None = None, *, own: bool = True
+        self, histories: Sequence[History] | None = None, using: Predictor | None = None, *, own_nuisances: bool = True
     ) -> Prediction:
         """Predict histories (by default those that were fitted) at the identified values.
 
         own : fitted tests, known by name, with their own nuisances and offsets; else, and all other histories, with
             what is known of their alloy or of all tests, or the prior means, and without offset.
         """
-        predictor = using or self.using
+        predictor = using or self.predictor
         if predictor is None:
             raise FitError("this identification was loaded from a file: give using=, the specimen it was made with")
         tests = list(histories or self.histories)
-        found = predict(predictor, self.law, self.values, tests, effects=self.effects(tests, own=own, using=predictor))
-        by_name = {m.name: m for m in self.misfits} if own else {}
+        prediction = predict(predictor, self.law, self.values, tests, nuisances=self.nuisance_values(tests, own_nuisances=own_nuisances, using=predictor))
+        by_name = {m.name: m for m in self.tests} if own_nuisances else {}
         for k, history in enumerate(tests):
-            for one in by_name[history.name].outputs if history.name in by_name else ():
-                found.values[:, k, :, found.outputs.index(one.output)] += one.offset
-        return found
+            for output_fit in by_name[history.name].outputs if history.name in by_name else ():
+                prediction.values[:, k, :, prediction.outputs.index(output_fit.output)] += output_fit.offset
+        return prediction
 
-    def effects(
-        self, histories: Sequence[History], *, own: bool = True, using: Predictor | None = None
+    def nuisance_values(
+        self, histories: Sequence[History], *, own_nuisances: bool = True, using: Predictor | None = None
     ) -> dict[str, Floats]:
         """{kind: (1, tests)} explicit nuisances of histories, as predictors take them."""
-        found = {(n.kind, n.member): n.value for n in self.nuisances if own or n.scope != "test"}
-        using = using or self.using
+        estimates = {(n.kind, n.owner): n.value for n in self.nuisances if own_nuisances or n.scope != "test"}
+        using = using or self.predictor
 
         def of(n: Nuisance, history: History) -> float:
-            known = found.get((n.kind, member_of(n, history)))
+            known = estimates.get((n.kind, owner_of(n, history)))
             return known if known is not None else n.mean if using is None else prior_mean(n, history, using)
 
         return {
-            n.kind: np.array([[of(n, h) for h in histories]]) for n in self.settings.nuisances if n.kind in EXPLICIT
+            n.kind: np.array([[of(n, h) for h in histories]]) for n in self.settings.nuisances if n.kind in SIMULATED_NUISANCES
         }
 
-    def on(self, histories: Sequence[History], using: Predictor) -> Identification:
+    def with_histories(self, histories: Sequence[History], using: Predictor) -> Identification:
         """The same answer with its histories (found by name) and specimen attached, as after load(), for plots."""
         by_name = {h.name: h for h in histories}
-        missing = [m.name for m in self.misfits if m.name not in by_name]
+        missing = [m.name for m in self.tests if m.name not in by_name]
         if missing:
             raise FitError(f"this identification was made from '{missing[0]}', which is not among the histories given")
-        return replace(self, histories=tuple(by_name[m.name] for m in self.misfits), using=using)
+        return replace(self, histories=tuple(by_name[m.name] for m in self.tests), predictor=using)
 
-    def profile(self, of: str | Quantity, *, level: float = 0.95) -> Profile:
+    def profile(self, quantity: str | DerivedQuantity, *, level: float = 0.95) -> ProfileLikelihood:
         """Profile likelihood of a parameter, or of another quantity (see inverse.intervals.quantities)."""
         from creepkit.inverse.intervals.profile import profile
 
-        return profile(self, of, level=level)
+        return profile(self, quantity, level=level)
 
-    def sample(self, *, walkers: int = 32, steps: int = 1000, seed: int = 0, using: Predictor | None = None) -> Samples:
+    def sample(self, *, walkers: int = 32, steps: int = 1000, seed: int = 0, using: Predictor | None = None) -> PosteriorSamples:
         """Draw from the posterior by Markov chains (emcee, an optional dependency); `using` may be a surrogate."""
-        from creepkit.inverse.intervals.sampling import sample
+        from creepkit.inverse.intervals.sampling import sample_posterior
 
-        return sample(self, walkers=walkers, steps=steps, seed=seed, using=using)
+        return sample_posterior(self, walkers=walkers, steps=steps, seed=seed, using=using)
 
     def correlation(self, frame: Literal["author", "conditioned"] = "author") -> Correlation:
         """How estimates hang together, of the author's parameters or of the conditioned coordinates."""
@@ -216,21 +216,21 @@ class Identification:
 
     def save(self, path: str | Path) -> Path:
         """Write the identification as JSON (to a temporary name, then renamed)."""
-        from creepkit.inverse.files import save
+        from creepkit.inverse.files import save_identification
 
-        return save(self, Path(path))
+        return save_identification(self, Path(path))
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Measured against identified, and residuals; written to `path` when given."""
-        from creepkit.inverse.plotting import figure_of
+        from creepkit.inverse.plotting import identification_figure
 
-        return figure_of(self, path)
+        return identification_figure(self, path)
 
     def __str__(self) -> str:
-        from creepkit.inverse.printing import text_of
+        from creepkit.inverse.printing import identification_text
 
-        return text_of(self)
+        return identification_text(self)
 
     @property
     def _quantile(self) -> float:
-        return quantile(self.freedom)
+        return interval_quantile(self.freedom)

@@ -10,33 +10,33 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.alternation import EXPENSIVE, SKETCH, Effort, Fitted, alternate, free
+from creepkit.inverse.alternation import SIMULATION_LIMITS, APPROXIMATE_LIMITS, IterationLimits, EstimationResult, estimate_iteratively, starting_point
 from creepkit.inverse.checks import check_bounds
-from creepkit.inverse.coordinates import Reference
-from creepkit.inverse.covariance import effective_size, expected_effects, whitener
-from creepkit.inverse.effects import Unknowns
+from creepkit.inverse.coordinates import ReferencePoint
+from creepkit.inverse.covariance import effective_sample_size, predicted_random_effects, cholesky_factors
+from creepkit.inverse.effects import NuisanceParameters
 from creepkit.inverse.findings import NuisanceEstimate
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.misfits import misfits, pooled_errors, pooled_rms
-from creepkit.inverse.problem import Problem
-from creepkit.inverse.provenance import notes, of_domain, provenance, ranges
-from creepkit.inverse.rupture import rupture_misfits
-from creepkit.inverse.satterthwaite import restricted_laplace
-from creepkit.inverse.scatter import ASSUMED_RATE, FEW_TESTS, Scatter, full_guess
-from creepkit.inverse.search.landscape import Search
-from creepkit.inverse.search.multistart import ALIKE, ALIKE_BY_STAND_IN, MultiStart, distinct
-from creepkit.inverse.search.refining import Progress
-from creepkit.inverse.settings import Settings
-from creepkit.inverse.sizes import estimated
-from creepkit.inverse.threads import single_threaded_algebra
-from creepkit.inverse.together import predict, screening_of
-from creepkit.inverse.uncertainty import estimates, laplace, quantile
-from creepkit.inverse.weighting import pulling
+from creepkit.inverse.misfits import goodness_of_tests, pooled_errors, pooled_log_strain_rms
+from creepkit.inverse.problem import IdentificationProblem
+from creepkit.inverse.provenance import identification_notes, domain_notes, provenance_of, fitted_ranges
+from creepkit.inverse.rupture import compare_rupture_times
+from creepkit.inverse.satterthwaite import restricted_covariance
+from creepkit.inverse.scatter import ASSUMED_RATE_SD, MINIMUM_TESTS, NoiseModel, initial_noise_model
+from creepkit.inverse.search.landscape import GlobalSearch
+from creepkit.inverse.search.multistart import EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS, MultiStart, distinct
+from creepkit.inverse.search.refining import IterationCallback
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sizes import estimate_variance_components
+from creepkit.inverse.threads import single_threaded_blas
+from creepkit.inverse.together import predict, reduced_order_model_of
+from creepkit.inverse.uncertainty import parameter_estimates, laplace_covariance, interval_quantile
+from creepkit.inverse.weighting import with_rupture_weight
 from creepkit.language import CreepLaw
 from creepkit.records import History, Nuisance, Predictor
 
 if TYPE_CHECKING:
-    from creepkit.inverse.search.trace import Trace
+    from creepkit.inverse.search.trace import SearchTrace
 
 REFIT_ROUNDS = 2
 
@@ -46,13 +46,13 @@ def identify(
     histories: Sequence[History],
     using: Predictor | Mapping[str, Predictor],
     *,
-    settings: Settings | None = None,
-    search: Search | None = None,
+    settings: IdentificationSettings | None = None,
+    search: GlobalSearch | None = None,
     through: Predictor | None = None,
     start: Floats | None = None,
-    known: Sequence[NuisanceEstimate] = (),
-    reference: Reference | None = None,
-    progress: Progress | None = None,
+    known_nuisances: Sequence[NuisanceEstimate] = (),
+    reference: ReferencePoint | None = None,
+    progress: IterationCallback | None = None,
 ) -> Identification:
     """Identify the parameters of `law` from `histories` by a global search, then by their likelihood.
 
@@ -64,162 +64,162 @@ def identify(
     start : conditioned coordinates to begin from instead of a global search; a refit takes two rounds at most.
     known : explicit nuisances as they were found before, to begin from.
     """
-    settings = settings or Settings()
-    with single_threaded_algebra():
-        problem = Problem.of(law, histories, using, settings, reference)
+    settings = settings or IdentificationSettings()
+    with single_threaded_blas():
+        problem = IdentificationProblem.from_histories(law, histories, using, settings, reference)
         if start is not None:
-            begun = Begun([problem.box.clip(np.asarray(start, float))], 0, None)
+            search_outcome = SearchOutcome([problem.bounds.clip(np.asarray(start, float))], 0, None)
         else:
-            begun = _searched(problem, through, search or MultiStart(), progress)
-        if begun.off:
-            return _without_terms(problem, begun, progress)
-        before = {(n.kind, n.member): n.value for n in known}
-        ends = _refined(problem, begun, through, before, start is not None, progress)
-        best = max(ends, key=lambda end: end.likelihood)
-        problem.objective.unknowns = best.unknowns
-        check_bounds(problem.objective, best.minimum.u[: len(law.params)], _force(best)[: len(law.params)])
-        return _answer(problem, best, begun)
+            search_outcome = _global_search(problem, through, search or MultiStart(), progress)
+        if search_outcome.dropped_terms:
+            return _without_terms(problem, search_outcome, progress)
+        nuisance_values = {(n.kind, n.owner): n.value for n in known_nuisances}
+        estimates = _local_estimates(problem, search_outcome, through, nuisance_values, start is not None, progress)
+        best = max(estimates, key=lambda end: end.log_likelihood)
+        problem.residual_function.nuisance_parameters = best.nuisance_parameters
+        check_bounds(problem.residual_function, best.minimum.u[: len(law.params)], _gradient(best)[: len(law.params)])
+        return _result(problem, best, search_outcome)
 
 
-def _force(best: Fitted) -> Floats:
+def _gradient(best: EstimationResult) -> Floats:
     """(unknowns,) derivative of half the chi-square of the data to x."""
-    factor, r = whitener(best.residuals, best.working), best.residuals
+    covariance_factor, r = cholesky_factors(best.residuals, best.working_noise), best.residuals
     assert r.jacobian is not None
-    white = np.linalg.solve(factor, np.concatenate([r.values[..., None], r.jacobian], axis=-1))
-    return np.asarray(np.einsum("te,tep->p", white[..., 0], white[..., 1:]))
+    whitened = np.linalg.solve(covariance_factor, np.concatenate([r.values[..., None], r.jacobian], axis=-1))
+    return np.asarray(np.einsum("te,tep->p", whitened[..., 0], whitened[..., 1:]))
 
 
-class Begun(NamedTuple):
+class SearchOutcome(NamedTuple):
     """Where a search left off: starts, candidates asked for, its trace, and terms that its best minimum is without."""
 
     starts: list[Floats]
     evaluations: int
-    trace: Trace | None
-    off: tuple[str, ...] = ()
+    trace: SearchTrace | None
+    dropped_terms: tuple[str, ...] = ()
 
 
-def _without_terms(problem: Problem, begun: Begun, progress: Progress | None) -> Identification:
+def _without_terms(problem: IdentificationProblem, search_outcome: SearchOutcome, progress: IterationCallback | None) -> Identification:
     """The answer for what the search left of a sum: a term that is off must not come back as a small one."""
-    objective = problem.objective
-    rest = objective.law.without(*begun.off)
-    live = [objective.law.names.index(name) for name in rest.names]
+    residual_function = problem.residual_function
+    reduced_law = residual_function.law.without(*search_outcome.dropped_terms)
+    kept_positions = [residual_function.law.names.index(name) for name in reduced_law.names]
     fit = identify(
-        rest, problem.histories, objective.using, settings=problem.settings, start=begun.starts[0][live],
-        reference=objective.coordinates.reference, progress=progress,
+        reduced_law, problem.histories, residual_function.predictor, settings=problem.settings, start=search_outcome.starts[0][kept_positions],
+        reference=residual_function.coordinates.reference, progress=progress,
     )  # fmt: skip
-    told = f"the search left out {' and '.join(begun.off)} of law '{objective.law.name}'"
-    return replace(fit, trace=begun.trace, notes=(*fit.notes, told))
+    note = f"the search left out {' and '.join(search_outcome.dropped_terms)} of law '{residual_function.law.name}'"
+    return replace(fit, search_trace=search_outcome.trace, notes=(*fit.notes, note))
 
 
-def _searched(problem: Problem, through: Predictor | None, search: Search, progress: Progress | None) -> Begun:
+def _global_search(problem: IdentificationProblem, through: Predictor | None, search: GlobalSearch, progress: IterationCallback | None) -> SearchOutcome:
     """The best minima that differ, by the stand-in of the cheapest predictor."""
-    first = through or problem.objective.using
-    stand_in = screening_of(first)
-    landscape = problem.landscape(stand_in or first)
-    found = search.minima(landscape, progress)
-    kept = distinct(found.minima, problem.box, alike=ALIKE if stand_in is None else ALIKE_BY_STAND_IN)
-    return Begun([m.u for m in kept], landscape.objective.evaluations, found.trace, kept[0].off)
+    predictor = through or problem.residual_function.predictor
+    reduced_order_model = reduced_order_model_of(predictor)
+    cost_function = problem.cost_function(reduced_order_model or predictor)
+    search_result = search.minima(cost_function, progress)
+    distinct_minima = distinct(search_result.minima, problem.bounds, equal_predictions=EQUAL_PREDICTIONS if reduced_order_model is None else EQUAL_REDUCED_ORDER_PREDICTIONS)
+    return SearchOutcome([m.u for m in distinct_minima], cost_function.objective.evaluations, search_result.trace, distinct_minima[0].terms_off)
 
 
-def _refined(
-    problem: Problem, begun: Begun, through: Predictor | None, before: Mapping[tuple[str, str], float], again: bool,
-    progress: Progress | None,
-) -> list[Fitted]:  # fmt: skip
+def _local_estimates(
+    problem: IdentificationProblem, search_outcome: SearchOutcome, through: Predictor | None, known_nuisances: Mapping[tuple[str, str], float], is_refit: bool,
+    progress: IterationCallback | None,
+) -> list[EstimationResult]:  # fmt: skip
     """Where the starts lead, through the cheaper predictor first if there is one; its best end goes on."""
-    objective, weighting, wide = problem.objective, problem.weighting, problem.wide
-    dear = screening_of(objective.using) is not None
-    xs, effort, working = [free(objective.unknowns, u, before) for u in begun.starts], Effort(), None
-    if through is not None and not again:
-        cheap = problem.of_predictor(through)
-        ends = [alternate(cheap, wide, x, weighting, SKETCH, progress) for x in xs]
-        best = max(ends, key=lambda end: end.likelihood)
-        xs, working = [best.minimum.u], best.working
-    if dear:
-        effort = EXPENSIVE
-    if again:
-        effort = replace(effort, rounds=REFIT_ROUNDS)
-    ends, unknowns = [], objective.unknowns
-    for x in xs:
-        objective.unknowns = unknowns
-        ends.append(alternate(objective, wide, x, weighting, effort, progress, working))
-    return ends
+    residual_function, working_estimator, full_bounds = problem.residual_function, problem.working_noise, problem.full_bounds
+    is_expensive = reduced_order_model_of(residual_function.predictor) is not None
+    starts, limits, working_noise = [starting_point(residual_function.nuisance_parameters, u, known_nuisances) for u in search_outcome.starts], IterationLimits(), None
+    if through is not None and not is_refit:
+        cheaper = problem.with_predictor(through)
+        results = [estimate_iteratively(cheaper, full_bounds, x, working_estimator, APPROXIMATE_LIMITS, progress) for x in starts]
+        best = max(results, key=lambda end: end.log_likelihood)
+        starts, working_noise = [best.minimum.u], best.working_noise
+    if is_expensive:
+        limits = SIMULATION_LIMITS
+    if is_refit:
+        limits = replace(limits, rounds=REFIT_ROUNDS)
+    results, nuisance_parameters = [], residual_function.nuisance_parameters
+    for x in starts:
+        residual_function.nuisance_parameters = nuisance_parameters
+        results.append(estimate_iteratively(residual_function, full_bounds, x, working_estimator, limits, progress, working_noise))
+    return results
 
 
-def _answer(problem: Problem, best: Fitted, begun: Begun) -> Identification:
+def _result(problem: IdentificationProblem, best: EstimationResult, search_outcome: SearchOutcome) -> Identification:
     """Scatter, intervals and misfits at the optimum."""
-    objective, settings, histories = problem.objective, problem.settings, problem.histories
-    law, coordinates, residuals = objective.law, objective.coordinates, best.residuals
-    size, x = len(law.params), best.minimum.u
-    u = x[:size]
-    scatter, posterior, freedom = _uncertainty(problem, best)
-    found = predict(
-        objective.using, law, coordinates.values(u), list(histories), effects=best.unknowns.effects(x[size:])
+    residual_function, settings, histories = problem.residual_function, problem.settings, problem.histories
+    law, coordinates, residuals = residual_function.law, residual_function.coordinates, best.residuals
+    parameters, x = len(law.params), best.minimum.u
+    u = x[:parameters]
+    noise_model, covariance, freedom = _uncertainty(problem, best)
+    prediction = predict(
+        residual_function.predictor, law, coordinates.values(u), list(histories), nuisances=best.nuisance_parameters.predictor_values(x[parameters:])
     )
-    inner = posterior[:size, :size]
-    ends = rupture_misfits(coordinates, u, inner, scatter, quantile(freedom), histories, objective.using)
-    tests = misfits(objective, residuals, expected_effects(residuals, scatter), histories, found, ends)
-    own = _nuisances(best.unknowns, x[size:], np.sqrt(np.diag(posterior))[size:])
+    law_covariance = covariance[:parameters, :parameters]
+    ruptures = compare_rupture_times(coordinates, u, law_covariance, noise_model, interval_quantile(freedom), histories, residual_function.predictor)
+    tests = goodness_of_tests(residual_function, residuals, predicted_random_effects(residuals, noise_model), histories, prediction, ruptures)
+    nuisance_estimates = _nuisance_estimates(best.nuisance_parameters, x[parameters:], np.sqrt(np.diag(covariance))[parameters:])
     return Identification(
         law=law,
-        estimates=estimates(law, coordinates, u, inner, quantile(freedom)),
+        estimates=parameter_estimates(law, coordinates, u, law_covariance, interval_quantile(freedom)),
         u=u,
-        covariance=inner,
+        covariance=law_covariance,
         reference=coordinates.reference,
-        scatter=scatter,
-        rms=pooled_rms(tests),
-        log_likelihood=best.likelihood,
-        size=effective_size(residuals, scatter),
+        noise_model=noise_model,
+        rms=pooled_log_strain_rms(tests),
+        log_likelihood=best.log_likelihood,
+        effective_frames=effective_sample_size(residuals, noise_model),
         freedom=freedom,
-        misfits=tests,
-        ranges=ranges(objective),
+        tests=tests,
+        ranges=fitted_ranges(residual_function),
         settings=settings,
-        provenance=provenance(objective, settings, begun.evaluations),
-        errors=pooled_errors(histories, found, tests),
-        nuisances=own,
+        provenance=provenance_of(residual_function, settings, search_outcome.evaluations),
+        errors=pooled_errors(histories, prediction, tests),
+        nuisances=nuisance_estimates,
         converged=best.minimum.converged,
-        notes=(*notes(objective, best, settings, tests, own), *of_domain(found, histories)),
+        notes=(*identification_notes(residual_function, best, settings, tests, nuisance_estimates), *domain_notes(prediction, histories)),
         histories=histories,
-        using=objective.using,
-        trace=begun.trace,
-        linear=best.linear,
+        predictor=residual_function.predictor,
+        search_trace=search_outcome.trace,
+        linearised=best.linearised,
     )
 
 
-def _uncertainty(problem: Problem, best: Fitted) -> tuple[Scatter, Floats, float]:
+def _uncertainty(problem: IdentificationProblem, best: EstimationResult) -> tuple[NoiseModel, Floats, float]:
     """The whole scatter, the posterior covariance of x = (u, e), and its degrees of freedom."""
-    settings, weighting = problem.settings, problem.weighting
-    if best.linear is not None:
-        stated = weighting.stated(best.working)
-        return best.working, *restricted_laplace(best.linear, best.working, settings.nuisances, stated)
-    size, known = len(problem.objective.law.params), _with_known_rate(settings.nuisances, len(problem.histories))
-    at_means = best.unknowns.integrated(best.residuals, best.minimum.u[size:])
-    scatter = estimated(at_means, full_guess(weighting.measured(best.working), known), known)
-    given = any(n.kind == "rate" and n.sd is not None for n in known)
-    wide = problem.box.beside(best.unknowns)
-    pull = pulling(best.working, problem.objective.entries)
-    return scatter, *laplace(best.residuals, pull, scatter, wide, best.unknowns, rate_known=given)
+    settings, working_estimator = problem.settings, problem.working_noise
+    if best.linearised is not None:
+        fixed = working_estimator.fixed_components(best.working_noise)
+        return best.working_noise, *restricted_covariance(best.linearised, best.working_noise, settings.nuisances, fixed)
+    size, nuisances = len(problem.residual_function.law.params), _with_assumed_rate(settings.nuisances, len(problem.histories))
+    at_prior_means = best.nuisance_parameters.integrate_out(best.residuals, best.minimum.u[size:])
+    noise_model = estimate_variance_components(at_prior_means, initial_noise_model(working_estimator.with_measured_noise(best.working_noise), nuisances), nuisances)
+    rate_is_given = any(n.kind == "rate" and n.sd is not None for n in nuisances)
+    full_bounds = problem.bounds.with_nuisances(best.nuisance_parameters)
+    fitting_noise = with_rupture_weight(best.working_noise, problem.residual_function.observations)
+    return noise_model, *laplace_covariance(best.residuals, fitting_noise, noise_model, full_bounds, best.nuisance_parameters, rate_known=rate_is_given)
 
 
-def _nuisances(unknowns: Unknowns, e: Floats, sd: Floats) -> tuple[NuisanceEstimate, ...]:
+def _nuisance_estimates(nuisance_parameters: NuisanceParameters, e: Floats, sd: Floats) -> tuple[NuisanceEstimate, ...]:
     return tuple(
-        NuisanceEstimate(n.kind, n.scope, member, float(value), float(s), float(mean), float(spread))
-        for n, member, value, s, mean, spread in zip(
-            unknowns.nuisances, unknowns.members, e, sd, unknowns.mean, unknowns.sd, strict=True
+        NuisanceEstimate(n.kind, n.scope, member, float(value), float(s), float(mean), float(prior_sd))
+        for n, member, value, s, mean, prior_sd in zip(
+            nuisance_parameters.nuisances, nuisance_parameters.owners, e, sd, nuisance_parameters.mean, nuisance_parameters.sd, strict=True
         )
     )
 
 
-def _with_known_rate(nuisances: Sequence[Nuisance], tests: int) -> tuple[Nuisance, ...]:
+def _with_assumed_rate(nuisances: Sequence[Nuisance], tests: int) -> tuple[Nuisance, ...]:
     """The nuisances, with the scatter between tests assumed where too few tests could show it."""
-    if tests >= FEW_TESTS:
+    if tests >= MINIMUM_TESTS:
         return tuple(nuisances)
-    return tuple(replace(n, sd=ASSUMED_RATE) if n.kind == "rate" and n.sd is None else n for n in nuisances)
+    return tuple(replace(n, sd=ASSUMED_RATE_SD) if n.kind == "rate" and n.sd is None else n for n in nuisances)
 
 
 def refit(fit: Identification, histories: Sequence[History]) -> Identification:
     """The same law on other histories, starting where `fit` ended (for hold-out and resampling)."""
-    if fit.using is None:
+    if fit.predictor is None:
         raise FitError("cannot refit an identification that was loaded from a file without its specimen")
     return identify(
-        fit.law, histories, fit.using, settings=fit.settings, start=fit.u, known=fit.nuisances, reference=fit.reference
+        fit.law, histories, fit.predictor, settings=fit.settings, start=fit.u, known_nuisances=fit.nuisances, reference=fit.reference
     )

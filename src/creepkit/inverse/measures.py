@@ -22,26 +22,26 @@ def relative_squared_error(
     measured: Sequence[ArrayLike], predicted: Sequence[ArrayLike], about: Literal["all", "test", "frame"] = "all"
 ) -> float:
     """Return sum (p - m)^2 / sum (m - mean)^2 over all frames of all tests; each test a (frames,) array."""
-    truth = [np.asarray(m, float) for m in measured]
-    squares = sum(float(((np.asarray(p, float) - m) ** 2).sum()) for m, p in zip(truth, predicted, strict=True))
-    return squares / squares_about(truth, about) if squares_about(truth, about) > 0 else float("nan")
+    measured_arrays = [np.asarray(m, float) for m in measured]
+    squares = sum(float(((np.asarray(p, float) - m) ** 2).sum()) for m, p in zip(measured_arrays, predicted, strict=True))
+    return squares / total_sum_of_squares(measured_arrays, about) if total_sum_of_squares(measured_arrays, about) > 0 else float("nan")
 
 
-def squares_about(truth: Sequence[Floats], about: Literal["all", "test", "frame"] = "all") -> float:
+def total_sum_of_squares(tests: Sequence[Floats], about: Literal["all", "test", "frame"] = "all") -> float:
     """Sum of (m - mean)^2 over all frames of all tests."""
     if about == "test":
-        return sum(float(((m - m.mean()) ** 2).sum()) for m in truth if m.size)
+        return sum(float(((m - m.mean()) ** 2).sum()) for m in tests if m.size)
     if about == "all":
-        joined = np.concatenate(truth) if truth else np.zeros(0)
+        joined = np.concatenate(tests) if tests else np.zeros(0)
         return float(((joined - joined.mean()) ** 2).sum()) if joined.size else 0.0
-    if len({m.size for m in truth}) > 1:
+    if len({m.size for m in tests}) > 1:
         raise FitError('about="frame" needs tests of as many frames each; use "all" or "test"')
-    table = np.stack(truth)
+    table = np.stack(tests)
     return float(((table - table.mean(axis=0)) ** 2).sum())
 
 
 @dataclass(frozen=True)
-class Errors:
+class OutputErrors:
     """Errors of one output, of one test or of all.
 
     frames : how many were compared. rse : relative squared error (about the mean of just these frames).
@@ -50,24 +50,24 @@ class Errors:
     """
 
     frames: int
-    rse: float
-    mse: float
-    mae: float
-    relative: float
+    relative_squared_error: float
+    mean_squared_error: float
+    mean_absolute_error: float
+    relative_rms_error: float
     chi_square: float
 
 
-def errors(measured: Floats, predicted: Floats, noise: Floats) -> Errors:
+def output_errors(measured: Floats, predicted: Floats, noise: Floats) -> OutputErrors:
     """Errors of predicted against measured values, (frames,) each; noise : (frames,) standard deviations."""
     nan = float("nan")
     if measured.size == 0:
-        return Errors(0, nan, nan, nan, nan, nan)
-    off = predicted - measured
-    mse = float(np.mean(off**2))
-    typical = float(np.mean(measured**2))
+        return OutputErrors(0, nan, nan, nan, nan, nan)
+    deviation = predicted - measured
+    mse = float(np.mean(deviation**2))
+    mean_square = float(np.mean(measured**2))
     known = noise > 0
-    chi_square = float(np.mean((off[known] / noise[known]) ** 2)) if known.any() else nan
-    return Errors(
-        measured.size, relative_squared_error([measured], [predicted]), mse, float(np.mean(np.abs(off))),
-        float(np.sqrt(mse / typical)) if typical > 0 else nan, chi_square,
+    chi_square = float(np.mean((deviation[known] / noise[known]) ** 2)) if known.any() else nan
+    return OutputErrors(
+        measured.size, relative_squared_error([measured], [predicted]), mse, float(np.mean(np.abs(deviation))),
+        float(np.sqrt(mse / mean_square)) if mean_square > 0 else nan, chi_square,
     )  # fmt: skip

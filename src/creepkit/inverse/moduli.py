@@ -17,21 +17,21 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.language.elastic import Elastic
 from creepkit.language.thermal import wachtman
 from creepkit.records import History, Nuisance, Predictor
 
-FRAMES = 15
-WITHIN = (-0.7, 2.0)
+FIRST_FRAMES = 15
+MODULUS_BOUNDS = (-0.7, 2.0)
 """Bounds of a modulus, relative to what the history states."""
-_T0 = (100.0, 3000.0)
+_T0_BOUNDS = (100.0, 3000.0)
 """K, bounds of T0: below, the form is a straight line in T; above, a constant over any test."""
 
 
 @dataclass(frozen=True, eq=False)
-class Moduli:
+class ModulusEstimates:
     """What the first frames say of the modulus.
 
     names : of the tests. temperatures : (tests,) K; values, sd : (tests,) MPa.
@@ -55,49 +55,49 @@ class Moduli:
 
 
 def identify_moduli(
-    law: CreepLaw, histories: Sequence[History], using: Predictor, *, frames: int = FRAMES,
-    settings: Settings | None = None,
-) -> Moduli:  # fmt: skip
+    law: CreepLaw, histories: Sequence[History], using: Predictor, *, frames: int = FIRST_FRAMES,
+    settings: IdentificationSettings | None = None,
+) -> ModulusEstimates:  # fmt: skip
     """Identify the modulus of each test from its first used frames; every history states a modulus to begin from."""
-    bare = [h.name for h in histories if h.elastic is None]
-    if bare:
-        raise FitError(f"history '{bare[0]}' states no modulus to begin from; set elastic=Elastic(E=...)")
+    without_modulus = [h.name for h in histories if h.elastic is None]
+    if without_modulus:
+        raise FitError(f"history '{without_modulus[0]}' states no modulus to begin from; set elastic=Elastic(E=...)")
     if frames < 3:
         raise FitError(f"frames is {frames}; at least 3 are needed to tell a modulus from creep")
-    early = [h.replace(used=h.used & (np.cumsum(h.used) <= frames)) for h in histories]
-    modulus = Nuisance("modulus", sd=np.inf, bounds=WITHIN)
-    fit = identify(law, early, using, settings=replace(settings or Settings(starts=4), nuisances=(modulus,)))
-    found = {n.member: n for n in fit.nuisances if n.kind == "modulus"}
-    stated = np.array([_stated(h) for h in histories])
-    values = stated * (1.0 + np.array([found[h.name].value for h in histories]))
-    sd = stated * np.array([found[h.name].sd for h in histories])
-    warmth = np.array([_warmth(h) for h in histories])
-    first = histories[0].elastic
-    nu = first.at(float(warmth[0])).nu if first is not None else 0.3
-    elastic = Elastic(wachtman(*wachtman_through(warmth, values, sd)), nu) if np.unique(warmth).size > 2 else None
-    return Moduli(tuple(h.name for h in histories), warmth, values, sd, elastic, fit)
+    first_frames = [h.replace(used=h.used & (np.cumsum(h.used) <= frames)) for h in histories]
+    modulus = Nuisance("modulus", sd=np.inf, bounds=MODULUS_BOUNDS)
+    fit = identify(law, first_frames, using, settings=replace(settings or IdentificationSettings(starts=4), nuisances=(modulus,)))
+    estimates = {n.owner: n for n in fit.nuisances if n.kind == "modulus"}
+    stated = np.array([_stated_modulus(h) for h in histories])
+    values = stated * (1.0 + np.array([estimates[h.name].value for h in histories]))
+    sd = stated * np.array([estimates[h.name].sd for h in histories])
+    temperatures = np.array([_mean_temperature(h) for h in histories])
+    first_elastic = histories[0].elastic
+    poisson_ratio = first_elastic.at(float(temperatures[0])).nu if first_elastic is not None else 0.3
+    elastic = Elastic(wachtman(*fit_wachtman(temperatures, values, sd)), poisson_ratio) if np.unique(temperatures).size > 2 else None
+    return ModulusEstimates(tuple(h.name for h in histories), temperatures, values, sd, elastic, fit)
 
 
-def wachtman_through(temperatures: Floats, values: Floats, sd: Floats) -> tuple[float, float, float]:
+def fit_wachtman(temperatures: Floats, values: Floats, sd: Floats) -> tuple[float, float, float]:
     """E0 MPa, b MPa/K and T0 K of Wachtman's form through moduli (tests,) in MPa, weighted by their sd."""
     weights = 1.0 / np.maximum(sd, 1e-3 * values)
 
     def linear(T0: float) -> tuple[Floats, Floats]:
         columns = np.stack([np.ones_like(temperatures), -temperatures * np.exp(-T0 / temperatures)], axis=1)
-        solved, *_ = np.linalg.lstsq(columns * weights[:, None], values * weights, rcond=None)
-        return np.asarray(solved, float), np.asarray((columns @ solved - values) * weights, float)
+        coefficients, *_ = np.linalg.lstsq(columns * weights[:, None], values * weights, rcond=None)
+        return np.asarray(coefficients, float), np.asarray((columns @ coefficients - values) * weights, float)
 
-    start = np.log(np.clip(np.median(temperatures), *_T0))
-    result = least_squares(lambda x: linear(float(np.exp(x[0])))[1], [start], bounds=np.log(_T0))
+    start = np.log(np.clip(np.median(temperatures), *_T0_BOUNDS))
+    result = least_squares(lambda x: linear(float(np.exp(x[0])))[1], [start], bounds=np.log(_T0_BOUNDS))
     T0 = float(np.exp(result.x[0]))
     E0, b = linear(T0)[0]
     return float(E0), float(b), T0
 
 
-def _warmth(history: History) -> float:
+def _mean_temperature(history: History) -> float:
     return float(np.mean(history.temperature_program().values))
 
 
-def _stated(history: History) -> float:
+def _stated_modulus(history: History) -> float:
     assert history.elastic is not None
-    return float(history.elastic.at(_warmth(history)).E)
+    return float(history.elastic.at(_mean_temperature(history)).E)

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.scales import usable
-from creepkit.inverse.together import predictor_of
+from creepkit.inverse.scales import usable_frames
+from creepkit.inverse.together import predictor_for
 from creepkit.records import History, Predictor
 
 STRESS_PER_PRESSURE = 12.5
@@ -22,53 +22,53 @@ AMPLITUDE_PER_STRAIN = 30.0
 """mm."""
 
 
-def stresses(history: History, using: Predictor | None = None) -> Floats:
+def reference_stresses(history: History, predictor: Predictor | None = None) -> Floats:
     """The reference stresses that a test visits, MPa."""
-    offered = None if using is None else getattr(predictor_of(using, history), "reference_stress", None)
-    levels = history.loading.program().values
-    if offered is not None:
-        return np.atleast_1d(np.asarray(offered(history), float))
+    reference_stress = None if predictor is None else getattr(predictor_for(predictor, history), "reference_stress", None)
+    loads = history.loading.program().values
+    if reference_stress is not None:
+        return np.atleast_1d(np.asarray(reference_stress(history), float))
     if history.loading.quantity == "stress":
-        return levels
-    return STRESS_PER_PRESSURE * np.unique(levels[levels > 0])
+        return loads
+    return STRESS_PER_PRESSURE * np.unique(loads[loads > 0])
 
 
-def end_strain(history: History, using: Predictor | None = None) -> float:
+def reference_end_strain(history: History, predictor: Predictor | None = None) -> float:
     """The largest strain that a test reached, as far as its outputs tell; `using` may know what they mean."""
-    offered = None if using is None else getattr(predictor_of(using, history), "reference_strain", None)
-    if offered is not None:
-        return max(float(offered(history)), 1e-7)
+    reference_strain = None if predictor is None else getattr(predictor_for(predictor, history), "reference_strain", None)
+    if reference_strain is not None:
+        return max(float(reference_strain(history)), 1e-7)
     if "strain" in history.outputs:
-        return max(float(np.max(history.outputs["strain"][usable(history, "strain")], initial=0.0)), 1e-7)
-    return max(_amplitude_growth(history)[0] / AMPLITUDE_PER_STRAIN, 1e-7)
+        return max(float(np.max(history.outputs["strain"][usable_frames(history, "strain")], initial=0.0)), 1e-7)
+    return max(_output_increase(history)[0] / AMPLITUDE_PER_STRAIN, 1e-7)
 
 
-def measured_log_rate(histories: Sequence[History], using: Predictor | None = None) -> float:
+def median_log_strain_rate(histories: Sequence[History], predictor: Predictor | None = None) -> float:
     """Median over tests of the log of strain over time: the scale of rates that the data speak of."""
-    logs = []
+    log_rates = []
     for history in histories:
-        if using is not None and hasattr(predictor_of(using, history), "reference_strain"):
-            strain, time = end_strain(history, using), float(history.times[history.used][-1])
+        if predictor is not None and hasattr(predictor_for(predictor, history), "reference_strain"):
+            strain, time = reference_end_strain(history, predictor), float(history.times[history.used][-1])
         elif "strain" in history.outputs:
-            last = int(np.flatnonzero(usable(history, "strain"))[-1])
+            last = int(np.flatnonzero(usable_frames(history, "strain"))[-1])
             strain, time = float(history.outputs["strain"][last]), float(history.times[last])
         else:
-            growth, time = _amplitude_growth(history)
-            strain = growth / AMPLITUDE_PER_STRAIN
-        logs.append(np.log(max(strain, 1e-9) / time))
-    return float(np.median(logs))
+            increase, time = _output_increase(history)
+            strain = increase / AMPLITUDE_PER_STRAIN
+        log_rates.append(np.log(max(strain, 1e-9) / time))
+    return float(np.median(log_rates))
 
 
-def measured_log_pace(histories: Sequence[History]) -> float:
+def median_log_inverse_duration(histories: Sequence[History]) -> float:
     """Median over tests of -ln of how long they lasted, s: the pace of whatever ends them."""
     return float(-np.median([np.log(h.rupture_time or h.times[-1]) for h in histories]))
 
 
-def _amplitude_growth(history: History) -> tuple[float, float]:
+def _output_increase(history: History) -> tuple[float, float]:
     """How much the output that grows with creep did so between the first and last usable frame, and in which time."""
     output = "amplitude" if "amplitude" in history.outputs else next(iter(history.outputs))
-    k = np.flatnonzero(usable(history, output))
-    values, times = history.outputs[output][k], history.times[k]
-    if k.size < 2:
+    used = np.flatnonzero(usable_frames(history, output))
+    values, times = history.outputs[output][used], history.times[used]
+    if used.size < 2:
         return 0.0, float(history.times[-1])
     return abs(float(values[-1] - values[0])), float(times[-1] - times[0])

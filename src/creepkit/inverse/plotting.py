@@ -10,12 +10,12 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.figures import blank, written
-from creepkit.inverse.nominal import stresses
+from creepkit.figures import empty_figure, save_figure
+from creepkit.inverse.nominal import reference_stresses
 from creepkit.inverse.plotting_linear import draw_linear
 from creepkit.inverse.plotting_rupture import draw_ruptures
-from creepkit.inverse.rupture import with_ends
-from creepkit.inverse.scales import LOGARITHMIC, usable
+from creepkit.inverse.rupture import rupture_rows
+from creepkit.inverse.scales import LOGARITHMIC_OUTPUTS, usable_frames
 from creepkit.records import ZERO_CELSIUS, History, Prediction
 
 if TYPE_CHECKING:
@@ -24,52 +24,52 @@ if TYPE_CHECKING:
 
     from creepkit.inverse.identification import Identification
 
-COLOURS = "viridis"
-CROWDED = 12
+COLOUR_MAP = "viridis"
+MANY_TESTS = 12
 """Above this many tests strain over time is a thicket: identified over measured strain is drawn instead."""
-TELLING = 0.02
+PLOTTED_STRAIN_RATIO = 0.02
 """Residuals are drawn where a test's strain exceeds this share of its last one; below, noise fills the panel."""
 
 
-def figure_of(fit: Identification, path: str | Path | None = None) -> Figure:
+def identification_figure(fit: Identification, path: str | Path | None = None) -> Figure:
     """Draw the tests and what is left of them over time, an output each, rates with 95 % bands, and ruptures."""
     if not fit.histories:
         raise FitError(
             "this identification was loaded without its histories: attach them with fit.on(histories, using)"
         )
-    shown = list(dict.fromkeys(m.outputs[0].output for m in fit.misfits))
-    ends = with_ends(fit)
-    ratios = (*(1.25, 1.0) * len(shown), 1.0, *[1.0][: len(ends)])
-    figure = blank(4.5 * len(ratios), 4.8)
+    outputs = list(dict.fromkeys(m.outputs[0].output for m in fit.tests))
+    ruptures = rupture_rows(fit)
+    ratios = (*(1.25, 1.0) * len(outputs), 1.0, *[1.0][: len(ruptures)])
+    figure = empty_figure(4.5 * len(ratios), 4.8)
     panels = list(figure.subplots(1, len(ratios), width_ratios=ratios))
-    if ends:
+    if ruptures:
         draw_ruptures(panels.pop(), fit, _colours(fit.histories))
     rates = panels.pop()
     found, colours = fit.predict(), _colours(fit.histories)
-    for k, output in enumerate(shown):
-        draw = _draw_strains if output in LOGARITHMIC else draw_linear
+    for k, output in enumerate(outputs):
+        draw = _draw_strains if output in LOGARITHMIC_OUTPUTS else draw_linear
         draw((panels[2 * k], panels[2 * k + 1]), fit, output, found, colours)
     _draw_rates(rates, fit)
     figure.suptitle(f"{fit.law.title or fit.law.name}   ({len(fit.histories)} tests)", fontsize=11)
-    return written(figure, path)
+    return save_figure(figure, path)
 
 
 def _draw_strains(
-    panels: tuple[Axes, Axes], fit: Identification, output: str, found: Prediction, colours: Sequence[Any]
+    panels: tuple[Axes, Axes], fit: Identification, output: str, prediction: Prediction, colours: Sequence[Any]
 ) -> None:
     """Strains less loading strain, and ln(identified / measured)."""
     tests, residuals = panels
-    draw = _draw_parity if len(fit.histories) > CROWDED else _draw_curve
+    draw = _draw_parity if len(fit.histories) > MANY_TESTS else _draw_curve
     for k, history in enumerate(fit.histories):
-        if fit.misfits[k].outputs[0].output != output:
+        if fit.tests[k].outputs[0].output != output:
             continue
-        used, offset = usable(history, output), fit.misfits[k].offset
+        used, offset = usable_frames(history, output), fit.tests[k].offset
         hours = history.times[used] / 3600.0
-        predicted = found.of(k)[used, found.outputs.index(output)] - offset
+        predicted = prediction.of(k)[used, prediction.outputs.index(output)] - offset
         measured = history.outputs[output][used] - offset
         draw(tests, hours, measured, predicted, colours[k], history.condition)
-        good = (measured > TELLING * measured[-1]) & (predicted > 0)
-        residuals.plot(hours[good], np.log(predicted[good] / measured[good]), lw=0.9, color=colours[k], alpha=0.8)
+        plotted = (measured > PLOTTED_STRAIN_RATIO * measured[-1]) & (predicted > 0)
+        residuals.plot(hours[plotted], np.log(predicted[plotted] / measured[plotted]), lw=0.9, color=colours[k], alpha=0.8)
     _finish_tests(tests, fit)
     _finish_residuals(residuals, fit)
 
@@ -80,43 +80,43 @@ def _draw_curve(axes: Axes, hours: Floats, measured: Floats, predicted: Floats, 
 
 
 def _draw_parity(axes: Axes, _: Floats, measured: Floats, predicted: Floats, colour: Any, label: str) -> None:
-    good = (measured > 0) & (predicted > 0)
-    axes.plot(100 * measured[good], 100 * predicted[good], "-", lw=0.8, color=colour, alpha=0.7)
+    plotted = (measured > 0) & (predicted > 0)
+    axes.plot(100 * measured[plotted], 100 * predicted[plotted], "-", lw=0.8, color=colour, alpha=0.7)
 
 
 def _finish_tests(axes: Axes, fit: Identification) -> None:
-    strained = [h for h in fit.histories if "strain" in h.outputs]
-    top = 100 * max(float(np.max(h.outputs["strain"][usable(h, "strain")])) for h in strained)
-    axes.set(xscale="log", yscale="log", ylim=(1e-3 * top, 2 * top))
+    with_strain = [h for h in fit.histories if "strain" in h.outputs]
+    largest_strain = 100 * max(float(np.max(h.outputs["strain"][usable_frames(h, "strain")])) for h in with_strain)
+    axes.set(xscale="log", yscale="log", ylim=(1e-3 * largest_strain, 2 * largest_strain))
     axes.grid(alpha=0.25)
-    if len(fit.histories) <= CROWDED:
+    if len(fit.histories) <= MANY_TESTS:
         axes.set(xlabel="time, h", ylabel="creep strain, %")
         axes.set_title("measured less loading strain (dots), identified (lines)", fontsize=10)
         axes.legend(fontsize=7, loc="lower right")
         return
-    ends = np.array([1e-3 * top, 2 * top])
-    axes.plot(ends, ends, "k-", lw=1.2)
-    axes.fill_between(ends, ends / 2, ends * 2, color="black", alpha=0.08, lw=0, label="within a factor of 2")
-    axes.set(xlim=ends, xlabel="measured less loading strain, %", ylabel="identified creep strain, %")
+    axis_limits = np.array([1e-3 * largest_strain, 2 * largest_strain])
+    axes.plot(axis_limits, axis_limits, "k-", lw=1.2)
+    axes.fill_between(axis_limits, axis_limits / 2, axis_limits * 2, color="black", alpha=0.08, lw=0, label="within a factor of 2")
+    axes.set(xlim=axis_limits, xlabel="measured less loading strain, %", ylabel="identified creep strain, %")
     axes.set_title("each line one test, coloured by temperature", fontsize=10)
     axes.legend(fontsize=8, loc="upper left")
 
 
 def _finish_residuals(axes: Axes, fit: Identification) -> None:
-    reach = float(np.clip(4.0 * fit.rms, 0.1, 4.0))
-    axes.set(xscale="log", ylim=(-reach, reach), xlabel="time, h", ylabel="ln (identified / measured)")
+    axis_limit = float(np.clip(4.0 * fit.rms, 0.1, 4.0))
+    axes.set(xscale="log", ylim=(-axis_limit, axis_limit), xlabel="time, h", ylabel="ln (identified / measured)")
     axes.axhline(0, color="black", lw=0.8)
     axes.grid(alpha=0.25)
-    what = "distance in ln strain and ln time" if with_ends(fit) else "of ln strain"
-    axes.set_title(f"rms {what} {fit.rms:.3g}, loading strains taken off", fontsize=10)
+    residual_label = "distance in ln strain and ln time" if rupture_rows(fit) else "of ln strain"
+    axes.set_title(f"rms {residual_label} {fit.rms:.3g}, loading strains taken off", fontsize=10)
 
 
 def _draw_rates(axes: Axes, fit: Identification) -> None:
-    levels_of_stress = [v for h in fit.histories for v in stresses(h, fit.using) if v > 0]
+    levels_of_stress = [v for h in fit.histories for v in reference_stresses(h, fit.predictor) if v > 0]
     grid = np.geomspace(0.8 * min(levels_of_stress), 1.25 * max(levels_of_stress), 60)
-    levels = np.unique(np.round([float(np.mean(h.temperature_program().values)) for h in fit.histories], 0))
-    levels = levels[np.linspace(0, levels.size - 1, min(levels.size, 5)).round().astype(int)]
-    for T, colour in zip(levels, _shades(levels), strict=True):
+    temperatures = np.unique(np.round([float(np.mean(h.temperature_program().values)) for h in fit.histories], 0))
+    temperatures = temperatures[np.linspace(0, temperatures.size - 1, min(temperatures.size, 5)).round().astype(int)]
+    for T, colour in zip(temperatures, _shades(temperatures), strict=True):
         rate, low, high = fit.rate(grid, np.full_like(grid, T))
         axes.fill_between(grid, low, high, color=colour, alpha=0.25, lw=0)
         axes.plot(grid, rate, color=colour, lw=1.4, label=f"{T - ZERO_CELSIUS:.0f} C")
@@ -132,13 +132,13 @@ def _draw_rates(axes: Axes, fit: Identification) -> None:
 def _colours(histories: tuple[History, ...]) -> list[Any]:
     from matplotlib import colormaps
 
-    warmth = np.array([float(np.mean(h.temperature_program().values)) for h in histories])
-    few = np.ptp(warmth) < 2.0 or len(histories) <= 10
-    return [colormaps["tab10"](k % 10) for k in range(len(histories))] if few else _shades(warmth)
+    temperatures = np.array([float(np.mean(h.temperature_program().values)) for h in histories])
+    use_cycle = np.ptp(temperatures) < 2.0 or len(histories) <= 10
+    return [colormaps["tab10"](k % 10) for k in range(len(histories))] if use_cycle else _shades(temperatures)
 
 
-def _shades(warmth: Floats) -> list[Any]:
+def _shades(temperatures: Floats) -> list[Any]:
     from matplotlib import colormaps
 
-    span = max(float(np.ptp(warmth)), 1e-9)
-    return [colormaps[COLOURS](0.9 * float(v - np.min(warmth)) / span) for v in warmth]
+    span = max(float(np.ptp(temperatures)), 1e-9)
+    return [colormaps[COLOUR_MAP](0.9 * float(v - np.min(temperatures)) / span) for v in temperatures]

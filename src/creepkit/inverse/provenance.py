@@ -10,118 +10,118 @@ from importlib.metadata import version
 import numpy as np
 
 from creepkit import registry
-from creepkit.inverse.alternation import Fitted
-from creepkit.inverse.fences import Fences
-from creepkit.inverse.findings import NuisanceEstimate, TestMisfit
-from creepkit.inverse.nominal import end_strain, stresses
-from creepkit.inverse.objective import Objective
-from creepkit.inverse.scales import usable
-from creepkit.inverse.scatter import ASSUMED_RATE, FEW_TESTS
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.alternation import EstimationResult
+from creepkit.inverse.fences import BoundPenalties
+from creepkit.inverse.findings import NuisanceEstimate, TestFit
+from creepkit.inverse.nominal import reference_end_strain, reference_stresses
+from creepkit.inverse.objective import ResidualFunction
+from creepkit.inverse.scales import usable_frames
+from creepkit.inverse.scatter import ASSUMED_RATE_SD, MINIMUM_TESTS
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import temperature
 from creepkit.records import History, Prediction, Status
 
-DISTRUSTED = 0.5
+LOW_TEST_WEIGHT = 0.5
 """Weight below which a test is named."""
 
-USUAL_STRAIN, RUPTURE_STRAIN = 0.5, 2.0
+LARGE_STRAIN, LARGE_RUPTURE_STRAIN = 0.5, 2.0
 """Strains above these are worth a word: of a test whose end is not known, and of one that was followed to it."""
 
 
-def ranges(objective: Objective) -> dict[str, tuple[float, float]]:
+def fitted_ranges(residual_function: ResidualFunction) -> dict[str, tuple[float, float]]:
     """What the fitted frames cover."""
-    tests = objective.histories
-    spread = {
-        "stress": [v for h in tests for v in stresses(h, objective.using)],
+    tests = residual_function.histories
+    values_by_name = {
+        "stress": [v for h in tests for v in reference_stresses(h, residual_function.predictor)],
         "temperature": [v for h in tests for v in h.temperature_program().values],
-        "strain": [0.0, *(end_strain(h, objective.using) for h in tests)],
+        "strain": [0.0, *(reference_end_strain(h, residual_function.predictor) for h in tests)],
         "time": [v for h in tests for v in (float(h.times[0]), float(h.times[-1]))],
     }
-    return {name: (float(min(values)), float(max(values))) for name, values in spread.items()}
+    return {name: (float(min(values)), float(max(values))) for name, values in values_by_name.items()}
 
 
-def provenance(objective: Objective, settings: Settings, screened: int) -> dict[str, str | int]:
+def provenance_of(residual_function: ResidualFunction, settings: IdentificationSettings, search_evaluations: int) -> dict[str, str | int]:
     """Versions, fingerprints and counts; one evaluation is one candidate on all tests.
 
     screened : evaluations of the global search, by the stand-in where the predictor has one.
     """
-    law = objective.law
+    law = residual_function.law
     return {
         "creepkit": version("creepkit"),
         "law": law.name,
-        "origin": registry.default().origin(law),
+        "origin": registry.default_registry().distributions_of(law),
         "fingerprint": law.fingerprint,
-        "specimen": getattr(objective.using, "name", type(objective.using).__name__),
-        "evaluations": objective.evaluations,
-        "search_evaluations": screened,
-        "data": _digest(objective, settings),
+        "specimen": getattr(residual_function.predictor, "name", type(residual_function.predictor).__name__),
+        "evaluations": residual_function.evaluations,
+        "search_evaluations": search_evaluations,
+        "data": _data_digest(residual_function, settings),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
 
-def _digest(objective: Objective, settings: Settings) -> str:
+def _data_digest(residual_function: ResidualFunction, settings: IdentificationSettings) -> str:
     """What was compared, and how: identifications that share it can be ranked against one another."""
-    digest, entries = hashlib.sha256(), objective.entries
-    for array in (entries.measured, entries.times, entries.present, entries.output):
+    digest, observations = hashlib.sha256(), residual_function.observations
+    for array in (observations.values, observations.times, observations.present, observations.output_index):
         digest.update(np.ascontiguousarray(array).tobytes())
-    names = [h.name for h in objective.histories]
+    names = [h.name for h in residual_function.histories]
     weights = settings.weights if isinstance(settings.weights, str) else sorted(settings.weights.items())
-    how = (names, entries.outputs, entries.scales, settings.loss, settings.test_loss, weights, settings.nuisances)
-    digest.update(repr(how).encode())
+    method = (names, observations.outputs, observations.transforms, settings.loss, settings.test_loss, weights, settings.nuisances)
+    digest.update(repr(method).encode())
     return digest.hexdigest()[:16]
 
 
-def notes(
-    objective: Objective, best: Fitted, settings: Settings, tests: Sequence[TestMisfit],
+def identification_notes(
+    residual_function: ResidualFunction, estimation: EstimationResult, settings: IdentificationSettings, tests: Sequence[TestFit],
     nuisances: Sequence[NuisanceEstimate],
 ) -> tuple[str, ...]:  # fmt: skip
     """What to be wary of, one sentence each."""
-    found, law, histories = [], objective.law, objective.histories
-    if not best.minimum.converged:
-        found.append("the last refinement stopped at its cap of steps: raise starts or look at the plot")
-    warmth = {round(float(v), 1) for h in histories for v in h.temperature_program().values}
-    if max(warmth) - min(warmth) > 5 and not law.uses(temperature):
-        found.append(f"the tests span {min(warmth):.0f} to {max(warmth):.0f} K and this law knows no temperature")
-    levels = {round(float(v), 3) for h in histories for v in stresses(h, objective.using)}
-    if len(levels) == 1 and all(h.loading.quantity == "stress" for h in histories):
-        found.append("all tests have one stress: the stress dependence is not determined by them")
-    if len(histories) < FEW_TESTS and any(n.kind == "rate" and n.sd is None for n in settings.nuisances):
-        assumed = f"their rates are assumed to scatter by {100 * ASSUMED_RATE:.0f} %"
-        unseen = "how their rates scatter cannot be seen, and intervals are those of these tests alone"
-        found.append(f"fewer than {FEW_TESTS} tests: {unseen if settings.weights == 'likelihood' else assumed}")
-    found += _of_large_strains(histories)
-    if (Fences(objective).violations(best.minimum.u[: len(law.params)]) > 1e-3).any():
-        found.append("a constraint of the law does not hold over the tests at these values")
-    return (*found, *_of_tests(objective, tests, nuisances))
+    sentences, law, histories = [], residual_function.law, residual_function.histories
+    if not estimation.minimum.converged:
+        sentences.append("the last refinement stopped at its cap of steps: raise starts or look at the plot")
+    temperatures = {round(float(v), 1) for h in histories for v in h.temperature_program().values}
+    if max(temperatures) - min(temperatures) > 5 and not law.uses(temperature):
+        sentences.append(f"the tests span {min(temperatures):.0f} to {max(temperatures):.0f} K and this law knows no temperature")
+    stress_levels = {round(float(v), 3) for h in histories for v in reference_stresses(h, residual_function.predictor)}
+    if len(stress_levels) == 1 and all(h.loading.quantity == "stress" for h in histories):
+        sentences.append("all tests have one stress: the stress dependence is not determined by them")
+    if len(histories) < MINIMUM_TESTS and any(n.kind == "rate" and n.sd is None for n in settings.nuisances):
+        assumption_note = f"their rates are assumed to scatter by {100 * ASSUMED_RATE_SD:.0f} %"
+        likelihood_note = "how their rates scatter cannot be seen, and intervals are those of these tests alone"
+        sentences.append(f"fewer than {MINIMUM_TESTS} tests: {likelihood_note if settings.weights == 'likelihood' else assumption_note}")
+    sentences += _large_strain_notes(histories)
+    if (BoundPenalties(residual_function).constraint_violations(estimation.minimum.u[: len(law.params)]) > 1e-3).any():
+        sentences.append("a constraint of the law does not hold over the tests at these values")
+    return (*sentences, *_test_notes(residual_function, tests, nuisances))
 
 
-def of_domain(found: Prediction, histories: Sequence[History]) -> tuple[str, ...]:
+def domain_notes(prediction: Prediction, histories: Sequence[History]) -> tuple[str, ...]:
     """The tests for which a surrogate speaks of what it was not trained on, in one sentence."""
-    outside = [h.name for h, s in zip(histories, found.status[0], strict=True) if s == Status.OUTSIDE_DOMAIN]
+    outside = [h.name for h, s in zip(histories, prediction.status[0], strict=True) if s == Status.OUTSIDE_DOMAIN]
     if not outside:
         return ()
-    shown = f"'{outside[0]}'" + (f" and {len(outside) - 1} more" if len(outside) > 1 else "")
-    told = "the answer lies outside the domain that the surrogate was trained in"
-    return (f"{told}, in test {shown}: simulate it with the specimen itself",)
+    named_tests = f"'{outside[0]}'" + (f" and {len(outside) - 1} more" if len(outside) > 1 else "")
+    problem = "the answer lies outside the domain that the surrogate was trained in"
+    return (f"{problem}, in test {named_tests}: simulate it with the specimen itself",)
 
 
-def _of_large_strains(histories: Sequence[History]) -> list[str]:
+def _large_strain_notes(histories: Sequence[History]) -> list[str]:
     """A column in percent that was taken for plain strain shows in its size."""
-    for known, limit in ((False, USUAL_STRAIN), (True, RUPTURE_STRAIN)):
-        tests = [h for h in histories if "strain" in h.outputs and h.ended == known]
-        if any(h.outputs["strain"][usable(h, "strain")].max(initial=0.0) > limit for h in tests):
+    for end_is_known, limit in ((False, LARGE_STRAIN), (True, LARGE_RUPTURE_STRAIN)):
+        tests = [h for h in histories if "strain" in h.outputs and h.end_known == end_is_known]
+        if any(h.outputs["strain"][usable_frames(h, "strain")].max(initial=0.0) > limit for h in tests):
             return [f"strains above {limit:g} were fitted: a column in percent must say so, as strain_pct"]
     return []
 
 
-def _of_tests(objective: Objective, tests: Sequence[TestMisfit], nuisances: Sequence[NuisanceEstimate]) -> list[str]:
-    found = [
+def _test_notes(residual_function: ResidualFunction, tests: Sequence[TestFit], nuisances: Sequence[NuisanceEstimate]) -> list[str]:
+    sentences = [
         f"test '{m.name}' is far from the others and weighs {m.weight:.2g} of one"
         for m in tests
-        if m.weight < DISTRUSTED
+        if m.weight < LOW_TEST_WEIGHT
     ]
-    unknowns = objective.unknowns
-    for n, low, high in zip(nuisances, unknowns.low, unknowns.high, strict=True):
+    nuisance_parameters = residual_function.nuisance_parameters
+    for n, low, high in zip(nuisances, nuisance_parameters.low, nuisance_parameters.high, strict=True):
         if min(n.value - low, high - n.value) < 1e-4 * (high - low):
-            found.append(f"the {n.kind} of '{n.member}' lies at its bound, {n.value:.4g}")
-    return found
+            sentences.append(f"the {n.kind} of '{n.owner}' lies at its bound, {n.value:.4g}")
+    return sentences

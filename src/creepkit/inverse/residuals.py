@@ -18,20 +18,20 @@ class Residuals:
     rate_effect : (tests, entries) derivative with respect to ln of a factor on this test's creep rate.
     output : (tests, entries) position of the entry's output; loudness : its noise over that of its output.
     trust : (tests,) weight of each test; the covariance of a test is divided by it.
-    known : (tests, entries, effects) what one standard deviation of further random effects does, or None.
+    known : (tests, entries, nuisances) what one standard deviation of further random effects does, or None.
     """
 
     values: Floats
-    slopes: Floats
+    transform_derivatives: Floats
     present: Bools
-    clock: Floats
+    correlation_time: Floats
     jacobian: Floats | None
-    rate_effect: Floats
-    output: Ints
-    loudness: Floats
-    trust: Floats
-    known: Floats | None = None
+    log_rate_sensitivity: Floats
+    output_index: Ints
+    relative_noise: Floats
+    test_weights: Floats
+    random_effect_sensitivities: Floats | None = None
 
-    def trusting(self, trust: Floats) -> Residuals:
+    def with_test_weights(self, test_weights: Floats) -> Residuals:
         """The same with other weights of tests."""
-        return replace(self, trust=trust)
+        return replace(self, test_weights=test_weights)

@@ -19,14 +19,14 @@ import numpy as np
 from creepkit.arrays import Bools, Floats
 from creepkit.inverse.covariance import covariance
 from creepkit.inverse.residuals import Residuals
-from creepkit.inverse.scatter import Scatter
+from creepkit.inverse.scatter import NoiseModel
 
-AT_BOUND = 1e-6
+BOUND_TOLERANCE = 1e-6
 """Of the width of the bounds: nearer than this an unknown stays where it is."""
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
+class LinearisedProblem:
     """A problem made linear where its residuals were taken.
 
     residuals : with their Jacobian to all unknowns; precision, distance : (unknowns,) of the priors, and from their
@@ -35,9 +35,9 @@ class Linear:
 
     residuals: Residuals
     precision: Floats
-    distance: Floats
+    prior_residual: Floats
     free: Bools
-    room: Floats
+    step_bounds: Floats
 
     @property
     def jacobian(self) -> Floats:
@@ -45,63 +45,63 @@ class Linear:
         assert self.residuals.jacobian is not None
         return self.residuals.jacobian[..., self.free]
 
-    def solved(self, inverses: Floats) -> Solved:
+    def solve(self, inverses: Floats) -> LinearSolution:
         """The optimum under covariances of given inverses, (tests, entries, entries)."""
         J, p = self.jacobian, self.precision[self.free]
-        pulled = inverses @ J
-        A = np.einsum("tep,teq->pq", J, pulled) + np.diag(p)
-        M = inverse(A)
-        from_means = self.distance.copy()
-        move = -M @ (np.einsum("tep,te->p", pulled, self.residuals.values) + p * from_means[self.free])
-        from_means[self.free] += move
-        left = self.residuals.values + J @ move
-        white = (inverses @ left[..., None])[..., 0]
-        chi2 = float((left * white).sum() + (self.precision * from_means**2).sum())
-        return Solved(move, left, white, pulled, M, chi2, -float(np.linalg.slogdet(M)[1]))
+        weighted_jacobian = inverses @ J
+        normal_matrix = np.einsum("tep,teq->pq", J, weighted_jacobian) + np.diag(p)
+        covariance = scaled_inverse(normal_matrix)
+        prior_residual = self.prior_residual.copy()
+        step = -covariance @ (np.einsum("tep,te->p", weighted_jacobian, self.residuals.values) + p * prior_residual[self.free])
+        prior_residual[self.free] += step
+        residuals = self.residuals.values + J @ step
+        weighted_residuals = (inverses @ residuals[..., None])[..., 0]
+        chi2 = float((residuals * weighted_residuals).sum() + (self.precision * prior_residual**2).sum())
+        return LinearSolution(step, residuals, weighted_residuals, weighted_jacobian, covariance, chi2, -float(np.linalg.slogdet(covariance)[1]))
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class LinearSolution:
     """The optimum of a linear problem: step, residuals r, C^-1 r, C^-1 J, A^-1, chi-square with priors, and ln|A|."""
 
-    move: Floats
-    left: Floats
-    white: Floats
-    pulled: Floats
-    variance: Floats
+    step: Floats
+    residuals: Floats
+    weighted_residuals: Floats
+    weighted_jacobian: Floats
+    covariance: Floats
     chi_square: float
     log_det: float
 
 
-def inverses_of(residuals: Residuals, scatter: Scatter) -> tuple[Floats, float]:
+def inverse_covariances(residuals: Residuals, noise_model: NoiseModel) -> tuple[Floats, float]:
     """C^-1 of every test, (tests, entries, entries), and ln|C| over all of them.
 
     Outputs that share nothing are inverted one by one.
     """
-    c = covariance(residuals, scatter)
-    if scatter.rate > 0 or residuals.known is not None:
+    c = covariance(residuals, noise_model)
+    if noise_model.rate > 0 or residuals.random_effect_sensitivities is not None:
         return np.asarray(np.linalg.inv(c)), float(np.linalg.slogdet(c)[1].sum())
     out, log_det = np.zeros_like(c), 0.0
-    for test, (present, output) in enumerate(zip(residuals.present, residuals.output, strict=True)):
+    for test, (present, output) in enumerate(zip(residuals.present, residuals.output_index, strict=True)):
         out[test][np.diag_indices_from(out[test])] = 1.0
         for position in np.unique(output[present]):
-            own = np.flatnonzero(present & (output == position))
-            block = np.ix_(own, own)
-            half = np.linalg.inv(np.linalg.cholesky(c[test][block]))
-            out[test][block] = half.T @ half
-            log_det -= 2.0 * float(np.log(np.diag(half)).sum())
+            indices = np.flatnonzero(present & (output == position))
+            block = np.ix_(indices, indices)
+            inverse_factor = np.linalg.inv(np.linalg.cholesky(c[test][block]))
+            out[test][block] = inverse_factor.T @ inverse_factor
+            log_det -= 2.0 * float(np.log(np.diag(inverse_factor)).sum())
     return out, log_det
 
 
-def restricted_log_likelihood(linear: Linear, scatter: Scatter) -> float:
+def restricted_log_likelihood(linearised: LinearisedProblem, noise_model: NoiseModel) -> float:
     """ln L but for a constant; ln|A| over all unknowns, so that it does not jump where one meets its bound."""
-    inverses, log_det = inverses_of(linear.residuals, scatter)
-    whole = replace(linear, free=np.ones_like(linear.free)).solved(inverses)
-    priors = float(np.log(linear.precision[linear.precision > 0]).sum())
-    return -0.5 * (log_det + whole.log_det - priors + linear.solved(inverses).chi_square)
+    inverses, log_det = inverse_covariances(linearised.residuals, noise_model)
+    unconstrained = replace(linearised, free=np.ones_like(linearised.free)).solve(inverses)
+    priors = float(np.log(linearised.precision[linearised.precision > 0]).sum())
+    return -0.5 * (log_det + unconstrained.log_det - priors + linearised.solve(inverses).chi_square)
 
 
-def inverse(matrix: Floats) -> Floats:
+def scaled_inverse(matrix: Floats) -> Floats:
     """Inverse of a positive matrix whose rows differ by orders of magnitude."""
     scale = np.sqrt(np.diag(matrix))
     return np.asarray(np.linalg.inv(matrix / np.outer(scale, scale)) / np.outer(scale, scale))

@@ -11,15 +11,15 @@ import numpy as np
 from creepkit.arrays import Bools, Floats
 from creepkit.records import History
 
-LOGARITHMIC = ("strain",)
+LOGARITHMIC_OUTPUTS = ("strain",)
 """Outputs that span decades."""
 
 
-RUPTURE = "rupture"
+RUPTURE_OUTPUT = "rupture"
 """The output of tests that were followed to their end: the time of rupture, s. It has no frames of its own."""
 
 
-class Scale(Protocol):
+class OutputTransform(Protocol):
     """A monotone map g from an output to the quantity in which it is compared."""
 
     @property
@@ -36,17 +36,17 @@ class Scale(Protocol):
         """The compared quantity."""
         ...
 
-    def backward(self, g: Floats) -> Floats:
+    def inverse(self, g: Floats) -> Floats:
         """The output whose compared quantity is g."""
         ...
 
-    def slope(self, y: Floats) -> Floats:
+    def derivative(self, y: Floats) -> Floats:
         """dg/dy."""
         ...
 
 
 @dataclass(frozen=True)
-class LogScale:
+class LogTransform:
     """g(y) = asinh(y / 2 floor): ln(y / floor) well above the floor, linear below it, finite for y <= 0."""
 
     floor: float
@@ -60,50 +60,50 @@ class LogScale:
         """The compared quantity."""
         return np.arcsinh(y / (2.0 * self.floor))
 
-    def backward(self, g: Floats) -> Floats:
+    def inverse(self, g: Floats) -> Floats:
         """The output whose compared quantity is g."""
         return 2.0 * self.floor * np.sinh(g)
 
-    def slope(self, y: Floats) -> Floats:
+    def derivative(self, y: Floats) -> Floats:
         """dg/dy; 1/y well above the floor."""
         return 1.0 / np.hypot(y, 2.0 * self.floor)
 
 
 @dataclass(frozen=True)
-class LinearScale:
+class LinearTransform:
     """g(y) = y / size: with size the spread of what was measured, one means as wrong as the mean of all frames is.
 
     largest : largest value measured.
     """
 
-    size: float
+    scale: float
     largest: float
 
     @property
     def floor(self) -> float:
         """One per cent of the size."""
-        return 0.01 * self.size
+        return 0.01 * self.scale
 
     @property
     def ceiling(self) -> float:
         """That of the largest value measured."""
-        return self.largest / self.size
+        return self.largest / self.scale
 
     def forward(self, y: Floats) -> Floats:
         """The compared quantity."""
-        return y / self.size
+        return y / self.scale
 
-    def backward(self, g: Floats) -> Floats:
+    def inverse(self, g: Floats) -> Floats:
         """The output whose compared quantity is g."""
-        return g * self.size
+        return g * self.scale
 
-    def slope(self, y: Floats) -> Floats:
+    def derivative(self, y: Floats) -> Floats:
         """dg/dy."""
-        return np.full(np.shape(y), 1.0 / self.size)
+        return np.full(np.shape(y), 1.0 / self.scale)
 
 
 @dataclass(frozen=True)
-class LifeScale:
+class LogTimeTransform:
     """g(t) = -ln t of a rupture time t in s: larger where a test breaks earlier, as strains are where it is faster."""
 
     floor: float = 0.0
@@ -113,39 +113,39 @@ class LifeScale:
         """The compared quantity."""
         return -np.log(y)
 
-    def backward(self, g: Floats) -> Floats:
+    def inverse(self, g: Floats) -> Floats:
         """The rupture time whose compared quantity is g."""
         return np.exp(-g)
 
-    def slope(self, y: Floats) -> Floats:
+    def derivative(self, y: Floats) -> Floats:
         """dg/dy."""
         return -1.0 / y
 
 
-def scale_for(histories: Sequence[History], output: str) -> Scale:
+def transform_for(histories: Sequence[History], output: str) -> OutputTransform:
     """The scale of one output of these histories, all of which have it."""
-    if output == RUPTURE:
-        return LifeScale()
-    return log_scale_for(histories, output) if output in LOGARITHMIC else linear_scale_for(histories, output)
+    if output == RUPTURE_OUTPUT:
+        return LogTimeTransform()
+    return log_transform_for(histories, output) if output in LOGARITHMIC_OUTPUTS else linear_transform_for(histories, output)
 
 
-def log_scale_for(histories: Sequence[History], output: str) -> LogScale:
+def log_transform_for(histories: Sequence[History], output: str) -> LogTransform:
     """A floor at 1 % of the median end value, and never below three times the frame-to-frame noise."""
-    ends = [float(np.max(h.outputs[output][usable(h, output)], initial=0.0)) for h in histories]
+    largest_values = [float(np.max(h.outputs[output][usable_frames(h, output)], initial=0.0)) for h in histories]
     noise = np.median([frame_noise(h, output) for h in histories])
-    typical = float(np.median(ends))
-    return LogScale(max(0.01 * typical, 3.0 * float(noise), 1e-14))
+    median_largest = float(np.median(largest_values))
+    return LogTransform(max(0.01 * median_largest, 3.0 * float(noise), 1e-14))
 
 
-def linear_scale_for(histories: Sequence[History], output: str) -> LinearScale:
+def linear_transform_for(histories: Sequence[History], output: str) -> LinearTransform:
     """The standard deviation of all frames of all tests about their one mean."""
-    values = np.concatenate([h.outputs[output][usable(h, output)] for h in histories])
-    size = float(np.std(values)) if values.size else 0.0
+    values = np.concatenate([h.outputs[output][usable_frames(h, output)] for h in histories])
+    scale = float(np.std(values)) if values.size else 0.0
     largest = float(np.max(values, initial=0.0))
-    return LinearScale(max(size, 1e-6 * abs(largest), 1e-14), largest)
+    return LinearTransform(max(scale, 1e-6 * abs(largest), 1e-14), largest)
 
 
-def usable(history: History, output: str) -> Bools:
+def usable_frames(history: History, output: str) -> Bools:
     """(frames,) which frames of one output may be used: marked so, after time zero, and a number."""
     return np.asarray(history.used & (history.times > 0) & np.isfinite(history.outputs[output]))
 
@@ -155,26 +155,26 @@ def frame_noise(history: History, output: str) -> float:
 
     From third differences, robustly, in time or in its logarithm, whichever calls less of the curve noise.
     """
-    late = usable(history, output)
-    t, y = history.times[late], history.outputs[output][late]
-    if t.size < 6:
+    used = usable_frames(history, output)
+    times, values = history.times[used], history.outputs[output][used]
+    if times.size < 6:
         return 0.0
-    return min(_third_differences(x, y) for x in (t, np.log(t)))
+    return min(_noise_from_third_differences(x, values) for x in (times, np.log(times)))
 
 
-def _third_differences(x: Floats, y: Floats) -> float:
+def _noise_from_third_differences(x: Floats, y: Floats) -> float:
     """Spread of what is left of four neighbours once a parabola is taken off, in units of one frame's error."""
-    four = np.lib.stride_tricks.sliding_window_view(x, 4)
-    apart = four[:, :, None] - four[:, None, :] + np.eye(4)
-    weights = 1.0 / apart.prod(axis=2)
-    left = (weights * np.lib.stride_tricks.sliding_window_view(y, 4)).sum(axis=1)
-    return float(1.4826 * np.median(np.abs(left / np.sqrt((weights**2).sum(axis=1)))))
+    windows = np.lib.stride_tricks.sliding_window_view(x, 4)
+    differences = windows[:, :, None] - windows[:, None, :] + np.eye(4)
+    weights = 1.0 / differences.prod(axis=2)
+    remainders = (weights * np.lib.stride_tricks.sliding_window_view(y, 4)).sum(axis=1)
+    return float(1.4826 * np.median(np.abs(remainders / np.sqrt((weights**2).sum(axis=1)))))
 
 
-def noise_of(history: History, output: str) -> Floats:
+def noise_standard_deviation(history: History, output: str) -> Floats:
     """(frames,) standard deviation of one output's error: as the history states it, else from frame to frame."""
     stated = history.standard_deviation.get(output)
-    measured = np.full(history.times.size, frame_noise(history, output))
+    estimated = np.full(history.times.size, frame_noise(history, output))
     if stated is None:
-        return measured
-    return np.where(np.isfinite(stated) & (stated > 0), stated, measured)
+        return estimated
+    return np.where(np.isfinite(stated) & (stated > 0), stated, estimated)

@@ -10,18 +10,18 @@ from typing import Literal
 import numpy as np
 
 from creepkit.errors import FitError
-from creepkit.records import ABSOLUTE, EXPLICIT, Nuisance
+from creepkit.records import LENGTH_NUISANCES, SIMULATED_NUISANCES, Nuisance
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
 TEST_LOSSES = ("gaussian", "student")
-WEIGHTS = ("noise", "likelihood", "equal", "paper")
-Weights = Literal["noise", "likelihood", "equal", "paper"] | Mapping[str, float]
+WEIGHTINGS = ("noise", "likelihood", "equal", "paper")
+OutputWeights = Literal["noise", "likelihood", "equal", "paper"] | Mapping[str, float]
 PAPER_WEIGHTS = MappingProxyType({"amplitude": 0.99, "width": 0.005, "shape": 0.005})
 """The paper's weighted loss for measured histories, Eq. (S3): .99 on D_amp; how the rest is split is not said."""
 
 
 @dataclass(frozen=True)
-class Settings:
+class IdentificationSettings:
     """What a run can be repeated from.
 
     draws : Sobol points that are screened, a power of two is best; frames : looked at in each history, with all
@@ -39,19 +39,19 @@ class Settings:
     """
 
     starts: int = 8
-    draws: int = 64
+    sobol_points: int = 64
     frames: int = 40
     seed: int = 0
     loss: str = "linear"
     nuisances: tuple[Nuisance, ...] = (Nuisance("offset"), Nuisance("rate"))
-    weights: Weights = "noise"
+    weights: OutputWeights = "noise"
     test_loss: str = "gaussian"
 
     def __post_init__(self) -> None:
-        for name, least in (("starts", 1), ("draws", 1), ("frames", 2), ("seed", 0)):
+        for name, minimum in (("starts", 1), ("draws", 1), ("frames", 2), ("seed", 0)):
             value = getattr(self, name)
-            if int(value) != value or value < least:
-                raise FitError(f"{name} is {value!r}; it must be a whole number of at least {least}")
+            if int(value) != value or value < minimum:
+                raise FitError(f"{name} is {value!r}; it must be a whole number of at least {minimum}")
         if self.loss not in LOSSES:
             raise FitError(f"loss '{self.loss}' is not known; allowed are {', '.join(LOSSES)}")
         if self.test_loss not in TEST_LOSSES:
@@ -70,24 +70,24 @@ class Settings:
                 raise FitError(f"nuisance '{kind}' is given twice; give one, with the scope that matters most")
 
 
-def _check_weights(weights: Weights) -> None:
+def _check_weights(weights: OutputWeights) -> None:
     if isinstance(weights, str):
-        if weights not in WEIGHTS:
+        if weights not in WEIGHTINGS:
             raise FitError(
-                f'weights is "{weights}"; allowed are {", ".join(WEIGHTS)} and a mapping such as {{"amplitude": 0.99}}'
+                f'weights is "{weights}"; allowed are {", ".join(WEIGHTINGS)} and a mapping such as {{"amplitude": 0.99}}'
             )
         return
-    bad = [f"{name}: {value!r}" for name, value in weights.items() if not (np.isfinite(value) and value > 0)]
-    if bad or not weights:
-        found = bad[0] if bad else "none"
-        raise FitError(f"weights must be numbers above zero for at least one output, found {found}")
+    invalid = [f"{name}: {value!r}" for name, value in weights.items() if not (np.isfinite(value) and value > 0)]
+    if invalid or not weights:
+        example = invalid[0] if invalid else "none"
+        raise FitError(f"weights must be numbers above zero for at least one output, found {example}")
 
 
 def _check_nuisance(nuisance: Nuisance) -> None:
     n, finite = nuisance, nuisance.sd is None or np.isfinite(nuisance.sd)
     if n.output and n.kind != "offset":
         raise FitError(f"nuisance '{n.kind}' acts on a whole test: it has no output, found output='{n.output}'")
-    if n.kind not in EXPLICIT:
+    if n.kind not in SIMULATED_NUISANCES:
         if n.mean != 0 or np.isfinite(n.bounds).any() or n.scope != "test" or not finite:
             raise FitError(
                 f"nuisance {n} is not known to this identification: Nuisance('offset') and Nuisance('rate') are one "
@@ -96,7 +96,7 @@ def _check_nuisance(nuisance: Nuisance) -> None:
         return
     if n.kind == "thickness" and n.mean == 0 and n.scope == "test":
         return
-    if n.kind in ABSOLUTE and not (np.isfinite(n.mean) and n.mean > 0):
+    if n.kind in LENGTH_NUISANCES and not (np.isfinite(n.mean) and n.mean > 0):
         raise FitError(
             f"nuisance '{n.kind}' is a length in mm and needs its prior mean, such as mean=0.4935; found {n.mean:g}"
         )

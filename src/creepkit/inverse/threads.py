@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager
 from threadpoolctl import threadpool_limits
 
 
-def single_threaded_algebra() -> AbstractContextManager[object]:
+def single_threaded_blas() -> AbstractContextManager[object]:
     """Limit BLAS to one thread inside a with statement."""
     manager: AbstractContextManager[object] = threadpool_limits(1, user_api="blas")
     return manager

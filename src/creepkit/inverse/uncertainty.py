@@ -22,12 +22,12 @@ from scipy.stats import t as student
 
 from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.covariance import covariance, effective_size, whitener
-from creepkit.inverse.effects import Unknowns
+from creepkit.inverse.covariance import covariance, effective_sample_size, cholesky_factors
+from creepkit.inverse.effects import NuisanceParameters
 from creepkit.inverse.residuals import Residuals
-from creepkit.inverse.restricted import inverse
-from creepkit.inverse.scatter import Scatter
-from creepkit.inverse.search.box import Box
+from creepkit.inverse.restricted import scaled_inverse
+from creepkit.inverse.scatter import NoiseModel
+from creepkit.inverse.search.box import Bounds
 from creepkit.language import CreepLaw
 
 
@@ -46,83 +46,83 @@ class Estimate:
     verdict: str
 
 
-def quantile(freedom: float) -> float:
+def interval_quantile(freedom: float) -> float:
     """Half width of a 95 % interval in standard deviations."""
     return float(student.ppf(0.975, max(freedom, 1.0)))
 
 
-def laplace(
-    residuals: Residuals, working: Scatter, scatter: Scatter, box: Box, unknowns: Unknowns, *, rate_known: bool = False
+def laplace_covariance(
+    residuals: Residuals, working_noise: NoiseModel, noise_model: NoiseModel, bounds: Bounds, nuisance_parameters: NuisanceParameters, *, rate_known: bool = False
 ) -> tuple[Floats, float]:
     """Posterior covariance of x = (u, e), (unknowns, unknowns), and its degrees of freedom.
 
     rate_known : the scatter of the rate between tests was given and not estimated from them.
     """
     assert residuals.jacobian is not None
-    count, tests = box.width.size - unknowns.size, len(residuals.values)
-    factor = whitener(residuals, working)
-    white = np.linalg.solve(factor, residuals.jacobian)
-    weighted = np.linalg.solve(np.swapaxes(factor, 1, 2), white)
-    prior = np.diag(np.concatenate([12.0 / box.width[:count] ** 2, unknowns.precision]))
-    inner = inverse(np.einsum("tfp,tfq->pq", white, white) + prior)
+    count, tests = bounds.width.size - nuisance_parameters.size, len(residuals.values)
+    covariance_factor = cholesky_factors(residuals, working_noise)
+    whitened = np.linalg.solve(covariance_factor, residuals.jacobian)
+    weighted = np.linalg.solve(np.swapaxes(covariance_factor, 1, 2), whitened)
+    prior = np.diag(np.concatenate([12.0 / bounds.width[:count] ** 2, nuisance_parameters.precision]))
+    inverse_normal_matrix = scaled_inverse(np.einsum("tfp,tfq->pq", whitened, whitened) + prior)
 
-    def meat(source: Scatter) -> Floats:
+    def meat(source: NoiseModel) -> Floats:
         c = covariance(residuals, source)
         return np.asarray(np.einsum("tfp,tfg,tgq->pq", weighted, c, weighted, optimize=True))
 
-    alone = replace(scatter, rate=0.0)
-    own = meat(alone)
-    within = inner @ (own + prior) @ inner
-    between = inner @ (meat(scatter) - own) @ inner
-    touched = (residuals.jacobian[residuals.present][:, :count] != 0).any(axis=0)
-    fitted = max(int(touched.sum()), 1)
-    free = max(tests - fitted, 1.0), max(effective_size(residuals, alone) - fitted, 1.0)
+    without_rate = replace(noise_model, rate=0.0)
+    within_meat = meat(without_rate)
+    within = inverse_normal_matrix @ (within_meat + prior) @ inverse_normal_matrix
+    between = inverse_normal_matrix @ (meat(noise_model) - within_meat) @ inverse_normal_matrix
+    determined = (residuals.jacobian[residuals.present][:, :count] != 0).any(axis=0)
+    parameters = max(int(determined.sum()), 1)
+    freedoms = max(tests - parameters, 1.0), max(effective_sample_size(residuals, without_rate) - parameters, 1.0)
     if rate_known:
-        free = (1e9, free[1])
+        freedoms = (1e9, freedoms[1])
     else:
-        between *= tests / free[0]
-    share = np.diag(between)[:count] / np.maximum(np.diag(between + within)[:count], 1e-300)
-    part = float(share[touched].sum() / fitted)
-    return within + between, 1.0 / (part**2 / free[0] + (1 - part) ** 2 / free[1])
+        between *= tests / freedoms[0]
+    between_share = np.diag(between)[:count] / np.maximum(np.diag(between + within)[:count], 1e-300)
+    mean_between_share = float(between_share[determined].sum() / parameters)
+    return within + between, 1.0 / (mean_between_share**2 / freedoms[0] + (1 - mean_between_share) ** 2 / freedoms[1])
 
 
-def curvature(residuals: Residuals, working: Scatter) -> Floats:
+def normal_matrix(residuals: Residuals, working_noise: NoiseModel) -> Floats:
     """J' W J of x = (u, e), (unknowns, unknowns)."""
     assert residuals.jacobian is not None
-    white = np.linalg.solve(whitener(residuals, working), residuals.jacobian)
-    return np.asarray(np.einsum("tfp,tfq->pq", white, white))
+    whitened = np.linalg.solve(cholesky_factors(residuals, working_noise), residuals.jacobian)
+    return np.asarray(np.einsum("tfp,tfq->pq", whitened, whitened))
 
 
-def marginal(likelihood: float, curve: Floats, e: Floats, unknowns: Unknowns) -> float:
+def marginal_log_likelihood(log_likelihood: float, normal_matrix: Floats, e: Floats, nuisance_parameters: NuisanceParameters) -> float:
     """Log-likelihood with the unknowns of tests integrated out, by Laplace's approximation.
 
     curve : J' W J of x. A prior without end counts as one of the width of the unknown's limits.
     """
-    if not unknowns.size:
-        return likelihood
-    sd = np.minimum(unknowns.sd, (unknowns.high - unknowns.low) / np.sqrt(12.0))
-    own = curve[-unknowns.size :, -unknowns.size :] * np.outer(sd, sd) + np.eye(unknowns.size)
-    distance = (e - unknowns.mean) * np.sqrt(unknowns.precision)
-    return float(likelihood - 0.5 * (distance**2).sum() - 0.5 * np.linalg.slogdet(own)[1])
+    if not nuisance_parameters.size:
+        return log_likelihood
+    sd = np.minimum(nuisance_parameters.sd, (nuisance_parameters.high - nuisance_parameters.low) / np.sqrt(12.0))
+    scaled_normal_matrix = normal_matrix[-nuisance_parameters.size :, -nuisance_parameters.size :] * np.outer(sd, sd) + np.eye(nuisance_parameters.size)
+    prior_residuals = (e - nuisance_parameters.mean) * np.sqrt(nuisance_parameters.precision)
+    return float(log_likelihood - 0.5 * (prior_residuals**2).sum() - 0.5 * np.linalg.slogdet(scaled_normal_matrix)[1])
 
 
-def estimates(
-    law: CreepLaw, coordinates: Coordinates, u: Floats, posterior: Floats, wide: float
+def parameter_estimates(
+    law: CreepLaw, coordinates: Coordinates, u: Floats, covariance: Floats, quantile: float
 ) -> tuple[Estimate, ...]:
     """Intervals of the author's parameters, `wide` standard deviations to each side."""
     theta = coordinates.theta(u)
     to_theta = coordinates.jacobian(u)
-    sd = np.sqrt(np.diag(to_theta @ posterior @ to_theta.T))
-    found = []
-    for (name, param), value, spread in zip(law.table.items(), theta, sd, strict=True):
+    sd = np.sqrt(np.diag(to_theta @ covariance @ to_theta.T))
+    results = []
+    for (name, param), value, standard_deviation in zip(law.table.items(), theta, sd, strict=True):
         low, high = (param.to_internal(b) for b in param.bounds)
         value = min(max(value, low), high)
         value = low if value - low < 1e-9 * (high - low) else high if high - value < 1e-9 * (high - low) else value
-        a, b = max(value - wide * spread, low), min(value + wide * spread, high)
+        a, b = max(value - quantile * standard_deviation, low), min(value + quantile * standard_deviation, high)
         middle, bottom, top = (param.from_internal(float(v)) for v in (value, a, b))
-        verdict = _verdict(float(value), float(wide * spread), low, high)
-        found.append(Estimate(name, middle, bottom, top, param.unit, verdict))
-    return tuple(found)
+        verdict = _verdict(float(value), float(quantile * standard_deviation), low, high)
+        results.append(Estimate(name, middle, bottom, top, param.unit, verdict))
+    return tuple(results)
 
 
 def _verdict(value: float, half: float, low: float, high: float) -> str:
@@ -133,18 +133,18 @@ def _verdict(value: float, half: float, low: float, high: float) -> str:
     return "determined"
 
 
-def band(
-    function: Callable[[Floats], Floats], u: Floats, posterior: Floats, step: float = 1e-4
+def delta_method(
+    function: Callable[[Floats], Floats], point: Floats, covariance: Floats, step: float = 1e-4
 ) -> tuple[Floats, Floats]:
     """Value and standard deviation of functions of u, by the delta method with central differences.
 
     function : u (parameters,) -> (...,); returns two arrays of that shape.
     """
-    sd = np.sqrt(np.diag(posterior))
+    sd = np.sqrt(np.diag(covariance))
     columns = []
-    for k in range(u.size):
-        h = np.zeros(u.size)
-        h[k] = step * max(sd[k], 1e-8)
-        columns.append((function(u + h) - function(u - h)) / (2 * h[k]))
-    slope = np.stack(columns, axis=-1)
-    return function(u), np.sqrt(np.einsum("...i,ij,...j->...", slope, posterior, slope))
+    for k in range(point.size):
+        step_vector = np.zeros(point.size)
+        step_vector[k] = step * max(sd[k], 1e-8)
+        columns.append((function(point + step_vector) - function(point - step_vector)) / (2 * step_vector[k]))
+    derivatives = np.stack(columns, axis=-1)
+    return function(point), np.sqrt(np.einsum("...i,ij,...j->...", derivatives, covariance, derivatives))

@@ -9,7 +9,7 @@ from pathlib import Path
 from creepkit.errors import FitError
 
 
-def write_text(text: str, path: Path) -> Path:
+def write_text_atomically(text: str, path: Path) -> Path:
     """Write to a temporary name, then rename."""
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:

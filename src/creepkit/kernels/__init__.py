@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
-    from creepkit.kernels.lowering import Derivatives, Kernel, lower
+    from creepkit.kernels.lowering import RateDerivatives, ArrayKernel, lower
 
-__all__ = ["CompiledLaw", "Derivatives", "Kernel", "lower"]
+__all__ = ["CompiledLaw", "RateDerivatives", "ArrayKernel", "lower"]
 
 
 def __getattr__(name: str) -> Any:

@@ -10,11 +10,11 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.kernels.interface import CompiledLaw
 
-_DOUBLE = ctypes.POINTER(ctypes.c_double)
-_ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, _DOUBLE, _DOUBLE, _DOUBLE)
+_DOUBLE_POINTER = ctypes.POINTER(ctypes.c_double)
+_C_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, _DOUBLE_POINTER, _DOUBLE_POINTER, _DOUBLE_POINTER)
 
 
-def call(
+def call_entry(
     law: CompiledLaw, entry: Literal["rate", "update", "sensitivity"], points: Floats, theta: Floats
 ) -> tuple[Floats, int]:
     """Return an entry's output, (rows, columns) as `interface` lays it out, and its flags.
@@ -25,5 +25,5 @@ def call(
     rows, width = points.shape
     columns = {"rate": 1, "update": 1 + width, "sensitivity": 1 + width + theta.size}[entry]
     out = np.empty((rows, (1 + law.states) * columns))
-    pointers = (array.ctypes.data_as(_DOUBLE) for array in (points, theta, out))
-    return out, int(_ENTRY(getattr(law, entry).address)(rows, *pointers))
+    pointers = (array.ctypes.data_as(_DOUBLE_POINTER) for array in (points, theta, out))
+    return out, int(_C_FUNCTION(getattr(law, entry).address)(rows, *pointers))

@@ -22,14 +22,14 @@ from creepkit.language.fingerprint import structure_of
 if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
 
-_POINT = (100.0, 0.0, 0.0, 1000.0, 100.0, 100.0 / 3.0)
+_REFERENCE_POINT = (100.0, 0.0, 0.0, 1000.0, 100.0, 100.0 / 3.0)
 """Where exponents that vary with stress or temperature are taken unless a point is given."""
 
 
-def compiled(law: CreepLaw) -> CompiledLaw:
+def compile_law(law: CreepLaw) -> CompiledLaw:
     """Return the law's compiled entries, from memory, from the disk cache or made now."""
-    key = _key(law)
-    module = disk_cache.load(key, partial(_text, law))
+    key = _cache_key(law)
+    module = disk_cache.load_module(key, partial(_module_source, law))
     initial = frozen([state.initial for state in law.states.values()])
     return CompiledLaw(
         rate=module.rate,
@@ -39,46 +39,46 @@ def compiled(law: CreepLaw) -> CompiledLaw:
         log_scale=frozen([p.scale == "log" for p in law.params.values()], dtype=bool),
         initial=initial,
         limits=frozen([np.inf if state.limit is None else state.limit for state in law.states.values()]),
-        leading=partial(_leading, module, (*_POINT, *initial)),
+        leading_exponent=partial(_leading_exponent, module, (*_REFERENCE_POINT, *initial)),
         source=module.SOURCE,
         fingerprint=key,
     )
 
 
-def _text(law: CreepLaw) -> str:
-    from creepkit.kernels.entries import entries
-    from creepkit.kernels.module_text import module_text
+def _module_source(law: CreepLaw) -> str:
+    from creepkit.kernels.entries import symbolic_kernel
+    from creepkit.kernels.module_text import module_source
 
-    return module_text(entries(law))
+    return module_source(symbolic_kernel(law))
 
 
 @lru_cache(maxsize=1024)
-def _key(law: CreepLaw) -> str:
+def _cache_key(law: CreepLaw) -> str:
     """Kept, for printing a law takes a millisecond and a fit asks a thousand times."""
-    return hashlib.sha256(f"{_maker()}\n{structure_of(law)}".encode()).hexdigest()[:24]
+    return hashlib.sha256(f"{_code_fingerprint()}\n{structure_of(law)}".encode()).hexdigest()[:24]
 
 
 @cache
-def _maker() -> str:
+def _code_fingerprint() -> str:
     """Hash of the code that makes kernels and of the machine they are for, so that no stale kernel survives."""
     digest = hashlib.sha256()
     for path in (*sorted(Path(__file__).parent.glob("*.py")), Path(str(symbols.__file__))):
         digest.update(path.read_bytes())
     machine = cpu_target.target_context.codegen().magic_tuple()
-    for word in (sys.version, numba.__version__, *machine):
-        digest.update(word.encode())
+    for item in (sys.version, numba.__version__, *machine):
+        digest.update(item.encode())
     return digest.hexdigest()
 
 
-def _leading(module: ModuleType, usual: tuple[float, ...], theta: Floats, point: Floats | None = None) -> Floats:
+def _leading_exponent(module: ModuleType, reference_point: tuple[float, ...], theta: Floats, point: Floats | None = None) -> Floats:
     """Smallest (1 + a)/(1 - b) among the terms that are not switched off; 1 when all are."""
     theta = np.asarray(theta, float)
-    best = np.full(theta.shape[:-1], np.inf)
-    at = usual if point is None else np.moveaxis(np.asarray(point, float), -1, 0)
-    pairs = module.exponents(*at, *np.moveaxis(theta, -1, 0))
+    smallest = np.full(theta.shape[:-1], np.inf)
+    point_columns = reference_point if point is None else np.moveaxis(np.asarray(point, float), -1, 0)
+    pairs = module.exponents(*point_columns, *np.moveaxis(theta, -1, 0))
     for (a, b), coefficients in zip(pairs, module.COEFFICIENTS, strict=True):
         b = np.minimum(b, 1.0 - 1e-12)  # a term that starts with strain itself does not lead
         beta = (1.0 + np.asarray(a)) / (1.0 - b)
         active = np.isfinite(theta[..., list(coefficients)]).all(axis=-1)
-        best = np.where(active, np.minimum(best, beta), best)
-    return np.where(np.isfinite(best), best, 1.0)
+        smallest = np.where(active, np.minimum(smallest, beta), smallest)
+    return np.where(np.isfinite(smallest), smallest, 1.0)

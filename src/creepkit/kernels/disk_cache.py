@@ -24,18 +24,18 @@ from typing import Any
 
 from numba.core import config
 
-SOURCE, SEAL = "law.py", "SHA256SUMS"
+SOURCE_FILE, CHECKSUM_FILE = "law.py", "SHA256SUMS"
 
-_loaded: dict[str, ModuleType] = {}
+_loaded_modules: dict[str, ModuleType] = {}
 _numba_settings: Any = config
 
 
-def load(key: str, text: Callable[[], str]) -> ModuleType:
+def load_module(key: str, source: Callable[[], str]) -> ModuleType:
     """Return the module of `key`: from memory, from disk, or made from text() now."""
-    if key not in _loaded:
-        folder = _place(f"law_{key}")
-        _loaded[key] = _executed(key, folder / SOURCE) if intact(folder) else _built(key, folder, text())
-    return _loaded[key]
+    if key not in _loaded_modules:
+        folder = _module_folder(f"law_{key}")
+        _loaded_modules[key] = _execute_module(key, folder / SOURCE_FILE) if is_intact(folder) else _build_module(key, folder, source())
+    return _loaded_modules[key]
 
 
 def cache_folder() -> Path:
@@ -45,10 +45,10 @@ def cache_folder() -> Path:
     return base / "kernels"
 
 
-def intact(folder: Path) -> bool:
+def is_intact(folder: Path) -> bool:
     """Whether a folder holds the files its seal names, unchanged, and no others."""
     try:
-        return (folder / SEAL).read_text(encoding="utf-8") == _sums(folder)
+        return (folder / CHECKSUM_FILE).read_text(encoding="utf-8") == _checksums(folder)
     except (OSError, UnicodeDecodeError):
         return False
 
@@ -56,13 +56,13 @@ def intact(folder: Path) -> bool:
 # ---- folders -------------------------------------------------------------------------------------------------------
 
 
-def _place(name: str) -> Path:
+def _module_folder(name: str) -> Path:
     """Where a module belongs: in the cache folder, or in a private one when that cannot be written."""
     folder = cache_folder()
     if _writable(folder):
         return folder / name
     private = _private_folder() / name
-    if intact(folder / name) and not private.exists():
+    if is_intact(folder / name) and not private.exists():
         shutil.copytree(folder / name, private)  # numba must be able to write beside the source
     return private
 
@@ -87,23 +87,23 @@ def _private_folder() -> Path:
 # ---- making and loading --------------------------------------------------------------------------------------------
 
 
-def _built(key: str, folder: Path, text: str) -> ModuleType:
+def _build_module(key: str, folder: Path, source: str) -> ModuleType:
     """Write, compile and seal a module in a temporary folder, then put the folder into its place."""
     temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f"new_{folder.name}_"))
     try:
-        (temporary / SOURCE).write_text(text, encoding="utf-8", newline="\n")
-        module = _executed(key, temporary / SOURCE)
-        (temporary / SEAL).write_text(_sums(temporary), encoding="utf-8", newline="\n")
-        _put(temporary, folder)
+        (temporary / SOURCE_FILE).write_text(source, encoding="utf-8", newline="\n")
+        module = _execute_module(key, temporary / SOURCE_FILE)
+        (temporary / CHECKSUM_FILE).write_text(_checksums(temporary), encoding="utf-8", newline="\n")
+        _install_folder(temporary, folder)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return module
 
 
-def _put(temporary: Path, folder: Path) -> None:
+def _install_folder(temporary: Path, folder: Path) -> None:
     """Rename the new folder into place; an intact one that is there already stays, a damaged one goes."""
-    if folder.exists() and not intact(folder):
-        _remove(folder)
+    if folder.exists() and not is_intact(folder):
+        _remove_folder(folder)
     try:
         os.rename(temporary, folder)
     except OSError:
@@ -111,39 +111,39 @@ def _put(temporary: Path, folder: Path) -> None:
             raise
 
 
-def _remove(folder: Path) -> None:
+def _remove_folder(folder: Path) -> None:
     """Take a folder away whole, so that no process sees half of it."""
-    aside = tempfile.mkdtemp(dir=folder.parent, prefix="damaged_")
+    temporary = tempfile.mkdtemp(dir=folder.parent, prefix="damaged_")
     try:
-        os.replace(folder, Path(aside) / folder.name)
+        os.replace(folder, Path(temporary) / folder.name)
     except FileNotFoundError:  # another process has just done it
         return
     finally:
-        shutil.rmtree(aside, ignore_errors=True)
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _executed(key: str, path: Path) -> ModuleType:
-    text = path.read_text(encoding="utf-8")
+def _execute_module(key: str, path: Path) -> ModuleType:
+    source = path.read_text(encoding="utf-8")
     module = ModuleType(f"creepkit_kernel_{key}")
-    module.__file__, module.__dict__["SOURCE"] = str(path), text
+    module.__file__, module.__dict__["SOURCE"] = str(path), source
     sys.modules[module.__name__] = module  # numba finds the functions of cached machine code through their module
-    with _machine_code_beside_the_source():
-        exec(compile(text, str(path), "exec"), module.__dict__)
+    with _machine_code_in_module_folder():
+        exec(compile(source, str(path), "exec"), module.__dict__)
     return module
 
 
 @contextmanager
-def _machine_code_beside_the_source() -> Iterator[None]:
+def _machine_code_in_module_folder() -> Iterator[None]:
     """Overrule NUMBA_CACHE_DIR: the seal has to cover the machine code, and the folder moves as a whole."""
-    elsewhere = _numba_settings.CACHE_DIR
+    previous = _numba_settings.CACHE_DIR
     _numba_settings.CACHE_DIR = ""
     try:
         yield
     finally:
-        _numba_settings.CACHE_DIR = elsewhere
+        _numba_settings.CACHE_DIR = previous
 
 
-def _sums(folder: Path) -> str:
+def _checksums(folder: Path) -> str:
     """One line a file: its SHA-256 and its path."""
-    files = sorted(p for p in folder.rglob("*") if p.is_file() and p != folder / SEAL)
+    files = sorted(p for p in folder.rglob("*") if p.is_file() and p != folder / CHECKSUM_FILE)
     return "".join(f"{hashlib.sha256(p.read_bytes()).hexdigest()}  {p.relative_to(folder).as_posix()}\n" for p in files)

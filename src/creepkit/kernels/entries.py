@@ -12,21 +12,21 @@ from functools import cached_property
 
 import sympy
 
-from creepkit.kernels.exponentials import paired_everywhere
+from creepkit.kernels.exponentials import with_all_exponential_differences
 from creepkit.kernels.logform import FLOOR, log_form
-from creepkit.kernels.naming import Names
+from creepkit.kernels.naming import PrintableNames
 from creepkit.kernels.stable_functions import Floored, LogFloor
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import POINT
+from creepkit.language.symbols import POINT_VARIABLES
 
-NOTHING = sympy.Float(-1e30)
+LOG_RATE_OFF = sympy.Float(-1e30)
 """ln of the rate of a law whose terms are all off: finite, in single precision too."""
 
-Steps = Mapping[sympy.Symbol, sympy.Expr]
+Assignments = Mapping[sympy.Symbol, sympy.Expr]
 
 
 @dataclass(frozen=True)
-class Entry:
+class KernelFunction:
     """One function to be printed.
 
     inputs : every symbol it may read, the point, the states, then theta.
@@ -42,13 +42,13 @@ class Entry:
     outputs: tuple[sympy.Expr, ...]
 
     @property
-    def read(self) -> set[sympy.Symbol]:
+    def used_inputs(self) -> set[sympy.Symbol]:
         """The inputs that matter."""
         expressions = [*self.outputs, *(e for _, e in (*self.constants, *self.steps))]
         return set().union(*(e.free_symbols for e in expressions)) & set(self.inputs)
 
 
-class Lowered:
+class SymbolicKernel:
     """A law as entries, ready for a printer, each made when it is first asked for.
 
     form is in the author's symbols, entries are in printable ones; the layout of `update` and `sensitivity` is that of
@@ -57,39 +57,39 @@ class Lowered:
 
     def __init__(self, law: CreepLaw) -> None:
         self.law, self.form = law, log_form(law)
-        self.names = Names(law, self.form)
+        self.names = PrintableNames(law, self.form)
         self._terms = {symbol: sympy.exp(ln) for symbol, ln in zip(self.names.terms, self.form.terms, strict=True)}
-        self._log_rate, self._weights, self._shares = _log_sum(self.names, self.form.terms)
-        point = (*POINT, *law.states)
+        self._log_rate, self._weights, self._scaled_terms = _log_sum_exp(self.names, self.form.terms)
+        point = (*POINT_VARIABLES, *law.states)
         self._size, self._variables = len(point), (*point, *self.form.theta)
 
     @cached_property
-    def rate(self) -> Entry:
+    def rate(self) -> KernelFunction:
         """Rates: of creep, then of each state."""
-        return _entry("rate", self.names, self._terms, self._rates)
+        return _kernel_function("rate", self.names, self._terms, self._rates)
 
     @cached_property
-    def log_rate(self) -> Entry:
+    def log_rate(self) -> KernelFunction:
         """ln of the rate of creep, then rates of states."""
-        return _entry("log_rate", self.names, self._shares, self._log_rates)
+        return _kernel_function("log_rate", self.names, self._scaled_terms, self._log_rates)
 
     @cached_property
-    def update(self) -> Entry:
+    def update(self) -> KernelFunction:
         """The same, then derivatives to the point and the states."""
-        outputs = [*self._log_rates, *self._along(self._weights, 0, self._size)]
-        return _entry("update", self.names, self._shares, outputs)
+        outputs = [*self._log_rates, *self._derivatives(self._weights, 0, self._size)]
+        return _kernel_function("update", self.names, self._scaled_terms, outputs)
 
     @cached_property
-    def sensitivity(self) -> Entry:
+    def sensitivity(self) -> KernelFunction:
         """Rates, their derivatives to the point and the states, then to theta."""
-        slopes = self._to_everything([*self._terms])
-        return _entry("sensitivity", self.names, self._terms, [*self._rates, *slopes])
+        derivatives = self._all_derivatives([*self._terms])
+        return _kernel_function("sensitivity", self.names, self._terms, [*self._rates, *derivatives])
 
     @cached_property
-    def log_sensitivity(self) -> Entry:
+    def log_sensitivity(self) -> KernelFunction:
         """The same of ln of the rate."""
-        slopes = self._to_everything(self._weights)
-        return _entry("log_sensitivity", self.names, self._shares, [*self._log_rates, *slopes])
+        derivatives = self._all_derivatives(self._weights)
+        return _kernel_function("log_sensitivity", self.names, self._scaled_terms, [*self._log_rates, *derivatives])
 
     @property
     def _rates(self) -> list[sympy.Expr]:
@@ -99,80 +99,80 @@ class Lowered:
     def _log_rates(self) -> list[sympy.Expr]:
         return [self._log_rate, *self.form.state_rates]
 
-    def _to_everything(self, weights: Sequence[sympy.Expr]) -> list[sympy.Expr]:
+    def _all_derivatives(self, weights: Sequence[sympy.Expr]) -> list[sympy.Expr]:
         size = self._size
-        return [*self._along(weights, 0, size), *self._along(weights, size, len(self._variables))]
+        return [*self._derivatives(weights, 0, size), *self._derivatives(weights, size, len(self._variables))]
 
-    def _along(self, weights: Sequence[sympy.Expr], start: int, stop: int) -> list[sympy.Expr]:
+    def _derivatives(self, weights: Sequence[sympy.Expr], start: int, stop: int) -> list[sympy.Expr]:
         """Derivatives to some variables, row by row: those of terms weighted and added, then those of states."""
-        rows = [[self._slope(term, k) for k in range(start, stop)] for term in self.form.terms]
-        first = [
+        rows = [[self._derivative(term, k) for k in range(start, stop)] for term in self.form.terms]
+        rate_derivatives = [
             sympy.Add(*(w * s for w, s in zip(weights, column, strict=True))) for column in zip(*rows, strict=True)
         ]
-        return [*first, *(self._slope(rate, k) for rate in self.form.state_rates for k in range(start, stop))]
+        return [*rate_derivatives, *(self._derivative(rate, k) for rate in self.form.state_rates for k in range(start, stop))]
 
-    def _slope(self, expression: sympy.Expr, k: int) -> sympy.Expr:
-        found = self._slopes.get((expression, k))
-        if found is None:
-            found = self._slopes[expression, k] = paired_everywhere(sympy.diff(expression, self._variables[k]))
-        return found
+    def _derivative(self, expression: sympy.Expr, k: int) -> sympy.Expr:
+        result = self._derivative_cache.get((expression, k))
+        if result is None:
+            result = self._derivative_cache[expression, k] = with_all_exponential_differences(sympy.diff(expression, self._variables[k]))
+        return result
 
     @cached_property
-    def _slopes(self) -> dict[tuple[sympy.Expr, int], sympy.Expr]:
+    def _derivative_cache(self) -> dict[tuple[sympy.Expr, int], sympy.Expr]:
         return {}
 
 
-def entries(law: CreepLaw) -> Lowered:
+def symbolic_kernel(law: CreepLaw) -> SymbolicKernel:
     """Lower a law to its entries; LawError, naming the term, where it holds what no kernel can evaluate."""
-    return Lowered(law)
+    return SymbolicKernel(law)
 
 
-def _log_sum(names: Names, logs: Sequence[sympy.Expr]) -> tuple[sympy.Expr, list[sympy.Expr], Steps]:
+def _log_sum_exp(names: PrintableNames, log_terms: Sequence[sympy.Expr]) -> tuple[sympy.Expr, list[sympy.Expr], Assignments]:
     """ln of the sum of exponentials, each term's weight in it, and the steps there; finite when every term is off."""
-    if len(logs) == 1:
-        return sympy.Max(logs[0], NOTHING, evaluate=False), [sympy.S.One], {}
-    ln_terms = dict(zip(names.logs_of_terms, logs, strict=True))
-    largest, total = names.word("largest"), names.word("total")
-    shares = {share: sympy.exp(ln - largest) for share, ln in zip(names.shares, ln_terms, strict=True)}
-    steps = {**ln_terms, largest: sympy.Max(*ln_terms, NOTHING, evaluate=False), **shares, total: sympy.Add(*shares)}
+    if len(log_terms) == 1:
+        return sympy.Max(log_terms[0], LOG_RATE_OFF, evaluate=False), [sympy.S.One], {}
+    ln_terms = dict(zip(names.log_terms, log_terms, strict=True))
+    largest, total = names.new_symbol("largest"), names.new_symbol("total")
+    scaled_terms = {scaled: sympy.exp(ln - largest) for scaled, ln in zip(names.scaled_terms, ln_terms, strict=True)}
+    steps = {**ln_terms, largest: sympy.Max(*ln_terms, LOG_RATE_OFF, evaluate=False), **scaled_terms, total: sympy.Add(*scaled_terms)}
     floor = sympy.Float(FLOOR)
-    return largest + LogFloor(total, floor), [share / Floored(total, floor) for share in shares], steps
+    return largest + LogFloor(total, floor), [share / Floored(total, floor) for share in scaled_terms], steps
 
 
-def _entry(name: str, names: Names, steps: Steps, outputs: Sequence[sympy.Expr]) -> Entry:
+def _kernel_function(name: str, names: PrintableNames, steps: Assignments, outputs: Sequence[sympy.Expr]) -> KernelFunction:
     """Name what has a name, what depends on theta alone and what is common; keep the steps that the outputs need."""
-    given = [names.renamed(e) for e in (*steps.values(), *outputs)]
+    expressions = [names.printable(e) for e in (*steps.values(), *outputs)]
     temporaries = names.temporaries()
-    constants = {e: next(temporaries) for e in _costly_constants(given, names.constants)}
-    given = [e.xreplace(constants) for e in given]
-    meanings = names.definitions([*given, *constants]) | {symbol: e for e, symbol in constants.items()}
-    common, found = sympy.cse([*meanings.values(), *given], symbols=temporaries, order="none")
-    every = dict(common) | dict(zip((*meanings, *steps), found, strict=False))
-    results = found[len(found) - len(outputs) :]
-    ordered = _ordered(every, results)
-    constant = _constant(every, ordered, names.constants)
-    return Entry(
+    constants = {e: next(temporaries) for e in _parameter_only_calls(expressions, names.constants)}
+    expressions = [e.xreplace(constants) for e in expressions]
+    definitions = names.definitions([*expressions, *constants]) | {symbol: e for e, symbol in constants.items()}
+    common, result = sympy.cse([*definitions.values(), *expressions], symbols=temporaries, order="none")
+    assignments = dict(common) | dict(zip((*definitions, *steps), result, strict=False))
+    results = result[len(result) - len(outputs) :]
+    ordered = _ordered_assignments(assignments, results)
+    constant = _parameter_only(assignments, ordered, names.constants)
+    return KernelFunction(
         name,
         names.inputs,
-        constants=tuple((s, every[s]) for s in ordered if s in constant),
-        steps=tuple((s, every[s]) for s in ordered if s not in constant),
+        constants=tuple((s, assignments[s]) for s in ordered if s in constant),
+        steps=tuple((s, assignments[s]) for s in ordered if s not in constant),
         outputs=tuple(results),
     )
 
 
-def _costly_constants(expressions: Sequence[sympy.Expr], theta: set[sympy.Symbol]) -> list[sympy.Expr]:
+def _parameter_only_calls(expressions: Sequence[sympy.Expr], theta: set[sympy.Symbol]) -> list[sympy.Expr]:
     """The largest subexpressions of theta alone that call a function, so that they are taken out of loops."""
-    found: dict[sympy.Expr, None] = {}
+    results: dict[sympy.Expr, None] = {}
     for expression in expressions:
         nodes = sympy.preorder_traversal(expression)
         for node in nodes:
             if isinstance(node, sympy.Expr) and node.free_symbols <= theta and node.has(sympy.Function):
-                found[node] = None
+                results[node] = None
                 nodes.skip()
-    return list(found)
+    return list(results)
 
 
-def _ordered(steps: Steps, wanted: Sequence[sympy.Expr]) -> list[sympy.Symbol]:
+def _ordered_assignments(steps: Assignments, outputs: Sequence[sympy.Expr]) -> list[sympy.Symbol]:
     """The steps that are wanted, each after those it needs."""
     position = {symbol: k for k, symbol in enumerate(steps)}
     ordered: dict[sympy.Symbol, None] = {}
@@ -182,15 +182,15 @@ def _ordered(steps: Steps, wanted: Sequence[sympy.Expr]) -> list[sympy.Symbol]:
             visit(steps[symbol])
             ordered[symbol] = None
 
-    for expression in wanted:
+    for expression in outputs:
         visit(expression)
     return list(ordered)
 
 
-def _constant(steps: Steps, ordered: Sequence[sympy.Symbol], known: set[sympy.Symbol]) -> set[sympy.Symbol]:
+def _parameter_only(steps: Assignments, ordered: Sequence[sympy.Symbol], parameters: set[sympy.Symbol]) -> set[sympy.Symbol]:
     """The steps that can be taken before the point is known."""
     constant: set[sympy.Symbol] = set()
     for symbol in ordered:
-        if steps[symbol].free_symbols <= known | constant:
+        if steps[symbol].free_symbols <= parameters | constant:
             constant.add(symbol)
     return constant

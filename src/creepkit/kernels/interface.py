@@ -28,11 +28,11 @@ from numba.extending import intrinsic
 from creepkit.arrays import Floats
 
 POINT_SIZE = 6
-STRESS, STRAIN, TIME, TEMPERATURE, PRINCIPAL, MEAN = range(POINT_SIZE)
+STRESS, STRAIN, TIME, TEMPERATURE, PRINCIPAL_STRESS, MEAN_STRESS = range(POINT_SIZE)
 
 _DOUBLES: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
 SIGNATURE = types.int64(types.int64, _DOUBLES, _DOUBLES, _DOUBLES)
-ENTRY = types.FunctionType(SIGNATURE)
+ENTRY_TYPE = types.FunctionType(SIGNATURE)
 """The numba type of an entry: a function compiled once for it accepts any law."""
 
 RATE_NOT_FINITE = 1
@@ -49,7 +49,7 @@ def _pointer(typingctx: Any, array: Any) -> Any:
     return signature, codegen
 
 
-pointer: Any = intrinsic(_pointer)
+data_pointer: Any = intrinsic(_pointer)
 """Inside compiled code: the C pointer to the first number of a contiguous float64 array."""
 
 
@@ -72,7 +72,7 @@ class CompiledLaw:
     log_scale: np.ndarray[Any, np.dtype[np.bool_]]
     initial: Floats
     limits: Floats
-    leading: Callable[..., Floats]
+    leading_exponent: Callable[..., Floats]
     source: str
     fingerprint: str
 
@@ -81,7 +81,7 @@ class CompiledLaw:
         """Number of internal variables, S."""
         return int(self.initial.size)
 
-    def internal(self, values: Mapping[str, Any]) -> Floats:
+    def to_internal(self, values: Mapping[str, Any]) -> Floats:
         """Return theta, (candidates, P), from author's values {name: number or (candidates,)}."""
         columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[name], float)) for name in self.names))
         theta = np.stack(columns, axis=-1) if columns else np.zeros((1, 0))

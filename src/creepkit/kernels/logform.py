@@ -14,7 +14,7 @@ from typing import Any
 import sympy
 
 from creepkit.errors import LawError
-from creepkit.kernels.exponentials import paired, paired_everywhere
+from creepkit.kernels.exponentials import with_exponential_differences, with_all_exponential_differences
 from creepkit.kernels.stable_functions import (
     Coth,
     ExpDifference,
@@ -29,7 +29,7 @@ from creepkit.kernels.stable_functions import (
     Tanh,
 )
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import POINT, temperature, time
+from creepkit.language.symbols import POINT_VARIABLES, temperature, time
 
 FLOOR = 1e-30
 """Stress, strain and states below this act as this when they are bases of powers; slopes are those there."""
@@ -37,7 +37,7 @@ FLOOR = 1e-30
 TIME_FLOOR = 1e-120
 """The same for time: with m = -0.95, t^m has done 2 % of its strain at 1e6 s by 1e-30 s, and 1e-6 of it by 1e-120 s."""
 
-TINY = 1e-200
+COMPOSITE_FLOOR = 1e-200
 """Composite bases, such as Max(stress - threshold, 0), are floored here: a term that is zero becomes about 1e-200 1/s,
 small enough to be nothing and large enough for its slope, which is the term over this floor."""
 
@@ -47,14 +47,14 @@ def floor_of(symbol: sympy.Symbol) -> sympy.Float:
     return sympy.Float(TIME_FLOOR if symbol == time else FLOOR)
 
 
-KNOWN = (
+KNOWN_FUNCTIONS = (
     *(sympy.exp, sympy.log, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth, sympy.asinh),
     *(sympy.sin, sympy.cos, sympy.atan, sympy.erf),
     *(sympy.Abs, sympy.sign, sympy.Heaviside, sympy.Max, sympy.Min, sympy.Piecewise),
 )
 """The functions that a law may call."""
 
-_ALGEBRA = (sympy.Add, sympy.Mul, sympy.Pow, sympy.functions.elementary.piecewise.ExprCondPair)
+_ALGEBRAIC_NODES = (sympy.Add, sympy.Mul, sympy.Pow, sympy.functions.elementary.piecewise.ExprCondPair)
 _CONDITIONS = (
     *(sympy.GreaterThan, sympy.StrictGreaterThan, sympy.LessThan, sympy.StrictLessThan, sympy.And, sympy.Or),
     *(type(sympy.true), type(sympy.false)),
@@ -81,11 +81,11 @@ class LogForm:
 
 def log_form(law: CreepLaw) -> LogForm:
     """Lower a law; LawError, naming the term, where it holds what no kernel can evaluate."""
-    logs = _logarithms(law)
-    lowering = _Lowering(logs, {*POINT, *law.states})
+    logs = _log_symbols(law)
+    lowering = _LogLowering(logs, {*POINT_VARIABLES, *law.states})
     rates = {f"rate of '{symbol}'": state.rate for symbol, state in law.states.items()}
     for place, expression in ({f"term '{k}'": v for k, v in law.terms.items()} | rates).items():
-        _check(expression, f"law '{law.name}', {place}")
+        _check_expression(expression, f"law '{law.name}', {place}")
     terms = []
     for label, term in law.terms.items():
         try:
@@ -93,54 +93,54 @@ def log_form(law: CreepLaw) -> LogForm:
         except LawError as error:
             raise LawError(f"law '{law.name}', term '{label}': {error}") from None
     positions = {symbol: k for k, symbol in enumerate(law.params) if symbol in logs}
-    coefficients = [sorted(positions[s] for s in _coefficients(t) if s in logs) for t in law.terms.values()]
+    coefficients = [sorted(positions[s] for s in _vanishing_factors(t) if s in logs) for t in law.terms.values()]
     return LogForm(
         terms=tuple(terms),
-        state_rates=tuple(paired_everywhere(lowering.linear(state.rate)) for state in law.states.values()),
+        state_rates=tuple(with_all_exponential_differences(lowering.linear(state.rate)) for state in law.states.values()),
         theta=tuple(logs.get(s, s) for s in law.params),
         logs=logs,
         coefficients=tuple(map(tuple, coefficients)),
     )
 
 
-def _logarithms(law: CreepLaw) -> dict[sympy.Symbol, sympy.Symbol]:
+def _log_symbols(law: CreepLaw) -> dict[sympy.Symbol, sympy.Symbol]:
     """A symbol for the logarithm of each parameter of log scale, of a name that is still free."""
-    taken, logs = {*law.names, *(s.name for s in law.states)}, {}
+    taken_names, logs = {*law.names, *(s.name for s in law.states)}, {}
     for symbol, param in law.params.items():
         if param.scale == "log":
             name = f"ln_{symbol.name}"
-            while name in taken:
+            while name in taken_names:
                 name += "_"
-            taken.add(name)
+            taken_names.add(name)
             logs[symbol] = sympy.Symbol(name, real=True)
     return logs
 
 
-def _check(expression: sympy.Expr, where: str) -> None:
+def _check_expression(expression: sympy.Expr, origin: str) -> None:
     """Refuse what has no kernel, and branches that leave a gap."""
     for node in sympy.preorder_traversal(expression):
-        if not (node.is_Atom or isinstance(node, (*KNOWN, *_ALGEBRA, *_CONDITIONS))):
-            allowed = ", ".join(sorted(f.__name__ for f in KNOWN))
-            raise LawError(f"{where}: the function {node.func.__name__} in {node} has no kernel; allowed are {allowed}")
+        if not (node.is_Atom or isinstance(node, (*KNOWN_FUNCTIONS, *_ALGEBRAIC_NODES, *_CONDITIONS))):
+            allowed = ", ".join(sorted(f.__name__ for f in KNOWN_FUNCTIONS))
+            raise LawError(f"{origin}: the function {node.func.__name__} in {node} has no kernel; allowed are {allowed}")
         if isinstance(node, sympy.Piecewise) and node.args[-1].cond != sympy.true:
-            raise LawError(f"{where}: the last branch of {node} must hold in all remaining cases: write (..., True)")
+            raise LawError(f"{origin}: the last branch of {node} must hold in all remaining cases: write (..., True)")
 
 
-def _coefficients(term: sympy.Expr) -> set[sympy.Symbol]:
+def _vanishing_factors(term: sympy.Expr) -> set[sympy.Symbol]:
     """The symbols whose zero makes the whole term zero."""
     if term.is_Symbol:
         return {term}
     if term.is_Mul:
-        return set().union(*map(_coefficients, term.args))
+        return set().union(*map(_vanishing_factors, term.args))
     if term.is_Pow and term.exp.is_positive:
-        return _coefficients(term.base)
+        return _vanishing_factors(term.base)
     if isinstance(term, sympy.Piecewise):
-        branches = [_coefficients(branch) for branch, _ in term.args if branch != 0]
+        branches = [_vanishing_factors(branch) for branch, _ in term.args if branch != 0]
         return set.intersection(*branches) if branches else set()
     return set()
 
 
-class _Lowering:
+class _LogLowering:
     """One walk over a law's expressions. logs : {parameter: its logarithm}; bases : what FLOOR applies to."""
 
     def __init__(self, logs: dict[sympy.Symbol, sympy.Symbol], bases: set[sympy.Symbol]) -> None:
@@ -165,9 +165,9 @@ class _Lowering:
             return sympy.Piecewise(*((self.log_of(branch), self.linear(condition)) for branch, condition in e.args))
         if isinstance(e, sympy.exp):
             return self.linear(e.args[0])
-        if e.func in _LOGARITHMS:
-            return _LOGARITHMS[e.func](self.linear(e.args[0]))
-        return LogFloor(self.linear(e), floor_of(e) if e in self.bases else sympy.Float(TINY))
+        if e.func in _LOG_FUNCTIONS:
+            return _LOG_FUNCTIONS[e.func](self.linear(e.args[0]))
+        return LogFloor(self.linear(e), floor_of(e) if e in self.bases else sympy.Float(COMPOSITE_FLOOR))
 
     def _log_of_product(self, e: sympy.Mul) -> sympy.Expr:
         """Return the sum of logarithms; a negative number is moved into a factor: -3 (a - b) is 3 (b - a)."""
@@ -176,15 +176,15 @@ class _Lowering:
         if number > 0:
             return sympy.Add(*(self.log_of(f) for f in (number, *factors)))
         sums = [f for f in factors if f.is_Add]
-        turned = next(iter(sums or filter(self._may_be_negative, factors)), None)
-        if turned is None:
+        negated = next(iter(sums or filter(self._may_be_negative, factors)), None)
+        if negated is None:
             raise LawError(f"{e} is negative, and a rate is not; write recovery as a factor or an internal variable")
-        factors.remove(turned)
-        if turned.is_Add:
-            last = self.log_of(sympy.Add(*(-a for a in turned.args)))
+        factors.remove(negated)
+        if negated.is_Add:
+            log_of_negated = self.log_of(sympy.Add(*(-a for a in negated.args)))
         else:
-            last = LogFloor(-self.linear(turned), sympy.Float(TINY))
-        return sympy.Add(*(self.log_of(f) for f in (-number, *factors)), last)
+            log_of_negated = LogFloor(-self.linear(negated), sympy.Float(COMPOSITE_FLOOR))
+        return sympy.Add(*(self.log_of(f) for f in (-number, *factors)), log_of_negated)
 
     def _may_be_negative(self, factor: sympy.Expr) -> bool:
         positive = (sympy.exp, sympy.sinh, sympy.cosh, sympy.Abs)
@@ -194,13 +194,13 @@ class _Lowering:
         """Differences of exponentials keep their digits and do not overflow, cosh(x) - 1 among them."""
         if len(e.args) == 2 and e.args[0] == -1 and isinstance(e.args[1], sympy.cosh):
             return _log_of_number(sympy.Integer(2)) + 2 * LogSinh(self.linear(e.args[1].args[0]) / 2)
-        total = paired(self.linear(e))
+        total = with_exponential_differences(self.linear(e))
         number, factors = total.as_coeff_mul()
-        found = [f for f in factors if isinstance(f, (Expm1, ExpDifference))]
-        others = [f for f in factors if f not in found]
-        if len(found) != 1 or not all(isinstance(f, sympy.exp) for f in others):
-            return LogFloor(total, sympy.Float(TINY))
-        a, b = (*found[0].args, sympy.S.Zero)[:2]
+        results = [f for f in factors if isinstance(f, (Expm1, ExpDifference))]
+        others = [f for f in factors if f not in results]
+        if len(results) != 1 or not all(isinstance(f, sympy.exp) for f in others):
+            return LogFloor(total, sympy.Float(COMPOSITE_FLOOR))
+        a, b = (*results[0].args, sympy.S.Zero)[:2]
         high, low = (a, b) if number > 0 else (b, a)
         return sympy.Add(_log_of_number(abs(number)), *(f.args[0] for f in others), high, LogRise(high - low))
 
@@ -241,7 +241,7 @@ _REWRITES: dict[Any, Callable[..., sympy.Basic]] = {
 }
 """Functions whose derivatives in sympy are distributions, or lose digits."""
 
-_LOGARITHMS: dict[Any, Any] = {sympy.sinh: LogSinh, sympy.cosh: LogCosh, sympy.tanh: LogTanh}
+_LOG_FUNCTIONS: dict[Any, Any] = {sympy.sinh: LogSinh, sympy.cosh: LogCosh, sympy.tanh: LogTanh}
 
 
 def _log_of_number(e: sympy.Expr) -> sympy.Expr:
@@ -250,4 +250,4 @@ def _log_of_number(e: sympy.Expr) -> sympy.Expr:
         raise LawError(f"{e} is negative, and a rate is not; write recovery as a factor or an internal variable")
     if value == 1:
         return sympy.S.Zero
-    return sympy.Float(sympy.log(value) if value > 0 else sympy.log(sympy.Float(TINY)), 17)
+    return sympy.Float(sympy.log(value) if value > 0 else sympy.log(sympy.Float(COMPOSITE_FLOOR)), 17)

@@ -12,34 +12,34 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from creepkit.errors import LawError, nearest
-from creepkit.kernels.entries import Lowered, entries
-from creepkit.kernels.printing import array_function, described
+from creepkit.kernels.entries import SymbolicKernel, symbolic_kernel
+from creepkit.kernels.printing import array_function_source, law_comments
 from creepkit.language.law import CreepLaw
-from creepkit.language.symbols import POINT
+from creepkit.language.symbols import POINT_VARIABLES
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
 
-Target = Literal["numpy", "torch", "numba"]
+KernelTarget = Literal["numpy", "torch", "numba"]
 
 
 @overload
-def lower(law: CreepLaw, target: Literal["numpy", "torch"]) -> Kernel: ...
+def lower(law: CreepLaw, target: Literal["numpy", "torch"]) -> ArrayKernel: ...
 @overload
 def lower(law: CreepLaw, target: Literal["numba"]) -> CompiledLaw: ...
-def lower(law: CreepLaw, target: Target = "numpy") -> Kernel | CompiledLaw:
+def lower(law: CreepLaw, target: KernelTarget = "numpy") -> ArrayKernel | CompiledLaw:
     """Return the law as a numeric kernel for "numpy", "torch" or "numba" (compiled, for integrators)."""
     if target == "numba":
-        from creepkit.kernels.compiled import compiled
+        from creepkit.kernels.compiled import compile_law
 
-        return compiled(law)
+        return compile_law(law)
     if target not in ("numpy", "torch"):
         raise LawError(f"no kernel target '{target}': {nearest(str(target), ('numpy', 'torch', 'numba'))}")
-    return _kernel(law, target)
+    return _array_kernel(law, target)
 
 
 @dataclass(frozen=True)
-class Derivatives:
+class RateDerivatives:
     """Derivatives of the rate, 1/s per unit; every entry has the broadcast shape of the inputs.
 
     params : with respect to the internal parameter, the natural logarithm where the scale is log.
@@ -56,7 +56,7 @@ class Derivatives:
         return self.point[name] if name in self.point else self.params[name]
 
 
-class Kernel:
+class ArrayKernel:
     """A law as functions of arrays (or tensors); everything broadcasts.
 
     Each method takes `values`, {parameter: number or array} in the author's units (0 switches a rate coefficient
@@ -67,17 +67,17 @@ class Kernel:
     (logarithms where the scale is log), by position, and check nothing.
     """
 
-    def __init__(self, lowered: Lowered, target: ModuleType) -> None:
+    def __init__(self, lowered: SymbolicKernel, target: ModuleType) -> None:
         law = lowered.law
         printed = (lowered.rate, lowered.log_rate, lowered.sensitivity, lowered.log_sensitivity)
         self.law = law
-        self.source = "\n".join([*described(law), "\n", *map(array_function, printed)])
+        self.source = "\n".join([*law_comments(law), "\n", *map(array_function_source, printed)])
         self._target = target
-        self._entries = target.bound(self._executed(), len(lowered.names.inputs) - len(law.params))
+        self._entries = target.bound(self._execute_source(), len(lowered.names.inputs) - len(law.params))
         self._states = [s.name for s in law.states]
-        self._variables = [*(s.name for s in POINT), *self._states]
+        self._variables = [*(s.name for s in POINT_VARIABLES), *self._states]
 
-    def _executed(self) -> dict[str, Callable[..., Any]]:
+    def _execute_source(self) -> dict[str, Callable[..., Any]]:
         """Run the printed text, with lines that tracebacks can show."""
         name = f"<creepkit kernel {self.law.fingerprint} {self._target.__name__}>"
         linecache.cache[name] = (len(self.source), None, self.source.splitlines(True), name)
@@ -98,7 +98,7 @@ class Kernel:
         out = self._entries["rate"](*self._arguments(values, point))
         return dict(zip(self._states, out[1:], strict=True))
 
-    def derivatives(self, values: Mapping[str, Any], **point: Any) -> Derivatives:
+    def derivatives(self, values: Mapping[str, Any], **point: Any) -> RateDerivatives:
         """The rate and its derivatives with respect to the point, the states and every internal parameter."""
         return self.internal_derivatives(*self._arguments(values, point))
 
@@ -114,15 +114,15 @@ class Kernel:
         """The logarithm of the rate."""
         return self._entries["log_rate"](*arguments)[0]
 
-    def internal_derivatives(self, *arguments: Any) -> Derivatives:
+    def internal_derivatives(self, *arguments: Any) -> RateDerivatives:
         """The rate and its derivatives."""
         rows, size, names = 1 + len(self._states), len(self._variables), self.law.names
         out = iter(self._entries["sensitivity"](*arguments))
         values = list(islice(out, rows))
         point = [dict(zip(self._variables, islice(out, size), strict=True)) for _ in range(rows)]
         theta = [dict(zip(names, islice(out, len(names)), strict=True)) for _ in range(rows)]
-        inner = [a | b for a, b in zip(point, theta, strict=True)]
-        return Derivatives(values[0], point[0], theta[0], dict(zip(self._states, inner[1:], strict=True)))
+        all_derivatives = [a | b for a, b in zip(point, theta, strict=True)]
+        return RateDerivatives(values[0], point[0], theta[0], dict(zip(self._states, all_derivatives[1:], strict=True)))
 
     def _arguments(self, values: Mapping[str, Any], point: Mapping[str, Any]) -> Sequence[Any]:
         for name in point:
@@ -130,14 +130,14 @@ class Kernel:
                 raise LawError(f"law '{self.law.name}' has no variable '{name}': {nearest(name, self._variables)}")
         if "stress" not in point:
             raise LawError(f"law '{self.law.name}' needs a stress, in MPa")
-        if self.law.uses(POINT[3]) and "temperature" not in point:
+        if self.law.uses(POINT_VARIABLES[3]) and "temperature" not in point:
             raise LawError(f"law '{self.law.name}' depends on temperature: give temperature in K")
         given = {name: self._target.number(value) for name, value in point.items()}
         defaults = {"principal_stress": given["stress"], "mean_stress": given["stress"] / 3.0, "temperature": 1.0}
         defaults |= {s.name: z.initial for s, z in self.law.states.items()}
-        return [*(given.get(n, defaults.get(n, 0.0)) for n in self._variables), *self._theta(values)]
+        return [*(given.get(n, defaults.get(n, 0.0)) for n in self._variables), *self._internal_values(values)]
 
-    def _theta(self, values: Mapping[str, Any]) -> list[Any]:
+    def _internal_values(self, values: Mapping[str, Any]) -> list[Any]:
         for name in values:
             self.law.symbol(name)
         missing = [name for name in self.law.names if name not in values]
@@ -149,5 +149,5 @@ class Kernel:
 
 
 @lru_cache(maxsize=256)
-def _kernel(law: CreepLaw, target: Target) -> Kernel:
-    return Kernel(entries(law), import_module(f"creepkit.kernels.{target}_target"))
+def _array_kernel(law: CreepLaw, target: KernelTarget) -> ArrayKernel:
+    return ArrayKernel(symbolic_kernel(law), import_module(f"creepkit.kernels.{target}_target"))

@@ -16,10 +16,10 @@ from sympy.printing.pycode import PythonCodePrinter
 from creepkit.errors import LawError
 
 if TYPE_CHECKING:
-    from creepkit.kernels.entries import Entry
+    from creepkit.kernels.entries import KernelFunction
     from creepkit.language.law import CreepLaw
 
-NAMES = {
+TARGET_FUNCTION_NAMES = {
     "exp": "exp",
     "log": "log",
     "sinh": "sinh",
@@ -45,18 +45,18 @@ NAMES = {
 }
 """{sympy class: function of every target}; Heaviside comes from the slopes of Max and Min."""
 
-FUNCTIONS = (*sorted({*NAMES.values()}), "both", "choose", "either", "larger", "power", "smaller", "sqrt", "square")
+TARGET_FUNCTIONS = (*sorted({*TARGET_FUNCTION_NAMES.values()}), "both", "choose", "either", "larger", "power", "smaller", "sqrt", "square")
 
 
 class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
     """Print lowered expressions as calls of the target's functions."""
 
-    reserved_words = (*PythonCodePrinter.reserved_words, *FUNCTIONS)
+    reserved_words = (*PythonCodePrinter.reserved_words, *TARGET_FUNCTIONS)
 
     def _print_Function(self, e: Any) -> str:
-        name = NAMES.get(type(e).__name__)
+        name = TARGET_FUNCTION_NAMES.get(type(e).__name__)
         if name is None:
-            raise LawError(f"the function {type(e).__name__} has no kernel; allowed are {', '.join(sorted(NAMES))}")
+            raise LawError(f"the function {type(e).__name__} has no kernel; allowed are {', '.join(sorted(TARGET_FUNCTION_NAMES))}")
         arguments = e.args[:1] if name == "heaviside" else e.args
         return f"{name}({', '.join(self._print(a) for a in arguments)})"
 
@@ -121,25 +121,25 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
 _PRINTER = KernelPrinter({"standard": "python3"})
 
 
-def text_of(expression: sympy.Basic) -> str:
+def expression_source(expression: sympy.Basic) -> str:
     """An expression as text."""
     return str(_PRINTER.doprint(expression))
 
 
-def assignments(steps: Iterable[tuple[sympy.Symbol, sympy.Expr]], indent: str) -> list[str]:
+def assignment_lines(steps: Iterable[tuple[sympy.Symbol, sympy.Expr]], indent: str) -> list[str]:
     """Steps as lines of text."""
-    return [f"{indent}{symbol} = {text_of(expression)}" for symbol, expression in steps]
+    return [f"{indent}{symbol} = {expression_source(expression)}" for symbol, expression in steps]
 
 
-def array_function(entry: Entry) -> str:
+def array_function_source(entry: KernelFunction) -> str:
     """An entry as a function of arrays or tensors that returns a tuple."""
     arguments = ", ".join(s.name for s in entry.inputs)
-    lines = [f"def {entry.name}({arguments}):", *assignments((*entry.constants, *entry.steps), "    ")]
-    outputs = "".join(f"        {text_of(output)},\n" for output in entry.outputs)
+    lines = [f"def {entry.name}({arguments}):", *assignment_lines((*entry.constants, *entry.steps), "    ")]
+    outputs = "".join(f"        {expression_source(output)},\n" for output in entry.outputs)
     return "\n".join(lines) + f"\n    return (\n{outputs}    )\n"
 
 
-def described(law: CreepLaw) -> list[str]:
+def law_comments(law: CreepLaw) -> list[str]:
     """The terms and state rates of a law as comments; nothing in a label can end one."""
     lines = [f"{label}: {term}" for label, term in law.terms.items()]
     lines += [f"d{symbol}/dt: {state.rate}" for symbol, state in law.states.items()]

@@ -95,5 +95,5 @@ def coth(x: Any) -> Any:
 
 def exp_difference(a: Any, b: Any) -> Any:
     """exp(a) - exp(b) without cancellation."""
-    gap = a - b
-    return -torch.sign(gap) * torch.exp(torch.maximum(a, b)) * torch.expm1(-torch.abs(gap))
+    difference = a - b
+    return -torch.sign(difference) * torch.exp(torch.maximum(a, b)) * torch.expm1(-torch.abs(difference))

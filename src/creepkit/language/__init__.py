@@ -16,12 +16,12 @@ from creepkit.language.symbols import (
     time,
 )
 from creepkit.language.thermal import (
-    Factor,
+    TemperatureFactor,
     TemperatureForm,
     activated,
     arrhenius,
     exponential,
-    inverse,
+    inverse_temperature,
     linear,
     wachtman,
 )
@@ -31,14 +31,14 @@ from creepkit.language.thermal_shapes import (
     logarithmic,
     modified_arrhenius,
     t_log_t,
-    wachtman_like,
+    wachtman_form,
 )
 
 __all__ = [
     "GAS_CONSTANT",
     "CreepLaw",
     "Elastic",
-    "Factor",
+    "TemperatureFactor",
     "Param",
     "State",
     "TemperatureForm",
@@ -48,7 +48,7 @@ __all__ = [
     "curved",
     "exponential",
     "hookimpl",
-    "inverse",
+    "inverse_temperature",
     "linear",
     "logarithmic",
     "mean_stress",
@@ -62,5 +62,5 @@ __all__ = [
     "temperature",
     "time",
     "wachtman",
-    "wachtman_like",
+    "wachtman_form",
 ]

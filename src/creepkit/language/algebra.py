@@ -11,10 +11,10 @@ import sympy
 from creepkit.errors import LawError, nearest
 from creepkit.language.law import CreepLaw
 from creepkit.language.params import Param, State
-from creepkit.language.symbols import POINT, temperature
-from creepkit.language.thermal import Factor, TemperatureForm
+from creepkit.language.symbols import POINT_VARIABLES, temperature
+from creepkit.language.thermal import TemperatureFactor, TemperatureForm
 
-_INDEXED = re.compile(r"^(?P<stem>.+?)_(?P<index>[1-9]\d*)$")
+_INDEXED_NAME = re.compile(r"^(?P<stem>.+?)_(?P<index>[1-9]\d*)$")
 
 
 _INDEXED_LABEL = re.compile(r"^(?P<stem>.+?) (?P<index>[1-9]\d*)$")
@@ -24,18 +24,18 @@ def add(first: CreepLaw, second: CreepLaw) -> CreepLaw:
     """Join two laws; names that collide are numbered in order of appearance: A_1, A_2; m_1, m_2."""
     laws = (first, second)
     symbols = _numbered([[s.name for s in (*law.params, *law.states)] for law in laws])
-    labels = _numbered([list(law.terms) for law in laws], joint=" ", pattern=_INDEXED_LABEL)
+    labels = _numbered([list(law.terms) for law in laws], separator=" ", pattern=_INDEXED_LABEL)
     terms: dict[str, sympy.Expr] = {}
     params: dict[sympy.Symbol, Param] = {}
     states: dict[sympy.Symbol, State] = {}
     constraints: list[sympy.Basic] = []
     for law, names, titles in zip(laws, symbols, labels, strict=True):
-        new = {s: sympy.Symbol(n, real=True) for s, n in zip((*law.params, *law.states), names, strict=True)}
+        replacements = {s: sympy.Symbol(n, real=True) for s, n in zip((*law.params, *law.states), names, strict=True)}
         for (_, expression), title in zip(law.terms.items(), titles, strict=True):
-            terms[title] = _renamed(expression, new)
-        params |= {new[s]: p for s, p in law.params.items()}
-        states |= {new[s]: replace(z, rate=_renamed(z.rate, new)) for s, z in law.states.items()}
-        constraints += [_renamed(c, new) for c in law.constraints]
+            terms[title] = _renamed(expression, replacements)
+        params |= {replacements[s]: p for s, p in law.params.items()}
+        states |= {replacements[s]: replace(z, rate=_renamed(z.rate, replacements)) for s, z in law.states.items()}
+        constraints += [_renamed(c, replacements) for c in law.constraints]
     return CreepLaw(
         name=f"{first.name}+{second.name}",
         title=" + ".join(law.title or law.name for law in laws),
@@ -50,13 +50,13 @@ def add(first: CreepLaw, second: CreepLaw) -> CreepLaw:
 def without(law: CreepLaw, labels: Sequence[str]) -> CreepLaw:
     """Drop terms by name."""
     _check_labels(law, labels)
-    return _kept(law, [label for label in law.terms if label not in labels])
+    return _restricted_to_terms(law, [label for label in law.terms if label not in labels])
 
 
 def only(law: CreepLaw, labels: Sequence[str]) -> CreepLaw:
     """Keep terms by name."""
     _check_labels(law, labels)
-    return _kept(law, [label for label in law.terms if label in labels])
+    return _restricted_to_terms(law, [label for label in law.terms if label in labels])
 
 
 def fix(law: CreepLaw, values: Mapping[str, float]) -> CreepLaw:
@@ -67,29 +67,29 @@ def fix(law: CreepLaw, values: Mapping[str, float]) -> CreepLaw:
     for name, given in values.items():
         symbol, value = law.symbol(name), law.number(given, f"parameter '{name}'")
         param = law.params[symbol]
-        if not param.admits(value):
+        if not param.within_bounds(value):
             low, high = param.bounds
             off = "" if param.off is None else f" or {param.off:g} (off)"
             raise LawError(f"law '{law.name}': cannot fix {name} = {value:g}; allowed are {low:g} to {high:g}{off}")
         number = sympy.Integer(int(value)) if value.is_integer() else sympy.Float(value)
         replacements[symbol] = number
-    told = ", ".join(f"{name}={float(value):g}" for name, value in values.items())
-    return _substituted(law, replacements, f"{law.name}({told})", f"{law.title} with {told}")
+    description = ", ".join(f"{name}={float(value):g}" for name, value in values.items())
+    return _substituted(law, replacements, f"{law.name}({description})", f"{law.title} with {description}")
 
 
-def times(law: CreepLaw, factor: Factor) -> CreepLaw:
+def times(law: CreepLaw, factor: TemperatureFactor) -> CreepLaw:
     """Multiply every term (not the rates of internal variables) by a factor of temperature."""
-    if not isinstance(factor, Factor):
+    if not isinstance(factor, TemperatureFactor):
         raise LawError(f"law '{law.name}': times() takes a factor such as arrhenius(T_ref=1073), found {factor!r}")
-    taken = {*law.names, *(s.name for s in law.states)}
-    new = {s: sympy.Symbol(_free(s.name, taken), real=True) for s in factor.params}
-    expression = _renamed(factor.expression, new)
+    taken_names = {*law.names, *(s.name for s in law.states)}
+    replacements = {s: sympy.Symbol(_unused_name(s.name, taken_names), real=True) for s in factor.params}
+    expression = _renamed(factor.expression, replacements)
     return replace(
         law,
         name=f"{law.name}*{factor.name}",
         title=f"{law.title}, {factor.name} in temperature",
         terms={label: term * expression for label, term in law.terms.items()},
-        params={**law.params, **{new[s]: p for s, p in factor.params.items()}},
+        params={**law.params, **{replacements[s]: p for s, p in factor.params.items()}},
         references=tuple(dict.fromkeys((*law.references, factor.reference))),
     )
 
@@ -100,7 +100,7 @@ def with_temperature(law: CreepLaw, forms: Mapping[str, TemperatureForm]) -> Cre
         return law
     replacements: dict[sympy.Symbol, sympy.Expr] = {}
     params = dict(law.params)
-    signs: list[sympy.Basic] = []
+    sign_constraints: list[sympy.Basic] = []
     for name, form in forms.items():
         symbol = law.symbol(name)
         if not isinstance(form, TemperatureForm):
@@ -110,22 +110,22 @@ def with_temperature(law: CreepLaw, forms: Mapping[str, TemperatureForm]) -> Cre
         if clash:
             raise LawError(f"law '{law.name}': {', '.join(clash)} exists already; {name} depends on temperature twice")
         replacements[symbol] = expression
-        signs += _keeps_sign(expression, law.params[symbol])
+        sign_constraints += _sign_constraints(expression, law.params[symbol])
         ordered: dict[sympy.Symbol, Param] = {}
         for s, p in params.items():
             ordered[s] = p
             if s == symbol:
                 ordered |= extra
         params = ordered
-    told = ", ".join(f"{name}:{form.name}" for name, form in forms.items())
-    swap = dict(replacements)
+    description = ", ".join(f"{name}:{form.name}" for name, form in forms.items())
+    substitutions = dict(replacements)
     return replace(
         law,
-        name=f"{law.name}[{told}]",
+        name=f"{law.name}[{description}]",
         title=f"{law.title} with {', '.join(forms)} dependent on temperature",
-        terms={label: term.xreplace(swap) for label, term in law.terms.items()},
-        states={s: replace(z, rate=z.rate.xreplace(swap)) for s, z in law.states.items()},
-        constraints=(*(c.xreplace(swap) for c in law.constraints), *signs),
+        terms={label: term.xreplace(substitutions) for label, term in law.terms.items()},
+        states={s: replace(z, rate=z.rate.xreplace(substitutions)) for s, z in law.states.items()},
+        constraints=(*(c.xreplace(substitutions) for c in law.constraints), *sign_constraints),
         params=params,
         references=tuple(dict.fromkeys((*law.references, *(form.reference for form in forms.values())))),
     )
@@ -136,32 +136,32 @@ def at(law: CreepLaw, T: float) -> CreepLaw:
     kelvin = law.number(T, "temperature")
     if not 0 < kelvin < 1e4:
         raise LawError(f"law '{law.name}': {T!r} is not a temperature in K (allowed: above 0, below 10000)")
-    told = f"{kelvin:g}"
-    return _substituted(law, {temperature: sympy.Float(kelvin)}, f"{law.name}@{told}K", f"{law.title} at {told} K")
+    description = f"{kelvin:g}"
+    return _substituted(law, {temperature: sympy.Float(kelvin)}, f"{law.name}@{description}K", f"{law.title} at {description} K")
 
 
 # ---- mechanisms ----------------------------------------------------------------------------------------------------
 
 
-def _substituted(law: CreepLaw, swap: Mapping[sympy.Symbol, sympy.Expr], name: str, title: str) -> CreepLaw:
-    terms = {label: term.subs(swap) for label, term in law.terms.items()}
+def _substituted(law: CreepLaw, substitutions: Mapping[sympy.Symbol, sympy.Expr], name: str, title: str) -> CreepLaw:
+    terms = {label: term.subs(substitutions) for label, term in law.terms.items()}
     terms = {label: term for label, term in terms.items() if term != 0}
     if not terms:
-        raise LawError(f"law '{law.name}': no term is left after setting {', '.join(map(str, swap))}")
-    states = {s: replace(z, rate=z.rate.subs(swap)) for s, z in law.states.items()}
-    constraints = [c.subs(swap) for c in law.constraints]
-    for relation, now in zip(law.constraints, constraints, strict=True):
-        if now == sympy.false:
+        raise LawError(f"law '{law.name}': no term is left after setting {', '.join(map(str, substitutions))}")
+    states = {s: replace(z, rate=z.rate.subs(substitutions)) for s, z in law.states.items()}
+    constraints = [c.subs(substitutions) for c in law.constraints]
+    for relation, substituted in zip(law.constraints, constraints, strict=True):
+        if substituted == sympy.false:
             raise LawError(f"law '{law.name}': its constraint {relation} cannot hold for '{name}'")
     return _pruned(law, terms, states, [c for c in constraints if c is not sympy.true], name, title)
 
 
-def _kept(law: CreepLaw, labels: list[str]) -> CreepLaw:
+def _restricted_to_terms(law: CreepLaw, labels: list[str]) -> CreepLaw:
     if not labels:
         raise LawError(f"law '{law.name}': no term would be left; its terms are {', '.join(law.terms)}")
     terms = {label: law.terms[label] for label in labels}
-    told = " + ".join(labels)
-    return _pruned(law, terms, dict(law.states), law.constraints, f"{law.name}[{told}]", f"{law.title}: {told} only")
+    description = " + ".join(labels)
+    return _pruned(law, terms, dict(law.states), law.constraints, f"{law.name}[{description}]", f"{law.title}: {description} only")
 
 
 def _pruned(
@@ -175,18 +175,18 @@ def _pruned(
     """Drop the states that no remaining term needs, then the parameters and constraints nobody uses."""
     needed = set().union(*(t.free_symbols for t in terms.values()))
     while True:
-        alive = {s: z for s, z in states.items() if s in needed}
-        grown = needed.union(*(z.rate.free_symbols for z in alive.values()))
-        if grown == needed:
+        needed_states = {s: z for s, z in states.items() if s in needed}
+        extended = needed.union(*(z.rate.free_symbols for z in needed_states.values()))
+        if extended == needed:
             break
-        needed = grown
+        needed = extended
     params = {s: p for s, p in law.params.items() if s in needed}
-    known = {*params, *alive, *POINT}
-    kept = tuple(c for c in constraints if c.free_symbols <= known)
-    return replace(law, name=name, title=title, terms=terms, states=alive, params=params, constraints=kept)
+    declared = {*params, *needed_states, *POINT_VARIABLES}
+    remaining_constraints = tuple(c for c in constraints if c.free_symbols <= declared)
+    return replace(law, name=name, title=title, terms=terms, states=needed_states, params=params, constraints=remaining_constraints)
 
 
-def _keeps_sign(expression: sympy.Expr, param: Param) -> list[sympy.Basic]:
+def _sign_constraints(expression: sympy.Expr, param: Param) -> list[sympy.Basic]:
     """A linear parameter whose bounds have one sign must keep it at every temperature."""
     low, high = param.bounds
     if param.scale == "log" or low < 0 < high:
@@ -194,17 +194,17 @@ def _keeps_sign(expression: sympy.Expr, param: Param) -> list[sympy.Basic]:
     return [expression >= 0] if low >= 0 else [expression <= 0]
 
 
-def _numbered(groups: list[list[str]], joint: str = "_", pattern: re.Pattern[str] = _INDEXED) -> list[list[str]]:
+def _numbered(groups: list[list[str]], separator: str = "_", pattern: re.Pattern[str] = _INDEXED_NAME) -> list[list[str]]:
     """Number the names that collide across groups; names that stand alone stay as they are."""
 
     def stem(name: str) -> str:
         match = pattern.match(name)
         return match["stem"] if match else name
 
-    flat = [name for group in groups for name in group]
+    all_names = [name for group in groups for name in group]
     colliding = {stem(a) for a in groups[0] for b in groups[1] if stem(a) == stem(b)}
     count: dict[str, int] = {}
-    taken = {name for name in flat if stem(name) not in colliding}
+    taken = {name for name in all_names if stem(name) not in colliding}
     result = []
     for group in groups:
         names = []
@@ -212,19 +212,19 @@ def _numbered(groups: list[list[str]], joint: str = "_", pattern: re.Pattern[str
             key = stem(name)
             if key in colliding:
                 count[key] = count.get(key, 0) + 1
-                while f"{key}{joint}{count[key]}" in taken:
+                while f"{key}{separator}{count[key]}" in taken:
                     count[key] += 1
-                name = f"{key}{joint}{count[key]}"
+                name = f"{key}{separator}{count[key]}"
             names.append(name)
         result.append(names)
     return result
 
 
-def _renamed(expression: sympy.Basic, new: Mapping[sympy.Symbol, sympy.Symbol]) -> sympy.Basic:
-    return expression.xreplace({old: to for old, to in new.items() if old != to})
+def _renamed(expression: sympy.Basic, replacements: Mapping[sympy.Symbol, sympy.Symbol]) -> sympy.Basic:
+    return expression.xreplace({old: to for old, to in replacements.items() if old != to})
 
 
-def _free(name: str, taken: set[str]) -> str:
+def _unused_name(name: str, taken: set[str]) -> str:
     if name not in taken:
         return name
     k = 2

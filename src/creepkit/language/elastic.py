@@ -23,8 +23,8 @@ class Elastic:
             if isinstance(value, sympy.Expr):
                 stray = value.free_symbols - {temperature}
                 if stray:
-                    found = ", ".join(sorted(map(str, stray)))
-                    raise LawError(f"Elastic: {name} may depend on temperature alone, found {found}")
+                    result = ", ".join(sorted(map(str, stray)))
+                    raise LawError(f"Elastic: {name} may depend on temperature alone, found {result}")
                 if value.free_symbols:
                     continue
             object.__setattr__(self, name, float(value))

@@ -15,7 +15,7 @@ import sympy
 from sympy.logic.boolalg import Boolean
 
 from creepkit.errors import LawError, nearest
-from creepkit.language.checks import check, symbols_used
+from creepkit.language.checks import validate_law, symbols_used
 from creepkit.language.fingerprint import fingerprint_of
 from creepkit.language.params import Param, State
 
@@ -62,7 +62,7 @@ class CreepLaw:
         freeze(self, "constraints", tuple(self.constraints))
         references = (self.references,) if isinstance(self.references, str) else tuple(self.references)
         freeze(self, "references", references)
-        check(self)
+        validate_law(self)
 
     # ---- what the law is -------------------------------------------------------------------------------------------
 
@@ -117,9 +117,9 @@ class CreepLaw:
         for name, value in values.items():
             if not abs(value) < float("inf"):
                 raise LawError(f"law '{self.name}', parameter '{name}': {value} is not a finite number")
-            if not self.table[name].possible(value):
-                told = f"{value:g} is not physical, which is {self.table[name].physical}"
-                raise LawError(f"law '{self.name}', parameter '{name}': {told}")
+            if not self.table[name].is_physical(value):
+                description = f"{value:g} is not physical, which is {self.table[name].physical_range_text}"
+                raise LawError(f"law '{self.name}', parameter '{name}': {description}")
             if self.table[name].scale == "log" and value < 0:
                 raise LawError(f"law '{self.name}', parameter '{name}': {value:g} is negative; it must be positive")
             if self.table[name].scale == "log" and value == 0 and self.table[name].off != 0:
@@ -135,9 +135,9 @@ class CreepLaw:
 
     def latex(self) -> str:
         """The law as a LaTeX equation."""
-        from creepkit.language.printing import latex_of
+        from creepkit.language.printing import law_latex
 
-        return latex_of(self)
+        return law_latex(self)
 
     # ---- algebra ---------------------------------------------------------------------------------------------------
 
@@ -212,9 +212,9 @@ class CreepLaw:
         return _rebuild, (plain,)
 
     def __str__(self) -> str:
-        from creepkit.language.printing import text_of
+        from creepkit.language.printing import law_text
 
-        return text_of(self)
+        return law_text(self)
 
     def __repr__(self) -> str:
         return f"<CreepLaw {self.name}: {len(self.terms)} term(s), parameters {', '.join(self.names) or 'none'}>"

@@ -17,53 +17,53 @@ import sympy
 from sympy.logic.boolalg import Boolean
 
 from creepkit.errors import LawError, nearest
-from creepkit.language.precise import value_of
+from creepkit.language.precise import evaluate_multiprecision
 
 DEPTH_LIMIT, SIZE_LIMIT = 60, 5000
 """Levels and nodes of the largest expression that is written or read."""
 EXPONENT_LIMIT = 1000
 """Largest numeric exponent."""
-_DIGITS, _BITS = 300, 1024
-_MANY = SIZE_LIMIT
+_INTEGER_DIGIT_LIMIT, _PRECISION_LIMIT = 300, 1024
+_ANY_NUMBER = SIZE_LIMIT
 
 
 @dataclass(frozen=True)
-class _Head:
+class _NodeType:
     """What a head builds: a sympy type, how many arguments it takes, of which kind, and what kind it is."""
 
     type: Any
-    least: int = 1
-    most: int = 1
-    takes: type = sympy.Expr
-    gives: type = sympy.Expr
+    fewest_arguments: int = 1
+    most_arguments: int = 1
+    argument_kind: type = sympy.Expr
+    result_kind: type = sympy.Expr
 
 
-_HEADS = {
-    "add": _Head(sympy.Add, 2, _MANY),
-    "mul": _Head(sympy.Mul, 2, _MANY),
-    "pow": _Head(sympy.Pow, 2, 2),
-    **{f.__name__: _Head(f) for f in (sympy.exp, sympy.log, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth)},
-    **{f.__name__: _Head(f) for f in (sympy.asinh, sympy.sin, sympy.cos, sympy.atan, sympy.erf, sympy.sign)},
-    "abs": _Head(sympy.Abs),
-    "max": _Head(sympy.Max, 2, _MANY),
-    "min": _Head(sympy.Min, 2, _MANY),
-    "heaviside": _Head(sympy.Heaviside, 2, 2),
-    "ge": _Head(sympy.GreaterThan, 2, 2, gives=Boolean),
-    "gt": _Head(sympy.StrictGreaterThan, 2, 2, gives=Boolean),
-    "le": _Head(sympy.LessThan, 2, 2, gives=Boolean),
-    "lt": _Head(sympy.StrictLessThan, 2, 2, gives=Boolean),
-    "and": _Head(sympy.And, 2, _MANY, Boolean, Boolean),
-    "or": _Head(sympy.Or, 2, _MANY, Boolean, Boolean),
+_NODE_TYPES = {
+    "add": _NodeType(sympy.Add, 2, _ANY_NUMBER),
+    "mul": _NodeType(sympy.Mul, 2, _ANY_NUMBER),
+    "pow": _NodeType(sympy.Pow, 2, 2),
+    **{f.__name__: _NodeType(f) for f in (sympy.exp, sympy.log, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth)},
+    **{f.__name__: _NodeType(f) for f in (sympy.asinh, sympy.sin, sympy.cos, sympy.atan, sympy.erf, sympy.sign)},
+    "abs": _NodeType(sympy.Abs),
+    "max": _NodeType(sympy.Max, 2, _ANY_NUMBER),
+    "min": _NodeType(sympy.Min, 2, _ANY_NUMBER),
+    "heaviside": _NodeType(sympy.Heaviside, 2, 2),
+    "ge": _NodeType(sympy.GreaterThan, 2, 2, result_kind=Boolean),
+    "gt": _NodeType(sympy.StrictGreaterThan, 2, 2, result_kind=Boolean),
+    "le": _NodeType(sympy.LessThan, 2, 2, result_kind=Boolean),
+    "lt": _NodeType(sympy.StrictLessThan, 2, 2, result_kind=Boolean),
+    "and": _NodeType(sympy.And, 2, _ANY_NUMBER, Boolean, Boolean),
+    "or": _NodeType(sympy.Or, 2, _ANY_NUMBER, Boolean, Boolean),
 }
-_NAMES = {head.type: name for name, head in _HEADS.items()}
+_HEAD_OF_TYPE = {head.type: name for name, head in _NODE_TYPES.items()}
 _CONSTANTS = {"pi": sympy.pi, "e": sympy.E, "true": sympy.true, "false": sympy.false}
-_WORDS = (*_HEADS, *_CONSTANTS, "rational", "float", "piecewise")
+_KNOWN_HEADS = (*_NODE_TYPES, *_CONSTANTS, "rational", "float", "piecewise")
 
 
 # ---- writing -------------------------------------------------------------------------------------------------------
 
 
-def to_tree(expression: sympy.Basic) -> Any:
+def expression_to_tree(expression: sympy.Basic) -> Any:
     """Return the tree of an expression or condition; LawError when it holds what the language does not know."""
     return _Writer().tree(expression, 0)
 
@@ -80,18 +80,18 @@ class _Writer:
         if isinstance(expression, sympy.Float):
             return _float_tree(expression)
         if isinstance(expression, sympy.Integer):
-            return _small(int(expression))
+            return _checked_integer(int(expression))
         if isinstance(expression, sympy.Rational):
-            return ["rational", _small(int(expression.p)), _small(int(expression.q))]
-        for word, constant in _CONSTANTS.items():
+            return ["rational", _checked_integer(int(expression.p)), _checked_integer(int(expression.q))]
+        for head, constant in _CONSTANTS.items():
             if expression is constant:
-                return [word]
+                return [head]
         if isinstance(expression, sympy.Piecewise):
             pairs = [[self.tree(part, depth + 1) for part in pair.args] for pair in expression.args]
             return ["piecewise", *pairs]
-        name = _NAMES.get(expression.func)
+        name = _HEAD_OF_TYPE.get(expression.func)
         if name is None:
-            raise LawError(f"'{expression}' cannot be written to a file; known are the heads {', '.join(_WORDS)}")
+            raise LawError(f"'{expression}' cannot be written to a file; known are the heads {', '.join(_KNOWN_HEADS)}")
         return [name, *(self.tree(argument, depth + 1) for argument in expression.args)]
 
 
@@ -112,7 +112,7 @@ def _float_tree(number: sympy.Float) -> list[Any]:
 # ---- reading -------------------------------------------------------------------------------------------------------
 
 
-def from_tree(tree: Any, symbols: Mapping[str, sympy.Symbol]) -> sympy.Expr:
+def expression_from_tree(tree: Any, symbols: Mapping[str, sympy.Symbol]) -> sympy.Expr:
     """Return the expression of a tree whose names are all in `symbols`; LawError for anything else."""
     return _Reader(symbols).read(tree, sympy.Expr)
 
@@ -133,24 +133,24 @@ class _Reader:
     def node(self, tree: Any, kind: type, depth: int) -> Any:
         self.size += 1
         _check_size(self.size, depth)
-        found = self.atom(tree) if not isinstance(tree, list) else self.branch(tree, depth)
-        if not isinstance(found, kind) or (kind is Boolean and isinstance(found, sympy.Symbol)):
+        result = self.atom(tree) if not isinstance(tree, list) else self.branch(tree, depth)
+        if not isinstance(result, kind) or (kind is Boolean and isinstance(result, sympy.Symbol)):
             wanted = "a number" if kind is sympy.Expr else "a condition"
-            raise LawError(f"the expression holds {_shown(tree)} where {wanted} is needed")
-        return found
+            raise LawError(f"the expression holds {_short_text(tree)} where {wanted} is needed")
+        return result
 
     def atom(self, tree: Any) -> sympy.Basic:
         if type(tree) is int:
-            return sympy.Integer(_small(tree))
+            return sympy.Integer(_checked_integer(tree))
         if not isinstance(tree, str):
-            raise LawError(f"the expression holds {_shown(tree)}; allowed are names, integers and lists with a head")
+            raise LawError(f"the expression holds {_short_text(tree)}; allowed are names, integers and lists with a head")
         if tree not in self.symbols:
-            raise LawError(f"the expression mentions {_shown(tree)}, not declared: {nearest(tree, self.symbols)}")
+            raise LawError(f"the expression mentions {_short_text(tree)}, not declared: {nearest(tree, self.symbols)}")
         return self.symbols[tree]
 
     def branch(self, tree: list[Any], depth: int) -> sympy.Basic:
-        if not tree or not isinstance(tree[0], str) or tree[0] not in _WORDS:
-            raise LawError(f"the expression holds {_shown(tree)}, which has no known head: {', '.join(_WORDS)}")
+        if not tree or not isinstance(tree[0], str) or tree[0] not in _KNOWN_HEADS:
+            raise LawError(f"the expression holds {_short_text(tree)}, which has no known head: {', '.join(_KNOWN_HEADS)}")
         name, *arguments = tree
         if name in _CONSTANTS and not arguments:
             return _CONSTANTS[name]
@@ -160,20 +160,20 @@ class _Reader:
             return _rational_from(arguments)
         if name == "piecewise":
             return sympy.Piecewise(*(self.pair(a, depth + 1) for a in arguments), evaluate=False)
-        head = _HEADS.get(name)
-        if head is None or not head.least <= len(arguments) <= head.most:
-            raise LawError(f"the expression holds {_shown(tree)}: '{name}' does not take {len(arguments)} argument(s)")
-        parts = [self.node(argument, head.takes, depth + 1) for argument in arguments]
+        head = _NODE_TYPES.get(name)
+        if head is None or not head.fewest_arguments <= len(arguments) <= head.most_arguments:
+            raise LawError(f"the expression holds {_short_text(tree)}: '{name}' does not take {len(arguments)} argument(s)")
+        parts = [self.node(argument, head.argument_kind, depth + 1) for argument in arguments]
         built = head.type(*parts, evaluate=False)
         _check_numbers(built, tree)
         return built
 
     def pair(self, tree: Any, depth: int) -> tuple[sympy.Expr, Boolean]:
         if not isinstance(tree, list) or len(tree) != 2:
-            raise LawError(f"a branch of 'piecewise' is {_shown(tree)}; write [expression, condition]")
+            raise LawError(f"a branch of 'piecewise' is {_short_text(tree)}; write [expression, condition]")
         value, condition = self.node(tree[0], sympy.Expr, depth), self.node(tree[1], Boolean, depth)
         if condition.has(sympy.Piecewise):
-            raise LawError(f"the condition {_shown(tree[1])} of 'piecewise' holds another 'piecewise'")
+            raise LawError(f"the condition {_short_text(tree[1])} of 'piecewise' holds another 'piecewise'")
         return value, condition
 
 
@@ -184,20 +184,20 @@ def _float_from(arguments: list[Any]) -> sympy.Float:
         case [int() as mantissa, int() as exponent, int() as bits] if _is_normal(mantissa, exponent, bits):
             sign, size = int(mantissa < 0), abs(mantissa)
             return sympy.Float((sign, size, exponent, size.bit_length()) if size else 0, precision=bits)
-    raise LawError(f'{_shown(["float", *arguments])} is not a finite number in the form ["float", 0.1]')
+    raise LawError(f'{_short_text(["float", *arguments])} is not a finite number in the form ["float", 0.1]')
 
 
 def _is_normal(mantissa: int, exponent: int, bits: int) -> bool:
     """Whether mantissa 2^exponent is written as sympy writes it: an odd mantissa of at most `bits` bits, or 0 2^0."""
     if mantissa == 0:
-        return exponent == 0 and 1 < bits <= _BITS
-    return mantissa % 2 == 1 and mantissa.bit_length() <= bits <= _BITS and abs(exponent) <= 2 * _BITS
+        return exponent == 0 and 1 < bits <= _PRECISION_LIMIT
+    return mantissa % 2 == 1 and mantissa.bit_length() <= bits <= _PRECISION_LIMIT and abs(exponent) <= 2 * _PRECISION_LIMIT
 
 
 def _rational_from(arguments: list[Any]) -> sympy.Rational:
     if [type(a) for a in arguments] != [int, int] or arguments[1] < 1:
-        raise LawError(f'{_shown(["rational", *arguments])} is not a fraction in the form ["rational", 1, 3]')
-    return sympy.Rational(*map(_small, arguments))
+        raise LawError(f'{_short_text(["rational", *arguments])} is not a fraction in the form ["rational", 1, 3]')
+    return sympy.Rational(*map(_checked_integer, arguments))
 
 
 # ---- limits --------------------------------------------------------------------------------------------------------
@@ -205,19 +205,19 @@ def _rational_from(arguments: list[Any]) -> sympy.Rational:
 
 def _check_numbers(built: sympy.Basic, tree: list[Any]) -> None:
     """Refuse numbers that sympy could not evaluate later, such as 9**9**9**9 and x**(10**99)."""
-    if isinstance(built, sympy.Pow) and not built.exp.free_symbols and not _size(built.exp) <= EXPONENT_LIMIT:
-        raise LawError(f"{_shown(tree)} has an exponent outside -{EXPONENT_LIMIT} to {EXPONENT_LIMIT}")
+    if isinstance(built, sympy.Pow) and not built.exp.free_symbols and not _magnitude(built.exp) <= EXPONENT_LIMIT:
+        raise LawError(f"{_short_text(tree)} has an exponent outside -{EXPONENT_LIMIT} to {EXPONENT_LIMIT}")
     if isinstance(built, sympy.Expr) and not built.free_symbols:
-        size = _size(built)
+        size = _magnitude(built)
         if not (size == 0 or 1e-308 < size < 1e308):
-            raise LawError(f"{_shown(tree)} is not a real number between 1e-308 and 1e308 in size")
+            raise LawError(f"{_short_text(tree)} is not a real number between 1e-308 and 1e308 in size")
 
 
-def _size(number: sympy.Basic) -> Any:
+def _magnitude(number: sympy.Basic) -> Any:
     """Absolute value of an expression without symbols; infinite when it is not real or cannot be computed."""
     try:
         with mpmath.workdps(20):
-            value = value_of(number, {})
+            value = evaluate_multiprecision(number, {})
     except ArithmeticError:
         return mpmath.inf
     return mpmath.inf if isinstance(value, mpmath.mpc) else abs(value)
@@ -228,13 +228,13 @@ def _check_size(size: int, depth: int) -> None:
         raise LawError(f"an expression is too large: at most {DEPTH_LIMIT} levels and {SIZE_LIMIT} nodes are allowed")
 
 
-def _small(number: int) -> int:
-    if abs(number) >= 10**_DIGITS:
-        raise LawError(f"an expression holds an integer of more than {_DIGITS} digits")
+def _checked_integer(number: int) -> int:
+    if abs(number) >= 10**_INTEGER_DIGIT_LIMIT:
+        raise LawError(f"an expression holds an integer of more than {_INTEGER_DIGIT_LIMIT} digits")
     return number
 
 
-class _Brief(reprlib.Repr):
+class _ShortRepr(reprlib.Repr):
     """A short view of any JSON, however deep or long."""
 
     def __init__(self) -> None:
@@ -245,4 +245,4 @@ class _Brief(reprlib.Repr):
         return str(x) if abs(x) < 10**20 else "a very long integer"
 
 
-_shown = _Brief().repr
+_short_text = _ShortRepr().repr

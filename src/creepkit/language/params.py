@@ -10,7 +10,7 @@ import sympy
 
 from creepkit.errors import LawError
 
-Scale = Literal["linear", "log"]
+ParameterScale = Literal["linear", "log"]
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Param:
     meaning: str
     bounds: tuple[float, float]
     unit: str = ""
-    scale: Scale = "linear"
+    scale: ParameterScale = "linear"
     off: float | None = None
     limits: tuple[float, float] | None = None
 
@@ -60,7 +60,7 @@ class Param:
                 raise LawError(f"parameter '{self.meaning}': off = {self.off} must be a finite number")
             object.__setattr__(self, "off", float(self.off))
         if self.limits is not None:
-            object.__setattr__(self, "limits", _limits(self.meaning, self.limits, self.bounds))
+            object.__setattr__(self, "limits", _checked_limits(self.meaning, self.limits, self.bounds))
 
     @property
     def center(self) -> float:
@@ -78,29 +78,29 @@ class Param:
         """Return the author's value of a kernel's parameter."""
         return math.exp(value) if self.scale == "log" else float(value)
 
-    def possible(self, value: float) -> bool:
+    def is_physical(self, value: float) -> bool:
         """Say whether `value` is physical: within the limits, if there are any, or the off value."""
         if self.limits is None or (self.off is not None and value == self.off):
             return True
         return self.limits[0] <= value <= self.limits[1]
 
     @property
-    def physical(self) -> str:
+    def physical_range_text(self) -> str:
         """The limits in words."""
         low, high = self.limits or (-math.inf, math.inf)
         off = "" if self.off is None else f" (or {self.off:g}, off)"
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"from {low:g} to {high:g}{unit}{off}"
 
-    def admits(self, value: float, slack: float = 1e-9) -> bool:
+    def within_bounds(self, value: float, relative_tolerance: float = 1e-9) -> bool:
         """Say whether `value` lies within the bounds (to a relative `slack`) or is the off value."""
         if self.off is not None and value == self.off:
             return True
         low, high = self.bounds
         if self.scale == "log":
-            return low * (1 - slack) <= value <= high * (1 + slack)
-        room = slack * max(abs(low), abs(high))
-        return low - room <= value <= high + room
+            return low * (1 - relative_tolerance) <= value <= high * (1 + relative_tolerance)
+        tolerance = relative_tolerance * max(abs(low), abs(high))
+        return low - tolerance <= value <= high + tolerance
 
 
 @dataclass(frozen=True)
@@ -137,15 +137,15 @@ class State:
             raise LawError(f"state '{self.meaning}': {self.rate!r} is not a sympy expression") from None
 
 
-def _limits(meaning: str, given: tuple[float, float], bounds: tuple[float, float]) -> tuple[float, float]:
+def _checked_limits(meaning: str, given: tuple[float, float], bounds: tuple[float, float]) -> tuple[float, float]:
     """Limits as floats, around the bounds."""
     try:
         low, high = (float(limit) for limit in given)
     except (TypeError, ValueError):
         raise LawError(f"parameter '{meaning}': limits are {given!r}; write two numbers (low, high)") from None
     if not low <= bounds[0] < bounds[1] <= high:
-        told = f"bounds ({bounds[0]:g}, {bounds[1]:g}) must lie within the limits ({low:g}, {high:g})"
-        raise LawError(f"parameter '{meaning}': {told}")
+        description = f"bounds ({bounds[0]:g}, {bounds[1]:g}) must lie within the limits ({low:g}, {high:g})"
+        raise LawError(f"parameter '{meaning}': {description}")
     return low, high
 
 

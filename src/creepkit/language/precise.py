@@ -14,53 +14,53 @@ import sympy
 
 from creepkit.errors import LawError
 
-_EXPONENT_LIMIT = 2.0**30
+_BINARY_EXPONENT_LIMIT = 2.0**30
 """Largest |log2| of a number that is computed."""
 
 
-def value_of(expression: sympy.Basic, at: Mapping[sympy.Symbol, Any]) -> Any:
+def evaluate_multiprecision(expression: sympy.Basic, values: Mapping[sympy.Symbol, Any]) -> Any:
     """Return the value of `expression` (an mpf, an mpc, or a bool for a condition) with the symbols of `at` as given.
 
     ArithmeticError when it has no finite value there or none that can be computed; LawError for a function unknown.
     """
     if isinstance(expression, sympy.Symbol):
-        return at[expression]
+        return values[expression]
     if isinstance(expression, sympy.Rational):
         return mpmath.mpf(expression.p) / mpmath.mpf(expression.q)
     if isinstance(expression, sympy.Float):
         return mpmath.mpf(expression)
     if isinstance(expression, sympy.Piecewise):
-        return _first_that_holds(expression, at)
-    function = _FUNCTIONS.get(expression.func) or _named(expression.func)
+        return _evaluate_piecewise(expression, values)
+    function = _FUNCTIONS.get(expression.func) or _mpmath_function(expression.func)
     try:
-        return function(*(value_of(argument, at) for argument in expression.args))
+        return function(*(evaluate_multiprecision(argument, values) for argument in expression.args))
     except (ValueError, TypeError) as error:  # the logarithm of zero, the order of complex numbers
         raise ArithmeticError(f"{expression} has no value: {error}") from None
 
 
-def _first_that_holds(expression: sympy.Piecewise, at: Mapping[sympy.Symbol, Any]) -> Any:
+def _evaluate_piecewise(expression: sympy.Piecewise, values: Mapping[sympy.Symbol, Any]) -> Any:
     for branch, condition in expression.args:
-        if value_of(condition, at):
-            return value_of(branch, at)
+        if evaluate_multiprecision(condition, values):
+            return evaluate_multiprecision(branch, values)
     raise ArithmeticError(f"no branch of {expression} holds")
 
 
 def _power(base: Any, exponent: Any) -> Any:
-    if base != 0 and abs(exponent) * (abs(mpmath.mag(base)) + 1) > _EXPONENT_LIMIT:
+    if base != 0 and abs(exponent) * (abs(mpmath.mag(base)) + 1) > _BINARY_EXPONENT_LIMIT:
         raise OverflowError("a power is too large or too small to be computed")
     return base**exponent
 
 
-def _bounded(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+def _overflow_guarded(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     def guarded(x: Any) -> Any:
-        if abs(x) > _EXPONENT_LIMIT:
+        if abs(x) > _BINARY_EXPONENT_LIMIT:
             raise OverflowError(f"{function.__name__} of {mpmath.nstr(x, 6)} is too large or too small to be computed")
         return function(x)
 
     return guarded
 
 
-def _named(head: Any) -> Callable[..., Any]:
+def _mpmath_function(head: Any) -> Callable[..., Any]:
     function = getattr(mpmath, head.__name__, None)
     if not callable(function):
         raise LawError(f"the function '{head.__name__}' has no numeric form; build the law from other functions")
@@ -71,12 +71,12 @@ _FUNCTIONS: dict[Any, Callable[..., Any]] = {
     sympy.Add: lambda *terms: mpmath.fsum(terms),
     sympy.Mul: lambda *factors: mpmath.fprod(factors),
     sympy.Pow: _power,
-    sympy.exp: _bounded(mpmath.exp),
-    sympy.sinh: _bounded(mpmath.sinh),
-    sympy.cosh: _bounded(mpmath.cosh),
-    sympy.coth: _bounded(mpmath.coth),
-    sympy.sin: _bounded(mpmath.sin),
-    sympy.cos: _bounded(mpmath.cos),
+    sympy.exp: _overflow_guarded(mpmath.exp),
+    sympy.sinh: _overflow_guarded(mpmath.sinh),
+    sympy.cosh: _overflow_guarded(mpmath.cosh),
+    sympy.coth: _overflow_guarded(mpmath.coth),
+    sympy.sin: _overflow_guarded(mpmath.sin),
+    sympy.cos: _overflow_guarded(mpmath.cos),
     sympy.Abs: abs,
     sympy.Max: max,
     sympy.Min: min,

@@ -9,57 +9,57 @@ import sympy
 from sympy.printing.latex import LatexPrinter
 from sympy.printing.str import StrPrinter
 
-from creepkit.language.symbols import GAS_CONSTANT, LATEX, temperature
+from creepkit.language.symbols import GAS_CONSTANT, LATEX_SYMBOLS, temperature
 
 if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
 
-_SPECIAL = {"n_inf": r"n_\infty"}
+_LATEX_NAMES = {"n_inf": r"n_\infty"}
 
 
 # ---- LaTeX ---------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class Activation:
+class ArrheniusExponent:
     """exp[-(Q/R)(1/T - 1/T_ref)] recognised in an expression: Q in J/mol, T_ref in K."""
 
     Q: sympy.Expr
     T_ref: float
 
 
-def activation_of(exponent: sympy.Expr) -> Activation | None:
+def arrhenius_exponent(exponent: sympy.Expr) -> ArrheniusExponent | None:
     """Read an exponent of the form (Q/R)(1/T_ref - 1/T); None when it is another function of temperature."""
     per_T = sympy.Symbol("per_T", positive=True)
-    line = sympy.expand(exponent.xreplace({temperature: 1 / per_T})).as_poly(per_T)
-    if line is None or line.degree() != 1:
+    polynomial = sympy.expand(exponent.xreplace({temperature: 1 / per_T})).as_poly(per_T)
+    if polynomial is None or polynomial.degree() != 1:
         return None
-    slope, start = line.coeff_monomial(per_T), line.coeff_monomial(1)
+    slope, start = polynomial.coeff_monomial(per_T), polynomial.coeff_monomial(1)
     T_ref = -slope / start if start != 0 else sympy.S.Zero
     if not (T_ref.is_Number and T_ref > 0):
         return None
-    number, rest = (-slope * GAS_CONSTANT).as_coeff_Mul()
-    return Activation(_tidy(number) * rest, float(_tidy(T_ref)))
+    number, remainder = (-slope * GAS_CONSTANT).as_coeff_Mul()
+    return ArrheniusExponent(_without_rounding(number) * remainder, float(_without_rounding(T_ref)))
 
 
-def _tidy(number: sympy.Expr) -> sympy.Expr:
+def _without_rounding(number: sympy.Expr) -> sympy.Expr:
     """The number without the last digits, which products of R and T_ref have rounded."""
     rounded = float(f"{float(number):.12g}")
     return sympy.Integer(int(rounded)) if rounded.is_integer() else sympy.Float(rounded)
 
 
-class LawPrinter(LatexPrinter):  # type: ignore[misc]
+class LatexLawPrinter(LatexPrinter):  # type: ignore[misc]
     """Print exponentials of reciprocal temperature as Arrhenius factors, everything else as sympy does."""
 
     def __init__(self, law: CreepLaw) -> None:
-        names = {s: _SPECIAL[s.name] for s in law.params if s.name in _SPECIAL}
-        super().__init__({"symbol_names": {**LATEX, **names}, "mul_symbol": None})
+        names = {s: _LATEX_NAMES[s.name] for s in law.params if s.name in _LATEX_NAMES}
+        super().__init__({"symbol_names": {**LATEX_SYMBOLS, **names}, "mul_symbol": None})
 
     def _print_exp(self, e: Any, exp: Any = None) -> str:
-        parts = {part: activation_of(part) for part in sympy.Add.make_args(e.args[0])}
+        parts = {part: arrhenius_exponent(part) for part in sympy.Add.make_args(e.args[0])}
         if not any(parts.values()):
             return str(self._print_ExpBase(e, exp=exp))
-        text = "".join(self._factor(found) for found in parts.values() if found)
+        text = "".join(self._arrhenius_factor(result) for result in parts.values() if result)
         rest = sympy.Add(*(part for part, found in parts.items() if not found))
         if rest != 0:
             text += rf" \exp\!\left[{self._print(rest)}\right]"
@@ -69,21 +69,21 @@ class LawPrinter(LatexPrinter):  # type: ignore[misc]
         text = str(super()._print_Piecewise(expr))
         return text if exp is None else rf"\left({text}\right)^{{{exp}}}"
 
-    def _factor(self, found: Activation) -> str:
-        falls = found.Q.could_extract_minus_sign()
-        sign, energy = ("", -found.Q) if falls else ("-", found.Q)
+    def _arrhenius_factor(self, found: ArrheniusExponent) -> str:
+        is_negative = found.Q.could_extract_minus_sign()
+        sign, energy = ("", -found.Q) if is_negative else ("-", found.Q)
         return (
             rf"\exp\!\left[{sign}\frac{{{self._print(energy)}}}{{R}}"
             rf"\left(\frac{{1}}{{T}} - \frac{{1}}{{{found.T_ref:g}\,\mathrm{{K}}}}\right)\right]"
         )
 
 
-def latex_of(law: CreepLaw) -> str:
+def law_latex(law: CreepLaw) -> str:
     r"""Return ``\dot{\varepsilon}_{cr} = ...`` with one summand a term; states follow as further equations."""
-    return r",\quad ".join(f"{left} = {' + '.join(right)}" for left, right in equations_of(law, LawPrinter(law)))
+    return r",\quad ".join(f"{left} = {' + '.join(right)}" for left, right in latex_equations(law, LatexLawPrinter(law)))
 
 
-def equations_of(law: CreepLaw, printer: LawPrinter) -> list[tuple[str, list[str]]]:
+def latex_equations(law: CreepLaw, printer: LatexLawPrinter) -> list[tuple[str, list[str]]]:
     """Return (left side, summands) of the rate of strain, then of each internal variable."""
     states = [(rf"\dot{{{printer.doprint(s)}}}", [printer.doprint(state.rate)]) for s, state in law.states.items()]
     return [(r"\dot{\varepsilon}_{cr}", [printer.doprint(term) for term in law.terms.values()]), *states]
@@ -92,46 +92,46 @@ def equations_of(law: CreepLaw, printer: LawPrinter) -> list[tuple[str, list[str
 # ---- plain text ----------------------------------------------------------------------------------------------------
 
 
-class TermPrinter(StrPrinter):  # type: ignore[misc]
+class TextPrinter(StrPrinter):  # type: ignore[misc]
     """Print expressions for people: Arrhenius factors as exp(-Q/R*(1/T - 1/1073.15))."""
 
     def _print_exp(self, e: Any) -> str:
-        parts = [(part, activation_of(part)) for part in sympy.Add.make_args(e.args[0])]
-        text = "*".join(self._factor(found) for _, found in parts if found)
+        parts = [(part, arrhenius_exponent(part)) for part in sympy.Add.make_args(e.args[0])]
+        text = "*".join(self._arrhenius_factor(result) for _, result in parts if result)
         rest = sympy.Add(*(part for part, found in parts if not found))
         if not text:
             return f"exp({self._print(rest)})"
         return text if rest == 0 else f"{text}*exp({self._print(rest)})"
 
-    def _factor(self, found: Activation) -> str:
-        falls = found.Q.could_extract_minus_sign()
-        sign, energy = ("", -found.Q) if falls else ("-", found.Q)
+    def _arrhenius_factor(self, found: ArrheniusExponent) -> str:
+        is_negative = found.Q.could_extract_minus_sign()
+        sign, energy = ("", -found.Q) if is_negative else ("-", found.Q)
         return f"exp({sign}{self._print(energy)}/R*(1/T - 1/{found.T_ref:g}))"
 
 
-def text_of_expression(expression: sympy.Basic) -> str:
+def expression_text(expression: sympy.Basic) -> str:
     """An expression as one line for people."""
-    return str(TermPrinter().doprint(expression))
+    return str(TextPrinter().doprint(expression))
 
 
-def text_of(law: CreepLaw) -> str:
+def law_text(law: CreepLaw) -> str:
     """Return the law as a small table for a terminal."""
     lines = [f"{law.name}: {law.title}" if law.title else law.name]
-    lead = "rate ="
+    prefix = "rate ="
     for label, term in law.terms.items():
-        lines.append(f"  {lead:6} {text_of_expression(term)}    [{label}]")
-        lead = "     +"
+        lines.append(f"  {prefix:6} {expression_text(term)}    [{label}]")
+        prefix = "     +"
     for symbol, state in law.states.items():
-        lines.append(f"  d{symbol}/dt = {text_of_expression(state.rate)}, from {state.initial:g}")
+        lines.append(f"  d{symbol}/dt = {expression_text(state.rate)}, from {state.initial:g}")
     for name, param in law.table.items():
         low, high = param.bounds
         off = "" if param.off is None or low <= param.off <= high else f" or {param.off:g}"
         unit = "" if param.unit == "1" else f" {param.unit}"
         scale = ", log scale" if param.scale == "log" else ""
-        hard = "" if param.limits is None else f", physical {param.physical}"
-        lines.append(f"  {name:8} {param.meaning}: {low:g} to {high:g}{off}{unit}{scale}{hard}")
+        limits_text = "" if param.limits is None else f", physical {param.physical_range_text}"
+        lines.append(f"  {name:8} {param.meaning}: {low:g} to {high:g}{off}{unit}{scale}{limits_text}")
     for relation in law.constraints:
-        lines.append(f"  with {text_of_expression(relation)}")
+        lines.append(f"  with {expression_text(relation)}")
     for reference in law.references:
         lines.append(f"  see {reference}")
     return "\n".join(lines)

@@ -10,12 +10,12 @@ from creepkit.language import (
     curved,
     exponential,
     hookimpl,
-    inverse,
+    inverse_temperature,
     linear,
     logarithmic,
     modified_arrhenius,
     t_log_t,
-    wachtman_like,
+    wachtman_form,
 )
 
 
@@ -27,10 +27,10 @@ def creepkit_temperature_forms() -> Mapping[str, Callable[..., Any]]:
         "boltzmann": boltzmann,
         "curved": curved,
         "exponential": exponential,
-        "inverse": inverse,
+        "inverse": inverse_temperature,
         "linear": linear,
         "logarithmic": logarithmic,
         "modified-arrhenius": modified_arrhenius,
         "t-log-t": t_log_t,
-        "wachtman": wachtman_like,
+        "wachtman": wachtman_form,
     }

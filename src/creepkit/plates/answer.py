@@ -12,24 +12,24 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.confirm import Confirmation
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.selection import CREDIBLE, DECISIVE
+from creepkit.inverse.selection import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.records import History, Predictor
 
-Outputs: TypeAlias = Mapping[str, Floats]
+PredictedOutputs: TypeAlias = Mapping[str, Floats]
 """{output: (frames,)} of one test."""
 
 
 @dataclass(frozen=True, eq=False)
-class Weighed:
+class WeightedLaw:
     """An identified law of an alloy: BIC less the best, and its share of belief."""
 
     fit: Identification
-    excess: float
+    bic_difference: float
     weight: float
 
 
 @dataclass(frozen=True, eq=False)
-class AlloyAnswer:
+class AlloyResult:
     """What was found of one alloy.
 
     fingerprint : of its tests and of all that was asked; an answer with the same one is not worked out again.
@@ -43,17 +43,17 @@ class AlloyAnswer:
 
     alloy: str
     fingerprint: str = ""
-    laws: tuple[Weighed, ...] = ()
-    failed: Mapping[str, str] = field(default_factory=dict)
+    laws: tuple[WeightedLaw, ...] = ()
+    failed_laws: Mapping[str, str] = field(default_factory=dict)
     verdict: str = ""
     equivalents: tuple[str, ...] = ()
-    reason: str = ""
-    dense: Identification | None = None
-    sparse: Identification | None = None
+    failure: str = ""
+    dense_fit: Identification | None = None
+    sparse_fit: Identification | None = None
     confirmation: Confirmation | None = None
-    predicted: Mapping[str, Outputs] = field(default_factory=dict)
+    predicted: Mapping[str, PredictedOutputs] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    seconds: float = 0.0
+    cpu_seconds: float = 0.0
 
     @property
     def identified(self) -> bool:
@@ -64,36 +64,36 @@ class AlloyAnswer:
     def best(self) -> Identification:
         """The law of largest weight."""
         if not self.laws:
-            raise FitError(f"alloy '{self.alloy}' has no identified law: {self.reason}")
+            raise FitError(f"alloy '{self.alloy}' has no identified law: {self.failure}")
         return self.laws[0].fit
 
     @property
     def decisive(self) -> bool:
         """Whether the best law has nearly all of the belief, in a choice of several."""
-        return len(self.laws) > 1 and self.laws[0].weight > DECISIVE
+        return len(self.laws) > 1 and self.laws[0].weight > DECISIVE_WEIGHT
 
     @property
-    def remaining(self) -> tuple[str, ...]:
+    def credible_laws(self) -> tuple[str, ...]:
         """Names of the laws that the tests cannot rule out, best first."""
-        return tuple(w.fit.law.name for k, w in enumerate(self.laws) if k == 0 or w.weight > CREDIBLE)
+        return tuple(w.fit.law.name for k, w in enumerate(self.laws) if k == 0 or w.weight > CREDIBLE_WEIGHT)
 
     @property
-    def reduced(self) -> Identification:
+    def reduced_fit(self) -> Identification:
         """What is set against the dense law: the one a penalty left, else the best of all."""
-        return self.best if self.sparse is None else self.sparse
+        return self.best if self.sparse_fit is None else self.sparse_fit
 
-    def on(self, tests: tuple[History, ...], using: Predictor) -> AlloyAnswer:
+    def with_tests(self, tests: tuple[History, ...], predictor: Predictor) -> AlloyResult:
         """The same with its tests and predictor attached to every identification, for predictions and plots."""
-        laws = tuple(replace(w, fit=w.fit.on(tests, using)) for w in self.laws)
-        dense, sparse = (None if fit is None else fit.on(tests, using) for fit in (self.dense, self.sparse))
-        return replace(self, laws=laws, dense=dense, sparse=sparse)
+        laws = tuple(replace(w, fit=w.fit.with_histories(tests, predictor)) for w in self.laws)
+        dense_fit, sparse_fit = (None if fit is None else fit.with_histories(tests, predictor) for fit in (self.dense_fit, self.sparse_fit))
+        return replace(self, laws=laws, dense_fit=dense_fit, sparse_fit=sparse_fit)
 
 
-def loss(fit: Identification) -> float:
+def mean_relative_squared_error(fit: Identification) -> float:
     """Eq. (4) of Chen et al.: relative squared errors, the mean over outputs."""
-    return float(np.mean([e.rse for e in fit.errors.values()]))
+    return float(np.mean([e.relative_squared_error for e in fit.errors.values()]))
 
 
-def chi_square(fit: Identification) -> float:
+def mean_chi_square(fit: Identification) -> float:
     """Mean of (error / noise)^2 over outputs; one is noise alone."""
     return float(np.mean([e.chi_square for e in fit.errors.values()]))

@@ -22,70 +22,70 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from creepkit.dataset.store import replacing
-from creepkit.plates.answer import AlloyAnswer, Outputs, Weighed
-from creepkit.plates.table import STRESS
+from creepkit.dataset.store import replace_on_success
+from creepkit.plates.answer import AlloyResult, PredictedOutputs, WeightedLaw
+from creepkit.plates.table import COMPARISON_STRESS
 from creepkit.records import History
 
 if TYPE_CHECKING:
     from creepkit.plates.plate import Plate
 
-FORMAT, LAYOUT, UNITS = "creepkit-plate", 1, "MPa, mm, s, K"
+HDF5_FORMAT, HDF5_LAYOUT, HDF5_UNITS = "creepkit-plate", 1, "MPa, mm, s, K"
 
 
-def write(plate: Plate, path: Path) -> Path:
+def write_hdf5(plate: Plate, path: Path) -> Path:
     """Write the file; it is whole or absent."""
-    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
-        file.attrs.update({"format": FORMAT, "layout": LAYOUT, "units": UNITS})
-        for k, answer in enumerate(plate.answers):
+    with replace_on_success(path) as temporary, h5py.File(temporary, "w") as file:
+        file.attrs.update({"format": HDF5_FORMAT, "layout": HDF5_LAYOUT, "units": HDF5_UNITS})
+        for k, result in enumerate(plate.results):
             group = file.create_group(f"alloys/{k:04d}")
-            group.attrs.update({"alloy": answer.alloy, "class": plate.class_of(answer.alloy)})
-            _write_answer(group, answer)
-            for n, test in enumerate(plate.histories[answer.alloy]):
-                _write_test(group.create_group(f"tests/{n}"), test, answer.predicted.get(test.name, {}))
+            group.attrs.update({"alloy": result.alloy, "class": plate.class_of(result.alloy)})
+            _write_result(group, result)
+            for n, test in enumerate(plate.histories[result.alloy]):
+                _write_test(group.create_group(f"tests/{n}"), test, result.predicted.get(test.name, {}))
     return path
 
 
-def _write_answer(group: Any, answer: AlloyAnswer) -> None:
+def _write_result(group: Any, result: AlloyResult) -> None:
     group.attrs.update(
         {
-            "law": answer.best.law.name if answer.identified else "",
-            "verdict": answer.verdict,
-            "reason": answer.reason,
-            "decisive": answer.decisive,
-            "notes": "\n".join(answer.notes),
+            "law": result.best.law.name if result.identified else "",
+            "verdict": result.verdict,
+            "reason": result.failure,
+            "decisive": result.decisive,
+            "notes": "\n".join(result.notes),
         }
     )
-    for k, weighed in enumerate(answer.laws):
-        _write_law(group.create_group(f"laws/{k}"), weighed)
-    if answer.identified:
-        group["rate"] = np.array([float(v) for v in answer.best.rate(STRESS)])
-        group["local_exponent"] = np.array([float(v) for v in answer.best.local_exponent(STRESS)])
-    if answer.confirmation is not None:
-        told = answer.confirmation
-        mine = group.create_group("confirmation")
-        mine.attrs.update({"holds": told.holds, "verdict": told.verdict, "using": told.using})
-        names = list(dict.fromkeys(o.output for t in told.tests for o in t.outputs))
-        mine.attrs["outputs"] = names
-        mine["chi_square"] = _grid(answer, names, "chi_square")
-        mine["difference"] = _grid(answer, names, "difference")
+    for k, weighted_law in enumerate(result.laws):
+        _write_law(group.create_group(f"laws/{k}"), weighted_law)
+    if result.identified:
+        group["rate"] = np.array([float(v) for v in result.best.rate(COMPARISON_STRESS)])
+        group["local_exponent"] = np.array([float(v) for v in result.best.local_exponent(COMPARISON_STRESS)])
+    if result.confirmation is not None:
+        confirmation = result.confirmation
+        confirmation_group = group.create_group("confirmation")
+        confirmation_group.attrs.update({"holds": confirmation.confirmed, "verdict": confirmation.verdict, "using": confirmation.predictor_name})
+        names = list(dict.fromkeys(o.output for t in confirmation.tests for o in t.outputs))
+        confirmation_group.attrs["outputs"] = names
+        confirmation_group["chi_square"] = _comparison_matrix(result, names, "chi_square")
+        confirmation_group["difference"] = _comparison_matrix(result, names, "difference")
 
 
-def _grid(answer: AlloyAnswer, names: list[str], what: str) -> Any:
+def _comparison_matrix(result: AlloyResult, names: list[str], quantity: str) -> Any:
     """(tests, outputs) of a confirmation; NaN for an output that a test has not."""
-    assert answer.confirmation is not None
-    grid = np.full((len(answer.confirmation.tests), len(names)), np.nan)
-    for row, test in zip(grid, answer.confirmation.tests, strict=True):
-        for one in test.outputs:
-            value = one.simulated.chi_square if what == "chi_square" else one.difference
-            row[names.index(one.output)] = value
-    return grid
+    assert result.confirmation is not None
+    matrix = np.full((len(result.confirmation.tests), len(names)), np.nan)
+    for row, test in zip(matrix, result.confirmation.tests, strict=True):
+        for comparison in test.outputs:
+            value = comparison.simulation_errors.chi_square if quantity == "chi_square" else comparison.rms_difference
+            row[names.index(comparison.output)] = value
+    return matrix
 
 
-def _write_law(group: Any, weighed: Weighed) -> None:
-    fit = weighed.fit
+def _write_law(group: Any, weighted_law: WeightedLaw) -> None:
+    fit = weighted_law.fit
     group.attrs.update(
-        {"law": fit.law.name, "weight": weighed.weight, "excess": weighed.excess, "converged": fit.converged}
+        {"law": fit.law.name, "weight": weighted_law.weight, "excess": weighted_law.bic_difference, "converged": fit.converged}
     )
     group.attrs["names"] = [e.name for e in fit.estimates]
     for name in ("value", "low", "high"):
@@ -93,12 +93,12 @@ def _write_law(group: Any, weighed: Weighed) -> None:
     group["u"], group["covariance"] = fit.u, fit.covariance
 
 
-def _write_test(group: Any, test: History, predicted: Outputs) -> None:
+def _write_test(group: Any, test: History, predicted: PredictedOutputs) -> None:
     temperature = float(np.mean(test.temperature_program().values))
     group.attrs.update({"name": test.name, "condition": test.condition, "temperature": temperature})
     program = test.loading.program()
     group["times"], group["used"] = test.times, test.used
     group["loading"] = np.stack([program.times, program.values], axis=1)
-    for kind, rows in (("measured", test.outputs), ("predicted", predicted)):
+    for source, rows in (("measured", test.outputs), ("predicted", predicted)):
         for name, values in rows.items():
-            group[f"{kind}/{name}"] = values
+            group[f"{source}/{name}"] = values

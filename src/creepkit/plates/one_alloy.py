@@ -8,91 +8,91 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from creepkit.errors import CreepkitError
-from creepkit.inverse.confirm import Confirmation, confirm, doubtful
+from creepkit.inverse.confirm import Confirmation, confirm, outside_domain
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.selection.equivalence import equivalents
+from creepkit.inverse.selection.equivalence import equivalent_laws
 from creepkit.inverse.selection.select import select
-from creepkit.inverse.sparsity.sparse import opened, reduced_by
+from creepkit.inverse.sparsity.sparse import identify_full, identify_reduced
 from creepkit.inverse.warmth import with_arrhenius
 from creepkit.language import CreepLaw
-from creepkit.plates.alloys import Alloy, check, remarks
-from creepkit.plates.answer import AlloyAnswer, Outputs, Weighed
-from creepkit.plates.predictors import specimen_behind
+from creepkit.plates.alloys import Alloy, check_tests, limitations
+from creepkit.plates.answer import AlloyResult, PredictedOutputs, WeightedLaw
+from creepkit.plates.predictors import underlying_specimen
 from creepkit.records import History, Predictor
 
 if TYPE_CHECKING:
-    from creepkit.plates.work import Screening
+    from creepkit.plates.work import ScreeningJob
 
 
-def screened(work: Screening, alloy: Alloy) -> AlloyAnswer:
+def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
     """The answer for one alloy; what is wrong with it is an answer too."""
-    began = time.process_time()
+    start = time.process_time()
     try:
-        check(alloy, work.using)
-        answer = _identified(work, alloy)
+        check_tests(alloy, job.predictor)
+        result = _identify_alloy(job, alloy)
     except CreepkitError as error:
-        answer = AlloyAnswer(alloy.name, reason=str(error))
-    return replace(answer, seconds=time.process_time() - began)
+        result = AlloyResult(alloy.name, failure=str(error))
+    return replace(result, cpu_seconds=time.process_time() - start)
 
 
-def _identified(work: Screening, alloy: Alloy) -> AlloyAnswer:
-    laws = [with_arrhenius(law, alloy.tests) for law in work.laws]
-    ranking = select(laws, alloy.tests, work.using, settings=work.settings, through=_through(work, laws))
-    best, found = ranking.best, list(remarks(alloy, work.using))
+def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
+    laws = [with_arrhenius(law, alloy.tests) for law in job.laws]
+    ranking = select(laws, alloy.tests, job.predictor, settings=job.settings, through=_surrogate_for(job, laws))
+    best, notes = ranking.best, list(limitations(alloy, job.predictor))
     dense = sparse = None
-    if work.dense is not None:
-        dense, sparse = _without_sparsity(work, work.dense, alloy, found)
-    confirmation = _confirmed(work, best, alloy, found)
-    predictor = work.using if confirmation is None else specimen_behind(work.using)
-    return AlloyAnswer(
+    if job.dense_law is not None:
+        dense, sparse = _fit_dense_law(job, job.dense_law, alloy, notes)
+    confirmation = _confirm_best(job, best, alloy, notes)
+    predictor = job.predictor if confirmation is None else underlying_specimen(job.predictor)
+    return AlloyResult(
         alloy.name,
-        laws=tuple(Weighed(r.fit, r.excess, r.weight) for r in ranking.laws),
-        failed=dict(ranking.failed),
+        laws=tuple(WeightedLaw(r.fit, r.excess, r.weight) for r in ranking.laws),
+        failed_laws=dict(ranking.failed),
         verdict=ranking.verdict,
-        equivalents=tuple(str(pair) for pair in equivalents(ranking)),
-        dense=dense,
-        sparse=sparse,
+        equivalents=tuple(str(pair) for pair in equivalent_laws(ranking)),
+        dense_fit=dense,
+        sparse_fit=sparse,
         confirmation=confirmation,
-        predicted=_predicted(best, alloy.tests, predictor),
-        notes=(*found, *best.notes),
+        predicted=_predict_tests(best, alloy.tests, predictor),
+        notes=(*notes, *best.notes),
     )
 
 
-def _through(work: Screening, laws: Sequence[CreepLaw]) -> Predictor | None:
+def _surrogate_for(job: ScreeningJob, laws: Sequence[CreepLaw]) -> Predictor | None:
     """The surrogate, where a law has several terms: those of one cost no more without it."""
-    return work.through if any(len(law.terms) > 1 for law in laws) else None
+    return job.surrogate if any(len(law.terms) > 1 for law in laws) else None
 
 
-def _without_sparsity(
-    work: Screening, dense: CreepLaw, alloy: Alloy, found: list[str]
+def _fit_dense_law(
+    job: ScreeningJob, dense: CreepLaw, alloy: Alloy, notes: list[str]
 ) -> tuple[Identification | None, Identification | None]:
     """The dense law, and what a penalty makes of it; a failure of these is a note, for the ranking stands."""
-    law, settings = with_arrhenius(dense, alloy.tests), work.settings
+    law, settings = with_arrhenius(dense, alloy.tests), job.settings
     try:
-        if work.penalty is None:
-            return identify(law, alloy.tests, work.using, settings=settings, through=work.through), None
-        whole, reductions = opened(law, alloy.tests, work.using, work.through, settings, None)
-        return whole, reduced_by(work.penalty, whole, reductions)
+        if job.penalty is None:
+            return identify(law, alloy.tests, job.predictor, settings=settings, through=job.surrogate), None
+        dense_fit, reductions = identify_full(law, alloy.tests, job.predictor, job.surrogate, settings, None)
+        return dense_fit, identify_reduced(job.penalty, dense_fit, reductions)
     except CreepkitError as error:
-        found.append(f"misfit without sparsity is not known: {error}")
+        notes.append(f"misfit without sparsity is not known: {error}")
         return None, None
 
 
-def _confirmed(work: Screening, best: Identification, alloy: Alloy, found: list[str]) -> Confirmation | None:
+def _confirm_best(job: ScreeningJob, best: Identification, alloy: Alloy, notes: list[str]) -> Confirmation | None:
     """The finite element run of the best law, where it is asked for or in doubt; that it failed is a note."""
-    if work.confirm is False or (work.confirm is not True and not doubtful(best)):
+    if job.confirm is False or (job.confirm is not True and not outside_domain(best)):
         return None
     try:
-        return confirm(best, alloy.tests, specimen_behind(work.using))
+        return confirm(best, alloy.tests, underlying_specimen(job.predictor))
     except CreepkitError as error:
-        found.append(f"not confirmed: {error}")
+        notes.append(f"not confirmed: {error}")
         return None
 
 
-def _predicted(best: Identification, tests: Sequence[History], using: Predictor) -> dict[str, Outputs]:
-    found = best.predict(tests, using)
+def _predict_tests(best: Identification, tests: Sequence[History], predictor: Predictor) -> dict[str, PredictedOutputs]:
+    prediction = best.predict(tests, predictor)
     return {
-        test.name: {name: found.of(k)[:, found.outputs.index(name)] for name in found.outputs if name in test.outputs}
+        test.name: {name: prediction.of(k)[:, prediction.outputs.index(name)] for name in prediction.outputs if name in test.outputs}
         for k, test in enumerate(tests)
     }

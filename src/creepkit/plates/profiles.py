@@ -8,18 +8,18 @@ import numpy as np
 
 from creepkit.arrays import Floats
 
-RADII = (0.0, 2.0, 4.0)
+PLOT_RADII = (0.0, 2.0, 4.0)
 """mm, those of Fig. 7a."""
-NEEDED = ("amplitude", "width", "shape")
+PROFILE_OUTPUTS = ("amplitude", "width", "shape")
 
 
-def displacement(outputs: Mapping[str, Floats], radius: float) -> Floats:
+def profile_displacement(outputs: Mapping[str, Floats], radius: float) -> Floats:
     """D exp(-(r / S)^p), (frames,) mm; NaN where width or shape is not above zero or was not observed."""
     amplitude = np.asarray(outputs["amplitude"], float)
     if radius == 0.0:
         return amplitude
-    missing = np.full(amplitude.shape, np.nan)
-    width, shape = (np.asarray(outputs.get(name, missing), float) for name in ("width", "shape"))
-    sound = (width > 0) & (shape > 0)
-    ratio = np.where(sound, radius / np.where(sound, width, 1.0), np.nan)
-    return np.asarray(amplitude * np.exp(-(ratio ** np.where(sound, shape, 1.0))))
+    not_observed = np.full(amplitude.shape, np.nan)
+    width, shape = (np.asarray(outputs.get(name, not_observed), float) for name in ("width", "shape"))
+    valid = (width > 0) & (shape > 0)
+    ratio = np.where(valid, radius / np.where(valid, width, 1.0), np.nan)
+    return np.asarray(amplitude * np.exp(-(ratio ** np.where(valid, shape, 1.0))))

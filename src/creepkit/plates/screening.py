@@ -12,34 +12,34 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from creepkit.dataset.pace import duration
-from creepkit.dataset.shards import Answer
-from creepkit.dataset.worker import attempt
+from creepkit.dataset.pace import duration_text
+from creepkit.dataset.shards import TaskResult
+from creepkit.dataset.worker import run_task
 from creepkit.dataset.workers import ProcessWorkers
 from creepkit.errors import FitError
-from creepkit.inverse.selection.select import FRAMES
-from creepkit.inverse.settings import Settings
-from creepkit.inverse.sparsity.penalties import Penalty, Subsets, check_penalty
+from creepkit.inverse.selection.select import SELECTION_FRAMES
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets, check_penalty
 from creepkit.language import CreepLaw
 from creepkit.plates import files
-from creepkit.plates.alloys import alloys_of
-from creepkit.plates.answer import AlloyAnswer
-from creepkit.plates.compositions import Compositions, compositions_given
-from creepkit.plates.given import folder_made, histories_given, laws_given, size_given, using_given
+from creepkit.plates.alloys import group_by_alloy
+from creepkit.plates.answer import AlloyResult
+from creepkit.plates.compositions import Compositions, resolve_compositions
+from creepkit.plates.given import make_folder, resolve_histories, resolve_laws, worker_count, resolve_predictor
 from creepkit.plates.plate import Plate
-from creepkit.plates.work import FITS, Screening
+from creepkit.plates.work import FITS_FOLDER, ScreeningJob
 from creepkit.records import History, Nuisance, Predictor
 
-Progress: TypeAlias = Callable[[str, int, int, str], None]
+ScreeningProgress: TypeAlias = Callable[[str, int, int, str], None]
 """Called with a task, alloys done, alloys in all, and a note on the time left."""
 
-LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
+CANDIDATE_LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
 """Those of Table 1 of Chen et al."""
-DENSE = "combined"
+DENSE_LAW = "combined"
 """The law of Eq. (2), to be had without sparsity."""
-DEATHS = 2
+MAX_CRASHES = 2
 """How often an alloy may kill its worker process."""
-PATIENCE = 1.0
+POLL_INTERVAL = 1.0
 """s between looks at who has died."""
 
 _log = logging.getLogger("creepkit.plates")
@@ -53,13 +53,13 @@ def screen(
     compositions: Compositions | str | Path | None = None,
     to: str | Path | None = None,
     nuisances: Sequence[Nuisance] | None = None,
-    settings: Settings | None = None,
+    settings: IdentificationSettings | None = None,
     through: Predictor | None = None,
-    dense: CreepLaw | str | None = DENSE,
-    penalty: Penalty | Subsets | None = None,
+    dense: CreepLaw | str | None = DENSE_LAW,
+    penalty: ContributionPenalty | Subsets | None = None,
     confirm: bool | Literal["when in doubt"] = "when in doubt",
     workers: int | None = None,
-    progress: Progress | None = None,
+    progress: ScreeningProgress | None = None,
 ) -> Plate:
     """Identify the law of every alloy from its tests, and set the alloys side by side.
 
@@ -79,8 +79,8 @@ def screen(
 
     An alloy that cannot be identified is recorded with the reason, and the others go on.
     """
-    tests, table = histories_given(histories, compositions), compositions_given(compositions)
-    settings = replace(settings or Settings(frames=FRAMES), weights="likelihood")
+    tests, composition_table = resolve_histories(histories, compositions), resolve_compositions(compositions)
+    settings = replace(settings or IdentificationSettings(frames=SELECTION_FRAMES), weights="likelihood")
     if nuisances is not None:
         settings = replace(settings, nuisances=tuple(nuisances))
     if penalty is not None:
@@ -91,74 +91,74 @@ def screen(
         raise FitError(f'confirm is {confirm!r}; allowed are True, False and "when in doubt"')
     with ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory()) if to is None else to
-        work = Screening(
-            alloys=alloys_of(tests), laws=laws_given(LAWS if laws is None else laws), using=using_given(using, tests),
-            through=through, settings=settings, dense=None if dense is None else laws_given([dense])[0],
-            penalty=penalty, confirm=confirm, folder=folder_made(Path(folder), FITS),
+        job = ScreeningJob(
+            alloys=group_by_alloy(tests), laws=resolve_laws(CANDIDATE_LAWS if laws is None else laws), predictor=resolve_predictor(using, tests),
+            surrogate=through, settings=settings, dense_law=None if dense is None else resolve_laws([dense])[0],
+            penalty=penalty, confirm=confirm, folder=make_folder(Path(folder), FITS_FOLDER),
         )  # fmt: skip
-        answers = _all(work, size_given(workers), progress)
-    return Plate.of(work.alloys, answers, work.using, table, None if to is None else Path(to))
+        results = _screen_all(job, worker_count(workers), progress)
+    return Plate.from_results(job.alloys, results, job.predictor, composition_table, None if to is None else Path(to))
 
 
-def _all(work: Screening, size: int, progress: Progress | None) -> list[AlloyAnswer]:
+def _screen_all(job: ScreeningJob, processes: int, progress: ScreeningProgress | None) -> list[AlloyResult]:
     """The answers for all alloys, in their order; those that are in the folder are taken from there."""
-    found = {k: answer for k in range(len(work.alloys)) if (answer := _kept(work, k)) is not None}
-    todo = [k for k in range(len(work.alloys)) if k not in found]
-    before, began = len(found), time.monotonic()
-    for done in _done(work, todo, size):
-        found[done.number], name = _told(work, done), work.alloys[done.number].name
+    results = {k: stored for k in range(len(job.alloys)) if (stored := _stored_result(job, k)) is not None}
+    pending = [k for k in range(len(job.alloys)) if k not in results]
+    stored_count, start = len(results), time.monotonic()
+    for outcome in _run_job(job, pending, processes):
+        results[outcome.number], name = _completed_result(job, outcome), job.alloys[outcome.number].name
         if progress is not None:
-            rate = (time.monotonic() - began) / (len(found) - before)
-            left = f"{duration(rate * (len(work.alloys) - len(found)))} left"
-            progress("alloys", len(found), len(work.alloys), f"{name} done, {left}")
-    return [found[k] for k in range(len(work.alloys))]
+            rate = (time.monotonic() - start) / (len(results) - stored_count)
+            time_left = f"{duration_text(rate * (len(job.alloys) - len(results)))} left"
+            progress("alloys", len(results), len(job.alloys), f"{name} done, {time_left}")
+    return [results[k] for k in range(len(job.alloys))]
 
 
-def _kept(work: Screening, number: int) -> AlloyAnswer | None:
+def _stored_result(job: ScreeningJob, number: int) -> AlloyResult | None:
     """The answer in the folder, if it is one to these tests and settings."""
-    path = work.path(number)
+    path = job.path(number)
     if not path.exists():
         return None
     try:
-        answer = files.load(path)
+        result = files.read_result(path)
     except FitError as error:
         _log.warning("%s", error)
         return None
-    return answer if answer.fingerprint == work.fingerprint(number) else None
+    return result if result.fingerprint == job.fingerprint(number) else None
 
 
-def _told(work: Screening, done: Answer) -> AlloyAnswer:
+def _completed_result(job: ScreeningJob, outcome: TaskResult) -> AlloyResult:
     """The answer that a worker left, or why it left none."""
-    if done.kind != "done":
-        return AlloyAnswer(work.alloys[done.number].name, reason=done.text)
+    if outcome.status != "done":
+        return AlloyResult(job.alloys[outcome.number].name, failure=outcome.text)
     try:
-        return files.load(work.path(done.number))
+        return files.read_result(job.path(outcome.number))
     except FitError as error:
-        return AlloyAnswer(work.alloys[done.number].name, reason=str(error))
+        return AlloyResult(job.alloys[outcome.number].name, failure=str(error))
 
 
-def _done(work: Screening, todo: Sequence[int], size: int) -> Iterator[Answer]:
+def _run_job(job: ScreeningJob, pending: Sequence[int], processes: int) -> Iterator[TaskResult]:
     """Each alloy as it is done."""
-    if min(size, len(todo)) <= 1:
-        yield from (attempt(work, number) for number in todo)
+    if min(processes, len(pending)) <= 1:
+        yield from (run_task(job, number) for number in pending)
         return
-    waiting, deaths = list(reversed(todo)), Counter[int]()
-    with ProcessWorkers(work, min(size, len(todo))) as crew:
-        left = len(todo)
-        while left:
-            while crew.free and waiting:
-                crew.submit(waiting.pop())
-            for answer in crew.answers(PATIENCE):
-                deaths[answer.number] += answer.kind == "died"
-                if answer.kind == "died" and deaths[answer.number] < DEATHS:
-                    waiting.append(answer.number)
+    queue, crashes = list(reversed(pending)), Counter[int]()
+    with ProcessWorkers(job, min(processes, len(pending))) as workers:
+        remaining = len(pending)
+        while remaining:
+            while workers.free_slots and queue:
+                workers.submit(queue.pop())
+            for outcome in workers.results(POLL_INTERVAL):
+                crashes[outcome.number] += outcome.status == "died"
+                if outcome.status == "died" and crashes[outcome.number] < MAX_CRASHES:
+                    queue.append(outcome.number)
                     continue
-                left -= 1
-                yield _in_words(answer)
+                remaining -= 1
+                yield _explained(outcome)
 
 
-def _in_words(answer: Answer) -> Answer:
-    if answer.kind != "died":
-        return answer
-    text = f"its worker process died {DEATHS} times, the last time by {answer.text}; is there memory enough?"
-    return replace(answer, text=text)
+def _explained(outcome: TaskResult) -> TaskResult:
+    if outcome.status != "died":
+        return outcome
+    text = f"its worker process died {MAX_CRASHES} times, the last time by {outcome.text}; is there memory enough?"
+    return replace(outcome, text=text)

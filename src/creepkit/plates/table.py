@@ -9,129 +9,129 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from creepkit.inverse.writing import write_text
-from creepkit.plates.answer import AlloyAnswer, chi_square, loss
+from creepkit.inverse.writing import write_text_atomically
+from creepkit.plates.answer import AlloyResult, mean_chi_square, mean_relative_squared_error
 
 if TYPE_CHECKING:
     from creepkit.plates.plate import Plate
 
-STRESS = 100.0
+COMPARISON_STRESS = 100.0
 """MPa, at which rates and local exponents of alloys are compared."""
-COLUMNS = ("alloy", "class", "law", "weight", "rate at 100 MPa, 1/s", "local exponent", "chi-square", "confirmed")
+TABLE_COLUMNS = ("alloy", "class", "law", "weight", "rate at 100 MPa, 1/s", "local exponent", "chi-square", "confirmed")
 
 
-def rows_of(plate: Plate) -> list[tuple[str, ...]]:
+def table_rows(plate: Plate) -> list[tuple[str, ...]]:
     """One row an alloy for people: COLUMNS."""
-    return [_row(plate, answer) for answer in plate.answers]
+    return [_table_row(plate, result) for result in plate.results]
 
 
-def text_of(plate: Plate) -> str:
+def screening_text(plate: Plate) -> str:
     """The table, the share of each law in each class, and what failed."""
-    rows = [COLUMNS, *rows_of(plate)]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(COLUMNS))]
+    rows = [TABLE_COLUMNS, *table_rows(plate)]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(TABLE_COLUMNS))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join([*lines, "", *summary(plate)])
+    return "\n".join([*lines, "", *summary_lines(plate)])
 
 
-def summary(plate: Plate) -> list[str]:
+def summary_lines(plate: Plate) -> list[str]:
     """What the alloys say together, and what is odd, a line each."""
-    decisive = sum(answer.decisive for answer in plate.identified)
-    lines = [f"{len(plate.identified)} of {len(plate.answers)} alloys identified, {decisive} of them decisively"]
+    decisive = sum(result.decisive for result in plate.identified)
+    lines = [f"{len(plate.identified)} of {len(plate.results)} alloys identified, {decisive} of them decisively"]
     if plate.compositions is not None:
-        for name, shares in plate.shares().items():
-            told = ", ".join(f"{law} {100 * share:.0f} %" for law, share in sorted(shares.items(), key=lambda p: -p[1]))
-            lines.append(f"{name} ({len(plate.classes()[name])}): {told}")
-    lines += [f"failed: {_beginning(alloy, reason)}" for alloy, reason in plate.failed.items()]
+        for name, law_fractions in plate.law_fractions().items():
+            fractions = ", ".join(f"{law} {100 * fraction:.0f} %" for law, fraction in sorted(law_fractions.items(), key=lambda p: -p[1]))
+            lines.append(f"{name} ({len(plate.by_class()[name])}): {fractions}")
+    lines += [f"failed: {_failure_text(alloy, reason)}" for alloy, reason in plate.failures.items()]
     for answer in plate.identified:
-        if answer.confirmation is not None and not answer.confirmation.holds:
+        if answer.confirmation is not None and not answer.confirmation.confirmed:
             lines.append(f"{answer.alloy}: {answer.confirmation.verdict}")
     return [*lines, *(f"note: {note}" for note in plate.notes)]
 
 
 def write_csv(plate: Plate, path: Path) -> Path:
     """Write the whole table; columns of parameters are those of all laws found, empty where a law has none."""
-    told = [record_of(plate, answer) for answer in plate.answers]
-    columns = list(dict.fromkeys(name for record in told for name in record))
+    rows = [result_columns(plate, result) for result in plate.results]
+    columns = list(dict.fromkeys(name for row in rows for name in row))
     columns.sort(key=lambda name: name == "notes")
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
     writer.writeheader()
-    writer.writerows(told)
-    return write_text(text.getvalue(), path)
+    writer.writerows(rows)
+    return write_text_atomically(text.getvalue(), path)
 
 
-def record_of(plate: Plate, answer: AlloyAnswer) -> dict[str, Any]:
+def result_columns(plate: Plate, result: AlloyResult) -> dict[str, Any]:
     """Everything that the CSV says of one alloy."""
-    start: dict[str, Any] = {"alloy": answer.alloy, "class": plate.class_of(answer.alloy)}
-    if not answer.identified:
-        return {**start, "tests": len(plate.histories[answer.alloy]), "notes": answer.reason}
-    fit = answer.best
-    told = {
-        **start,
-        "tests": len(plate.histories[answer.alloy]),
+    first_columns: dict[str, Any] = {"alloy": result.alloy, "class": plate.class_of(result.alloy)}
+    if not result.identified:
+        return {**first_columns, "tests": len(plate.histories[result.alloy]), "notes": result.failure}
+    fit = result.best
+    columns = {
+        **first_columns,
+        "tests": len(plate.histories[result.alloy]),
         "law": fit.law.name,
-        "weight": _digits(answer.laws[0].weight),
-        "decisive": "yes" if answer.decisive else "no",
-        "not_ruled_out": "; ".join(answer.remaining[1:]),
-        "equivalents": "; ".join(answer.equivalents),
-        **_band("rate_100MPa", fit.rate(STRESS)),
-        **_band("local_exponent_100MPa", fit.local_exponent(STRESS)),
-        "rate_strain": _digits(fit.reference.strain),
-        "rate_time_s": _digits(fit.reference.time),
-        "rate_temperature_K": _digits(fit.reference.temperature),
-        **{f"rse_{name}": _digits(e.rse) for name, e in fit.errors.items()},
-        **{f"chi_square_{name}": _digits(e.chi_square) for name, e in fit.errors.items()},
-        "confirmed": _confirmed(answer),
-        **_confirmed_misfits(answer),
-        "loss_reduced": _digits(loss(answer.reduced)),
-        "loss_dense": "" if answer.dense is None else _digits(loss(answer.dense)),
-        **({} if answer.sparse is None else {"law_by_penalty": answer.sparse.law.name}),
+        "weight": _number_text(result.laws[0].weight),
+        "decisive": "yes" if result.decisive else "no",
+        "not_ruled_out": "; ".join(result.credible_laws[1:]),
+        "equivalents": "; ".join(result.equivalents),
+        **_interval_columns("rate_100MPa", fit.rate(COMPARISON_STRESS)),
+        **_interval_columns("local_exponent_100MPa", fit.local_exponent(COMPARISON_STRESS)),
+        "rate_strain": _number_text(fit.reference.strain),
+        "rate_time_s": _number_text(fit.reference.time),
+        "rate_temperature_K": _number_text(fit.reference.temperature),
+        **{f"rse_{name}": _number_text(e.relative_squared_error) for name, e in fit.errors.items()},
+        **{f"chi_square_{name}": _number_text(e.chi_square) for name, e in fit.errors.items()},
+        "confirmed": confirmation_text(result),
+        **_confirmation_columns(result),
+        "loss_reduced": _number_text(mean_relative_squared_error(result.reduced_fit)),
+        "loss_dense": "" if result.dense_fit is None else _number_text(mean_relative_squared_error(result.dense_fit)),
+        **({} if result.sparse_fit is None else {"law_by_penalty": result.sparse_fit.law.name}),
     }
     for e in fit.estimates:
-        told |= {e.name: _digits(e.value), f"{e.name}_low": _digits(e.low), f"{e.name}_high": _digits(e.high)}
-    return {**told, "notes": "; ".join([*answer.notes, *(f"{law}: {why}" for law, why in answer.failed.items())])}
+        columns |= {e.name: _number_text(e.value), f"{e.name}_low": _number_text(e.low), f"{e.name}_high": _number_text(e.high)}
+    return {**columns, "notes": "; ".join([*result.notes, *(f"{law}: {why}" for law, why in result.failed_laws.items())])}
 
 
-def _row(plate: Plate, answer: AlloyAnswer) -> tuple[str, ...]:
-    start = (answer.alloy, plate.class_of(answer.alloy))
-    if not answer.identified:
-        return (*start, "none", *[""] * (len(COLUMNS) - 3))
-    fit = answer.best
-    names = fit.law.name + (f" or {', '.join(answer.remaining[1:])}" if len(answer.remaining) > 1 else "")
+def _table_row(plate: Plate, result: AlloyResult) -> tuple[str, ...]:
+    first_cells = (result.alloy, plate.class_of(result.alloy))
+    if not result.identified:
+        return (*first_cells, "none", *[""] * (len(TABLE_COLUMNS) - 3))
+    fit = result.best
+    names = fit.law.name + (f" or {', '.join(result.credible_laws[1:])}" if len(result.credible_laws) > 1 else "")
     return (
-        *start, names, f"{answer.laws[0].weight:.2f}", _ends(fit.rate(STRESS), 3), _ends(fit.local_exponent(STRESS), 3),
-        f"{chi_square(fit):.3g}", _confirmed(answer),
+        *first_cells, names, f"{result.laws[0].weight:.2f}", _interval_text(fit.rate(COMPARISON_STRESS), 3), _interval_text(fit.local_exponent(COMPARISON_STRESS), 3),
+        f"{mean_chi_square(fit):.3g}", confirmation_text(result),
     )  # fmt: skip
 
 
-def _ends(band: Sequence[Any], digits: int) -> str:
-    value, low, high = (float(v) for v in band)
+def _interval_text(interval: Sequence[Any], digits: int) -> str:
+    value, low, high = (float(v) for v in interval)
     return f"{value:.{digits}g} [{low:.{digits}g}, {high:.{digits}g}]"
 
 
-def _band(name: str, band: Sequence[Any]) -> dict[str, str]:
-    return {f"{name}{end}": _digits(float(v)) for end, v in zip(("", "_low", "_high"), band, strict=True)}
+def _interval_columns(name: str, interval: Sequence[Any]) -> dict[str, str]:
+    return {f"{name}{suffix}": _number_text(float(v)) for suffix, v in zip(("", "_low", "_high"), interval, strict=True)}
 
 
-def _confirmed(answer: AlloyAnswer) -> str:
-    if answer.confirmation is None:
+def confirmation_text(result: AlloyResult) -> str:
+    if result.confirmation is None:
         return ""
-    return "yes" if answer.confirmation.holds else "no"
+    return "yes" if result.confirmation.confirmed else "no"
 
 
-def _confirmed_misfits(answer: AlloyAnswer) -> dict[str, str]:
+def _confirmation_columns(result: AlloyResult) -> dict[str, str]:
     """{confirmed_chi_square_...}: of the simulation, the mean over tests."""
-    found: dict[str, list[float]] = {}
-    for test in answer.confirmation.tests if answer.confirmation is not None else ():
-        for one in test.outputs:
-            found.setdefault(f"confirmed_chi_square_{one.output}", []).append(one.simulated.chi_square)
-    return {name: _digits(sum(values) / len(values)) for name, values in found.items()}
+    chi_squares: dict[str, list[float]] = {}
+    for test in result.confirmation.tests if result.confirmation is not None else ():
+        for comparison in test.outputs:
+            chi_squares.setdefault(f"confirmed_chi_square_{comparison.output}", []).append(comparison.simulation_errors.chi_square)
+    return {name: _number_text(sum(values) / len(values)) for name, values in chi_squares.items()}
 
 
-def _digits(number: float) -> str:
+def _number_text(number: float) -> str:
     return "" if math.isnan(number) else f"{number:.7g}"
 
 
-def _beginning(alloy: str, reason: str) -> str:
+def _failure_text(alloy: str, failure: str) -> str:
     """The reason, after the alloy's name where it does not say it itself."""
-    return reason if f"'{alloy}'" in reason else f"alloy '{alloy}': {reason}"
+    return failure if f"'{alloy}'" in failure else f"alloy '{alloy}': {failure}"

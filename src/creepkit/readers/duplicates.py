@@ -10,7 +10,7 @@ import numpy as np
 from creepkit.records import History, Program
 
 
-def duplicates(
+def duplicate_tests(
     histories: Sequence[History], *, time_rounding: float = 1e-5, output_rounding: float = 1e-4
 ) -> list[tuple[str, str]]:
     """Return the names of every two histories that are one test: same condition, same end.
@@ -29,8 +29,8 @@ def _same_test(a: History, b: History, time_rounding: float, output_rounding: fl
         return False
     if not all(np.isclose(a.outputs[k][-1], b.outputs[k][-1], rtol=output_rounding, atol=0.0) for k in a.outputs):
         return False
-    return _same(a.loading.program(), b.loading.program()) and _same(a.temperature_program(), b.temperature_program())
+    return _same_program(a.loading.program(), b.loading.program()) and _same_program(a.temperature_program(), b.temperature_program())
 
 
-def _same(a: Program, b: Program) -> bool:
+def _same_program(a: Program, b: Program) -> bool:
     return a.times.shape == b.times.shape and np.allclose(a.times, b.times) and np.allclose(a.values, b.values)

@@ -21,14 +21,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from creepkit.readers.assemble import assemble
+from creepkit.readers.assemble import assemble_history
 from creepkit.readers.tables import peek_columns, read_table
-from creepkit.readers.words import Words
+from creepkit.readers.words import HeaderVocabulary
 from creepkit.records import History
 
 
 @dataclass(frozen=True)
-class HistoryCsv:
+class HistoryCsvReader:
     """Reader of files that hold one history each.
 
     columns : columns by which a file of this laboratory is recognised; () accepts every CSV file.
@@ -38,7 +38,7 @@ class HistoryCsv:
     name: str
     title: str
     columns: tuple[str, ...] = ()
-    words: Words = field(default_factory=Words)
+    vocabulary: HeaderVocabulary = field(default_factory=HeaderVocabulary)
 
     def accepts(self, path: Path) -> bool:
         """Say whether `path` is a CSV file with the columns."""
@@ -49,7 +49,7 @@ class HistoryCsv:
     def read(self, path: Path) -> list[History]:
         """Return the one history in the file."""
         table = read_table(path)
-        return [assemble(path.stem, table.head, table, self.words, place=str(path), source=str(path))]
+        return [assemble_history(path.stem, table.header, table, self.vocabulary, location=str(path), source=str(path))]
 
 
-CSV = HistoryCsv("csv", "one history a file: `# key: value` lines, then columns such as time_s,strain")
+HISTORY_CSV = HistoryCsvReader("csv", "one history a file: `# key: value` lines, then columns such as time_s,strain")

@@ -8,13 +8,13 @@ from glob import glob
 from pathlib import Path
 
 from creepkit.errors import HistoryError, nearest
-from creepkit.readers.history_csv import CSV
+from creepkit.readers.history_csv import HISTORY_CSV
 from creepkit.records import History, Reader
 
-Paths = str | Path | Iterable[str | Path]
+PathsLike = str | Path | Iterable[str | Path]
 
 
-def read_histories(paths: Paths, readers: Sequence[Reader], reader: str | None = None) -> list[History]:
+def read_histories(paths: PathsLike, readers: Sequence[Reader], reader: str | None = None) -> list[History]:
     """Read the histories in files, folders and glob patterns, in the order given and sorted within each.
 
     reader : the name of the reader to use; None asks each of `readers` which files it accepts. The general `csv`
@@ -23,38 +23,38 @@ def read_histories(paths: Paths, readers: Sequence[Reader], reader: str | None =
     folder in front.
     """
     if reader is not None:
-        readers = [_named(reader, readers)]
+        readers = [_reader_named(reader, readers)]
     read: dict[tuple[str, str], tuple[Path, History]] = {}
-    for path in _expanded(paths):
-        for source in _sources(path, readers):
+    for path in _existing_paths(paths):
+        for source in _readable_paths(path, readers):
             for history in _reader_of(source, readers).read(source):
                 read.setdefault((history.source or str(source), history.name), (source, history))
-    return _distinguished(list(read.values()))
+    return _with_unique_names(list(read.values()))
 
 
-def _named(name: str, readers: Sequence[Reader]) -> Reader:
+def _reader_named(name: str, readers: Sequence[Reader]) -> Reader:
     known = {reader.name: reader for reader in readers}
     if name not in known:
         raise HistoryError(f"no reader is called '{name}'; {nearest(name, known)}")
     return known[name]
 
 
-def _expanded(paths: Paths) -> list[Path]:
+def _existing_paths(paths: PathsLike) -> list[Path]:
     """The paths that exist, with `~` and patterns expanded, each once."""
-    given = [paths] if isinstance(paths, (str, Path)) else list(paths)
-    if not given:
+    path_list = [paths] if isinstance(paths, (str, Path)) else list(paths)
+    if not path_list:
         raise HistoryError("no file, folder or pattern was given to read histories from")
-    found: dict[Path, None] = {}
-    for item in given:
+    results: dict[Path, None] = {}
+    for item in path_list:
         path = Path(item).expanduser()
         matches = [path] if path.exists() else [Path(match) for match in sorted(glob(str(path)))]
         if not matches:
             raise HistoryError(f"{path}: no such file or folder, and no file matches it as a pattern")
-        found.update(dict.fromkeys(matches))
-    return list(found)
+        results.update(dict.fromkeys(matches))
+    return list(results)
 
 
-def _sources(path: Path, readers: Sequence[Reader]) -> list[Path]:
+def _readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
     """What to read for a path: itself, or the files in a folder that no reader accepts as a whole."""
     if path.is_file() or any(reader.accepts(path) for reader in readers):
         return [path]
@@ -66,19 +66,19 @@ def _reader_of(path: Path, readers: Sequence[Reader]) -> Reader:
     """The one reader for a path; a reader without rivals is not asked."""
     if len(readers) == 1:
         return readers[0]
-    willing = [reader for reader in readers if reader.accepts(path)]
-    if len(willing) > 1:
-        willing = [reader for reader in willing if reader is not CSV]
-    if not willing:
-        known = "; ".join(f"{reader.name}: {reader.title}" for reader in readers)
-        raise HistoryError(f"{path}: no reader understands it; known are {known or 'none'}")
-    if len(willing) > 1:
-        names = " and ".join(f"'{reader.name}'" for reader in willing)
+    accepting = [reader for reader in readers if reader.accepts(path)]
+    if len(accepting) > 1:
+        accepting = [reader for reader in accepting if reader is not HISTORY_CSV]
+    if not accepting:
+        reader_list = "; ".join(f"{reader.name}: {reader.title}" for reader in readers)
+        raise HistoryError(f"{path}: no reader understands it; known are {reader_list or 'none'}")
+    if len(accepting) > 1:
+        names = " and ".join(f"'{reader.name}'" for reader in accepting)
         raise HistoryError(f"{path}: the readers {names} both accept it; say which one with reader=")
-    return willing[0]
+    return accepting[0]
 
 
-def _distinguished(read: Sequence[tuple[Path, History]]) -> list[History]:
+def _with_unique_names(read: Sequence[tuple[Path, History]]) -> list[History]:
     """The histories with names of their own: the folder's name in front where a name comes twice."""
     counts = Counter(history.name for _, history in read)
     histories = [

@@ -14,22 +14,22 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 @dataclass(frozen=True)
-class Entry:
+class SourceText:
     """One piece of text and its place, 'file:line'."""
 
     text: str
-    place: str
+    location: str
 
     def number(self, name: str) -> float:
         """The text as a finite number; `name` says in the error what it was meant to be."""
         if not _NUMBER.fullmatch(self.text):
-            found = f"'{self.text}'" if self.text else "empty"
-            raise HistoryError(f"{self.place}: '{name}' is {found}; write a finite number such as 1.5e-3")
+            description = f"'{self.text}'" if self.text else "empty"
+            raise HistoryError(f"{self.location}: '{name}' is {description}; write a finite number such as 1.5e-3")
         return float(self.text)
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """The cells of one line of a table."""
 
     line: int
@@ -37,66 +37,66 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Table:
+class TextTable:
     """A file as it was written: the entries of its head, its columns, its rows; all still text."""
 
     path: Path
-    head: Mapping[str, Entry]
+    header: Mapping[str, SourceText]
     columns: Sequence[str]
     columns_line: int
-    rows: Sequence[Row]
+    rows: Sequence[TableRow]
 
-    def place(self, line: int) -> str:
+    def location(self, line_number: int) -> str:
         """Where a line stands, 'file:line'."""
-        return f"{self.path}:{line}"
+        return f"{self.path}:{line_number}"
 
     def column(self, name: str) -> int:
         """The number of a column that must be there."""
         if name not in self.columns:
-            found = ", ".join(self.columns)
-            raise HistoryError(f"{self.place(self.columns_line)}: missing column '{name}'; found: {found}")
+            result = ", ".join(self.columns)
+            raise HistoryError(f"{self.location(self.columns_line)}: missing column '{name}'; found: {result}")
         return self.columns.index(name)
 
     def numbers(self, name: str) -> list[float]:
         """One column as numbers."""
         k = self.column(name)
-        return [Entry(row.cells[k], self.place(row.line)).number(name) for row in self.rows]
+        return [SourceText(row.cells[k], self.location(row.line)).number(name) for row in self.rows]
 
-    def entries(self, row: Row) -> dict[str, Entry]:
+    def entries(self, row: TableRow) -> dict[str, SourceText]:
         """The cells of one row by column, those left empty excepted."""
-        place = self.place(row.line)
-        return {name: Entry(cell, place) for name, cell in zip(self.columns, row.cells, strict=True) if cell}
+        place = self.location(row.line)
+        return {name: SourceText(cell, place) for name, cell in zip(self.columns, row.cells, strict=True) if cell}
 
-    def with_rows(self, rows: Sequence[Row]) -> Table:
+    def with_rows(self, rows: Sequence[TableRow]) -> TextTable:
         """The same table with other rows."""
         return replace(self, rows=tuple(rows))
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path) -> TextTable:
     """Read a CSV file: UTF-8, commas, at most one head of `# key: value` lines, one line of columns, then rows."""
     lines = _lines(path)
     start = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), None)
     if start is None:
-        what = "holds a header but no table" if any(line.strip() for line in lines) else "is empty"
-        raise HistoryError(f"{path}: the file {what}; write a line of columns such as time_s,strain, then rows")
+        problem = "holds a header but no table" if any(line.strip() for line in lines) else "is empty"
+        raise HistoryError(f"{path}: the file {problem}; write a line of columns such as time_s,strain, then rows")
     columns = _cells(path, start + 1, lines[start])
     _check_columns(f"{path}:{start + 1}", columns)
-    body = ((number, line) for number, line in enumerate(lines[start + 1 :], start + 2) if line.strip())
-    rows = tuple(Row(number, _cells(path, number, line)) for number, line in body)
+    numbered_lines = ((number, line) for number, line in enumerate(lines[start + 1 :], start + 2) if line.strip())
+    rows = tuple(TableRow(number, _cells(path, number, line)) for number, line in numbered_lines)
     for row in rows:
         if len(row.cells) != len(columns):
-            found = f"number of cells {len(row.cells)}, of columns {len(columns)}"
-            raise HistoryError(f"{path}:{row.line}: {found}; write one cell a column, separated by commas")
+            description = f"number of cells {len(row.cells)}, of columns {len(columns)}"
+            raise HistoryError(f"{path}:{row.line}: {description}; write one cell a column, separated by commas")
     if not rows:
         raise HistoryError(f"{path}:{start + 1}: no rows below the line of columns; a table needs at least one")
-    return Table(path, _head(path, lines[:start]), columns, start + 1, rows)
+    return TextTable(path, _header(path, lines[:start]), columns, start + 1, rows)
 
 
-def peek_columns(path: Path, size: int = 65536) -> tuple[str, ...]:
+def peek_columns(path: Path, byte_limit: int = 65536) -> tuple[str, ...]:
     """The columns of a file as far as its beginning tells, () when it has none; never raises for what it holds."""
     try:
         with path.open("rb") as stream:
-            text = stream.read(size).decode("utf-8-sig", errors="replace")
+            text = stream.read(byte_limit).decode("utf-8-sig", errors="replace")
     except OSError:
         return ()
     lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
@@ -111,8 +111,8 @@ def _lines(path: Path) -> list[str]:
         raise HistoryError(f"{path}: cannot be read ({error.strerror or error})") from error
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
-        found = f"byte 0x{error.object[error.start]:02x} is not text in UTF-8"
-        raise HistoryError(f"{path}:{line}: {found}; save the table as CSV in UTF-8") from error
+        description = f"byte 0x{error.object[error.start]:02x} is not text in UTF-8"
+        raise HistoryError(f"{path}:{line}: {description}; save the table as CSV in UTF-8") from error
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
@@ -124,24 +124,24 @@ def _cells(path: Path, number: int, line: str) -> tuple[str, ...]:
         raise HistoryError(f"{path}:{number}: not a line of a CSV table ({error}); look for stray quotes") from error
 
 
-def _head(path: Path, lines: Sequence[str]) -> dict[str, Entry]:
+def _header(path: Path, lines: Sequence[str]) -> dict[str, SourceText]:
     """The `# key: value` lines; a `#` line without a colon is a remark."""
-    head: dict[str, Entry] = {}
+    header: dict[str, SourceText] = {}
     for number, line in enumerate(lines, 1):
         key, colon, text = line.strip().removeprefix("#").partition(":")
         key = key.strip()
         if not colon:
             continue
-        if key in head:
-            first = head[key].place.rpartition(":")[2]
+        if key in header:
+            first = header[key].location.rpartition(":")[2]
             raise HistoryError(f"{path}:{number}: '{key}' was already given in line {first}; keep one of them")
-        head[key] = Entry(text.strip(), f"{path}:{number}")
-    return head
+        header[key] = SourceText(text.strip(), f"{path}:{number}")
+    return header
 
 
-def _check_columns(place: str, columns: Sequence[str]) -> None:
+def _check_columns(location: str, columns: Sequence[str]) -> None:
     for name in columns:
         if not name:
-            raise HistoryError(f"{place}: a column has no name; name every column, such as time_s,strain")
+            raise HistoryError(f"{location}: a column has no name; name every column, such as time_s,strain")
         if columns.count(name) > 1:
-            raise HistoryError(f"{place}: the column '{name}' stands there twice; keep one of them")
+            raise HistoryError(f"{location}: the column '{name}' stands there twice; keep one of them")

@@ -11,54 +11,54 @@ from creepkit.records import ZERO_CELSIUS
 
 
 @dataclass(frozen=True)
-class Unit:
+class UnitConversion:
     """How a number in some unit becomes creepkit's own: factor * number + shift."""
 
     factor: float
-    shift: float = 0.0
+    offset: float = 0.0
 
 
 @dataclass(frozen=True)
-class Kind:
+class QuantityKind:
     """A kind of quantity: the unit suffixes it may carry (creepkit's own first) and the values that make sense.
 
     low, high : the values, in creepkit's unit, that bound the sensible ones; both excluded when `open`.
     """
 
     name: str
-    units: Mapping[str, Unit]
+    units: Mapping[str, UnitConversion]
     low: float = -1e30
     high: float = 1e30
-    open: bool = False
+    open_interval: bool = False
 
-    def unit(self, suffix: str, place: str, name: str) -> Unit:
+    def unit(self, suffix: str, location: str, name: str) -> UnitConversion:
         """Return the unit that a suffix means; `name` and `place` say in the error what was read and where."""
         if suffix not in self.units:
-            raise HistoryError(f"{place}: {self._complaint(name, suffix)}; allowed: {self._spellings(name, suffix)}")
+            raise HistoryError(f"{location}: {self._unit_error(name, suffix)}; allowed: {self._spellings(name, suffix)}")
         return self.units[suffix]
 
-    def convert(self, number: float, suffix: str, place: str, name: str) -> float:
+    def convert(self, number: float, suffix: str, location: str, name: str) -> float:
         """Return `number` in creepkit's unit."""
-        unit = self.unit(suffix, place, name)
-        value = unit.factor * number + unit.shift
-        inside = self.low < value < self.high if self.open else self.low <= value <= self.high
-        if not (math.isfinite(value) and inside):
-            raise HistoryError(f"{place}: '{name}' is {number:g}; a {self.name} must lie {self.range}")
+        unit = self.unit(suffix, location, name)
+        value = unit.factor * number + unit.offset
+        is_inside = self.low < value < self.high if self.open_interval else self.low <= value <= self.high
+        if not (math.isfinite(value) and is_inside):
+            raise HistoryError(f"{location}: '{name}' is {number:g}; a {self.name} must lie {self.range_text}")
         return value
 
     @property
-    def range(self) -> str:
+    def range_text(self) -> str:
         """The sensible values in words."""
         unit = next(iter(self.units))
-        words = ("above {} and below {}" if self.open else "from {} to {}").format(f"{self.low:g}", f"{self.high:g}")
-        return f"{words} {unit}".rstrip()
+        template = ("above {} and below {}" if self.open_interval else "from {} to {}").format(f"{self.low:g}", f"{self.high:g}")
+        return f"{template} {unit}".rstrip()
 
-    def spread(self) -> Kind:
+    def standard_deviation(self) -> QuantityKind:
         """The kind of a standard deviation of this quantity: same units, above zero."""
-        units = {suffix: Unit(unit.factor) for suffix, unit in self.units.items()}
-        return replace(self, name=f"standard deviation of a {self.name}", units=units, low=0.0, open=True)
+        units = {suffix: UnitConversion(unit.factor) for suffix, unit in self.units.items()}
+        return replace(self, name=f"standard deviation of a {self.name}", units=units, low=0.0, open_interval=True)
 
-    def _complaint(self, name: str, suffix: str) -> str:
+    def _unit_error(self, name: str, suffix: str) -> str:
         return f"the unit '{suffix}' of '{name}' is not understood" if suffix else f"'{name}' has no unit"
 
     def _spellings(self, name: str, suffix: str) -> str:
@@ -68,26 +68,26 @@ class Kind:
         return ", ".join(f"{stem}_{unit}" if unit else stem for unit in self.units)
 
 
-TIME = Kind("time", {"s": Unit(1.0), "min": Unit(60.0), "h": Unit(3600.0), "d": Unit(86400.0)}, low=0.0)
-LENGTH = Kind("length", {"mm": Unit(1.0), "um": Unit(1e-3), "m": Unit(1e3)})
-STRAIN = Kind("strain", {"": Unit(1.0), "pct": Unit(1e-2), "percent": Unit(1e-2)})
-NUMBER = Kind("number", {"": Unit(1.0)})
-STRESS = Kind(
+TIME = QuantityKind("time", {"s": UnitConversion(1.0), "min": UnitConversion(60.0), "h": UnitConversion(3600.0), "d": UnitConversion(86400.0)}, low=0.0)
+LENGTH = QuantityKind("length", {"mm": UnitConversion(1.0), "um": UnitConversion(1e-3), "m": UnitConversion(1e3)})
+STRAIN = QuantityKind("strain", {"": UnitConversion(1.0), "pct": UnitConversion(1e-2), "percent": UnitConversion(1e-2)})
+NUMBER = QuantityKind("number", {"": UnitConversion(1.0)})
+STRESS = QuantityKind(
     "stress",
-    {"MPa": Unit(1.0), "kPa": Unit(1e-3), "GPa": Unit(1e3), "bar": Unit(0.1), "ksi": Unit(6.894757293168361)},
+    {"MPa": UnitConversion(1.0), "kPa": UnitConversion(1e-3), "GPa": UnitConversion(1e3), "bar": UnitConversion(0.1), "ksi": UnitConversion(6.894757293168361)},
     low=0.0,
     high=1e5,
 )
 SIGNED_STRESS = replace(STRESS, low=-1e5)
-MODULUS = Kind("modulus", {"MPa": Unit(1.0), "GPa": Unit(1e3), "ksi": Unit(6.894757293168361)}, 0.0, 1e8, open=True)
-POISSON = Kind("Poisson's ratio", NUMBER.units, low=-1.0, high=0.5, open=True)
-TEMPERATURE = Kind("temperature", {"K": Unit(1.0), "C": Unit(1.0, ZERO_CELSIUS)}, low=0.0, high=1e4, open=True)
-FLAG = Kind("flag", NUMBER.units, low=0.0, high=1.0)
+MODULUS = QuantityKind("modulus", {"MPa": UnitConversion(1.0), "GPa": UnitConversion(1e3), "ksi": UnitConversion(6.894757293168361)}, 0.0, 1e8, open_interval=True)
+POISSON = QuantityKind("Poisson's ratio", NUMBER.units, low=-1.0, high=0.5, open_interval=True)
+TEMPERATURE = QuantityKind("temperature", {"K": UnitConversion(1.0), "C": UnitConversion(1.0, ZERO_CELSIUS)}, low=0.0, high=1e4, open_interval=True)
+FLAG = QuantityKind("flag", NUMBER.units, low=0.0, high=1.0)
 
 
-def split(name: str, known: Mapping[str, Kind]) -> tuple[str, str] | None:
+def split_unit(name: str, kinds: Mapping[str, QuantityKind]) -> tuple[str, str] | None:
     """Split `stress_MPa` into the longest known quantity and the unit behind it; None when it begins with none."""
-    for quantity in sorted(known, key=len, reverse=True):
+    for quantity in sorted(kinds, key=len, reverse=True):
         if name == quantity or name.startswith(f"{quantity}_"):
             return quantity, name[len(quantity) + 1 :]
     return None

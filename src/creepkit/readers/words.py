@@ -17,11 +17,11 @@ from creepkit.readers.units import (
     STRESS,
     TEMPERATURE,
     TIME,
-    Kind,
+    QuantityKind,
 )
 from creepkit.records import COMPONENTS
 
-OUTPUTS: Mapping[str, Mapping[str, Kind]] = {
+SPECIMEN_OUTPUTS: Mapping[str, Mapping[str, QuantityKind]] = {
     "uniaxial": {"strain": STRAIN},
     "bulge": {"amplitude": LENGTH, "width": LENGTH, "shape": NUMBER},
     "relaxation": {"stress": STRESS},
@@ -33,14 +33,14 @@ OUTPUTS: Mapping[str, Mapping[str, Kind]] = {
 }
 """What each specimen's outputs are called, and of which kind they are."""
 
-TELLING = ("uniaxial", "bulge")
+IDENTIFIABLE_SPECIMENS = ("uniaxial", "bulge")
 """Specimens that a file need not name: their outputs tell."""
 
-IMPOSED: Mapping[str, Kind] = {"stress": STRESS, "pressure": STRESS, "temperature": TEMPERATURE}
+LOADING_KINDS: Mapping[str, QuantityKind] = {"stress": STRESS, "pressure": STRESS, "temperature": TEMPERATURE}
 """What may be imposed on a specimen: a number, `_steps`, a `_program`, or a column."""
 
-CONDITIONS: Mapping[str, Kind] = {
-    **IMPOSED,
+CONDITION_KINDS: Mapping[str, QuantityKind] = {
+    **LOADING_KINDS,
     **{f"{quantity}_{k}": STRESS for quantity in ("stress", "pressure") for k in (1, 2)},
     **dict.fromkeys(("jump_time", "end_time", "ramp", "rupture"), TIME),
     "modulus": MODULUS,
@@ -48,30 +48,30 @@ CONDITIONS: Mapping[str, Kind] = {
 }
 """Numbers that stand once for a whole test."""
 
-IMPOSED_STRAINS: Mapping[str, Kind] = {"strain": STRAIN}
+STRAIN_LOADING_KINDS: Mapping[str, QuantityKind] = {"strain": STRAIN}
 """What may be imposed on a bar in relaxation: `_steps` or a `_program` alone, for its number would be an output."""
 
-COMPONENTS_IMPOSED: Mapping[str, Kind] = {
+COMPONENT_LOADING_KINDS: Mapping[str, QuantityKind] = {
     **{f"stress_{c}": SIGNED_STRESS for c in COMPONENTS},
     **{f"strain_{c}": STRAIN for c in COMPONENTS},
 }
 """What may be imposed on a material point: `_steps` or a `_program`."""
 
-TEXTS = frozenset(
-    [f"{q}_{form}" for q in (*IMPOSED, *IMPOSED_STRAINS, *COMPONENTS_IMPOSED) for form in ("steps", "program")]
+TEXT_KEYS = frozenset(
+    [f"{q}_{form}" for q in (*LOADING_KINDS, *STRAIN_LOADING_KINDS, *COMPONENT_LOADING_KINDS) for form in ("steps", "program")]
     + ["name", "alloy", "specimen", "operator", "control", "strain_measure", "includes_elastic", "ended"]
 )
 """Words that stand once for a whole test; every other key becomes a label."""
 
-SPECIMEN_NAME = re.compile(r"[a-z][a-z0-9_-]*")
+SPECIMEN_NAME_PATTERN = re.compile(r"[a-z][a-z0-9_-]*")
 """What the name of a specimen looks like; any other text after `specimen` is a label."""
 
-CREEP_MACHINE: Mapping[str, str] = {"control": "load", "strain_measure": "engineering", "includes_elastic": "no"}
+CREEP_MACHINE_DEFAULTS: Mapping[str, str] = {"control": "load", "strain_measure": "engineering", "includes_elastic": "no"}
 """What a creep machine with a dead load and an extensometer records, unless the file says otherwise."""
 
 
 @dataclass(frozen=True)
-class Words:
+class HeaderVocabulary:
     """How a laboratory names things.
 
     rename : {its name: ours}, for columns and conditions alike, such as {"youngs_MPa": "modulus_MPa"}.
@@ -82,25 +82,25 @@ class Words:
         rupture times such a word may stand in the place of a number.
     """
 
-    rename: Mapping[str, str] = field(default_factory=dict)
-    assumed: Mapping[str, str] = field(default_factory=lambda: CREEP_MACHINE)
-    averaged: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    outputs: Mapping[str, Mapping[str, Kind]] = field(default_factory=lambda: OUTPUTS)
-    endings: Mapping[str, str] = field(default_factory=dict)
+    synonyms: Mapping[str, str] = field(default_factory=dict)
+    default_texts: Mapping[str, str] = field(default_factory=lambda: CREEP_MACHINE_DEFAULTS)
+    averaged_columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    outputs: Mapping[str, Mapping[str, QuantityKind]] = field(default_factory=lambda: SPECIMEN_OUTPUTS)
+    end_of_test_terms: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def conditions(self) -> dict[str, Kind]:
+    def condition_kinds(self) -> dict[str, QuantityKind]:
         """The kinds of all numbers that stand once for a test."""
-        return {**CONDITIONS, **self._spreads()}
+        return {**CONDITION_KINDS, **self._standard_deviation_kinds()}
 
     @property
-    def columns(self) -> dict[str, Kind]:
+    def column_kinds(self) -> dict[str, QuantityKind]:
         """The kinds of all columns of frames."""
-        return {"time": TIME, **self.observed(), **self._spreads(), **IMPOSED, "used": FLAG}
+        return {"time": TIME, **self.output_kinds(), **self._standard_deviation_kinds(), **LOADING_KINDS, "used": FLAG}
 
-    def observed(self) -> dict[str, Kind]:
+    def output_kinds(self) -> dict[str, QuantityKind]:
         """The outputs of all specimens."""
         return {name: kind for outputs in self.outputs.values() for name, kind in outputs.items()}
 
-    def _spreads(self) -> dict[str, Kind]:
-        return {f"{name}_sd": kind.spread() for name, kind in self.observed().items()}
+    def _standard_deviation_kinds(self) -> dict[str, QuantityKind]:
+        return {f"{name}_sd": kind.standard_deviation() for name, kind in self.output_kinds().items()}

@@ -10,8 +10,8 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
-from creepkit.readers.units import LENGTH, Kind
-from creepkit.readers.words import SPECIMEN_NAME, Words
+from creepkit.readers.units import LENGTH, QuantityKind
+from creepkit.readers.words import SPECIMEN_NAME_PATTERN, HeaderVocabulary
 from creepkit.records import (
     History,
     PointLoading,
@@ -33,9 +33,9 @@ def write_history(history: History, path: str | Path) -> Path:
     path = Path(path)
     try:
         with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
-            whole = Path(folder) / path.name
-            whole.write_text(text, encoding="utf-8", newline="\n")
-            whole.replace(path)
+            temporary_file = Path(folder) / path.name
+            temporary_file.write_text(text, encoding="utf-8", newline="\n")
+            temporary_file.replace(path)
     except OSError as error:
         raise HistoryError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
     return path
@@ -45,31 +45,31 @@ def history_text(history: History) -> str:
     """The text of the CSV file of a history; HistoryError when it could not be read back."""
     if history.times.size < 2:
         raise HistoryError(f"history '{history.name}' has one frame; at least two can be written and read back")
-    columns = dict(_columns(history, Words().observed()))
+    columns = dict(_frame_columns(history, HeaderVocabulary().output_kinds()))
     for name, values in columns.items():
         if not np.isfinite(values).all():
             raise HistoryError(f"history '{history.name}': '{name}' holds a number that is not finite; drop that frame")
-    lines = [f"# {key}: {_line(history, text)}" for key, text in _head(history)]
+    lines = [f"# {key}: {_one_line(history, text)}" for key, text in _header_lines(history)]
     lines.append(",".join(columns))
-    lines += [",".join(map(_digits, row)) for row in zip(*columns.values(), strict=True)]
+    lines += [",".join(map(_number_text, row)) for row in zip(*columns.values(), strict=True)]
     return "\n".join(lines) + "\n"
 
 
-def _head(history: History) -> Iterator[tuple[str, str]]:
+def _header_lines(history: History) -> Iterator[tuple[str, str]]:
     """Key and text of every line of the head."""
     yield "name", history.name
-    if not SPECIMEN_NAME.fullmatch(history.specimen):
+    if not SPECIMEN_NAME_PATTERN.fullmatch(history.specimen):
         raise HistoryError(f"history '{history.name}': specimen '{history.specimen}' is not a name in small letters")
     yield "specimen", history.specimen
     if history.alloy:
         yield "alloy", history.alloy
-    yield from _loading(history)
-    yield from _temperature(history)
-    yield from _elastic(history)
+    yield from _loading_lines(history)
+    yield from _temperature_lines(history)
+    yield from _elastic_lines(history)
     yield "strain_measure", history.strain_measure
     yield "includes_elastic", "yes" if history.includes_elastic else "no"
     if history.rupture_time is not None:
-        yield "rupture_s", _digits(history.rupture_time)
+        yield "rupture_s", _number_text(history.rupture_time)
     if history.unruptured:
         yield "ended", "stopped"
     if history.operator:
@@ -77,43 +77,43 @@ def _head(history: History) -> Iterator[tuple[str, str]]:
     for key, value in history.geometry.items():
         # A bare number is read as it stands, but a name that ends in a unit would lose it.
         unit = "_mm" if key.rpartition("_")[2] in LENGTH.units else ""
-        yield f"geometry {_key(history, key)}{unit}", _digits(value)
+        yield f"geometry {_header_key(history, key)}{unit}", _number_text(value)
     for key, text in history.labels.items():
-        yield f"label {_key(history, key)}", text
+        yield f"label {_header_key(history, key)}", text
 
 
-def _loading(history: History) -> Iterator[tuple[str, str]]:
+def _loading_lines(history: History) -> Iterator[tuple[str, str]]:
     loading = history.loading
     if isinstance(loading, PressureJump):
-        yield "pressure_1_MPa", _digits(loading.P1)
-        yield "pressure_2_MPa", _digits(loading.P2)
-        yield "jump_time_s", _digits(loading.Tj)
-        yield "ramp_s", _digits(loading.ramp)
+        yield "pressure_1_MPa", _number_text(loading.P1)
+        yield "pressure_2_MPa", _number_text(loading.P2)
+        yield "jump_time_s", _number_text(loading.Tj)
+        yield "ramp_s", _number_text(loading.ramp)
     elif isinstance(loading, StressSteps) and len(loading.steps) == 1:
-        yield "stress_MPa", _digits(loading.steps[0][1])
+        yield "stress_MPa", _number_text(loading.steps[0][1])
     elif isinstance(loading, StressSteps):
-        yield "stress_steps", _pairs(loading.steps, "MPa")
+        yield "stress_steps", _pairs_text(loading.steps, "MPa")
     elif isinstance(loading, PointLoading):
-        yield from ((f"stress_{name}_program", _program(p, "MPa")) for name, p in loading.stress.items())
-        yield from ((f"strain_{name}_program", _program(p, "")) for name, p in loading.strain.items())
+        yield from ((f"stress_{name}_program", _program_text(p, "MPa")) for name, p in loading.stress.items())
+        yield from ((f"strain_{name}_program", _program_text(p, "")) for name, p in loading.strain.items())
     elif isinstance(loading, StrainSteps) and loading.ramp == 0.0:
-        yield "strain_steps", _pairs(loading.steps, "")
+        yield "strain_steps", _pairs_text(loading.steps, "")
     elif loading.quantity == "strain":
-        yield "strain_program", _program(loading.program(), "")
+        yield "strain_program", _program_text(loading.program(), "")
     else:
-        yield f"{loading.quantity}_program", _program(loading.program(), "MPa")
+        yield f"{loading.quantity}_program", _program_text(loading.program(), "MPa")
     if loading.quantity == "stress":
         yield "control", loading.control if isinstance(loading, (StressSteps, RecordedLoading)) else "load"
 
 
-def _temperature(history: History) -> Iterator[tuple[str, str]]:
+def _temperature_lines(history: History) -> Iterator[tuple[str, str]]:
     if isinstance(history.temperature, Program):
-        yield "temperature_program", _program(history.temperature, "K")
+        yield "temperature_program", _program_text(history.temperature, "K")
     else:
-        yield "temperature_K", _digits(history.temperature)
+        yield "temperature_K", _number_text(history.temperature)
 
 
-def _elastic(history: History) -> Iterator[tuple[str, str]]:
+def _elastic_lines(history: History) -> Iterator[tuple[str, str]]:
     if history.elastic is None:
         return
     elastic = history.elastic
@@ -124,14 +124,14 @@ def _elastic(history: History) -> Iterator[tuple[str, str]]:
                 "written; replace them by elastic.at(T)"
             )
         elastic = elastic.at(history.temperature)
-    yield "modulus_MPa", _digits(float(elastic.E))
-    yield "poisson", _digits(float(elastic.nu))
+    yield "modulus_MPa", _number_text(float(elastic.E))
+    yield "poisson", _number_text(float(elastic.nu))
 
 
-def _columns(history: History, kinds: Mapping[str, Kind]) -> Iterator[tuple[str, Floats]]:
+def _frame_columns(history: History, kinds: Mapping[str, QuantityKind]) -> Iterator[tuple[str, Floats]]:
     yield "time_s", history.times
-    spreads = {f"{name}_sd": values for name, values in history.standard_deviation.items()}
-    for name, values in {**history.outputs, **spreads}.items():
+    standard_deviations = {f"{name}_sd": values for name, values in history.standard_deviation.items()}
+    for name, values in {**history.outputs, **standard_deviations}.items():
         kind = kinds.get(name.removesuffix("_sd"))
         if kind is None:
             raise HistoryError(f"history '{history.name}': no unit is known for '{name}'; known: {', '.join(kinds)}")
@@ -142,27 +142,27 @@ def _columns(history: History, kinds: Mapping[str, Kind]) -> Iterator[tuple[str,
         yield "used", used.astype(float)
 
 
-def _digits(number: float) -> str:
+def _number_text(number: float) -> str:
     """The shortest text that reads back as the same number."""
     return repr(float(number))
 
 
-def _program(program: Program, unit: str) -> str:
-    return _pairs(zip(program.times, program.values, strict=True), unit)
+def _program_text(program: Program, unit: str) -> str:
+    return _pairs_text(zip(program.times, program.values, strict=True), unit)
 
 
-def _pairs(pairs: Iterator[tuple[float, float]] | tuple[tuple[float, float], ...], unit: str) -> str:
-    return "; ".join(f"{_digits(time)} s {_digits(value)} {unit}".rstrip() for time, value in pairs)
+def _pairs_text(pairs: Iterator[tuple[float, float]] | tuple[tuple[float, float], ...], unit: str) -> str:
+    return "; ".join(f"{_number_text(time)} s {_number_text(value)} {unit}".rstrip() for time, value in pairs)
 
 
-def _line(history: History, text: str) -> str:
+def _one_line(history: History, text: str) -> str:
     """Refuse what would not survive as part of one line."""
     if text != text.strip() or not text.isprintable():
         raise HistoryError(f"history '{history.name}': {text!r} cannot be written in one line; use plain words there")
     return text
 
 
-def _key(history: History, key: str) -> str:
+def _header_key(history: History, key: str) -> str:
     if ":" in key or not key:
         raise HistoryError(f"history '{history.name}': {key!r} cannot name a line; use words without a colon")
-    return _line(history, key)
+    return _one_line(history, key)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from creepkit.records.history import History
 
 if TYPE_CHECKING:
-    from creepkit.records.valued import ValuedLaw
+    from creepkit.records.valued import LawWithValues
 
 
 @runtime_checkable
@@ -53,7 +53,7 @@ class Exporter(Protocol):
         """Ending of a file's name, with its dot."""
         ...
 
-    def text(self, source: ValuedLaw) -> str:
+    def text(self, source: LawWithValues) -> str:
         """Return the text; notes (intervals, validity) become comments.
 
         ExportError, with the reason, when the target cannot express the law or its units.

@@ -12,14 +12,14 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError
 from creepkit.records.loading import Loading, Program
-from creepkit.records.point_loading import in_words
+from creepkit.records.point_loading import loading_text
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
 
 ZERO_CELSIUS = 273.15
 
-ROUNDING = 0.01
+RUPTURE_TIME_TOLERANCE = 0.01
 """By how much of a rupture time frames may lie after it: laboratories round it to three digits."""
 
 EVERY_FRAME: Bools = frozen([], dtype=bool)
@@ -63,57 +63,57 @@ class History:
     unruptured: bool = False
 
     def __post_init__(self) -> None:
-        where = self.source or f"history '{self.name}'"
+        origin = self.source or f"history '{self.name}'"
         times = frozen(self.times)
         if times.ndim != 1 or times.size == 0:
-            raise HistoryError(f"{where}: no frames; a history needs at least one time")
+            raise HistoryError(f"{origin}: no frames; a history needs at least one time")
         if not np.isfinite(times).all() or times[0] < 0:
-            raise HistoryError(f"{where}: times must be finite and start at or after 0 s")
+            raise HistoryError(f"{origin}: times must be finite and start at or after 0 s")
         if (np.diff(times) <= 0).any():
             k = int(np.argmax(np.diff(times) <= 0)) + 1
-            found = f"{times[k]:g} s after {times[k - 1]:g} s"
-            raise HistoryError(f"{where}: time does not increase at frame {k + 1} ({found})")
+            description = f"{times[k]:g} s after {times[k - 1]:g} s"
+            raise HistoryError(f"{origin}: time does not increase at frame {k + 1} ({description})")
         outputs = {name: frozen(values) for name, values in self.outputs.items()}
         for name, values in outputs.items():
             if values.shape != times.shape:
-                raise HistoryError(f"{where}: output '{name}' has {values.size} values for {times.size} times")
+                raise HistoryError(f"{origin}: output '{name}' has {values.size} values for {times.size} times")
         used = np.ones(times.size, bool) if self.used is EVERY_FRAME else self.used
         if np.shape(used) != times.shape:
-            raise HistoryError(f"{where}: 'used' marks {np.size(used)} frames of {times.size}")
+            raise HistoryError(f"{origin}: 'used' marks {np.size(used)} frames of {times.size}")
         freeze = object.__setattr__
         freeze(self, "times", times)
         freeze(self, "outputs", MappingProxyType(outputs))
         freeze(self, "used", frozen(used, dtype=bool))
-        warmth = (
+        temperatures = (
             self.temperature.values if isinstance(self.temperature, Program) else np.array([float(self.temperature)])
         )
-        if not ((warmth > 0) & (warmth < 1e4)).all():
-            raise HistoryError(f"{where}: a temperature of {warmth.min():g} K is not above 0 and below 10000 K")
+        if not ((temperatures > 0) & (temperatures < 1e4)).all():
+            raise HistoryError(f"{origin}: a temperature of {temperatures.min():g} K is not above 0 and below 10000 K")
         if not isinstance(self.temperature, Program):
             freeze(self, "temperature", float(self.temperature))
-        self._check_end(where)
+        self._check_end(origin)
         sd = {n: frozen(np.broadcast_to(np.asarray(v, float), times.shape)) for n, v in self.standard_deviation.items()}
         freeze(self, "standard_deviation", MappingProxyType(sd))
         freeze(self, "geometry", MappingProxyType(dict(self.geometry)))
         freeze(self, "labels", MappingProxyType(dict(self.labels)))
 
-    def _check_end(self, where: str) -> None:
+    def _check_end(self, origin: str) -> None:
         """A specimen breaks once, and has no frames afterwards but for the rounding of the rupture time."""
         if self.rupture_time is None:
             return
         time, last = float(self.rupture_time), float(self.times[self.used][-1]) if self.used.any() else 0.0
         if not (np.isfinite(time) and time > 0):
-            raise HistoryError(f"{where}: a rupture time of {time:g} s is not a finite time above zero")
+            raise HistoryError(f"{origin}: a rupture time of {time:g} s is not a finite time above zero")
         if self.unruptured:
-            raise HistoryError(f"{where}: it ruptured at {time:g} s and was stopped unruptured; keep one of them")
-        if last > (1 + ROUNDING) * time:
+            raise HistoryError(f"{origin}: it ruptured at {time:g} s and was stopped unruptured; keep one of them")
+        if last > (1 + RUPTURE_TIME_TOLERANCE) * time:
             raise HistoryError(
-                f"{where}: a used frame at {last:g} s lies after the rupture at {time:g} s; mark it unused"
+                f"{origin}: a used frame at {last:g} s lies after the rupture at {time:g} s; mark it unused"
             )
         object.__setattr__(self, "rupture_time", time)
 
     @property
-    def ended(self) -> bool:
+    def end_known(self) -> bool:
         """Whether it is known how the test ended: by rupture, or stopped before."""
         return self.rupture_time is not None or self.unruptured
 
@@ -129,18 +129,18 @@ class History:
     def __reduce__(self) -> tuple[Any, ...]:
         state = {f.name: getattr(self, f.name) for f in fields(self)}
         plain = {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
-        return _history, (type(self), plain)
+        return _rebuild, (type(self), plain)
 
     def up_to(self, output: str, limit: float) -> History:
         """Mark unused every frame from the first used one whose `output` exceeds `limit` on.
 
         A history that is cut says nothing any more of how the test ended.
         """
-        over = np.flatnonzero((self.outputs[output] > limit) & self.used)
-        if not over.size:
+        exceeding = np.flatnonzero((self.outputs[output] > limit) & self.used)
+        if not exceeding.size:
             return self
         used = np.array(self.used)
-        used[over[0] :] = False
+        used[exceeding[0] :] = False
         return self.replace(used=used, rupture_time=None, unruptured=False)
 
     def temperature_program(self) -> Program:
@@ -150,10 +150,10 @@ class History:
     @property
     def condition(self) -> str:
         """The nominal condition in words, '850 C, 43 MPa': what leave-one-condition-out holds out."""
-        T = self.temperature_program().values - ZERO_CELSIUS
-        warm = f"{T[0]:.0f}" if np.ptp(T) < 0.5 else f"{T[0]:.0f} to {T[-1]:.0f}"
-        return f"{warm} C, {in_words(self.loading)}"
+        celsius = self.temperature_program().values - ZERO_CELSIUS
+        temperature_text = f"{celsius[0]:.0f}" if np.ptp(celsius) < 0.5 else f"{celsius[0]:.0f} to {celsius[-1]:.0f}"
+        return f"{temperature_text} C, {loading_text(self.loading)}"
 
 
-def _history(kind: type[History], state: dict[str, Any]) -> History:
+def _rebuild(kind: type[History], state: dict[str, Any]) -> History:
     return kind(**state)

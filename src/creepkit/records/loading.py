@@ -63,11 +63,11 @@ class Program:
     def at(self, times: ArrayLike) -> Floats:
         """Values at `times` (any shape), the later one at a jump, the last one beyond the end."""
         t = np.asarray(times, dtype=float)
-        k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, self.times.size - 1)
-        following = np.minimum(k + 1, self.times.size - 1)
-        width = self.times[following] - self.times[k]
-        share = np.divide(t - self.times[k], width, out=np.zeros_like(t), where=width > 0)
-        return np.asarray(self.values[k] + share * (self.values[following] - self.values[k]))
+        index = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, self.times.size - 1)
+        following = np.minimum(index + 1, self.times.size - 1)
+        width = self.times[following] - self.times[index]
+        fraction = np.divide(t - self.times[index], width, out=np.zeros_like(t), where=width > 0)
+        return np.asarray(self.values[index] + fraction * (self.values[following] - self.values[index]))
 
 
 @runtime_checkable
@@ -133,9 +133,9 @@ class StrainSteps:
             raise SolveError("strain steps must start at time 0 and follow one another in time")
         if any(not 0 <= e <= 1 for _, e in steps):
             raise SolveError(f"total strain must lie from 0 to 1 in every step, found {[e for _, e in steps]}")
-        apart = min([b[0] - a[0] for a, b in pairwise(steps)], default=np.inf)
-        if not 0 <= self.ramp <= apart or not np.isfinite(self.ramp):
-            raise SolveError(f"ramp is {self.ramp:g} s; it must not be negative nor outlast a step ({apart:g} s)")
+        shortest_step = min([b[0] - a[0] for a, b in pairwise(steps)], default=np.inf)
+        if not 0 <= self.ramp <= shortest_step or not np.isfinite(self.ramp):
+            raise SolveError(f"ramp is {self.ramp:g} s; it must not be negative nor outlast a step ({shortest_step:g} s)")
         object.__setattr__(self, "steps", steps)
 
     def program(self) -> Program:
@@ -143,8 +143,8 @@ class StrainSteps:
         if self.ramp == 0.0:
             return Program.steps(self.steps)
         times = [t for start, _ in self.steps for t in (start, start + self.ramp)]
-        before = [0.0, *(e for _, e in self.steps)]
-        return Program(np.array(times), np.array([e for pair in pairwise(before) for e in pair]))
+        strains = [0.0, *(e for _, e in self.steps)]
+        return Program(np.array(times), np.array([e for pair in pairwise(strains) for e in pair]))
 
 
 def constant_strain(strain: float, ramp: float = 0.0) -> StrainSteps:

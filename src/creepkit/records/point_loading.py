@@ -15,7 +15,7 @@ from creepkit.records.loading import Loading, Program, Quantity
 COMPONENTS = ("11", "22", "33", "12", "23", "13")
 """Names of the components of a stress or strain, in the order of every vector of six; shear strains of the tensor."""
 
-Imposed: TypeAlias = float | Program | Sequence[tuple[float, float]]
+ComponentHistory: TypeAlias = float | Program | Sequence[tuple[float, float]]
 """A constant, a program, or steps as (start time, value) pairs."""
 
 
@@ -32,7 +32,7 @@ class PointLoading:
     quantity: Quantity = field(default="components", init=False)
 
     def __init__(
-        self, stress: Mapping[str, Imposed] | None = None, strain: Mapping[str, Imposed] | None = None
+        self, stress: Mapping[str, ComponentHistory] | None = None, strain: Mapping[str, ComponentHistory] | None = None
     ) -> None:
         given = {"stress": dict(stress or {}), "strain": dict(strain or {})}
         for name in (*given["stress"], *given["strain"]):
@@ -44,8 +44,8 @@ class PointLoading:
             raise SolveError(
                 'a material point needs a stress or a strain of some component, such as stress={"11": 100}'
             )
-        for kind, parts in given.items():
-            ordered = {name: _imposed(parts[name]) for name in COMPONENTS if name in parts}
+        for kind, components in given.items():
+            ordered = {name: _as_program(components[name]) for name in COMPONENTS if name in components}
             object.__setattr__(self, kind, MappingProxyType(ordered))
         object.__setattr__(self, "quantity", "components")
 
@@ -60,7 +60,7 @@ class PointLoading:
         return next(iter([*self.stress.values(), *self.strain.values()]))
 
 
-def _imposed(given: Imposed) -> Program:
+def _as_program(given: ComponentHistory) -> Program:
     if isinstance(given, Program):
         return given
     if isinstance(given, Sequence):
@@ -68,17 +68,17 @@ def _imposed(given: Imposed) -> Program:
     return Program.constant(given)
 
 
-def in_words(loading: Loading) -> str:
+def loading_text(loading: Loading) -> str:
     """What is imposed, as people say it: '43 MPa', '60 to 95 MPa', 'strain 0.002', '11 100 MPa, 12 40 MPa'."""
     if isinstance(loading, PointLoading):
-        parts = [f"{name} {_levels(p)} MPa" for name, p in loading.stress.items()]
-        return ", ".join(parts + [f"strain {name} {_levels(p)}" for name, p in loading.strain.items()])
+        parts = [f"{name} {_levels_text(p)} MPa" for name, p in loading.stress.items()]
+        return ", ".join(parts + [f"strain {name} {_levels_text(p)}" for name, p in loading.strain.items()])
     program = loading.program()
     if loading.quantity == "strain":
-        return f"strain {_levels(program)}"
-    return f"{program.values.max():g} MPa" if loading.quantity == "pressure" else f"{_levels(program)} MPa"
+        return f"strain {_levels_text(program)}"
+    return f"{program.values.max():g} MPa" if loading.quantity == "pressure" else f"{_levels_text(program)} MPa"
 
 
-def _levels(program: Program) -> str:
+def _levels_text(program: Program) -> str:
     first, last = float(program.values[0]), float(program.values[-1])
     return f"{last:g}" if float(np.ptp(program.values)) == 0.0 else f"{first:g} to {last:g}"

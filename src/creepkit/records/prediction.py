@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
 
 
-Effects: TypeAlias = Mapping[str, Floats]
+NuisanceValues: TypeAlias = Mapping[str, Floats]
 """{kind: (candidates or 1, tests)}: the value of an explicit nuisance in each test."""
 
 
@@ -25,13 +25,13 @@ class Status(IntEnum):
     """How a predicted row ended."""
 
     COMPLETE = 0
-    BURST = 1
+    RUPTURED = 1
     NOT_CONVERGED = 2
     OUTSIDE_DOMAIN = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Life:
+class TimesToStrain:
     """When a prediction arrives at what was measured, and when it breaks, for candidates x tests, padded as there.
 
     arrivals : (candidates, tests, times) s, when the strain measured at each frame is predicted; the rupture where that
@@ -43,11 +43,11 @@ class Life:
         law's internal parameters, or None.
     """
 
-    arrivals: Floats
-    slopes: Floats
-    ruptures: Floats
+    times: Floats
+    log_time_derivatives: Floats
+    rupture_times: Floats
     horizon: Floats
-    arrival_jacobian: Floats | None = None
+    time_jacobian: Floats | None = None
     rupture_jacobian: Floats | None = None
 
 
@@ -61,7 +61,7 @@ class Prediction:
     status : (candidates, tests) Status of each row; end_times : (candidates, tests) s, where it ended.
     jacobian : (candidates, tests, times, outputs, parameters) or None: derivatives with respect to the law's
         *internal* parameters (the natural logarithm where the scale is log), in the law's order.
-    effect_jacobian : {kind: (candidates, tests, times, outputs)}: derivatives with respect to each test's own effect,
+    nuisance_jacobian : {kind: (candidates, tests, times, outputs)}: derivatives with respect to each test's own effect,
         in the unit of that kind (see Nuisance); without the kinds that the predictor cannot differentiate.
     life : when measured strains are arrived at, and rupture, where that was asked for (see WholeLife).
     """
@@ -73,8 +73,8 @@ class Prediction:
     end_times: Floats
     jacobian: Floats | None = None
     times: tuple[Floats, ...] = ()
-    effect_jacobian: Mapping[str, Floats] = field(default_factory=dict)
-    life: Life | None = None
+    nuisance_jacobian: Mapping[str, Floats] = field(default_factory=dict)
+    times_to_strain: TimesToStrain | None = None
 
     def of(self, test: int, candidate: int = 0) -> Floats:
         """Outputs of one test, (times, outputs)."""
@@ -86,7 +86,7 @@ class Predictor(Protocol):
     """Anything that predicts histories from a law and its values: specimen, surrogate or closed form.
 
     Optional attributes, looked for by name: `outputs`, the names of what is predicted, first the one that grows with
-    creep; `effects`, the kinds of explicit nuisances that predict() understands (none without it);
+    creep; `nuisances`, the kinds of explicit nuisances that predict() understands (none without it);
     `reference_stress(history)`, the von Mises stress, MPa, that stands for the test (a number, or one for each level
     of its loading); `screening()`, see Screened.
     """
@@ -98,23 +98,23 @@ class Predictor(Protocol):
         histories: Sequence[History],
         *,
         jacobian: bool = False,
-        effects: Effects | None = None,
+        nuisances: NuisanceValues | None = None,
     ) -> Prediction:
         """Predict each history's outputs at its times.
 
         values : {parameter: number or (candidates,)} in the author's units; 0 may switch a parameter off.
-        effects : {kind: (candidates or 1, tests)} of what differs from test to test, measured as Nuisance says. A
+        nuisances : {kind: (candidates or 1, tests)} of what differs from test to test, measured as Nuisance says. A
             kind that the predictor does not know is a SolveError. With `jacobian` the prediction has the derivatives
-            to the kinds given in `effect_jacobian`.
+            to the kinds given in `nuisance_jacobian`.
         """
         ...
 
 
 @runtime_checkable
-class WholeLife(Predictor, Protocol):
+class SupportsRupturePrediction(Predictor, Protocol):
     """A predictor that follows a specimen to its rupture, beyond the last time of its history."""
 
-    def predict_life(
+    def predict_to_rupture(
         self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], *, jacobian: bool = False
     ) -> Prediction:
         """Predict as predict() does, with `life`: when measured strains are arrived at, and when it breaks."""
@@ -122,10 +122,10 @@ class WholeLife(Predictor, Protocol):
 
 
 @runtime_checkable
-class Screened(Predictor, Protocol):
-    """A predictor too expensive for a global search, with a cheap stand-in of the same outputs and effects."""
+class SupportsReducedOrderModel(Predictor, Protocol):
+    """A predictor too expensive for a global search, with a cheap stand-in of the same outputs and nuisances."""
 
-    def screening(self) -> Predictor:
+    def reduced_order_model(self) -> Predictor:
         """Return the stand-in; it may be some per cent off and need not know derivatives."""
         ...
 
@@ -150,11 +150,11 @@ class Specimen(Predictor, Protocol):
         ...
 
 
-Kind: TypeAlias = Literal["offset", "rate", "thickness", "modulus", "temperature", "window"]
+NuisanceKind: TypeAlias = Literal["offset", "rate", "thickness", "modulus", "temperature", "window"]
 
-EXPLICIT: tuple[Kind, ...] = ("thickness", "modulus", "temperature", "window")
+SIMULATED_NUISANCES: tuple[NuisanceKind, ...] = ("thickness", "modulus", "temperature", "window")
 """Kinds that change the simulation; "offset" and "rate" only change how its residuals scatter."""
-ABSOLUTE: tuple[Kind, ...] = ("thickness", "window")
+LENGTH_NUISANCES: tuple[NuisanceKind, ...] = ("thickness", "window")
 """Kinds that are lengths in themselves, so that their prior mean is one too; the others are deviations, about zero."""
 
 
@@ -175,7 +175,7 @@ class Nuisance:
     bounds : hard limits, in the same unit.
     """
 
-    kind: Kind
+    kind: NuisanceKind
     scope: Literal["test", "alloy", "all"] = "test"
     output: str = ""
     mean: float = 0.0

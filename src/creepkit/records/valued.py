@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
     from creepkit.language.law import CreepLaw
 
-STRESSES = {"MPa": 1.0, "Pa": 1e-6, "kPa": 1e-3, "GPa": 1e3, "psi": 0.006894757293168361, "ksi": 6.894757293168361}
+STRESS_UNITS = {"MPa": 1.0, "Pa": 1e-6, "kPa": 1e-3, "GPa": 1e3, "psi": 0.006894757293168361, "ksi": 6.894757293168361}
 """MPa in one unit of stress; 1 psi is 1 lbf/in^2 = 4.4482216152605 N/(25.4 mm)^2."""
 
-TIMES = {"s": 1.0, "min": 60.0, "h": 3600.0, "day": 86400.0, "year": 31557600.0}
+TIME_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "day": 86400.0, "year": 31557600.0}
 """Seconds in one unit of time; a year is a Julian year."""
 
 
@@ -31,28 +31,28 @@ class Units:
     time: str = "s"
 
     def __post_init__(self) -> None:
-        for what, unit, known in (("stress", self.stress, STRESSES), ("time", self.time, TIMES)):
+        for what, unit, known in (("stress", self.stress, STRESS_UNITS), ("time", self.time, TIME_UNITS)):
             if unit not in known:
                 raise ExportError(f"'{unit}' is not a unit of {what}: {nearest(unit, known)}")
 
     @property
     def megapascals(self) -> float:
         """MPa in one unit of stress."""
-        return STRESSES[self.stress]
+        return STRESS_UNITS[self.stress]
 
     @property
     def seconds(self) -> float:
         """Seconds in one unit of time."""
-        return TIMES[self.time]
+        return TIME_UNITS[self.time]
 
     @property
-    def native(self) -> bool:
+    def is_native(self) -> bool:
         """Whether these are the units of laws themselves."""
         return self == Units()
 
 
 @dataclass(frozen=True)
-class ValuedLaw:
+class LawWithValues:
     """A law with its values, and what travels with them.
 
     values : {parameter: number in its unit}, completed and checked.
@@ -80,30 +80,30 @@ class ValuedLaw:
         """The law in words."""
         return self.law.title or self.law.name
 
-    def replace(self, **changes: Any) -> ValuedLaw:
+    def replace(self, **changes: Any) -> LawWithValues:
         """The same with some fields changed."""
         return replace(self, **changes)
 
-    def at(self, temperature: float) -> ValuedLaw:
+    def at(self, temperature: float) -> LawWithValues:
         """The same with a number, in K, in the place of the temperature."""
         law = self.law.at(temperature)
         elastic = None if self.elastic is None else self.elastic.at(temperature)
         return replace(self, law=law, values={name: self.values[name] for name in law.names}, elastic=elastic)
 
-    def reduced(self) -> ValuedLaw:
+    def without_inactive_terms(self) -> LawWithValues:
         """The same without what is switched off: terms of a zero coefficient, exponents that are 0.
 
         ExportError when no term is left.
         """
         table = self.law.table
-        off = {name: value for name, value in self.values.items() if value == table[name].off}
-        if not off:
+        inactive = {name: value for name, value in self.values.items() if value == table[name].off}
+        if not inactive:
             return self
         try:
-            law = self.law.fix(**off)
+            law = self.law.fix(**inactive)
         except LawError as error:
             raise ExportError(f"nothing to export: {error}") from None
-        told = ", ".join(f"{name} = {value:g}" for name, value in off.items())
+        description = ", ".join(f"{name} = {value:g}" for name, value in inactive.items())
         values = {name: self.values[name] for name in law.names}
         law = replace(law, name=self.law.name, title=self.law.title)
-        return replace(self, law=law, values=values, notes=(*self.notes, f"switched off and left out: {told}"))
+        return replace(self, law=law, values=values, notes=(*self.notes, f"switched off and left out: {description}"))

@@ -19,8 +19,8 @@ import pluggy
 from creepkit import hookspecs
 from creepkit.errors import PluginError, nearest
 from creepkit.registry import kinds, sources
-from creepkit.registry.kinds import Kind
-from creepkit.registry.packages import package_of
+from creepkit.registry.kinds import ContributionKind
+from creepkit.registry.packages import package_with_law
 from creepkit.registry.sources import Provenance
 
 if TYPE_CHECKING:
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
     from creepkit.records import Exporter, Reader, Specimen
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
-class Registered(Generic[T]):
+class Registered(Generic[_T]):
     """Something a plugin offers, and the plugin it came from."""
 
-    value: T
+    value: _T
     provenance: Provenance
 
 
@@ -50,7 +50,7 @@ class Plugin:
     """
 
     provenance: Provenance
-    offers: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    contributions: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     commands: bool = False
     problem: str = ""
 
@@ -62,7 +62,7 @@ class Registry:
         self._manager = pluggy.PluginManager(hookspecs.PROJECT)
         self._manager.add_hookspecs(hookspecs)
         self._plugins: dict[Provenance, Plugin] = {}
-        self._complete = False
+        self._loaded = False
 
     # ---- what there is ---------------------------------------------------------------------------------------------
 
@@ -71,9 +71,9 @@ class Registry:
         self._load_all()
         return tuple(self._plugins.values())
 
-    def clashes(self) -> tuple[str, ...]:
+    def conflicts(self) -> tuple[str, ...]:
         """Return one sentence for each name that two plugins offer."""
-        return tuple(clash for kind in kinds.KINDS for clash in _merged(kind, self.plugins())[1].values())
+        return tuple(conflict for kind in kinds.CONTRIBUTION_KINDS for conflict in _merged_contributions(kind, self.plugins())[1].values())
 
     def laws(self) -> dict[str, Registered[CreepLaw]]:
         """Return {name: registered law}."""
@@ -93,14 +93,14 @@ class Registry:
 
     def temperature_forms(self) -> dict[str, Registered[Callable[..., Any]]]:
         """Return {name: registered function of T_ref that gives a form or a factor}."""
-        return self._all(kinds.FORM)
+        return self._all(kinds.TEMPERATURE_FORM)
 
     def law(self, name: str) -> CreepLaw:
         """Return the law called `name`; LawError with the nearest name when there is none."""
         law: CreepLaw = self._one(kinds.LAW, name)
         return law
 
-    def origin(self, law: CreepLaw) -> str:
+    def distributions_of(self, law: CreepLaw) -> str:
         """Return the distributions, with versions, of the laws that a law's name tells it was made of.
 
         'creepkit-damage 0.1.0' of 'kachanov-rabotnov*arrhenius'; empty when nobody offers them.
@@ -125,34 +125,34 @@ class Registry:
 
     def temperature_form(self, name: str) -> Callable[..., Any]:
         """Return the function of T_ref called `name`; LawError with the nearest name when there is none."""
-        form: Callable[..., Any] = self._one(kinds.FORM, name)
+        form: Callable[..., Any] = self._one(kinds.TEMPERATURE_FORM, name)
         return form
 
-    def _all(self, kind: Kind) -> dict[str, Registered[Any]]:
-        return _merged(kind, self.plugins())[0]
+    def _all(self, kind: ContributionKind) -> dict[str, Registered[Any]]:
+        return _merged_contributions(kind, self.plugins())[0]
 
-    def _one(self, kind: Kind, name: str) -> Any:
-        known, clashes = _merged(kind, self.plugins())
+    def _one(self, kind: ContributionKind, name: str) -> Any:
+        known, clashes = _merged_contributions(kind, self.plugins())
         if name in known:
             return known[name].value
         if name in clashes:
             raise PluginError(clashes[name])
-        package = package_of(name) if kind is kinds.LAW else ""
+        package = package_with_law(name) if kind is kinds.LAW else ""
         broken = sum(bool(plugin.problem) for plugin in self.plugins())
         hint = f"; {broken} plugin(s) could not be loaded, see 'creepkit plugins'" if broken else ""
         if package:
             raise kind.error(f"there is no law '{name}'; package {package} has it: pip install {package}{hint}")
-        raise kind.error(f"there is no {kind.word} '{name}': {nearest(name, known)}{hint}")
+        raise kind.error(f"there is no {kind.label} '{name}': {nearest(name, known)}{hint}")
 
     # ---- where it comes from ---------------------------------------------------------------------------------------
 
     def load_file(self, path: str | Path) -> Plugin:
         """Load one plugin file; PluginError, and nothing registered, when it cannot be used."""
         path = Path(path)
-        provenance = sources.of_file(path)
+        provenance = sources.provenance_of_file(path)
         known = self._plugins.get(provenance)
         if known is None or known.problem:
-            self._plugins[provenance] = self._entered(provenance, sources.import_file(provenance, path))
+            self._plugins[provenance] = self._register_plugin(provenance, sources.import_file(provenance, path))
         return self._plugins[provenance]
 
     def add_commands(self, app: typer.Typer) -> None:
@@ -161,67 +161,67 @@ class Registry:
         for implementation in self._manager.hook.creepkit_commands.get_hookimpls():
             plugin = by_name[implementation.plugin_name]
             try:
-                kinds.called(implementation, app=app)
+                kinds.call_hook(implementation, app=app)
             except PluginError as error:
                 self._plugins[plugin.provenance] = replace(plugin, problem=str(error))
 
     def _load_all(self) -> None:
         """Load what is installed and what the environment names, once."""
-        if self._complete:
+        if self._loaded:
             return
-        self._complete = True
-        for provenance, entry in sources.installed():
-            self._keep(provenance, partial(sources.import_entry, provenance, entry))
-        for path in sources.named_in_environment():
-            provenance = sources.of_file(path)
-            self._keep(provenance, partial(sources.import_file, provenance, path))
+        self._loaded = True
+        for provenance, entry in sources.installed_entry_points():
+            self._add_plugin(provenance, partial(sources.import_entry, provenance, entry))
+        for path in sources.plugin_files_in_environment():
+            provenance = sources.provenance_of_file(path)
+            self._add_plugin(provenance, partial(sources.import_file, provenance, path))
 
-    def _keep(self, provenance: Provenance, imported: Callable[[], object]) -> None:
+    def _add_plugin(self, provenance: Provenance, imported: Callable[[], object]) -> None:
         """Enter a plugin, or else the reason why it cannot be used."""
         if provenance in self._plugins:
             return
         try:
-            self._plugins[provenance] = self._entered(provenance, imported())
+            self._plugins[provenance] = self._register_plugin(provenance, imported())
         except PluginError as error:
             self._plugins[provenance] = Plugin(provenance, problem=str(error))
 
-    def _entered(self, provenance: Provenance, module: object) -> Plugin:
+    def _register_plugin(self, provenance: Provenance, module: object) -> Plugin:
         """Enter a plugin whole or not at all: its hooks must exist and return what they promise."""
-        if twin := self._manager.get_name(module):
-            raise PluginError(f"{provenance} is the same module as {twin}; drop one of the two entry points")
+        if other_name := self._manager.get_name(module):
+            raise PluginError(f"{provenance} is the same module as {other_name}; drop one of the two entry points")
         try:
-            self._register(provenance, module)
-            hooks = kinds.implementations(self._manager, module, provenance)
-            offers = {k.word: kinds.offered(k, hooks[k.hook]) for k in kinds.KINDS if k.hook in hooks}
+            self._register_module(provenance, module)
+            hooks = kinds.hook_implementations(self._manager, module, provenance)
+            contributions = {k.label: kinds.contributions_of(k, hooks[k.hook]) for k in kinds.CONTRIBUTION_KINDS if k.hook in hooks}
         except PluginError:
             if self._manager.is_registered(module):
                 self._manager.unregister(module)
             raise
-        return Plugin(provenance, offers, commands=kinds.COMMANDS in hooks)
+        return Plugin(provenance, contributions, commands=kinds.COMMANDS_HOOK in hooks)
 
-    def _register(self, provenance: Provenance, module: object) -> None:
+    def _register_module(self, provenance: Provenance, module: object) -> None:
         try:
             self._manager.register(module, str(provenance))
         except pluggy.PluginValidationError as error:
-            told = " ".join(str(error).split())
-            raise PluginError(f"{provenance} does not fit the hooks of creepkit: {told}") from error
+            description = " ".join(str(error).split())
+            raise PluginError(f"{provenance} does not fit the hooks of creepkit: {description}") from error
 
 
 @cache
-def default() -> Registry:
+def default_registry() -> Registry:
     """The registry that the verbs share: made at its first use, from what is installed and the environment names."""
     return Registry()
 
 
-def _merged(kind: Kind, plugins: Iterable[Plugin]) -> tuple[dict[str, Registered[Any]], dict[str, str]]:
+def _merged_contributions(kind: ContributionKind, plugins: Iterable[Plugin]) -> tuple[dict[str, Registered[Any]], dict[str, str]]:
     """Return {name: registered} over plugins, and {name: a sentence} for each that two offer, which is left out."""
-    found: dict[str, Registered[Any]] = {}
-    clashes: dict[str, str] = {}
+    results: dict[str, Registered[Any]] = {}
+    conflicts: dict[str, str] = {}
     for plugin in plugins:
-        for name, value in plugin.offers.get(kind.word, {}).items():
-            if name in found:
-                culprits = f"{found[name].provenance} and by {plugin.provenance}"
-                clashes[name] = f"the {kind.word} '{name}' is offered twice, by {culprits}; rename one or uninstall it"
+        for name, value in plugin.contributions.get(kind.label, {}).items():
+            if name in results:
+                providers = f"{results[name].provenance} and by {plugin.provenance}"
+                conflicts[name] = f"the {kind.label} '{name}' is offered twice, by {providers}; rename one or uninstall it"
             else:
-                found[name] = Registered(value, plugin.provenance)
-    return {name: one for name, one in found.items() if name not in clashes}, clashes
+                results[name] = Registered(value, plugin.provenance)
+    return {name: one for name, one in results.items() if name not in conflicts}, conflicts

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-PACKAGES = {
+LAWS_BY_PACKAGE = {
     "creepkit-classic": (
         "blackburn",
         "coble",
@@ -24,6 +24,6 @@ PACKAGES = {
 """{package: its laws}, the packages under plugins/."""
 
 
-def package_of(law: str) -> str:
+def package_with_law(law: str) -> str:
     """The package that has a law of this name; empty when none is known to."""
-    return next((package for package, laws in PACKAGES.items() if law in laws), "")
+    return next((package for package, laws in LAWS_BY_PACKAGE.items() if law in laws), "")

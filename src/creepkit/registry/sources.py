@@ -18,8 +18,8 @@ from types import CodeType, ModuleType
 
 from creepkit.errors import CreepkitError, PluginError
 
-GROUP = "creepkit"
-VARIABLE = "CREEPKIT_PLUGINS"
+ENTRY_POINT_GROUP = "creepkit"
+ENVIRONMENT_VARIABLE = "CREEPKIT_PLUGINS"
 
 
 @dataclass(frozen=True, order=True)
@@ -33,18 +33,18 @@ class Provenance:
         return f"plugin '{self.name}' ({self.origin})"
 
 
-def installed() -> list[tuple[Provenance, EntryPoint]]:
+def installed_entry_points() -> list[tuple[Provenance, EntryPoint]]:
     """Return the entry points of group `creepkit`: creepkit's own first, then by distribution and name."""
-    found = [(Provenance(_distribution(entry), entry.name), entry) for entry in entry_points(group=GROUP)]
-    return sorted(found, key=lambda pair: (not pair[0].origin.startswith("creepkit "), pair[0]))
+    results = [(Provenance(_distribution_text(entry), entry.name), entry) for entry in entry_points(group=ENTRY_POINT_GROUP)]
+    return sorted(results, key=lambda pair: (not pair[0].origin.startswith("creepkit "), pair[0]))
 
 
-def named_in_environment() -> list[Path]:
+def plugin_files_in_environment() -> list[Path]:
     """Return the files that the environment variable CREEPKIT_PLUGINS lists, separated as in PATH."""
-    return [Path(text) for text in os.environ.get(VARIABLE, "").split(os.pathsep) if text.strip()]
+    return [Path(text) for text in os.environ.get(ENVIRONMENT_VARIABLE, "").split(os.pathsep) if text.strip()]
 
 
-def of_file(path: Path) -> Provenance:
+def provenance_of_file(path: Path) -> Provenance:
     """Return the provenance of a plugin file."""
     return Provenance(str(path.resolve()), path.stem)
 
@@ -54,7 +54,7 @@ def import_entry(provenance: Provenance, entry: EntryPoint) -> object:
     try:
         return entry.load()
     except (Exception, SystemExit) as error:
-        raise PluginError(f"{provenance} cannot be imported: {blame(error)}") from error
+        raise PluginError(f"{provenance} cannot be imported: {error_text(error)}") from error
 
 
 def import_file(provenance: Provenance, path: Path) -> ModuleType:
@@ -63,7 +63,7 @@ def import_file(provenance: Provenance, path: Path) -> ModuleType:
         raise PluginError(f"plugin file {path} does not exist; name a Python file with hooks in it")
     digest = hashlib.sha256(provenance.origin.encode()).hexdigest()[:8]
     name = f"creepkit_plugin_{path.stem}_{digest}"
-    spec = importlib.util.spec_from_file_location(name, provenance.origin, loader=_FreshLoader(name, provenance.origin))
+    spec = importlib.util.spec_from_file_location(name, provenance.origin, loader=_UncachedSourceLoader(name, provenance.origin))
     if spec is None or spec.loader is None:
         raise PluginError(f"plugin file {path} cannot be imported; name a Python file with hooks in it")
     module = importlib.util.module_from_spec(spec)
@@ -72,22 +72,22 @@ def import_file(provenance: Provenance, path: Path) -> ModuleType:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
-        raise PluginError(f"{provenance} cannot be imported: {blame(error)}") from error
+        raise PluginError(f"{provenance} cannot be imported: {error_text(error)}") from error
     return module
 
 
-def blame(error: BaseException) -> str:
+def error_text(error: BaseException) -> str:
     """Return one sentence for what a plugin raised, with the plugin's file and line where they are known."""
     if isinstance(error, SyntaxError):
         return f"{type(error).__name__}: {error.msg} ({error.filename}, line {error.lineno})"
-    told = " ".join(str(error).split()) or "no message"
+    description = " ".join(str(error).split()) or "no message"
     if not isinstance(error, CreepkitError):
-        told = f"{type(error).__name__}: {told}"
-    place = _place(error)
-    return f"{told} ({place})" if place else told
+        description = f"{type(error).__name__}: {description}"
+    location = _source_location(error)
+    return f"{description} ({location})" if location else description
 
 
-class _FreshLoader(importlib.machinery.SourceFileLoader):
+class _UncachedSourceLoader(importlib.machinery.SourceFileLoader):
     """Compiles the source each time: no bytecode beside the user's file, and never a stale one while it is edited."""
 
     def get_code(self, fullname: str) -> CodeType:
@@ -95,14 +95,14 @@ class _FreshLoader(importlib.machinery.SourceFileLoader):
         return self.source_to_code(self.get_data(path), path)
 
 
-def _distribution(entry: EntryPoint) -> str:
+def _distribution_text(entry: EntryPoint) -> str:
     return f"{entry.dist.name} {entry.dist.version}" if entry.dist is not None else "unknown distribution"
 
 
-def _place(error: BaseException) -> str:
+def _source_location(error: BaseException) -> str:
     """Say where the plugin's own file appears deepest in the traceback, below the frames of registry and importlib."""
-    machinery = (os.path.dirname(__file__), os.path.dirname(importlib.__file__), "<frozen importlib")
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith(machinery)]
+    internal_paths = (os.path.dirname(__file__), os.path.dirname(importlib.__file__), "<frozen importlib")
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith(internal_paths)]
     if not frames:
         return ""
     last = [frame for frame in frames if frame.filename == frames[0].filename][-1]

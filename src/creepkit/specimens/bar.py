@@ -12,15 +12,15 @@ import numpy as np
 from creepkit import integration, kernels
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError
-from creepkit.records import Effects, History, Prediction, Status
-from creepkit.specimens.run import Run, run_of
-from creepkit.specimens.uniaxial_effects import KINDS, predict_with
+from creepkit.records import NuisanceValues, History, Prediction, Status
+from creepkit.specimens.run import Run, run_from_outputs
+from creepkit.specimens.uniaxial_effects import NUISANCES, predict_with_nuisances
 
 if TYPE_CHECKING:
     from creepkit.integration import Integration, PointTest
     from creepkit.language import CreepLaw
 
-STEPS_FOR_A_BREAK = 20
+STEPS_PER_BREAKPOINT = 20
 """Each straight piece of a program takes some 7 steps of its own; a logged temperature has thousands of pieces."""
 
 
@@ -40,7 +40,7 @@ class Bar:
     name: ClassVar[str]
     title: ClassVar[str]
     outputs: ClassVar[tuple[str, ...]]
-    effects: ClassVar[tuple[str, ...]] = KINDS
+    nuisances: ClassVar[tuple[str, ...]] = NUISANCES
     """Kinds of explicit nuisances that predict() understands."""
 
     def __post_init__(self) -> None:
@@ -63,19 +63,19 @@ class Bar:
         """What the material point of a history goes through."""
         raise NotImplementedError
 
-    def shown(self, history: History, creep: Floats) -> Floats:
+    def observed_output(self, history: History, creep: Floats) -> Floats:
         """The output, (candidates, times), from logarithmic creep strain."""
         raise NotImplementedError
 
-    def slope(self, history: History, creep: Floats) -> Floats:
+    def output_derivative(self, history: History, creep: Floats) -> Floats:
         """Derivative of the output to the creep strain."""
         raise NotImplementedError
 
-    def softening(self, found: Prediction, histories: Sequence[History], stiffer: Floats) -> Floats | None:
+    def modulus_derivative(self, result: Prediction, histories: Sequence[History], modulus_changes: Floats) -> Floats | None:
         """Derivative of the values to the relative change of the modulus; None leaves it to differences."""
         return None
 
-    def ending(self, history: History, reason: str, output: Floats, end: float) -> str:
+    def end_reason(self, history: History, reason: str, output: Floats, end: float) -> str:
         """Why a test ended at `end`, s, from what the integration says; output : (times,) up to there, then NaN."""
         return reason
 
@@ -88,32 +88,32 @@ class Bar:
         histories: Sequence[History],
         *,
         jacobian: bool = False,
-        effects: Effects | None = None,
+        nuisances: NuisanceValues | None = None,
     ) -> Prediction:
         """Predict the output of each history at its times, for numbers or (candidates,) values of the parameters.
 
-        effects : "temperature" (K above what the history says) and "modulus" (relative change).
+        nuisances : "temperature" (K above what the history says) and "modulus" (relative change).
         """
-        plain = partial(self._predict, law)
-        return predict_with(plain, values, histories, effects, jacobian, softening=self.softening, specimen=self.name)
+        predict_plain = partial(self._predict, law)
+        return predict_with_nuisances(predict_plain, values, histories, nuisances, jacobian, modulus_derivative=self.modulus_derivative, specimen=self.name)
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> Run:
         """Run one test: what its history would show at its times, and how it ended."""
         result = self._integrate(law, law.values(values), self._tests([plan]), jacobian=False)
-        rows = self.shown(plan, result.of(0))[0]
-        end, reason = float(result.end_times[0, 0]), integration.REASONS[int(result.endings[0, 0])]
-        reason = self.ending(plan, reason, rows, end)
-        return run_of(Run, plan, self.outputs, rows[:, None], Status(int(result.status[0, 0])), end, reason)
+        rows = self.observed_output(plan, result.of(0))[0]
+        end, reason = float(result.end_times[0, 0]), integration.REASONS[int(result.terminations[0, 0])]
+        reason = self.end_reason(plan, reason, rows, end)
+        return run_from_outputs(Run, plan, self.outputs, rows[:, None], Status(int(result.status[0, 0])), end, reason)
 
     def _predict(
         self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], jacobian: bool
     ) -> Prediction:
-        return self._seen(law, histories, self._integrate(law, values, self._tests(histories), jacobian))
+        return self._observed_prediction(law, histories, self._integrate(law, values, self._tests(histories), jacobian))
 
     def _tests(self, histories: Sequence[History]) -> list[PointTest]:
         return [self.point_test(history) for history in histories]
 
-    def _seen(self, law: CreepLaw, histories: Sequence[History], result: Integration) -> Prediction:
+    def _observed_prediction(self, law: CreepLaw, histories: Sequence[History], result: Integration) -> Prediction:
         """What the instruments of the histories show of an integration."""
         candidates, longest = result.strain.shape[0], max((h.times.size for h in histories), default=0)
         shown = np.full((candidates, len(histories), longest, 1), np.nan)
@@ -121,9 +121,9 @@ class Bar:
         for k, history in enumerate(histories):
             frames, reach = history.times.size, slice(result.starts[k], result.starts[k + 1])
             creep = result.of(k)
-            shown[:, k, :frames, 0] = self.shown(history, creep)
+            shown[:, k, :frames, 0] = self.observed_output(history, creep)
             if changes is not None and result.jacobian is not None:
-                changes[:, k, :frames, 0] = result.jacobian[:, reach] * self.slope(history, creep)[..., None]
+                changes[:, k, :frames, 0] = result.jacobian[:, reach] * self.output_derivative(history, creep)[..., None]
         return Prediction(
             values=shown,
             outputs=self.outputs,
@@ -139,9 +139,9 @@ class Bar:
     ) -> Integration:
         kernel = kernels.lower(law, "numba")
         breaks = max((test.driving.times.size + test.temperature.times.size - 2 for test in tests), default=0)
-        settings = integration.Settings(
+        settings = integration.IntegrationSettings(
             rtol=self.tolerance,
             strain_limit=self.strain_limit,
-            max_steps=int(self.max_steps) + STEPS_FOR_A_BREAK * breaks,
+            max_steps=int(self.max_steps) + STEPS_PER_BREAKPOINT * breaks,
         )
-        return integration.integrate(kernel, kernel.internal(values), tests, settings=settings, jacobian=jacobian)
+        return integration.integrate(kernel, kernel.to_internal(values), tests, settings=settings, jacobian=jacobian)

@@ -16,7 +16,7 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError, nearest
 from creepkit.hookspecs import hookimpl
-from creepkit.records import Effects, History, Prediction, Predictor, Specimen
+from creepkit.records import NuisanceValues, History, Prediction, Predictor, Specimen
 from creepkit.specimens.dimple import DimpleGeometry
 from creepkit.specimens.observation import OBSERVED, Observation
 
@@ -62,7 +62,7 @@ class Bulge:
     title: str = field(default="Bulge test of a dimple under gas pressure, by finite elements", init=False)
     outputs: tuple[str, ...] = field(default=OBSERVED, init=False)
 
-    effects: ClassVar[tuple[str, ...]] = ("thickness", "modulus", "temperature", "window")
+    nuisances: ClassVar[tuple[str, ...]] = ("thickness", "modulus", "temperature", "window")
     """Kinds of explicit nuisances that predict() understands."""
 
     def __post_init__(self) -> None:
@@ -76,13 +76,13 @@ class Bulge:
 
     def replace(self, **changes: Any) -> Bulge:
         """The same specimen with some fields, or lengths of its geometry, changed: replace(apex_thickness=0.48)."""
-        own = {f.name for f in fields(self) if f.init}
-        known = own | {f.name for f in fields(self.geometry)}
+        own_fields = {f.name for f in fields(self) if f.init}
+        known = own_fields | {f.name for f in fields(self.geometry)}
         for name in changes.keys() - known:
             raise SolveError(f"a bulge specimen has no field '{name}'; {nearest(name, known)}")
-        inner = {name: changes.pop(name) for name in list(changes) if name not in own}
-        if inner:
-            changes["geometry"] = changes.get("geometry", self.geometry).replace(**inner)
+        geometry_changes = {name: changes.pop(name) for name in list(changes) if name not in own_fields}
+        if geometry_changes:
+            changes["geometry"] = changes.get("geometry", self.geometry).replace(**geometry_changes)
         return replace(self, **changes)
 
     def predict(
@@ -92,24 +92,24 @@ class Bulge:
         histories: Sequence[History],
         *,
         jacobian: bool = False,
-        effects: Effects | None = None,
+        nuisances: NuisanceValues | None = None,
     ) -> Prediction:
         """Predict amplitude, width and shape of each history at its times; see records.Predictor."""
-        from creepkit.specimens.bulge_prediction import predict
+        from creepkit.specimens.bulge_prediction import predict_bulge
 
-        return predict(self, law, values, histories, jacobian, effects or {})
+        return predict_bulge(self, law, values, histories, jacobian, nuisances or {})
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
         """Run one test, keeping displacements, stresses and strains of the whole dimple; see BulgeRun."""
-        from creepkit.specimens.bulge_run import run
+        from creepkit.specimens.bulge_run import run_bulge
 
-        return run(self, law, values, plan)
+        return run_bulge(self, law, values, plan)
 
-    def screening(self) -> Predictor:
+    def reduced_order_model(self) -> Predictor:
         """The stand-in of one degree of freedom, for searches."""
-        from creepkit.specimens.reduced import ReducedBulge
+        from creepkit.specimens.reduced import BulgeReducedOrderModel
 
-        return ReducedBulge(self)
+        return BulgeReducedOrderModel(self)
 
     def reference_stress(self, history: History) -> Floats:
         """The von Mises stress, MPa, that stands for each pressure level: 12.5 P (t/.5 mm)^-1.15 for the default.
@@ -118,9 +118,9 @@ class Bulge:
         scaled as a plate of the same radius to thickness.
         """
         thickness = history.geometry.get("apex_thickness", self.geometry.apex_thickness)
-        slender = self.geometry.cavity_radius / 7.5 * 0.5 / thickness
+        slenderness = self.geometry.cavity_radius / 7.5 * 0.5 / thickness
         levels = np.unique(history.loading.program().values)
-        return np.asarray(12.5 * slender**1.15 * levels[levels > 0])
+        return np.asarray(12.5 * slenderness**1.15 * levels[levels > 0])
 
 
 @hookimpl

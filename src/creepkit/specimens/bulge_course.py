@@ -11,8 +11,8 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
-from creepkit.fem.body import Body, body_of
-from creepkit.fem.simulation import Course
+from creepkit.fem.body import FiniteElementModel, finite_element_model
+from creepkit.fem.simulation import LoadHistory
 from creepkit.records import History, Program
 from creepkit.specimens.dimple import DimpleGeometry
 from creepkit.specimens.observation import Observation
@@ -21,19 +21,19 @@ if TYPE_CHECKING:
     from creepkit.language import Elastic
     from creepkit.specimens.bulge import Bulge
 
-MODULUS_STEP = 1.0
+MODULUS_TEMPERATURE_STEP = 1.0
 """K, of the central difference of the modulus to the temperature."""
 
 
 @dataclass(frozen=True, eq=False)
-class Setup:
+class TestSetup:
     """One test made ready: its body and course, its geometry, its observation operator.
 
     refinement : of the structured mesh, None for a mesh from files.
     """
 
-    body: Body
-    course: Course
+    model: FiniteElementModel
+    load_history: LoadHistory
     geometry: DimpleGeometry
     observation: Observation
     refinement: float | None
@@ -41,11 +41,11 @@ class Setup:
     @property
     def radii(self) -> Floats:
         """(top,) mm, radii of the observed nodes at rest."""
-        return np.asarray(self.body.nodes[self.body.top, 0])
+        return np.asarray(self.model.nodes[self.model.top, 0])
 
 
-def setup(specimen: Bulge, history: History, effects: Mapping[str, float]) -> Setup:
-    """Prepare one test; effects : {kind: value} of its explicit nuisances."""
+def set_up_test(specimen: Bulge, history: History, nuisances: Mapping[str, float]) -> TestSetup:
+    """Prepare one test; nuisances : {kind: value} of its explicit nuisances."""
     where = history.source or f"history '{history.name}'"
     if history.loading.quantity != "pressure":
         raise SolveError(
@@ -58,47 +58,47 @@ def setup(specimen: Bulge, history: History, effects: Mapping[str, float]) -> Se
     pressure = history.loading.program()
     if pressure.values.min() < 0.0:
         raise SolveError(f"{where}: the pressure falls to {pressure.values.min():g} MPa; it must not be negative")
-    geometry = _geometry(specimen, history, effects)
+    geometry = _geometry(specimen, history, nuisances)
     operator = Observation.from_text(history.operator) if history.operator else specimen.observation
-    if "window" in effects:
-        operator = operator.replace(window=float(effects["window"]))
-    warmth = history.temperature_program()
-    warmth = Program(warmth.times, warmth.values + effects.get("temperature", 0.0))
-    modulus = modulus_program(history.elastic, warmth, 1.0 + effects.get("modulus", 0.0), where)
-    body = prepared(geometry, specimen.refinement) if specimen.mesh is None else _prepared_mesh(specimen)
-    poisson = float(history.elastic.at(float(warmth.values[0])).nu)
-    course = Course(pressure, warmth, modulus, float(history.times[-1]), poisson)
-    return Setup(body, course, geometry, operator, specimen.refinement if specimen.mesh is None else None)
+    if "window" in nuisances:
+        operator = operator.replace(window=float(nuisances["window"]))
+    temperature = history.temperature_program()
+    temperature = Program(temperature.times, temperature.values + nuisances.get("temperature", 0.0))
+    modulus = modulus_program(history.elastic, temperature, 1.0 + nuisances.get("modulus", 0.0), where)
+    model = model_of_geometry(geometry, specimen.refinement) if specimen.mesh is None else _model_of_mesh(specimen)
+    poisson = float(history.elastic.at(float(temperature.values[0])).nu)
+    load_history = LoadHistory(pressure, temperature, modulus, float(history.times[-1]), poisson)
+    return TestSetup(model, load_history, geometry, operator, specimen.refinement if specimen.mesh is None else None)
 
 
-def modulus_program(elastic: Elastic, warmth: Program, factor: float, where: str) -> Program:
+def modulus_program(elastic: Elastic, temperature: Program, factor: float, where: str) -> Program:
     """Young's modulus over time, MPa, a straight line where the temperature is one."""
-    known = {float(T): float(elastic.at(float(T)).E) for T in np.unique(warmth.values)}
-    values = np.array([factor * known[float(T)] for T in warmth.values])
+    moduli = {float(T): float(elastic.at(float(T)).E) for T in np.unique(temperature.values)}
+    values = np.array([factor * moduli[float(T)] for T in temperature.values])
     if not (values > 0).all():
         raise SolveError(f"{where}: the modulus is {values.min():g} MPa; it must be above zero")
-    return Program(warmth.times, values)
+    return Program(temperature.times, values)
 
 
 @lru_cache(maxsize=256)
-def prepared(geometry: DimpleGeometry, refinement: float) -> Body:
+def model_of_geometry(geometry: DimpleGeometry, refinement: float) -> FiniteElementModel:
     """The body of a dimple; kept, for a fit asks for it a thousand times."""
-    return body_of(geometry.mesh(refinement))
+    return finite_element_model(geometry.mesh(refinement))
 
 
 @lru_cache(maxsize=16)
-def _prepared_mesh(specimen: Bulge) -> Body:
+def _model_of_mesh(specimen: Bulge) -> FiniteElementModel:
     assert specimen.mesh is not None
     if not specimen.mesh.top.size:
         raise SolveError("the mesh of a bulge specimen names no observed surface; give it the nodes of its top")
-    return body_of(specimen.mesh)
+    return finite_element_model(specimen.mesh)
 
 
-def _geometry(specimen: Bulge, history: History, effects: Mapping[str, float]) -> DimpleGeometry:
+def _geometry(specimen: Bulge, history: History, nuisances: Mapping[str, float]) -> DimpleGeometry:
     """The specimen's geometry, with what was measured of this test and then what is assumed of it."""
     changes = {name: value for name, value in history.geometry.items() if name in DimpleGeometry.lengths}
-    if "thickness" in effects:
-        changes["apex_thickness"] = float(effects["thickness"])
+    if "thickness" in nuisances:
+        changes["apex_thickness"] = float(nuisances["thickness"])
     if not changes:
         return specimen.geometry
     if specimen.mesh is not None:

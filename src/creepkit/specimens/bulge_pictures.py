@@ -11,8 +11,8 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS
 from creepkit.fem.mesh_checks import SIDES, outline
-from creepkit.fem.shape import POINTS, shape_functions
-from creepkit.figures import blank
+from creepkit.fem.shape import GAUSS_POINTS, shape_functions
+from creepkit.figures import empty_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
 
     from creepkit.specimens.bulge_run import BulgeRun
 
-FINENESS = 6
+SUBDIVISIONS = 6
 """Facets along the side of an element: its curved sides look smooth."""
 
 _LABELS = {"stress": "von Mises stress, MPa", "creep strain": "equivalent creep strain"}
 _GREY = "0.45"
 
 
-def section(run: BulgeRun, time: float, name: str, path: str | Path | None = None) -> Figure:
+def plot_section(run: BulgeRun, time: float, name: str, path: str | Path | None = None) -> Figure:
     """The deformed section, both halves, coloured by a field, over the outline at rest; true to scale."""
     from matplotlib.tri import Triangulation
 
     field = run.field(name, time)
-    body = run.made.body
+    body = run.setup.model
     moved = body.nodes + run._at(run.simulation.displacements, time)
-    figure = blank(9.0, 3.1)
+    figure = empty_figure(9.0, 3.1)
     axes = figure.subplots()
     places, facets = _facets(moved[body.elements])
     values = _at_facets(field.values.reshape(-1, 4), body.elements)
@@ -45,7 +45,7 @@ def section(run: BulgeRun, time: float, name: str, path: str | Path | None = Non
         _draw_outline(axes, body.nodes, body.elements, side, color=_GREY, lw=0.8, ls=(0, (4, 3)))
         _draw_outline(axes, moved, body.elements, side, color="black", lw=0.9)
     figure.colorbar(coloured, ax=axes, label=_LABELS.get(name, name), shrink=0.8, pad=0.01, aspect=18)
-    pressure = float(run.made.course.pressure.at(time))
+    pressure = float(run.setup.load_history.pressure.at(time))
     axes.set(aspect="equal", xlabel="r, mm", ylabel="z, mm")
     axes.set_title(f"{run.name}: {_duration(time)}, {pressure:.3g} MPa (dashed: at rest)", fontsize=10)
     axes.spines[["top", "right"]].set_visible(False)
@@ -53,15 +53,15 @@ def section(run: BulgeRun, time: float, name: str, path: str | Path | None = Non
     return figure
 
 
-def outputs(run: BulgeRun, path: str | Path | None = None) -> Figure:
+def plot_outputs(run: BulgeRun, path: str | Path | None = None) -> Figure:
     """Amplitude, width, shape and pressure over time, one below the other."""
-    figure = blank(6.4, 6.6)
+    figure = empty_figure(6.4, 6.6)
     panels = figure.subplots(4, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0, 0.8))
     hours, units = run.times / 3600.0, {"amplitude": ", mm", "width": ", mm"}
     for axes, (name, values) in zip(panels, run.outputs.items(), strict=False):
         axes.plot(hours, values, lw=1.5, color="tab:blue")
         axes.set_ylabel(f"{name}{units.get(name, '')}")
-    program = run.made.course.pressure
+    program = run.setup.load_history.pressure
     inside = program.times[program.times < run.end_time]
     knots = np.unique(np.concatenate([inside, [0.0, run.end_time]]))
     panels[3].plot(knots / 3600.0, program.at(knots), lw=1.5, color="tab:red")
@@ -79,9 +79,9 @@ def outputs(run: BulgeRun, path: str | Path | None = None) -> Figure:
 
 def _facets(nodes: Floats) -> tuple[Floats, Ints]:
     """Corners (corners, 2) and triangles (triangles, 3) of elements (elements, 8, 2) cut into small pieces."""
-    side = FINENESS + 1
+    side = SUBDIVISIONS + 1
     corners = np.einsum("pa,eai->epi", shape_functions(_grid()), nodes).reshape(-1, 2)
-    first = np.add.outer(side * np.arange(FINENESS), np.arange(FINENESS)).ravel()
+    first = np.add.outer(side * np.arange(SUBDIVISIONS), np.arange(SUBDIVISIONS)).ravel()
     one = np.stack([first, first + 1, first + side + 1], axis=1)
     other = np.stack([first, first + side + 1, first + side], axis=1)
     pieces = np.concatenate([one, other])
@@ -95,17 +95,17 @@ def _at_facets(values: Floats, elements: Ints) -> Floats:
     between the nodes; never beyond what the points hold.
     """
     nodes = np.vstack([CORNERS, 0.5 * (CORNERS + np.roll(CORNERS, -1, axis=0))])
-    scaled, signs = nodes / np.abs(POINTS[0, 0]), np.sign(POINTS)
-    own = values @ (0.25 * np.prod(1.0 + scaled[:, None] * signs, axis=2)).T
+    scaled, signs = nodes / np.abs(GAUSS_POINTS[0, 0]), np.sign(GAUSS_POINTS)
+    own_values = values @ (0.25 * np.prod(1.0 + scaled[:, None] * signs, axis=2)).T
     count = np.bincount(elements.ravel())
-    mean = np.bincount(elements.ravel(), weights=own.ravel()) / np.maximum(count, 1)
+    mean = np.bincount(elements.ravel(), weights=own_values.ravel()) / np.maximum(count, 1)
     smooth = mean[elements] @ shape_functions(_grid()).T
     return np.clip(smooth, values.min(), values.max()).ravel()
 
 
 def _grid() -> Floats:
     """(places, 2) local coordinates of the corners of the facets."""
-    ticks = np.linspace(-1.0, 1.0, FINENESS + 1)
+    ticks = np.linspace(-1.0, 1.0, SUBDIVISIONS + 1)
     return np.stack([a.ravel() for a in np.meshgrid(ticks, ticks)], axis=1)
 
 
@@ -113,7 +113,7 @@ def _draw_outline(axes: Axes, nodes: Floats, elements: Ints, side: float, **styl
     """The sides that belong to one element only, but for those on the axis."""
     from matplotlib.collections import LineCollection
 
-    ticks = np.linspace(-1.0, 1.0, FINENESS + 1)[:, None]
+    ticks = np.linspace(-1.0, 1.0, SUBDIVISIONS + 1)[:, None]
     weights = np.hstack([0.5 * ticks * (ticks - 1.0), 1.0 - ticks**2, 0.5 * ticks * (ticks + 1.0)])
     chosen = outline(elements)
     ends = nodes[elements[chosen[:, 0, None], SIDES[chosen[:, 1]]]]
@@ -131,5 +131,5 @@ def _save(figure: Figure, path: str | Path | None) -> None:
     try:
         figure.savefig(path, dpi=160)
     except (OSError, ValueError) as error:
-        told = str(error).splitlines()[0]
-        raise SolveError(f"{path}: the picture cannot be written ({told}); name a .png, .svg or .pdf file") from None
+        message = str(error).splitlines()[0]
+        raise SolveError(f"{path}: the picture cannot be written ({message}); name a .png, .svg or .pdf file") from None

@@ -14,11 +14,11 @@ import numpy as np
 from creepkit import kernels
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError
-from creepkit.fem.record import Settings
+from creepkit.fem.record import SolverSettings
 from creepkit.fem.simulation import simulate
-from creepkit.records import Effects, History, Prediction, Status
-from creepkit.specimens.bulge_course import setup
-from creepkit.specimens.bulge_slopes import Slopes, slopes_of
+from creepkit.records import NuisanceValues, History, Prediction, Status
+from creepkit.specimens.bulge_course import set_up_test
+from creepkit.specimens.bulge_slopes import BulgeSensitivities, output_sensitivities
 from creepkit.specimens.observation import OBSERVED
 
 if TYPE_CHECKING:
@@ -28,40 +28,40 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class BulgeResponse:
     """One candidate in one test: outputs (times, 3), how it ended, and derivatives if asked for."""
 
     values: Floats
     status: Status
     end_time: float
-    slopes: Slopes | None
+    sensitivities: BulgeSensitivities | None
 
 
-def predict(
+def predict_bulge(
     specimen: Bulge,
     law: CreepLaw,
     values: Mapping[str, ArrayLike],
     histories: Sequence[History],
     jacobian: bool,
-    effects: Effects,
+    nuisances: NuisanceValues,
 ) -> Prediction:
     """Predict every candidate in every test; see records.Predictor."""
-    for kind in effects:
-        if kind not in specimen.effects:
+    for kind in nuisances:
+        if kind not in specimen.nuisances:
             raise SolveError(
-                f"a bulge specimen does not know the nuisance '{kind}'; it knows {', '.join(specimen.effects)}"
+                f"a bulge specimen does not know the nuisance '{kind}'; it knows {', '.join(specimen.nuisances)}"
             )
     kernel = kernels.lower(law, "numba")
-    theta = kernel.internal(values)
-    candidates = max([len(theta), *(len(v) for v in effects.values())])
+    theta = kernel.to_internal(values)
+    candidates = max([len(theta), *(len(v) for v in nuisances.values())])
     theta = np.broadcast_to(theta, (candidates, theta.shape[1]))
-    assumed = {kind: np.broadcast_to(v, (candidates, len(histories))) for kind, v in effects.items()}
+    broadcast_nuisances = {kind: np.broadcast_to(v, (candidates, len(histories))) for kind, v in nuisances.items()}
     tasks = list(product(range(candidates), range(len(histories))))
 
-    def run(task: tuple[int, int]) -> Row:
+    def run(task: tuple[int, int]) -> BulgeResponse:
         c, k = task
-        own = {kind: float(value[c, k]) for kind, value in assumed.items()}
-        return row(specimen, kernel, theta[c], histories[k], own, jacobian)
+        nuisance_values = {kind: float(value[c, k]) for kind, value in broadcast_nuisances.items()}
+        return simulate_and_observe(specimen, kernel, theta[c], histories[k], nuisance_values, jacobian)
 
     workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
     if workers > 1:
@@ -69,28 +69,28 @@ def predict(
             rows = list(pool.map(run, tasks))
     else:
         rows = [run(task) for task in tasks]
-    return _gathered(rows, histories, candidates, theta.shape[1], tuple(effects) if jacobian else (), jacobian)
+    return _to_prediction(rows, histories, candidates, theta.shape[1], tuple(nuisances) if jacobian else (), jacobian)
 
 
-def row(
-    specimen: Bulge, kernel: CompiledLaw, theta: Floats, history: History, effects: Mapping[str, float], jacobian: bool
-) -> Row:
+def simulate_and_observe(
+    specimen: Bulge, kernel: CompiledLaw, theta: Floats, history: History, nuisances: Mapping[str, float], jacobian: bool
+) -> BulgeResponse:
     """Simulate one test and observe it at the times of its history."""
-    made = setup(specimen, history, effects)
-    settings = settings_of(specimen, exact=jacobian)
-    found = simulate(kernel, theta, made.body, made.course, settings=settings, keep_stages=jacobian)
-    profiles = found.displacements[:, made.body.top, 1]
-    slopes = None
+    test_setup = set_up_test(specimen, history, nuisances)
+    settings = solver_settings(specimen, exact=jacobian)
+    simulation = simulate(kernel, theta, test_setup.model, test_setup.load_history, settings=settings, keep_stages=jacobian)
+    profiles = simulation.displacements[:, test_setup.model.top, 1]
+    sensitivities = None
     if jacobian:
-        seen, slopes = slopes_of(made, kernel, theta, history, found, profiles, tuple(effects))
+        outputs, sensitivities = output_sensitivities(test_setup, kernel, theta, history, simulation, profiles, tuple(nuisances))
     else:
-        seen = found.at(made.observation.observe(made.radii, profiles), history.times)
-    return Row(seen, found.status, found.end_time, slopes)
+        outputs = simulation.at(test_setup.observation.observe(test_setup.radii, profiles), history.times)
+    return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
 
 
-def settings_of(specimen: Bulge, *, exact: bool = False) -> Settings:
+def solver_settings(specimen: Bulge, *, exact: bool = False) -> SolverSettings:
     """The solver's settings; exact : equilibrium so tight that derivatives are those of the scheme."""
-    return Settings(
+    return SolverSettings(
         tolerance=specimen.tolerance,
         newton=1e-7 if exact else 1e-2 * specimen.tolerance,
         deflection_limit=specimen.deflection_limit,
@@ -99,8 +99,8 @@ def settings_of(specimen: Bulge, *, exact: bool = False) -> Settings:
     )
 
 
-def _gathered(
-    rows: Sequence[Row],
+def _to_prediction(
+    rows: Sequence[BulgeResponse],
     histories: Sequence[History],
     candidates: int,
     parameters: int,
@@ -110,23 +110,23 @@ def _gathered(
     longest = max((h.times.size for h in histories), default=0)
     shape = (candidates, len(histories), longest, len(OBSERVED))
     values = np.full(shape, np.nan)
-    changes = np.full((*shape, parameters), np.nan) if jacobian else None
-    by_kind = {kind: np.full(shape, np.nan) for kind in kinds}
-    for n, found in enumerate(rows):
+    law_jacobian = np.full((*shape, parameters), np.nan) if jacobian else None
+    nuisance_jacobian = {kind: np.full(shape, np.nan) for kind in kinds}
+    for n, response in enumerate(rows):
         c, k = divmod(n, len(histories))
         frames = histories[k].times.size
-        values[c, k, :frames] = found.values
-        if changes is not None and found.slopes is not None:
-            changes[c, k, :frames] = found.slopes.law
+        values[c, k, :frames] = response.values
+        if law_jacobian is not None and response.sensitivities is not None:
+            law_jacobian[c, k, :frames] = response.sensitivities.law
             for kind in kinds:
-                by_kind[kind][c, k, :frames] = found.slopes.effects[kind]
+                nuisance_jacobian[kind][c, k, :frames] = response.sensitivities.nuisances[kind]
     return Prediction(
         values=values,
         outputs=OBSERVED,
         lengths=np.array([h.times.size for h in histories], dtype=np.int64),
         status=np.array([int(r.status) for r in rows], dtype=np.int64).reshape(shape[:2]),
         end_times=np.array([r.end_time for r in rows]).reshape(shape[:2]),
-        jacobian=changes,
+        jacobian=law_jacobian,
         times=tuple(h.times for h in histories),
-        effect_jacobian=by_kind,
+        nuisance_jacobian=nuisance_jacobian,
     )

@@ -12,16 +12,16 @@ import numpy as np
 from creepkit import kernels
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError, nearest
-from creepkit.fem.material import EQUIVALENT
-from creepkit.fem.shape import POINTS, shape_functions
+from creepkit.fem.material import EQUIVALENT_STRAIN
+from creepkit.fem.shape import GAUSS_POINTS, shape_functions
 from creepkit.fem.simulation import Simulation, simulate
 from creepkit.records import History, Status
-from creepkit.specimens.bulge_course import Setup, setup
-from creepkit.specimens.bulge_prediction import settings_of
+from creepkit.specimens.bulge_course import TestSetup, set_up_test
+from creepkit.specimens.bulge_prediction import solver_settings
 from creepkit.specimens.observation import OBSERVED
-from creepkit.specimens.rate_check import fault_of, points_at
-from creepkit.specimens.run import Run, run_of
-from creepkit.specimens.top_profile import interpolation
+from creepkit.specimens.rate_check import missing_rate_message, uniaxial_points
+from creepkit.specimens.run import Run, run_from_outputs
+from creepkit.specimens.top_profile import surface_interpolation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,27 +30,27 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
     from creepkit.specimens.bulge import Bulge
 
-STRESS, CREEP_STRAIN = "stress", "creep strain"
+STRESS_FIELD, CREEP_STRAIN_FIELD = "stress", "creep strain"
 
 
-class Profile(NamedTuple):
+class TopProfile(NamedTuple):
     """The top of the dimple: radii (nodes,) at rest, mm, and how far each has risen, (times, nodes) mm."""
 
     radii: Floats
     displacement: Floats
 
 
-class Range(NamedTuple):
+class StressRange(NamedTuple):
     """Least and greatest von Mises stress, (times,) MPa."""
 
     low: Floats
     high: Floats
 
 
-class Field(NamedTuple):
+class FieldValues(NamedTuple):
     """A quantity at the integration points: places (points, 2), r and z at rest in mm, and values (times, points)."""
 
-    places: Floats
+    points: Floats
     values: Floats
 
 
@@ -66,69 +66,69 @@ class BulgeRun(Run):
     states : names of the law's internal variables.
     """
 
-    made: Setup = field(repr=False)
+    setup: TestSetup = field(repr=False)
     simulation: Simulation = field(repr=False)
     states: tuple[str, ...] = ()
 
     def displacement(self, radius: ArrayLike = 0.0, times: ArrayLike | None = None) -> Floats:
         """How far the top has risen at a radius (mm, at rest), (times,) mm, or at several, (times, radii)."""
-        rows = self._at(self._profiles, times) @ interpolation(self.made.radii, radius).T
+        rows = self._at(self._profiles, times) @ surface_interpolation(self.setup.radii, radius).T
         return rows if np.ndim(radius) else np.asarray(rows[..., 0])
 
-    def profile(self, times: ArrayLike | None = None) -> Profile:
+    def profile(self, times: ArrayLike | None = None) -> TopProfile:
         """The whole top, at the nodes of the mesh."""
-        return Profile(self.made.radii, self._at(self._profiles, times))
+        return TopProfile(self.setup.radii, self._at(self._profiles, times))
 
-    def mises_range(self, times: ArrayLike | None = None, within: float | None = None) -> Range:
+    def mises_range(self, times: ArrayLike | None = None, within: float | None = None) -> StressRange:
         """Least and greatest von Mises stress of the integration points at radii up to `within` mm.
 
         By default the whole roof, up to the radius of the cavity. The least of these hangs on the mesh: it is that of
         the point nearest to where bending changes its sign.
         """
-        reach = self.made.geometry.cavity_radius if within is None else float(within)
-        chosen = self.places[:, 0] <= reach
+        reach = self.setup.geometry.cavity_radius if within is None else float(within)
+        chosen = self.point_coordinates[:, 0] <= reach
         if not chosen.any():
             raise SolveError(f"run '{self.name}': no integration point lies within a radius of {reach:g} mm")
         values = np.maximum(self._at(self.simulation.mises[:, chosen], times), 0.0)
-        return Range(values.min(axis=-1), values.max(axis=-1))
+        return StressRange(values.min(axis=-1), values.max(axis=-1))
 
-    def field(self, name: str = STRESS, times: ArrayLike | None = None) -> Field:
+    def field(self, name: str = STRESS_FIELD, times: ArrayLike | None = None) -> FieldValues:
         """Von Mises "stress" (MPa), equivalent "creep strain" or a state of the law by its name, at all points."""
-        values = self._at(self._kept(name), times)
-        return Field(self.places, np.maximum(values, 0.0) if name in (STRESS, CREEP_STRAIN) else values)
+        values = self._at(self._field_at_steps(name), times)
+        return FieldValues(self.point_coordinates, np.maximum(values, 0.0) if name in (STRESS_FIELD, CREEP_STRAIN_FIELD) else values)
 
-    def section(self, time: float | None = None, name: str = STRESS, path: str | Path | None = None) -> Figure:
+    def section(self, time: float | None = None, name: str = STRESS_FIELD, path: str | Path | None = None) -> Figure:
         """A picture of the deformed section, coloured by a field (see `field`), at a time; by default the last."""
-        from creepkit.specimens.bulge_pictures import section
+        from creepkit.specimens.bulge_pictures import plot_section
 
-        return section(self, float(self.times[-1]) if time is None else float(time), name, path)
+        return plot_section(self, float(self.times[-1]) if time is None else float(time), name, path)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """A picture of amplitude, width, shape and pressure over time."""
-        from creepkit.specimens.bulge_pictures import outputs
+        from creepkit.specimens.bulge_pictures import plot_outputs
 
-        return outputs(self, path)
+        return plot_outputs(self, path)
 
     @property
-    def places(self) -> Floats:
+    def point_coordinates(self) -> Floats:
         """(points, 2) r and z of the integration points at rest, mm; four an element, in the order of the mesh."""
-        body = self.made.body
-        return np.asarray(np.einsum("pa,eai->epi", shape_functions(POINTS), body.nodes[body.elements]).reshape(-1, 2))
+        body = self.setup.model
+        return np.asarray(np.einsum("pa,eai->epi", shape_functions(GAUSS_POINTS), body.nodes[body.elements]).reshape(-1, 2))
 
     @property
     def _profiles(self) -> Floats:
         """(steps, top nodes) mm."""
-        return np.asarray(self.simulation.displacements[:, self.made.body.top, 1])
+        return np.asarray(self.simulation.displacements[:, self.setup.model.top, 1])
 
-    def _kept(self, name: str) -> Floats:
+    def _field_at_steps(self, name: str) -> Floats:
         """Values of a field at the accepted steps, (steps, points)."""
         assert self.simulation.values is not None
-        if name == STRESS:
+        if name == STRESS_FIELD:
             return self.simulation.mises
-        known = (CREEP_STRAIN, *self.states)
+        known = (CREEP_STRAIN_FIELD, *self.states)
         if name not in known:
-            raise SolveError(f"a bulge run has no field '{name}'; {nearest(name, (STRESS, *known))}")
-        return np.asarray(self.simulation.values[:, :, EQUIVALENT + known.index(name)])
+            raise SolveError(f"a bulge run has no field '{name}'; {nearest(name, (STRESS_FIELD, *known))}")
+        return np.asarray(self.simulation.values[:, :, EQUIVALENT_STRAIN + known.index(name)])
 
     def _at(self, steps: Floats, times: ArrayLike | None) -> Floats:
         """Values (steps, ...) at times, (times, ...), or (...) at one time; refuses times after the end."""
@@ -137,54 +137,54 @@ class BulgeRun(Run):
         outside = ~((wanted >= 0.0) & (wanted <= reach * (1 + 1e-12)))
         if outside.any():
             why = f" ({self.reason})" if self.reason else ""
-            found = float(np.atleast_1d(wanted)[np.atleast_1d(outside)][0])
+            time = float(np.atleast_1d(wanted)[np.atleast_1d(outside)][0])
             raise SolveError(
-                f"run '{self.name}': nothing is known at {found:g} s; the simulation reaches from 0 to {reach:g} s{why}"
+                f"run '{self.name}': nothing is known at {time:g} s; the simulation reaches from 0 to {reach:g} s{why}"
             )
         rows = self.simulation.at(steps, wanted)
         return rows if wanted.ndim else np.asarray(rows[0])
 
 
-def run(specimen: Bulge, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
+def run_bulge(specimen: Bulge, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
     """Simulate one test and keep all of it."""
-    made = setup(specimen, plan, {})
+    test_setup = set_up_test(specimen, plan, {})
     kernel = kernels.lower(law, "numba")
-    theta = kernel.internal(law.values(values))[0]
-    found = simulate(kernel, theta, made.body, made.course, settings=settings_of(specimen), keep_points=True)
-    rows = found.at(made.observation.observe(made.radii, found.displacements[:, made.body.top, 1]), plan.times)
-    status, end_time, reason = found.status, found.end_time, found.reason
-    fault = _fault(specimen, kernel, theta, plan, made, found)
-    if fault is not None:
-        status, end_time, reason = Status.NOT_CONVERGED, *fault
-    told = plan.replace(operator=str(made.observation), geometry={**plan.geometry, **_lengths(specimen, made)})
+    theta = kernel.to_internal(law.values(values))[0]
+    simulation = simulate(kernel, theta, test_setup.model, test_setup.load_history, settings=solver_settings(specimen), keep_points=True)
+    rows = simulation.at(test_setup.observation.observe(test_setup.radii, simulation.displacements[:, test_setup.model.top, 1]), plan.times)
+    status, end_time, reason = simulation.status, simulation.end_time, simulation.reason
+    rate_failure = _rate_failure(specimen, kernel, theta, plan, test_setup, simulation)
+    if rate_failure is not None:
+        status, end_time, reason = Status.NOT_CONVERGED, *rate_failure
+    plan_with_setup = plan.replace(operator=str(test_setup.observation), geometry={**plan.geometry, **_lengths(specimen, test_setup)})
     states = tuple(map(str, law.states))
-    return run_of(BulgeRun, told, OBSERVED, rows, status, end_time, reason, made=made, simulation=found, states=states)
+    return run_from_outputs(BulgeRun, plan_with_setup, OBSERVED, rows, status, end_time, reason, made=test_setup, simulation=simulation, states=states)
 
 
-def _lengths(specimen: Bulge, made: Setup) -> dict[str, float]:
+def _lengths(specimen: Bulge, setup: TestSetup) -> dict[str, float]:
     """The lengths of the dimple, so that a written history says what was simulated; a mesh from files has none."""
-    return {} if specimen.mesh is not None else {name: getattr(made.geometry, name) for name in made.geometry.lengths}
+    return {} if specimen.mesh is not None else {name: getattr(setup.geometry, name) for name in setup.geometry.lengths}
 
 
-def _fault(
-    specimen: Bulge, kernel: CompiledLaw, theta: Floats, plan: History, made: Setup, found: Simulation
+def _rate_failure(
+    specimen: Bulge, kernel: CompiledLaw, theta: Floats, plan: History, setup: TestSetup, simulation: Simulation
 ) -> tuple[float, str] | None:
     """Until when the law had a creep rate, and where it has none: at any step, and beyond an early end.
 
     A simulation that stopped was on its way to other stresses, at most a few times those that stand for the test.
     """
-    assert found.values is not None
-    warmth = made.course.temperature.at(found.times)
-    for k in range(1, found.times.size):
-        strains, states = found.values[k, :, EQUIVALENT], found.values[k, :, EQUIVALENT + 1 :]
-        points = points_at(found.mises[k], strains, states, float(found.times[k]), float(warmth[k]))
-        reason = fault_of(kernel, theta, points)
+    assert simulation.values is not None
+    temperatures = setup.load_history.temperature.at(simulation.times)
+    for k in range(1, simulation.times.size):
+        strains, states = simulation.values[k, :, EQUIVALENT_STRAIN], simulation.values[k, :, EQUIVALENT_STRAIN + 1 :]
+        points = uniaxial_points(simulation.mises[k], strains, states, float(simulation.times[k]), float(temperatures[k]))
+        reason = missing_rate_message(kernel, theta, points)
         if reason:
-            return float(found.times[k - 1]), reason
-    if found.status is Status.COMPLETE:
+            return float(simulation.times[k - 1]), reason
+    if simulation.status is Status.COMPLETE:
         return None
     stresses = np.geomspace(0.1, 4.0, 9) * float(np.max(specimen.reference_stress(plan), initial=1.0))
-    worst = found.values[-1, np.argmax(found.values[-1, :, EQUIVALENT])]
-    strains, states = np.full(9, worst[EQUIVALENT]), np.tile(worst[EQUIVALENT + 1 :], (9, 1))
-    reason = fault_of(kernel, theta, points_at(stresses, strains, states, max(found.end_time, 1.0), float(warmth[-1])))
-    return (found.end_time, reason) if reason else None
+    worst = simulation.values[-1, np.argmax(simulation.values[-1, :, EQUIVALENT_STRAIN])]
+    strains, states = np.full(9, worst[EQUIVALENT_STRAIN]), np.tile(worst[EQUIVALENT_STRAIN + 1 :], (9, 1))
+    reason = missing_rate_message(kernel, theta, uniaxial_points(stresses, strains, states, max(simulation.end_time, 1.0), float(temperatures[-1])))
+    return (simulation.end_time, reason) if reason else None

@@ -9,14 +9,14 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 
-_FEWEST = 12
+_FEWEST_POINTS = 12
 _SHAPES = (0.25, 40.0)
 """Least and greatest p of an answer, as in the fit of profiles."""
 
-_SURE = 5.0
+_LEAST_SIGNAL_TO_ERROR = 5.0
 """Least ratio of D to its standard error in an answer; the best fit to noise alone reached 3 in forty trials."""
 
-_TOPS = (1.0, 0.98)
+_START_QUANTILES = (1.0, 0.98)
 """Searches start from the greatest height, right for a small bulge, and from one that a few wild points leave alone."""
 
 
@@ -36,7 +36,7 @@ class FieldFit:
     x_center: float
     y_center: float
     standard_errors: tuple[float, ...]
-    scatter: float
+    residual_sd: float
     points: int
 
 
@@ -51,7 +51,7 @@ def fit_field(x: ArrayLike, y: ArrayLike, heights: ArrayLike) -> FieldFit:
     v, jacobian, left = _search(X, Y, H / scale)
     values = np.array([scale * v[0], np.exp(v[1]), np.exp(v[2]), v[3], v[4]])
     errors = _standard_errors(jacobian, left) * np.array([scale, values[1], values[2], 1.0, 1.0])
-    if not (abs(values[0]) > _SURE * errors[0] and _SHAPES[0] < values[2] < _SHAPES[1]):
+    if not (abs(values[0]) > _LEAST_SIGNAL_TO_ERROR * errors[0] and _SHAPES[0] < values[2] < _SHAPES[1]):
         raise FitError(
             f"the field of {H.size} points shows no bulge of Eq. (7): the best fit has D = {values[0]:.3g} +- "
             f"{errors[0]:.2g} mm, S = {values[1]:.3g} mm, p = {values[2]:.3g}; take off what the surface showed "
@@ -76,7 +76,7 @@ def _search(X: Floats, Y: Floats, heights: Floats) -> tuple[Floats, Floats, floa
             gtol=1e-15,
             max_nfev=200,
         )
-        for start in (_start(X, Y, heights, share) for share in _TOPS)
+        for start in (_start(X, Y, heights, share) for share in _START_QUANTILES)
     ]
     best = min(fits, key=lambda fit: float(fit.cost))
     return best.x, best.jac, 2.0 * float(best.cost)
@@ -88,11 +88,11 @@ def _points(x: ArrayLike, y: ArrayLike, heights: ArrayLike) -> tuple[Floats, Flo
     if len({array.shape for array in arrays}) > 1:
         shapes = ", ".join(str(array.shape) for array in arrays)
         raise FitError(f"a field needs as many x as y as heights; found the shapes {shapes}")
-    seen = np.isfinite(arrays).all(axis=0)
-    X, Y, H = (array[seen] for array in arrays)
-    if H.size < _FEWEST or not np.abs(H).max() > 0.0 or not min(np.ptp(X), np.ptp(Y)) > 0.0:
+    outputs = np.isfinite(arrays).all(axis=0)
+    X, Y, H = (array[outputs] for array in arrays)
+    if H.size < _FEWEST_POINTS or not np.abs(H).max() > 0.0 or not min(np.ptp(X), np.ptp(Y)) > 0.0:
         raise FitError(
-            f"a field of {H.size} finite points cannot be fitted; it needs at least {_FEWEST}, spread over x and y, "
+            f"a field of {H.size} finite points cannot be fitted; it needs at least {_FEWEST_POINTS}, spread over x and y, "
             "and heights that are not all zero"
         )
     return X, Y, H

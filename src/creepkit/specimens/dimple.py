@@ -17,14 +17,14 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.mesh import Mesh
-from creepkit.fem.strip import strip, strip_nodes
-from creepkit.specimens.dimple_columns import Dimensions, Layout, layout_of, sides
+from creepkit.fem.strip import strip_mesh, strip_nodes
+from creepkit.specimens.dimple_columns import DimpleDimensions, MeshLayout, mesh_layout, column_lines
 
 EDGES = ("bottom", "rim")
-LENGTHS = (1e-3, 1e4)
+LENGTH_RANGE = (1e-3, 1e4)
 """Least and greatest length, mm."""
 
-REFINEMENTS = (0.5, 16.0)
+REFINEMENT_RANGE = (0.5, 16.0)
 """Least and greatest refinement of a mesh; below it two layers would be left, or columns too few for the roof."""
 
 _COMPLEX_STEP = 1e-30
@@ -59,8 +59,8 @@ class DimpleGeometry:
 
     def __post_init__(self) -> None:
         for name in self.lengths:
-            object.__setattr__(self, name, _length(name, getattr(self, name)))
-        object.__setattr__(self, "clamped", _edges(self.clamped))
+            object.__setattr__(self, name, _checked_length(name, getattr(self, name)))
+        object.__setattr__(self, "clamped", _checked_edges(self.clamped))
         _refuse_contradictions(self)
 
     def replace(self, **changes: Any) -> DimpleGeometry:
@@ -73,8 +73,8 @@ class DimpleGeometry:
         1 is meant for production: 10 columns of 5 layers in the tapered dimple, 15 of 5 in a plate with a fillet.
         """
         layout = self._layout(refinement)
-        inner, outer = (side.real for side in sides(self._dimensions(), layout))
-        body = strip(inner, outer, layout.breaks)
+        inner, outer = (side.real for side in column_lines(self._dimensions(), layout))
+        body = strip_mesh(inner, outer, layout.breaks)
         held = np.zeros(body.nodes.shape, dtype=bool)
         if "bottom" in self.clamped:
             held[body.last] = True
@@ -87,17 +87,17 @@ class DimpleGeometry:
         if field not in self.lengths:
             raise SolveError(f"dimple: no length is called '{field}'; {nearest(field, self.lengths)}")
         layout = self._layout(refinement)
-        size = Dimensions(*map(complex, self._dimensions()))
+        size = DimpleDimensions(*map(complex, self._dimensions()))
         # an imaginary step is exact, also where a real one would leave the allowed range, as at roof_radial = R
         changed = size._replace(**{field: complex(getattr(self, field), _COMPLEX_STEP)})
-        inner, outer = (side.imag / _COMPLEX_STEP for side in sides(changed, layout))
+        inner, outer = (side.imag / _COMPLEX_STEP for side in column_lines(changed, layout))
         return strip_nodes(inner, outer, layout.breaks) + self._layout_velocity(field, refinement)
 
     def _layout_velocity(self, field: str, refinement: float) -> Floats:
         """What the layout adds: where columns and layers lie changes with the length, how many there are does not."""
         size, step = self._dimensions(), 1e-6 * getattr(self, field)
         lengths = (size._replace(**{field: getattr(self, field) + s}) for s in (step, -step))
-        up, down = (layout_of(each, float(refinement)) for each in lengths)
+        up, down = (mesh_layout(each, float(refinement)) for each in lengths)
         if up.counts != down.counts:
             return np.zeros(2)
         ahead, behind = (_nodes(size, layout) for layout in (up, down))
@@ -110,22 +110,22 @@ class DimpleGeometry:
         cavity = size.cavity(np.linspace(*size.span, max(points - 4, 2)))
         return np.vstack([cavity, [[Ro, 0.0], [Ro, H], [0.0, H]], cavity[:1]])
 
-    def _dimensions(self) -> Dimensions:
-        return Dimensions(*(getattr(self, name) for name in self.lengths))
+    def _dimensions(self) -> DimpleDimensions:
+        return DimpleDimensions(*(getattr(self, name) for name in self.lengths))
 
-    def _layout(self, refinement: float) -> Layout:
-        least, most = REFINEMENTS
+    def _layout(self, refinement: float) -> MeshLayout:
+        least, most = REFINEMENT_RANGE
         if not _between(refinement, least, most):
             raise SolveError(
                 f"dimple: refinement is {refinement!r}; allowed is a number from {least:g} to {most:g}, 2 giving twice "
                 "as many elements each way as 1, the mesh for production"
             )
-        return layout_of(self._dimensions(), float(refinement))
+        return mesh_layout(self._dimensions(), float(refinement))
 
 
-def _nodes(size: Dimensions, layout: Layout) -> Floats:
+def _nodes(size: DimpleDimensions, layout: MeshLayout) -> Floats:
     """Nodes of a dimple of that size, laid out so."""
-    inner, outer = (side.real for side in sides(size, layout))
+    inner, outer = (side.real for side in column_lines(size, layout))
     return strip_nodes(inner, outer, layout.breaks)
 
 
@@ -133,20 +133,20 @@ def _between(value: object, least: float, most: float) -> bool:
     return not isinstance(value, bool) and isinstance(value, Real) and least <= float(value) <= most
 
 
-def _length(name: str, value: Any) -> float:
+def _checked_length(name: str, value: Any) -> float:
     """One length as a float."""
-    least, most = LENGTHS
+    least, most = LENGTH_RANGE
     if not _between(value, least, most):
         raise SolveError(f"dimple: {name} is {value!r}; allowed is a number from {least:g} to {most:g}, a length in mm")
     return float(value)
 
 
-def _edges(clamped: str | Iterable[str]) -> tuple[str, ...]:
+def _checked_edges(clamped: str | Iterable[str]) -> tuple[str, ...]:
     """The clamped edges, each once and in one order."""
     chosen = {clamped} if isinstance(clamped, str) else set(clamped)
     if not chosen or not chosen <= set(EDGES):
-        found = ", ".join(f"'{edge}'" for edge in sorted(map(str, chosen))) or "empty"
-        raise SolveError(f"dimple: clamped is {found}; allowed are 'bottom', 'rim' or both, for the plate must be held")
+        result = ", ".join(f"'{edge}'" for edge in sorted(map(str, chosen))) or "empty"
+        raise SolveError(f"dimple: clamped is {result}; allowed are 'bottom', 'rim' or both, for the plate must be held")
     return tuple(edge for edge in EDGES if edge in chosen)
 
 

@@ -16,15 +16,15 @@ from creepkit.arrays import Floats
 Numbers: TypeAlias = NDArray[np.inexact[Any]]
 
 QUARTER = 0.5 * np.pi
-TAPERED = np.array([0.0, 0.16, 0.38, 0.57, 0.68, 1.0])
-PLATE = np.array([0.0, 0.17, 0.4, 0.6, 0.83, 1.0])
+TAPERED_LAYERS = np.array([0.0, 0.16, 0.38, 0.57, 0.68, 1.0])
+PLATE_LAYERS = np.array([0.0, 0.17, 0.4, 0.6, 0.83, 1.0])
 """Ends of the layers, from the cavity, of a tapered dimple and of a plate with a fillet.
 
 Their number decides: creep stress has a kink where bending changes sign, sharper for larger exponents, and the more
 layers the less it matters on which side of the kink a point lies.
 """
 
-LAYERS = len(PLATE) - 1
+LAYERS = len(PLATE_LAYERS) - 1
 
 SHIFT = 1 / 3
 """How much denser the columns of a tapered roof are at its middle, where it bulges most."""
@@ -33,11 +33,11 @@ STEEPEST = 1.5
 """Largest power of the fan over the columns it runs through: the middle node of the last side along the top then lies
 at .32 of it, and at .25 the element would fold."""
 
-LATER = 1.35
+GROWTH_RATIO = 1.35
 """How much later the top of a tapered dimple fans out, for its roof bulges where the columns stand upright."""
 
 
-class Dimensions(NamedTuple):
+class DimpleDimensions(NamedTuple):
     """The lengths of a dimple, mm; where one has an imaginary part, the points computed from it have theirs."""
 
     apex_thickness: Any
@@ -63,7 +63,7 @@ class Dimensions(NamedTuple):
         return np.stack([radius, height], axis=-1)
 
 
-class Layout(NamedTuple):
+class MeshLayout(NamedTuple):
     """What stays as it is when a length of the dimple changes a little.
 
     floor, roof, wall : columns; what is too short for a column of its own is part of the roof.
@@ -86,14 +86,14 @@ class Layout(NamedTuple):
         return self.floor, self.roof, self.wall, self.corner, len(self.breaks)
 
 
-def layout_of(size: Dimensions, refinement: float) -> Layout:
+def mesh_layout(size: DimpleDimensions, refinement: float) -> MeshLayout:
     """The layout of a dimple with `refinement` times as many columns and layers as it needs."""
     taper = float(np.clip((size.roof_radial / size.cavity_radius - 0.2) / 0.8, 0.0, 1.0))
     columns, fine = _columns(size, 1.0), _columns(size, refinement)
-    coarse = Layout(*columns, 1, SHIFT * taper, 1.0, _breaks(taper, 1.0))
+    coarse = MeshLayout(*columns, 1, SHIFT * taper, 1.0, _breaks(taper, 1.0))
     corner = _corner(size, coarse)
     turn = _same_place(corner, columns, fine)
-    wanted = _power(size, coarse, corner) * (1.0 + LATER * taper)
+    wanted = _power(size, coarse, corner) * (1.0 + GROWTH_RATIO * taper)
     return coarse._replace(
         floor=fine[0],
         roof=fine[1],
@@ -104,7 +104,7 @@ def layout_of(size: Dimensions, refinement: float) -> Layout:
     )
 
 
-def sides(size: Dimensions, layout: Layout) -> tuple[Numbers, Numbers]:
+def column_lines(size: DimpleDimensions, layout: MeshLayout) -> tuple[Numbers, Numbers]:
     """Ends of the column lines, those of mid-columns included, on the cavity and outside: (2 columns + 1, 2) each."""
     angles = _angles(size, layout)
     inner = size.cavity(angles)
@@ -121,7 +121,7 @@ def sides(size: Dimensions, layout: Layout) -> tuple[Numbers, Numbers]:
     return inner, outer
 
 
-def _columns(size: Dimensions, refinement: float) -> tuple[int, int, int]:
+def _columns(size: DimpleDimensions, refinement: float) -> tuple[int, int, int]:
     """Columns of floor, roof and wall; unrefined 0, 8, 2 in the paper's dimple and 8, 6, 1 where a = R / 5.
 
     None of floor or wall is much shorter than those of the roof; what is shorter than half of one has none.
@@ -137,7 +137,7 @@ def _columns(size: Dimensions, refinement: float) -> tuple[int, int, int]:
     return floor, roof, wall
 
 
-def _corner(size: Dimensions, layout: Layout) -> int:
+def _corner(size: DimpleDimensions, layout: MeshLayout) -> int:
     """The column line for the upper outer corner: the end of the roof, or where the cavity lies deep enough.
 
     Deep enough is about as far below the top as the rim is wide, so that the strip turns at 45 degrees.
@@ -152,7 +152,7 @@ def _corner(size: Dimensions, layout: Layout) -> int:
     return int(first + np.argmin(abs(depth[first:-1] - wanted)))
 
 
-def _power(size: Dimensions, layout: Layout, corner: int) -> float:
+def _power(size: DimpleDimensions, layout: MeshLayout, corner: int) -> float:
     """The power of the fan that makes the sides along the top about equally long at the roof's middle and its end."""
     angle = _angles(size, layout)[2 * corner]
     turned = min(angle, QUARTER)
@@ -174,10 +174,10 @@ def _same_place(line: int, old: tuple[int, int, int], new: tuple[int, int, int])
 def _breaks(taper: float, refinement: float) -> Floats:
     layers = max(2, round(LAYERS * refinement))
     even = np.linspace(0.0, 1.0, LAYERS + 1)
-    return np.interp(np.linspace(0.0, 1.0, layers + 1), even, taper * TAPERED + (1 - taper) * PLATE)
+    return np.interp(np.linspace(0.0, 1.0, layers + 1), even, taper * TAPERED_LAYERS + (1 - taper) * PLATE_LAYERS)
 
 
-def _angles(size: Dimensions, layout: Layout) -> Numbers:
+def _angles(size: DimpleDimensions, layout: MeshLayout) -> Numbers:
     """Angles of the column lines, those of mid-columns included, (2 columns + 1,)."""
     start, end = size.span
     rise, fall = (0.0 if layout.floor else start), (QUARTER if layout.wall else end)

@@ -9,7 +9,7 @@ from creepkit.errors import SolveError
 from creepkit.records import History
 
 
-def observed(history: History, creep: Floats) -> Floats:
+def observed_strain(history: History, creep: Floats) -> Floats:
     """The strain that a history's instrument shows, (candidates, times), from logarithmic creep strain."""
     strain = np.expm1(creep) if history.strain_measure == "engineering" else creep
     return strain + elastic_strain(history) if history.includes_elastic else strain
@@ -24,7 +24,7 @@ def elastic_strain(history: History) -> Floats:
     return np.asarray(history.loading.program().at(history.times) / moduli[which])
 
 
-def one_elasticity(history: History, specimen: str) -> tuple[float, float]:
+def isothermal_elasticity(history: History, specimen: str) -> tuple[float, float]:
     """E, MPa, and nu of a test whose strain is prescribed: they must be the same at all its temperatures."""
     where = history.source or f"history '{history.name}'"
     if history.elastic is None:
@@ -32,11 +32,11 @@ def one_elasticity(history: History, specimen: str) -> tuple[float, float]:
             f"{where}: a {specimen} specimen under prescribed strain needs elastic data; set elastic=Elastic(E=150e3), "
             "in MPa"
         )
-    found = [history.elastic.at(float(T)) for T in np.unique(history.temperature_program().values)]
-    moduli = [float(one.E) for one in found]
+    result = [history.elastic.at(float(T)) for T in np.unique(history.temperature_program().values)]
+    moduli = [float(one.E) for one in result]
     if max(moduli) - min(moduli) > 1e-12 * max(moduli):
         raise SolveError(
             f"{where}: the modulus changes from {moduli[0]:g} to {moduli[-1]:g} MPa with the temperature of the test; "
             f"a {specimen} specimen takes one modulus a test, such as elastic.at(T)"
         )
-    return moduli[0], float(found[0].nu)
+    return moduli[0], float(result[0].nu)

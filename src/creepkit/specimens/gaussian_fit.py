@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats, Ints
-from creepkit.specimens.gaussian_sum import Grid, Normal, best_amplitude, derivatives_to_profile, solve, sum_up
+from creepkit.specimens.gaussian_sum import PolarGrid, NormalEquations, best_amplitude, derivatives_to_profile, solve_damped, sum_up
 
 FITTED, AT_REST, FAILED = 0, 1, 2
 """What became of a frame: fitted; no displacement to fit; no fit that deserves the name."""
@@ -39,14 +39,14 @@ _CONVERGED = 1e-7  # Newton squares it: the step taken last leaves 1e-13 or so
 
 
 @njit(cache=True, error_model="numpy")
-def fit_frames(grid: Grid, samples: Floats, fits: Floats, states: Ints, pulls: Floats) -> None:
+def fit_frames(grid: PolarGrid, samples: Floats, fits: Floats, states: Ints, derivatives: Floats) -> None:
     """Fit every frame of samples (frames, radii), in mm.
 
     fits : (frames, 3) becomes D in mm, S / window and p, each frame starting from the last one fitted.
     states : (frames,) becomes FITTED, AT_REST or FAILED.
     pulls : (frames, 3, radii) becomes the derivatives of `fits` to `samples`; with a length of zero they are left out.
     """
-    normal = Normal(np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(1))
+    normal = NormalEquations(np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(1))
     x, last, y = np.zeros(3), np.zeros(3), np.zeros(samples.shape[1])
     last[1] = nan
     for k in range(samples.shape[0]):
@@ -61,11 +61,11 @@ def fit_frames(grid: Grid, samples: Floats, fits: Floats, states: Ints, pulls: F
             continue
         _copy(x, last)
         fits[k, 0], fits[k, 1], fits[k, 2] = scale * x[0], exp(x[1]), exp(x[2])
-        if pulls.shape[0] > 0:
-            derivatives_to_profile(grid, x, normal, pulls[k])
+        if derivatives.shape[0] > 0:
+            derivatives_to_profile(grid, x, normal, derivatives[k])
             for i in range(y.size):
-                pulls[k, 1, i] *= fits[k, 1] / scale
-                pulls[k, 2, i] *= fits[k, 2] / scale
+                derivatives[k, 1, i] *= fits[k, 1] / scale
+                derivatives[k, 2, i] *= fits[k, 2] / scale
 
 
 @njit(cache=True, error_model="numpy")
@@ -87,7 +87,7 @@ def _state_and_scale(profile: Floats) -> tuple[int, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def _fit(grid: Grid, y: Floats, last: Floats, x: Floats, normal: Normal) -> bool:
+def _fit(grid: PolarGrid, y: Floats, last: Floats, x: Floats, normal: NormalEquations) -> bool:
     """Fit one profile, largest value 1; `x` (3,) and `normal` are the answer.
 
     The first clear fit is taken, begun at the answer before it or else at the starts; of noisy ones, the best of all.
@@ -113,7 +113,7 @@ def _fit(grid: Grid, y: Floats, last: Floats, x: Floats, normal: Normal) -> bool
 
 
 @njit(cache=True, error_model="numpy")
-def _half_square(grid: Grid, y: Floats) -> float:
+def _half_square(grid: PolarGrid, y: Floats) -> float:
     """Half the weighted sum of squares of a profile itself."""
     along, around = 0.0, 0.0
     for i in range(y.size):
@@ -124,7 +124,7 @@ def _half_square(grid: Grid, y: Floats) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _fallen(grid: Grid, y: Floats) -> float:
+def _fallen(grid: PolarGrid, y: Floats) -> float:
     """ln(r / window) of the place where a profile has fallen to 1/e of its largest value."""
     peak = 0
     for i in range(1, y.size):
@@ -136,14 +136,14 @@ def _fallen(grid: Grid, y: Floats) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _descend(grid: Grid, y: Floats, x: Floats, normal: Normal) -> bool:
+def _descend(grid: PolarGrid, y: Floats, x: Floats, normal: NormalEquations) -> bool:
     """Minimise from ln S and ln p in `x`; true when a strict minimum was reached that the grid can see."""
     step, trial = np.empty(3), np.empty(3)
     x[0] = best_amplitude(grid, y, x)
     sum_up(grid, y, x, normal)
     squares, damping = normal.squares[0], 0.0
     for _ in range(_ITERATIONS):
-        if not solve(normal, damping, step):
+        if not solve_damped(normal, damping, step):
             damping = max(4.0 * damping, 1e-3)
             continue
         longest = max(abs(step[1]), abs(step[2]))
@@ -161,5 +161,5 @@ def _descend(grid: Grid, y: Floats, x: Floats, normal: Normal) -> bool:
             sum_up(grid, y, x, normal)
         if close:
             inside = _WIDTHS[0] < x[1] < _WIDTHS[1] and _SHAPES[0] < x[2] < _SHAPES[1]
-            return inside and solve(normal, 0.0, step)
+            return inside and solve_damped(normal, 0.0, step)
     return False

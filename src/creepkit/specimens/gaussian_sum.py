@@ -22,7 +22,7 @@ LOG_OF_ZERO = -700.0
 _FARTHEST = 6.0  # exp(-exp(6)) = 1e-175 is nothing, and its products with q still are numbers
 
 
-class Grid(NamedTuple):
+class PolarGrid(NamedTuple):
     """Where profiles are looked at.
 
     log_radius : (radii,) ln(r / window). radial : (radii,) their weights.
@@ -36,7 +36,7 @@ class Grid(NamedTuple):
     angular: Floats
 
 
-class Normal(NamedTuple):
+class NormalEquations(NamedTuple):
     """Half the sum of squares at one place: `squares` (1,).
 
     slope : (3,) its derivatives. matrix : (3, 3) its second derivatives, the upper half. diagonal : (3,) of the part of
@@ -50,7 +50,7 @@ class Normal(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _angle(grid: Grid, p: float, j: int) -> tuple[float, float, float]:
+def _angle(grid: PolarGrid, p: float, j: int) -> tuple[float, float, float]:
     """g of an angle, and the first and second derivative of ln g to p."""
     cosine, sine = exp(p * grid.log_cosine[j]), exp(p * grid.log_sine[j])
     g = cosine + sine
@@ -67,7 +67,7 @@ def _bell(far: float, p: float, g: float) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def best_amplitude(grid: Grid, y: Floats, x: Floats) -> float:
+def best_amplitude(grid: PolarGrid, y: Floats, x: Floats) -> float:
     """D of the least squares at given ln S and ln p: D is linear."""
     p = exp(x[2])
     product, square = 0.0, 0.0
@@ -81,7 +81,7 @@ def best_amplitude(grid: Grid, y: Floats, x: Floats) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def sum_up(grid: Grid, y: Floats, x: Floats, normal: Normal) -> None:
+def sum_up(grid: PolarGrid, y: Floats, x: Floats, normal: NormalEquations) -> None:
     """Half the sum of squares at x = (D, ln S, ln p), and its derivatives, into `normal`."""
     p, squares = exp(x[2]), 0.0
     slope, matrix, diagonal = normal.slope, normal.matrix, normal.diagonal
@@ -116,7 +116,7 @@ def sum_up(grid: Grid, y: Floats, x: Floats, normal: Normal) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def solve(normal: Normal, damping: float, solution: Floats) -> bool:
+def solve_damped(normal: NormalEquations, damping: float, solution: Floats) -> bool:
     """Cholesky's method for the damped matrix and the slope; false where the matrix is not positive definite."""
     lower = np.empty((3, 3))
     for a in range(3):
@@ -142,13 +142,13 @@ def solve(normal: Normal, damping: float, solution: Floats) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def derivatives_to_profile(grid: Grid, x: Floats, normal: Normal, pull: Floats) -> None:
+def derivatives_to_profile(grid: PolarGrid, x: Floats, normal: NormalEquations, pull: Floats) -> None:
     """Derivatives (3, radii) of x = (D, ln S, ln p) to the profile, `normal` being that of the answer."""
     p, inverse, solution = exp(x[2]), np.empty((3, 3)), np.empty(3)
     for v in range(3):
         normal.slope[0], normal.slope[1], normal.slope[2] = 0.0, 0.0, 0.0
         normal.slope[v] = 1.0
-        solve(normal, 0.0, solution)
+        solve_damped(normal, 0.0, solution)
         for w in range(3):
             inverse[v, w] = solution[w]
     for v in range(pull.shape[0]):

@@ -8,7 +8,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.records import COMPONENTS, PointLoading
 
-_TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+_SHEAR_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 
 def compliance(elastic: tuple[float, float]) -> Floats:
@@ -19,7 +19,7 @@ def compliance(elastic: tuple[float, float]) -> Floats:
     return matrix
 
 
-def elastic_course(loading: PointLoading, elastic: tuple[float, float] | None) -> Floats:
+def elastic_von_mises(loading: PointLoading, elastic: tuple[float, float] | None) -> Floats:
     """The von Mises stresses above zero at the breakpoints of a loading, if nothing crept, (levels,) MPa."""
     marks = np.unique(np.concatenate([p.times for p in (*loading.stress.values(), *loading.strain.values())]))
     stress = np.zeros((marks.size, 6))
@@ -30,10 +30,10 @@ def elastic_course(loading: PointLoading, elastic: tuple[float, float] | None) -
             raise SolveError(
                 "a material point under prescribed strain needs elastic data; set elastic=Elastic(E=150e3)"
             )
-        held = [COMPONENTS.index(name) for name in loading.strain]
+        strain_controlled = [COMPONENTS.index(name) for name in loading.strain]
         flexibility = compliance(elastic)
-        wanted = np.stack([p.at(marks) for p in loading.strain.values()], axis=-1) - stress @ flexibility[held].T
-        stress[:, held] = np.linalg.solve(flexibility[np.ix_(held, held)], wanted.T).T
+        wanted = np.stack([p.at(marks) for p in loading.strain.values()], axis=-1) - stress @ flexibility[strain_controlled].T
+        stress[:, strain_controlled] = np.linalg.solve(flexibility[np.ix_(strain_controlled, strain_controlled)], wanted.T).T
     deviator = stress - stress[:, :3].mean(axis=1)[:, None] * np.array([1, 1, 1, 0, 0, 0])
-    levels = np.unique(np.sqrt(1.5 * (deviator**2 @ _TWICE)))
+    levels = np.unique(np.sqrt(1.5 * (deviator**2 @ _SHEAR_WEIGHTS)))
     return np.asarray(levels[levels > 0])

@@ -22,16 +22,16 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats, Ints, frozen
 from creepkit.errors import SolveError, nearest
-from creepkit.specimens.top_profile import Interpolation, checked_radii, interpolate
+from creepkit.specimens.top_profile import SurfaceInterpolation, checked_surface_radii, surface_interpolation_with_slopes
 
 if TYPE_CHECKING:
-    from creepkit.specimens.gaussian_sum import Grid
+    from creepkit.specimens.gaussian_sum import PolarGrid
 
 OBSERVED = ("amplitude", "width", "shape")
 """Columns of what is observed: D_amp in mm, S_d in mm, S_p."""
 
 Form = Literal["profile", "field"]
-POINTS: dict[str, int] = {"profile": 76, "field": 40}
+DEFAULT_RADII: dict[str, int] = {"profile": 76, "field": 40}
 """Radii looked at by default: for the profile 0, 0.1 ... 7.5 mm in the default window."""
 
 _ANGLES = 6
@@ -41,12 +41,12 @@ _FEWEST, _MOST = 8, 2000
 _TEXT = re.compile(r"\s*(\w+)\s+0\s*(?:-|to)\s*(\S+)\s*mm\s*(?:,\s*(\d+)\s+radii\s*)?")
 
 
-class Sampling(NamedTuple):
+class ProfileSampling(NamedTuple):
     """What a form, a window and a set of nodes come to: the radii as shares of the window, the way there, the grid."""
 
     shares: Floats
-    nodes: Interpolation
-    grid: Grid
+    nodes: SurfaceInterpolation
+    grid: PolarGrid
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Observation:
             raise SolveError(f"observation: no form is called '{self.form}'; {nearest(str(self.form), get_args(Form))}")
         if not _lies_within(self.window, 1e-3, 1e4):
             raise SolveError(f"observation: window is {self.window!r}; allowed is a length of 0.001 to 10000 mm")
-        points = POINTS[self.form] if self.points is None else self.points
+        points = DEFAULT_RADII[self.form] if self.points is None else self.points
         if not _lies_within(points, _FEWEST, _MOST) or points != int(points):
             raise SolveError(f"observation: points is {points!r}; allowed are whole numbers, {_FEWEST} to {_MOST}")
         object.__setattr__(self, "window", float(self.window))
@@ -77,21 +77,21 @@ class Observation:
     @classmethod
     def from_text(cls, text: str) -> Observation:
         """The operator that `str` wrote, as in 'profile 0-7.5 mm' or 'field 0-5 mm, 30 radii'."""
-        found = _TEXT.fullmatch(text)
+        result = _TEXT.fullmatch(text)
         try:
-            if found is None:
+            if result is None:
                 raise ValueError(text)
-            window, points = float(found[2]), None if found[3] is None else int(found[3])
+            window, points = float(result[2]), None if result[3] is None else int(result[3])
         except ValueError as error:
             raise SolveError(
                 f"observation: '{text}' is not understood; write a form and a window, as in 'profile 0-7.5 mm' or "
                 "'field 0-5 mm'"
             ) from error
-        return cls(found[1], window, points)  # type: ignore[arg-type]
+        return cls(result[1], window, points)  # type: ignore[arg-type]
 
     def __str__(self) -> str:
         window = repr(self.window).removesuffix(".0")
-        radii = "" if self.points == POINTS[self.form] else f", {self.points} radii"
+        radii = "" if self.points == DEFAULT_RADII[self.form] else f", {self.points} radii"
         return f"{self.form} 0-{window} mm{radii}"
 
     def replace(self, **changes: Any) -> Observation:
@@ -112,64 +112,64 @@ class Observation:
         sampling = self._sampling(radii)
         return self._fit(sampling, _frames(profiles, sampling), slopes=False)[0]
 
-    def observe_with_slopes(self, radii: ArrayLike, profiles: ArrayLike) -> tuple[Floats, Floats]:
+    def observe_with_derivatives(self, radii: ArrayLike, profiles: ArrayLike) -> tuple[Floats, Floats]:
         """As `observe`, and the exact derivatives (frames, 3, nodes) to `profiles`.
 
         At rest D has the derivatives of the frame that lent its shape (those of D do not change with the size of a
         profile), S and p have none and are given zeros.
         """
         sampling = self._sampling(radii)
-        seen, pulls = self._fit(sampling, _frames(profiles, sampling), slopes=True)
-        return seen, pulls @ sampling.nodes.values
+        outputs, derivatives = self._fit(sampling, _frames(profiles, sampling), slopes=True)
+        return outputs, derivatives @ sampling.nodes.values
 
-    def window_slopes(self, radii: ArrayLike, profiles: ArrayLike) -> Floats:
+    def window_derivatives(self, radii: ArrayLike, profiles: ArrayLike) -> Floats:
         """Derivatives (frames, 3) of what is observed to the window, 1/mm of each."""
         sampling = self._sampling(radii)
         frames = _frames(profiles, sampling)
-        seen, pulls = self._fit(sampling, frames, slopes=True)
-        slopes = self._follow(pulls, frames @ sampling.nodes.slopes.T * sampling.shares)
-        slopes[:, 1] += seen[:, 1] / self.window
+        outputs, derivatives = self._fit(sampling, frames, slopes=True)
+        slopes = self._chain(derivatives, frames @ sampling.nodes.slopes.T * sampling.shares)
+        slopes[:, 1] += outputs[:, 1] / self.window
         return slopes
 
-    def node_slopes(self, radii: ArrayLike, profiles: ArrayLike, shift: ArrayLike) -> Floats:
+    def node_derivatives(self, radii: ArrayLike, profiles: ArrayLike, shift: ArrayLike) -> Floats:
         """Derivatives (frames, 3) of what is observed when the top nodes move along the radius, keeping their u_z.
 
         shift : (nodes,) mm for each unit of what moves them, such as the apex thickness of a mesh that follows it.
         """
         sampling = self._sampling(radii)
         frames = _frames(profiles, sampling)
-        _, pulls = self._fit(sampling, frames, slopes=True)
+        _, derivatives = self._fit(sampling, frames, slopes=True)
         moved = sampling.nodes.values @ np.asarray(shift, dtype=float)
-        return self._follow(pulls, -(frames @ sampling.nodes.slopes.T) * moved)
+        return self._chain(derivatives, -(frames @ sampling.nodes.slopes.T) * moved)
 
-    def _sampling(self, radii: ArrayLike) -> Sampling:
+    def _sampling(self, radii: ArrayLike) -> ProfileSampling:
         return _sampling_of(self, np.asarray(radii, dtype=float).tobytes())
 
-    def _fit(self, sampling: Sampling, frames: Floats, slopes: bool) -> tuple[Floats, Floats]:
+    def _fit(self, sampling: ProfileSampling, frames: Floats, slopes: bool) -> tuple[Floats, Floats]:
         """What is observed (frames, 3), and its derivatives (frames, 3, radii) to the profile at the radii."""
         from creepkit.specimens import gaussian_fit  # numba is heavy, and a list of specimens needs none of it
 
         with np.errstate(invalid="ignore"):  # a profile that is not finite becomes NaN, which is the answer to it
             samples = frames @ sampling.nodes.values.T
         fits, states = np.empty((len(samples), 3)), np.empty(len(samples), dtype=np.int64)
-        pulls = np.full((len(samples) if slopes else 0, 3, samples.shape[1]), np.nan)
-        gaussian_fit.fit_frames(sampling.grid, samples, fits, states, pulls)
+        derivatives = np.full((len(samples) if slopes else 0, 3, samples.shape[1]), np.nan)
+        gaussian_fit.fit_frames(sampling.grid, samples, fits, states, derivatives)
         fits[:, 1] *= self.window
-        pulls[:, 1] *= self.window
-        _lend_shapes(fits, pulls, np.flatnonzero(states == gaussian_fit.AT_REST), states == gaussian_fit.FITTED)
-        return fits, pulls
+        derivatives[:, 1] *= self.window
+        _fill_rest_shapes(fits, derivatives, np.flatnonzero(states == gaussian_fit.AT_REST), states == gaussian_fit.FITTED)
+        return fits, derivatives
 
     @staticmethod
-    def _follow(pulls: Floats, change: Floats) -> Floats:
+    def _chain(derivatives: Floats, change: Floats) -> Floats:
         """Change (frames, 3) of what is observed with a change (frames, radii) of the profile."""
-        return np.asarray(np.einsum("fvi,fi->fv", pulls, change))
+        return np.asarray(np.einsum("fvi,fi->fv", derivatives, change))
 
 
 def _lies_within(value: object, least: float, most: float) -> bool:
     return isinstance(value, Real) and least <= float(value) <= most
 
 
-def _frames(profiles: ArrayLike, sampling: Sampling) -> Floats:
+def _frames(profiles: ArrayLike, sampling: ProfileSampling) -> Floats:
     frames = np.asarray(profiles, dtype=float)
     nodes = sampling.nodes.values.shape[1]
     if frames.ndim != 2 or frames.shape[1] != nodes:
@@ -179,25 +179,25 @@ def _frames(profiles: ArrayLike, sampling: Sampling) -> Floats:
     return frames
 
 
-def _lend_shapes(fits: Floats, pulls: Floats, resting: Ints, fitted: np.ndarray) -> None:
+def _fill_rest_shapes(fits: Floats, derivatives: Floats, resting: Ints, fitted: np.ndarray) -> None:
     """Give frames at rest no amplitude and the shape of the next frame that was fitted, else of the last one."""
     fits[resting, 0] = 0.0
-    lenders = np.flatnonzero(fitted)
-    if not (resting.size and lenders.size):
+    source_frames = np.flatnonzero(fitted)
+    if not (resting.size and source_frames.size):
         return
-    lender = lenders[np.minimum(np.searchsorted(lenders, resting), lenders.size - 1)]
-    fits[resting, 1:] = fits[lender, 1:]
-    if len(pulls):
-        pulls[resting, 0] = pulls[lender, 0]
-        pulls[resting, 1:] = 0.0
+    source = source_frames[np.minimum(np.searchsorted(source_frames, resting), source_frames.size - 1)]
+    fits[resting, 1:] = fits[source, 1:]
+    if len(derivatives):
+        derivatives[resting, 0] = derivatives[source, 0]
+        derivatives[resting, 1:] = 0.0
 
 
 @lru_cache(maxsize=64)
-def _sampling_of(operator: Observation, nodes: bytes) -> Sampling:
+def _sampling_of(operator: Observation, nodes: bytes) -> ProfileSampling:
     """Where `operator` looks on a surface with these radii."""
-    from creepkit.specimens.gaussian_sum import LOG_OF_ZERO, Grid
+    from creepkit.specimens.gaussian_sum import LOG_OF_ZERO, PolarGrid
 
-    radii = checked_radii(np.frombuffer(nodes))
+    radii = checked_surface_radii(np.frombuffer(nodes))
     if radii[0] > 1e-9 or radii[-1] < operator.window * (1 - 1e-9):
         raise SolveError(
             f"observation: the window reaches from 0 to {operator.window:g} mm, but the observed surface from "
@@ -206,8 +206,8 @@ def _sampling_of(operator: Observation, nodes: bytes) -> Sampling:
     shares, radial, angles, angular = _disc(operator) if operator.form == "field" else _line(operator)
     with np.errstate(divide="ignore"):
         logarithms = [np.maximum(np.log(values), LOG_OF_ZERO) for values in (shares, np.cos(angles), np.sin(angles))]
-    grid = Grid(frozen(logarithms[0]), frozen(radial), frozen(logarithms[1]), frozen(logarithms[2]), frozen(angular))
-    return Sampling(frozen(shares), interpolate(radii, operator.window * shares), grid)
+    grid = PolarGrid(frozen(logarithms[0]), frozen(radial), frozen(logarithms[1]), frozen(logarithms[2]), frozen(angular))
+    return ProfileSampling(frozen(shares), surface_interpolation_with_slopes(radii, operator.window * shares), grid)
 
 
 def _line(operator: Observation) -> tuple[Floats, Floats, Floats, Floats]:

@@ -22,27 +22,27 @@ from creepkit import integration, kernels
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
-from creepkit.records import COMPONENTS, Effects, History, PointLoading, Prediction, Specimen
-from creepkit.specimens.bar import STEPS_FOR_A_BREAK
-from creepkit.specimens.elastic_part import one_elasticity
-from creepkit.specimens.isotropic import compliance, elastic_course
-from creepkit.specimens.uniaxial_effects import KINDS, predict_with
+from creepkit.records import COMPONENTS, NuisanceValues, History, PointLoading, Prediction, Specimen
+from creepkit.specimens.bar import STEPS_PER_BREAKPOINT
+from creepkit.specimens.elastic_part import isothermal_elasticity
+from creepkit.specimens.isotropic import compliance, elastic_von_mises
+from creepkit.specimens.uniaxial_effects import NUISANCES, predict_with_nuisances
 
 if TYPE_CHECKING:
-    from creepkit.integration.driver import Driven
+    from creepkit.integration.driver import PointTrajectory
     from creepkit.kernels.interface import CompiledLaw
     from creepkit.language import CreepLaw
     from creepkit.specimens.point_run import PointRun
-    from creepkit.specimens.proportional import Proportional
+    from creepkit.specimens.proportional import ProportionalLoading
 
 OUTPUTS = ("strain", *(f"strain_{c}" for c in COMPONENTS), *(f"stress_{c}" for c in COMPONENTS))
-STEP = 1e-3
+DIFFERENCE_STEP = 1e-3
 """Of the central differences in internal parameters, relative where a parameter of linear scale is above one."""
-WITHOUT_ELASTICITY = (150e3, 0.3)
+DEFAULT_ELASTICITY = (150e3, 0.3)
 """E, MPa, and nu where stresses alone are prescribed and no elastic data are given: creep does not depend on them."""
 
 
-class Rows(NamedTuple):
+class PointPrediction(NamedTuple):
     """One history: values (candidates, frames, outputs), status and end times (candidates,), and derivatives."""
 
     values: Floats
@@ -52,7 +52,7 @@ class Rows(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Point:
+class MaterialPoint:
     """A material point.
 
     tolerance : relative local error of a step of the integration. strain_limit : equivalent creep strain at which the
@@ -67,7 +67,7 @@ class Point:
     name: ClassVar[str] = "point"
     title: ClassVar[str] = "Material point under prescribed stresses and strains of any components"
     outputs: ClassVar[tuple[str, ...]] = OUTPUTS
-    effects: ClassVar[tuple[str, ...]] = KINDS
+    nuisances: ClassVar[tuple[str, ...]] = NUISANCES
     """Kinds of explicit nuisances that predict() understands."""
 
     def __post_init__(self) -> None:
@@ -77,7 +77,7 @@ class Point:
                 f"{self.max_steps}; allowed are 1e-10 to 1e-2, above 0 up to 10, and 10 or more"
             )
 
-    def replace(self, **changes: float) -> Point:
+    def replace(self, **changes: float) -> MaterialPoint:
         """The same specimen with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
@@ -88,33 +88,33 @@ class Point:
         histories: Sequence[History],
         *,
         jacobian: bool = False,
-        effects: Effects | None = None,
+        nuisances: NuisanceValues | None = None,
     ) -> Prediction:
         """Predict all components of each history at its times, for numbers or (candidates,) values of the parameters.
 
-        effects : "temperature" (K above what the history says) and "modulus" (relative change).
+        nuisances : "temperature" (K above what the history says) and "modulus" (relative change).
         """
-        plain = partial(self._predict, law)
-        return predict_with(plain, values, histories, effects, jacobian, specimen=self.name)
+        predict_plain = partial(self._predict, law)
+        return predict_with_nuisances(predict_plain, values, histories, nuisances, jacobian, specimen=self.name)
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> PointRun:
         """Run one test, keeping all tensors and the states of the law; see PointRun."""
-        from creepkit.specimens.point_run import run
+        from creepkit.specimens.point_run import run_material_point
 
-        return run(self, law, values, plan)
+        return run_material_point(self, law, values, plan)
 
     def reference_stress(self, history: History) -> Floats:
         """The von Mises stresses that are prescribed, or would be if nothing crept, MPa."""
-        return elastic_course(_loading(history), None if history.elastic is None else _elastic(history))
+        return elastic_von_mises(_loading(history), None if history.elastic is None else _elastic(history))
 
     def reference_strain(self, history: History) -> float:
         """The largest equivalent creep strain that a test reached, about as far as its outputs tell."""
         for kind in ("strain", "strain_", "stress_"):
-            found = [v[history.used] for name, v in history.outputs.items() if name.startswith(kind)]
-            if found and kind == "stress_":
-                return max(float(np.ptp(v)) for v in found) / _elastic(history)[0]
-            if found:
-                return max(float(np.max(np.abs(v), initial=0.0)) for v in found)
+            result = [v[history.used] for name, v in history.outputs.items() if name.startswith(kind)]
+            if result and kind == "stress_":
+                return max(float(np.ptp(v)) for v in result) / _elastic(history)[0]
+            if result:
+                return max(float(np.max(np.abs(v), initial=0.0)) for v in result)
         return 0.0
 
     # ---- one history at a time -------------------------------------------------------------------------------------
@@ -123,9 +123,9 @@ class Point:
         self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], jacobian: bool
     ) -> Prediction:
         kernel = kernels.lower(law, "numba")
-        theta = np.array(kernel.internal(values), dtype=float, ndmin=2)
-        steps = STEP * np.array([1.0 if p.scale == "log" else np.inf for p in law.params.values()])
-        steps = np.where(np.isinf(steps), STEP * np.maximum(1.0, np.abs(theta)), steps)
+        theta = np.array(kernel.to_internal(values), dtype=float, ndmin=2)
+        steps = DIFFERENCE_STEP * np.array([1.0 if p.scale == "log" else np.inf for p in law.params.values()])
+        steps = np.where(np.isinf(steps), DIFFERENCE_STEP * np.maximum(1.0, np.abs(theta)), steps)
         parts = [self._rows(kernel, theta, history, steps if jacobian else None) for history in histories]
         lengths = [h.times.size for h in histories]
         shape = (len(theta), len(histories), max(lengths, default=0), len(OUTPUTS))
@@ -145,14 +145,14 @@ class Point:
             times=tuple(h.times for h in histories),
         )
 
-    def _rows(self, kernel: CompiledLaw, theta: Floats, history: History, steps: Floats | None) -> Rows:
+    def _rows(self, kernel: CompiledLaw, theta: Floats, history: History, steps: Floats | None) -> PointPrediction:
         """One history; steps : (candidates, P) of the differences, or None to do without derivatives."""
         path = _path(history)
         if path is not None:
-            return self._along(path, kernel, theta, history, steps is not None)
-        runs = [self.drive(kernel, candidate, history) for candidate in theta]
-        return Rows(
-            np.array([shown(run, history) for run in runs]),
+            return self._predict_proportional(path, kernel, theta, history, steps is not None)
+        runs = [self.simulate(kernel, candidate, history) for candidate in theta]
+        return PointPrediction(
+            np.array([point_outputs(run, history) for run in runs]),
             np.array([float(run.status) for run in runs]),
             np.array([run.end_time for run in runs]),
             None
@@ -160,52 +160,52 @@ class Point:
             else np.array([self._differences(kernel, *one, history) for one in zip(theta, steps, strict=True)]),
         )
 
-    def _along(self, path: Proportional, kernel: CompiledLaw, theta: Floats, history: History, jacobian: bool) -> Rows:
+    def _predict_proportional(self, path: ProportionalLoading, kernel: CompiledLaw, theta: Floats, history: History, jacobian: bool) -> PointPrediction:
         """One history whose stress keeps its direction: what is shown is a straight line in the creep strain."""
         test = integration.PointTest(path.driving, history.temperature_program(), history.times, path.stiffness)
-        found = integration.integrate(
+        result = integration.integrate(
             kernel, theta, [test], settings=self._settings(history), jacobian=jacobian, axes=path.axes
         )
-        stress, falling = (
+        stress, stress_derivative = (
             _imposed(history) + np.outer(path.driving.at(history.times), path.along),
             -path.stiffness * path.along,
         )
         elastic = compliance(_elastic(history)) if history.includes_elastic else np.zeros((6, 6))
         start = np.concatenate([np.zeros((len(stress), 1)), stress @ elastic.T, stress], axis=1)
-        slope = np.concatenate([[1.0], path.flow + elastic @ falling, falling])
-        changes = None if found.jacobian is None else found.jacobian[:, :, None, :] * slope[:, None]
-        values = start + found.strain[..., None] * slope
-        return Rows(values, found.status[:, 0].astype(float), found.end_times[:, 0], changes)
+        slope = np.concatenate([[1.0], path.flow + elastic @ stress_derivative, stress_derivative])
+        changes = None if result.jacobian is None else result.jacobian[:, :, None, :] * slope[:, None]
+        values = start + result.strain[..., None] * slope
+        return PointPrediction(values, result.status[:, 0].astype(float), result.end_times[:, 0], changes)
 
-    def drive(self, kernel: CompiledLaw, theta: Floats, history: History) -> Driven:
+    def simulate(self, kernel: CompiledLaw, theta: Floats, history: History) -> PointTrajectory:
         """March one candidate, theta (P,) in internal form, through one history in six components."""
-        from creepkit.integration.driver import by_strain, by_stress, drive
+        from creepkit.integration.driver import prescribed_strain, prescribed_stress, integrate_tensor_point
         from creepkit.integration.tableau import SDIRK4
 
         loading = _loading(history)
-        controls = {name: by_stress(p) for name, p in loading.stress.items()}
-        controls |= {name: by_strain(p) for name, p in loading.strain.items()}
-        bare = not loading.strain and not history.includes_elastic
-        elastic = WITHOUT_ELASTICITY if bare and history.elastic is None else _elastic(history)
-        warmth = history.temperature_program()
+        controls = {name: prescribed_stress(p) for name, p in loading.stress.items()}
+        controls |= {name: prescribed_strain(p) for name, p in loading.strain.items()}
+        stress_only = not loading.strain and not history.includes_elastic
+        elastic = DEFAULT_ELASTICITY if stress_only and history.elastic is None else _elastic(history)
+        temperature = history.temperature_program()
         settings = self._settings(history)
-        return drive(kernel, theta, elastic, controls, warmth, history.times, settings=settings, tableau=SDIRK4)
+        return integrate_tensor_point(kernel, theta, elastic, controls, temperature, history.times, settings=settings, tableau=SDIRK4)
 
     def _differences(self, kernel: CompiledLaw, theta: Floats, steps: Floats, history: History) -> Floats:
         """Central differences to the internal parameters, (frames, outputs, P); zero where one is switched off."""
         slopes = np.zeros((history.times.size, len(OUTPUTS), theta.size))
         for p in np.flatnonzero(np.isfinite(theta)):
             shift = np.where(np.arange(theta.size) == p, steps, 0.0)
-            up, down = (shown(self.drive(kernel, end, history), history) for end in (theta + shift, theta - shift))
+            up, down = (point_outputs(self.simulate(kernel, end, history), history) for end in (theta + shift, theta - shift))
             slopes[:, :, p] = (up - down) / (2 * steps[p])
         return slopes
 
-    def _settings(self, history: History) -> integration.Settings:
+    def _settings(self, history: History) -> integration.IntegrationSettings:
         loading = _loading(history)
         programs = [*loading.stress.values(), *loading.strain.values(), history.temperature_program()]
         breaks = sum(program.times.size - 1 for program in programs)
-        most = int(self.max_steps) + history.times.size + STEPS_FOR_A_BREAK * breaks
-        return integration.Settings(rtol=self.tolerance, strain_limit=self.strain_limit, max_steps=most)
+        most = int(self.max_steps) + history.times.size + STEPS_PER_BREAKPOINT * breaks
+        return integration.IntegrationSettings(rtol=self.tolerance, strain_limit=self.strain_limit, max_steps=most)
 
 
 def _loading(history: History) -> PointLoading:
@@ -219,15 +219,15 @@ def _loading(history: History) -> PointLoading:
 
 
 @lru_cache(maxsize=4096)
-def _path(history: History) -> Proportional | None:
-    from creepkit.specimens.proportional import proportional
+def _path(history: History) -> ProportionalLoading | None:
+    from creepkit.specimens.proportional import proportional_loading
 
     loading = _loading(history)
-    return proportional(loading, float(history.times[-1]), _elastic(history) if loading.strain else None)
+    return proportional_loading(loading, float(history.times[-1]), _elastic(history) if loading.strain else None)
 
 
 def _elastic(history: History) -> tuple[float, float]:
-    return one_elasticity(history, "point")
+    return isothermal_elasticity(history, "point")
 
 
 def _imposed(history: History) -> Floats:
@@ -237,7 +237,7 @@ def _imposed(history: History) -> Floats:
     return np.stack([stress[c].at(history.times) if c in stress else zero for c in COMPONENTS], axis=-1)
 
 
-def shown(run: Driven, history: History) -> Floats:
+def point_outputs(run: PointTrajectory, history: History) -> Floats:
     """The outputs of a driven point, (frames, outputs), NaN after its end."""
     strains = run.strain if history.includes_elastic else run.creep_strain
     rows = np.concatenate([run.equivalent[:, None], strains, run.stress], axis=1)
@@ -249,4 +249,4 @@ def shown(run: Driven, history: History) -> Floats:
 @hookimpl
 def creepkit_specimens() -> list[Specimen]:
     """The material point with its default settings."""
-    return [Point()]
+    return [MaterialPoint()]

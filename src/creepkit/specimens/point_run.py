@@ -11,11 +11,11 @@ import numpy as np
 from creepkit import kernels
 from creepkit.arrays import Floats
 from creepkit.records import History
-from creepkit.specimens.run import Run, run_of
+from creepkit.specimens.run import Run, run_from_outputs
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
-    from creepkit.specimens.point import Point
+    from creepkit.specimens.point import MaterialPoint
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,29 +42,29 @@ class PointRun(Run):
         return np.asarray(np.sqrt(1.5 * (deviator**2 @ np.array([1, 1, 1, 2, 2, 2]))))
 
 
-def run(specimen: Point, law: CreepLaw, values: Mapping[str, float], plan: History) -> PointRun:
+def run_material_point(specimen: MaterialPoint, law: CreepLaw, values: Mapping[str, float], plan: History) -> PointRun:
     """Simulate one test and keep all of it."""
-    from creepkit.specimens.point import OUTPUTS, shown
+    from creepkit.specimens.point import OUTPUTS, point_outputs
 
     kernel = kernels.lower(law, "numba")
-    found = specimen.drive(kernel, kernel.internal(law.values(values))[0], plan)
-    rows = shown(found, plan)
-    told = [k for k, column in enumerate(rows.T) if k == 0 or np.nanmax(np.abs(column), initial=0.0) > 0.0]
-    names = [OUTPUTS[k] for k in told]
-    kept = np.searchsorted(found.times, plan.times[plan.times <= found.end_time])
-    total = found.strain if plan.elastic is not None else np.full_like(found.strain, np.nan)
-    states = {symbol.name: found.states[kept, k] for k, symbol in enumerate(law.states)}
-    return run_of(
+    result = specimen.simulate(kernel, kernel.to_internal(law.values(values))[0], plan)
+    rows = point_outputs(result, plan)
+    shown_columns = [k for k, column in enumerate(rows.T) if k == 0 or np.nanmax(np.abs(column), initial=0.0) > 0.0]
+    names = [OUTPUTS[k] for k in shown_columns]
+    output_rows = np.searchsorted(result.times, plan.times[plan.times <= result.end_time])
+    total = result.strain if plan.elastic is not None else np.full_like(result.strain, np.nan)
+    states = {symbol.name: result.states[output_rows, k] for k, symbol in enumerate(law.states)}
+    return run_from_outputs(
         PointRun,
         plan,
         names,
-        rows[:, told],
-        found.status,
-        found.end_time,
-        found.reason,
-        stress=found.stress[kept],
-        total_strain=total[kept],
-        creep_strain=found.creep_strain[kept],
-        equivalent=found.equivalent[kept],
+        rows[:, shown_columns],
+        result.status,
+        result.end_time,
+        result.reason,
+        stress=result.stress[output_rows],
+        total_strain=total[output_rows],
+        creep_strain=result.creep_strain[output_rows],
+        equivalent=result.equivalent[output_rows],
         states=states,
     )

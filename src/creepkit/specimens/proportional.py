@@ -14,17 +14,17 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.integration.problem import Axes
-from creepkit.integration.segments import segments_of
-from creepkit.integration.tensor_point import trial_of
+from creepkit.integration.segments import merge_programs
+from creepkit.integration.tensor_point import trial_stress
 from creepkit.records import COMPONENTS, PointLoading, Program
 
-_ALIKE = 1e-9
+_PROPORTIONALITY_TOLERANCE = 1e-9
 """Of the largest stress: what differs by less is the same direction."""
-_TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
-_UNIT = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+_SHEAR_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+_MEAN_DIRECTION = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
-class Proportional(NamedTuple):
+class ProportionalLoading(NamedTuple):
     """A scalar problem.
 
     driving : von Mises stress if nothing crept, over time, MPa; stiffness : k, MPa; axes : of the scalar problem.
@@ -38,26 +38,26 @@ class Proportional(NamedTuple):
     along: Floats
 
 
-def proportional(loading: PointLoading, end: float, elastic: tuple[float, float] | None = None) -> Proportional | None:
+def proportional_loading(loading: PointLoading, end: float, elastic: tuple[float, float] | None = None) -> ProportionalLoading | None:
     """The scalar problem of a loading up to `end`, s; None where there is none. elastic : E, MPa, and nu."""
     if loading.strain:
-        return None if elastic is None else _held(loading, elastic)
+        return None if elastic is None else _single_strain(loading, elastic)
     programs = [loading.stress.get(name, Program.constant(0.0)) for name in COMPONENTS]
-    times, stresses = _ends(programs, end)
+    times, stresses = _segment_ends(programs, end)
     means = stresses[:, :3].mean(axis=1)
-    deviators = stresses - means[:, None] * _UNIT
-    size, room = np.sqrt(1.5 * (deviators**2 @ _TWICE)), _ALIKE * max(float(np.abs(stresses).max()), 1e-300)
+    deviators = stresses - means[:, None] * _MEAN_DIRECTION
+    size, room = np.sqrt(1.5 * (deviators**2 @ _SHEAR_WEIGHTS)), _PROPORTIONALITY_TOLERANCE * max(float(np.abs(stresses).max()), 1e-300)
     along = deviators[np.argmax(size)] / size.max() if size.max() > room else np.zeros(6)
-    level = 1.5 * (deviators * _TWICE) @ along
+    level = 1.5 * (deviators * _SHEAR_WEIGHTS) @ along
     line = _line(level, means, room)
     if line is None or np.abs(deviators - level[:, None] * along).max() > room or level.min() < -room:
         return None
     offset, slope = line
-    axes = Axes(offset, trial_of(along).axes.principal_slope + slope, offset, slope)
-    return Proportional(Program(times, np.maximum(level, 0.0)), 0.0, axes, 1.5 * along, np.zeros(6))
+    axes = Axes(offset, trial_stress(along).axes.principal_slope + slope, offset, slope)
+    return ProportionalLoading(Program(times, np.maximum(level, 0.0)), 0.0, axes, 1.5 * along, np.zeros(6))
 
 
-def _held(loading: PointLoading, elastic: tuple[float, float]) -> Proportional | None:
+def _single_strain(loading: PointLoading, elastic: tuple[float, float]) -> ProportionalLoading | None:
     """One strain that never falls, and no stress but its own."""
     if loading.stress or len(loading.strain) > 1:
         return None
@@ -68,14 +68,14 @@ def _held(loading: PointLoading, elastic: tuple[float, float]) -> Proportional |
     along = np.where(np.arange(6) == COMPONENTS.index(name), 1.0 / np.sqrt(3.0) if shear else 1.0, 0.0)
     stiffness = 1.5 * E / (1.0 + nu) if shear else E
     driving = stiffness * strain.values * (2.0 / np.sqrt(3.0) if shear else 1.0)
-    trial = trial_of(along)
+    trial = trial_stress(along)
     axes = Axes(0.0, trial.axes.principal_slope + trial.mean, 0.0, trial.mean)
-    return Proportional(Program(strain.times, driving), stiffness, axes, 1.5 * trial.s, along)
+    return ProportionalLoading(Program(strain.times, driving), stiffness, axes, 1.5 * trial.s, along)
 
 
-def _ends(programs: list[Program], end: float) -> tuple[Floats, Floats]:
+def _segment_ends(programs: list[Program], end: float) -> tuple[Floats, Floats]:
     """Times and values (times, programs) at both ends of every segment."""
-    rows = segments_of(*programs, end=end)
+    rows = merge_programs(*programs, end=end)
     if not len(rows):
         return np.zeros(1), np.array([[float(p.at(0.0)) for p in programs]])
     values = np.stack([rows[:, 2::2], rows[:, 3::2]], axis=1)

@@ -7,31 +7,31 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.kernels.calling import call
-from creepkit.kernels.interface import MEAN, POINT_SIZE, PRINCIPAL, STRAIN, STRESS, TEMPERATURE, TIME
+from creepkit.kernels.calling import call_entry
+from creepkit.kernels.interface import MEAN_STRESS, POINT_SIZE, PRINCIPAL_STRESS, STRAIN, STRESS, TEMPERATURE, TIME
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
 
 
-def points_at(stresses: Floats, strains: Floats, states: Floats, time: float, temperature: float) -> Floats:
+def uniaxial_points(stresses: Floats, strains: Floats, states: Floats, time: float, temperature: float) -> Floats:
     """Points of a law, (points, 6 + S), under uniaxial stress; stress and strain a little above zero at least."""
     points = np.zeros((stresses.size, POINT_SIZE + states.shape[1]))
-    points[:, STRESS] = points[:, PRINCIPAL] = np.maximum(stresses, 1e-3)
-    points[:, MEAN] = points[:, STRESS] / 3.0
+    points[:, STRESS] = points[:, PRINCIPAL_STRESS] = np.maximum(stresses, 1e-3)
+    points[:, MEAN_STRESS] = points[:, STRESS] / 3.0
     points[:, STRAIN], points[:, TIME], points[:, TEMPERATURE] = np.maximum(strains, 1e-9), time, temperature
     points[:, POINT_SIZE:] = states
     return points
 
 
-def fault_of(law: CompiledLaw, theta: Floats, points: Floats) -> str:
+def missing_rate_message(law: CompiledLaw, theta: Floats, points: Floats) -> str:
     """The first of these points where the law has no rate, or one without derivatives, in words; empty when none is.
 
     Kernels floor what they take logarithms of: where an equation has no number, such as the logarithm of something
     negative, its rate may look small instead, but then its derivatives are not finite. A rate too large for a number
     is one: its logarithm is what the integration works with.
     """
-    rates, flags = call(law, "update", points, theta)
+    rates, flags = call_entry(law, "update", points, theta)
     if not flags:
         return ""
     bad = np.flatnonzero(~np.isfinite(rates).all(axis=1))

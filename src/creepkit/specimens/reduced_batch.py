@@ -8,16 +8,16 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats, Ints
-from creepkit.specimens.reduced_curves import Dimple
-from creepkit.specimens.reduced_march import EFFECTS, Candidate, Factors, march, room, slopes_room
-from creepkit.specimens.reduced_observed import COLUMNS
+from creepkit.specimens.reduced_curves import DimpleCurves
+from creepkit.specimens.reduced_march import NUISANCE_DIRECTIONS, ReducedCandidate, FeatureFactors, integrate_candidate, reduced_workspace, sensitivity_workspace
+from creepkit.specimens.reduced_observed import TRAJECTORY_COLUMNS
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def march_all(
+def integrate_candidates(
     update: Any, sensitivity: Any, rate: Any, first: int, last: int, theta: Floats, beta: Floats, beta_slopes: Floats,
     stiffer: Floats, counts: Ints, tests: Floats, curves: Floats, slopes: Floats, redistribution: Floats,
-    row: Ints, grid: tuple[float, float], initial: Floats, limits: Floats, ends: tuple[float, float], factors: Factors,
+    row: Ints, grid: tuple[float, float], initial: Floats, limits: Floats, ends: tuple[float, float], factors: FeatureFactors,
     tolerance: float, out: Floats, changes: Floats, status: Ints, end_times: Floats,
 ) -> None:  # fmt: skip
     """March the candidates from `first` to before `last` through all tests; arrays as in `reduced_courses`.
@@ -25,18 +25,18 @@ def march_all(
     tests : (candidates or 1, tests, 8, nodes) as in `reduced_problem`.
     """
     exact = changes.shape[0] > 0
-    directions = theta.shape[1] + len(EFFECTS) if exact else 0
+    directions = theta.shape[1] + len(NUISANCE_DIRECTIONS) if exact else 0
     count = factors.stress.size * factors.strain.size
-    work = room(initial.size, count)
-    slopes_work = slopes_room(initial.size, theta.shape[1], count, directions, len(COLUMNS))
+    work = reduced_workspace(initial.size, count)
+    slopes_work = sensitivity_workspace(initial.size, theta.shape[1], count, directions, len(TRAJECTORY_COLUMNS))
     nothing = np.zeros((0, out.shape[3], directions))
     for c in range(first, last):
         e = c if tests.shape[0] > 1 else 0
         for k in range(counts.size):
-            candidate = Candidate(theta[c], beta[c], beta_slopes[c], stiffer[e, k], initial, limits, ends[0], ends[1])
+            candidate = ReducedCandidate(theta[c], beta[c], beta_slopes[c], stiffer[e, k], initial, limits, ends[0], ends[1])
             r = row[e, k]
-            dimple = Dimple(curves[r], slopes[r], redistribution[r], grid[0], grid[1])
-            status[c, k], end_times[c, k] = march(
+            dimple = DimpleCurves(curves[r], slopes[r], redistribution[r], grid[0], grid[1])
+            status[c, k], end_times[c, k] = integrate_candidate(
                 update, sensitivity, rate, tests[e, k], counts[k], candidate, dimple, factors, tolerance, work,
                 slopes_work, out[c, k], changes[c, k] if exact else nothing,
             )  # fmt: skip

@@ -1,6 +1,6 @@
 """What the one-degree-of-freedom bulge goes through, node by node: many candidates in many tests, compiled.
 
-    found = courses(specimen, law, theta, histories, effects={}, factors=NO_FEATURES, exact=False, threads=1)
+    found = courses(specimen, law, theta, histories, nuisances={}, factors=NO_FEATURES, exact=False, threads=1)
 
 One row of `found.values` is one node of one test for one candidate; its columns are COLUMNS, then the features. Node
 values are carried to the history's times by `found.frames(k, values)`: plans[k].frames @ values[..., :nodes, :].
@@ -37,19 +37,19 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.records import History
-from creepkit.specimens.bulge_course import MODULUS_STEP
-from creepkit.specimens.reduced_batch import march_all
-from creepkit.specimens.reduced_march import EFFECTS, Factors
-from creepkit.specimens.reduced_observed import COLUMNS
-from creepkit.specimens.reduced_schedule import Schedule, schedule
-from creepkit.specimens.reduced_tables import Tables, tables
+from creepkit.specimens.bulge_course import MODULUS_TEMPERATURE_STEP
+from creepkit.specimens.reduced_batch import integrate_candidates
+from creepkit.specimens.reduced_march import NUISANCE_DIRECTIONS, FeatureFactors
+from creepkit.specimens.reduced_observed import TRAJECTORY_COLUMNS
+from creepkit.specimens.reduced_schedule import TimeNodes, time_nodes
+from creepkit.specimens.reduced_tables import ReducedOrderTables, build_tables
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
     from creepkit.language import Elastic
     from creepkit.specimens.bulge import Bulge
 
-NO_FEATURES = Factors(np.zeros(0), np.zeros(0))
+WITHOUT_FEATURES = FeatureFactors(np.zeros(0), np.zeros(0))
 
 _TOLERANCE, _EXACT_TOLERANCE = 1e-5, 1e-11
 """Of ln of increments."""
@@ -61,7 +61,7 @@ _NO_LOAD = 1e-15
 
 
 @dataclass(frozen=True, eq=False)
-class Courses:
+class Trajectories:
     """Courses of candidates in tests, padded to the longest test with its last node.
 
     values : (candidates, tests, nodes, columns). changes : the same with a last axis of P + 3 derivatives, to the law's
@@ -70,61 +70,61 @@ class Courses:
     """
 
     values: Floats
-    changes: Floats | None
-    plans: tuple[Schedule, ...]
+    jacobian: Floats | None
+    schedules: tuple[TimeNodes, ...]
     status: Ints
     end_times: Floats
 
     def frames(self, test: int, values: Floats) -> Floats:
         """Values (candidates, nodes, ...) of the nodes of a test at its history's times, (candidates, times, ...)."""
-        weights = self.plans[test].frames
+        weights = self.schedules[test].frames
         return np.asarray(np.moveaxis(np.tensordot(weights, values[:, : weights.shape[1]], axes=(1, 1)), 0, 1))
 
 
-def courses(
+def simulate_trajectories(
     specimen: Bulge,
     law: CompiledLaw,
     theta: Floats,
     histories: Sequence[History],
     *,
-    effects: Mapping[str, Floats] | None = None,
-    factors: Factors = NO_FEATURES,
+    nuisances: Mapping[str, Floats] | None = None,
+    factors: FeatureFactors = WITHOUT_FEATURES,
     exact: bool = False,
     threads: int = 1,
-    known: Tables | None = None,
-) -> Courses:
+    tables: ReducedOrderTables | None = None,
+) -> Trajectories:
     """March candidates, theta (candidates, P) internal, through all tests.
 
-    effects : {kind: (candidates or 1, tests)}, see records.Predictor; "window" too. factors : of the features.
+    nuisances : {kind: (candidates or 1, tests)}, see records.Predictor; "window" too. factors : of the features.
     exact : with derivatives. Results are the same for any number of threads. known : tables to go by, in place of those
     of the specimen; a test of another dimple than theirs (but for its apex thickness), or window, is a SolveError.
     """
     theta = np.array(theta, dtype=float, order="C", ndmin=2)
-    assumed = {kind: np.atleast_2d(value) for kind, value in (effects or {}).items()}
-    plans = tuple(schedule(specimen, history) for history in histories)
-    counts = np.array([plan.times.size for plan in plans], dtype=np.int64)
-    rows = max([len(v) for v in assumed.values()], default=1)
-    dimples = _dimples(specimen, histories, plans, assumed, rows, known)
-    tests, stiffer = _tests(histories, plans, assumed, dimples, counts, rows)
-    shape = (len(theta), len(plans), int(counts.max()), len(COLUMNS) + factors.stress.size * factors.strain.size)
+    broadcast_nuisances = {kind: np.atleast_2d(value) for kind, value in (nuisances or {}).items()}
+    schedules = tuple(time_nodes(specimen, history) for history in histories)
+    counts = np.array([plan.times.size for plan in schedules], dtype=np.int64)
+    rows = max([len(v) for v in broadcast_nuisances.values()], default=1)
+    geometries = _dimples(specimen, histories, schedules, broadcast_nuisances, rows, tables)
+    tests, modulus_changes = _tests(histories, schedules, broadcast_nuisances, geometries, counts, rows)
+    shape = (len(theta), len(schedules), int(counts.max()), len(TRAJECTORY_COLUMNS) + factors.stress.size * factors.strain.size)
     out = np.zeros(shape)
-    changes = np.zeros((*shape, theta.shape[1] + len(EFFECTS)) if exact else (0, *shape[1:], 1))
+    changes = np.zeros((*shape, theta.shape[1] + len(NUISANCE_DIRECTIONS)) if exact else (0, *shape[1:], 1))
     status, end_times = np.zeros(shape[:2], dtype=np.int64), np.zeros(shape[:2])
     beta, beta_slopes = _beta(law, theta, exact)
 
     def part(first: int, last: int) -> None:
-        march_all(
-            law.update, law.sensitivity, law.rate, first, last, theta, beta, beta_slopes, stiffer, counts, tests,
-            *dimples.arrays, dimples.row, dimples.grid, np.array(law.initial), np.array(law.limits),
+        integrate_candidates(
+            law.update, law.sensitivity, law.rate, first, last, theta, beta, beta_slopes, modulus_changes, counts, tests,
+            *geometries.arrays, geometries.row, geometries.grid, np.array(law.initial), np.array(law.limits),
             (specimen.deflection_limit, specimen.strain_limit), factors, _EXACT_TOLERANCE if exact else _TOLERANCE,
             out, changes, status, end_times,
         )  # fmt: skip
 
-    _shared(part, len(theta), threads)
-    return Courses(out, changes if exact else None, plans, status, end_times)
+    _in_threads(part, len(theta), threads)
+    return Trajectories(out, changes if exact else None, schedules, status, end_times)
 
 
-def _shared(part: Callable[[int, int], None], count: int, threads: int) -> None:
+def _in_threads(part: Callable[[int, int], None], count: int, threads: int) -> None:
     """Let threads do parts of the candidates."""
     cuts = np.linspace(0, count, min(threads, count) + 1).astype(int)
     if cuts.size == 2:
@@ -138,7 +138,7 @@ def _shared(part: Callable[[int, int], None], count: int, threads: int) -> None:
 class _Dimples:
     """Different dimples: their tables, thicknesses, and stacked arrays; row (candidates or 1, tests) which is whose."""
 
-    tables: list[Tables]
+    tables: list[ReducedOrderTables]
     thickness: Floats
     arrays: tuple[Floats, Floats, Floats]
     row: Ints
@@ -146,79 +146,79 @@ class _Dimples:
 
 
 def _dimples(
-    specimen: Bulge, histories: Sequence[History], plans: Sequence[Schedule], effects: Mapping[str, Floats], rows: int,
-    given: Tables | None,
+    specimen: Bulge, histories: Sequence[History], plans: Sequence[TimeNodes], nuisances: Mapping[str, Floats], rows: int,
+    known_tables: ReducedOrderTables | None,
 ) -> _Dimples:  # fmt: skip
     """Every different dimple, and which one each candidate has in each test."""
-    own = np.array([(k, p.made.observation.window, p.made.geometry.apex_thickness) for k, p in enumerate(plans)])
-    keys = np.broadcast_to(own, (rows, len(plans), 3)).copy()
+    own_values = np.array([(k, p.setup.observation.window, p.setup.geometry.apex_thickness) for k, p in enumerate(plans)])
+    keys = np.broadcast_to(own_values, (rows, len(plans), 3)).copy()
     for column, kind in ((1, "window"), (2, "thickness")):
-        if kind in effects:
-            keys[..., column] = effects[kind]
+        if kind in nuisances:
+            keys[..., column] = nuisances[kind]
     different, row = np.unique(keys.reshape(-1, 3), axis=0, return_inverse=True)
-    if given is None:
+    if known_tables is None:
         known = [_tables(specimen, plans[int(k)], float(window)) for k, window, _ in different]
     else:
         for k, window, _ in different:
-            _refuse_another(given, histories[int(k)], plans[int(k)], float(window))
-        known = [given] * len(different)
-    found = [t.dimple(float(h)) for t, h in zip(known, different[:, 2], strict=True)]
-    arrays = tuple(np.array([getattr(d, name) for d in found]) for name in ("curves", "slopes", "redistribution"))
-    grid = (found[0].offset, found[0].step)
+            _refuse_another(known_tables, histories[int(k)], plans[int(k)], float(window))
+        known = [known_tables] * len(different)
+    result = [t.dimple(float(h)) for t, h in zip(known, different[:, 2], strict=True)]
+    arrays = tuple(np.array([getattr(d, name) for d in result]) for name in ("curves", "slopes", "redistribution"))
+    grid = (result[0].offset, result[0].step)
     return _Dimples(known, different[:, 2], arrays, row.reshape(rows, len(plans)), grid)  # type: ignore[arg-type]
 
 
-def _refuse_another(known: Tables, history: History, plan: Schedule, window: float) -> None:
+def _refuse_another(known: ReducedOrderTables, history: History, plan: TimeNodes, window: float) -> None:
     """A test of another dimple than that of the tables."""
-    where, tested = history.source or f"history '{history.name}'", plan.made.geometry
+    where, tested = history.source or f"history '{history.name}'", plan.setup.geometry
     pairs = [(name, getattr(tested, name), getattr(known.geometry, name)) for name in tested.lengths[1:]]
-    for name, found, allowed in [*pairs, ("window", window, known.window)]:
-        if abs(found - allowed) > 1e-6 * allowed:
+    for name, result, allowed in [*pairs, ("window", window, known.window)]:
+        if abs(result - allowed) > 1e-6 * allowed:
             raise SolveError(
-                f"{where}: {name} is {found:g} mm, but the tables of the one-degree-of-freedom model are for "
+                f"{where}: {name} is {result:g} mm, but the tables of the one-degree-of-freedom model are for "
                 f"{allowed:g} mm; make others with 'creepkit base'"
             )
 
 
-def _tables(specimen: Bulge, plan: Schedule, window: float) -> Tables:
+def _tables(specimen: Bulge, plan: TimeNodes, window: float) -> ReducedOrderTables:
     """The tables of the dimple of a test, for all its thicknesses."""
-    made, nominal = plan.made, specimen.geometry.apex_thickness
-    room = made.geometry.plate_thickness - made.geometry.roof_axial
-    geometry = made.geometry.replace(apex_thickness=min(nominal, room))
-    return tables(specimen, geometry, made.observation.replace(window=window))
+    setup, nominal = plan.setup, specimen.geometry.apex_thickness
+    room = setup.geometry.plate_thickness - setup.geometry.roof_axial
+    geometry = setup.geometry.replace(apex_thickness=min(nominal, room))
+    return build_tables(specimen, geometry, setup.observation.replace(window=window))
 
 
 def _tests(
-    histories: Sequence[History], plans: Sequence[Schedule], effects: Mapping[str, Floats], dimples: _Dimples,
+    histories: Sequence[History], plans: Sequence[TimeNodes], nuisances: Mapping[str, Floats], dimples: _Dimples,
     counts: Ints, rows: int,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Each test as in `reduced_problem`, (candidates or 1, tests, 8, nodes), and relative changes of the modulus."""
     shape = (rows, len(plans))
     out = np.zeros((*shape, 8, int(counts.max())))
-    stiffer = np.broadcast_to(effects.get("modulus", np.zeros((1, 1))), shape).astype(float)
-    warmer = np.broadcast_to(effects.get("temperature", np.zeros((1, 1))), shape)
+    modulus_changes = np.broadcast_to(nuisances.get("modulus", np.zeros((1, 1))), shape).astype(float)
+    temperature_changes = np.broadcast_to(nuisances.get("temperature", np.zeros((1, 1))), shape)
     for k, (plan, history) in enumerate(zip(plans, histories, strict=True)):
         assert history.elastic is not None  # the schedule has complained
-        temperature, factor = plan.temperature + warmer[:, k, None], 1.0 + stiffer[:, k, None]
+        temperature, factor = plan.temperature + temperature_changes[:, k, None], 1.0 + modulus_changes[:, k, None]
         warm, which = np.unique(temperature, return_inverse=True)
         modulus, softening = (
             factor * np.array([f(history.elastic, float(T)) for T in warm])[which.reshape(temperature.shape)]
-            for f in (_modulus, _softening)
+            for f in (_modulus, _modulus_temperature_slope)
         )
         _refuse_soft(history, modulus)
-        lifted = _lifted(dimples, dimples.row[:, k], np.maximum(plan.pressure / modulus, _NO_LOAD))
+        lifted = _elastic_deflections(dimples, dimples.row[:, k], np.maximum(plan.pressure / modulus, _NO_LOAD))
         for i, values in enumerate((plan.times, plan.pressure, temperature, modulus, softening, *lifted)):
             out[:, k, i, : counts[k]] = values
         out[:, k, :, counts[k] :] = out[:, k, :, counts[k] - 1, None]
-    return out, stiffer
+    return out, modulus_changes
 
 
-def _lifted(dimples: _Dimples, row: Ints, load: Floats) -> Floats:
+def _elastic_deflections(dimples: _Dimples, row: Ints, load: Floats) -> Floats:
     """Elastic deflections at P/E (rows, nodes), and their derivatives to the thickness and to ln of the modulus."""
     out = np.empty((3, *load.shape))
-    own = [dimples.tables[r] for r in row]
-    for known in set(own):
-        mine = np.array([one is known for one in own])
+    own_values = [dimples.tables[r] for r in row]
+    for known in set(own_values):
+        mine = np.array([one is known for one in own_values])
         out[:, mine] = known.elastic_deflection(load[mine], dimples.thickness[row[mine]])
     out[2] *= -1.0
     return out
@@ -230,10 +230,10 @@ def _modulus(elastic: Elastic, temperature: float) -> float:
 
 
 @lru_cache(maxsize=65536)
-def _softening(elastic: Elastic, temperature: float) -> float:
+def _modulus_temperature_slope(elastic: Elastic, temperature: float) -> float:
     """dE/dT, MPa/K."""
-    above, below = (_modulus(elastic, temperature + step) for step in (MODULUS_STEP, -MODULUS_STEP))
-    return (above - below) / (2 * MODULUS_STEP)
+    above, below = (_modulus(elastic, temperature + step) for step in (MODULUS_TEMPERATURE_STEP, -MODULUS_TEMPERATURE_STEP))
+    return (above - below) / (2 * MODULUS_TEMPERATURE_STEP)
 
 
 def _refuse_soft(history: History, modulus: Floats) -> None:
@@ -247,8 +247,8 @@ def _beta(law: CompiledLaw, theta: Floats, exact: bool) -> tuple[Floats, Floats]
     parameters = theta.shape[1]
     steps = np.concatenate([np.zeros((1, parameters)), *(_BETA_STEP * s * np.eye(parameters) for s in (1, -1))])
     points = theta + steps[: None if exact else 1, None]
-    found = np.clip(np.broadcast_to(np.asarray(law.leading(points), float), points.shape[:2]), *_BETA)
+    result = np.clip(np.broadcast_to(np.asarray(law.leading_exponent(points), float), points.shape[:2]), *_BETA)
     slopes = np.zeros(theta.shape)
     if exact:
-        slopes[:] = (found[1 : 1 + parameters] - found[1 + parameters :]).T / (2 * _BETA_STEP)
-    return found[0].copy(), slopes
+        slopes[:] = (result[1 : 1 + parameters] - result[1 + parameters :]).T / (2 * _BETA_STEP)
+    return result[0].copy(), slopes

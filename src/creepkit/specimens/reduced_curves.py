@@ -24,7 +24,7 @@ each exponent, and width and shape of an elastic dimple."""
 CURVES = ELASTIC_SHAPE + 1
 
 
-class Dimple(NamedTuple):
+class DimpleCurves(NamedTuple):
     """Curves (grid + 2, CURVES) of one dimple with their derivatives to the thickness, and the numbers of
     redistribution; D = (exp(x) - 1) offset on the grid, which is uniform in x with `step`.
     """
@@ -36,7 +36,7 @@ class Dimple(NamedTuple):
     step: float
 
 
-class Place(NamedTuple):
+class GridPosition(NamedTuple):
     """Where a deflection lies: the first of four points of the grid, the share of the interval between the second and
     the third that lies behind, and weights of the four.
     """
@@ -50,7 +50,7 @@ class Place(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def place(deflection: Any, dimple: Dimple) -> Place:
+def grid_position(deflection: Any, dimple: DimpleCurves) -> GridPosition:
     """Where a deflection, mm, lies; weights are of cubics that go on smoothly from one interval to the next."""
     position = log(1.0 + deflection * (1.0 / dimple.offset)) * (1.0 / dimple.step)
     last = dimple.curves.shape[0] - 3
@@ -61,24 +61,24 @@ def place(deflection: Any, dimple: Dimple) -> Place:
     elif position.real > last:
         s = 0.0 * position + 1.0
     w0, w1 = 0.5 * s * (s * (2.0 - s) - 1.0), 0.5 * (s * s * (3.0 * s - 5.0) + 2.0)
-    return Place(index, s, w0, w1, 0.5 * s * (s * (4.0 - 3.0 * s) + 1.0), 0.5 * s * s * (s - 1.0))
+    return GridPosition(index, s, w0, w1, 0.5 * s * (s * (4.0 - 3.0 * s) + 1.0), 0.5 * s * s * (s - 1.0))
 
 
 @njit(cache=True, error_model="numpy")
-def curve(which: int, at: Place, dimple: Dimple, thicker: Any) -> Any:
+def curve_value(which: int, at: GridPosition, dimple: DimpleCurves, thicker: Any) -> Any:
     """A curve there; thicker : mm."""
     value = _blended(dimple.curves, which, at)
     return value if thicker == 0.0 else value + thicker * _blended(dimple.slopes, which, at)
 
 
 @njit(cache=True, error_model="numpy")
-def _blended(c: Floats, k: int, at: Place) -> Any:
+def _blended(c: Floats, k: int, at: GridPosition) -> Any:
     i = at.index
     return at.w0 * c[i, k] + at.w1 * c[i + 1, k] + at.w2 * c[i + 2, k] + at.w3 * c[i + 3, k]
 
 
 @njit(cache=True, error_model="numpy")
-def write_curves(first: int, last: int, at: Place, dimple: Dimple, thicker: Any, values: Any) -> None:
+def write_curves(first: int, last: int, at: GridPosition, dimple: DimpleCurves, thicker: Any, values: Any) -> None:
     """Write the curves from `first` to before `last` there into values (CURVES,); thicker : mm.
 
     Many at once: numba counts references to arrays at each call, which costs more than a curve.
@@ -94,7 +94,7 @@ def write_curves(first: int, last: int, at: Place, dimple: Dimple, thicker: Any,
 
 
 @njit(cache=True, error_model="numpy")
-def slope(which: int, at: Place, dimple: Dimple, deflection: float) -> Any:
+def curve_slope(which: int, at: GridPosition, dimple: DimpleCurves, deflection: float) -> Any:
     """Its derivative to D, 1/mm."""
     s, c, i = at.share, dimple.curves, at.index
     rise = 0.5 * (s * (4.0 - 3.0 * s) - 1.0) * c[i, which] + 0.5 * s * (9.0 * s - 10.0) * c[i + 1, which]
@@ -103,7 +103,7 @@ def slope(which: int, at: Place, dimple: Dimple, deflection: float) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-def over_exponents(first: int, power: Any, values: Any) -> Any:
+def interpolate_exponents(first: int, power: Any, values: Any) -> Any:
     """What the six exponents' values, from `first` on, say of another one, power = n/(n + 2): the polynomial."""
     d0, d1, d2 = power - _PLACES[0], power - _PLACES[1], power - _PLACES[2]
     d3, d4, d5 = power - _PLACES[3], power - _PLACES[4], power - _PLACES[5]

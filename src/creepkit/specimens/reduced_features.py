@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.kernels.interface import MEAN, PRINCIPAL, STRAIN, STRESS, pointer
+from creepkit.kernels.interface import MEAN_STRESS, PRINCIPAL_STRESS, STRAIN, STRESS, data_pointer
 
 _LARGEST = 5.0
 """Decades; features are bent towards it smoothly."""
@@ -16,7 +16,7 @@ _LOG_10 = float(np.log(10.0))
 
 
 @njit(cache=True, error_model="numpy")
-def features(
+def rate_features(
     rate: Any, theta: Floats, point: Floats, log_rate: float, stress_factors: Floats, strain_factors: Floats,
     rows: Floats, said: Floats, out: Floats,
 ) -> None:  # fmt: skip
@@ -25,7 +25,7 @@ def features(
     rows (features, 6 + S), said : room for the law.
     """
     _around(point, stress_factors, strain_factors, rows)
-    rate(rows.shape[0], pointer(rows), pointer(theta), pointer(said))
+    rate(rows.shape[0], data_pointer(rows), data_pointer(theta), data_pointer(said))
     columns = point.size - 5  # the rate, then each state's
     for k in range(rows.shape[0]):
         out[k] = (np.log(max(said[k * columns], 1e-300)) - log_rate) / _LOG_10
@@ -48,14 +48,14 @@ def _around(point: Floats, stress_factors: Floats, strain_factors: Floats, rows:
         for s in stress_factors:
             for i in range(point.size):
                 rows[k, i] = point[i]
-            for i in (STRESS, PRINCIPAL, MEAN):
+            for i in (STRESS, PRINCIPAL_STRESS, MEAN_STRESS):
                 rows[k, i] *= s
             rows[k, STRAIN] *= c
             k += 1
 
 
 @njit(cache=True, error_model="numpy")
-def feature_changes(
+def rate_feature_derivatives(
     sensitivity: Any, theta: Floats, point: Floats, log_rate: float, changes: Floats, log_rate_changes: Floats,
     stress_factors: Floats, strain_factors: Floats, rows: Floats, said: Floats, out: Floats,
 ) -> None:  # fmt: skip
@@ -64,7 +64,7 @@ def feature_changes(
     changes : (directions, 6 + S) of the point; log_rate_changes : (directions,) of ln of the rate there.
     """
     _around(point, stress_factors, strain_factors, rows)
-    sensitivity(rows.shape[0], pointer(rows), pointer(theta), pointer(said))
+    sensitivity(rows.shape[0], data_pointer(rows), data_pointer(theta), data_pointer(said))
     width, parameters = point.size, theta.size
     outputs = width - 5
     columns = outputs * (1 + width + parameters)
@@ -76,7 +76,7 @@ def feature_changes(
         scale = 1.0 / (bend * bend * bend * bend * bend * _LOG_10)
         s, c = stress_factors[k % stress_factors.size], strain_factors[k // stress_factors.size]
         for i in range(width):
-            said[first + outputs + i] *= s if i in (STRESS, PRINCIPAL, MEAN) else (c if i == STRAIN else 1.0)
+            said[first + outputs + i] *= s if i in (STRESS, PRINCIPAL_STRESS, MEAN_STRESS) else (c if i == STRAIN else 1.0)
         for p in range(changes.shape[0]):
             total = said[first + outputs * (1 + width) + p] if p < parameters else 0.0
             for i in range(width):

@@ -10,18 +10,18 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
 from creepkit.errors import SolveError
-from creepkit.specimens.reduced_tables import Tables
+from creepkit.specimens.reduced_tables import ReducedOrderTables
 
-KEY = "creepkit"
+_HEADER_KEY = "creepkit"
 
 
-def write_tables(tables: Tables, path: str | Path) -> Path:
+def write_tables(tables: ReducedOrderTables, path: str | Path) -> Path:
     """Write to a temporary name, then rename: a file is whole or absent."""
     path = Path(path)
     arrays, document = tables.to_tensors()
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        temporary.write_bytes(save(arrays, metadata={KEY: json.dumps(document)}))
+        temporary.write_bytes(save(arrays, metadata={_HEADER_KEY: json.dumps(document)}))
         os.replace(temporary, path)
     except OSError as error:
         why = f"cannot be written ({error.strerror})"
@@ -31,19 +31,19 @@ def write_tables(tables: Tables, path: str | Path) -> Path:
     return path
 
 
-def read_tables(path: str | Path) -> Tables:
+def read_tables(path: str | Path) -> ReducedOrderTables:
     """The tables of a file; SolveError says what is wrong with any other."""
     path = Path(path)
     if not path.is_file():
         raise SolveError(f"{path}: there is no such file; give one that creepkit base wrote")
     try:
         with safe_open(path, framework="numpy") as file:
-            told = (file.metadata() or {}).get(KEY, "{}")
+            message = (file.metadata() or {}).get(_HEADER_KEY, "{}")
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (a handle, not a mapping)
-        document = json.loads(told)
+        document = json.loads(message)
     except (SafetensorError, json.JSONDecodeError):
         raise SolveError(f"{path}: damaged, or not a file of tables; make it again with 'creepkit base'") from None
     try:
-        return Tables.from_tensors(arrays, document)
+        return ReducedOrderTables.from_tensors(arrays, document)
     except SolveError as error:
         raise SolveError(f"{path}: {error}") from None

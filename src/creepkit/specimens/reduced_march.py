@@ -9,31 +9,31 @@ from numba import njit
 
 from creepkit.arrays import Floats
 from creepkit.kernels.interface import STRAIN
-from creepkit.specimens.reduced_curves import Dimple
-from creepkit.specimens.reduced_features import feature_changes, features
-from creepkit.specimens.reduced_newton import solve
-from creepkit.specimens.reduced_observed import AMPLITUDE_COLUMN, COLUMNS, OF_STEP, observe, observe_step
+from creepkit.specimens.reduced_curves import DimpleCurves
+from creepkit.specimens.reduced_features import rate_feature_derivatives, rate_features
+from creepkit.specimens.reduced_newton import solve_step
+from creepkit.specimens.reduced_observed import AMPLITUDE_COLUMN, TRAJECTORY_COLUMNS, FIRST_STEP_COLUMN, write_node_outputs, write_step_outputs
 from creepkit.specimens.reduced_problem import (
-    EFFECTS,
+    NUISANCE_DIRECTIONS,
     ELASTIC,
     PRESSURE,
     TIMES,
-    Candidate,
-    Factors,
-    Room,
-    Slopes,
+    ReducedCandidate,
+    FeatureFactors,
+    ReducedWorkspace,
+    ReducedSensitivities,
     end_of,
     real_node,
-    room,
-    slopes_room,
-    virgin,
+    reduced_workspace,
+    sensitivity_workspace,
+    virgin_state,
 )
-from creepkit.specimens.reduced_step import CREEP, FAST, SLOW, STATES, STRAINED, advance
-from creepkit.specimens.reduced_tangents import consult, differentiate
+from creepkit.specimens.reduced_step import CREEP_DEFLECTION, FAST, SLOW, STATES, STRAIN_STATE, advance_state
+from creepkit.specimens.reduced_tangents import evaluate_law, differentiate_step
 
-__all__ = ["EFFECTS", "Candidate", "Factors", "Room", "Slopes", "march", "room", "slopes_room"]
+__all__ = ["NUISANCE_DIRECTIONS", "ReducedCandidate", "FeatureFactors", "ReducedWorkspace", "ReducedSensitivities", "integrate_candidate", "reduced_workspace", "sensitivity_workspace"]
 
-COMPLETE, BURST, LOST = range(3)
+REACHED_END, BURST, NOT_CONVERGED = range(3)
 """Ends; values of records.Status."""
 
 _FIRST_RATE = 1e-9
@@ -41,9 +41,9 @@ _FIRST_RATE = 1e-9
 
 
 @njit(cache=True, error_model="numpy")
-def march(
-    update: Any, sensitivity: Any, rate: Any, test: Floats, count: int, candidate: Candidate, dimple: Dimple,
-    factors: Factors, tolerance: float, work: Room, slopes: Slopes, out: Floats, changes: Floats,
+def integrate_candidate(
+    update: Any, sensitivity: Any, rate: Any, test: Floats, count: int, candidate: ReducedCandidate, dimple: DimpleCurves,
+    factors: FeatureFactors, tolerance: float, work: ReducedWorkspace, slopes: ReducedSensitivities, out: Floats, changes: Floats,
 ) -> tuple[int, float]:  # fmt: skip
     """March to the last of `count` nodes, or to where the dimple bursts; how that ended and when, s.
 
@@ -51,7 +51,7 @@ def march(
     where derivatives are not wanted.
     """
     theta, initial = candidate.theta, candidate.initial
-    state, unknown = virgin(test, initial), np.zeros(2 + initial.size)
+    state, unknown = virgin_state(test, initial), np.zeros(2 + initial.size)
     before = state.copy()
     exact, log_rate, gap, toughness = changes.shape[0] > 0, np.log(_FIRST_RATE), 3.0, 0.5
     slopes.tangents[:] = 0.0
@@ -61,51 +61,51 @@ def march(
         if instant:
             state[FAST] += test[PRESSURE, j] - test[PRESSURE, j - 1]
             state[SLOW] += test[PRESSURE, j] - test[PRESSURE, j - 1]
-            out[j, OF_STEP:] = out[j - 1, OF_STEP:]
+            out[j, FIRST_STEP_COLUMN:] = out[j - 1, FIRST_STEP_COLUMN:]
         else:
             node = real_node(test, j, candidate.beta)
             unknown[0], unknown[1] = log_rate + node.log_weight, log_rate + node.log_weight + gap
             unknown[2:] = state[STATES:]
-            middle, now = solve(update, theta, node, state, unknown, dimple, tolerance, work)
+            middle, now = solve_step(update, theta, node, state, unknown, dimple, tolerance, work)
             log_rate, gap, toughness = work.logs[0], unknown[1] - unknown[0], now.place
             if not np.isfinite(log_rate + unknown.sum()):
                 _stay(out, changes, j, count)
-                return LOST, test[TIMES, j - 1]
-            advance(state, unknown, middle, now, work.gains)
-            observe_step(work.rows[0, STRAIN], now, log_rate, out[j])
-            features(rate, theta, work.rows[0], log_rate, factors.stress, factors.strain, work.wide,
-                     work.wide_said, out[j, len(COLUMNS):])  # fmt: skip
-        observe(end_of(test, j), state, toughness, dimple, 0.0, test[TIMES, j], work.values, out[j])
+                return NOT_CONVERGED, test[TIMES, j - 1]
+            advance_state(state, unknown, middle, now, work.gains)
+            write_step_outputs(work.rows[0, STRAIN], now, log_rate, out[j])
+            rate_features(rate, theta, work.rows[0], log_rate, factors.stress, factors.strain, work.wide,
+                     work.wide_said, out[j, len(TRAJECTORY_COLUMNS):])  # fmt: skip
+        write_node_outputs(end_of(test, j), state, toughness, dimple, 0.0, test[TIMES, j], work.values, out[j])
         if j == 1:
-            observe(end_of(test, 0), virgin(test, initial), toughness, dimple, 0.0, test[TIMES, 0], work.values, out[0])
-            out[0, OF_STEP:] = out[1, OF_STEP:]
+            write_node_outputs(end_of(test, 0), virgin_state(test, initial), toughness, dimple, 0.0, test[TIMES, 0], work.values, out[0])
+            out[0, FIRST_STEP_COLUMN:] = out[1, FIRST_STEP_COLUMN:]
         if exact:
             if not instant:
-                consult(update, sensitivity, theta, work, slopes.full)
-            differentiate(test, j, candidate, dimple, before, state, unknown, toughness, work, slopes, changes)
+                evaluate_law(update, sensitivity, theta, work, slopes.full)
+            differentiate_step(test, j, candidate, dimple, before, state, unknown, toughness, work, slopes, changes)
             if not instant:
-                feature_changes(
+                rate_feature_derivatives(
                     sensitivity, theta, work.rows[0], log_rate, slopes.along, slopes.bent, factors.stress,
-                    factors.strain, work.wide, slopes.wide_full, changes[j, len(COLUMNS):],
+                    factors.strain, work.wide, slopes.wide_full, changes[j, len(TRAJECTORY_COLUMNS):],
                 )  # fmt: skip
             if j == 1:
-                changes[0, OF_STEP:] = changes[1, OF_STEP:]
-        share = burst_share(test, j, candidate, before, state)
+                changes[0, FIRST_STEP_COLUMN:] = changes[1, FIRST_STEP_COLUMN:]
+        share = burst_fraction(test, j, candidate, before, state)
         if share >= 0.0:
             out[j, AMPLITUDE_COLUMN] = min(out[j, AMPLITUDE_COLUMN], candidate.deflection_limit)
             _stay(out, changes, j + 1, count)
             return BURST, test[TIMES, j - 1] + share * (test[TIMES, j] - test[TIMES, j - 1])
-    return COMPLETE, test[TIMES, count - 1]
+    return REACHED_END, test[TIMES, count - 1]
 
 
 @njit(cache=True, error_model="numpy")
-def burst_share(test: Floats, j: int, candidate: Candidate, before: Floats, state: Floats) -> float:
+def burst_fraction(test: Floats, j: int, candidate: ReducedCandidate, before: Floats, state: Floats) -> float:
     """The share of the step to node j after which the dimple has burst; -1 if it has not."""
-    reached = test[ELASTIC, j] + state[CREEP]
+    reached = test[ELASTIC, j] + state[CREEP_DEFLECTION]
     if reached > candidate.deflection_limit:
-        last = test[ELASTIC, j - 1] + before[CREEP]
+        last = test[ELASTIC, j - 1] + before[CREEP_DEFLECTION]
         return float(min(max((candidate.deflection_limit - last) / (reached - last), 0.0), 1.0))
-    broken = state[STRAINED] > candidate.strain_limit
+    broken = state[STRAIN_STATE] > candidate.strain_limit
     for v in range(candidate.limits.size):
         broken = broken or state[STATES + v] >= candidate.limits[v]
     return 1.0 if broken else -1.0

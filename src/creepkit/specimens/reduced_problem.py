@@ -11,11 +11,11 @@ from creepkit.arrays import Floats
 from creepkit.kernels.interface import POINT_SIZE
 from creepkit.specimens.reduced_curves import CURVES
 from creepkit.specimens.reduced_dual import exp, log
-from creepkit.specimens.reduced_step import FAST, PROBES, SLOW, STATES, Node
+from creepkit.specimens.reduced_step import FAST, PROBES, SLOW, STATES, StepData
 
-EFFECTS = ("thickness", "modulus", "temperature")
+NUISANCE_DIRECTIONS = ("thickness", "modulus", "temperature")
 """Directions of derivatives after the law's parameters: mm, relative, K."""
-TINY = 2.0**-100
+COMPLEX_STEP = 2.0**-100
 """Scale of imaginary parts; to divide by a power of two is to multiply."""
 
 
@@ -25,7 +25,7 @@ deflection mm with its derivatives to thickness and to ln of the modulus. One ar
 """
 
 
-class Candidate(NamedTuple):
+class ReducedCandidate(NamedTuple):
     """Internal parameters (P,), exponent of the clock with its derivatives (P,), relative change of the modulus; the
     law's initial states and limits (S,); limits of deflection mm and strain.
     """
@@ -40,14 +40,14 @@ class Candidate(NamedTuple):
     strain_limit: float
 
 
-class Factors(NamedTuple):
+class FeatureFactors(NamedTuple):
     """Factors on stress (.,) and on strain (.,) of the features."""
 
     stress: Floats
     strain: Floats
 
 
-class Room(NamedTuple):
+class ReducedWorkspace(NamedTuple):
     """Working arrays: for the law at the probes and at the features, for curves and Newton's method.
 
     rows (PROBES, 6 + S), said (PROBES, .) of `update`; wide, wide_said at features; values (CURVES,).
@@ -65,7 +65,7 @@ class Room(NamedTuple):
     matrix: Floats
 
 
-class Slopes(NamedTuple):
+class ReducedSensitivities(NamedTuple):
     """Working arrays of derivatives: complex ones of a step; what the law says of all its derivatives at the probes and
     at the features; and of each direction those of the state (directions, state), of the point in the middle and ln of
     the rate there, and of n'/(n' + 2).
@@ -93,10 +93,10 @@ class Slopes(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def room(states: int, count: int) -> Room:
+def reduced_workspace(states: int, count: int) -> ReducedWorkspace:
     """Allocate for `count` features."""
     width, size = POINT_SIZE + states, 1 + states
-    return Room(
+    return ReducedWorkspace(
         np.zeros((PROBES, width)), np.zeros((PROBES, size * (1 + width))), np.zeros((count, width)),
         np.zeros(count * size), np.zeros(CURVES), np.zeros(PROBES), np.zeros(states), np.ones(states),
         np.zeros((2 + states, 1)), np.zeros((2 + states, 2 + states)),
@@ -104,12 +104,12 @@ def room(states: int, count: int) -> Room:
 
 
 @njit(cache=True, error_model="numpy")
-def slopes_room(states: int, parameters: int, count: int, directions: int, columns: int) -> Slopes:
+def sensitivity_workspace(states: int, parameters: int, count: int, directions: int, columns: int) -> ReducedSensitivities:
     """Allocate for `count` features and some directions of derivatives (none: 0) of as many columns of a course."""
     width, size, some = POINT_SIZE + states, 2 + states, 1 if directions > 0 else 0
     said = (1 + states) * (1 + width + parameters)
     kind = np.complex128
-    return Slopes(
+    return ReducedSensitivities(
         np.zeros((PROBES, width), kind), np.zeros(CURVES, kind), np.zeros(PROBES, kind), np.zeros(states, kind),
         np.zeros(size, kind), np.zeros(STATES + states, kind), np.zeros(size, kind), np.zeros(columns, kind),
         np.zeros((PROBES, said)), np.zeros(some * count * said), np.zeros((size, size)), np.zeros((size, directions)),
@@ -119,7 +119,7 @@ def slopes_room(states: int, parameters: int, count: int, directions: int, colum
 
 
 @njit(cache=True, error_model="numpy")
-def virgin(test: Floats, initial: Floats) -> Floats:
+def virgin_state(test: Floats, initial: Floats) -> Floats:
     """The state at node 0; a load that is there already is all elastic."""
     state = np.zeros(STATES + initial.size)
     state[FAST] = state[SLOW] = test[PRESSURE, 0]
@@ -128,7 +128,7 @@ def virgin(test: Floats, initial: Floats) -> Floats:
 
 
 @njit(cache=True, error_model="numpy")
-def clock(before: float, after: float, beta: Any) -> Any:
+def midpoint_time(before: float, after: float, beta: Any) -> Any:
     """Of the middle in t^beta: the share of time before it, its time s, and ln of dt/ds times the step."""
     low = exp(beta * np.log(before)) if before > 0.0 else 0.0 * beta
     high = exp(beta * np.log(after))
@@ -138,36 +138,36 @@ def clock(before: float, after: float, beta: Any) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-def real_node(test: Floats, j: int, beta: float) -> Node:
+def real_node(test: Floats, j: int, beta: float) -> StepData:
     """The step that ends at node j."""
     i = j - 1
-    share, time, weight = clock(test[TIMES, i], test[TIMES, j], beta)
-    return Node(
+    share, time, weight = midpoint_time(test[TIMES, i], test[TIMES, j], beta)
+    return StepData(
         test[PRESSURE, i], test[PRESSURE, j], test[TEMPERATURES, i], test[TEMPERATURES, j], test[MODULUS, i],
         test[MODULUS, j], test[ELASTIC, i], test[ELASTIC, j], share, time, weight,
     )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")
-def end_of(test: Floats, j: int) -> Node:
+def end_of(test: Floats, j: int) -> StepData:
     """Node j by itself."""
     P, T, E, D = test[PRESSURE, j], test[TEMPERATURES, j], test[MODULUS, j], test[ELASTIC, j]
-    return Node(P, P, T, T, E, E, D, D, 0.5, test[TIMES, j], 0.0)
+    return StepData(P, P, T, T, E, E, D, D, 0.5, test[TIMES, j], 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def complex_node(test: Floats, i: int, j: int, effect: int, stiffer: float, share: Any, time: Any, weight: Any) -> Node:
+def complex_node(test: Floats, i: int, j: int, effect: int, stiffer: float, share: Any, time: Any, weight: Any) -> StepData:
     """What lies between nodes i and j along one of the EFFECTS (none: less than 0).
 
     stiffer : relative change of the modulus; share, time, weight : of the clock, with derivatives.
     """
-    warm = TINY * 1j if effect == 2 else 0j
+    warm = COMPLEX_STEP * 1j if effect == 2 else 0j
     first, last = _change(test, i, effect, stiffer), _change(test, j, effect, stiffer)
-    return Node(
+    return StepData(
         test[PRESSURE, i], test[PRESSURE, j], test[TEMPERATURES, i] + warm, test[TEMPERATURES, j] + warm,
-        test[MODULUS, i] + TINY * 1j * first, test[MODULUS, j] + TINY * 1j * last,
-        test[ELASTIC, i] + TINY * 1j * _lifted(test, i, effect, first),
-        test[ELASTIC, j] + TINY * 1j * _lifted(test, j, effect, last), share, time, weight,
+        test[MODULUS, i] + COMPLEX_STEP * 1j * first, test[MODULUS, j] + COMPLEX_STEP * 1j * last,
+        test[ELASTIC, i] + COMPLEX_STEP * 1j * _lifted(test, i, effect, first),
+        test[ELASTIC, j] + COMPLEX_STEP * 1j * _lifted(test, j, effect, last), share, time, weight,
     )  # fmt: skip
 
 

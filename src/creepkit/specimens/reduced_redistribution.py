@@ -29,7 +29,7 @@ def redistribution_sizes(deflections: Floats) -> Floats:
     return np.asarray(known(np.log(0.1 + np.minimum(deflections, _DEFLECTIONS[-1]))))
 
 
-def multiplier(strains: Floats, exponent: float, *, size: float = 1.0, share: float = 1.0) -> Floats:
+def growth_multiplier(strains: Floats, exponent: float, *, size: float = 1.0, share: float = 1.0) -> Floats:
     """Growth over steady growth at creep strains lambda since `share` of the elastic stresses came, in Norton creep."""
     slow_size, slow_speed, fast_size, offset, fast_speed, _ = REDISTRIBUTION
     slow = slow_size * np.log(exponent) * np.exp(-slow_speed * strains)

@@ -12,12 +12,12 @@ from scipy.interpolate import CubicSpline
 
 from creepkit.arrays import Floats
 from creepkit.records import History
-from creepkit.specimens.bulge_course import Setup, setup
+from creepkit.specimens.bulge_course import TestSetup, set_up_test
 
 if TYPE_CHECKING:
     from creepkit.specimens.bulge import Bulge
 
-FIRST, GROWTH, SHARE = 2.5, 1.0, 1.0 / 12.0
+FIRST_STEP, STEP_GROWTH, LARGEST_STEP_FRACTION = 2.5, 1.0, 1.0 / 12.0
 """Steps: the first after a change of load, s; later ones over the time since; the longest over the test."""
 RAMP_STEPS = 4
 """Steps of a ramp from zero to the largest pressure."""
@@ -26,13 +26,13 @@ _OFFSET = 20.0
 
 
 @dataclass(frozen=True, eq=False)
-class Schedule:
+class TimeNodes:
     """When a test is looked at: nodes (nodes,) with time s, pressure MPa and temperature K; weights of frames.
 
     frames : (frames, nodes) the values at the history's times as sums of those at nodes.
     """
 
-    made: Setup
+    setup: TestSetup
     times: Floats
     pressure: Floats
     temperature: Floats
@@ -40,10 +40,10 @@ class Schedule:
 
 
 @lru_cache(maxsize=1024)
-def schedule(specimen: Bulge, history: History) -> Schedule:
+def time_nodes(specimen: Bulge, history: History) -> TimeNodes:
     """The schedule of a test; complains as the specimen does where the test cannot be simulated."""
-    made = setup(specimen, history, {})
-    segments, largest = made.course.segments, float(made.course.pressure.values.max())
+    test_setup = set_up_test(specimen, history, {})
+    segments, largest = test_setup.load_history.segments, float(test_setup.load_history.pressure.values.max())
     nodes, values, rows, origins = [np.zeros(0)], [np.zeros((0, 2))], [], []
     count, before, origin = 0, np.full(2, np.nan), 0.0
     for start, end, P, P_end, T, T_end in segments[:, :6]:
@@ -62,12 +62,12 @@ def schedule(specimen: Bulge, history: History) -> Schedule:
         origin = end if moving else origin
     times, columns = np.concatenate(nodes), np.concatenate(values)
     frames = _weights(times, rows, segments[:, 0], np.array(origins), history.times)
-    return Schedule(made, times, columns[:, 0], columns[:, 1], frames)
+    return TimeNodes(test_setup, times, columns[:, 0], columns[:, 1], frames)
 
 
 def _ramp(start: float, end: float, share: float, whole: float) -> Floats:
     """Nodes of a segment in which the pressure changes by a share of the largest one; whole : s, length of the test."""
-    steps = max(RAMP_STEPS * share, (end - start) / max(SHARE * whole, FIRST))
+    steps = max(RAMP_STEPS * share, (end - start) / max(LARGEST_STEP_FRACTION * whole, FIRST_STEP))
     return np.linspace(start, end, max(1, int(np.ceil(steps))) + 1)
 
 
@@ -76,9 +76,9 @@ def _hold(start: float, end: float, origin: float, whole: float) -> Floats:
 
     whole : s, length of the test.
     """
-    nodes, longest = [start], max(SHARE * whole, FIRST)
+    nodes, longest = [start], max(LARGEST_STEP_FRACTION * whole, FIRST_STEP)
     while nodes[-1] < end:
-        nodes.append(nodes[-1] + min(max(GROWTH * (nodes[-1] - origin), FIRST), longest))
+        nodes.append(nodes[-1] + min(max(STEP_GROWTH * (nodes[-1] - origin), FIRST_STEP), longest))
     nodes[-1] = end
     return np.array(nodes)
 

@@ -22,30 +22,30 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.kernels.interface import MEAN, POINT_SIZE, PRINCIPAL, STRAIN, STRESS, TEMPERATURE, TIME
+from creepkit.kernels.interface import MEAN_STRESS, POINT_SIZE, PRINCIPAL_STRESS, STRAIN, STRESS, TEMPERATURE, TIME
 from creepkit.specimens.reduced_curves import (
     AMPLITUDE,
     LOG_STRESS,
     RESIDUAL,
     WIDTH,
-    Dimple,
-    Place,
-    over_exponents,
-    place,
+    DimpleCurves,
+    GridPosition,
+    interpolate_exponents,
+    grid_position,
     write_curves,
 )
 from creepkit.specimens.reduced_dual import exp, log, sqrt
 
-MEAN_STRESS = 2.0 / 3.0
+MEAN_STRESS_RATIO = 2.0 / 3.0
 """Over the von Mises stress, in equibiaxial tension, as in the middle of the roof."""
 PROBES = 3
 """Rows the law is asked at: the reference point, there with more stress, there with more strain."""
-PUSH = 1.2
+PROBE_FACTOR = 1.2
 """Factor on stress, and on strain, that shows their local exponents; elastic stresses lie above sigma*."""
 
-_PER_PUSH = float(1.0 / np.log(PUSH))
+_PER_PROBE_FACTOR = float(1.0 / np.log(PROBE_FACTOR))
 
-CREEP, STRAINED, PLACE, FAST, SLOW, STATES = range(6)
+CREEP_DEFLECTION, STRAIN_STATE, EXPONENT_STATE, FAST, SLOW, STATES = range(6)
 """Of a state: creep deflection mm, strain, creep times mean n'/(n' + 2), elastic pressures phi P (MPa), the law's."""
 SLOW_SIZE, SLOW_SPEED, FAST_SIZE, FAST_OFFSET, FAST_SPEED, CEILING = range(6)
 """Of redistribution: m_slow = . ln n, rho_slow, m_fast = . (n - 1)^2 / (n + .), rho_fast = . n; n at most."""
@@ -61,7 +61,7 @@ _RELIEF = 0.3
 _ROUNDING = 0.02
 
 
-class Node(NamedTuple):
+class StepData(NamedTuple):
     """A step: pressures, temperatures, moduli, elastic deflections at its ends; of its middle the share of time before
     it, its time and ln of dt/ds times the step, s.
     """
@@ -79,13 +79,13 @@ class Node(NamedTuple):
     log_weight: Any
 
 
-class Middle(NamedTuple):
+class StepMidpoint(NamedTuple):
     """What is known of the middle of a step, beside the law's rows and the dimple's curves: the deflection (mm) and
     where it lies, the modulus over the stress, and the increments of strain and of creep deflection (mm).
     """
 
     deflection: Any
-    at: Place
+    at: GridPosition
     stiffness: Any
     strained: Any
     grown: Any
@@ -100,31 +100,31 @@ def within(x: Any, low: float, high: float, rounding: float) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-def ask(node: Node, state: Any, unknown: Any, dimple: Dimple, thicker: Any, rows: Any, values: Any) -> Middle:
+def write_probes(node: StepData, state: Any, unknown: Any, dimple: DimpleCurves, thicker: Any, rows: Any, values: Any) -> StepMidpoint:
     """Write the rows that the law is asked at, (PROBES, 6 + S), and the curves up to WIDTH into values (CURVES,).
 
     unknown : ln of the increments of strain and of creep deflection (mm), then the states in the middle.
     """
     strained, grown = exp(unknown[0]), exp(unknown[1])
-    deflection = 0.5 * (node.elastic0 + node.elastic) + state[CREEP] + 0.5 * grown
-    at = place(deflection, dimple)
+    deflection = 0.5 * (node.elastic0 + node.elastic) + state[CREEP_DEFLECTION] + 0.5 * grown
+    at = grid_position(deflection, dimple)
     write_curves(LOG_STRESS, WIDTH, at, dimple, thicker, values)
     pressure = node.pressure0 + node.share * (node.pressure - node.pressure0) + _FLOOR
     stress = exp(values[LOG_STRESS]) * pressure
-    strain = state[STRAINED] + 0.5 * strained
+    strain = state[STRAIN_STATE] + 0.5 * strained
     temperature = node.temperature0 + node.share * (node.temperature - node.temperature0)
     modulus = node.modulus0 + node.share * (node.modulus - node.modulus0)
     for k in range(PROBES):
-        pushed = stress * (PUSH if k == 1 else 1.0)
-        rows[k, STRESS], rows[k, PRINCIPAL], rows[k, MEAN] = pushed, pushed, MEAN_STRESS * pushed
-        rows[k, STRAIN] = strain * (PUSH if k == 2 else 1.0)
+        pushed = stress * (PROBE_FACTOR if k == 1 else 1.0)
+        rows[k, STRESS], rows[k, PRINCIPAL_STRESS], rows[k, MEAN_STRESS] = pushed, pushed, MEAN_STRESS_RATIO * pushed
+        rows[k, STRAIN] = strain * (PROBE_FACTOR if k == 2 else 1.0)
         rows[k, TIME], rows[k, TEMPERATURE] = node.time, temperature
         for v in range(unknown.size - 2):
             rows[k, POINT_SIZE + v] = unknown[2 + v]
-    return Middle(deflection, at, modulus / stress, strained, grown)
+    return StepMidpoint(deflection, at, modulus / stress, strained, grown)
 
 
-class Pace(NamedTuple):
+class StepExponents(NamedTuple):
     """Local exponents of stress and strain, n'/(n' + 2) of proportional creep, what is left of the shares after a step
     (times pressure, MPa), ln of the mean multiplier, and how fast that changes with ln of the strain increment.
     """
@@ -165,16 +165,16 @@ def _multiplied(excess: Any) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-def pace(node: Node, fast: Any, slow: Any, values: Any, numbers: Floats, middle: Middle, logs: Any) -> Pace:
+def step_exponents(node: StepData, fast: Any, slow: Any, values: Any, numbers: Floats, middle: StepMidpoint, logs: Any) -> StepExponents:
     """How the dimple creeps in a step, by ln of the rates at the PROBES.
 
     fast, slow : shares times pressure before, MPa; values : of the curves; numbers : of redistribution.
     """
-    n, m = (logs[1] - logs[0]) * _PER_PUSH, (logs[2] - logs[0]) * _PER_PUSH
+    n, m = (logs[1] - logs[0]) * _PER_PROBE_FACTOR, (logs[2] - logs[0]) * _PER_PROBE_FACTOR
     proportional = n / (1.0 - within(m, -20.0, 0.8, 0.05))
     power = within(proportional, 0.4, 14.0, 0.1)
     place_of_power = power / (power + 2.0)
-    steady = over_exponents(RESIDUAL, place_of_power, values)
+    steady = interpolate_exponents(RESIDUAL, place_of_power, values)
     redistributing = within(proportional, 0.4, numbers[CEILING], 0.2)
     beyond, size = redistributing - 1.0, values[AMPLITUDE]
     slow_size = size * numbers[SLOW_SIZE] * log(redistributing)
@@ -193,12 +193,12 @@ def pace(node: Node, fast: Any, slow: Any, values: Any, numbers: Floats, middle:
         mean += 2.0 * _NODES[g] * _WEIGHTS[g] * _multiplied(now)
     slow, fast = _left(slow, added, slow_x), _left(fast, added, fast_x)
     last = _multiplied(slow_size * _felt(slow) + fast_size * _felt(fast))
-    return Pace(n, m, place_of_power, fast * end, slow * end, steady + log(mean), (last / mean).real - 1.0)
+    return StepExponents(n, m, place_of_power, fast * end, slow * end, steady + log(mean), (last / mean).real - 1.0)
 
 
 @njit(cache=True, error_model="numpy")
-def residual(
-    node: Node, state: Any, unknown: Any, log_growth: Any, now: Pace, log_rate: Any, rates: Any, out: Any
+def step_residual(
+    node: StepData, state: Any, unknown: Any, log_growth: Any, now: StepExponents, log_rate: Any, rates: Any, out: Any
 ) -> None:
     """What must be zero of each unknown; log_rate : ln of the strain rate, rates (S,) of the law's states."""
     out[0] = log_rate + node.log_weight - unknown[0]
@@ -208,11 +208,11 @@ def residual(
 
 
 @njit(cache=True, error_model="numpy")
-def advance(state: Any, unknown: Any, middle: Middle, now: Pace, gains: Floats) -> None:
+def advance_state(state: Any, unknown: Any, middle: StepMidpoint, now: StepExponents, gains: Floats) -> None:
     """The state after a step, in place; gains (S,) : what the law's states do after the middle over that before it."""
-    state[CREEP] += middle.grown
-    state[STRAINED] += middle.strained
-    state[PLACE] += middle.grown * now.place
+    state[CREEP_DEFLECTION] += middle.grown
+    state[STRAIN_STATE] += middle.strained
+    state[EXPONENT_STATE] += middle.grown * now.place
     state[FAST], state[SLOW] = now.fast, now.slow
     for v in range(unknown.size - 2):
         state[STATES + v] = unknown[2 + v] + gains[v] * (unknown[2 + v] - state[STATES + v])

@@ -34,10 +34,10 @@ from creepkit.specimens.reduced_curves import (
     RESIDUAL,
     SHAPE,
     WIDTH,
-    Dimple,
+    DimpleCurves,
 )
 from creepkit.specimens.reduced_redistribution import REDISTRIBUTION, redistribution_sizes
-from creepkit.specimens.reduced_trials import LOAD_RANGE, Trial, thicknesses, trials
+from creepkit.specimens.reduced_trials import LOAD_RANGE, OfflineSimulation, offline_thicknesses, offline_simulations
 
 if TYPE_CHECKING:
     from creepkit.specimens.bulge import Bulge
@@ -50,7 +50,7 @@ _DEFLECTIONS, _LOADS = 64, 48
 """Points of the grids."""
 
 
-class Grid(NamedTuple):
+class TableGrid(NamedTuple):
     """x = offset (exp(step i) - 1), i = 0 .. length - 1: even near zero, then in proportion."""
 
     offset: float
@@ -58,7 +58,7 @@ class Grid(NamedTuple):
     length: int
 
     @classmethod
-    def to(cls, most: float, offset: float, length: int) -> Grid:
+    def spanning(cls, most: float, offset: float, length: int) -> TableGrid:
         """From zero to the most."""
         return cls(offset, float(np.log1p(most / offset)) / (length - 1), length)
 
@@ -68,14 +68,14 @@ class Grid(NamedTuple):
         return np.asarray(self.offset * np.expm1(self.step * np.arange(self.length)))
 
 
-LOADS = Grid.to(LOAD_RANGE[1], 1e-6, _LOADS)
+LOADS = TableGrid.spanning(LOAD_RANGE[1], 1e-6, _LOADS)
 """P/E of the elastic tables."""
 _FORMAT = "creepkit-one-degree-of-freedom-1"
 _ARRAYS = ("thicknesses", "curves", "elastic", "redistribution")
 
 
 @dataclass(frozen=True, eq=False)
-class Tables:
+class ReducedOrderTables:
     """Tables of one observed dimple at some thicknesses.
 
     thicknesses : (rows,) mm. curves : (rows, CURVES, deflections), named in `reduced_step`, on `grid`.
@@ -88,7 +88,7 @@ class Tables:
     curves: Floats
     elastic: Floats
     redistribution: Floats
-    grid: Grid
+    grid: TableGrid
     geometry: DimpleGeometry
     window: float
 
@@ -101,7 +101,7 @@ class Tables:
         }  # fmt: skip
 
     @classmethod
-    def from_tensors(cls, arrays: Mapping[str, Any], document: Mapping[str, Any]) -> Tables:
+    def from_tensors(cls, arrays: Mapping[str, Any], document: Mapping[str, Any]) -> ReducedOrderTables:
         """The tables that `to_tensors` wrote; SolveError for any others."""
         ours = {"format": _FORMAT, "loads": list(LOADS), "exponents": list(EXPONENTS)}
         for name, value in ours.items():
@@ -114,13 +114,13 @@ class Tables:
         geometry = DimpleGeometry(**{**document["geometry"], **length})
         offset, step, points = document["deflections"]
         values = {name: np.asarray(arrays[name], float) for name in _ARRAYS}
-        return cls(**values, grid=Grid(offset, step, int(points)), geometry=geometry, window=float(document["window"]))
+        return cls(**values, grid=TableGrid(offset, step, int(points)), geometry=geometry, window=float(document["window"]))
 
-    def dimple(self, thickness: float) -> Dimple:
+    def dimple(self, thickness: float) -> DimpleCurves:
         """The curves of one thickness and their derivatives to it, with a point more at each end."""
         weights, slopes = self._weights(thickness)
         curves, changes = (_extended(np.tensordot(w, self.curves, 1)) for w in (weights, slopes))
-        return Dimple(curves, changes, self.redistribution, self.grid.offset, self.grid.step)
+        return DimpleCurves(curves, changes, self.redistribution, self.grid.offset, self.grid.step)
 
     def elastic_deflection(self, load: Floats, thickness: float | Floats) -> tuple[Floats, Floats, Floats]:
         """Elastic deflection, mm, at P/E (..., loads), with its derivatives to the thickness (...) and to ln(P/E)."""
@@ -155,41 +155,41 @@ def _extended(curves: Floats) -> Floats:
     return np.ascontiguousarray(np.concatenate([first, curves, last], axis=1).T)
 
 
-def deflection_grid(specimen: Bulge) -> Grid:
+def deflection_grid(specimen: Bulge) -> TableGrid:
     """Deflections of the tables, mm, up to where the dimple has burst."""
     least = _SMALLEST * specimen.geometry.apex_thickness
-    return Grid.to(max(specimen.deflection_limit, 2 * least), least, _DEFLECTIONS)
+    return TableGrid.spanning(max(specimen.deflection_limit, 2 * least), least, _DEFLECTIONS)
 
 
 @lru_cache(maxsize=64)
-def tables(specimen: Bulge, geometry: DimpleGeometry, operator: Observation) -> Tables:
+def build_tables(specimen: Bulge, geometry: DimpleGeometry, operator: Observation) -> ReducedOrderTables:
     """The tables of a dimple as an operator sees it; some seconds of CPU, then kept while the program runs."""
     grid = deflection_grid(specimen)
-    rows = [_row(runs, grid.points, operator) for runs in trials(specimen, geometry)]
+    rows = [_row(runs, grid.points, operator) for runs in offline_simulations(specimen, geometry)]
     curves, elastic = (np.array(values) for values in zip(*rows, strict=True))
-    heights = np.array(thicknesses(specimen, geometry))
+    heights = np.array(offline_thicknesses(specimen, geometry))
     curves[:, AMPLITUDE] = redistribution_sizes(grid.points / heights[:, None])
-    return Tables(heights, curves, elastic, REDISTRIBUTION, grid, geometry, operator.window)
+    return ReducedOrderTables(heights, curves, elastic, REDISTRIBUTION, grid, geometry, operator.window)
 
 
-def _row(runs: tuple[Trial, ...], points: Floats, operator: Observation) -> tuple[Floats, Floats]:
+def _row(runs: tuple[OfflineSimulation, ...], points: Floats, operator: Observation) -> tuple[Floats, Floats]:
     """Curves and elastic deflections of one thickness from its Norton runs and, last, its elastic one."""
-    seen = [operator.observe(run.radii, run.profiles) for run in runs]
-    logs = np.array([_log_rate(run, out[:, 0], points) for run, out in zip(runs[:-1], seen[:-1], strict=True)])
+    outputs = [operator.observe(run.radii, run.profiles) for run in runs]
+    logs = np.array([_log_rate(run, out[:, 0], points) for run, out in zip(runs[:-1], outputs[:-1], strict=True)])
     stress, growth = _fitted(np.array(EXPONENTS)[_STEADY], logs[_STEADY], points)
     curves = np.zeros((CURVES, points.size))
     curves[LOG_STRESS], curves[LOG_GROWTH] = stress, growth
     for k, n in enumerate(EXPONENTS):
-        curves[RESIDUAL + k] = _held(logs[k] - growth - n * stress)
-        curves[[WIDTH + k, SHAPE + k]] = _along(points, seen[k])
-    curves[ELASTIC_WIDTH : ELASTIC_WIDTH + 2] = _along(points, seen[-1])
-    load, deflection = runs[-1].times[1:], seen[-1][1:, 0]
+        curves[RESIDUAL + k] = _filled(logs[k] - growth - n * stress)
+        curves[[WIDTH + k, SHAPE + k]] = _outputs_along(points, outputs[k])
+    curves[ELASTIC_WIDTH : ELASTIC_WIDTH + 2] = _outputs_along(points, outputs[-1])
+    load, deflection = runs[-1].times[1:], outputs[-1][1:, 0]
     known = CubicSpline(np.log(load), np.log(deflection / load))
     inside = np.clip(np.log(np.maximum(LOADS.points, load[0])), np.log(load[0]), np.log(load[-1]))
     return curves, np.asarray(known(inside))
 
 
-def _held(values: Floats) -> Floats:
+def _filled(values: Floats) -> Floats:
     """Values with what is missing taken from the nearest."""
     there = np.isfinite(values)
     if not there.any():
@@ -217,34 +217,34 @@ def _fitted(exponents: Floats, logs: Floats, points: Floats) -> tuple[Floats, Fl
         spread = np.where(there, n - mean_n, 0.0)
         slope = (spread * (y - mean_y)).sum(axis=0) / (spread**2).sum(axis=0)
         level = mean_y - slope * mean_n
-    return _held(np.where(usable, slope, np.nan)), _held(np.where(usable, level, np.nan))
+    return _filled(np.where(usable, slope, np.nan)), _filled(np.where(usable, level, np.nan))
 
 
-def _log_rate(run: Trial, amplitude: Floats, points: Floats) -> Floats:
+def _log_rate(run: OfflineSimulation, amplitude: Floats, points: Floats) -> Floats:
     """ln(dD/dt / (A P^n)) at each deflection, NaN where the run did not get, (deflections,)."""
-    rising = _rising(amplitude)
+    rising = _monotonic(amplitude)
     rising[np.flatnonzero(rising)[-2:]] = False  # the steps in which a run ends are its worst
     time = CubicSpline(np.log(amplitude[rising]), np.log(run.times[rising]))
-    reached = (points <= amplitude[rising][-1]) & (points >= max(amplitude[rising][0], points[1], _LEAST * points[-1]))
+    reached = (points <= amplitude[rising][-1]) & (points >= max(amplitude[rising][0], points[1], _LEAST_DEFLECTION * points[-1]))
     x = np.log(np.where(reached, points, amplitude[rising][-1]))
     slope = time(x, 1)
     reached &= slope > 0
     return np.where(reached, x - time(x) - np.log(np.where(reached, slope, 1.0)) - run.level, np.nan)
 
 
-_LEAST = 0.008
+_LEAST_DEFLECTION = 0.008
 """Least deflection that is used, over the largest: before it stresses have not settled."""
 
 
-def _along(points: Floats, seen: Floats) -> Floats:
+def _outputs_along(points: Floats, outputs: Floats) -> Floats:
     """Width and shape, (2, deflections), at deflections on the way of a run; its end values beyond."""
-    rising = _rising(seen[:, 0])
-    x = np.log(seen[rising, 0])
-    where = np.log(np.maximum(points, seen[rising, 0][0]))
-    return np.stack([np.interp(where, x, seen[rising, k]) for k in (1, 2)])
+    rising = _monotonic(outputs[:, 0])
+    x = np.log(outputs[rising, 0])
+    where = np.log(np.maximum(points, outputs[rising, 0][0]))
+    return np.stack([np.interp(where, x, outputs[rising, k]) for k in (1, 2)])
 
 
-def _rising(amplitude: Floats) -> Bools:
+def _monotonic(amplitude: Floats) -> Bools:
     """(records,) those that lie above all before."""
     highest = np.maximum.accumulate(np.concatenate([[0.0], amplitude[:-1]]))
     return np.asarray(amplitude > 1.0005 * highest)

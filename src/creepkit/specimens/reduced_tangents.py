@@ -11,84 +11,84 @@ from typing import Any
 from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.integration.elimination import eliminate
-from creepkit.kernels.interface import STRAIN, pointer
-from creepkit.specimens.reduced_curves import LOG_GROWTH, Dimple
-from creepkit.specimens.reduced_observed import COLUMNS, OF_STEP, observe, observe_step
+from creepkit.integration.elimination import solve_dense
+from creepkit.kernels.interface import STRAIN, data_pointer
+from creepkit.specimens.reduced_curves import LOG_GROWTH, DimpleCurves
+from creepkit.specimens.reduced_observed import TRAJECTORY_COLUMNS, FIRST_STEP_COLUMN, write_node_outputs, write_step_outputs
 from creepkit.specimens.reduced_problem import (
     TIMES,
-    TINY,
-    Candidate,
-    Room,
-    Slopes,
-    clock,
+    COMPLEX_STEP,
+    ReducedCandidate,
+    ReducedWorkspace,
+    ReducedSensitivities,
+    midpoint_time,
     complex_node,
-    virgin,
+    virgin_state,
 )
-from creepkit.specimens.reduced_step import FAST, PROBES, SLOW, Node, advance, ask, pace, residual
+from creepkit.specimens.reduced_step import FAST, PROBES, SLOW, StepData, advance_state, write_probes, step_exponents, step_residual
 
 
 @njit(cache=True, error_model="numpy")
-def consult(update: Any, sensitivity: Any, theta: Floats, work: Room, full: Floats) -> None:
+def evaluate_law(update: Any, sensitivity: Any, theta: Floats, work: ReducedWorkspace, full: Floats) -> None:
     """What the law says at the solution."""
-    update(PROBES, pointer(work.rows), pointer(theta), pointer(work.said))
-    sensitivity(PROBES, pointer(work.rows), pointer(theta), pointer(full))
+    update(PROBES, data_pointer(work.rows), data_pointer(theta), data_pointer(work.said))
+    sensitivity(PROBES, data_pointer(work.rows), data_pointer(theta), data_pointer(full))
 
 
 @njit(cache=True, error_model="numpy")
-def differentiate(
-    test: Floats, j: int, candidate: Candidate, dimple: Dimple, before: Floats, state: Floats, unknown: Floats,
-    toughness: float, work: Room, slopes: Slopes, changes: Floats,
+def differentiate_step(
+    test: Floats, j: int, candidate: ReducedCandidate, dimple: DimpleCurves, before: Floats, state: Floats, unknown: Floats,
+    toughness: float, work: ReducedWorkspace, slopes: ReducedSensitivities, changes: Floats,
 ) -> None:  # fmt: skip
     """Derivatives of what is told of node j along all directions, and of the state there."""
     if test[TIMES, j] > test[TIMES, j - 1]:
-        _differentiate_step(test, j, candidate, dimple, before, unknown, work, slopes)
-        first = slopes.ends.shape[1] - len(COLUMNS)
+        _differentiate_step_outputs(test, j, candidate, dimple, before, unknown, work, slopes)
+        first = slopes.ends.shape[1] - len(TRAJECTORY_COLUMNS)
         for d in range(changes.shape[2]):
-            for c in range(OF_STEP, len(COLUMNS)):
+            for c in range(FIRST_STEP_COLUMN, len(TRAJECTORY_COLUMNS)):
                 changes[j, c, d] = slopes.ends[unknown.size + d, first + c]
     else:
-        changes[j, OF_STEP:] = changes[j - 1, OF_STEP:]
+        changes[j, FIRST_STEP_COLUMN:] = changes[j - 1, FIRST_STEP_COLUMN:]
         slopes.turned[:] = 0.0
     _differentiate_node(test, j, candidate, dimple, state, toughness, slopes, changes)
     if j == 1:
         tangents = slopes.tangents.copy()
         slopes.tangents[:] = 0.0
-        _differentiate_node(test, 0, candidate, dimple, virgin(test, candidate.initial), toughness, slopes, changes)
+        _differentiate_node(test, 0, candidate, dimple, virgin_state(test, candidate.initial), toughness, slopes, changes)
         slopes.tangents[:] = tangents
 
 
 @njit(cache=True, error_model="numpy")
 def _differentiate_node(
-    test: Floats, j: int, candidate: Candidate, dimple: Dimple, state: Floats, toughness: float, slopes: Slopes,
+    test: Floats, j: int, candidate: ReducedCandidate, dimple: DimpleCurves, state: Floats, toughness: float, slopes: ReducedSensitivities,
     changes: Floats,
 ) -> None:  # fmt: skip
     """Of what is told of node j itself."""
     parameters, moved, told, values = candidate.theta.size, slopes.state, slopes.told, slopes.values
     for d in range(changes.shape[2]):
         for i in range(state.size):
-            moved[i] = complex(state[i], TINY * slopes.tangents[d, i])
+            moved[i] = complex(state[i], COMPLEX_STEP * slopes.tangents[d, i])
         node = complex_node(test, j, j, d - parameters, candidate.stiffer, 0.5 + 0j, 0j, 0j)
-        turned = complex(toughness, TINY * slopes.turned[d])
-        observe(node, moved, turned, dimple, _thicker(d, parameters), test[TIMES, j], values, told)
-        for c in range(OF_STEP):
-            changes[j, c, d] = told[c].imag / TINY
+        turned = complex(toughness, COMPLEX_STEP * slopes.turned[d])
+        write_node_outputs(node, moved, turned, dimple, _thicker(d, parameters), test[TIMES, j], values, told)
+        for c in range(FIRST_STEP_COLUMN):
+            changes[j, c, d] = told[c].imag / COMPLEX_STEP
 
 
 @njit(cache=True, error_model="numpy")
-def _differentiate_step(
-    test: Floats, j: int, candidate: Candidate, dimple: Dimple, before: Floats, unknown: Floats, work: Room,
-    slopes: Slopes,
+def _differentiate_step_outputs(
+    test: Floats, j: int, candidate: ReducedCandidate, dimple: DimpleCurves, before: Floats, unknown: Floats, work: ReducedWorkspace,
+    slopes: ReducedSensitivities,
 ) -> None:  # fmt: skip
     """Of the state after a step and what is told of the step: along each unknown, along each direction, then both."""
     parameters, size, ends = candidate.theta.size, unknown.size, slopes.ends
-    share, time, weight = clock(test[TIMES, j - 1], test[TIMES, j], candidate.beta + TINY * 1j)
+    share, time, weight = midpoint_time(test[TIMES, j - 1], test[TIMES, j], candidate.beta + COMPLEX_STEP * 1j)
     for k in range(ends.shape[0]):
         d = k - size
         for i in range(before.size):
-            slopes.state[i] = complex(before[i], TINY * slopes.tangents[d, i] if d >= 0 else 0.0)
+            slopes.state[i] = complex(before[i], COMPLEX_STEP * slopes.tangents[d, i] if d >= 0 else 0.0)
         for i in range(size):
-            slopes.unknown[i] = complex(unknown[i], TINY if i == k else 0.0)
+            slopes.unknown[i] = complex(unknown[i], COMPLEX_STEP if i == k else 0.0)
         slower = candidate.beta_slopes[d] if 0 <= d < parameters else 0.0
         node = complex_node(
             test, j - 1, j, d - parameters, candidate.stiffer, complex(share.real, slower * share.imag),
@@ -97,38 +97,38 @@ def _differentiate_step(
         _along(node, d, parameters, dimple, work, slopes, ends[k])
         for i in range(size):
             if d < 0:
-                slopes.matrix[i, k] = slopes.left[i].imag / TINY
+                slopes.matrix[i, k] = slopes.left[i].imag / COMPLEX_STEP
             else:
-                slopes.right[i, d] = -slopes.left[i].imag / TINY
-    eliminate(slopes.matrix, slopes.right)
+                slopes.right[i, d] = -slopes.left[i].imag / COMPLEX_STEP
+    solve_dense(slopes.matrix, slopes.right)
     _combine(size, before.size, slopes)
 
 
 @njit(cache=True, error_model="numpy")
 def _along(
-    node: Node, direction: int, parameters: int, dimple: Dimple, work: Room, slopes: Slopes, ends: Floats
+    node: StepData, direction: int, parameters: int, dimple: DimpleCurves, work: ReducedWorkspace, slopes: ReducedSensitivities, ends: Floats
 ) -> None:
     """One direction: what must be zero, into `left`; the state after, the middle's point and what is told, to ends."""
     rows, values, state, told = slopes.rows, slopes.values, slopes.state, slopes.told
     fast, slow = state[FAST], state[SLOW]
-    middle = ask(node, state, slopes.unknown, dimple, _thicker(direction, parameters), rows, values)
+    middle = write_probes(node, state, slopes.unknown, dimple, _thicker(direction, parameters), rows, values)
     _law_along(work.said, slopes.full, work.logs, rows, direction, parameters, slopes.logs, slopes.rates)
-    now = pace(node, fast, slow, values, dimple.redistribution, middle, slopes.logs)
-    residual(node, state, slopes.unknown, values[LOG_GROWTH], now, slopes.logs[0], slopes.rates, slopes.left)
-    advance(state, slopes.unknown, middle, now, work.gains)
-    observe_step(rows[0, STRAIN], now, slopes.logs[0], told)
+    now = step_exponents(node, fast, slow, values, dimple.redistribution, middle, slopes.logs)
+    step_residual(node, state, slopes.unknown, values[LOG_GROWTH], now, slopes.logs[0], slopes.rates, slopes.left)
+    advance_state(state, slopes.unknown, middle, now, work.gains)
+    write_step_outputs(rows[0, STRAIN], now, slopes.logs[0], told)
     told[0], told[1] = now.place, slopes.logs[0]  # columns of nodes are free here
     point, first = state.size, state.size + rows.shape[1]
     for i in range(point):
-        ends[i] = state[i].imag / TINY
+        ends[i] = state[i].imag / COMPLEX_STEP
     for i in range(rows.shape[1]):
-        ends[point + i] = rows[0, i].imag / TINY
+        ends[point + i] = rows[0, i].imag / COMPLEX_STEP
     for c in range(told.size):
-        ends[first + c] = told[c].imag / TINY
+        ends[first + c] = told[c].imag / COMPLEX_STEP
 
 
 @njit(cache=True, error_model="numpy")
-def _combine(size: int, states: int, slopes: Slopes) -> None:
+def _combine(size: int, states: int, slopes: ReducedSensitivities) -> None:
     """Add to each direction what the unknowns do, and hand it on."""
     ends, right, width = slopes.ends, slopes.right, slopes.along.shape[1]
     for d in range(right.shape[1]):
@@ -157,17 +157,17 @@ def _law_along(
         for i in range(width):
             total += said[k, outputs + i] * rows[k, i].imag
         if own and full[k, 0] > 0.0:
-            total += TINY * full[k, outputs * (1 + width) + direction] / full[k, 0]
+            total += COMPLEX_STEP * full[k, outputs * (1 + width) + direction] / full[k, 0]
         logs[k] = complex(known[k], total)
     for v in range(rates.size):
         total = 0.0
         for i in range(width):
             total += said[0, outputs + (1 + v) * width + i] * rows[0, i].imag
         if own:
-            total += TINY * full[0, outputs * (1 + width) + (1 + v) * parameters + direction]
+            total += COMPLEX_STEP * full[0, outputs * (1 + width) + (1 + v) * parameters + direction]
         rates[v] = complex(said[0, 1 + v], total)
 
 
 @njit(cache=True, error_model="numpy")
 def _thicker(direction: int, parameters: int) -> complex:
-    return TINY * 1j if direction == parameters else 0j
+    return COMPLEX_STEP * 1j if direction == parameters else 0j

@@ -20,12 +20,12 @@ from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
 from creepkit.records import History, Program, Specimen
 from creepkit.specimens.bar import Bar
-from creepkit.specimens.elastic_part import one_elasticity
+from creepkit.specimens.elastic_part import isothermal_elasticity
 
 if TYPE_CHECKING:
     from creepkit.integration import PointTest
 
-SLACK = 1e-3
+STRESS_TOLERANCE = 1e-3
 """Of the largest elastic stress: a stress below zero by more than this is no rounding."""
 
 
@@ -41,17 +41,17 @@ class Relaxation(Bar):
         """The elastic stress of the total strain, the modulus, and the temperature over time."""
         return point_test(history)
 
-    def shown(self, history: History, creep: Floats) -> Floats:
+    def observed_output(self, history: History, creep: Floats) -> Floats:
         """The stress, MPa; NaN where a step down compresses the bar."""
         test = point_test(history)
         stress = np.asarray(test.driving.at(history.times) - test.stiffness * creep)
-        return np.where(stress < -SLACK * float(np.max(test.driving.values)), np.nan, stress)
+        return np.where(stress < -STRESS_TOLERANCE * float(np.max(test.driving.values)), np.nan, stress)
 
-    def slope(self, history: History, creep: Floats) -> Floats:
+    def output_derivative(self, history: History, creep: Floats) -> Floats:
         """Minus the modulus."""
         return np.full_like(creep, -point_test(history).stiffness)
 
-    def ending(self, history: History, reason: str, output: Floats, end: float) -> str:
+    def end_reason(self, history: History, reason: str, output: Floats, end: float) -> str:
         """Says so where the bar would be compressed: steps get stuck where a fall of strain takes away all stress."""
         from creepkit.integration.endings import STEP_TOO_SMALL
 
@@ -64,8 +64,8 @@ class Relaxation(Bar):
     def reference_stress(self, history: History) -> Floats:
         """The elastic stress of each strain and the last stress seen, MPa: what a law is looked at in a test."""
         levels = np.unique(point_test(history).driving.values)
-        seen = np.abs(history.outputs["stress"][history.used]) if "stress" in history.outputs else levels[levels > 0]
-        return np.array([float(np.min(seen[seen > 0], initial=levels.max())), float(levels.max())])
+        outputs = np.abs(history.outputs["stress"][history.used]) if "stress" in history.outputs else levels[levels > 0]
+        return np.array([float(np.min(outputs[outputs > 0], initial=levels.max())), float(levels.max())])
 
     def reference_strain(self, history: History) -> float:
         """The largest creep strain that a test reached, as far as its stress tells."""
@@ -83,7 +83,7 @@ def point_test(history: History) -> PointTest:
             f"{where}: a relaxation specimen is loaded by strain, found {history.loading.quantity}; "
             "use StrainSteps or constant_strain"
         )
-    modulus, _ = one_elasticity(history, "relaxation")
+    modulus, _ = isothermal_elasticity(history, "relaxation")
     strain = history.loading.program()
     logarithmic = np.log1p(strain.values) if history.strain_measure == "engineering" else strain.values
     return integration.PointTest(

@@ -15,15 +15,15 @@ from creepkit.records import History, Status
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
 
-IN_WORDS = {
+STATUS_TEXT = {
     Status.COMPLETE: "",
-    Status.BURST: "burst",
+    Status.RUPTURED: "burst",
     Status.NOT_CONVERGED: "not converged",
     Status.OUTSIDE_DOMAIN: "outside the domain",
 }
 """What a status means where nobody gives a reason."""
 
-_Kind = TypeVar("_Kind", bound="Run")
+_RunType = TypeVar("_RunType", bound="Run")
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +53,8 @@ class Runnable(Protocol):
         ...
 
 
-def run_of(
-    kind: type[_Kind],
+def run_from_outputs(
+    kind: type[_RunType],
     plan: History,
     names: Sequence[str],
     rows: Floats,
@@ -62,12 +62,12 @@ def run_of(
     end_time: float,
     reason: str = "",
     **more: Any,
-) -> _Kind:
+) -> _RunType:
     """The run of a plan: its frames up to the end; SolveError if it ended before any of them.
 
     rows : (times of the plan, names) outputs. more : fields that this kind of run has beside those of Run.
     """
-    reason = reason or IN_WORDS[status]
+    reason = reason or STATUS_TEXT[status]
     reached = np.isfinite(rows).all(axis=1)
     labels = dict(plan.labels)
     if status is not Status.COMPLETE:
@@ -82,5 +82,5 @@ def run_of(
     known = {f.name: getattr(plan, f.name) for f in fields(History)}
     outputs = {name: rows[reached, k] for k, name in enumerate(names)}
     frames = {"times": plan.times[reached], "used": plan.used[reached], "outputs": outputs, "labels": labels}
-    ends = {"rupture_time": end_time if status is Status.BURST else None, "unruptured": False}
+    ends = {"rupture_time": end_time if status is Status.RUPTURED else None, "unruptured": False}
     return kind(**{**known, **frames, **ends, **more}, status=status, end_time=end_time, reason=reason)

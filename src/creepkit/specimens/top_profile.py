@@ -17,14 +17,14 @@ _ROUNDING = 1e-9
 """mm by which a wanted radius may lie outside the nodes: a window that ends on a node ends inside."""
 
 
-class Interpolation(NamedTuple):
+class SurfaceInterpolation(NamedTuple):
     """Matrices (wanted, nodes) from the displacement of the nodes to that at wanted radii, and to its slope d/dr."""
 
     values: Floats
     slopes: Floats
 
 
-def interpolation(radii_nodes: ArrayLike, wanted: ArrayLike) -> Floats:
+def surface_interpolation(radii_nodes: ArrayLike, wanted: ArrayLike) -> Floats:
     """Matrix (wanted, nodes) from the displacement of the top nodes to that at `wanted` radii, mm.
 
     radii_nodes : (nodes,) mm, corner and middle nodes in turn from the axis outwards, in the undeformed plate.
@@ -32,12 +32,12 @@ def interpolation(radii_nodes: ArrayLike, wanted: ArrayLike) -> Floats:
         >>> interpolation([0, 1, 2], [0.5]) @ [0.0, 1.0, 4.0]
         array([0.25])
     """
-    return interpolate(radii_nodes, wanted).values
+    return surface_interpolation_with_slopes(radii_nodes, wanted).values
 
 
-def interpolate(radii_nodes: ArrayLike, wanted: ArrayLike) -> Interpolation:
+def surface_interpolation_with_slopes(radii_nodes: ArrayLike, wanted: ArrayLike) -> SurfaceInterpolation:
     """As `interpolation`, with the slopes; where two sides meet, the mean of theirs."""
-    nodes, radii = checked_radii(radii_nodes), np.atleast_1d(np.asarray(wanted, dtype=float))
+    nodes, radii = checked_surface_radii(radii_nodes), np.atleast_1d(np.asarray(wanted, dtype=float))
     outside = ~((radii >= nodes[0] - _ROUNDING) & (radii <= nodes[-1] + _ROUNDING))
     if outside.any():
         raise SolveError(
@@ -47,10 +47,10 @@ def interpolate(radii_nodes: ArrayLike, wanted: ArrayLike) -> Interpolation:
     inner, outer = (
         _on_sides(nodes, radii, np.searchsorted(nodes[::2], radii + nudge) - 1) for nudge in (-_ROUNDING, _ROUNDING)
     )
-    return Interpolation(0.5 * (inner.values + outer.values), 0.5 * (inner.slopes + outer.slopes))
+    return SurfaceInterpolation(0.5 * (inner.values + outer.values), 0.5 * (inner.slopes + outer.slopes))
 
 
-def checked_radii(radii: ArrayLike) -> Floats:
+def checked_surface_radii(radii: ArrayLike) -> Floats:
     """Radii of top nodes as an array; SolveError unless they can be corner and middle nodes of sides."""
     nodes = np.asarray(radii, dtype=float)
     if nodes.ndim != 1 or nodes.size < 3 or nodes.size % 2 == 0:
@@ -70,7 +70,7 @@ def checked_radii(radii: ArrayLike) -> Floats:
     return nodes
 
 
-def _on_sides(nodes: Floats, radii: Floats, side: Ints) -> Interpolation:
+def _on_sides(nodes: Floats, radii: Floats, side: Ints) -> SurfaceInterpolation:
     """The matrices at radii that lie on the sides of these numbers, or at an end of them."""
     side = np.clip(side, 0, nodes.size // 2 - 1)
     first, middle, last = nodes[2 * side], nodes[2 * side + 1], nodes[2 * side + 2]
@@ -80,7 +80,7 @@ def _on_sides(nodes: Floats, radii: Floats, side: Ints) -> Interpolation:
     shapes = np.stack([0.5 * c * (c - 1.0), 1.0 - c**2, 0.5 * c * (c + 1.0)], axis=1)
     slopes = np.stack([c - 0.5, -2.0 * c, c + 0.5], axis=1) / (reach + 2.0 * bend * c)[:, None]
     columns = 2 * side[:, None] + np.arange(3)
-    matrices = Interpolation(np.zeros((radii.size, nodes.size)), np.zeros((radii.size, nodes.size)))
+    matrices = SurfaceInterpolation(np.zeros((radii.size, nodes.size)), np.zeros((radii.size, nodes.size)))
     np.put_along_axis(matrices.values, columns, shapes, axis=1)
     np.put_along_axis(matrices.slopes, columns, slopes, axis=1)
     return matrices

@@ -20,8 +20,8 @@ from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
 from creepkit.records import History, Prediction, Specimen, Status
 from creepkit.specimens.bar import Bar
-from creepkit.specimens.elastic_part import elastic_strain, observed
-from creepkit.specimens.uniaxial_life import life_of, rungs_of
+from creepkit.specimens.elastic_part import elastic_strain, observed_strain
+from creepkit.specimens.uniaxial_life import predicted_life, strain_levels
 
 if TYPE_CHECKING:
     from creepkit.integration import PointTest
@@ -40,11 +40,11 @@ class Uniaxial(Bar):
         """The stress and the temperature over time."""
         return point_test(history)
 
-    def shown(self, history: History, creep: Floats) -> Floats:
+    def observed_output(self, history: History, creep: Floats) -> Floats:
         """The strain of the history's measure."""
-        return observed(history, creep)
+        return observed_strain(history, creep)
 
-    def slope(self, history: History, creep: Floats) -> Floats:
+    def output_derivative(self, history: History, creep: Floats) -> Floats:
         """Derivative of the observed strain to the creep strain."""
         return np.exp(creep) if history.strain_measure == "engineering" else np.ones_like(creep)
 
@@ -52,19 +52,19 @@ class Uniaxial(Bar):
         self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], *, jacobian: bool = False
     ) -> Prediction:
         """Predict as predict() does, and follow each bar to its rupture: by a state's limit, or by the strain limit."""
-        rungs = [rungs_of(history, self.point_test(history)) for history in histories]
-        result = self._integrate(law, values, [own.test for own in rungs], jacobian)
-        found, last = self._seen(law, histories, result), np.array([h.times[-1] for h in histories])
-        late = (result.end_times > last) & (found.status == int(Status.BURST))
-        status, ends = np.where(late, int(Status.COMPLETE), found.status), np.minimum(found.end_times, last)
-        return replace(found, status=status, end_times=ends, life=life_of(histories, rungs, result))
+        levels = [strain_levels(history, self.point_test(history)) for history in histories]
+        result = self._integrate(law, values, [own_values.test for own_values in levels], jacobian)
+        values_found, last = self._observed_prediction(law, histories, result), np.array([h.times[-1] for h in histories])
+        after_last_frame = (result.end_times > last) & (values_found.status == int(Status.RUPTURED))
+        status, ends = np.where(after_last_frame, int(Status.COMPLETE), values_found.status), np.minimum(values_found.end_times, last)
+        return replace(values_found, status=status, end_times=ends, times_to_strain=predicted_life(histories, levels, result))
 
-    def softening(self, found: Prediction, histories: Sequence[History], stiffer: Floats) -> Floats:
+    def modulus_derivative(self, result: Prediction, histories: Sequence[History], modulus_changes: Floats) -> Floats:
         """Derivative of the strain to the relative change of the modulus: that of its elastic part."""
-        slope = np.zeros_like(found.values)
+        slope = np.zeros_like(result.values)
         for k, history in enumerate(histories):
             if history.includes_elastic:
-                slope[:, k, : history.times.size, 0] = -elastic_strain(history) / (1.0 + stiffer[k])
+                slope[:, k, : history.times.size, 0] = -elastic_strain(history) / (1.0 + modulus_changes[k])
         return slope
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.records import History, Life, Status
+from creepkit.records import History, TimesToStrain, Status
 from creepkit.specimens.elastic_part import elastic_strain
 
 if TYPE_CHECKING:
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 HORIZON = 100.0
 """How far beyond the last frame, and the measured rupture, a bar is followed, as a factor on time."""
-LEAST = 1e-12
+SMALLEST_STRAIN = 1e-12
 """Creep strains below this are there from the beginning."""
-SOONEST = 1e-12
+EARLIEST_RUPTURE = 1e-12
 """s; a bar that breaks at once does so then, for rupture times are compared by their logarithms."""
 
 
 @dataclass(frozen=True)
-class Rungs:
+class StrainLevels:
     """The creep strains of a history's frames as levels to arrive at.
 
     test : the point test that is followed to the horizon.
@@ -39,16 +39,16 @@ class Rungs:
 
 
 @lru_cache(maxsize=4096)
-def rungs_of(history: History, test: PointTest) -> Rungs:
+def strain_levels(history: History, test: PointTest) -> StrainLevels:
     """The levels of a history; `test` is what its material point goes through."""
-    creep = _creep(history)
-    frames = np.flatnonzero(np.isfinite(creep) & (creep > LEAST))
+    creep = _measured_creep_strain(history)
+    frames = np.flatnonzero(np.isfinite(creep) & (creep > SMALLEST_STRAIN))
     frames = frames[np.argsort(creep[frames], kind="stable")]
     last = max(float(history.times[-1]), history.rupture_time or 0.0)
-    return Rungs(replace(test, levels=creep[frames], until=HORIZON * last), frames, creep)
+    return StrainLevels(replace(test, levels=creep[frames], until=HORIZON * last), frames, creep)
 
 
-def _creep(history: History) -> Floats:
+def _measured_creep_strain(history: History) -> Floats:
     """Measured logarithmic creep strain, (frames,); nothing where the history only plans."""
     if "strain" not in history.outputs:
         return np.full(history.times.size, np.nan)
@@ -59,27 +59,27 @@ def _creep(history: History) -> Floats:
         return np.log1p(strain)
 
 
-def life_of(histories: Sequence[History], rungs: Sequence[Rungs], found: Integration) -> Life:
+def predicted_life(histories: Sequence[History], levels: Sequence[StrainLevels], result: Integration) -> TimesToStrain:
     """Arrivals and ruptures on the axes of a prediction."""
-    candidates, longest = found.endings.shape[0], max((h.times.size for h in histories), default=0)
+    candidates, longest = result.terminations.shape[0], max((h.times.size for h in histories), default=0)
     shape = candidates, len(histories), longest
-    broke = found.status == int(Status.BURST)
-    ruptures = np.where(broke, np.maximum(found.end_times, SOONEST), np.nan)
-    arrivals, slopes = np.repeat(ruptures[..., None], longest, axis=2), np.full(shape, np.inf)
-    changes = None
-    if found.end_jacobian is not None:
-        changes = np.repeat(found.end_jacobian[:, :, None], longest, axis=2)
+    ruptured = result.status == int(Status.RUPTURED)
+    ruptures = np.where(ruptured, np.maximum(result.end_times, EARLIEST_RUPTURE), np.nan)
+    level_times, level_rates = np.repeat(ruptures[..., None], longest, axis=2), np.full(shape, np.inf)
+    jacobian = None
+    if result.end_jacobian is not None:
+        jacobian = np.repeat(result.end_jacobian[:, :, None], longest, axis=2)
     start = 0
-    for k, (history, own) in enumerate(zip(histories, rungs, strict=True)):
-        reach, frames = slice(start, start + own.frames.size), own.frames
+    for k, (history, own_values) in enumerate(zip(histories, levels, strict=True)):
+        reach, frames = slice(start, start + own_values.frames.size), own_values.frames
         start = reach.stop
-        arrivals[:, k, np.flatnonzero(own.creep <= LEAST)] = 0.0
-        reached = np.isfinite(found.arrivals[:, reach])
-        stretch = np.exp(own.creep[frames]) if history.strain_measure == "engineering" else 1.0
-        arrivals[:, k, frames] = np.where(reached, found.arrivals[:, reach], arrivals[:, k, frames])
-        slopes[:, k, frames] = np.where(reached, found.arrival_slopes[:, reach] * stretch, np.inf)
-        if changes is not None and found.arrival_jacobian is not None:
-            own_changes = found.arrival_jacobian[:, reach]
-            changes[:, k, frames] = np.where(reached[..., None], own_changes, changes[:, k, frames])
-    horizon = np.array([own.test.end for own in rungs])
-    return Life(arrivals, slopes, ruptures, horizon, changes, found.end_jacobian)
+        level_times[:, k, np.flatnonzero(own_values.creep <= SMALLEST_STRAIN)] = 0.0
+        reached = np.isfinite(result.level_times[:, reach])
+        output_factor = np.exp(own_values.creep[frames]) if history.strain_measure == "engineering" else 1.0
+        level_times[:, k, frames] = np.where(reached, result.level_times[:, reach], level_times[:, k, frames])
+        level_rates[:, k, frames] = np.where(reached, result.level_rates[:, reach] * output_factor, np.inf)
+        if jacobian is not None and result.level_time_jacobian is not None:
+            level_jacobian = result.level_time_jacobian[:, reach]
+            jacobian[:, k, frames] = np.where(reached[..., None], level_jacobian, jacobian[:, k, frames])
+    horizon = np.array([own.test.end for own in levels])
+    return TimesToStrain(level_times, level_rates, ruptures, horizon, jacobian, result.end_jacobian)

@@ -1,6 +1,6 @@
 """The verbs of a study, as typed in a notebook; each finds its nouns in the registry and hands over the work."""
 
-from creepkit.study.files import load, read_histories, suspects, with_suspects_marked
+from creepkit.study.files import load, read_histories, check_data_quality, exclude_suspect_frames
 from creepkit.study.models import identify, moduli, rank, select, simulate
 from creepkit.study.networks import surrogate, train
 from creepkit.study.nouns import law, laws, specimen, specimens
@@ -30,8 +30,8 @@ __all__ = [
     "specimen",
     "specimens",
     "surrogate",
-    "suspects",
+    "check_data_quality",
     "temperature_study",
     "train",
-    "with_suspects_marked",
+    "exclude_suspect_frames",
 ]

@@ -11,17 +11,17 @@ import numpy as np
 from creepkit.errors import FitError, SolveError
 from creepkit.language import symbols
 from creepkit.records import History, Loading, Nuisance, Predictor, Program, Status
-from creepkit.specimens.run import Run, Runnable, run_of
-from creepkit.study.nouns import histories_given, law_given, predictor_given, predictors_given, specimens_of
+from creepkit.specimens.run import Run, Runnable, run_from_outputs
+from creepkit.study.nouns import check_histories, resolve_law, resolve_predictor, resolve_predictors, specimens_of_histories
 
 if TYPE_CHECKING:
     from creepkit.arrays import ArrayLike
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.moduli import Moduli
-    from creepkit.inverse.search.landscape import Search
+    from creepkit.inverse.moduli import ModulusEstimates
+    from creepkit.inverse.search.landscape import GlobalSearch
     from creepkit.inverse.selection import Ranking
-    from creepkit.inverse.settings import Weights
-    from creepkit.inverse.sparsity.penalties import Penalty, Subsets
+    from creepkit.inverse.settings import OutputWeights
+    from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
     from creepkit.language import CreepLaw, Elastic
 
 ROOM_TEMPERATURE = 293.15
@@ -48,12 +48,12 @@ def simulate(
     A test that bursts, meets its limit load or loses convergence is an answer too: the history ends there, and says so
     in `status`, `end_time` and `reason`. A specimen may return more, such as the stresses of a BulgeRun.
     """
-    law, using = law_given(law), predictor_given(using)
+    law, using = resolve_law(law), resolve_predictor(using)
     if not hasattr(loading, "program"):
         raise SolveError(f"loading is {loading!r}; write constant_stress(50) or PressureJump(P1=8, P2=10, Tj=14400)")
     if temperature is None and law.uses(symbols.temperature):
         raise SolveError(f"law '{law.name}' depends on temperature: give temperature= in K")
-    plan = History(
+    planned_test = History(
         name=name,
         times=np.atleast_1d(np.asarray(times, float)),
         outputs={},
@@ -66,10 +66,10 @@ def simulate(
     )
     values = law.values(values)
     if isinstance(using, Runnable):
-        return using.run(law, values, plan)
-    found = using.predict(law, values, [plan])
-    status, end = Status(int(found.status[0, 0])), float(found.end_times[0, 0])
-    return run_of(Run, plan, found.outputs, found.of(0), status, end)
+        return using.run(law, values, planned_test)
+    prediction = using.predict(law, values, [planned_test])
+    status, end = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
+    return run_from_outputs(Run, planned_test, prediction.outputs, prediction.of(0), status, end)
 
 
 def identify(
@@ -78,9 +78,9 @@ def identify(
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     *,
     nuisances: Sequence[Nuisance] | None = None,
-    weights: Weights = "noise",
-    search: Search | None = None,
-    penalty: Penalty | Subsets | None = None,
+    weights: OutputWeights = "noise",
+    search: GlobalSearch | None = None,
+    penalty: ContributionPenalty | Subsets | None = None,
     through: Predictor | Literal["auto"] | None = "auto",
     starts: int = 8,
     frames: int = 40,
@@ -107,32 +107,32 @@ def identify(
         stay Gaussian); test_loss : of whole tests: "gaussian", or "student", with which a test far from the others
         loses its pull.
     """
-    from creepkit.inverse.identification import Settings
+    from creepkit.inverse.identification import IdentificationSettings
     from creepkit.inverse.identify import identify as run
 
-    histories = histories_given(histories)
-    settings = Settings(
-        starts=starts, draws=_draws(starts), frames=frames, seed=seed, loss=loss, test_loss=test_loss, weights=weights
+    histories = check_histories(histories)
+    settings = IdentificationSettings(
+        starts=starts, sobol_points=_sobol_draws(starts), frames=frames, seed=seed, loss=loss, test_loss=test_loss, weights=weights
     )
     if nuisances is not None:
         settings = replace(settings, nuisances=tuple(nuisances))
-    chosen = specimens_of(histories) if using is None else predictors_given(using)
-    on_the_way = _through(through, chosen, histories)
+    predictor = specimens_of_histories(histories) if using is None else resolve_predictors(using)
+    surrogate_predictor = _resolve_surrogate(through, predictor, histories)
     if penalty is not None:
-        from creepkit.inverse.sparsity.sparse import sparse
+        from creepkit.inverse.sparsity.sparse import identify_sparse
 
-        return sparse(
-            law_given(law), histories, chosen, penalty=penalty, search=search, through=on_the_way, settings=settings,
+        return identify_sparse(
+            resolve_law(law), histories, predictor, penalty=penalty, search=search, through=surrogate_predictor, settings=settings,
             progress=progress,
         )  # fmt: skip
     return run(
-        law_given(law), histories, chosen, settings=settings, search=search, through=on_the_way, progress=progress
+        resolve_law(law), histories, predictor, settings=settings, search=search, through=surrogate_predictor, progress=progress
     )
 
 
 def moduli(
     law: CreepLaw | str, histories: Sequence[History], using: Predictor | str | None = None, *, frames: int = 15
-) -> Moduli:
+) -> ModulusEstimates:
     """Identify each bulge test's Young's modulus from its first frames, and Wachtman's form through them.
 
     law : what creeps meanwhile, with its temperature; frames : used frames looked at, the paper's 15 by default.
@@ -140,11 +140,11 @@ def moduli(
     """
     from creepkit.inverse.moduli import identify_moduli as run
 
-    histories = histories_given(histories)
-    chosen = predictors_given(using) if using is not None else specimens_of(histories)
-    if isinstance(chosen, Mapping):
+    histories = check_histories(histories)
+    predictor = resolve_predictors(using) if using is not None else specimens_of_histories(histories)
+    if isinstance(predictor, Mapping):
         raise FitError("moduli are identified from tests of one specimen; give those alone, and using= that one")
-    return run(law_given(law), histories, chosen, frames=frames)
+    return run(resolve_law(law), histories, predictor, frames=frames)
 
 
 def select(
@@ -167,21 +167,21 @@ def select(
     by : the criterion; the answer is a set of laws with weights, "decisive" only above .95.
     nuisances, through, starts, frames, seed : as for identify().
     """
-    from creepkit.inverse.identification import Settings
+    from creepkit.inverse.identification import IdentificationSettings
     from creepkit.inverse.selection.select import select as run
 
-    histories = histories_given(histories)
-    settings = Settings(starts=starts, draws=_draws(starts), frames=frames, seed=seed)
+    histories = check_histories(histories)
+    settings = IdentificationSettings(starts=starts, sobol_points=_sobol_draws(starts), frames=frames, seed=seed)
     if nuisances is not None:
         settings = replace(settings, nuisances=tuple(nuisances))
-    chosen = specimens_of(histories) if using is None else predictors_given(using)
-    candidates = [law_given(law) for law in laws]
+    predictor = specimens_of_histories(histories) if using is None else resolve_predictors(using)
+    candidates = [resolve_law(law) for law in laws]
     return run(
         candidates,
         histories,
-        chosen,
+        predictor,
         settings=settings,
-        through=_through(through, chosen, histories),
+        through=_resolve_surrogate(through, predictor, histories),
         sums=sums,
         by=by,
         progress=progress,
@@ -198,20 +198,20 @@ def rank(fits: Sequence[Identification]) -> Ranking:
     return run(list(fits))
 
 
-def _through(
-    asked: Predictor | Literal["auto"] | None, using: Predictor | Mapping[str, Predictor], histories: Sequence[History]
+def _resolve_surrogate(
+    requested: Predictor | Literal["auto"] | None, predictor: Predictor | Mapping[str, Predictor], histories: Sequence[History]
 ) -> Predictor | None:
     """What was asked for; or the shipped surrogate, where it stands for this very specimen and these histories."""
-    if not isinstance(asked, str):
-        return asked
-    if isinstance(using, Mapping) or getattr(using, "name", "") != "bulge":
+    if not isinstance(requested, str):
+        return requested
+    if isinstance(predictor, Mapping) or getattr(predictor, "name", "") != "bulge":
         return None
     from creepkit.study.networks import surrogate
 
     model = surrogate("dimple")
-    return model if model.stands_for(using, histories) else None
+    return model if model.applies_to(predictor, histories) else None
 
 
-def _draws(starts: int) -> int:
+def _sobol_draws(starts: int) -> int:
     """Sobol points to screen for so many starts: eight each, a power of two, and at least 64."""
     return max(64, 1 << (8 * max(int(starts), 1) - 1).bit_length())

@@ -9,7 +9,7 @@ from creepkit.errors import DatasetError, SurrogateError
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
-    from creepkit.surrogate.recipe import Progress, Recipe, Training
+    from creepkit.surrogate.recipe import ProgressCallback, Recipe, Training
     from creepkit.surrogate.surrogate import Surrogate
 
 
@@ -21,7 +21,7 @@ def train(
     seed: int = 0,
     training: Training | None = None,
     device: str = "auto",
-    progress: Progress | None = None,
+    progress: ProgressCallback | None = None,
 ) -> Surrogate:
     """Train a network on a data set, or its file, and return it as a predictor: identify(..., using=it).
 
@@ -34,19 +34,19 @@ def train(
     from creepkit.surrogate.train import train as run
 
     if isinstance(data, (str, Path)):
-        from creepkit.dataset.store import read
+        from creepkit.dataset.store import read_dataset
 
-        data = read(data)
+        data = read_dataset(data)
     if not hasattr(data, "accepted"):
         raise DatasetError(f"train() takes a data set or its file, found {type(data).__name__}; generate() makes one")
     if isinstance(recipe, type) or not hasattr(recipe, "samples"):
-        found = recipe.__name__ if isinstance(recipe, type) else type(recipe).__name__
-        raise SurrogateError(f"train() takes a recipe such as ParameterGru(hidden=128, layers=3), found {found}")
+        found_type = recipe.__name__ if isinstance(recipe, type) else type(recipe).__name__
+        raise SurrogateError(f"train() takes a recipe such as ParameterGru(hidden=128, layers=3), found {found_type}")
     return run(data, recipe, to=to, seed=seed, training=training, device=device, progress=progress)
 
 
 def surrogate(name_or_path: str | Path) -> Surrogate:
     """Return the surrogate of this name that comes with creepkit, such as "dimple", or the one in a file."""
-    from creepkit.surrogate.shipped import surrogate as run
+    from creepkit.surrogate.shipped import surrogate_by_name as run
 
     return run(name_or_path)

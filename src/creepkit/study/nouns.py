@@ -16,64 +16,64 @@ if TYPE_CHECKING:
 
 def law(name: str) -> CreepLaw:
     """Return the law called `name`: one of `laws()`."""
-    return registry.default().law(name)
+    return registry.default_registry().law(name)
 
 
 def laws() -> dict[str, CreepLaw]:
     """Return every law that is known: {name: law}."""
-    return {name: found.value for name, found in registry.default().laws().items()}
+    return {name: entry.value for name, entry in registry.default_registry().laws().items()}
 
 
 def specimen(name: str) -> Specimen:
     """Return the specimen called `name`: one of `specimens()`."""
-    return registry.default().specimen(name)
+    return registry.default_registry().specimen(name)
 
 
 def specimens() -> dict[str, Specimen]:
     """Return every specimen that is known: {name: specimen}."""
-    return {name: found.value for name, found in registry.default().specimens().items()}
+    return {name: entry.value for name, entry in registry.default_registry().specimens().items()}
 
 
 # ---- what is given -------------------------------------------------------------------------------------------------
 
 
-def law_given(given: CreepLaw | str) -> CreepLaw:
+def resolve_law(law_or_name: CreepLaw | str) -> CreepLaw:
     """The law itself, or the one of that name."""
-    if isinstance(given, str):
-        return law(given)
-    if not hasattr(given, "terms"):
-        raise LawError(f"a creep law or its name is needed, found {type(given).__name__}")
-    return given
+    if isinstance(law_or_name, str):
+        return law(law_or_name)
+    if not hasattr(law_or_name, "terms"):
+        raise LawError(f"a creep law or its name is needed, found {type(law_or_name).__name__}")
+    return law_or_name
 
 
-def predictor_given(given: Predictor | str) -> Predictor:
+def resolve_predictor(predictor_or_name: Predictor | str) -> Predictor:
     """The predictor itself, or the specimen of that name."""
-    if isinstance(given, str):
-        return specimen(given)
-    if not hasattr(given, "predict"):
-        raise SolveError(f"a specimen, its name or another predictor is needed, found {type(given).__name__}")
-    return given
+    if isinstance(predictor_or_name, str):
+        return specimen(predictor_or_name)
+    if not hasattr(predictor_or_name, "predict"):
+        raise SolveError(f"a specimen, its name or another predictor is needed, found {type(predictor_or_name).__name__}")
+    return predictor_or_name
 
 
-def histories_given(given: Sequence[History]) -> list[History]:
+def check_histories(values: Sequence[History]) -> list[History]:
     """The histories as a list; FitError for what is none."""
-    if isinstance(given, (str, Path, History)):
+    if isinstance(values, (str, Path, History)):
         raise FitError("histories must be a list of them: read_histories(path) returns one, [history] makes one")
-    histories = list(given)
-    strangers = [type(h).__name__ for h in histories if not isinstance(h, History)]
-    if strangers:
-        raise FitError(f"histories must be a list of them, found {strangers[0]} in it; use read_histories(path)")
+    histories = list(values)
+    wrong_types = [type(h).__name__ for h in histories if not isinstance(h, History)]
+    if wrong_types:
+        raise FitError(f"histories must be a list of them, found {wrong_types[0]} in it; use read_histories(path)")
     return histories
 
 
-def predictors_given(given: Predictor | str | Mapping[str, Predictor | str]) -> Predictor | dict[str, Predictor]:
+def resolve_predictors(predictors: Predictor | str | Mapping[str, Predictor | str]) -> Predictor | dict[str, Predictor]:
     """One predictor, or one for each specimen."""
-    if isinstance(given, Mapping):
-        return {name: predictor_given(one) for name, one in given.items()}
-    return predictor_given(given)
+    if isinstance(predictors, Mapping):
+        return {name: resolve_predictor(predictor) for name, predictor in predictors.items()}
+    return resolve_predictor(predictors)
 
 
-def specimens_of(histories: Sequence[History]) -> Predictor | dict[str, Predictor]:
+def specimens_of_histories(histories: Sequence[History]) -> Predictor | dict[str, Predictor]:
     """The specimen that the histories name, or all of them by name."""
     names = sorted({h.specimen for h in histories})
     if not names:

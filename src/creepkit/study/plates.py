@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit.records import History, Predictor
-from creepkit.study.nouns import histories_given, predictors_given, specimens_of
+from creepkit.study.nouns import check_histories, resolve_predictors, specimens_of_histories
 
 if TYPE_CHECKING:
     from creepkit.inverse.confirm import Confirmation
@@ -44,5 +44,5 @@ def confirm(
     """
     from creepkit.inverse.confirm import confirm as run
 
-    own = histories_given(list(fit.histories if tests is None else tests))
-    return run(fit, own, specimens_of(own) if using is None else predictors_given(using))
+    histories = check_histories(list(fit.histories if tests is None else tests))
+    return run(fit, histories, specimens_of_histories(histories) if using is None else resolve_predictors(using))

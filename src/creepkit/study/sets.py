@@ -6,29 +6,29 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import DatasetError
-from creepkit.study.nouns import law_given, specimen
+from creepkit.study.nouns import resolve_law, specimen
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
-    from creepkit.dataset.design import Design
-    from creepkit.dataset.pace import Progress
+    from creepkit.dataset.design import SamplingDesign
+    from creepkit.dataset.pace import ProgressCallback
     from creepkit.language import CreepLaw
     from creepkit.records import Specimen
 
 
 def generate(
-    source: Design | CreepLaw | str,
+    source: SamplingDesign | CreepLaw | str,
     using: Specimen | str,
     samples: int | None = None,
     *,
     seed: int,
     to: str | Path,
-    box: str | None = None,
+    domain: str | None = None,
     draws: int | None = None,
     workers: int | None = None,
     cluster: str | None = None,
     part: tuple[int, int] | None = None,
-    progress: Progress | None = None,
+    progress: ProgressCallback | None = None,
     **changes: Any,
 ) -> Dataset:
     """Simulate samples until so many are accepted, write them to an HDF5 file, and return them.
@@ -44,29 +44,29 @@ def generate(
     """
     from creepkit.dataset.campaign import generate as run
 
-    chosen = specimen(using) if isinstance(using, str) else using
-    design = design_given(source, chosen, box, changes)
+    specimen_record = specimen(using) if isinstance(using, str) else using
+    design = resolve_design(source, specimen_record, domain, changes)
     return run(
-        design, chosen, samples=samples, seed=seed, to=to, workers=workers, cluster=cluster, draws=draws, part=part,
+        design, specimen_record, samples=samples, seed=seed, to=to, workers=workers, cluster=cluster, draws=draws, part=part,
         progress=progress,
     )  # fmt: skip
 
 
-def design_given(
-    source: Design | CreepLaw | str, specimen: Specimen, box: str | None = None, changes: dict[str, Any] | None = None
-) -> Design:
+def resolve_design(
+    source: SamplingDesign | CreepLaw | str, specimen: Specimen, domain: str | None = None, changes: dict[str, Any] | None = None
+) -> SamplingDesign:
     """The design itself, or the one for a law in a box."""
-    from creepkit.dataset.design import Design, design_of
+    from creepkit.dataset.design import SamplingDesign, sampling_design
 
-    if not isinstance(source, Design):
-        return design_of(law_given(source), specimen, box or "conditioned", **changes or {})
-    if box is not None or changes:
-        odd = "box" if box is not None else next(iter(changes or {}))
-        raise DatasetError(f"{odd}= belongs to a law; a design such as {source.name} has its own, change it there")
+    if not isinstance(source, SamplingDesign):
+        return sampling_design(resolve_law(source), specimen, domain or "conditioned", **changes or {})
+    if domain is not None or changes:
+        argument = "box" if domain is not None else next(iter(changes or {}))
+        raise DatasetError(f"{argument}= belongs to a law; a design such as {source.name} has its own, change it there")
     return source
 
 
-def rate_family(using: Specimen | str | None = None, **changes: Any) -> Design:
+def rate_family(using: Specimen | str | None = None, **changes: Any) -> SamplingDesign:
     """Return the design of diverse rate functions, not of one law, from which a surrogate learns to serve any law.
 
     using : the specimen, by default the paper's dimple. changes : ranges of conditions, P1=(5, 20); grid=TimeGrid(...).
@@ -81,6 +81,6 @@ def read_dataset(path: str | Path, *, accepted_only: bool = False) -> Dataset:
 
     accepted_only : leave rejected and failed samples in the file, which spares their memory.
     """
-    from creepkit.dataset.store import read
+    from creepkit.dataset.store import read_dataset
 
-    return read(path, accepted_only=accepted_only)
+    return read_dataset(path, accepted_only=accepted_only)

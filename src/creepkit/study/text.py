@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit import registry
 from creepkit.errors import ExportError
-from creepkit.records import Exporter, Units, ValuedLaw
-from creepkit.study.nouns import law_given
+from creepkit.records import Exporter, Units, LawWithValues
+from creepkit.study.nouns import resolve_law
 
 if TYPE_CHECKING:
     from creepkit.discovery.trend import TemperatureLaw
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def export(
-    source: CreepLaw | Identification | TemperatureLaw | ValuedLaw | str,
+    source: CreepLaw | Identification | TemperatureLaw | LawWithValues | str,
     target: str,
     values: Mapping[str, float] | None = None,
     *,
@@ -42,54 +42,54 @@ def export(
 
     ExportError, with the reason, when the target cannot express the law.
     """
-    from creepkit.export.writing import write_text
+    from creepkit.export.writing import write_export
 
-    exporter = registry.default().exporter(target)
+    exporter = registry.default_registry().exporter(target)
     if temperature is not None:
         notes = [*notes, f"taken at a temperature of {temperature:g} K"]
-    valued = _valued(source, values, notes)
+    valued = _resolve_valued_law(source, values, notes)
     valued = valued.replace(
-        units=valued.units if units is None else _units(units),
+        units=valued.units if units is None else _resolve_units(units),
         elastic=elastic or valued.elastic,
         name=name or valued.name,
     )
     if temperature is not None:
         valued = valued.at(temperature)
     if to is not None:
-        write_text(valued, exporter, to, force=force)
+        write_export(valued, exporter, to, force=force)
     return exporter.text(valued)
 
 
 def exporters() -> dict[str, Exporter]:
     """Return every target that laws can be exported to: {name: exporter}."""
-    return {name: found.value for name, found in registry.default().exporters().items()}
+    return {name: entry.value for name, entry in registry.default_registry().exporters().items()}
 
 
-def _valued(
-    source: CreepLaw | Identification | TemperatureLaw | ValuedLaw | str, values: Mapping[str, float] | None,
+def _resolve_valued_law(
+    source: CreepLaw | Identification | TemperatureLaw | LawWithValues | str, values: Mapping[str, float] | None,
     notes: Sequence[str],
-) -> ValuedLaw:  # fmt: skip
+) -> LawWithValues:  # fmt: skip
     """The source with its own values, or those given in their place, which its notes then tell."""
     from creepkit.inverse.identification import Identification
 
-    given: Any = getattr(source, "valued", source)  # a law of temperature has one
-    if isinstance(given, Identification):
-        from creepkit.inverse.printing import notes_of
+    resolved: Any = getattr(source, "valued", source)  # a law of temperature has one
+    if isinstance(resolved, Identification):
+        from creepkit.inverse.printing import identification_comments
 
-        given = ValuedLaw(given.law, given.values, tuple(notes_of(given)), ranges=given.ranges)
-    if not isinstance(given, ValuedLaw):
-        return ValuedLaw(law_given(given), values or {}, tuple(notes))
-    own, found = given.values, given if values is None else given.replace(values=values)
-    changed = [
-        f"{k} = {v:.8g} was set by hand, in place of {own[k]:.8g}" for k, v in found.values.items() if v != own[k]
+        resolved = LawWithValues(resolved.law, resolved.values, tuple(identification_comments(resolved)), ranges=resolved.ranges)
+    if not isinstance(resolved, LawWithValues):
+        return LawWithValues(resolve_law(resolved), values or {}, tuple(notes))
+    source_values, valued_law = resolved.values, resolved if values is None else resolved.replace(values=values)
+    change_notes = [
+        f"{k} = {v:.8g} was set by hand, in place of {source_values[k]:.8g}" for k, v in valued_law.values.items() if v != source_values[k]
     ]
-    return found.replace(notes=(*given.notes, *changed, *notes))
+    return valued_law.replace(notes=(*resolved.notes, *change_notes, *notes))
 
 
-def _units(given: Units | Mapping[str, str]) -> Units:
-    if isinstance(given, Units):
-        return given
-    odd = sorted({*given} - {"stress", "time"})
-    if odd:
-        raise ExportError(f"units have no '{odd[0]}'; write units={{'stress': 'Pa', 'time': 'h'}}")
-    return Units(**given)
+def _resolve_units(units: Units | Mapping[str, str]) -> Units:
+    if isinstance(units, Units):
+        return units
+    unknown = sorted({*units} - {"stress", "time"})
+    if unknown:
+        raise ExportError(f"units have no '{unknown[0]}'; write units={{'stress': 'Pa', 'time': 'h'}}")
+    return Units(**units)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from creepkit.records import History, Predictor
-from creepkit.study.nouns import histories_given, law_given, predictor_given
+from creepkit.study.nouns import check_histories, resolve_law, resolve_predictor
 
 if TYPE_CHECKING:
     from creepkit.discovery.temperature_study import TemperatureStudy
@@ -31,9 +31,9 @@ def discover(
     """
     from creepkit.discovery.discover import discover as run
 
-    own = None if using is None else predictor_given(using)
-    tests = None if histories is None else histories_given(histories)
-    return run(fits, forms=forms, histories=tests, using=own, progress=progress, **options)
+    predictor = None if using is None else resolve_predictor(using)
+    tests = None if histories is None else check_histories(histories)
+    return run(fits, forms=forms, histories=tests, using=predictor, progress=progress, **options)
 
 
 def temperature_study(
@@ -46,4 +46,4 @@ def temperature_study(
     """
     from creepkit.discovery.temperature_study import temperature_study as run
 
-    return run(law_given(law), histories_given(tests), predictor_given(using), progress=progress, **options)
+    return run(resolve_law(law), check_histories(tests), resolve_predictor(using), progress=progress, **options)

@@ -12,21 +12,21 @@ from creepkit.arrays import Floats
 from creepkit.errors import SurrogateError
 from creepkit.records import History, Program, Specimen
 
-CONSTANTS = ("modulus", "apex_thickness", "temperature")
+CONSTANT_INPUTS = ("modulus", "apex_thickness", "temperature")
 """Conditions that do not change during a test: MPa, mm, K."""
-SERIES = ("load", "mean_load", "time", "step")
+SERIES_INPUTS = ("load", "mean_load", "time", "step")
 """Inputs at each frame: the load there, its mean since the frame before (MPa), log10 of 1 s + the time, and of 1 s +
 the time since the frame before."""
-DEGREE = 0.1
+TEMPERATURE_STEP = 0.1
 """K, by which a modulus is differenced."""
-UNNOTICED = 0.02
+JUMP_TOLERANCE = 0.02
 """Mean deviation of a load from a jump, over its largest value, that is none."""
-STEADY = 1.0
+LARGEST_TEMPERATURE_CHANGE = 1.0
 """K by which the temperature of a test may drift."""
 
 
 @dataclass(frozen=True, eq=False)
-class CourseInputs:
+class LoadHistoryInputs:
     """Inputs that tests of one specimen give.
 
     constants : of CONSTANTS, those that the data set varied. series : of SERIES, those of the recipe. relative :
@@ -38,58 +38,58 @@ class CourseInputs:
     series: tuple[str, ...]
     relative: bool = False
 
-    def numbers(self, history: History) -> Floats:
+    def constant_values(self, history: History) -> Floats:
         """(constants,) of one test."""
-        return np.array([_constant(name, history, self.specimen) for name in self.constants])
+        return np.array([_constant_input(name, history, self.specimen) for name in self.constants])
 
-    def moved(self, history: History, effects: Mapping[str, Floats], count: int) -> tuple[Floats, dict[str, Floats]]:
-        """(count, constants) of one test with effects, {kind: (count,)}, and {kind: derivatives}; see Nuisance."""
-        numbers = np.tile(self.numbers(history), (count, 1))
-        slopes = {kind: np.zeros_like(numbers) for kind in effects}
-        place = {name: k for k, name in enumerate(self.constants)}
-        if "thickness" in effects:
-            numbers[:, place["apex_thickness"]] = effects["thickness"]
-            slopes["thickness"][:, place["apex_thickness"]] = 1.0
-        if "temperature" in effects:
-            warmer = effects["temperature"]
-            numbers[:, place["temperature"]] += warmer
-            slopes["temperature"][:, place["temperature"]] = 1.0
-            if "modulus" in place:
-                ends = [_softened(history, warmer + step) for step in (0.0, -DEGREE, DEGREE)]
-                numbers[:, place["modulus"]] = ends[0]
-                slopes["temperature"][:, place["modulus"]] = (ends[2] - ends[1]) / (2 * DEGREE)
-        if "modulus" in effects:
-            factor, k = 1.0 + effects["modulus"], place["modulus"]
-            slopes["modulus"][:, k] = numbers[:, k]
-            numbers[:, k] *= factor
-            if "temperature" in effects:
-                slopes["temperature"][:, k] *= factor
-        return numbers, slopes
+    def with_nuisances(self, history: History, nuisances: Mapping[str, Floats], count: int) -> tuple[Floats, dict[str, Floats]]:
+        """(count, constants) of one test with nuisances, {kind: (count,)}, and {kind: derivatives}; see Nuisance."""
+        values = np.tile(self.constant_values(history), (count, 1))
+        derivatives = {kind: np.zeros_like(values) for kind in nuisances}
+        position = {name: k for k, name in enumerate(self.constants)}
+        if "thickness" in nuisances:
+            values[:, position["apex_thickness"]] = nuisances["thickness"]
+            derivatives["thickness"][:, position["apex_thickness"]] = 1.0
+        if "temperature" in nuisances:
+            temperature_change = nuisances["temperature"]
+            values[:, position["temperature"]] += temperature_change
+            derivatives["temperature"][:, position["temperature"]] = 1.0
+            if "modulus" in position:
+                moduli = [_modulus_at(history, temperature_change + step) for step in (0.0, -TEMPERATURE_STEP, TEMPERATURE_STEP)]
+                values[:, position["modulus"]] = moduli[0]
+                derivatives["temperature"][:, position["modulus"]] = (moduli[2] - moduli[1]) / (2 * TEMPERATURE_STEP)
+        if "modulus" in nuisances:
+            factor, k = 1.0 + nuisances["modulus"], position["modulus"]
+            derivatives["modulus"][:, k] = values[:, k]
+            values[:, k] *= factor
+            if "temperature" in nuisances:
+                derivatives["temperature"][:, k] *= factor
+        return values, derivatives
 
-    def over_time(self, history: History, times: Floats) -> Floats:
+    def series_values(self, history: History, times: Floats) -> Floats:
         """(frames, series) at the times of frames, s."""
         program = history.loading.program()
-        return np.stack([_COLUMNS[name](program, times) for name in self.series], axis=1)
+        return np.stack([_SERIES_FUNCTIONS[name](program, times) for name in self.series], axis=1)
 
-    def domain(self, history: History, times: Floats) -> Floats:
+    def domain_inputs(self, history: History, times: Floats) -> Floats:
         """What the domain guard sees of a test, named by `domain_names`.
 
         The constants, and a thickness also where it did not vary; of the load over the frames the value at the first
         that is loaded, the last, the mean, and how unlike one jump from the first to the last it is; and where grids
         stretch with the test log10 of its end.
         """
-        load = _loaded(history, times)
-        course = [load[0], load[-1], load.mean(), _unlike_a_jump(load)]
-        fixed = [thickness_of(history, self.specimen)] if self._has_fixed_thickness else []
+        load = _load_after_start(history, times)
+        load_summary = [load[0], load[-1], load.mean(), _deviation_from_jump(load)]
+        fixed_thickness = [apex_thickness_of(history, self.specimen)] if self._has_fixed_thickness else []
         end = [np.log10(times[-1])] if self.relative else []
-        return np.array([*self.numbers(history), *fixed, *course, *end])
+        return np.array([*self.constant_values(history), *fixed_thickness, *load_summary, *end])
 
     def domain_names(self, history: History) -> tuple[str, ...]:
         """Of what `domain` gives."""
         load = history.loading.quantity
-        course = (f"first {load}", f"last {load}", f"mean {load}", f"{load} unlike one jump")
-        fixed = ("apex_thickness",) if self._has_fixed_thickness else ()
-        return (*self.constants, *fixed, *course, *(("log10 end_time",) if self.relative else ()))
+        load_names = (f"first {load}", f"last {load}", f"mean {load}", f"{load} unlike one jump")
+        fixed_names = ("apex_thickness",) if self._has_fixed_thickness else ()
+        return (*self.constants, *fixed_names, *load_names, *(("log10 end_time",) if self.relative else ()))
 
     @property
     def _has_fixed_thickness(self) -> bool:
@@ -97,67 +97,67 @@ class CourseInputs:
         return "apex_thickness" not in self.constants and hasattr(geometry, "apex_thickness")
 
 
-def _constant(name: str, history: History, specimen: Specimen) -> float:
+def _constant_input(name: str, history: History, specimen: Specimen) -> float:
     where = history.source or f"history '{history.name}'"
-    warmth = history.temperature_program().values
-    if name in ("modulus", "temperature") and np.ptp(warmth) > STEADY:
+    temperature = history.temperature_program().values
+    if name in ("modulus", "temperature") and np.ptp(temperature) > LARGEST_TEMPERATURE_CHANGE:
         raise SurrogateError(
-            f"{where}: its temperature goes from {warmth.min():g} to {warmth.max():g} K; the surrogate was trained at "
+            f"{where}: its temperature goes from {temperature.min():g} to {temperature.max():g} K; the surrogate was trained at "
             "temperatures that do not change, use the specimen itself"
         )
     if name == "temperature":
-        return float(warmth.mean())
+        return float(temperature.mean())
     if name == "modulus":
         if history.elastic is None:
             raise SurrogateError(f"{where}: the surrogate needs the modulus; set elastic=Elastic(E=150e3), in MPa")
-        return float(history.elastic.at(float(warmth.mean())).E)
-    return thickness_of(history, specimen)
+        return float(history.elastic.at(float(temperature.mean())).E)
+    return apex_thickness_of(history, specimen)
 
 
-def _softened(history: History, warmer: Floats) -> Floats:
+def _modulus_at(history: History, temperature_changes: Floats) -> Floats:
     """The modulus, MPa, at the temperature of a test and so many K more."""
     assert history.elastic is not None  # _constant has complained
     T = float(history.temperature_program().values.mean())
-    return np.array([float(history.elastic.at(T + float(step)).E) for step in warmer])
+    return np.array([float(history.elastic.at(T + float(step)).E) for step in temperature_changes])
 
 
-def thickness_of(history: History, specimen: Specimen) -> float:
+def apex_thickness_of(history: History, specimen: Specimen) -> float:
     """The apex thickness of a test, mm: its own, or the specimen's."""
     geometry: Any = getattr(specimen, "geometry", None)
     return float(history.geometry.get("apex_thickness", getattr(geometry, "apex_thickness", np.nan)))
 
 
-def _loaded(history: History, times: Floats) -> Floats:
+def _load_after_start(history: History, times: Floats) -> Floats:
     """The load from the first frame on that is loaded, MPa."""
     load = history.loading.program().at(times)
     loaded = np.flatnonzero(load > 0)
     return load[loaded[0] :] if loaded.size else load
 
 
-def _unlike_a_jump(load: Floats) -> float:
+def _deviation_from_jump(load: Floats) -> float:
     """Mean distance of a load from the nearest one that jumps from its first to its last value, over its largest.
 
     Zero below UNNOTICED: a recorded load is noisy, and a frame may lie on a ramp.
     """
     before, after = (np.abs(load - level) for level in (load[0], load[-1]))
-    kept = np.concatenate([[0.0], np.cumsum(before)])
-    left = np.concatenate([np.cumsum(after[::-1])[::-1], [0.0]])
-    share = float((kept + left).min() / load.size / max(float(load.max()), 1e-300))
-    return share if share > UNNOTICED else 0.0
+    cost_before = np.concatenate([[0.0], np.cumsum(before)])
+    cost_after = np.concatenate([np.cumsum(after[::-1])[::-1], [0.0]])
+    deviation = float((cost_before + cost_after).min() / load.size / max(float(load.max()), 1e-300))
+    return deviation if deviation > JUMP_TOLERANCE else 0.0
 
 
-def _means(program: Program, times: Floats) -> Floats:
+def _interval_means(program: Program, times: Floats) -> Floats:
     """Mean of a program since the time before, (times,); the first since zero, or the value at zero."""
     knots = np.union1d(program.times, times)
     after, before = program.at(np.nextafter(knots[:-1], np.inf)), program.at(np.nextafter(knots[1:], -np.inf))
     integral = np.concatenate([[0.0], np.cumsum(0.5 * (after + before) * np.diff(knots))])
-    steps, rises = (np.diff(v, prepend=0.0) for v in (times, integral[np.searchsorted(knots, times)]))
-    return np.where(steps > 0, rises / np.where(steps > 0, steps, 1.0), program.at(times))
+    steps, increments = (np.diff(v, prepend=0.0) for v in (times, integral[np.searchsorted(knots, times)]))
+    return np.where(steps > 0, increments / np.where(steps > 0, steps, 1.0), program.at(times))
 
 
-_COLUMNS: dict[str, Callable[[Program, Floats], Floats]] = {
+_SERIES_FUNCTIONS: dict[str, Callable[[Program, Floats], Floats]] = {
     "load": lambda program, times: program.at(times),
-    "mean_load": _means,
+    "mean_load": _interval_means,
     "time": lambda program, times: np.log10(1.0 + times),
     "step": lambda program, times: np.log10(1.0 + np.diff(times, prepend=0.0)),
 }

@@ -18,17 +18,17 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Bools, Floats
 from creepkit.errors import SurrogateError
 
-BEYOND = 0.01
+DEFAULT_MARGIN = 0.01
 """Share of an input's range by which it may leave it, unless more is forgiven."""
-FLAT = 1e-9
+LEAST_VARIANCE = 1e-9
 """Variance of a standardised direction below which it never varied."""
-WORDS = 3
+INPUTS_NAMED = 3
 """Inputs named when a row is outside."""
-ARRAYS = ("low", "high", "forgiven", "mean", "scale", "whitening")
+ARRAY_FIELDS = ("low", "high", "forgiven", "mean", "scale", "whitening")
 
 
 @dataclass(frozen=True, eq=False)
-class Domain:
+class ApplicabilityDomain:
     """Where training rows lie.
 
     names : of the inputs. low, high : their ranges; forgiven : share of it by which each may leave it; mean, scale :
@@ -39,84 +39,84 @@ class Domain:
     names: tuple[str, ...]
     low: Floats
     high: Floats
-    forgiven: Floats
+    margin: Floats
     mean: Floats
     scale: Floats
     whitening: Floats
     limit: float
 
     @classmethod
-    def of(cls, names: Sequence[str], rows: Floats, forgiven: ArrayLike = BEYOND) -> Domain:
+    def from_rows(cls, names: Sequence[str], rows: Floats, margin: ArrayLike = DEFAULT_MARGIN) -> ApplicabilityDomain:
         """The domain of training rows, (n, inputs); NaN, an input that is not there, counts nowhere."""
         rows = np.array(rows, float)
-        known = np.isfinite(rows)
-        rows[:, ~known.any(axis=0)] = 0.0
+        finite = np.isfinite(rows)
+        rows[:, ~finite.any(axis=0)] = 0.0
         mean, low, high = (f(rows, axis=0) for f in (np.nanmean, np.nanmin, np.nanmax))
         rows = np.where(np.isnan(rows), mean, rows)
-        varied = rows.std(axis=0)
-        scale = np.where(varied > 1e-6 * np.maximum(np.abs(mean), 1e-300), varied, np.maximum(np.abs(mean), 1.0))
+        deviation = rows.std(axis=0)
+        scale = np.where(deviation > 1e-6 * np.maximum(np.abs(mean), 1e-300), deviation, np.maximum(np.abs(mean), 1.0))
         standard = (rows - mean) / scale
         variance, axes = np.linalg.eigh(np.cov(standard, rowvar=False, ddof=1).reshape(len(names), len(names)))
-        whitening = axes / np.sqrt(np.maximum(variance, FLAT))
+        whitening = axes / np.sqrt(np.maximum(variance, LEAST_VARIANCE))
         square = ((standard @ whitening) ** 2).sum(axis=1)
-        limit = float(np.sqrt(_left_out(square, len(rows)).max()))
-        room = np.broadcast_to(np.asarray(forgiven, float), low.shape).copy()
-        return cls(tuple(names), low, high, room, mean, scale, whitening, limit)
+        limit = float(np.sqrt(_leave_one_out_distance(square, len(rows)).max()))
+        margins = np.broadcast_to(np.asarray(margin, float), low.shape).copy()
+        return cls(tuple(names), low, high, margins, mean, scale, whitening, limit)
 
     def distance(self, rows: Floats) -> Floats:
         """How far rows (..., inputs) lie out, (...): up to 1 is inside; NaN, an input that is not there, is not far."""
         rows = np.where(np.isnan(rows), self.mean, rows)
-        whole = np.sqrt((((rows - self.mean) / self.scale @ self.whitening) ** 2).sum(axis=-1)) / self.limit
-        return np.asarray(np.maximum(whole, 1.0 + self._too_far(rows).max(axis=-1, initial=-1.0)))
+        mahalanobis = np.sqrt((((rows - self.mean) / self.scale @ self.whitening) ** 2).sum(axis=-1)) / self.limit
+        return np.asarray(np.maximum(mahalanobis, 1.0 + self._beyond_margin(rows).max(axis=-1, initial=-1.0)))
 
     def outside(self, rows: Floats) -> Bools:
         """Which rows (..., inputs) lie outside, (...)."""
         return np.asarray(self.distance(rows) > 1.0)
 
-    def beyond(self, rows: Floats) -> Floats:
+    def excess(self, rows: Floats) -> Floats:
         """By what share of its training range each input leaves it, (..., inputs); negative inside."""
         width = np.where(self.high > self.low, self.high - self.low, 1e-6 * self.scale)
         return np.asarray(np.maximum(self.low - rows, rows - self.high) / width)
 
-    def _too_far(self, rows: Floats) -> Floats:
-        return self.beyond(rows) - self.forgiven
+    def _beyond_margin(self, rows: Floats) -> Floats:
+        return self.excess(rows) - self.margin
 
     def reason(self, row: Floats) -> str:
         """Why one row is outside, in words; "" inside."""
         row = np.asarray(row, float)
         if not self.outside(row):
             return ""
-        over = self._too_far(row)
-        far = [k for k in np.argsort(-over) if over[k] > 0][:WORDS]
-        told = [f"{self.names[k]} = {row[k]:.4g} (trained on {self.low[k]:.4g} to {self.high[k]:.4g})" for k in far]
-        return ", ".join(told) or "a combination of inputs far from those of the training"
+        excess = self._beyond_margin(row)
+        farthest = [k for k in np.argsort(-excess) if excess[k] > 0][:INPUTS_NAMED]
+        descriptions = [f"{self.names[k]} = {row[k]:.4g} (trained on {self.low[k]:.4g} to {self.high[k]:.4g})" for k in farthest]
+        return ", ".join(descriptions) or "a combination of inputs far from those of the training"
 
     def document(self) -> dict[str, Any]:
         """The domain as JSON-able data."""
-        arrays = {name: getattr(self, name).tolist() for name in ARRAYS}
+        arrays = {name: getattr(self, name).tolist() for name in ARRAY_FIELDS}
         return {"names": list(self.names), "limit": self.limit if np.isfinite(self.limit) else None, **arrays}
 
     @classmethod
-    def from_document(cls, data: Mapping[str, Any]) -> Domain:
+    def from_document(cls, data: Mapping[str, Any]) -> ApplicabilityDomain:
         """The domain that `document` wrote."""
         try:
             names, limit = tuple(str(n) for n in data["names"]), data["limit"]
-            known = {"forgiven": [BEYOND] * len(names), **data}
-            arrays = {name: np.array(known[name], float) for name in ARRAYS}
-            made = cls(names, **arrays, limit=np.inf if limit is None else float(limit))
+            document = {"forgiven": [DEFAULT_MARGIN] * len(names), **data}
+            arrays = {name: np.array(document[name], float) for name in ARRAY_FIELDS}
+            domain = cls(names, **arrays, limit=np.inf if limit is None else float(limit))
         except (KeyError, TypeError, ValueError):
             raise SurrogateError("the domain in the header of this surrogate is damaged; train it again") from None
         if any(a.shape[0] != len(names) for a in arrays.values()):
             raise SurrogateError("the domain in the header of this surrogate is damaged; train it again")
-        return made
+        return domain
 
 
-def _left_out(square: Floats, n: int) -> Floats:
+def _leave_one_out_distance(square: Floats, n: int) -> Floats:
     """Squared distance of each row from the others, given that from all n with their covariance.
 
     Removing row i moves the mean by (x_i - m)/(n - 1) and the scatter by n/(n - 1) (x_i - m)(x_i - m)'; Sherman and
     Morrison give the rest.
     """
-    left = (n - 1) - n / (n - 1) * square
-    apart = (n / (n - 1)) ** 2 * (n - 2) * square / np.maximum(left, 1e-300)
-    return np.asarray(np.where(left > 1e-9 * n, apart, np.inf))
+    denominator = (n - 1) - n / (n - 1) * square
+    distance_squared = (n / (n - 1)) ** 2 * (n - 2) * square / np.maximum(denominator, 1e-300)
+    return np.asarray(np.where(denominator > 1e-9 * n, distance_squared, np.inf))

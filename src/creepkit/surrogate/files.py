@@ -14,48 +14,48 @@ from torch import Tensor
 
 from creepkit.errors import SurrogateError
 
-KEY = "creepkit"
+HEADER_KEY = "creepkit"
 """Under which the header stands in the file's metadata."""
 FORMAT = "creepkit-surrogate"
 VERSION = 1
 
 
-def write(path: str | Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -> Path:
+def write_safetensors(path: str | Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -> Path:
     """Write tensors and a JSON-able header to a temporary name, then rename: a file is whole or absent."""
     path = Path(path)
     text = json.dumps({"format": FORMAT, "version": VERSION, **header}, allow_nan=False)
-    plain = {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
+    contiguous = {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        temporary.write_bytes(save(plain, metadata={KEY: text}))
+        temporary.write_bytes(save(contiguous, metadata={HEADER_KEY: text}))
         os.replace(temporary, path)
     except OSError as error:
-        why = f"cannot be written ({error.strerror})"
-        raise SurrogateError(f"{path}: {why}; choose a file in a folder that exists and has room") from None
+        reason = f"cannot be written ({error.strerror})"
+        raise SurrogateError(f"{path}: {reason}; choose a file in a folder that exists and has room") from None
     finally:
         temporary.unlink(missing_ok=True)
     return path
 
 
-def read(path: str | Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
+def read_safetensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """Return the tensors and the header of a file; SurrogateError says what is wrong with any other."""
     path = Path(path)
     if not path.is_file():
         raise SurrogateError(f"{path}: there is no such file; give one that creepkit train wrote")
     try:
         with safe_open(path, framework="pt") as file:
-            told = (file.metadata() or {}).get(KEY)
+            header_text = (file.metadata() or {}).get(HEADER_KEY)
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (a handle, not a mapping)
     except OSError as error:
         raise SurrogateError(f"{path}: cannot be read ({error.strerror or error})") from None
     except SafetensorError:
         raise SurrogateError(f"{path}: damaged, or not a safetensors file; train again or take a copy") from None
-    if told is None:
+    if header_text is None:
         raise SurrogateError(f"{path}: weights of another program (there is no creepkit header); train with creepkit")
-    return tensors, _checked(path, told)
+    return tensors, _checked_header(path, header_text)
 
 
-def _checked(path: Path, text: str) -> dict[str, Any]:
+def _checked_header(path: Path, text: str) -> dict[str, Any]:
     """The header of this version of the format."""
     try:
         header = json.loads(text)
@@ -66,6 +66,6 @@ def _checked(path: Path, text: str) -> dict[str, Any]:
     version = header.get("version")
     if version != VERSION:
         newer = isinstance(version, int) and version > VERSION
-        what = "written by a newer creepkit: update creepkit" if newer else "of an unknown version: train again"
-        raise SurrogateError(f"{path}: version {version!r} of the format, this creepkit reads {VERSION}; {what}")
+        advice = "written by a newer creepkit: update creepkit" if newer else "of an unknown version: train again"
+        raise SurrogateError(f"{path}: version {version!r} of the format, this creepkit reads {VERSION}; {advice}")
     return header

@@ -15,14 +15,14 @@ import torch
 from torch import Tensor
 
 from creepkit.errors import SurrogateError
-from creepkit.surrogate.recipe import Module, Progress, Samples, Training
-from creepkit.surrogate.schedule import rate_of, since_best
+from creepkit.surrogate.recipe import SurrogateModule, ProgressCallback, SampleTensors, Training
+from creepkit.surrogate.schedule import learning_rate, epochs_since_best
 
-JUDGED_AT_ONCE = 256
+VALIDATION_BATCH = 256
 """Rows in a batch without gradients."""
 
 
-class Fit:
+class NetworkTraining:
     """A network between epochs.
 
     curves : {"loss": of training rows during the epoch, "validation": of those set aside after it, "rse": Eq. (4) of
@@ -30,18 +30,18 @@ class Fit:
     """
 
     def __init__(
-        self, module: Module, samples: Samples, rows: tuple[Tensor, Tensor], training: Training, seed: int,
+        self, module: SurrogateModule, samples: SampleTensors, rows: tuple[Tensor, Tensor], training: Training, seed: int,
         device: torch.device,
     ) -> None:  # fmt: skip
         self.module, self.device = module.to(device), device
         self.samples = {name: tensor.to(device) for name, tensor in samples.items()}
-        self.train, self.valid = (part.to(device) for part in rows)
+        self.train, self.validation = (part.to(device) for part in rows)
         self.training, self.seed = training, seed
         self.adam = torch.optim.Adam(module.parameters(), lr=training.rate)
         self.curves: dict[str, list[float]] = {"loss": [], "validation": [], "rse": [], "rate": []}
         self.best = self._weights()
-        self._scale = deviation(self.samples, self.train)
-        self._spread = self._denominator()
+        self._scale = output_deviation(self.samples, self.train)
+        self._total_squares = self._validation_squares()
 
     @property
     def epochs(self) -> int:
@@ -51,15 +51,15 @@ class Fit:
     @property
     def finished(self) -> bool:
         """Whether all epochs are done, or enough of them were of no use."""
-        enough = self.training.early_stop
-        stalled = enough is not None and since_best(self.curves["validation"]) >= enough
+        patience = self.training.early_stop
+        stalled = patience is not None and epochs_since_best(self.curves["validation"]) >= patience
         return self.epochs >= self.training.epochs or stalled
 
-    def run(self, after: Callable[[Fit], None], progress: Progress | None) -> None:
+    def run(self, after_epoch: Callable[[NetworkTraining], None], progress: ProgressCallback | None) -> None:
         """Go through the epochs that are left; `after` is called with the fit when one is done."""
         while not self.finished:
             self.epoch()
-            after(self)
+            after_epoch(self)
             if progress is not None:
                 note = f"loss {self.curves['rse'][-1]:.3g}, best {min(self.curves['rse']):.3g}"
                 done = self.training.epochs if self.finished else self.epochs
@@ -67,8 +67,8 @@ class Fit:
 
     def epoch(self) -> None:
         """One pass over the training rows, then a look at the others."""
-        loss, rate = self._pass()
-        validation, rse = self.judge()
+        loss, rate = self._train_epoch()
+        validation, rse = self.validate()
         if not (math.isfinite(loss) and math.isfinite(validation)):
             raise SurrogateError(
                 f"the training diverged in epoch {self.epochs + 1}: its loss is not a finite number; lower the rate "
@@ -79,20 +79,20 @@ class Fit:
         for name, value in (("loss", loss), ("validation", validation), ("rse", rse), ("rate", rate)):
             self.curves[name].append(value)
 
-    def _pass(self) -> tuple[float, float]:
+    def _train_epoch(self) -> tuple[float, float]:
         """The mean loss of the batches, and the rate at the beginning."""
-        plan, losses, rate = self.training, self.curves["validation"], rate_of(self.training, self.curves["validation"])
-        own = [self.device] if self.device.type == "cuda" else []
+        settings, losses, initial_rate = self.training, self.curves["validation"], learning_rate(self.training, self.curves["validation"])
+        devices = [self.device] if self.device.type == "cuda" else []
         total = torch.zeros((), dtype=torch.float64, device=self.device)
         self.module.train()
-        with torch.random.fork_rng(devices=own):
+        with torch.random.fork_rng(devices=devices):
             torch.manual_seed(int(np.random.SeedSequence((self.seed, self.epochs)).generate_state(1)[0]))
             order = self.train[torch.randperm(len(self.train)).to(self.device)]
-            batches = torch.split(order, plan.batch)
+            batches = torch.split(order, settings.batch)
             for k, rows in enumerate(batches):
-                self.adam.param_groups[0]["lr"] = rate_of(plan, losses, k / len(batches))
+                self.adam.param_groups[0]["lr"] = learning_rate(settings, losses, k / len(batches))
                 total += self._step(rows) * len(rows)
-        return float(total) / len(order), rate
+        return float(total) / len(order), initial_rate
 
     def _step(self, rows: Tensor) -> Tensor:
         self.adam.zero_grad()
@@ -104,22 +104,22 @@ class Fit:
         return loss.detach().double()
 
     @torch.no_grad()
-    def judge(self) -> tuple[float, float]:
+    def validate(self) -> tuple[float, float]:
         """The module's loss, and Eq. (4), of the validation rows."""
         self.module.eval()
         total = torch.zeros((), dtype=torch.float64, device=self.device)
         squares = torch.zeros((), dtype=torch.float64, device=self.device)
-        for rows in torch.split(self.valid, JUDGED_AT_ONCE):
+        for rows in torch.split(self.validation, VALIDATION_BATCH):
             batch = _batch(self.samples, rows)
-            loss, predicted = self.module.judged(batch)
+            loss, predicted = self.module.loss_and_outputs(batch)
             total += loss.double() * len(rows)
-            wrong = (predicted - batch["targets"]).double() / self._scale
-            squares += torch.where(batch["mask"][..., None], wrong, 0.0).square().sum()
-        return float(total) / len(self.valid), float(squares) / self._spread
+            errors = (predicted - batch["targets"]).double() / self._scale
+            squares += torch.where(batch["mask"][..., None], errors, 0.0).square().sum()
+        return float(total) / len(self.validation), float(squares) / self._total_squares
 
-    def _denominator(self) -> float:
+    def _validation_squares(self) -> float:
         """Squared deviations of the validation rows from their mean at each time."""
-        targets, mask = self.samples["targets"][self.valid].double(), self.samples["mask"][self.valid][..., None]
+        targets, mask = self.samples["targets"][self.validation].double(), self.samples["mask"][self.validation][..., None]
         mean = torch.where(mask, targets, 0.0).sum(dim=0) / mask.sum(dim=0).clamp(min=1)
         return max(float(torch.where(mask, (targets - mean) / self._scale, 0.0).square().sum()), 1e-300)
 
@@ -130,34 +130,34 @@ class Fit:
 
     def state(self) -> dict[str, Tensor]:
         """All tensors that going on needs: weights, the best ones, Adam's moments."""
-        kept = {f"module/{name}": tensor for name, tensor in self._weights().items()}
-        kept |= {f"best/{name}": tensor for name, tensor in self.best.items()}
+        tensors = {f"module/{name}": tensor for name, tensor in self._weights().items()}
+        tensors |= {f"best/{name}": tensor for name, tensor in self.best.items()}
         for number, moments in self.adam.state_dict()["state"].items():
-            kept |= {f"adam/{number}/{name}": torch.as_tensor(value).cpu() for name, value in moments.items()}
-        return kept
+            tensors |= {f"adam/{number}/{name}": torch.as_tensor(value).cpu() for name, value in moments.items()}
+        return tensors
 
-    def restore(self, kept: dict[str, Tensor], curves: dict[str, list[float]]) -> None:
+    def restore(self, tensors: dict[str, Tensor], curves: dict[str, list[float]]) -> None:
         """Go back to where `state` was asked."""
-        self.module.load_state_dict(_under(kept, "module/"))
-        self.best = _under(kept, "best/")
+        self.module.load_state_dict(_with_prefix(tensors, "module/"))
+        self.best = _with_prefix(tensors, "best/")
         moments: dict[int, dict[str, Any]] = {}
-        for name, tensor in _under(kept, "adam/").items():
+        for name, tensor in _with_prefix(tensors, "adam/").items():
             number, _, moment = name.partition("/")
             moments.setdefault(int(number), {})[moment] = tensor
         self.adam.load_state_dict({**self.adam.state_dict(), "state": moments})
         self.curves = {name: list(values) for name, values in curves.items()}
 
 
-def deviation(samples: Samples, rows: Tensor) -> Tensor:
+def output_deviation(samples: SampleTensors, rows: Tensor) -> Tensor:
     """Standard deviation of each output over the frames of these rows, (outputs,) float64."""
-    data = samples["targets"][rows][samples["mask"][rows]].double()
-    spread = data.std(dim=0, correction=0)
-    return torch.where(spread > 0, spread, 1.0)
+    target_rows = samples["targets"][rows][samples["mask"][rows]].double()
+    standard_deviation = target_rows.std(dim=0, correction=0)
+    return torch.where(standard_deviation > 0, standard_deviation, 1.0)
 
 
-def _batch(samples: Samples, rows: Tensor) -> Samples:
+def _batch(samples: SampleTensors, rows: Tensor) -> SampleTensors:
     return {name: tensor[rows] for name, tensor in samples.items()}
 
 
-def _under(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:
+def _with_prefix(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:
     return {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}

@@ -27,41 +27,41 @@ class LawInputs:
     law: CreepLaw
 
     @cached_property
-    def switches(self) -> tuple[int, ...]:
+    def switchable(self) -> tuple[int, ...]:
         """Positions of the parameters that can be switched off and then have no logarithm."""
         return tuple(k for k, p in enumerate(self.law.params.values()) if p.scale == "log" and p.off == 0)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Of the columns."""
-        own = [f"log10 {name}" if p.scale == "log" else name for name, p in self.law.table.items()]
-        return (*own, *(f"{self.law.names[k]} is off" for k in self.switches))
+        columns = [f"log10 {name}" if p.scale == "log" else name for name, p in self.law.table.items()]
+        return (*columns, *(f"{self.law.names[k]} is off" for k in self.switchable))
 
     @cached_property
-    def _units(self) -> Floats:
+    def _column_scales(self) -> Floats:
         """(parameters,) what a column grows by with its internal parameter."""
         return np.array([1.0 / LN10 if p.scale == "log" else 1.0 for p in self.law.params.values()])
 
     def internal(self, values: Mapping[str, Any]) -> Floats:
         """(candidates, parameters) internal, from the author's values; 0 of a coefficient is -inf."""
         columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[n], float)) for n in self.law.names))
-        return self.of_table(np.stack(columns, axis=-1))
+        return self.internal_rows(np.stack(columns, axis=-1))
 
-    def of_table(self, parameters: Floats) -> Floats:
+    def internal_rows(self, parameters: Floats) -> Floats:
         """(rows, parameters) internal, from the author's."""
-        theta, logs = np.array(parameters, float), [p.scale == "log" for p in self.law.params.values()]
+        theta, on_log_scale = np.array(parameters, float), [p.scale == "log" for p in self.law.params.values()]
         with np.errstate(divide="ignore"):
-            theta[:, logs] = np.log(theta[:, logs])
+            theta[:, on_log_scale] = np.log(theta[:, on_log_scale])
         return theta
 
-    def rows(self, theta: Floats) -> Floats:
+    def input_rows(self, theta: Floats) -> Floats:
         """(rows, columns) of internal parameters (rows, parameters)."""
         off = np.isneginf(theta)
-        return np.concatenate([np.where(off, np.nan, theta * self._units), off[:, list(self.switches)]], axis=1)
+        return np.concatenate([np.where(off, np.nan, theta * self._column_scales), off[:, list(self.switchable)]], axis=1)
 
-    def slopes(self, theta: Floats) -> Floats:
+    def derivatives(self, theta: Floats) -> Floats:
         """(rows, columns, parameters) derivatives of `rows`; zero where a coefficient is off."""
         count = theta.shape[1]
-        slopes = np.zeros((len(theta), len(self.names), count))
-        slopes[:, range(count), range(count)] = np.where(np.isneginf(theta), 0.0, self._units)
-        return slopes
+        derivatives = np.zeros((len(theta), len(self.names), count))
+        derivatives[:, range(count), range(count)] = np.where(np.isneginf(theta), 0.0, self._column_scales)
+        return derivatives

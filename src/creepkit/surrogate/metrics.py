@@ -19,14 +19,14 @@ from creepkit.arrays import Bools, Floats, Ints
 if TYPE_CHECKING:
     from creepkit.dataset.time_grid import TimeGrid
 
-PAPER_TIMES = (7_500.0, 22_500.0, 37_500.0)
+PAPER_EVALUATION_TIMES = (7_500.0, 22_500.0, 37_500.0)
 """s, at which Fig. 4 looks; other lengths of tests are looked at after the same shares of twelve hours."""
-PAPER_END = 43_200.0
-WORST = 10
+PAPER_TEST_DURATION = 43_200.0
+WORST_COUNT = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class PredictionComparison:
     """What a network predicts of samples, and what is true.
 
     times : (n, frames) s. true, predicted : (n, frames, outputs). mask : (n, frames) which frames are data.
@@ -42,107 +42,107 @@ class Compared:
     scale: Floats
     index: Ints
 
-    def at(self, time: float) -> tuple[Floats, Floats]:
+    def at_time(self, time: float) -> tuple[Floats, Floats]:
         """True and predicted outputs at a time, (samples that last so long, outputs), linear between frames."""
         last = np.where(self.mask, self.times, -np.inf).max(axis=1)
         rows = [k for k in np.flatnonzero(last >= time) if self.times[k, self.mask[k]][0] <= time]
-        values = [np.stack([_between(time, self.times[k], v[k], self.mask[k]) for k in rows]) if rows else
+        values = [np.stack([_interpolated(time, self.times[k], v[k], self.mask[k]) for k in rows]) if rows else
                   np.zeros((0, len(self.outputs))) for v in (self.true, self.predicted)]  # fmt: skip
         return values[0], values[1]
 
-    def largest(self) -> Floats:
+    def largest_errors(self) -> Floats:
         """(n, outputs) largest absolute error of each history."""
         return np.asarray(np.where(self.mask[..., None], np.abs(self.predicted - self.true), 0.0).max(axis=1))
 
 
-def _between(time: float, times: Floats, values: Floats, mask: Bools) -> Floats:
+def _interpolated(time: float, times: Floats, values: Floats, mask: Bools) -> Floats:
     return np.array([np.interp(time, times[mask], column[mask]) for column in values.T])
 
 
-def rse(true: Floats, predicted: Floats, mask: Bools, scale: Floats | None = None) -> float:
+def relative_squared_error(true: Floats, predicted: Floats, mask: Bools, scale: Floats | None = None) -> float:
     """Eq. (4) over the outputs together: (n, frames, outputs) each, mask (n, frames), scale (outputs,)."""
     scale = np.ones(true.shape[-1]) if scale is None else scale
-    errors, spread = (_squares(v / scale, mask) for v in (predicted - true, deviations(true, mask)))
-    return float(errors.sum() / spread.sum()) if spread.sum() > 0 else float("nan")
+    error_squares, deviation_squares = (_sum_of_squares(v / scale, mask) for v in (predicted - true, deviations_from_mean(true, mask)))
+    return float(error_squares.sum() / deviation_squares.sum()) if deviation_squares.sum() > 0 else float("nan")
 
 
-def deviations(true: Floats, mask: Bools) -> Floats:
+def deviations_from_mean(true: Floats, mask: Bools) -> Floats:
     """True outputs less their mean over samples at each time, (n, frames, outputs)."""
     count = np.maximum(mask.sum(axis=0), 1)[:, None]
     mean = np.where(mask[..., None], true, 0.0).sum(axis=0) / count
     return np.asarray(true - mean)
 
 
-def _squares(values: Floats, mask: Bools) -> Floats:
+def _sum_of_squares(values: Floats, mask: Bools) -> Floats:
     return np.asarray((np.where(mask[..., None], values, 0.0) ** 2).sum(axis=(0, 1)))
 
 
-def errors(true: Floats, predicted: Floats, mask: Bools) -> dict[str, float]:
+def error_metrics(true: Floats, predicted: Floats, mask: Bools) -> dict[str, float]:
     """RSE, MSE, MAE and R2 of one output: (n, frames) each."""
-    wrong, data = (predicted - true)[mask], true[mask]
-    spread = float(((data - data.mean()) ** 2).sum()) if data.size else 0.0
+    residuals, true_values = (predicted - true)[mask], true[mask]
+    total_squares = float(((true_values - true_values.mean()) ** 2).sum()) if true_values.size else 0.0
     return {
-        "rse": rse(true[..., None], predicted[..., None], mask),
-        "mse": float((wrong**2).mean()) if data.size else float("nan"),
-        "mae": float(np.abs(wrong).mean()) if data.size else float("nan"),
-        "r2": 1.0 - float((wrong**2).sum()) / spread if spread > 0 else float("nan"),
+        "rse": relative_squared_error(true[..., None], predicted[..., None], mask),
+        "mse": float((residuals**2).mean()) if true_values.size else float("nan"),
+        "mae": float(np.abs(residuals).mean()) if true_values.size else float("nan"),
+        "r2": 1.0 - float((residuals**2).sum()) / total_squares if total_squares > 0 else float("nan"),
     }
 
 
-def metrics_of(found: Compared, times: Sequence[float]) -> dict[str, Any]:
+def comparison_metrics(comparison: PredictionComparison, times: Sequence[float]) -> dict[str, Any]:
     """Everything that is told of a network: {"loss", "outputs", "times", "worst", "samples"}; NaN becomes None."""
-    largest = found.largest()
+    largest = comparison.largest_errors()
     outputs = {}
-    for k, name in enumerate(found.outputs):
-        own = errors(found.true[..., k], found.predicted[..., k], found.mask)
+    for k, name in enumerate(comparison.outputs):
+        output_metrics = error_metrics(comparison.true[..., k], comparison.predicted[..., k], comparison.mask)
         quantiles = np.quantile(largest[:, k], (0.5, 0.95))
-        outputs[name] = {**own, "largest_median": float(quantiles[0]), "largest_p95": float(quantiles[1])}
-    told = {
-        "loss": rse(found.true, found.predicted, found.mask, found.scale),
-        "samples": len(found.true),
+        outputs[name] = {**output_metrics, "largest_median": float(quantiles[0]), "largest_p95": float(quantiles[1])}
+    metrics = {
+        "loss": relative_squared_error(comparison.true, comparison.predicted, comparison.mask, comparison.scale),
+        "samples": len(comparison.true),
         "outputs": outputs,
-        "times": {f"{time:g}": _at(found, time) for time in times},
-        "worst": worst(found, largest),
+        "times": {f"{time:g}": _metrics_at_time(comparison, time) for time in times},
+        "worst": worst_histories(comparison, largest),
     }
-    plain: dict[str, Any] = _plain(told)
-    return plain
+    result: dict[str, Any] = _without_nan(metrics)
+    return result
 
 
-def _at(found: Compared, time: float) -> dict[str, dict[str, float]]:
-    true, predicted = found.at(time)
-    everywhere = np.ones((len(true), 1), bool)
+def _metrics_at_time(comparison: PredictionComparison, time: float) -> dict[str, dict[str, float]]:
+    true, predicted = comparison.at_time(time)
+    mask = np.ones((len(true), 1), bool)
     return {
-        name: errors(true[:, k : k + 1], predicted[:, k : k + 1], everywhere) for k, name in enumerate(found.outputs)
+        name: error_metrics(true[:, k : k + 1], predicted[:, k : k + 1], mask) for k, name in enumerate(comparison.outputs)
     }
 
 
-def worst(found: Compared, largest: Floats) -> list[dict[str, float]]:
+def worst_histories(comparison: PredictionComparison, largest: Floats) -> list[dict[str, float]]:
     """The samples with the largest errors of the first output: number in the design, row, error and when."""
-    rows = np.argsort(-largest[:, 0])[:WORST]
-    wrong = np.where(found.mask, np.abs(found.predicted - found.true)[..., 0], -1.0)
+    rows = np.argsort(-largest[:, 0])[:WORST_COUNT]
+    absolute_errors = np.where(comparison.mask, np.abs(comparison.predicted - comparison.true)[..., 0], -1.0)
     return [
         {
-            "index": int(found.index[k]),
+            "index": int(comparison.index[k]),
             "row": int(k),
             "error": float(largest[k, 0]),
-            "time": float(found.times[k, int(wrong[k].argmax())]),
+            "time": float(comparison.times[k, int(absolute_errors[k].argmax())]),
         }
         for k in rows
     ]
 
 
-def chosen_times(grid: TimeGrid, end: float) -> tuple[float, ...]:
+def evaluation_times(grid: TimeGrid, end: float) -> tuple[float, ...]:
     """The paper's three times where the tests are as long as the paper's, else the same shares of their length."""
     last = end if grid.relative else float(grid.values[-1])
-    if np.isclose(last, PAPER_END):
-        return PAPER_TIMES
-    return tuple(float(f"{time / PAPER_END * last:.4g}") for time in PAPER_TIMES)
+    if np.isclose(last, PAPER_TEST_DURATION):
+        return PAPER_EVALUATION_TIMES
+    return tuple(float(f"{time / PAPER_TEST_DURATION * last:.4g}") for time in PAPER_EVALUATION_TIMES)
 
 
-def _plain(value: Any) -> Any:
+def _without_nan(value: Any) -> Any:
     """JSON has no NaN."""
     if isinstance(value, Mapping):
-        return {k: _plain(v) for k, v in value.items()}
+        return {k: _without_nan(v) for k, v in value.items()}
     if isinstance(value, list):
-        return [_plain(v) for v in value]
+        return [_without_nan(v) for v in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value

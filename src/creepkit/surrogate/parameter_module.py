@@ -7,18 +7,18 @@ from typing import Literal
 import torch
 from torch import Tensor, nn
 
-from creepkit.surrogate.recipe import Module, Samples
-from creepkit.surrogate.scaling import Scale
+from creepkit.surrogate.recipe import SurrogateModule, SampleTensors
+from creepkit.surrogate.scaling import Standardisation
 
-Cell = Literal["gru", "lstm"]
+RecurrentCell = Literal["gru", "lstm"]
 
-FLOOR = 0.01
+LOG_FLOOR = 0.01
 """Share of the median of an output that is added to it before its logarithm is taken: it may begin at zero."""
-ROOM = 2.0
+LARGEST_LOG_EXCESS = 2.0
 """By how much (of ln) a prediction may exceed the largest value of the training: an exponential must not overflow."""
 
 
-class ParameterModule(Module):
+class ParameterModule(SurrogateModule):
     """Standardised constants and series into recurrent layers, and a linear layer to standardised outputs.
 
     samples : "constants" (n, C), NaN where a coefficient is off; "series" (n, frames, S); and "base" (n, frames) where
@@ -35,99 +35,99 @@ class ParameterModule(Module):
     most: Tensor
 
     def __init__(
-        self, sizes: tuple[int, int, int], hidden: int, layers: int, cell: Cell, *, logarithm: bool, based: bool
+        self, sizes: tuple[int, int, int], hidden: int, layers: int, cell: RecurrentCell, *, logarithm: bool, corrects_base: bool
     ) -> None:
         super().__init__()
         constants, series, outputs = sizes
-        self.logarithm, self.based = logarithm or based, based
+        self.logarithm, self.corrects_base = logarithm or corrects_base, corrects_base
         kind = nn.GRU if cell == "gru" else nn.LSTM
-        self.network = kind(constants + series + int(based), hidden, layers, batch_first=True)
+        self.network = kind(constants + series + int(corrects_base), hidden, layers, batch_first=True)
         self.head = nn.Linear(hidden, outputs)
-        self.constants, self.series = Scale.blank(constants), Scale.blank(series + int(based))
-        self.targets = Scale.blank(outputs)
+        self.constants, self.series = Standardisation.identity(constants), Standardisation.identity(series + int(corrects_base))
+        self.targets = Standardisation.identity(outputs)
         self.register_buffer("deviation", torch.ones(outputs, dtype=torch.float64))
         for name in ("spread", "floor", "most"):
             self.register_buffer(name, torch.ones((), dtype=torch.float64))
 
-    def fitted(self, samples: Samples, train: Tensor) -> ParameterModule:
+    def with_scales(self, samples: SampleTensors, train: Tensor) -> ParameterModule:
         """The same network with the scales of these rows."""
         rows = {name: tensor[train] for name, tensor in samples.items()}
         mask, targets = rows["mask"], rows["targets"]
         data = targets[mask].double()
-        self.deviation = Scale.of(data).deviation
+        self.deviation = Standardisation.from_rows(data).deviation
         mean = torch.where(mask[..., None], targets, 0.0).double().sum(dim=0) / mask.sum(dim=0).clamp(min=1)[:, None]
         squares = ((targets.double() - mean) / self.deviation).square()
         spread = torch.where(mask[..., None], squares, 0.0).sum() / mask.sum()
         self.spread = torch.where(spread > 0, spread, 1.0)
         first = data[:, 0].abs()
-        self.floor = (FLOOR * first[first > 0].median()) if (first > 0).any() else torch.ones(()).double()
-        self.constants = Scale.of(rows["constants"])
-        self.series = Scale.of(self._series(rows))
+        self.floor = (LOG_FLOOR * first[first > 0].median()) if (first > 0).any() else torch.ones(()).double()
+        self.constants = Standardisation.from_rows(rows["constants"])
+        self.series = Standardisation.from_rows(self._series(rows))
         encoded = self._encoded(rows)
-        self.targets, self.most = Scale.of(encoded, mask), encoded[mask][:, 0].max().double() + ROOM
+        self.targets, self.most = Standardisation.from_rows(encoded, mask), encoded[mask][:, 0].max().double() + LARGEST_LOG_EXCESS
         return self
 
-    def forward(self, batch: Samples) -> Tensor:
+    def forward(self, batch: SampleTensors) -> Tensor:
         """(rows, frames, outputs) in physical units."""
-        return self.decoded(self.raw(self.inputs(batch)), batch.get("base"))
+        return self.decoded(self.standardised_outputs(self.standardised_inputs(batch)), batch.get("base"))
 
-    def inputs(self, batch: Samples) -> Tensor:
+    def standardised_inputs(self, batch: SampleTensors) -> Tensor:
         """(rows, frames, inputs) standardised; a coefficient that is off stands at zero."""
         constants = torch.nan_to_num(self.constants(batch["constants"]), nan=0.0)
         series = self.series(self._series(batch))
         return torch.cat([constants[:, None].expand(-1, series.shape[1], -1), series], dim=-1)
 
-    def raw(self, inputs: Tensor) -> Tensor:
+    def standardised_outputs(self, inputs: Tensor) -> Tensor:
         """(rows, frames, outputs) standardised."""
         return self.head(self.network(inputs)[0])  # type: ignore[no-any-return]
 
     def decoded(self, raw: Tensor, base: Tensor | None) -> Tensor:
         """Physical outputs of standardised ones."""
-        shown = self.targets.back(raw)
+        outputs = self.targets.inverse(raw)
         if not self.logarithm:
-            return shown
-        first = torch.exp(torch.minimum(shown[..., 0], self.most.to(raw.dtype)))
+            return outputs
+        first = torch.exp(torch.minimum(outputs[..., 0], self.most.to(raw.dtype)))
         floor = self.floor.to(raw.dtype)
-        scale = 1.0 if base is None or not self.based else base + floor
-        return torch.cat([(scale * first - floor)[..., None], shown[..., 1:]], dim=-1)
+        scale = 1.0 if base is None or not self.corrects_base else base + floor
+        return torch.cat([(scale * first - floor)[..., None], outputs[..., 1:]], dim=-1)
 
-    def decoded_slopes(self, raw: Tensor) -> Tensor:
+    def decoded_derivatives(self, raw: Tensor) -> Tensor:
         """(rows, frames, outputs) derivative of physical outputs to standardised ones; without a base."""
-        slopes = self.targets.deviation.to(raw.dtype).expand_as(raw)
+        derivatives = self.targets.deviation.to(raw.dtype).expand_as(raw)
         if not self.logarithm:
-            return slopes
-        shown = self.targets.back(raw)[..., 0]
-        inside = (shown < self.most) * torch.exp(torch.minimum(shown, self.most.to(raw.dtype)))
-        return torch.cat([(inside * slopes[..., 0])[..., None], slopes[..., 1:]], dim=-1)
+            return derivatives
+        log_output = self.targets.inverse(raw)[..., 0]
+        inside = (log_output < self.most) * torch.exp(torch.minimum(log_output, self.most.to(raw.dtype)))
+        return torch.cat([(inside * derivatives[..., 0])[..., None], derivatives[..., 1:]], dim=-1)
 
-    def loss(self, batch: Samples) -> Tensor:
+    def loss(self, batch: SampleTensors) -> Tensor:
         """See the class."""
-        return self.judged(batch)[0]
+        return self.loss_and_outputs(batch)[0]
 
-    def judged(self, batch: Samples) -> tuple[Tensor, Tensor]:
+    def loss_and_outputs(self, batch: SampleTensors) -> tuple[Tensor, Tensor]:
         """The loss and the outputs."""
-        raw, mask = self.raw(self.inputs(batch)), batch["mask"]
-        shown, count = self.decoded(raw, batch.get("base")), mask.sum()
-        wrong = (shown - batch["targets"]) / self.deviation.to(shown.dtype)
-        loss = _masked_squares(wrong, mask) / (count * self.spread.to(shown.dtype))
+        raw, mask = self.standardised_outputs(self.standardised_inputs(batch)), batch["mask"]
+        outputs, count = self.decoded(raw, batch.get("base")), mask.sum()
+        errors = (outputs - batch["targets"]) / self.deviation.to(outputs.dtype)
+        loss = _masked_squares(errors, mask) / (count * self.spread.to(outputs.dtype))
         if self.logarithm:
-            own = raw - self.targets(self._encoded(batch))
-            loss = 0.5 * (loss + _masked_squares(own, mask) / (count * raw.shape[-1]))
-        return loss, shown
+            standardised_errors = raw - self.targets(self._encoded(batch))
+            loss = 0.5 * (loss + _masked_squares(standardised_errors, mask) / (count * raw.shape[-1]))
+        return loss, outputs
 
-    def _encoded(self, batch: Samples) -> Tensor:
+    def _encoded(self, batch: SampleTensors) -> Tensor:
         """What the network is to give, before it is standardised."""
         targets = batch["targets"]
         if not self.logarithm:
             return targets
         floor = self.floor.to(targets.dtype)
         first = torch.log((targets[..., 0] + floor).clamp(min=1e-3 * float(floor)))
-        if self.based:
+        if self.corrects_base:
             first = first - torch.log(batch["base"] + floor)
         return torch.cat([first[..., None], targets[..., 1:]], dim=-1)
 
-    def _series(self, batch: Samples) -> Tensor:
-        if not self.based:
+    def _series(self, batch: SampleTensors) -> Tensor:
+        if not self.corrects_base:
             return batch["series"]
         base = torch.log(batch["base"] + self.floor.to(batch["base"].dtype))
         return torch.cat([batch["series"], base[..., None]], dim=-1)

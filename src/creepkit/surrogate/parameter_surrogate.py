@@ -12,28 +12,28 @@ import numpy as np
 import torch
 
 from creepkit.arrays import ArrayLike, Floats, Ints
-from creepkit.records import Effects, History, Prediction, Status
-from creepkit.surrogate.course_inputs import CourseInputs
+from creepkit.records import NuisanceValues, History, Prediction, Status
+from creepkit.surrogate.course_inputs import LoadHistoryInputs
 from creepkit.surrogate.law_inputs import LawInputs
-from creepkit.surrogate.matching import check_asked, frames_of, seen, seen_slope, weights_between
-from creepkit.surrogate.parameter_gru import ParameterGru, held, stand_in_of, tests_of
+from creepkit.surrogate.matching import check_applicable, prediction_frames, observed_outputs, observation_derivative, interpolation_weights
+from creepkit.surrogate.parameter_gru import ParameterGru, hold_last_value, screening_model_of, load_history_inputs
 from creepkit.surrogate.parameter_module import ParameterModule
-from creepkit.surrogate.recipe import Samples
-from creepkit.surrogate.recurrent_tangent import recurrent
-from creepkit.surrogate.reduction import completed
+from creepkit.surrogate.recipe import SampleTensors
+from creepkit.surrogate.recurrent_tangent import recurrent_with_derivatives
+from creepkit.surrogate.reduction import complete_parameters
 from creepkit.surrogate.surrogate import Surrogate
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
 
-EFFECTS = {"modulus": "modulus", "apex_thickness": "thickness", "temperature": "temperature"}
+NUISANCE_OF_INPUT = {"modulus": "modulus", "apex_thickness": "thickness", "temperature": "temperature"}
 """{input: the nuisance that moves it}."""
-AT_ONCE = 2**24
+BATCH_NUMBERS = 2**24
 """Numbers in the inputs of a batch."""
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class NetworkQuery:
     """What is asked of the network: candidates x tests.
 
     theta : (candidates, parameters) internal. rows : (candidates, columns) of the law, as the network sees them.
@@ -42,24 +42,24 @@ class Asked:
     """
 
     theta: Floats
-    rows: Floats
-    numbers: Floats
+    law_rows: Floats
+    constants: Floats
     series: Floats
     base: Floats | None
-    slopes: Mapping[str, Floats]
+    derivatives: Mapping[str, Floats]
 
-    def batch(self, part: slice) -> Samples:
+    def batch(self, candidates: slice) -> SampleTensors:
         """Some candidates, each with every test: what the module eats, a row for each pair."""
-        numbers = self.numbers[part]
-        count, tests = numbers.shape[:2]
-        rows = np.repeat(self.rows[part], tests, axis=0)
-        made = {
-            "constants": np.concatenate([rows, numbers.reshape(count * tests, -1)], axis=1),
+        constants = self.constants[candidates]
+        count, tests = constants.shape[:2]
+        rows = np.repeat(self.law_rows[candidates], tests, axis=0)
+        arrays = {
+            "constants": np.concatenate([rows, constants.reshape(count * tests, -1)], axis=1),
             "series": np.tile(self.series, (count, 1, 1)),
         }
         if self.base is not None:
-            made["base"] = self.base[part].reshape(count * tests, -1)
-        return {name: torch.from_numpy(np.array(array)) for name, array in made.items()}
+            arrays["base"] = self.base[candidates].reshape(count * tests, -1)
+        return {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
 
 
 class ParameterSurrogate(Surrogate):
@@ -68,9 +68,9 @@ class ParameterSurrogate(Surrogate):
     recipe: ParameterGru
 
     @property
-    def effects(self) -> tuple[str, ...]:  # type: ignore[override]
+    def nuisances(self) -> tuple[str, ...]:  # type: ignore[override]
         """The nuisances whose inputs were varied."""
-        return tuple(EFFECTS[name] for name in self._tests.constants)
+        return tuple(NUISANCE_OF_INPUT[name] for name in self._history_inputs.constants)
 
     def predict(
         self,
@@ -79,145 +79,145 @@ class ParameterSurrogate(Surrogate):
         histories: Sequence[History],
         *,
         jacobian: bool = False,
-        effects: Effects | None = None,
+        nuisances: NuisanceValues | None = None,
     ) -> Prediction:
         """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
-        effects = effects or {}
-        check_asked(self.told, histories, effects, self.effects)
-        whole = completed(self.told.law, law, values, self._middle)
-        frames = frames_of(self.told.grid, histories)
-        asked = self._asked(whole, histories, frames, effects)
-        own = [self.told.law.names.index(name) for name in law.names]
-        shown = self._values(asked)
-        slopes = self._slopes(asked, own) if jacobian and self.recipe.base == "none" else None
-        return self._prediction(asked, histories, frames, shown, slopes, tuple(effects))
+        nuisances = nuisances or {}
+        check_applicable(self.metadata, histories, nuisances, self.nuisances)
+        parameters = complete_parameters(self.metadata.law, law, values, self._default_values)
+        frames = prediction_frames(self.metadata.grid, histories)
+        query = self._query(parameters, histories, frames, nuisances)
+        positions = [self.metadata.law.names.index(name) for name in law.names]
+        outputs = self._values(query)
+        derivatives = self._derivatives(query, positions) if jacobian and self.recipe.base == "none" else None
+        return self._prediction(query, histories, frames, outputs, derivatives, tuple(nuisances))
 
     # ---- what the network is asked ---------------------------------------------------------------------------------
 
     @cached_property
-    def _tests(self) -> CourseInputs:
-        return tests_of(self.recipe, self.specimen, self.told.conditions, self.told.grid.relative)
+    def _history_inputs(self) -> LoadHistoryInputs:
+        return load_history_inputs(self.recipe, self.specimen, self.metadata.conditions, self.metadata.grid.relative)
 
     @cached_property
-    def _law(self) -> LawInputs:
-        return LawInputs(self.told.law)
+    def _law_inputs(self) -> LawInputs:
+        return LawInputs(self.metadata.law)
 
     @cached_property
-    def _middle(self) -> dict[str, float]:
+    def _default_values(self) -> dict[str, float]:
         """Values of parameters whose term is switched off: any will do, the middle of the bounds is inside."""
-        return {name: param.center for name, param in self.told.law.table.items()}
+        return {name: param.center for name, param in self.metadata.law.table.items()}
 
     @cached_property
-    def _double(self) -> ParameterModule:
+    def _double_precision(self) -> ParameterModule:
         """The network in float64: derivatives by differences need the digits."""
         module = copy.deepcopy(self.module).double()
         assert isinstance(module, ParameterModule)
         return module
 
-    def _asked(
-        self, values: Mapping[str, Any], histories: Sequence[History], frames: Sequence[Floats], effects: Effects
-    ) -> Asked:
-        theta = self._law.internal(values)
-        count = max([len(theta), *(len(v) for v in effects.values())])
+    def _query(
+        self, values: Mapping[str, Any], histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues
+    ) -> NetworkQuery:
+        theta = self._law_inputs.internal(values)
+        count = max([len(theta), *(len(v) for v in nuisances.values())])
         theta = np.broadcast_to(theta, (count, theta.shape[1]))
-        assumed = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in effects.items()}
-        moved = [
-            self._tests.moved(h, {kind: v[:, k] for kind, v in assumed.items()}, count) for k, h in enumerate(histories)
+        nuisances = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in nuisances.items()}
+        perturbed = [
+            self._history_inputs.with_nuisances(h, {kind: v[:, k] for kind, v in nuisances.items()}, count) for k, h in enumerate(histories)
         ]
-        return Asked(
+        return NetworkQuery(
             theta=theta,
-            rows=self._law.rows(theta),
-            numbers=np.stack([numbers for numbers, _ in moved], axis=1),
-            series=np.stack([self._tests.over_time(h, t) for h, t in zip(histories, frames, strict=True)]),
-            base=self._base(values, histories, frames, effects, count) if self.recipe.base != "none" else None,
-            slopes={kind: np.stack([slopes[kind] for _, slopes in moved], axis=1) for kind in assumed},
+            law_rows=self._law_inputs.input_rows(theta),
+            constants=np.stack([numbers for numbers, _ in perturbed], axis=1),
+            series=np.stack([self._history_inputs.series_values(h, t) for h, t in zip(histories, frames, strict=True)]),
+            base=self._base(values, histories, frames, nuisances, count) if self.recipe.base != "none" else None,
+            derivatives={kind: np.stack([slopes[kind] for _, slopes in perturbed], axis=1) for kind in nuisances},
         )
 
     def _base(
-        self, values: Mapping[str, Any], histories: Sequence[History], frames: Sequence[Floats], effects: Effects,
+        self, values: Mapping[str, Any], histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues,
         count: int,
     ) -> Floats:  # fmt: skip
         """(candidates, tests, frames) what the specimen's stand-in predicts of the first output."""
-        plans = [h.replace(times=t, outputs={}) for h, t in zip(histories, frames, strict=True)]
-        found = stand_in_of(self.specimen).predict(self.told.law, values, plans, effects=effects)
-        first = held(found.values[..., found.outputs.index(self.outputs[0])])
+        tests = [h.replace(times=t, outputs={}) for h, t in zip(histories, frames, strict=True)]
+        prediction = screening_model_of(self.specimen).predict(self.metadata.law, values, tests, nuisances=nuisances)
+        first = hold_last_value(prediction.values[..., prediction.outputs.index(self.outputs[0])])
         return np.broadcast_to(first, (count, *first.shape[1:]))
 
     # ---- what it answers -------------------------------------------------------------------------------------------
 
     @torch.no_grad()
-    def _values(self, asked: Asked) -> Floats:
+    def _values(self, query: NetworkQuery) -> Floats:
         """(candidates, tests, frames, outputs)."""
-        wide = 4 * self._double.network.hidden_size
-        parts = [self._double(asked.batch(part)).numpy() for part in _parts(asked, wide)]
-        return np.concatenate(parts).reshape(*asked.numbers.shape[:2], *parts[0].shape[1:])
+        width = 4 * self._double_precision.network.hidden_size
+        parts = [self._double_precision(query.batch(part)).numpy() for part in _batches(query, width)]
+        return np.concatenate(parts).reshape(*query.constants.shape[:2], *parts[0].shape[1:])
 
     @torch.no_grad()
-    def _slopes(self, asked: Asked, own: Sequence[int]) -> Floats:
-        """(candidates, tests, frames, outputs, directions): to the parameters `own`, then to the effects."""
-        wide = (len(own) + len(asked.slopes)) * self._double.network.hidden_size * 4
-        parts = [self._slopes_of(asked, part, own) for part in _parts(asked, wide)]
-        return np.concatenate(parts).reshape(*asked.numbers.shape[:2], *parts[0].shape[1:])
+    def _derivatives(self, query: NetworkQuery, positions: Sequence[int]) -> Floats:
+        """(candidates, tests, frames, outputs, directions): to the parameters `own`, then to the nuisances."""
+        width = (len(positions) + len(query.derivatives)) * self._double_precision.network.hidden_size * 4
+        parts = [self._batch_derivatives(query, part, positions) for part in _batches(query, width)]
+        return np.concatenate(parts).reshape(*query.constants.shape[:2], *parts[0].shape[1:])
 
-    def _slopes_of(self, asked: Asked, part: slice, own: Sequence[int]) -> Floats:
-        net = self._double
-        inputs = net.inputs(asked.batch(part))
-        columns, tests = asked.rows.shape[1], asked.numbers.shape[1]
-        moving = np.zeros((len(inputs), len(own) + len(asked.slopes), inputs.shape[2]))
-        law = np.repeat(self._law.slopes(asked.theta[part])[:, :, list(own)], tests, axis=0)
-        moving[:, : len(own), :columns] = np.swapaxes(law, 1, 2)
-        reach = slice(columns, columns + asked.numbers.shape[2])
-        for k, slopes in enumerate(asked.slopes.values()):
-            moving[:, len(own) + k, reach] = slopes[part].reshape(len(inputs), -1)
-        moving[:, :, : reach.stop] /= net.constants.deviation.numpy()
-        directions = torch.from_numpy(moving)[:, :, None].expand(-1, -1, inputs.shape[1], -1)
-        state, changes = recurrent(net.network, inputs, directions)
-        shown = net.decoded_slopes(net.head(state))[:, None] * (changes @ net.head.weight.T)
-        return shown.movedim(1, -1).numpy()
+    def _batch_derivatives(self, query: NetworkQuery, candidates: slice, positions: Sequence[int]) -> Floats:
+        network = self._double_precision
+        inputs = network.standardised_inputs(query.batch(candidates))
+        columns, tests = query.law_rows.shape[1], query.constants.shape[1]
+        directions_in = np.zeros((len(inputs), len(positions) + len(query.derivatives), inputs.shape[2]))
+        law_derivatives = np.repeat(self._law_inputs.derivatives(query.theta[candidates])[:, :, list(positions)], tests, axis=0)
+        directions_in[:, : len(positions), :columns] = np.swapaxes(law_derivatives, 1, 2)
+        constant_columns = slice(columns, columns + query.constants.shape[2])
+        for k, constant_derivatives in enumerate(query.derivatives.values()):
+            directions_in[:, len(positions) + k, constant_columns] = constant_derivatives[candidates].reshape(len(inputs), -1)
+        directions_in[:, :, : constant_columns.stop] /= network.constants.deviation.numpy()
+        directions = torch.from_numpy(directions_in)[:, :, None].expand(-1, -1, inputs.shape[1], -1)
+        state, state_derivatives = recurrent_with_derivatives(network.network, inputs, directions)
+        derivatives = network.decoded_derivatives(network.head(state))[:, None] * (state_derivatives @ network.head.weight.T)
+        return derivatives.movedim(1, -1).numpy()
 
     def _prediction(
-        self, asked: Asked, histories: Sequence[History], frames: Sequence[Floats], shown: Floats,
-        slopes: Floats | None, kinds: tuple[str, ...],
+        self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats], outputs: Floats,
+        derivatives: Floats | None, nuisance_names: tuple[str, ...],
     ) -> Prediction:  # fmt: skip
         """At the times of the histories, as their instruments show it."""
         lengths = np.array([h.times.size for h in histories], dtype=np.int64)
-        shape = (*shown.shape[:2], int(lengths.max(initial=0)), shown.shape[3])
+        shape = (*outputs.shape[:2], int(lengths.max(initial=0)), outputs.shape[3])
         values = np.full(shape, np.nan)
-        wide = None if slopes is None else np.full((*shape, slopes.shape[-1]), np.nan)
-        for k, (history, known) in enumerate(zip(histories, frames, strict=True)):
-            weights = weights_between(known, history.times)
-            plain = np.einsum("tf,cfo->cto", weights, shown[:, k])
-            values[:, k, : lengths[k]] = seen(self.specimen, history, plain)
-            if wide is not None and slopes is not None:
-                change = np.einsum("tf,cfod->ctod", weights, slopes[:, k])
-                wide[:, k, : lengths[k]] = change * seen_slope(self.specimen, history, plain)[..., None]
-        count = 0 if wide is None else wide.shape[-1] - len(kinds)
-        ends = np.broadcast_to([h.times[-1] for h in histories], shown.shape[:2]).astype(float)
+        derivative_array = None if derivatives is None else np.full((*shape, derivatives.shape[-1]), np.nan)
+        for k, (history, frame_times) in enumerate(zip(histories, frames, strict=True)):
+            weights = interpolation_weights(frame_times, history.times)
+            interpolated = np.einsum("tf,cfo->cto", weights, outputs[:, k])
+            values[:, k, : lengths[k]] = observed_outputs(self.specimen, history, interpolated)
+            if derivative_array is not None and derivatives is not None:
+                derivative = np.einsum("tf,cfod->ctod", weights, derivatives[:, k])
+                derivative_array[:, k, : lengths[k]] = derivative * observation_derivative(self.specimen, history, interpolated)[..., None]
+        count = 0 if derivative_array is None else derivative_array.shape[-1] - len(nuisance_names)
+        ends = np.broadcast_to([h.times[-1] for h in histories], outputs.shape[:2]).astype(float)
         return Prediction(
-            values=values, outputs=self.outputs, lengths=lengths, status=self._status(asked, histories, frames),
-            end_times=ends, jacobian=None if wide is None else wide[..., :count],
+            values=values, outputs=self.outputs, lengths=lengths, status=self._status(query, histories, frames),
+            end_times=ends, jacobian=None if derivative_array is None else derivative_array[..., :count],
             times=tuple(h.times for h in histories),
-            effect_jacobian={} if wide is None else {kind: wide[..., count + k] for k, kind in enumerate(kinds)},
+            nuisance_jacobian={} if derivative_array is None else {kind: derivative_array[..., count + k] for k, kind in enumerate(nuisance_names)},
         )  # fmt: skip
 
-    def _status(self, asked: Asked, histories: Sequence[History], frames: Sequence[Floats]) -> Ints:
+    def _status(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Ints:
         """(candidates, tests): complete, or outside the domain."""
-        outside = np.zeros(asked.numbers.shape[:2], bool)
-        if self.told.domain is not None:
-            outside = self.told.domain.outside(self._guarded(asked, histories, frames))
+        outside = np.zeros(query.constants.shape[:2], bool)
+        if self.metadata.domain is not None:
+            outside = self.metadata.domain.outside(self._domain_inputs(query, histories, frames))
         return np.where(outside, int(Status.OUTSIDE_DOMAIN), int(Status.COMPLETE)).astype(np.int64)
 
-    def _guarded(self, asked: Asked, histories: Sequence[History], frames: Sequence[Floats]) -> Floats:
+    def _domain_inputs(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Floats:
         """(candidates, tests, inputs) what the guard sees."""
-        count, tests, constants = asked.numbers.shape
-        of_tests = np.stack([self._tests.domain(h, t) for h, t in zip(histories, frames, strict=True)])
-        rest = np.broadcast_to(of_tests[None, :, constants:], (count, tests, of_tests.shape[1] - constants))
-        rows = np.broadcast_to(asked.rows[:, None], (count, tests, asked.rows.shape[1]))
-        return np.concatenate([rows, asked.numbers, rest], axis=2)
+        count, tests, constants = query.constants.shape
+        test_rows = np.stack([self._history_inputs.domain_inputs(h, t) for h, t in zip(histories, frames, strict=True)])
+        test_summary = np.broadcast_to(test_rows[None, :, constants:], (count, tests, test_rows.shape[1] - constants))
+        rows = np.broadcast_to(query.law_rows[:, None], (count, tests, query.law_rows.shape[1]))
+        return np.concatenate([rows, query.constants, test_summary], axis=2)
 
 
-def _parts(asked: Asked, wide: int) -> list[slice]:
+def _batches(query: NetworkQuery, width: int) -> list[slice]:
     """Candidates in groups whose largest tensors are not too large."""
-    count, tests = asked.numbers.shape[:2]
-    step = max(1, AT_ONCE // (tests * asked.series.shape[1] * wide))
+    count, tests = query.constants.shape[:2]
+    step = max(1, BATCH_NUMBERS // (tests * query.series.shape[1] * width))
     return [slice(first, first + step) for first in range(0, count, step)]

@@ -18,25 +18,25 @@ from torch import Tensor
 from creepkit import kernels
 from creepkit.errors import DatasetError, SurrogateError
 from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.reduced_courses import Courses, courses
-from creepkit.specimens.reduced_march import Factors
-from creepkit.specimens.reduced_observed import COLUMNS
-from creepkit.surrogate.domain import Domain
-from creepkit.surrogate.rate_inputs import inputs, local, names
-from creepkit.surrogate.rate_module import BASE, RateModule
-from creepkit.surrogate.recipe import Module, Progress, Samples, Told, Training
+from creepkit.specimens.reduced_courses import Trajectories, simulate_trajectories
+from creepkit.specimens.reduced_march import FeatureFactors
+from creepkit.specimens.reduced_observed import TRAJECTORY_COLUMNS
+from creepkit.surrogate.domain import ApplicabilityDomain
+from creepkit.surrogate.rate_inputs import network_inputs, local_inputs, input_names
+from creepkit.surrogate.rate_module import BASE_COLUMNS, RateModule
+from creepkit.surrogate.recipe import SurrogateModule, ProgressCallback, SampleTensors, SurrogateMetadata, Training
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
     from creepkit.surrogate.surrogate import Surrogate
 
-GUARDED_NODES = 4
+DOMAIN_NODES = 4
 """Nodes of each history that the domain is made of, spread over it: neighbours say the same."""
 
-CONDITIONS = ("ln P/E", "log10 age", "ln D", "ln D/D_elastic", "fast", "slow", "apex thickness")
-DIGITS = 6
+CONDITION_INPUTS = ("ln P/E", "log10 age", "ln D", "ln D/D_elastic", "fast", "slow", "apex thickness")
+DOMAIN_DIGITS = 6
 """Decimals of what the domain is made of: a feature that is zero but for its rounding does not vary."""
-BEYOND_CONDITIONS, BEYOND_RATES = 0.05, 0.5
+CONDITION_MARGIN, RATE_MARGIN = 0.05, 0.5
 """Shares of its range by which a CONDITION of the dimple, and all else, what a law's rate is like, may leave it.
 
 Trained on exponents of stress up to 14 the network is still nearer than its base for Norton's law with n = 20 (5.6
@@ -64,10 +64,10 @@ class RateNet:
     kind: ClassVar[str] = "rate-net"
 
     def __post_init__(self) -> None:
-        for name, most in (("hidden", 4096), ("layers", 32)):
+        for name, largest in (("hidden", 4096), ("layers", 32)):
             value = getattr(self, name)
-            if value != int(value) or not 1 <= value <= most:
-                raise SurrogateError(f"RateNet: {name} is {value}; allowed are whole numbers from 1 to {most}")
+            if value != int(value) or not 1 <= value <= largest:
+                raise SurrogateError(f"RateNet: {name} is {value}; allowed are whole numbers from 1 to {largest}")
         for name in ("stress_factors", "strain_factors"):
             values = tuple(float(v) for v in getattr(self, name))
             if not values or not all(0 < v < 100 for v in values):
@@ -75,68 +75,68 @@ class RateNet:
             object.__setattr__(self, name, values)
 
     @property
-    def factors(self) -> Factors:
+    def factors(self) -> FeatureFactors:
         """Where the features are taken."""
-        return Factors(np.array(self.stress_factors), np.array(self.strain_factors))
+        return FeatureFactors(np.array(self.stress_factors), np.array(self.strain_factors))
 
     # ---- what the trainer asks -------------------------------------------------------------------------------------
 
-    def samples(self, data: Dataset, progress: Progress | None = None) -> Samples:
+    def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:
         """Tensors of a data set: inputs and base at nodes, weights of frames, targets and masks."""
         specimen = bulge_of(data)
         law = kernels.lower(data.law, "numba")
-        theta = law.internal(dict(zip(data.parameter_names, data.parameters.T, strict=True)))
-        found = []
+        theta = law.to_internal(dict(zip(data.parameter_names, data.parameters.T, strict=True)))
+        trajectories = []
         for row in range(len(data)):
-            found.append(courses(specimen, law, theta[row : row + 1], [data.plan(row)], factors=self.factors))
+            trajectories.append(simulate_trajectories(specimen, law, theta[row : row + 1], [data.planned_test(row)], factors=self.factors))
             if progress is not None:
                 progress("features", row + 1, len(data), "")
-        nodes = max(one.values.shape[2] for one in found)
-        course = np.stack([_padded(one.values[0, 0], nodes) for one in found])
-        thickness = torch.tensor([one.plans[0].made.geometry.apex_thickness for one in found], dtype=torch.float64)
-        counts = torch.tensor([one.values.shape[2] for one in found])
-        values = torch.from_numpy(course)
+        nodes = max(trajectory.values.shape[2] for trajectory in trajectories)
+        padded_values = np.stack([_padded(one.values[0, 0], nodes) for one in trajectories])
+        thickness = torch.tensor([one.schedules[0].setup.geometry.apex_thickness for one in trajectories], dtype=torch.float64)
+        counts = torch.tensor([one.values.shape[2] for one in trajectories])
+        values = torch.from_numpy(padded_values)
         mask = np.asarray(np.isfinite(data.values).all(axis=-1))
-        made = {
-            "inputs": inputs(values, thickness),
-            "base": base_of(values),
-            "frames": torch.from_numpy(np.stack([_frames(one, data.grid.frames, nodes) for one in found])),
+        tensors = {
+            "inputs": network_inputs(values, thickness),
+            "base": base_columns(values),
+            "frames": torch.from_numpy(np.stack([_frame_weights(one, data.grid.frames, nodes) for one in trajectories])),
             "targets": torch.from_numpy(np.where(mask[..., None], data.values, 0.0)),
         }
-        single = {name: tensor.to(torch.float32) for name, tensor in made.items()}
-        guarded = local(values, thickness)[:, _spread(nodes)].to(torch.float32)
-        there = torch.arange(nodes) < counts[:, None]
-        return {**single, "mask": torch.from_numpy(mask), "nodes": there, "domain": guarded}
+        single = {name: tensor.to(torch.float32) for name, tensor in tensors.items()}
+        domain_rows = local_inputs(values, thickness)[:, _domain_nodes(nodes)].to(torch.float32)
+        node_mask = torch.arange(nodes) < counts[:, None]
+        return {**single, "mask": torch.from_numpy(mask), "nodes": node_mask, "domain": domain_rows}
 
-    def module(self, data: Dataset, samples: Samples, train: Tensor) -> Module:
+    def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
         """A fresh network with the scales of the training rows."""
-        return RateModule(samples["inputs"].shape[-1], self.hidden, self.layers).fitted(samples, train)
+        return RateModule(samples["inputs"].shape[-1], self.hidden, self.layers).with_scales(samples, train)
 
-    def told(self, data: Dataset, samples: Samples, train: Tensor) -> Told:
+    def metadata(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateMetadata:
         """Scales and domain."""
         module = self.module(data, samples, train)
         assert isinstance(module, RateModule)
-        known = names(self._features)
+        input_labels = input_names(self._feature_count)
         scaling = {
-            "inputs": {n: [float(m), float(d)] for n, m, d in zip(known, module.mean, module.deviation, strict=True)}
+            "inputs": {n: [float(m), float(d)] for n, m, d in zip(input_labels, module.mean, module.deviation, strict=True)}
         }
-        rows = samples["domain"][train].numpy().round(DIGITS)
-        own = known[: rows.shape[-1]]
-        forgiven = [BEYOND_CONDITIONS if name in CONDITIONS else BEYOND_RATES for name in own]
-        return Told.of(data, scaling=scaling, domain=Domain.of(own, rows.reshape(-1, rows.shape[-1]), forgiven))
+        rows = samples["domain"][train].numpy().round(DOMAIN_DIGITS)
+        domain_names = input_labels[: rows.shape[-1]]
+        margins = [CONDITION_MARGIN if name in CONDITION_INPUTS else RATE_MARGIN for name in domain_names]
+        return SurrogateMetadata.from_dataset(data, scaling=scaling, domain=ApplicabilityDomain.from_rows(domain_names, rows.reshape(-1, rows.shape[-1]), margins))
 
-    def blank(self, told: Told) -> Module:
+    def empty_module(self, metadata: SurrogateMetadata) -> SurrogateModule:
         """A network for the weights of a file."""
-        return RateModule(len(names(self._features)), self.hidden, self.layers)
+        return RateModule(len(input_names(self._feature_count)), self.hidden, self.layers)
 
-    def surrogate(self, module: Module, told: Told) -> Surrogate:
+    def surrogate(self, module: SurrogateModule, metadata: SurrogateMetadata) -> Surrogate:
         """The network as a predictor."""
         from creepkit.surrogate.rate_surrogate import RateSurrogate
 
-        return RateSurrogate(self, module, told)
+        return RateSurrogate(self, module, metadata)
 
     @property
-    def _features(self) -> int:
+    def _feature_count(self) -> int:
         return len(self.stress_factors) * len(self.strain_factors)
 
 
@@ -150,9 +150,9 @@ def bulge_of(data: Dataset) -> Bulge:
     return data.specimen
 
 
-def base_of(course: Any) -> Any:
+def base_columns(trajectory: Any) -> Any:
     """(..., nodes, 4) what the network corrects, from courses (..., nodes, columns)."""
-    return course[..., [COLUMNS.index(name) for name in BASE]]
+    return trajectory[..., [TRAJECTORY_COLUMNS.index(name) for name in BASE_COLUMNS]]
 
 
 def _padded(values: Any, nodes: int) -> Any:
@@ -160,11 +160,11 @@ def _padded(values: Any, nodes: int) -> Any:
     return np.pad(values, ((0, nodes - len(values)), (0, 0)), mode="edge")
 
 
-def _frames(found: Courses, frames: int, nodes: int) -> Any:
+def _frame_weights(trajectory: Trajectories, frames: int, nodes: int) -> Any:
     """(frames, nodes) weights of the nodes at the frames of the grid; zero for what is not there."""
-    weights = found.plans[0].frames
+    weights = trajectory.schedules[0].frames
     return np.pad(weights, ((0, frames - weights.shape[0]), (0, nodes - weights.shape[1])))
 
 
-def _spread(nodes: int) -> list[int]:
-    return [round(k * (nodes - 1) / (GUARDED_NODES - 1)) for k in range(GUARDED_NODES)]
+def _domain_nodes(nodes: int) -> list[int]:
+    return [round(k * (nodes - 1) / (DOMAIN_NODES - 1)) for k in range(DOMAIN_NODES)]

@@ -13,32 +13,32 @@ from torch import Tensor
 
 from creepkit import kernels
 from creepkit.arrays import ArrayLike, Bools, Floats
-from creepkit.records import Effects, History, Prediction, Status
+from creepkit.records import NuisanceValues, History, Prediction, Status
 from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.reduced_courses import Courses, courses
-from creepkit.specimens.reduced_march import EFFECTS
-from creepkit.surrogate.matching import check_asked
-from creepkit.surrogate.rate_inputs import inputs, local, remembering
+from creepkit.specimens.reduced_courses import Trajectories, simulate_trajectories
+from creepkit.specimens.reduced_march import NUISANCE_DIRECTIONS
+from creepkit.surrogate.matching import check_applicable
+from creepkit.surrogate.rate_inputs import network_inputs, local_inputs, with_running_means
 from creepkit.surrogate.rate_module import RateModule
-from creepkit.surrogate.rate_net import RateNet, base_of
+from creepkit.surrogate.rate_net import RateNet, base_columns
 from creepkit.surrogate.surrogate import Surrogate
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
 
-AT_ONCE = 2**17
+VALUE_BATCH_NUMBERS = 2**17
 """Numbers in the courses that a thread looks at, about what a cache holds."""
-AT_ONCE_CHANGES = 2**22
+DERIVATIVE_BATCH_NUMBERS = 2**22
 """The same of their derivatives: a call of torch's for them costs some milliseconds, however few they are."""
 
 
-class Shown(NamedTuple):
+class NodeOutputs(NamedTuple):
     """At nodes: outputs (candidates, nodes, 3), their derivatives with a last axis of directions, or None; and which
     candidates leave the domain, (candidates,).
     """
 
     values: Floats
-    changes: Floats | None
+    derivatives: Floats | None
     outside: Bools
 
 
@@ -46,7 +46,7 @@ class RateSurrogate(Surrogate):
     """The one-degree-of-freedom model of a dimple, corrected by a network; for any law."""
 
     recipe: RateNet
-    effects = EFFECTS
+    nuisances = NUISANCE_DIRECTIONS
 
     @property
     def title(self) -> str:
@@ -60,86 +60,86 @@ class RateSurrogate(Surrogate):
         histories: Sequence[History],
         *,
         jacobian: bool = False,
-        effects: Effects | None = None,
+        nuisances: NuisanceValues | None = None,
     ) -> Prediction:
         """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
-        effects = effects or {}
-        check_asked(self.told, histories, effects, self.effects)
+        nuisances = nuisances or {}
+        check_applicable(self.metadata, histories, nuisances, self.nuisances)
         specimen, compiled = self.specimen, kernels.lower(law, "numba")
         assert isinstance(specimen, Bulge)
-        theta = compiled.internal(values)
-        count = max([len(theta), *(len(v) for v in effects.values())])
+        theta = compiled.to_internal(values)
+        count = max([len(theta), *(len(v) for v in nuisances.values())])
         theta = np.broadcast_to(theta, (count, theta.shape[1]))
-        assumed = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in effects.items()}
+        nuisances = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in nuisances.items()}
         threads = specimen.threads or len(os.sched_getaffinity(0))
-        found = courses(
-            specimen, compiled, theta, histories, effects=assumed, factors=self.recipe.factors, exact=jacobian,
+        trajectories = simulate_trajectories(
+            specimen, compiled, theta, histories, nuisances=nuisances, factors=self.recipe.factors, exact=jacobian,
             threads=threads,
         )  # fmt: skip
-        return self._prediction(found, histories, theta.shape[1], assumed, threads)
+        return self._prediction(trajectories, histories, theta.shape[1], nuisances, threads)
 
     def _prediction(
-        self, found: Courses, histories: Sequence[History], parameters: int, assumed: Effects, threads: int
+        self, trajectories: Trajectories, histories: Sequence[History], parameters: int, nuisances: NuisanceValues, threads: int
     ) -> Prediction:
         lengths = np.array([h.times.size for h in histories], dtype=np.int64)
-        count = len(found.values)
+        count = len(trajectories.values)
         values = np.full((count, len(histories), int(lengths.max(initial=0)), 3), np.nan)
-        wide = None if found.changes is None else np.full((*values.shape, found.changes.shape[-1]), np.nan)
-        status = np.array(found.status)
+        derivatives = None if trajectories.jacobian is None else np.full((*values.shape, trajectories.jacobian.shape[-1]), np.nan)
+        status = np.array(trajectories.status)
         for k, history in enumerate(histories):
-            thickness = self._thickness(found, k, count, assumed)
-            shown = self._shown(found, k, thickness, threads)
-            values[:, k, : lengths[k]] = found.frames(k, shown.values)
-            if wide is not None and shown.changes is not None:
-                wide[:, k, : lengths[k]] = found.frames(k, shown.changes)
-            cut = status[:, k] != Status.COMPLETE
-            gone = cut[:, None] & (history.times >= found.end_times[:, k, None])
-            values[:, k, : lengths[k]][gone] = np.nan
-            status[:, k] = np.where(shown.outside & ~cut, int(Status.OUTSIDE_DOMAIN), status[:, k])
-        kinds = {kind: wide[..., parameters + EFFECTS.index(kind)] for kind in assumed} if wide is not None else {}
+            thickness = self._thickness(trajectories, k, count, nuisances)
+            node_outputs = self._node_outputs(trajectories, k, thickness, threads)
+            values[:, k, : lengths[k]] = trajectories.frames(k, node_outputs.values)
+            if derivatives is not None and node_outputs.derivatives is not None:
+                derivatives[:, k, : lengths[k]] = trajectories.frames(k, node_outputs.derivatives)
+            incomplete = status[:, k] != Status.COMPLETE
+            after_end = incomplete[:, None] & (history.times >= trajectories.end_times[:, k, None])
+            values[:, k, : lengths[k]][after_end] = np.nan
+            status[:, k] = np.where(node_outputs.outside & ~incomplete, int(Status.OUTSIDE_DOMAIN), status[:, k])
+        nuisance_derivatives = {kind: derivatives[..., parameters + NUISANCE_DIRECTIONS.index(kind)] for kind in nuisances} if derivatives is not None else {}
         return Prediction(
-            values=values, outputs=self.outputs, lengths=lengths, status=status, end_times=found.end_times,
-            jacobian=None if wide is None else wide[..., :parameters], times=tuple(h.times for h in histories),
-            effect_jacobian=kinds,
+            values=values, outputs=self.outputs, lengths=lengths, status=status, end_times=trajectories.end_times,
+            jacobian=None if derivatives is None else derivatives[..., :parameters], times=tuple(h.times for h in histories),
+            nuisance_jacobian=nuisance_derivatives,
         )  # fmt: skip
 
-    def _thickness(self, found: Courses, test: int, count: int, assumed: Effects) -> Tensor:
-        own = np.full(count, found.plans[test].made.geometry.apex_thickness)
-        return torch.from_numpy(np.array(assumed["thickness"][:, test]) if "thickness" in assumed else own)
+    def _thickness(self, trajectories: Trajectories, test: int, count: int, nuisances: NuisanceValues) -> Tensor:
+        thicknesses = np.full(count, trajectories.schedules[test].setup.geometry.apex_thickness)
+        return torch.from_numpy(np.array(nuisances["thickness"][:, test]) if "thickness" in nuisances else thicknesses)
 
-    def _shown(self, found: Courses, test: int, thickness: Tensor, threads: int) -> Shown:
+    def _node_outputs(self, trajectories: Trajectories, test: int, thickness: Tensor, threads: int) -> NodeOutputs:
         """What the network makes of the courses of one test."""
-        nodes = found.plans[test].times.size
-        course = torch.from_numpy(found.values[:, test, :nodes])
-        values, outside = self._values(course, thickness, threads)
-        if found.changes is None:
-            return Shown(values, None, outside)
-        changes = torch.from_numpy(found.changes[:, test, :nodes])
-        step = max(1, AT_ONCE_CHANGES // changes[0].numel())
-        parts = [slice(k, k + step) for k in range(0, len(course), step)]
-        slopes = [self._slopes(course[part], thickness[part], changes[part]) for part in parts]
-        return Shown(values, np.concatenate(slopes), outside)
+        nodes = trajectories.schedules[test].times.size
+        trajectory = torch.from_numpy(trajectories.values[:, test, :nodes])
+        values, outside = self._values(trajectory, thickness, threads)
+        if trajectories.jacobian is None:
+            return NodeOutputs(values, None, outside)
+        trajectory_derivatives = torch.from_numpy(trajectories.jacobian[:, test, :nodes])
+        step = max(1, DERIVATIVE_BATCH_NUMBERS // trajectory_derivatives[0].numel())
+        parts = [slice(k, k + step) for k in range(0, len(trajectory), step)]
+        derivative_parts = [self._derivatives(trajectory[part], thickness[part], trajectory_derivatives[part]) for part in parts]
+        return NodeOutputs(values, np.concatenate(derivative_parts), outside)
 
-    def _values(self, course: Tensor, thickness: Tensor, threads: int) -> tuple[Floats, Bools]:
+    def _values(self, trajectory: Tensor, thickness: Tensor, threads: int) -> tuple[Floats, Bools]:
         """Outputs at nodes, and who is outside; threads share the candidates."""
-        step = max(1, min(AT_ONCE // course[0].numel(), -(-len(course) // threads)))
-        parts = [slice(k, k + step) for k in range(0, len(course), step)]
-        values, outside = np.empty((*course.shape[:2], 3)), np.zeros(len(course), bool)
+        step = max(1, min(VALUE_BATCH_NUMBERS // trajectory[0].numel(), -(-len(trajectory) // threads)))
+        parts = [slice(k, k + step) for k in range(0, len(trajectory), step)]
+        values, outside = np.empty((*trajectory.shape[:2], 3)), np.zeros(len(trajectory), bool)
 
-        def look(part: slice) -> None:
+        def evaluate(part: slice) -> None:
             with torch.no_grad():  # torch keeps this for each thread
-                own = local(course[part], thickness[part])
-                seen = remembering(course[part], own)
-                values[part] = self._module.at_nodes(seen, base_of(course[part])).numpy()
-            if self.told.domain is not None:
-                outside[part] = self.told.domain.outside(own.numpy()).any(axis=1)
+                local_values = local_inputs(trajectory[part], thickness[part])
+                node_inputs = with_running_means(trajectory[part], local_values)
+                values[part] = self._module.at_nodes(node_inputs, base_columns(trajectory[part])).numpy()
+            if self.metadata.domain is not None:
+                outside[part] = self.metadata.domain.outside(local_values.numpy()).any(axis=1)
 
         if len(parts) == 1 or torch.get_num_threads() > 1:  # torch's own threads and ours would fight for the cores
             for part in parts:
-                look(part)
+                evaluate(part)
         else:
             with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(look, parts))
+                list(pool.map(evaluate, parts))
         return values, outside
 
     @property
@@ -147,23 +147,23 @@ class RateSurrogate(Surrogate):
         assert isinstance(self.module, RateModule)
         return self.module
 
-    def at_nodes(self, course: Tensor, thickness: Tensor) -> Tensor:
+    def at_nodes(self, trajectory: Tensor, thickness: Tensor) -> Tensor:
         """(candidates, nodes, 3) corrected outputs, from courses (candidates, nodes, columns) and thicknesses, mm."""
-        return self._module.at_nodes(inputs(course, thickness), base_of(course))
+        return self._module.at_nodes(network_inputs(trajectory, thickness), base_columns(trajectory))
 
-    def _slopes(self, course: Tensor, thickness: Tensor, changes: Tensor) -> Floats:
+    def _derivatives(self, trajectory: Tensor, thickness: Tensor, trajectory_derivatives: Tensor) -> Floats:
         """Derivatives of outputs at nodes: forward through inputs and network, all directions at once."""
-        directions = changes.shape[-1]
-        thicker = torch.zeros(directions, len(thickness), dtype=thickness.dtype)
-        thicker[directions - len(EFFECTS) + EFFECTS.index("thickness")] = 1.0
+        directions = trajectory_derivatives.shape[-1]
+        thickness_directions = torch.zeros(directions, len(thickness), dtype=thickness.dtype)
+        thickness_directions[directions - len(NUISANCE_DIRECTIONS) + NUISANCE_DIRECTIONS.index("thickness")] = 1.0
 
         def along(moved: Tensor, thick: Tensor) -> Any:
-            return torch.func.jvp(inputs, (course, thickness), (moved, thick))
+            return torch.func.jvp(network_inputs, (trajectory, thickness), (moved, thick))
 
         out: Any = (None, 0)  # inputs themselves are the same along all directions
 
         with torch.no_grad():
-            moved = changes.movedim(-1, 0)
-            seen, seen_moved = torch.func.vmap(along, out_dims=out)(moved, thicker)
-            found = self._module.slopes(seen, base_of(course), seen_moved, base_of(moved)).movedim(0, -1)
-        return np.asarray(found.double().numpy())
+            trajectory_directions = trajectory_derivatives.movedim(-1, 0)
+            node_inputs, input_directions = torch.func.vmap(along, out_dims=out)(trajectory_directions, thickness_directions)
+            derivatives = self._module.derivatives(node_inputs, base_columns(trajectory), input_directions, base_columns(trajectory_directions)).movedim(0, -1)
+        return np.asarray(derivatives.double().numpy())

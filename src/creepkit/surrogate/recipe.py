@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from creepkit.dataset.time_grid import TimeGrid
     from creepkit.language import CreepLaw
     from creepkit.records import Specimen
-    from creepkit.surrogate.domain import Domain
+    from creepkit.surrogate.domain import ApplicabilityDomain
     from creepkit.surrogate.surrogate import Surrogate
 
-Samples: TypeAlias = dict[str, Tensor]
+SampleTensors: TypeAlias = dict[str, Tensor]
 """Tensors whose leading axis is the sample. Always there: "targets" (n, frames, outputs), physical, float32, zero where
 there is none; "mask" (n, frames), which frames are data. The rest is the recipe's own: what its module eats."""
 
-Progress: TypeAlias = Callable[[str, int, int, str], None]
+ProgressCallback: TypeAlias = Callable[[str, int, int, str], None]
 """Called with (task, parts done, parts in all, what else there is to say)."""
 
 
@@ -64,24 +64,24 @@ class Training:
             raise SurrogateError(f"training: validation is {self.validation}; allowed are shares between 0 and 1")
 
 
-class Module(nn.Module, ABC):
+class SurrogateModule(nn.Module, ABC):
     """A network with its scales: from samples to outputs in physical units. Its buffers are saved with its weights."""
 
     @abstractmethod
-    def forward(self, batch: Samples) -> Tensor:
+    def forward(self, batch: SampleTensors) -> Tensor:
         """(rows, frames, outputs) in physical units at the times of the data."""
 
     @abstractmethod
-    def loss(self, batch: Samples) -> Tensor:
+    def loss(self, batch: SampleTensors) -> Tensor:
         """What training makes small: a number, the mean over the rows of the batch."""
 
-    def judged(self, batch: Samples) -> tuple[Tensor, Tensor]:
+    def loss_and_outputs(self, batch: SampleTensors) -> tuple[Tensor, Tensor]:
         """The loss and the outputs at once; a module may spare itself the second pass."""
         return self.loss(batch), self(batch)
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class SurrogateMetadata:
     """What a surrogate knows beside its weights; all of it stands in the header of its file.
 
     law, specimen, outputs, grid : of the data set; a surrogate of one law answers for that law.
@@ -100,18 +100,18 @@ class Told:
     parameters: tuple[str, ...]
     conditions: tuple[str, ...]
     scaling: Mapping[str, Any] = field(default_factory=dict)
-    domain: Domain | None = None
+    domain: ApplicabilityDomain | None = None
     metrics: Mapping[str, Any] = field(default_factory=dict)
     curves: Mapping[str, list[float]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, data: Dataset, **more: Any) -> Told:
+    def from_dataset(cls, data: Dataset, **fields: Any) -> SurrogateMetadata:
         """What a data set says; more : the other fields."""
         return cls(
             law=data.law, specimen=data.specimen, outputs=data.outputs, grid=data.grid,
-            parameters=data.parameter_names, conditions=data.condition_names, **more,
+            parameters=data.parameter_names, conditions=data.condition_names, **fields,
         )  # fmt: skip
 
 
@@ -126,22 +126,22 @@ class Recipe(Protocol):
         """How it is trained, unless train() is told otherwise; a field."""
         ...
 
-    def samples(self, data: Dataset, progress: Progress | None = None) -> Samples:
+    def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:
         """The tensors of a data set; DatasetError where it cannot be learnt from."""
         ...
 
-    def module(self, data: Dataset, samples: Samples, train: Tensor) -> Module:
+    def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
         """A fresh network for these data; scales are those of the training rows, positions (rows,), alone."""
         ...
 
-    def told(self, data: Dataset, samples: Samples, train: Tensor) -> Told:
+    def metadata(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateMetadata:
         """What the data say of a surrogate before its training: scaling, domain and notes among it."""
         ...
 
-    def blank(self, told: Told) -> Module:
+    def empty_module(self, metadata: SurrogateMetadata) -> SurrogateModule:
         """A network of the right shapes, into which the weights and scales of a file are put."""
         ...
 
-    def surrogate(self, module: Module, told: Told) -> Surrogate:
+    def surrogate(self, module: SurrogateModule, metadata: SurrogateMetadata) -> Surrogate:
         """The trained network as a predictor."""
         ...

@@ -9,50 +9,50 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-Both = tuple[Tensor, Tensor]
+ValuesAndDerivatives = tuple[Tensor, Tensor]
 """Values (rows, ...) and their derivatives (rows, directions, ...)."""
 
 
-def recurrent(network: nn.GRU | nn.LSTM, inputs: Tensor, directions: Tensor) -> Both:
+def recurrent_with_derivatives(network: nn.GRU | nn.LSTM, inputs: Tensor, directions: Tensor) -> ValuesAndDerivatives:
     """Outputs of a stack of layers, (rows, frames, hidden), and derivatives, (rows, directions, frames, hidden).
 
     inputs : (rows, frames, inputs). directions : (rows, directions, frames, inputs), how inputs move.
     """
-    cell = _gru if isinstance(network, nn.GRU) else _lstm
+    cell = _gru_step if isinstance(network, nn.GRU) else _lstm_step
     values = torch.cat([inputs[:, None], directions], dim=1)
     for layer in range(network.num_layers):
         weights = [getattr(network, f"{name}_l{layer}") for name in ("weight_ih", "weight_hh", "bias_ih", "bias_hh")]
-        values = _layer(cell, values, *weights)
+        values = _recurrent_layer(cell, values, *weights)
     return values[:, 0], values[:, 1:]
 
 
-def _layer(cell: object, values: Tensor, w_in: Tensor, w_back: Tensor, b_in: Tensor, b_back: Tensor) -> Tensor:
+def _recurrent_layer(cell: object, values: Tensor, w_in: Tensor, w_hidden: Tensor, b_in: Tensor, b_hidden: Tensor) -> Tensor:
     """One layer over all frames; (rows, 1 + directions, frames, inputs), the value first."""
-    driven = values @ w_in.T
-    driven[:, 0] += b_in
-    rows, wide, frames, hidden = *values.shape[:3], w_back.shape[1]
-    state, memory = (values.new_zeros(rows, wide, hidden) for _ in range(2))
-    out = []
+    input_part = values @ w_in.T
+    input_part[:, 0] += b_in
+    rows, width, frames, hidden = *values.shape[:3], w_hidden.shape[1]
+    state, memory = (values.new_zeros(rows, width, hidden) for _ in range(2))
+    states = []
     for k in range(frames):
-        back = state @ w_back.T
-        back[:, 0] += b_back
-        state, memory = cell(driven[:, :, k], back, state, memory)  # type: ignore[operator]
-        out.append(state)
-    return torch.stack(out, dim=2)
+        hidden_part = state @ w_hidden.T
+        hidden_part[:, 0] += b_hidden
+        state, memory = cell(input_part[:, :, k], hidden_part, state, memory)  # type: ignore[operator]
+        states.append(state)
+    return torch.stack(states, dim=2)
 
 
-def _gru(driven: Tensor, back: Tensor, state: Tensor, memory: Tensor) -> Both:
+def _gru_step(input_part: Tensor, hidden_part: Tensor, state: Tensor, memory: Tensor) -> ValuesAndDerivatives:
     """r, z = sigmoid(i + b), n = tanh(i_n + r b_n), h' = (1 - z) n + z h."""
-    r_in, z_in, n_in = driven.chunk(3, dim=-1)
-    r_back, z_back, n_back = back.chunk(3, dim=-1)
+    r_in, z_in, n_in = input_part.chunk(3, dim=-1)
+    r_back, z_back, n_back = hidden_part.chunk(3, dim=-1)
     r, z = _sigmoid(r_in + r_back), _sigmoid(z_in + z_back)
     n = _tanh(n_in + _product(r, n_back))
     return n + _product(z, state - n), memory
 
 
-def _lstm(driven: Tensor, back: Tensor, state: Tensor, memory: Tensor) -> Both:
+def _lstm_step(input_part: Tensor, hidden_part: Tensor, state: Tensor, memory: Tensor) -> ValuesAndDerivatives:
     """i, f, o = sigmoid, g = tanh; c' = f c + i g, h' = o tanh c'."""
-    i, f, g, o = (driven + back).chunk(4, dim=-1)
+    i, f, g, o = (input_part + hidden_part).chunk(4, dim=-1)
     memory = _product(_sigmoid(f), memory) + _product(_sigmoid(i), _tanh(g))
     return _product(_sigmoid(o), _tanh(memory)), memory
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-CONSTANT = 1e-6
+CONSTANT_TOLERANCE = 1e-6
 """A standard deviation below this share of the largest value is rounding: the column is constant."""
 
 
-class Scale(nn.Module):
+class Standardisation(nn.Module):
     """Standardises the last axis; its mean and deviation are buffers, float64, saved with the weights.
 
     A column that is constant in training is only shifted: the network sees zero, and the domain guard sees others.
@@ -24,16 +24,16 @@ class Scale(nn.Module):
         self.register_buffer("deviation", deviation.double())
 
     @classmethod
-    def of(cls, values: Tensor, mask: Tensor | None = None) -> Scale:
+    def from_rows(cls, values: Tensor, mask: Tensor | None = None) -> Standardisation:
         """The scale of columns; values : (..., columns), mask : (...) which rows count. NaN counts nowhere."""
         rows = (values[mask] if mask is not None else values.reshape(-1, values.shape[-1])).double()
         mean = torch.nan_to_num(rows.nanmean(dim=0), nan=0.0)
         deviation = torch.nan_to_num((rows - mean).square().nanmean(dim=0).sqrt(), nan=0.0)
-        constant = deviation <= CONSTANT * torch.nan_to_num(rows, nan=0.0).abs().amax(dim=0)
+        constant = deviation <= CONSTANT_TOLERANCE * torch.nan_to_num(rows, nan=0.0).abs().amax(dim=0)
         return cls(mean, torch.where(constant, 1.0, deviation))
 
     @classmethod
-    def blank(cls, columns: int) -> Scale:
+    def identity(cls, columns: int) -> Standardisation:
         """A scale that changes nothing."""
         return cls(torch.zeros(columns), torch.ones(columns))
 
@@ -41,6 +41,6 @@ class Scale(nn.Module):
         """Standardised values."""
         return (values - self.mean.to(values.dtype)) / self.deviation.to(values.dtype)
 
-    def back(self, values: Tensor) -> Tensor:
+    def inverse(self, values: Tensor) -> Tensor:
         """Physical values of standardised ones."""
         return values * self.deviation.to(values.dtype) + self.mean.to(values.dtype)

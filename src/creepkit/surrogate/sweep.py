@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.errors import SurrogateError
-from creepkit.figures import blank, written
+from creepkit.figures import empty_figure, save_figure
 from creepkit.surrogate.parameter_gru import ParameterGru
-from creepkit.surrogate.parameter_module import Cell
-from creepkit.surrogate.recipe import Progress
+from creepkit.surrogate.parameter_module import RecurrentCell
+from creepkit.surrogate.recipe import ProgressCallback
 from creepkit.surrogate.surrogate import Surrogate
 from creepkit.surrogate.train import train
-from creepkit.surrogate.trainable import split, trainable
+from creepkit.surrogate.trainable import training_split, trainable_samples
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Entry:
+class SizeStudyResult:
     """One training of a sweep.
 
     cell, hidden, layers, samples : what was varied; samples are those learnt from.
@@ -34,11 +34,11 @@ class Entry:
         the training rows in that epoch. outputs : {output: its RSE}. losses : Eq. (4) of each epoch.
     """
 
-    cell: Cell
+    cell: RecurrentCell
     hidden: int
     layers: int
     samples: int
-    weights: int
+    weight_count: int
     loss: float
     training: float
     epochs: int
@@ -53,93 +53,93 @@ class Entry:
         return f"{self.cell} {self.hidden} x {self.layers}, {self.samples} samples"
 
 
-def sweep(
+def size_study(
     data: Dataset, recipe: ParameterGru, *, to: str | Path, layers: Sequence[int] = (), hidden: Sequence[int] = (),
-    cells: Sequence[Cell] = (), samples: Sequence[int] = (), seed: int = 0, device: str = "auto",
-    progress: Progress | None = None,
-) -> list[Entry]:  # fmt: skip
+    cells: Sequence[RecurrentCell] = (), samples: Sequence[int] = (), seed: int = 0, device: str = "auto",
+    progress: ProgressCallback | None = None,
+) -> list[SizeStudyResult]:  # fmt: skip
     """Train every combination, each to a file of its own in the folder `to`; those that are there already are read.
 
     What is not given stays as the recipe has it; samples are numbers to learn from. Every training is judged by the
     same rows, a share of the whole data set that none of them learns from.
     """
-    data, folder = trainable(data), Path(to)
-    whole = len(split(len(data), recipe.training, seed)[0])
-    counts = [*samples] or [whole]
-    split(len(data), replace(recipe.training, samples=max(counts)), seed)  # complains now, not after hours of training
+    data, folder = trainable_samples(data), Path(to)
+    training_count = len(training_split(len(data), recipe.training, seed)[0])
+    counts = [*samples] or [training_count]
+    training_split(len(data), replace(recipe.training, samples=max(counts)), seed)  # complains now, not after hours of training
     folder.mkdir(parents=True, exist_ok=True)
-    varied = list(product(cells or [recipe.cell], layers or [recipe.layers], hidden or [recipe.hidden], counts))
-    entries = []
-    for k, (cell, depth, width, count) in enumerate(varied):
-        how = replace(recipe.training, samples=count)
-        one = replace(recipe, cell=cell, layers=depth, hidden=width, training=how)
+    combinations = list(product(cells or [recipe.cell], layers or [recipe.layers], hidden or [recipe.hidden], counts))
+    results = []
+    for k, (cell, depth, width, count) in enumerate(combinations):
+        settings = replace(recipe.training, samples=count)
+        variant = replace(recipe, cell=cell, layers=depth, hidden=width, training=settings)
         path = folder / f"{cell}-{width}x{depth}-{count}.safetensors"
-        named = _named(progress, f"{k + 1} of {len(varied)}, {path.stem}")
-        model = train(data, one, to=path, seed=seed, device=device, progress=named)
-        entries.append(_entry(model, one, count, path))
-    return entries
+        named_progress = _with_task_name(progress, f"{k + 1} of {len(combinations)}, {path.stem}")
+        model = train(data, variant, to=path, seed=seed, device=device, progress=named_progress)
+        results.append(_study_result(model, variant, count, path))
+    return results
 
 
-def _named(progress: Progress | None, name: str) -> Progress | None:
+def _with_task_name(progress: ProgressCallback | None, name: str) -> ProgressCallback | None:
     if progress is None:
         return None
     return lambda task, done, total, note: progress(f"{name}, {task}", done, total, note)
 
 
-def _entry(model: Surrogate, recipe: ParameterGru, count: int, path: Path) -> Entry:
-    told, known = model.told, model.told.provenance
-    best = int(known["best_epoch"])
-    return Entry(
+def _study_result(model: Surrogate, recipe: ParameterGru, count: int, path: Path) -> SizeStudyResult:
+    metadata, provenance = model.metadata, model.metadata.provenance
+    best = int(provenance["best_epoch"])
+    return SizeStudyResult(
         recipe.cell, recipe.hidden, recipe.layers, count,
-        weights=sum(weight.numel() for weight in model.module.parameters()),
-        loss=float(told.metrics["loss"]),
-        training=float(told.curves["loss"][best - 1]),
-        epochs=int(known["epochs"]),
+        weight_count=sum(weight.numel() for weight in model.module.parameters()),
+        loss=float(metadata.metrics["loss"]),
+        training=float(metadata.curves["loss"][best - 1]),
+        epochs=int(provenance["epochs"]),
         best_epoch=best,
-        outputs={name: float(own["rse"]) for name, own in told.metrics["outputs"].items()},
-        losses=tuple(told.curves["rse"]),
+        outputs={name: float(errors_of_output["rse"]) for name, errors_of_output in metadata.metrics["outputs"].items()},
+        losses=tuple(metadata.curves["rse"]),
         file=path.name,
     )  # fmt: skip
 
 
-def rows_of(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def size_study_rows(results: Sequence[SizeStudyResult]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """The heads and rows of a table, the best first."""
-    outputs = list(entries[0].outputs) if entries else []
+    outputs = list(results[0].outputs) if results else []
     heads = ("cell", "hidden", "layers", "samples", "weights", "loss (Eq. 4)", "training", "epochs", "best",
              *(f"RSE {name}" for name in outputs))  # fmt: skip
     rows: list[tuple[str, ...]] = []
-    for e in sorted(entries, key=lambda e: e.loss):
-        sizes = tuple(map(str, (e.cell, e.hidden, e.layers, e.samples, e.weights)))
-        own = (f"{e.outputs[name]:.3g}" for name in outputs)
-        rows.append((*sizes, f"{e.loss:.4g}", f"{e.training:.4g}", str(e.epochs), str(e.best_epoch), *own))
+    for result in sorted(results, key=lambda e: e.loss):
+        sizes = tuple(map(str, (result.cell, result.hidden, result.layers, result.samples, result.weight_count)))
+        output_errors = (f"{result.outputs[name]:.3g}" for name in outputs)
+        rows.append((*sizes, f"{result.loss:.4g}", f"{result.training:.4g}", str(result.epochs), str(result.best_epoch), *output_errors))
     return heads, rows
 
 
-def figure(entries: Sequence[Entry], path: str | Path | None = None) -> Figure:
+def size_study_figure(results: Sequence[SizeStudyResult], path: str | Path | None = None) -> Figure:
     """Loss over epochs of every training, and the lowest of each, the best on top."""
     from matplotlib import colormaps
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    ordered = sorted(entries, key=lambda e: e.loss)
-    made = blank(11.0, max(3.8, 0.28 * len(ordered) + 1.6))
-    left, right = made.subplots(1, 2, width_ratios=(1.15, 1.0))
+    ordered = sorted(results, key=lambda e: e.loss)
+    canvas = empty_figure(11.0, max(3.8, 0.28 * len(ordered) + 1.6))
+    left, right = canvas.subplots(1, 2, width_ratios=(1.15, 1.0))
     shades: list[Any] = [colormaps["viridis"](0.92 * k / max(len(ordered) - 1, 1)) for k in range(len(ordered))]
-    for entry, shade in reversed(list(zip(ordered, shades, strict=True))):
-        left.plot(np.arange(1, len(entry.losses) + 1), entry.losses, lw=1.2, color=shade)
+    for result, shade in reversed(list(zip(ordered, shades, strict=True))):
+        left.plot(np.arange(1, len(result.losses) + 1), result.losses, lw=1.2, color=shade)
     left.set(xlabel="epoch", ylabel="loss of validation rows, Eq. (4)", yscale="log")
     left.grid(alpha=0.25)
-    places = np.arange(len(ordered))
-    for place, entry, shade in zip(places, ordered, shades, strict=True):
-        right.plot([entry.training, entry.loss], [place, place], "-", lw=1.0, color="grey")
-        right.plot(entry.training, place, "o", ms=4, mfc="none", color="grey", label="training" if place == 0 else None)
-        right.plot(entry.loss, place, "o", ms=6, color=shade, label="validation" if place == 0 else None)
-    right.set(xscale="log", xlabel="loss at the best epoch", yticks=places)
+    positions = np.arange(len(ordered))
+    for position, result, shade in zip(positions, ordered, shades, strict=True):
+        right.plot([result.training, result.loss], [position, position], "-", lw=1.0, color="grey")
+        right.plot(result.training, position, "o", ms=4, mfc="none", color="grey", label="training" if position == 0 else None)
+        right.plot(result.loss, position, "o", ms=6, color=shade, label="validation" if position == 0 else None)
+    right.set(xscale="log", xlabel="loss at the best epoch", yticks=positions)
     for axis in (left.yaxis, right.xaxis):
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter(NullFormatter())
-    right.set_yticklabels([e.label for e in ordered], fontsize=8)
+    right.set_yticklabels([result_entry.label for result_entry in ordered], fontsize=8)
     right.invert_yaxis()
     right.grid(alpha=0.25)
     right.legend(fontsize=8)
-    return written(made, path, SurrogateError)
+    return save_figure(canvas, path, SurrogateError)

@@ -14,13 +14,13 @@ from torch import Tensor
 
 from creepkit.errors import SurrogateError
 from creepkit.surrogate import files
-from creepkit.surrogate.checkpoint import Checkpoint, call_of
-from creepkit.surrogate.evaluation import compared
-from creepkit.surrogate.fitting import Fit, deviation
-from creepkit.surrogate.metrics import chosen_times, metrics_of
-from creepkit.surrogate.recipe import Progress, Recipe, Samples, Told, Training
-from creepkit.surrogate.surrogate import Surrogate, load
-from creepkit.surrogate.trainable import split, trainable
+from creepkit.surrogate.checkpoint import Checkpoint, training_request
+from creepkit.surrogate.evaluation import compare_predictions
+from creepkit.surrogate.fitting import NetworkTraining, output_deviation
+from creepkit.surrogate.metrics import evaluation_times, comparison_metrics
+from creepkit.surrogate.recipe import ProgressCallback, Recipe, SampleTensors, SurrogateMetadata, Training
+from creepkit.surrogate.surrogate import Surrogate, load_surrogate
+from creepkit.surrogate.trainable import training_split, trainable_samples
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
@@ -34,7 +34,7 @@ def train(
     seed: int = 0,
     training: Training | None = None,
     device: str = "auto",
-    progress: Progress | None = None,
+    progress: ProgressCallback | None = None,
 ) -> Surrogate:
     """Train a network on the accepted samples of a data set and return it as a predictor.
 
@@ -45,35 +45,35 @@ def train(
     progress : called with (task, epochs done, epochs in all, note); the note says Eq. (4) of the validation rows.
     """
     recipe = recipe if training is None else replace(recipe, training=training)  # type: ignore[type-var]
-    place, path, data = _device(device), None if to is None else Path(to), trainable(data)
-    call = call_of(data, recipe, seed)
+    torch_device, path, data = _device(device), None if to is None else Path(to), trainable_samples(data)
+    request = training_request(data, recipe, seed)
     if path is not None and path.exists():
-        return _finished(path, call)
-    samples = recipe.samples(data, progress)
-    rows = split(len(data), recipe.training, seed)
+        return _load_finished(path, request)
+    samples = recipe.sample_tensors(data, progress)
+    rows = training_split(len(data), recipe.training, seed)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        module, told = recipe.module(data, samples, rows[0]), recipe.told(data, samples, rows[0])
-    fit, checkpoint = Fit(module, samples, rows, recipe.training, seed, place), Checkpoint(path, call)
+        module, metadata = recipe.module(data, samples, rows[0]), recipe.metadata(data, samples, rows[0])
+    fit, checkpoint = NetworkTraining(module, samples, rows, recipe.training, seed, torch_device), Checkpoint(path, request)
     checkpoint.restore(fit)
     fit.run(checkpoint.save, progress)
     module = module.cpu().eval()
     module.load_state_dict(fit.best)
-    made = recipe.surrogate(module, _trained(told, data, samples, rows, fit, call))
+    result = recipe.surrogate(module, _training_metadata(metadata, data, samples, rows, fit, request))
     if path is not None:
-        made.save(path)
+        result.save(path)
         checkpoint.remove()
-    return made
+    return result
 
 
-def _trained(
-    told: Told, data: Dataset, samples: Samples, rows: tuple[Tensor, Tensor], fit: Fit, call: dict[str, Any]
-) -> Told:
+def _training_metadata(
+    metadata: SurrogateMetadata, data: Dataset, samples: SampleTensors, rows: tuple[Tensor, Tensor], fit: NetworkTraining, request: dict[str, Any]
+) -> SurrogateMetadata:
     """What the surrogate is told, with how its training went."""
-    found = compared(fit.module, samples, data, rows[1], deviation(samples, rows[0]))
-    times = chosen_times(data.grid, float(np.median(found.times[:, -1])))
+    comparison = compare_predictions(fit.module, samples, data, rows[1], output_deviation(samples, rows[0]))
+    times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
     provenance = {
-        **call,
+        **request,
         "creepkit": version("creepkit"),
         "torch": torch.__version__,
         "device": fit.device.type,
@@ -84,22 +84,22 @@ def _trained(
         "data_set": dict(data.provenance),
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    return replace(told, metrics=metrics_of(found, times), curves=fit.curves, provenance=provenance)
+    return replace(metadata, metrics=comparison_metrics(comparison, times), curves=fit.curves, provenance=provenance)
 
 
-def _finished(path: Path, call: dict[str, Any]) -> Surrogate:
+def _load_finished(path: Path, request: dict[str, Any]) -> Surrogate:
     """The surrogate that the same call has written; SurrogateError where something else lies there."""
-    _, header = files.read(path)
-    before = header.get("provenance", {})
-    if any(before.get(name) != value for name, value in call.items()):
+    _, header = files.read_safetensors(path)
+    provenance = header.get("provenance", {})
+    if any(provenance.get(name) != value for name, value in request.items()):
         raise SurrogateError(f"{path}: another surrogate is there already; remove it or choose another name")
-    return load(path)
+    return load_surrogate(path)
 
 
 def _device(name: str) -> torch.device:
     if name == "auto":
         return torch.device("cuda" if torch.cuda.is_available() else "cpu")
     if name not in ("cpu", "cuda") or (name == "cuda" and not torch.cuda.is_available()):
-        there = "auto, cpu and cuda" if torch.cuda.is_available() else "auto and cpu (torch sees no GPU)"
-        raise SurrogateError(f"device '{name}' is not there; allowed are {there}")
+        available = "auto, cpu and cuda" if torch.cuda.is_available() else "auto and cpu (torch sees no GPU)"
+        raise SurrogateError(f"device '{name}' is not there; allowed are {available}")
     return torch.device(name)

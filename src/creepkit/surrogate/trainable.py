@@ -9,16 +9,16 @@ import torch
 from torch import Tensor
 
 from creepkit.arrays import Bools
-from creepkit.dataset.conditions import UNITS
+from creepkit.dataset.conditions import CONDITION_UNITS
 from creepkit.errors import DatasetError
 from creepkit.surrogate.recipe import Training
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
 
-FEWEST = 10
+LEAST_SAMPLES = 10
 """Samples below which nothing can be learnt and nothing be said of it."""
-SENSIBLE = {
+PLAUSIBLE_RANGES = {
     "modulus": (1e3, 2e6),
     "P1": (1e-4, 1e4),
     "P2": (1e-4, 1e4),
@@ -30,46 +30,46 @@ SENSIBLE = {
 """Where conditions lie that are in MPa, mm and K; a modulus in GPa does not."""
 
 
-def trainable(data: Dataset) -> Dataset:
+def trainable_samples(data: Dataset) -> Dataset:
     """The samples to learn from: accepted ones, each with a history; DatasetError where there are too few."""
-    kept = data.accepted
-    if len(kept) < FEWEST:
+    accepted = data.accepted
+    if len(accepted) < LEAST_SAMPLES:
         raise DatasetError(
-            f"a data set with {len(kept)} accepted samples of {len(data)} teaches nothing; {FEWEST} are the least, "
+            f"a data set with {len(accepted)} accepted samples of {len(data)} teaches nothing; {LEAST_SAMPLES} are the least, "
             "generate more"
         )
-    _check_units(kept)
-    whole: Bools = np.asarray(np.isfinite(kept.values).all(axis=-1))
-    empty = ~whole.any(axis=1)
+    _check_units(accepted)
+    finite_frames: Bools = np.asarray(np.isfinite(accepted.values).all(axis=-1))
+    empty = ~finite_frames.any(axis=1)
     if empty.any():
-        first = int(kept.index[int(np.argmax(empty))])
+        first = int(accepted.index[int(np.argmax(empty))])
         raise DatasetError(
             f"sample {first} of the data set is accepted, but no frame of its history is a number (so it is with "
             f"{int(empty.sum())} in all); the file is damaged, generate it again"
         )
-    return kept
+    return accepted
 
 
 def _check_units(data: Dataset) -> None:
     for name, column in zip(data.condition_names, data.conditions.T, strict=True):
-        low, high = SENSIBLE.get(name, (0.0, np.inf))
+        low, high = PLAUSIBLE_RANGES.get(name, (0.0, np.inf))
         if not ((column >= low) & (column <= high)).all():
             raise DatasetError(
                 f"condition '{name}' of the data set goes from {column.min():g} to {column.max():g}, which is not in "
-                f"{UNITS.get(name, 'its unit')}; it was written in another unit or is damaged"
+                f"{CONDITION_UNITS.get(name, 'its unit')}; it was written in another unit or is damaged"
             )
     if not np.isfinite(data.parameters).all():
         raise DatasetError("some parameter of the data set is not a number; the file is damaged, generate it again")
 
 
-def split(count: int, training: Training, seed: int) -> tuple[Tensor, Tensor]:
+def training_split(count: int, training: Training, seed: int) -> tuple[Tensor, Tensor]:
     """Positions of training and validation rows, in the order of the data; the seed draws those set aside."""
     order = np.random.default_rng(seed).permutation(count)
-    aside = min(max(round(training.validation * count), 1), count - 1)
-    left = np.sort(order[aside:])
-    if training.samples is not None and training.samples > len(left):
+    validation_count = min(max(round(training.validation * count), 1), count - 1)
+    training_rows = np.sort(order[validation_count:])
+    if training.samples is not None and training.samples > len(training_rows):
         raise DatasetError(
             f"there are not {training.samples} samples to learn from: the data set has {count} accepted ones, of which "
-            f"{aside} are set aside; ask for {len(left)} at most or generate more"
+            f"{validation_count} are set aside; ask for {len(training_rows)} at most or generate more"
         )
-    return torch.from_numpy(left[: training.samples]), torch.from_numpy(np.sort(order[:aside]))
+    return torch.from_numpy(training_rows[: training.samples]), torch.from_numpy(np.sort(order[:validation_count]))

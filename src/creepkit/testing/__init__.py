@@ -17,28 +17,28 @@ from creepkit.kernels.lowering import lower
 from creepkit.language.law import CreepLaw
 from creepkit.testing import promises
 from creepkit.testing.parity import DERIVATIVE_TOLERANCE, VALUE_TOLERANCE
-from creepkit.testing.report import Check, Report
-from creepkit.testing.sampling import Samples, sample
+from creepkit.testing.report import ConformanceCheck, ConformanceReport
+from creepkit.testing.sampling import LawSamples, draw_samples
 
-__all__ = ["DERIVATIVE_TOLERANCE", "VALUE_TOLERANCE", "Check", "Report", "Samples", "check_law", "sample"]
+__all__ = ["DERIVATIVE_TOLERANCE", "VALUE_TOLERANCE", "ConformanceCheck", "ConformanceReport", "LawSamples", "check_law", "draw_samples"]
 
-_FEWEST = 8
+_FEWEST_SAMPLES = 8
 """Samples at which the constraints must hold for a verdict to mean something."""
 
-_PROMISES: dict[str, Callable[[CreepLaw, Samples], Iterator[Check]]] = {
-    "table": promises.table,
-    "printing": promises.printing,
-    "signs": promises.signs,
-    "finite": promises.finite,
-    "monotone": promises.monotone,
-    "parity": promises.parity,
-    "torch gradients": promises.gradients,
-    "switches": promises.switches,
-    "leading exponent": promises.leading,
+_LAW_CHECKS: dict[str, Callable[[CreepLaw, LawSamples], Iterator[ConformanceCheck]]] = {
+    "table": promises.check_declarations,
+    "printing": promises.check_printing,
+    "signs": promises.check_signs,
+    "finite": promises.check_finite,
+    "monotone": promises.check_monotonic,
+    "parity": promises.check_parity,
+    "torch gradients": promises.check_torch_gradients,
+    "switches": promises.check_switches,
+    "leading exponent": promises.check_leading_exponent,
 }
 
 
-def check_law(law: CreepLaw, samples: int = 64, seed: int = 0) -> Report:
+def check_law(law: CreepLaw, samples: int = 64, seed: int = 0) -> ConformanceReport:
     """Run every check on a law; never raises for a law that fails one.
 
     samples : a power of two.
@@ -46,25 +46,25 @@ def check_law(law: CreepLaw, samples: int = 64, seed: int = 0) -> Report:
     try:
         lower(law, "numpy")
     except CreepkitError as error:
-        return Report(law, (Check("lowering", False, str(error)),))
-    drawn = sample(law, samples, seed)
-    if len(drawn) < _FEWEST:
-        detail = f"the constraints hold at {len(drawn)} of the samples; widen them or narrow the bounds"
-        return Report(law, (Check("constraints", False, detail),))
-    found: list[Check] = []
-    for name, promise in _PROMISES.items():
-        found += _kept(name, promise, law, drawn)
-        if name == "signs" and not found[-1].ok:
+        return ConformanceReport(law, (ConformanceCheck("lowering", False, str(error)),))
+    sampled = draw_samples(law, samples, seed)
+    if len(sampled) < _FEWEST_SAMPLES:
+        detail = f"the constraints hold at {len(sampled)} of the samples; widen them or narrow the bounds"
+        return ConformanceReport(law, (ConformanceCheck("constraints", False, detail),))
+    results: list[ConformanceCheck] = []
+    for name, check in _LAW_CHECKS.items():
+        results += _checks_of_property(name, check, law, sampled)
+        if name == "signs" and not results[-1].passed:
             break  # the logarithm of a negative term means nothing
-    return Report(law, tuple(found))
+    return ConformanceReport(law, tuple(results))
 
 
-def _kept(
-    name: str, promise: Callable[[CreepLaw, Samples], Iterator[Check]], law: CreepLaw, drawn: Samples
-) -> list[Check]:
+def _checks_of_property(
+    name: str, check: Callable[[CreepLaw, LawSamples], Iterator[ConformanceCheck]], law: CreepLaw, sampled: LawSamples
+) -> list[ConformanceCheck]:
     """The findings of one promise; one that cannot even be examined is a finding too."""
     try:
         with np.errstate(all="ignore"):
-            return list(promise(law, drawn))
+            return list(check(law, sampled))
     except (CreepkitError, ArithmeticError, ValueError) as error:
-        return [Check(name, False, f"{type(error).__name__}: {error}")]
+        return [ConformanceCheck(name, False, f"{type(error).__name__}: {error}")]

@@ -8,32 +8,32 @@ from creepkit.language.law import CreepLaw
 
 
 @dataclass(frozen=True)
-class Check:
+class ConformanceCheck:
     """One finding: what was checked, whether it holds, and the figure or the sentence that says so."""
 
     name: str
-    ok: bool
+    passed: bool
     detail: str
 
 
 @dataclass(frozen=True)
-class Report:
+class ConformanceReport:
     """All findings about one law."""
 
     law: CreepLaw
-    checks: tuple[Check, ...]
+    checks: tuple[ConformanceCheck, ...]
 
     @property
-    def ok(self) -> bool:
+    def passed(self) -> bool:
         """Whether every check holds."""
-        return all(check.ok for check in self.checks)
+        return all(check.passed for check in self.checks)
 
     @property
-    def failures(self) -> tuple[Check, ...]:
+    def failures(self) -> tuple[ConformanceCheck, ...]:
         """The checks that do not hold."""
-        return tuple(check for check in self.checks if not check.ok)
+        return tuple(check for check in self.checks if not check.passed)
 
     def __str__(self) -> str:
-        lines = [f"{self.law.name}: {'conforms' if self.ok else 'does NOT conform'}"]
-        lines += [f"  {'ok  ' if c.ok else 'FAIL'} {c.name}: {c.detail}" for c in self.checks]
+        lines = [f"{self.law.name}: {'conforms' if self.passed else 'does NOT conform'}"]
+        lines += [f"  {'ok  ' if c.passed else 'FAIL'} {c.name}: {c.detail}" for c in self.checks]
         return "\n".join(lines)

@@ -12,17 +12,17 @@ from creepkit.arrays import Bools, Floats
 from creepkit.kernels.interface import POINT_SIZE
 from creepkit.language.law import CreepLaw
 from creepkit.language.params import State
-from creepkit.language.symbols import POINT
+from creepkit.language.symbols import POINT_VARIABLES
 
-STRESS, STRAIN, TIME, WARMTH = (1e-3, 2000.0), (1e-12, 1.0), (1e-3, 1e6), (600.0, 1600.0)
+STRESS_RANGE, STRAIN_RANGE, TIME_RANGE, TEMPERATURE_RANGE = (1e-3, 2000.0), (1e-12, 1.0), (1e-3, 1e6), (600.0, 1600.0)
 """Ranges in MPa, 1, s and K."""
 
-_BLOCKS = 64
+_MOST_BATCHES = 64
 """How many times as many points are drawn, at most, to find enough where the law's constraints hold."""
 
 
 @dataclass(frozen=True)
-class Samples:
+class LawSamples:
     """points : (samples, 6 + states); theta : (samples, parameters), internal; the constraints hold at all of them."""
 
     points: Floats
@@ -35,27 +35,27 @@ class Samples:
         """The columns of points and theta, as the internal methods of kernels take them."""
         return [*self.points.T, *self.theta.T]
 
-    def at(self, **columns: float) -> Samples:
+    def at(self, **columns: float) -> LawSamples:
         """The same with variables of the point set to numbers: at(strain=0.0)."""
         points = self.points.copy()
         for name, value in columns.items():
-            points[:, [s.name for s in POINT].index(name)] = value
-        return Samples(points, self.theta)
+            points[:, [s.name for s in POINT_VARIABLES].index(name)] = value
+        return LawSamples(points, self.theta)
 
 
-def sample(law: CreepLaw, samples: int, seed: int = 0) -> Samples:
+def draw_samples(law: CreepLaw, samples: int, seed: int = 0) -> LawSamples:
     """Return Sobol points at which the law's constraints hold: `samples`, a power of two, or fewer if such are rare."""
     size = POINT_SIZE + len(law.states) + len(law.params)
     sequence = qmc.Sobol(size, seed=seed)
     points, theta = np.empty((0, POINT_SIZE + len(law.states))), np.empty((0, len(law.params)))
-    for _ in range(_BLOCKS):
+    for _ in range(_MOST_BATCHES):
         unit = sequence.random(samples)
-        new_points, new_theta = _points(law, unit[:, : points.shape[1]]), _theta(law, unit[:, points.shape[1] :])
-        holds = constraints_hold(law, new_points, new_theta)
-        points, theta = np.vstack([points, new_points[holds]]), np.vstack([theta, new_theta[holds]])
+        new_points, new_theta = _to_points(law, unit[:, : points.shape[1]]), _to_theta(law, unit[:, points.shape[1] :])
+        satisfied = constraints_hold(law, new_points, new_theta)
+        points, theta = np.vstack([points, new_points[satisfied]]), np.vstack([theta, new_theta[satisfied]])
         if len(points) >= samples:
             break
-    return Samples(points[:samples], theta[:samples])
+    return LawSamples(points[:samples], theta[:samples])
 
 
 def constraints_hold(law: CreepLaw, points: Floats, theta: Floats) -> Bools:
@@ -63,30 +63,30 @@ def constraints_hold(law: CreepLaw, points: Floats, theta: Floats) -> Bools:
     values = [np.exp(t) if p.scale == "log" else t for p, t in zip(law.params.values(), theta.T, strict=True)]
     holds = np.ones(len(points), bool)
     for relation in law.constraints:
-        test = sympy.lambdify((*POINT, *law.states, *law.params), relation, "numpy", dummify=True)
+        test = sympy.lambdify((*POINT_VARIABLES, *law.states, *law.params), relation, "numpy", dummify=True)
         holds &= np.asarray(test(*points.T, *values), bool)
     return holds
 
 
-def _points(law: CreepLaw, unit: Floats) -> Floats:
+def _to_points(law: CreepLaw, unit: Floats) -> Floats:
     """Stress, strain, time spread over decades; the principal stress 0.4 to 1 of the stress, the mean -1/3 to 2/3."""
-    stress, strain, time = (_log_between(u, r) for u, r in zip(unit.T, (STRESS, STRAIN, TIME), strict=False))
-    temperature = WARMTH[0] + unit[:, 3] * (WARMTH[1] - WARMTH[0])
+    stress, strain, time = (_log_between(u, r) for u, r in zip(unit.T, (STRESS_RANGE, STRAIN_RANGE, TIME_RANGE), strict=False))
+    temperature = TEMPERATURE_RANGE[0] + unit[:, 3] * (TEMPERATURE_RANGE[1] - TEMPERATURE_RANGE[0])
     point = [stress, strain, time, temperature, stress * (0.4 + 0.6 * unit[:, 4]), stress * (unit[:, 5] - 1 / 3)]
-    inner = [_between(u, state) for u, state in zip(unit.T[POINT_SIZE:], law.states.values(), strict=True)]
-    return np.stack([*point, *inner], axis=1)
+    state_values = [_state_between(u, state) for u, state in zip(unit.T[POINT_SIZE:], law.states.values(), strict=True)]
+    return np.stack([*point, *state_values], axis=1)
 
 
-def _theta(law: CreepLaw, unit: Floats) -> Floats:
+def _to_theta(law: CreepLaw, unit: Floats) -> Floats:
     bounds = [[p.to_internal(b) for b in p.bounds] for p in law.params.values()]
     low, high = np.array(bounds).reshape(-1, 2).T
     return np.asarray(low + unit * (high - low))
 
 
-def _between(u: Floats, state: State) -> Floats:
+def _state_between(u: Floats, state: State) -> Floats:
     """From just after the start of an internal variable to just before its limit (or 1 from its start)."""
-    reach = 1.0 if state.limit is None else state.limit - state.initial
-    return state.initial + (0.01 + 0.94 * u) * reach
+    distance = 1.0 if state.limit is None else state.limit - state.initial
+    return state.initial + (0.01 + 0.94 * u) * distance
 
 
 def _log_between(u: Floats, bounds: tuple[float, float]) -> Floats:

@@ -9,62 +9,62 @@ from typing import Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.kernels.calling import call
+from creepkit.kernels.calling import call_entry
 from creepkit.kernels.interface import POINT_SIZE
-from creepkit.kernels.lowering import Kernel, lower
+from creepkit.kernels.lowering import ArrayKernel, lower
 from creepkit.language.law import CreepLaw
-from creepkit.testing.sampling import Samples
+from creepkit.testing.sampling import LawSamples
 
 
 @dataclass(frozen=True)
-class Table:
+class KernelTable:
     """rows : (samples, 1 + S, 1 + 6 + S + P) value and derivatives of the rate and of each state rate.
 
     logs : (samples,) ln rate.
     """
 
     rows: Floats
-    logs: Floats
+    log_rates: Floats
 
 
-def numpy_table(law: CreepLaw, drawn: Samples) -> Table:
+def evaluate_numpy(law: CreepLaw, samples: LawSamples) -> KernelTable:
     """Evaluate the NumPy kernel."""
-    return _stacked(lower(law, "numpy"), drawn.arguments())
+    return _kernel_table(lower(law, "numpy"), samples.arguments())
 
 
-def torch_table(law: CreepLaw, drawn: Samples) -> Table:
+def evaluate_torch(law: CreepLaw, samples: LawSamples) -> KernelTable:
     """Evaluate the torch kernel."""
     import torch
 
-    return _stacked(lower(law, "torch"), [torch.tensor(column) for column in drawn.arguments()])
+    return _kernel_table(lower(law, "torch"), [torch.tensor(column) for column in samples.arguments()])
 
 
-def numba_table(law: CreepLaw, drawn: Samples) -> Table:
+def evaluate_numba(law: CreepLaw, samples: LawSamples) -> KernelTable:
     """Evaluate the compiled entries."""
     compiled = lower(law, "numba")
     rows, width, count = 1 + compiled.states, POINT_SIZE + compiled.states, len(law.params)
-    blocks, logs = [], []
-    for point, theta in zip(drawn.points, drawn.theta, strict=True):
-        out = call(compiled, "sensitivity", point[None], theta)[0][0]
+    blocks, log_rates = [], []
+    for point, theta in zip(samples.points, samples.theta, strict=True):
+        out = call_entry(compiled, "sensitivity", point[None], theta)[0][0]
         to_point = out[rows : rows + rows * width].reshape(rows, width)
         to_theta = out[rows + rows * width :].reshape(rows, count)
         blocks.append(np.hstack([out[:rows, None], to_point, to_theta]))
-        logs.append(call(compiled, "update", point[None], theta)[0][0, 0])
-    return Table(np.array(blocks), np.array(logs))
+        log_rates.append(call_entry(compiled, "update", point[None], theta)[0][0, 0])
+    return KernelTable(np.array(blocks), np.array(log_rates))
 
 
-def _stacked(kernel: Kernel, arguments: Sequence[Any]) -> Table:
-    found = kernel.internal_derivatives(*arguments)
-    values = [found.rate, *kernel.internal_rates(*arguments)[1:]]
-    slopes = [{**found.point, **found.params}, *found.state_rates.values()]
-    rows = [[value, *along.values()] for value, along in zip(values, slopes, strict=True)]
+def _kernel_table(kernel: ArrayKernel, arguments: Sequence[Any]) -> KernelTable:
+    result = kernel.internal_derivatives(*arguments)
+    values = [result.rate, *kernel.internal_rates(*arguments)[1:]]
+    derivatives = [{**result.point, **result.params}, *result.state_rates.values()]
+    rows = [[value, *derivatives_of_row.values()] for value, derivatives_of_row in zip(values, derivatives, strict=True)]
     columns = np.array([[np.asarray(column, float) for column in row] for row in rows])
-    return Table(np.moveaxis(columns, -1, 0), np.asarray(kernel.internal_log_rate(*arguments), float))
+    return KernelTable(np.moveaxis(columns, -1, 0), np.asarray(kernel.internal_log_rate(*arguments), float))
 
 
-TABLES: dict[str, Callable[[CreepLaw, Samples], Table]] = {
-    "numpy": numpy_table,
-    "torch": torch_table,
-    "numba": numba_table,
+KERNEL_EVALUATORS: dict[str, Callable[[CreepLaw, LawSamples], KernelTable]] = {
+    "numpy": evaluate_numpy,
+    "torch": evaluate_torch,
+    "numba": evaluate_numba,
 }
 """{target: function that evaluates it}."""

@@ -11,17 +11,17 @@ from typing import Any
 
 import sympy
 
-from creepkit.kernels.printing import FUNCTIONS, KernelPrinter
+from creepkit.kernels.printing import TARGET_FUNCTIONS, KernelPrinter
 
-WIDTH = 72
+FORTRAN_LINE_LENGTH = 72
 _NUMBER = re.compile(r"(?<![\w.])(\d+\.?\d*)(?:[eE]([+-]?\d+))?(?![\w.])")
 _TOKEN = re.compile(r"\d+\.?\d*(?:d[+-]?\d+)?|\w+|\*\*|[<>=/]=|::|\S|\s+")
 
-_WORDS = """
+_FORTRAN_WORDS = """
 abs atanh contains do double else end endif exit function if implicit intent log max merge min none out parameter
 precision pure return subroutine then x
 """
-RESERVED = frozenset(_WORDS.split()) | {*FUNCTIONS}
+FORTRAN_RESERVED = frozenset(_FORTRAN_WORDS.split()) | {*TARGET_FUNCTIONS}
 """Words that no name of a law may be: those of the routine that evaluates it."""
 
 
@@ -46,59 +46,59 @@ class FortranPrinter(KernelPrinter):
 _PRINTER = FortranPrinter({"standard": "python3"})
 
 
-def text_of(expression: sympy.Basic) -> str:
+def fortran_expression(expression: sympy.Basic) -> str:
     """An expression as Fortran, every number in double precision."""
-    return str(_NUMBER.sub(_double, _PRINTER.doprint(expression))).replace("!=", "/=")
+    return str(_NUMBER.sub(_double_literal, _PRINTER.doprint(expression))).replace("!=", "/=")
 
 
-def number(value: float) -> str:
+def fortran_number(value: float) -> str:
     """A number in double precision, all of its digits."""
-    return _NUMBER.sub(_double, repr(float(value)))
+    return _NUMBER.sub(_double_literal, repr(float(value)))
 
 
-def _double(match: re.Match[str]) -> str:
+def _double_literal(match: re.Match[str]) -> str:
     digits = match[1] if "." in match[1] else f"{match[1]}.0"
     return f"{digits}d{int(match[2] or 0)}"
 
 
-def statement(text: str, depth: int = 0) -> list[str]:
+def fortran_statement(text: str, depth: int = 0) -> list[str]:
     """One statement as lines of at most 72 columns, broken between tokens."""
-    lead, more = " " * (6 + 2 * depth), f"     &{' ' * (2 * depth + 2)}"
-    lines, line = [], lead
+    first_indent, continuation = " " * (6 + 2 * depth), f"     &{' ' * (2 * depth + 2)}"
+    lines, line = [], first_indent
     for token in _TOKEN.findall(text):
-        if len(line) + len(token) > WIDTH:
+        if len(line) + len(token) > FORTRAN_LINE_LENGTH:
             lines.append(line.rstrip())
-            line = more + token.lstrip()
+            line = continuation + token.lstrip()
         else:
             line += token
     return [*lines, line.rstrip()]
 
 
-def statements(texts: Iterable[str], depth: int = 0) -> list[str]:
+def fortran_statements(texts: Iterable[str], depth: int = 0) -> list[str]:
     """Several statements; indentation of a text adds to the depth, two blanks a level."""
     lines = []
     for text in texts:
         body = text.lstrip(" ")
-        lines += statement(body, depth + (len(text) - len(body)) // 2) if body[:1] != "!" else [body]
+        lines += fortran_statement(body, depth + (len(text) - len(body)) // 2) if body[:1] != "!" else [body]
     return lines
 
 
-def fitted(text: str) -> list[str]:
+def wrapped_lines(text: str) -> list[str]:
     """Lines of fixed form, each that is longer than 72 columns broken between tokens."""
     lines = []
     for line in text.splitlines():
         body = line[6:].lstrip(" ")
-        broken = statement(body, (len(line[6:]) - len(body)) // 2) if len(line) > WIDTH and line[:1] != "!" else [line]
-        lines += [line[:6] + broken[0][6:], *broken[1:]]
+        wrapped = fortran_statement(body, (len(line[6:]) - len(body)) // 2) if len(line) > FORTRAN_LINE_LENGTH and line[:1] != "!" else [line]
+        lines += [line[:6] + wrapped[0][6:], *wrapped[1:]]
     return lines
 
 
-def assignments(steps: Iterable[tuple[sympy.Symbol, sympy.Expr]]) -> list[str]:
+def fortran_assignments(definitions: Iterable[tuple[sympy.Symbol, sympy.Expr]]) -> list[str]:
     """Steps as statements."""
-    return [f"{symbol} = {text_of(expression)}" for symbol, expression in steps]
+    return [f"{symbol} = {fortran_expression(expression)}" for symbol, expression in definitions]
 
 
-def declared(names: Sequence[str]) -> list[str]:
+def double_declarations(names: Sequence[str]) -> list[str]:
     """Declarations of double precision variables, some a statement."""
     return [f"double precision {', '.join(names[k : k + 6])}" for k in range(0, len(names), 6)]
 
@@ -106,27 +106,27 @@ def declared(names: Sequence[str]) -> list[str]:
 # ---- the stable functions ------------------------------------------------------------------------------------------
 
 
-def functions(called: Iterable[str]) -> list[str]:
+def stable_function_definitions(names_called: Iterable[str]) -> list[str]:
     """Internal functions, as statements: those called and those they need in turn."""
-    needed: dict[str, None] = {}
+    required: dict[str, None] = {}
 
-    def need(name: str) -> None:
-        for other in _CALLS.get(name, ()):
-            need(other)
-        needed[name] = None
+    def require(name: str) -> None:
+        for other in _FUNCTION_CALLS.get(name, ()):
+            require(other)
+        required[name] = None
 
-    for name in sorted(set(called) & _BODIES.keys()):
-        need(name)
-    return [line for name in needed for line in _function(name)]
+    for name in sorted(set(names_called) & _FUNCTION_BODIES.keys()):
+        require(name)
+    return [line for name in required for line in _function_definition(name)]
 
 
-def calls_in(texts: Iterable[str]) -> set[str]:
+def called_names(texts: Iterable[str]) -> set[str]:
     """The names that statements call."""
     return {name for text in texts for name in re.findall(r"(\w+)\(", text)}
 
 
-def _function(name: str) -> list[str]:
-    arguments, locals_, body = _BODIES[name]
+def _function_definition(name: str) -> list[str]:
+    arguments, locals_, body = _FUNCTION_BODIES[name]
     logical = name in ("both", "either")
     kind = "logical" if logical else "double precision"
     return [
@@ -138,7 +138,7 @@ def _function(name: str) -> list[str]:
     ]
 
 
-_BODIES: dict[str, tuple[str, str, tuple[str, ...]]] = {
+_FUNCTION_BODIES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "power": ("a, b", "", ("power = a**b",)),
     "square": ("a", "", ("square = a*a",)),
     "both": ("a, b", "", ("both = a .and. b",)),
@@ -215,7 +215,7 @@ Fortran has neither log1p nor expm1: 2 artanh(a/(2 + a)) and 2 sinh(a/2) exp(a/2
 an optimiser does to sums.
 """
 
-_CALLS = {
+_FUNCTION_CALLS = {
     "log_sinh": ("expm1",),
     "log_cosh": ("log1p",),
     "log_rise": ("log1p", "expm1"),

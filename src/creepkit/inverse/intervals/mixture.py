@@ -18,54 +18,54 @@ from scipy.stats import t as student
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.intervals.quantities import Function, local_exponent, log_rate
-from creepkit.inverse.uncertainty import band
+from creepkit.inverse.intervals.quantities import CoordinateFunction, local_exponent, log_rate
+from creepkit.inverse.uncertainty import delta_method
 
-HALVINGS = 80
+BISECTIONS = 80
 """Of the interval between the lowest and the highest quantile of the parts: to the last digit."""
-CLOSED = 1e9
+NORMAL_FREEDOM = 1e9
 """Degrees of freedom at which Student's distribution is the normal one."""
-TAILS = (0.5, 0.025, 0.975)
+INTERVAL_PROBABILITIES = (0.5, 0.025, 0.975)
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
+class MixtureDistribution:
     """The parts of a mixture: location, spread and degrees of freedom of each, with its weight.
 
     weight, freedom : (parts,); middle, sd : (parts, ...).
     """
 
     weight: Floats
-    freedom: Floats
-    middle: Floats
-    sd: Floats
+    degrees_of_freedom: Floats
+    location: Floats
+    scale: Floats
 
-    def below(self, x: Floats) -> Floats:
+    def cumulative(self, x: Floats) -> Floats:
         """(...,) the probability of less than x (...,)."""
-        each = student.cdf((x - self.middle) / self.sd, self._freedom)
-        return np.asarray(np.einsum("p,p...->...", self.weight, each), float)
+        probabilities = student.cdf((x - self.location) / self.scale, self._freedom)
+        return np.asarray(np.einsum("p,p...->...", self.weight, probabilities), float)
 
     def quantile(self, probability: float) -> Floats:
         """(...,) by halving, between the lowest and the highest quantile of the parts."""
-        each = self.middle + self.sd * student.ppf(probability, self._freedom)
-        low, high = each.min(axis=0), each.max(axis=0)
-        for _ in range(HALVINGS):
-            half = 0.5 * (low + high)
-            under = self.below(half) < probability
-            low, high = np.where(under, half, low), np.where(under, high, half)
-        return np.asarray(0.5 * (low + high), float)
+        quantiles = self.location + self.scale * student.ppf(probability, self._freedom)
+        lower, upper = quantiles.min(axis=0), quantiles.max(axis=0)
+        for _ in range(BISECTIONS):
+            midpoint = 0.5 * (lower + upper)
+            is_below = self.cumulative(midpoint) < probability
+            lower, upper = np.where(is_below, midpoint, lower), np.where(is_below, upper, midpoint)
+        return np.asarray(0.5 * (lower + upper), float)
 
     def interval(self) -> tuple[Floats, Floats, Floats]:
         """Median and 95 % interval, (...,) each."""
-        middle, low, high = (self.quantile(p) for p in TAILS)
-        return middle, low, high
+        median, low, high = (self.quantile(p) for p in INTERVAL_PROBABILITIES)
+        return median, low, high
 
     @property
     def _freedom(self) -> Floats:
-        return self.freedom.reshape(-1, *(1 for _ in self.middle.shape[1:]))
+        return self.degrees_of_freedom.reshape(-1, *(1 for _ in self.location.shape[1:]))
 
 
-class Weighed(Protocol):
+class WeightedFit(Protocol):
     """One law of a ranking: its identification and its weight."""
 
     @property
@@ -79,17 +79,17 @@ class Weighed(Protocol):
         ...
 
 
-class Laws(Protocol):
+class WeightedLaws(Protocol):
     """A ranking."""
 
     @property
-    def laws(self) -> Sequence[Weighed]:
+    def laws(self) -> Sequence[WeightedFit]:
         """Its laws."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
-class Mixture:
+class ModelAverage:
     """Laws with weights that add up to one, each with its own posterior."""
 
     fits: tuple[Identification, ...]
@@ -104,12 +104,12 @@ class Mixture:
         object.__setattr__(self, "weights", tuple(float(w) / total for w in self.weights))
 
     @classmethod
-    def of(cls, source: Laws | Identification) -> Mixture:
+    def from_ranking(cls, source: WeightedLaws | Identification) -> ModelAverage:
         """The laws of a ranking; a single identification is a mixture of one."""
         if isinstance(source, Identification):
             return cls((source,), (1.0,))
-        known = [r for r in source.laws if r.weight > 0]
-        return cls(tuple(r.fit for r in known), tuple(r.weight for r in known))
+        weighted = [r for r in source.laws if r.weight > 0]
+        return cls(tuple(r.fit for r in weighted), tuple(r.weight for r in weighted))
 
     def rate(
         self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
@@ -119,48 +119,48 @@ class Mixture:
 
         stress MPa, temperature K; what is not given is that of the best law's reference point.
         """
-        parts = self.parts(log_rate, stress, temperature, strain, time)
-        middle, low, high = (np.exp(v) for v in parts.interval())
-        return middle, low, high
+        distribution = self.distribution(log_rate, stress, temperature, strain, time)
+        median, low, high = (np.exp(v) for v in distribution.interval())
+        return median, low, high
 
     def local_exponent(
         self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
     ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
         """Median local stress exponent over the laws, with its 95 % interval."""
-        return self.parts(local_exponent, stress, temperature, strain, time).interval()
+        return self.distribution(local_exponent, stress, temperature, strain, time).interval()
 
-    def parts(
-        self, what: Callable[..., Function], stress: ArrayLike, temperature: ArrayLike | None,
+    def distribution(
+        self, quantity: Callable[..., CoordinateFunction], stress: ArrayLike, temperature: ArrayLike | None,
         strain: ArrayLike | None, time: ArrayLike | None,
-    ) -> Parts:  # fmt: skip
+    ) -> MixtureDistribution:  # fmt: skip
         """The distribution under each law of what(coordinates, stress, temperature, strain, time), at one point."""
-        r = self.fits[0].reference
+        reference = self.fits[0].reference
         point = [
             default if given is None else given
-            for given, default in ((temperature, r.temperature), (strain, r.strain), (time, r.time))
+            for given, default in ((temperature, reference.temperature), (strain, reference.strain), (time, reference.time))
         ]
-        found = [_under(fit, what(fit.coordinates, stress, *point)) for fit in self.fits]
-        middle, sd = (np.stack([each[k] for each in found]) for k in (0, 1))
-        return Parts(np.array(self.weights), freedoms(self.fits), middle, sd)
+        normals = [_normal_under_law(fit, quantity(fit.coordinates, stress, *point)) for fit in self.fits]
+        location, scale = (np.stack([each[k] for each in normals]) for k in (0, 1))
+        return MixtureDistribution(np.array(self.weights), degrees_of_freedom(self.fits), location, scale)
 
     def __str__(self) -> str:
-        r = self.fits[0].reference
-        rate, low, high = (float(v) for v in self.rate(r.stress))
-        n, less, more = (float(v) for v in self.local_exponent(r.stress))
+        reference = self.fits[0].reference
+        rate, low, high = (float(v) for v in self.rate(reference.stress))
+        exponent, exponent_low, exponent_high = (float(v) for v in self.local_exponent(reference.stress))
         names = ", ".join(f"{fit.law.name} ({w:.2g})" for fit, w in zip(self.fits, self.weights, strict=True))
         return (
-            f"over the laws {names}: rate at {r.stress:.4g} MPa, {r.temperature:.0f} K {rate:.3g} "
-            f"[{low:.3g}, {high:.3g}] 1/s, local stress exponent {n:.3g} [{less:.3g}, {more:.3g}]"
+            f"over the laws {names}: rate at {reference.stress:.4g} MPa, {reference.temperature:.0f} K {rate:.3g} "
+            f"[{low:.3g}, {high:.3g}] 1/s, local stress exponent {exponent:.3g} [{exponent_low:.3g}, {exponent_high:.3g}]"
         )
 
 
-def freedoms(fits: Sequence[Identification]) -> Floats:
+def degrees_of_freedom(fits: Sequence[Identification]) -> Floats:
     """(fits,) degrees of freedom of their intervals."""
-    return np.array([min(max(fit.freedom, 1.0), CLOSED) for fit in fits])
+    return np.array([min(max(fit.freedom, 1.0), NORMAL_FREEDOM) for fit in fits])
 
 
-def _under(fit: Identification, function: Function) -> tuple[Floats, Floats]:
+def _normal_under_law(fit: Identification, function: CoordinateFunction) -> tuple[Floats, Floats]:
     """Value and standard deviation under one law; never quite zero, so that a mixture of certainties has quantiles."""
-    middle, sd = band(function, fit.u, fit.covariance)
+    middle, sd = delta_method(function, fit.u, fit.covariance)
     return middle, np.maximum(sd, 1e-12 * np.maximum(np.abs(middle), 1.0))

@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.figures import blank, written
+from creepkit.figures import empty_figure, save_figure
 from creepkit.records import ZERO_CELSIUS
 
 if TYPE_CHECKING:
@@ -18,48 +18,48 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.inverse.intervals.correlation import Correlation
-    from creepkit.inverse.intervals.profile import Profile
-    from creepkit.inverse.intervals.sampling import Samples
+    from creepkit.inverse.intervals.profile import ProfileLikelihood
+    from creepkit.inverse.intervals.sampling import PosteriorSamples
     from creepkit.inverse.intervals.temperature_band import RateBand
 
-SHOWN = 2000
+MAX_DRAWS = 2000
 """Draws in a panel of pairs; more are a blot."""
-WIDE = 30.0
+LOGARITHMIC_RATIO = 30.0
 """Ratio of largest to smallest value beyond which an axis is logarithmic."""
 
 
-def profile_figure(found: Profile, path: str | Path | None = None) -> Figure:
+def profile_figure(profile: ProfileLikelihood, path: str | Path | None = None) -> Figure:
     """The rise of chi-square over the quantity, its limit, and the parabola of Laplace's approximation."""
-    figure, axes = _figure(5.2, 4.2)
-    logarithmic = bool((found.values > 0).all()) and float(found.values.max() / found.values.min()) > WIDE
-    axes.plot(found.values, found.chi_square, "o-", ms=4, color="C0", label="profile")
-    low, high = found.laplace
+    figure, axes = _figure_and_axes(5.2, 4.2)
+    logarithmic = bool((profile.values > 0).all()) and float(profile.values.max() / profile.values.min()) > LOGARITHMIC_RATIO
+    axes.plot(profile.values, profile.chi_square, "o-", ms=4, color="C0", label="profile")
+    low, high = profile.laplace
     scale = np.log if low > 0 and logarithmic else np.asarray
     grid = np.geomspace(low, high, 80) if low > 0 and logarithmic else np.linspace(low, high, 80)
     middle, half = 0.5 * (scale(low) + scale(high)), 0.5 * (scale(high) - scale(low))
-    axes.plot(grid, found.limit * ((scale(grid) - middle) / half) ** 2, "--", color="C1", label="Laplace")
-    axes.axhline(found.limit, color="black", lw=0.8, label=f"{100 * found.level:g} %")
-    for end in (found.low, found.high):
+    axes.plot(grid, profile.limit * ((scale(grid) - middle) / half) ** 2, "--", color="C1", label="Laplace")
+    axes.axhline(profile.limit, color="black", lw=0.8, label=f"{100 * profile.level:g} %")
+    for end in (profile.low, profile.high):
         if end is not None:
             axes.axvline(end, color="black", lw=0.8, ls=":")
-    unit = "" if found.unit == "1" else f", {found.unit}"
-    axes.set_xlim(*_with_margin(found.values, logarithmic))
-    axes.set(xlabel=f"{found.name}{unit}", ylabel="rise of chi-square", ylim=(0.0, 1.6 * found.limit))
+    unit = "" if profile.unit == "1" else f", {profile.unit}"
+    axes.set_xlim(*_with_margin(profile.values, logarithmic))
+    axes.set(xlabel=f"{profile.name}{unit}", ylabel="rise of chi-square", ylim=(0.0, 1.6 * profile.limit))
     if logarithmic:
         axes.set_xscale("log")
     axes.legend(fontsize=8)
     axes.grid(alpha=0.25)
-    return written(figure, path)
+    return save_figure(figure, path)
 
 
 def _with_margin(values: Floats, logarithmic: bool) -> tuple[float, float]:
     ends = np.log(values[[0, -1]]) if logarithmic else values[[0, -1]]
-    room = 0.08 * float(np.ptp(ends)) + 1e-12
-    low, high = float(ends[0]) - room, float(ends[1]) + room
-    return (float(np.exp(low)), float(np.exp(high))) if logarithmic else (low, high)
+    margin = 0.08 * float(np.ptp(ends)) + 1e-12
+    lower, upper = float(ends[0]) - margin, float(ends[1]) + margin
+    return (float(np.exp(lower)), float(np.exp(upper))) if logarithmic else (lower, upper)
 
 
-def pairs_figure(samples: Samples, path: str | Path | None = None) -> Figure:
+def pairs_figure(samples: PosteriorSamples, path: str | Path | None = None) -> Figure:
     """Histograms of every parameter and clouds of every pair, in the author's units, coefficients as log10."""
     from matplotlib.figure import Figure
 
@@ -70,25 +70,25 @@ def pairs_figure(samples: Samples, path: str | Path | None = None) -> Figure:
     names = list(columns)
     for row, first in enumerate(names):
         for column, second in enumerate(names):
-            _pair(panels[row, column], columns, (first, second), (row, column), count)
+            _draw_pair(panels[row, column], columns, (first, second), (row, column), count)
     figure.suptitle(f"{samples.coordinates.law.title or samples.coordinates.law.name}: posterior", fontsize=11)
-    return written(figure, path)
+    return save_figure(figure, path)
 
 
-def _columns(samples: Samples) -> dict[str, Floats]:
+def _columns(samples: PosteriorSamples) -> dict[str, Floats]:
     """{label: (draws,)}, at most SHOWN draws."""
     table = samples.coordinates.law.table
-    every = max(len(samples.u) // SHOWN, 1)
+    stride = max(len(samples.u) // MAX_DRAWS, 1)
     return {
         f"log10 {name}" if table[name].scale == "log" else name: (
-            np.log10(values[::every]) if table[name].scale == "log" else values[::every]
+            np.log10(values[::stride]) if table[name].scale == "log" else values[::stride]
         )
         for name, values in samples.values.items()
     }
 
 
-def _pair(axes: Axes, columns: dict[str, Floats], names: tuple[str, str], place: tuple[int, int], count: int) -> None:
-    (first, second), (row, column) = names, place
+def _draw_pair(axes: Axes, columns: dict[str, Floats], names: tuple[str, str], position: tuple[int, int], count: int) -> None:
+    (first, second), (row, column) = names, position
     if column > row:
         axes.set_visible(False)
         return
@@ -106,41 +106,41 @@ def _pair(axes: Axes, columns: dict[str, Floats], names: tuple[str, str], place:
     axes.tick_params(labelsize=7)
 
 
-def correlation_figure(found: Correlation, path: str | Path | None = None) -> Figure:
+def correlation_figure(correlation: Correlation, path: str | Path | None = None) -> Figure:
     """The matrix in colours from -1 to 1, with its numbers."""
-    count = len(found.names)
-    figure, axes = _figure(2.0 + 0.8 * count, 1.6 + 0.8 * count)
-    image = axes.imshow(found.matrix, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
+    count = len(correlation.names)
+    figure, axes = _figure_and_axes(2.0 + 0.8 * count, 1.6 + 0.8 * count)
+    image = axes.imshow(correlation.matrix, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
     for row in range(count):
         for column in range(count):
-            value = found.matrix[row, column]
+            value = correlation.matrix[row, column]
             axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8,
                       color="white" if abs(value) > 0.6 else "black")  # fmt: skip
-    axes.set_xticks(range(count), found.names, rotation=45, ha="right")
-    axes.set_yticks(range(count), found.names)
-    axes.set_title(found.title, fontsize=10)
+    axes.set_xticks(range(count), correlation.names, rotation=45, ha="right")
+    axes.set_yticks(range(count), correlation.names)
+    axes.set_title(correlation.title, fontsize=10)
     figure.colorbar(image, ax=axes, shrink=0.8, label="correlation")
-    return written(figure, path)
+    return save_figure(figure, path)
 
 
-def bands_figure(bands: Sequence[RateBand], path: str | Path | None = None) -> Figure:
+def rate_bands_figure(bands: Sequence[RateBand], path: str | Path | None = None) -> Figure:
     """Rates over stress with their bands: lighter with the temperature's uncertainty, darker without."""
     if not bands:
         raise FitError("there are no bands to draw")
-    figure, axes = _figure(5.6, 4.6)
+    figure, axes = _figure_and_axes(5.6, 4.6)
     for k, band in enumerate(bands):
         colour = f"C{k % 10}"
-        label = f"{band.temperature - ZERO_CELSIUS:.0f} $\\pm$ {band.plus_minus:g} °C"
+        label = f"{band.temperature - ZERO_CELSIUS:.0f} $\\pm$ {band.temperature_uncertainty:g} °C"
         axes.fill_between(band.stress, band.low, band.high, color=colour, alpha=0.2, lw=0)
-        axes.fill_between(band.stress, *band.inner, color=colour, alpha=0.35, lw=0)
+        axes.fill_between(band.stress, *band.parameter_band, color=colour, alpha=0.35, lw=0)
         axes.plot(band.stress, band.rate, color=colour, lw=1.4, label=label)
     axes.set(xscale="log", yscale="log", xlabel="stress, MPa", ylabel="creep rate, 1/s")
     axes.grid(alpha=0.25, which="both")
     axes.legend(fontsize=8, title="95 %: law and temperature (dark: law alone)", title_fontsize=7)
     axes.set_title("\n".join(dict.fromkeys(band.name for band in bands)), fontsize=9)
-    return written(figure, path)
+    return save_figure(figure, path)
 
 
-def _figure(width: float, height: float) -> tuple[Figure, Any]:
-    figure = blank(width, height)
+def _figure_and_axes(width: float, height: float) -> tuple[Figure, Any]:
+    figure = empty_figure(width, height)
     return figure, figure.subplots()

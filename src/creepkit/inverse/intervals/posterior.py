@@ -24,9 +24,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.covariance import whitener
-from creepkit.inverse.objective import Objective
-from creepkit.inverse.problem import Opened
+from creepkit.inverse.covariance import cholesky_factors
+from creepkit.inverse.objective import ResidualFunction
+from creepkit.inverse.problem import LeastSquaresProblem
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,94 +40,94 @@ class Posterior:
     freedom : nu; least : the least chi-square.
     """
 
-    problem: Opened
-    objective: Objective
+    problem: LeastSquaresProblem
+    objective: ResidualFunction
     whitening: Floats
-    effect: Floats
-    floor: Floats
-    ceiling: Floats
-    taken: Floats
-    prior: Floats
-    freedom: float
-    least: float
+    rate_effect: Floats
+    parameter_lower: Floats
+    parameter_upper: Floats
+    nuisance_basis: Floats
+    prior_residuals: Floats
+    degrees_of_freedom: float
+    least_chi_square: float
 
     @classmethod
-    def of(cls, problem: Opened, freedom: float) -> Posterior:
+    def from_problem(cls, problem: LeastSquaresProblem, degrees_of_freedom: float) -> Posterior:
         """That of a reopened identification."""
-        o, r, size = problem.objective, problem.residuals, len(problem.objective.law.params)
-        held, unknowns, e = o.asking(o.using, o.law, o.coordinates), o.unknowns, problem.x[size:]
-        held.unknowns = replace(unknowns, mean=np.array(e), held=True)
-        ends = np.array([[p.to_internal(b) for b in p.bounds] for p in o.law.params.values()])
-        whitening = np.asarray(np.linalg.inv(whitener(r, replace(problem.scatter, rate=0.0))), float)
-        effect = r.rate_effect * problem.scatter.rate / np.sqrt(r.trust)[:, None]
-        pull = np.diag(np.sqrt(unknowns.precision))
-        assert r.jacobian is not None
-        own = _whitened(whitening, effect, np.moveaxis(r.jacobian[..., size:], -1, 0))[:, o.entries.present].T
-        taken, prior = np.linalg.qr(np.concatenate([own, pull]))[0], pull @ (e - unknowns.mean[: unknowns.size])
-        least = problem.chi2(problem.minimise().u)
+        objective, residuals, parameter_count = problem.residual_function, problem.residuals, len(problem.residual_function.law.params)
+        fixed, nuisances, nuisance_values = objective.with_predictor(objective.predictor, objective.law, objective.coordinates), objective.nuisance_parameters, problem.x[parameter_count:]
+        fixed.nuisance_parameters = replace(nuisances, mean=np.array(nuisance_values), fixed=True)
+        parameter_bounds = np.array([[p.to_internal(b) for b in p.bounds] for p in objective.law.params.values()])
+        whitening = np.asarray(np.linalg.inv(cholesky_factors(residuals, replace(problem.noise_model, rate=0.0))), float)
+        rate_effect = residuals.log_rate_sensitivity * problem.noise_model.rate / np.sqrt(residuals.test_weights)[:, None]
+        root_precision = np.diag(np.sqrt(nuisances.precision))
+        assert residuals.jacobian is not None
+        nuisance_jacobian = _whitened(whitening, rate_effect, np.moveaxis(residuals.jacobian[..., parameter_count:], -1, 0))[:, objective.observations.present].T
+        nuisance_basis, prior_residuals = np.linalg.qr(np.concatenate([nuisance_jacobian, root_precision]))[0], root_precision @ (nuisance_values - nuisances.mean[: nuisances.size])
+        least_chi_square = problem.chi_square(problem.minimise().u)
         return cls(
-            problem, held, whitening, effect, ends[:, 0], ends[:, 1], taken, prior, max(freedom, 1.0), least
+            problem, fixed, whitening, rate_effect, parameter_bounds[:, 0], parameter_bounds[:, 1], nuisance_basis, prior_residuals, max(degrees_of_freedom, 1.0), least_chi_square
         )  # fmt: skip
 
     @property
-    def low(self) -> Floats:
+    def lower(self) -> Floats:
         """(parameters,) the lower bounds of u."""
-        return self.problem.box.low[: self.floor.size]
+        return self.problem.bounds.lower[: self.parameter_lower.size]
 
     @property
-    def high(self) -> Floats:
+    def upper(self) -> Floats:
         """(parameters,) the upper bounds of u."""
-        return self.problem.box.high[: self.floor.size]
+        return self.problem.bounds.upper[: self.parameter_lower.size]
 
     def __call__(self, u: Floats) -> Floats:
         """(candidates,) ln p; -inf outside the bounds. All candidates are one prediction."""
-        out, inside = np.full(len(u), -np.inf), self.inside(u)
-        if inside.any():
-            rise = np.maximum(self.chi2(u[inside]) - self.least, -0.5 * self.freedom)
-            out[inside] = -0.5 * (self.freedom + u.shape[1]) * np.log1p(rise / self.freedom)
-        return np.where(np.isfinite(out), out, -np.inf)
+        log_density, is_inside = np.full(len(u), -np.inf), self.inside(u)
+        if is_inside.any():
+            rise = np.maximum(self.chi_square(u[is_inside]) - self.least_chi_square, -0.5 * self.degrees_of_freedom)
+            log_density[is_inside] = -0.5 * (self.degrees_of_freedom + u.shape[1]) * np.log1p(rise / self.degrees_of_freedom)
+        return np.where(np.isfinite(log_density), log_density, -np.inf)
 
-    def chi2(self, u: Floats) -> Floats:
+    def chi_square(self, u: Floats) -> Floats:
         """(candidates,) least sum of squares that any values of the nuisances leave."""
-        misfit, effect = self._misfits(u)
-        white = _whitened(self.whitening, effect, misfit)[:, self.objective.entries.present]
-        rows = np.concatenate([white, np.broadcast_to(self.prior, (len(u), self.prior.size))], axis=1)
-        return np.asarray((rows**2).sum(axis=1) - ((rows @ self.taken) ** 2).sum(axis=1))
+        residuals, rate_effect = self._residuals(u)
+        whitened = _whitened(self.whitening, rate_effect, residuals)[:, self.objective.observations.present]
+        rows = np.concatenate([whitened, np.broadcast_to(self.prior_residuals, (len(u), self.prior_residuals.size))], axis=1)
+        return np.asarray((rows**2).sum(axis=1) - ((rows @ self.nuisance_basis) ** 2).sum(axis=1))
 
-    def _misfits(self, u: Floats) -> tuple[Floats, Floats]:
+    def _residuals(self, u: Floats) -> tuple[Floats, Floats]:
         """Residuals (candidates, tests, entries), and what a test's own rate does half way to each candidate.
 
         A factor on all rates moves every coefficient, each of which is a coordinate's own. Where a term has none, and
         for tests compared over their whole life, whose derivatives are dear, it does what it does at the optimum.
         """
-        o, law = self.objective, self.objective.law
-        own = list(o.coordinates.coefficients)
-        apart = len(own) == len(law.terms) + len(law.states) and not o.entries.whole.any()
-        if not (apart and self.problem.scatter.rate > 0):
-            return o.screen(u), self.effect
-        misfit, slopes = o.side_by_side(u)
-        size = self.problem.scatter.rate / np.sqrt(self.problem.residuals.trust)[:, None]
-        return misfit, 0.5 * (self.effect + slopes[..., own].sum(axis=-1) * size)
+        objective, law = self.objective, self.objective.law
+        coefficients = list(objective.coordinates.coefficients)
+        is_separable = len(coefficients) == len(law.terms) + len(law.states) and not objective.observations.followed_to_rupture.any()
+        if not (is_separable and self.problem.noise_model.rate > 0):
+            return objective.batch_residuals(u), self.rate_effect
+        residuals, jacobian = objective.batch_jacobian(u)
+        rate_scatter = self.problem.noise_model.rate / np.sqrt(self.problem.residuals.test_weights)[:, None]
+        return residuals, 0.5 * (self.rate_effect + jacobian[..., coefficients].sum(axis=-1) * rate_scatter)
 
     def inside(self, u: Floats) -> Bools:
         """(candidates,) whether the bounds of u and of the law's parameters, and its constraints, hold."""
-        good = np.asarray(((u >= self.low) & (u <= self.high)).all(axis=1))
-        theta, room = self.problem.objective.coordinates.theta(u), 1e-9 * (self.ceiling - self.floor)
-        good &= ((theta >= self.floor - room) & (theta <= self.ceiling + room)).all(axis=1)
-        if self.problem.objective.law.constraints:
-            fences = self.problem.fences
-            good &= np.array([not (fences.violations(one) > 0).any() for one in u])
-        return np.asarray(good)
+        is_inside = np.asarray(((u >= self.lower) & (u <= self.upper)).all(axis=1))
+        theta, tolerance = self.problem.residual_function.coordinates.theta(u), 1e-9 * (self.parameter_upper - self.parameter_lower)
+        is_inside &= ((theta >= self.parameter_lower - tolerance) & (theta <= self.parameter_upper + tolerance)).all(axis=1)
+        if self.problem.residual_function.law.constraints:
+            bound_penalties = self.problem.bound_penalties
+            is_inside &= np.array([not (bound_penalties.constraint_violations(candidate) > 0).any() for candidate in u])
+        return np.asarray(is_inside)
 
 
-def _whitened(whitening: Floats, effect: Floats, values: Floats) -> Floats:
+def _whitened(whitening: Floats, rate_effect: Floats, values: Floats) -> Floats:
     """Residuals (..., tests, entries) over their scatter, with a random effect (..., tests, entries) beside.
 
     With v = W effect the covariance is W^-1 (I + v v') W^-T, and its inverse root (I - b v v') W,
     b = (1 - 1 / sqrt(1 + v'v)) / v'v.
     """
-    white = np.einsum("tij,...tj->...ti", whitening, values, optimize=True)
-    v = np.einsum("tij,...tj->...ti", whitening, effect, optimize=True)
-    size = np.maximum((v**2).sum(axis=-1, keepdims=True), 1e-300)
-    share = (1.0 - 1.0 / np.sqrt(1.0 + size)) / size
-    return np.asarray(white - share * v * (v * white).sum(axis=-1, keepdims=True))
+    whitened = np.einsum("tij,...tj->...ti", whitening, values, optimize=True)
+    whitened_effect = np.einsum("tij,...tj->...ti", whitening, rate_effect, optimize=True)
+    squared_norm = np.maximum((whitened_effect**2).sum(axis=-1, keepdims=True), 1e-300)
+    correction = (1.0 - 1.0 / np.sqrt(1.0 + squared_norm)) / squared_norm
+    return np.asarray(whitened - correction * whitened_effect * (whitened_effect * whitened).sum(axis=-1, keepdims=True))

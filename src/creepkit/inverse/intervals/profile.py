@@ -26,30 +26,30 @@ from scipy.stats import t as student
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.covariance import whitener
+from creepkit.inverse.covariance import cholesky_factors
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.intervals.opening import opened
-from creepkit.inverse.intervals.quantities import Function, Quantity, chosen, gradient
-from creepkit.inverse.problem import Opened
-from creepkit.inverse.threads import single_threaded_algebra
+from creepkit.inverse.intervals.opening import interval_problem
+from creepkit.inverse.intervals.quantities import CoordinateFunction, DerivedQuantity, quantity_of, gradient
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.threads import single_threaded_blas
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SHARPNESS = 0.02
+CONSTRAINT_WIDTH = 0.02
 """w over the standard deviation of the quantity."""
-RISE = 0.35
+STEP_RISE = 0.35
 """Aimed at from point to point: the rise of sqrt(chi2) over that of the interval's end."""
-MOST = 15
+MAX_POINTS = 15
 """Points to each side; an end that lies further out than they reach is called open."""
-STUCK = 0.5
+BLOCKED_FRACTION = 0.5
 """Share of a step below which what was asked for cannot be had: the law's bounds are in the way."""
-NOTHING = 1e-9
+ZERO_TOLERANCE = 1e-9
 """Of the standard deviation: nearer to zero than this is zero."""
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class ProfileLikelihood:
     """The profile of one quantity.
 
     values, chi_square : (points,) values in the quantity's unit, rising, and the rise of chi-square at each.
@@ -84,10 +84,10 @@ class Profile:
 
 
 @dataclass(frozen=True)
-class _Held:
+class _QuantityConstraint:
     """The residual (q(x) - value) / width, which holds a quantity at a value."""
 
-    function: Function
+    function: CoordinateFunction
     size: int
     value: float
     width: float
@@ -97,12 +97,12 @@ class _Held:
 
     def jacobian(self, x: Floats) -> Floats:
         u = x[: self.size]
-        own = gradient(self.function, u, np.maximum(np.abs(u), 1.0))
-        return np.concatenate([own, np.zeros(x.size - self.size)])[None] / self.width
+        quantity_gradient = gradient(self.function, u, np.maximum(np.abs(u), 1.0))
+        return np.concatenate([quantity_gradient, np.zeros(x.size - self.size)])[None] / self.width
 
 
 @dataclass(frozen=True)
-class _Point:
+class _ProfilePoint:
     """One point of a profile: where, the quantity on its scale, and chi-square."""
 
     x: Floats
@@ -110,121 +110,121 @@ class _Point:
     chi_square: float
 
 
-class _Walk:
+class _ProfileWalk:
     """Points of a profile, one after the other outwards from the optimum."""
 
-    def __init__(self, fit: Identification, problem: Opened, quantity: Quantity, root: float) -> None:
+    def __init__(self, fit: Identification, problem: LeastSquaresProblem, quantity: DerivedQuantity, root: float) -> None:
         self.problem, self.root, self.size = problem, root, fit.u.size
-        self.function, self.covariance = quantity.of(fit.coordinates), fit.covariance
-        slope = gradient(self.function, fit.u, np.sqrt(np.diag(fit.covariance)))
-        self.sd = float(np.sqrt(slope @ fit.covariance @ slope))
+        self.function, self.covariance = quantity.function(fit.coordinates), fit.covariance
+        quantity_gradient = gradient(self.function, fit.u, np.sqrt(np.diag(fit.covariance)))
+        self.sd = float(np.sqrt(quantity_gradient @ fit.covariance @ quantity_gradient))
         if not (np.isfinite(self.sd) and self.sd > 0):
             raise FitError(
                 f"{quantity.name} does not depend on any parameter of law '{fit.law.name}': no profile of it"
             )
-        self.start = self._point(problem.x, None)
+        self.start = self._constrained_minimum(problem.x, None)
 
-    def side(self, sign: float) -> tuple[list[_Point], bool]:
+    def one_side(self, sign: float) -> tuple[list[_ProfilePoint], bool]:
         """Points to one side, and whether chi-square rose as far as wanted there."""
-        points, step = [self.start], sign * RISE * self.root * self.sd
-        for _ in range(MOST):
+        points, step = [self.start], sign * STEP_RISE * self.root * self.sd
+        for _ in range(MAX_POINTS):
             last = points[-1]
-            found = self._point(self._ahead(last, step), last.value + step)
-            moved = (found.value - last.value) / step
-            points += [found] if moved > 0 else []
-            if self._rise(points[-1]) >= self.root:
+            point = self._constrained_minimum(self._predicted_start(last, step), last.value + step)
+            relative_step = (point.value - last.value) / step
+            points += [point] if relative_step > 0 else []
+            if self._root_rise(points[-1]) >= self.root:
                 return points, True
-            if moved < STUCK:
+            if relative_step < BLOCKED_FRACTION:
                 return points, False
-            gained = (self._rise(found) - self._rise(last)) / (found.value - last.value) * sign
-            wanted = RISE * self.root / gained if gained > 0 else np.inf
-            step = sign * float(np.clip(wanted, 0.3 * abs(step), 2.0 * abs(step)))
+            root_rise_rate = (self._root_rise(point) - self._root_rise(last)) / (point.value - last.value) * sign
+            wanted_step = STEP_RISE * self.root / root_rise_rate if root_rise_rate > 0 else np.inf
+            step = sign * float(np.clip(wanted_step, 0.3 * abs(step), 2.0 * abs(step)))
         return points, False
 
-    def _rise(self, point: _Point) -> float:
+    def _root_rise(self, point: _ProfilePoint) -> float:
         return float(np.sqrt(max(point.chi_square - self.start.chi_square, 0.0)))
 
-    def _ahead(self, last: _Point, step: float) -> Floats:
+    def _predicted_start(self, last: _ProfilePoint, step: float) -> Floats:
         """Where Laplace's approximation expects the next point."""
         u = last.x[: self.size]
-        slope = gradient(self.function, u, np.sqrt(np.diag(self.covariance)))
-        way = self.covariance @ slope
-        along = float(slope @ way)
+        quantity_gradient = gradient(self.function, u, np.sqrt(np.diag(self.covariance)))
+        direction = self.covariance @ quantity_gradient
+        directional_variance = float(quantity_gradient @ direction)
         x = np.array(last.x)
-        x[: self.size] += way * (step / along) if along > 0 else 0.0
-        return self.problem.box.clip(x)
+        x[: self.size] += direction * (step / directional_variance) if directional_variance > 0 else 0.0
+        return self.problem.bounds.clip(x)
 
-    def _point(self, start: Floats, value: float | None) -> _Point:
-        extra = None if value is None else _Held(self.function, self.size, value, SHARPNESS * self.sd)
-        x = self.problem.minimise(start, extra=extra).u
-        x = self._bent(x).minimise(x, extra=extra).u if self.problem.scatter.rate > 0 else x
-        found = float(self.function(x[: self.size]))
-        return _Point(x, 0.0 if abs(found) < NOTHING * self.sd else found, self._chi_square(x))
+    def _constrained_minimum(self, start: Floats, value: float | None) -> _ProfilePoint:
+        constraint = None if value is None else _QuantityConstraint(self.function, self.size, value, CONSTRAINT_WIDTH * self.sd)
+        x = self.problem.minimise(start, additional=constraint).u
+        x = self._problem_at(x).minimise(x, additional=constraint).u if self.problem.noise_model.rate > 0 else x
+        value_reached = float(self.function(x[: self.size]))
+        return _ProfilePoint(x, 0.0 if abs(value_reached) < ZERO_TOLERANCE * self.sd else value_reached, self._chi_square(x))
 
-    def _bent(self, x: Floats) -> Opened:
+    def _problem_at(self, x: Floats) -> LeastSquaresProblem:
         """The problem with what a test's own rate does taken half way between the optimum and x."""
-        p = self.problem
-        effect = 0.5 * (p.residuals.rate_effect + p.objective.at(x).rate_effect)
-        return replace(p, factor=whitener(replace(p.residuals, rate_effect=effect), p.scatter))
+        problem = self.problem
+        rate_effect = 0.5 * (problem.residuals.log_rate_sensitivity + problem.residual_function.evaluate(x).log_rate_sensitivity)
+        return replace(problem, covariance_factor=cholesky_factors(replace(problem.residuals, log_rate_sensitivity=rate_effect), problem.noise_model))
 
     def _chi_square(self, x: Floats) -> float:
         """Of the data and the priors: the walls stand for bounds, at which a value is possible still."""
-        problem = self._bent(x) if self.problem.scatter.rate > 0 else self.problem
-        white, own = problem.white(x), x.size - self.size
-        data = int(problem.objective.entries.present.sum())
-        return float((white[:data] ** 2).sum() + (white[white.size - own :] ** 2).sum())
+        problem = self._problem_at(x) if self.problem.noise_model.rate > 0 else self.problem
+        whitened, nuisance_count = problem.whitened(x), x.size - self.size
+        observation_count = int(problem.residual_function.observations.present.sum())
+        return float((whitened[:observation_count] ** 2).sum() + (whitened[whitened.size - nuisance_count :] ** 2).sum())
 
 
-def profile(fit: Identification, of: str | Quantity, *, level: float = 0.95) -> Profile:
+def profile(fit: Identification, quantity_or_name: str | DerivedQuantity, *, level: float = 0.95) -> ProfileLikelihood:
     """Profile a parameter, by its name, or another quantity such as rate_at(120) or exponent_at(120).
 
     The interval holds the value with probability `level`, 0.95 unless told otherwise.
     """
     if not 0.0 < level < 1.0:
         raise FitError(f"level is {level:g}; a probability between 0 and 1 is needed, such as 0.95")
-    quantity = chosen(fit.coordinates, of)
+    quantity = quantity_of(fit.coordinates, quantity_or_name)
     root = float(student.ppf(0.5 + 0.5 * level, max(fit.freedom, 1.0)))
-    with single_threaded_algebra():
-        walk = _Walk(fit, opened(fit), quantity, root)
-        (below, low), (above, high) = walk.side(-1.0), walk.side(1.0)
+    with single_threaded_blas():
+        walk = _ProfileWalk(fit, interval_problem(fit), quantity, root)
+        (below, low), (above, high) = walk.one_side(-1.0), walk.one_side(1.0)
     return _profile(quantity, walk, [*below[:0:-1], *above], (low, high), level)
 
 
-def _profile(quantity: Quantity, walk: _Walk, points: list[_Point], closed: tuple[bool, bool], level: float) -> Profile:
+def _profile(quantity: DerivedQuantity, walk: _ProfileWalk, points: list[_ProfilePoint], is_closed: tuple[bool, bool], level: float) -> ProfileLikelihood:
     values, chi_square = (np.array([getattr(p, name) for p in points]) for name in ("value", "chi_square"))
-    k = int(chi_square.argmin())
-    rise = chi_square - chi_square[k]
+    best = int(chi_square.argmin())
+    rise = chi_square - chi_square[best]
     ends = [
-        _end(values, np.sqrt(rise), walk.root, k, sign) if c else None for c, sign in zip(closed, (-1, 1), strict=True)
+        _interval_end(values, np.sqrt(rise), walk.root, best, sign) if c else None for c, sign in zip(is_closed, (-1, 1), strict=True)
     ]
-    low, high = (None if end is None else float(quantity.shown(end)) for end in ends)
-    reach = [float(quantity.shown(walk.start.value + s * walk.root * walk.sd)) for s in (-1, 1)]
-    return Profile(
-        quantity.name, quantity.unit, quantity.shown(values), rise, float(quantity.shown(values[k])), low, high,
-        walk.root**2, level, (reach[0], reach[1]), _notes(quantity, points, rise, closed, walk),
+    low, high = (None if end is None else float(quantity.to_unit(end)) for end in ends)
+    laplace = [float(quantity.to_unit(walk.start.value + s * walk.root * walk.sd)) for s in (-1, 1)]
+    return ProfileLikelihood(
+        quantity.name, quantity.unit, quantity.to_unit(values), rise, float(quantity.to_unit(values[best])), low, high,
+        walk.root**2, level, (laplace[0], laplace[1]), _notes(quantity, points, rise, is_closed, walk),
     )  # fmt: skip
 
 
-def _end(values: Floats, roots: Floats, limit: float, k: int, sign: int) -> float:
+def _interval_end(values: Floats, roots: Floats, limit: float, best: int, sign: int) -> float:
     """Where sqrt(rise), nearly straight, passes its limit to one side of point k."""
-    own = slice(k, None) if sign > 0 else slice(k, None, -1)
-    v, r = values[own], roots[own]
-    keep = np.concatenate([[True], r[1:] > np.maximum.accumulate(r)[:-1]])
-    return float(PchipInterpolator(r[keep], v[keep])(limit))
+    side = slice(best, None) if sign > 0 else slice(best, None, -1)
+    side_values, side_roots = values[side], roots[side]
+    is_rising = np.concatenate([[True], side_roots[1:] > np.maximum.accumulate(side_roots)[:-1]])
+    return float(PchipInterpolator(side_roots[is_rising], side_values[is_rising])(limit))
 
 
 def _notes(
-    quantity: Quantity, points: list[_Point], rise: Floats, closed: tuple[bool, bool], walk: _Walk
+    quantity: DerivedQuantity, points: list[_ProfilePoint], rise: Floats, is_closed: tuple[bool, bool], walk: _ProfileWalk
 ) -> tuple[str, ...]:
-    found = []
-    for done, k, side in ((closed[0], 0, "below"), (closed[1], -1, "above")):
-        if not done:
-            reached = float(quantity.shown(points[k].value))
-            found.append(
+    notes = []
+    for is_side_closed, k, side in ((is_closed[0], 0, "below"), (is_closed[1], -1, "above")):
+        if not is_side_closed:
+            reached = float(quantity.to_unit(points[k].value))
+            notes.append(
                 f"not bounded {side} within the law's bounds: at {reached:.4g} chi-square has risen by {rise[k]:.2g} "
                 f"of {walk.root**2:.2g}"
             )
     better = walk.start.chi_square - min(p.chi_square for p in points)
     if better > 0.5:
-        found.append(f"a better minimum was met on the way, by {better:.2g} in chi-square: identify with more starts")
-    return tuple(found)
+        notes.append(f"a better minimum was met on the way, by {better:.2g} in chi-square: identify with more starts")
+    return tuple(notes)

@@ -15,15 +15,15 @@ from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 
-NEAR = 1.0005
+EXPONENT_STRESS_RATIO = 1.0005
 """Ratio of the stresses between which a local exponent is taken, to each side."""
 
-Function = Callable[[Floats], Floats]
+CoordinateFunction = Callable[[Floats], Floats]
 """u (..., parameters) to numbers (..., points)."""
 
 
 @dataclass(frozen=True)
-class Quantity:
+class DerivedQuantity:
     """Something that follows from the values of a law.
 
     scale : "log" where its logarithm is what is nearly normal.
@@ -33,64 +33,64 @@ class Quantity:
     name: str
     unit: str
     scale: Literal["linear", "log"]
-    of: Callable[[Coordinates], Function]
+    function: Callable[[Coordinates], CoordinateFunction]
 
-    def shown(self, value: Floats | float) -> Floats:
+    def to_unit(self, value: Floats | float) -> Floats:
         """In the quantity's unit, from its scale."""
         return np.exp(value) if self.scale == "log" else np.asarray(value, float)
 
 
-def parameter(coordinates: Coordinates, name: str) -> Quantity:
+def parameter(coordinates: Coordinates, name: str) -> DerivedQuantity:
     """One parameter of the law of these coordinates, by name."""
     position = coordinates.names.index(coordinates.law.symbol(name).name)
     param = coordinates.law.table[name]
-    return Quantity(name, param.unit, param.scale, lambda c: lambda u: c.theta(u)[..., position])
+    return DerivedQuantity(name, param.unit, param.scale, lambda c: lambda u: c.theta(u)[..., position])
 
 
 def rate_at(
     stress: float, temperature: float | None = None, *, strain: float | None = None, time: float | None = None
-) -> Quantity:
+) -> DerivedQuantity:
     """The creep rate, 1/s, at a stress (MPa) and temperature (K); what is left out is that of the reference point."""
-    told = _at(stress, temperature)
-    return Quantity(f"rate {told}", "1/s", "log", lambda c: log_rate(c, stress, temperature, strain, time))
+    point_text = _point_text(stress, temperature)
+    return DerivedQuantity(f"rate {point_text}", "1/s", "log", lambda c: log_rate(c, stress, temperature, strain, time))
 
 
 def exponent_at(
     stress: float, temperature: float | None = None, *, strain: float | None = None, time: float | None = None
-) -> Quantity:
+) -> DerivedQuantity:
     """The local stress exponent d ln rate / d ln stress there."""
-    told = _at(stress, temperature)
-    return Quantity(
-        f"local exponent {told}", "1", "linear", lambda c: local_exponent(c, stress, temperature, strain, time)
+    point_text = _point_text(stress, temperature)
+    return DerivedQuantity(
+        f"local exponent {point_text}", "1", "linear", lambda c: local_exponent(c, stress, temperature, strain, time)
     )
 
 
-def _at(stress: float, temperature: float | None) -> str:
+def _point_text(stress: float, temperature: float | None) -> str:
     return f"at {stress:g} MPa" + ("" if temperature is None else f", {temperature:g} K")
 
 
 def log_rate(
     coordinates: Coordinates, stress: ArrayLike, temperature: ArrayLike | None = None, strain: ArrayLike | None = None,
     time: ArrayLike | None = None,
-) -> Function:  # fmt: skip
+) -> CoordinateFunction:  # fmt: skip
     """ln of the creep rate (1/s) of virgin material at points, as a function of u: (..., parameters) to (..., points).
 
     What is not given is that of the reference point.
     """
     from creepkit.kernels import lower
 
-    law, r, kernel = coordinates.law, coordinates.reference, lower(coordinates.law, "numpy")
+    law, reference, kernel = coordinates.law, coordinates.reference, lower(coordinates.law, "numpy")
     if (np.asarray(stress, float) < 0).any():
         raise FitError("a creep rate was asked for at a negative stress; give the von Mises stress, in MPa")
-    given = ((stress, r.stress), (strain, r.strain), (time, r.time), (temperature, r.temperature))
+    given = ((stress, reference.stress), (strain, reference.strain), (time, reference.time), (temperature, reference.temperature))
     point = np.broadcast_arrays(*(np.asarray(default if v is None else v, float) for v, default in given))
-    inner = [z.initial for z in law.states.values()]
+    initial_states = [z.initial for z in law.states.values()]
     shape = point[0].shape
 
     def function(u: Floats) -> Floats:
         theta = coordinates.theta(u)
         columns = np.moveaxis(theta.reshape(*theta.shape, *(1 for _ in shape)), theta.ndim - 1, 0)
-        out = kernel.internal_log_rate(*point, point[0], point[0] / 3, *inner, *columns)
+        out = kernel.internal_log_rate(*point, point[0], point[0] / 3, *initial_states, *columns)
         return np.asarray(out + np.zeros((*theta.shape[:-1], *shape)), float)
 
     return function
@@ -99,19 +99,19 @@ def log_rate(
 def local_exponent(
     coordinates: Coordinates, stress: ArrayLike, temperature: ArrayLike | None = None, strain: ArrayLike | None = None,
     time: ArrayLike | None = None,
-) -> Function:  # fmt: skip
+) -> CoordinateFunction:  # fmt: skip
     """The local stress exponent at points, likewise."""
     level = np.asarray(stress, float)
-    up, down = (log_rate(coordinates, level * f, temperature, strain, time) for f in (NEAR, 1 / NEAR))
-    return lambda u: (up(u) - down(u)) / (2 * np.log(NEAR))
+    above, below = (log_rate(coordinates, level * f, temperature, strain, time) for f in (EXPONENT_STRESS_RATIO, 1 / EXPONENT_STRESS_RATIO))
+    return lambda u: (above(u) - below(u)) / (2 * np.log(EXPONENT_STRESS_RATIO))
 
 
-def chosen(coordinates: Coordinates, of: str | Quantity) -> Quantity:
+def quantity_of(coordinates: Coordinates, quantity_or_name: str | DerivedQuantity) -> DerivedQuantity:
     """The quantity meant: itself, or a parameter by its name."""
-    return parameter(coordinates, of) if isinstance(of, str) else of
+    return parameter(coordinates, quantity_or_name) if isinstance(quantity_or_name, str) else quantity_or_name
 
 
-def gradient(function: Function, u: Floats, scale: Floats, step: float = 1e-4) -> Floats:
+def gradient(function: CoordinateFunction, u: Floats, scale: Floats, step: float = 1e-4) -> Floats:
     """(..., parameters) derivatives of a function's numbers at one u, by central differences of step times scale."""
     h = np.diag(step * np.maximum(scale, 1e-8))
     change = function(u + h) - function(u - h)

@@ -21,7 +21,7 @@ from scipy.stats import norm
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.intervals.mixture import Laws, Mixture, Parts
+from creepkit.inverse.intervals.mixture import WeightedLaws, ModelAverage, MixtureDistribution
 from creepkit.inverse.intervals.quantities import log_rate
 from creepkit.language import temperature as TEMPERATURE
 from creepkit.records import ZERO_CELSIUS
@@ -29,9 +29,9 @@ from creepkit.records import ZERO_CELSIUS
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NODES = 81
+TEMPERATURE_NODES = 81
 """Slices of the temperature's distribution."""
-CLOSE = 5.0
+SAME_TEMPERATURE = 5.0
 """K: tests within it of one another say nothing of how a rate depends on temperature."""
 
 
@@ -47,87 +47,87 @@ class RateBand:
     rate: Floats
     low: Floats
     high: Floats
-    inner: tuple[Floats, Floats]
+    parameter_band: tuple[Floats, Floats]
     temperature: float
-    plus_minus: float
+    temperature_uncertainty: float
     name: str = ""
     notes: tuple[str, ...] = ()
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Rate over stress, both logarithmic, with both bands; written to `path` when given."""
-        from creepkit.inverse.intervals.plots import bands_figure
+        from creepkit.inverse.intervals.plots import rate_bands_figure
 
-        return bands_figure([self], path)
+        return rate_bands_figure([self], path)
 
     def __str__(self) -> str:
-        warm = f"{self.temperature - ZERO_CELSIUS:.0f} +- {self.plus_minus:g} C"
-        lines = [f"creep rate at {warm}, 95 % band"]
+        temperature_text = f"{self.temperature - ZERO_CELSIUS:.0f} +- {self.temperature_uncertainty:g} C"
+        lines = [f"creep rate at {temperature_text}, 95 % band"]
         for row in zip(self.stress, self.rate, self.low, self.high, strict=True):
             lines.append("  {:8.4g} MPa  {:9.3g}  [{:.3g}, {:.3g}] 1/s".format(*row))
         return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
 
 
 def rate_band(
-    source: Identification | Laws | Mixture, stresses: ArrayLike, temperature: float, *, plus_minus: float = 10.0,
-    shape: Literal["uniform", "normal"] = "uniform", strain: float | None = None, time: float | None = None,
+    source: Identification | WeightedLaws | ModelAverage, stresses: ArrayLike, temperature: float, *, temperature_uncertainty: float = 10.0,
+    temperature_distribution: Literal["uniform", "normal"] = "uniform", strain: float | None = None, time: float | None = None,
 ) -> RateBand:  # fmt: skip
     """Creep rates at `stresses` (MPa) and temperature +- plus_minus (K), over one law or the laws of a ranking.
 
     A law without temperature cannot know how the temperature moves its rate: its part of the band is not widened, and
     a note says so.
     """
-    mixture = source if isinstance(source, Mixture) else Mixture.of(source)
+    mixture = source if isinstance(source, ModelAverage) else ModelAverage.from_ranking(source)
     levels = np.atleast_1d(np.asarray(stresses, float))
-    if not (plus_minus >= 0 and np.isfinite(plus_minus) and temperature - plus_minus > 0):
+    if not (temperature_uncertainty >= 0 and np.isfinite(temperature_uncertainty) and temperature - temperature_uncertainty > 0):
         raise FitError(
-            f"a temperature of {temperature:g} +- {plus_minus:g} K was asked for; give kelvin, and a finite "
+            f"a temperature of {temperature:g} +- {temperature_uncertainty:g} K was asked for; give kelvin, and a finite "
             "uncertainty that is not negative"
         )
-    if shape not in ("uniform", "normal"):
-        raise FitError(f"shape is '{shape}'; allowed are 'uniform' and 'normal'")
+    if temperature_distribution not in ("uniform", "normal"):
+        raise FitError(f"shape is '{temperature_distribution}'; allowed are 'uniform' and 'normal'")
     if not (levels > 0).all():
         raise FitError("a rate band was asked for at a stress that is not above zero; give von Mises stresses, in MPa")
-    _, inner_low, inner_high = mixture.parts(log_rate, levels, temperature, strain, time).interval()
-    warmth = temperature + plus_minus * _slices(shape) if plus_minus > 0 else np.array([temperature])
-    each = mixture.parts(log_rate, levels, warmth[:, None], strain, time)
-    middle, low, high = _joined(each).interval()
+    _, inner_low, inner_high = mixture.distribution(log_rate, levels, temperature, strain, time).interval()
+    temperatures = temperature + temperature_uncertainty * _standard_temperatures(temperature_distribution) if temperature_uncertainty > 0 else np.array([temperature])
+    distribution_by_temperature = mixture.distribution(log_rate, levels, temperatures[:, None], strain, time)
+    median, low, high = _flattened(distribution_by_temperature).interval()
     return RateBand(
-        levels, np.exp(middle), np.exp(low), np.exp(high), (np.exp(inner_low), np.exp(inner_high)), float(temperature),
-        float(plus_minus), " or ".join(fit.law.title or fit.law.name for fit in mixture.fits),
-        _notes(mixture, temperature, plus_minus),
+        levels, np.exp(median), np.exp(low), np.exp(high), (np.exp(inner_low), np.exp(inner_high)), float(temperature),
+        float(temperature_uncertainty), " or ".join(fit.law.title or fit.law.name for fit in mixture.fits),
+        _band_notes(mixture, temperature, temperature_uncertainty),
     )  # fmt: skip
 
 
-def _slices(shape: str) -> Floats:
+def _standard_temperatures(temperature_distribution: str) -> Floats:
     """(nodes,) temperatures of equal probability, in units of plus_minus about the middle."""
-    share = (np.arange(NODES) + 0.5) / NODES
-    return 2.0 * share - 1.0 if shape == "uniform" else norm.ppf(share) / norm.ppf(0.975)
+    probabilities = (np.arange(TEMPERATURE_NODES) + 0.5) / TEMPERATURE_NODES
+    return 2.0 * probabilities - 1.0 if temperature_distribution == "uniform" else norm.ppf(probabilities) / norm.ppf(0.975)
 
 
-def _joined(each: Parts) -> Parts:
+def _flattened(distribution: MixtureDistribution) -> MixtureDistribution:
     """Parts (laws, nodes, points) as parts (laws x nodes, points)."""
-    nodes = each.middle.shape[1]
-    flat = (v.reshape(-1, v.shape[-1]) for v in (each.middle, each.sd))
-    return Parts(np.repeat(each.weight, nodes) / nodes, np.repeat(each.freedom, nodes), *flat)
+    nodes = distribution.location.shape[1]
+    flat = (v.reshape(-1, v.shape[-1]) for v in (distribution.location, distribution.scale))
+    return MixtureDistribution(np.repeat(distribution.weight, nodes) / nodes, np.repeat(distribution.degrees_of_freedom, nodes), *flat)
 
 
-def _notes(mixture: Mixture, temperature: float, plus_minus: float) -> tuple[str, ...]:
+def _band_notes(mixture: ModelAverage, temperature: float, temperature_uncertainty: float) -> tuple[str, ...]:
     """What the laws, or their tests, cannot know of temperature."""
-    found = []
-    blind = [fit.law.name for fit in mixture.fits if not fit.law.uses(TEMPERATURE)]
-    if blind and plus_minus > 0:
-        found.append(
-            f"without a temperature in the law {' and '.join(blind)} the band cannot hold what {plus_minus:g} K do to "
+    notes = []
+    laws_without_temperature = [fit.law.name for fit in mixture.fits if not fit.law.uses(TEMPERATURE)]
+    if laws_without_temperature and temperature_uncertainty > 0:
+        notes.append(
+            f"without a temperature in the law {' and '.join(laws_without_temperature)} the band cannot hold what {temperature_uncertainty:g} K do to "
             "the rate; identify law.times(arrhenius())"
         )
     fit = mixture.fits[0]
     low, high = fit.ranges["temperature"]
-    if len(blind) < len(mixture.fits) and high - low < CLOSE:
-        found.append(
+    if len(laws_without_temperature) < len(mixture.fits) and high - low < SAME_TEMPERATURE:
+        notes.append(
             f"all tests were made at {0.5 * (low + high) - ZERO_CELSIUS:.0f} C: how the rate depends on temperature is "
             "not determined by them, and the band shows it"
         )
-    outside = max(low - CLOSE - temperature, temperature - high - CLOSE)
-    if outside > 0:
-        found.append(f"{temperature - ZERO_CELSIUS:.0f} C lies {outside + CLOSE:.0f} K outside the tests")
-    return tuple(found)
+    extrapolation = max(low - SAME_TEMPERATURE - temperature, temperature - high - SAME_TEMPERATURE)
+    if extrapolation > 0:
+        notes.append(f"{temperature - ZERO_CELSIUS:.0f} C lies {extrapolation + SAME_TEMPERATURE:.0f} K outside the tests")
+    return tuple(notes)

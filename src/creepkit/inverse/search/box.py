@@ -9,59 +9,59 @@ from scipy.stats import qmc
 
 from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.effects import Unknowns
-from creepkit.inverse.local_exponents import LARGEST
+from creepkit.inverse.effects import NuisanceParameters
+from creepkit.inverse.local_exponents import LARGEST_EXPONENT
 from creepkit.language import CreepLaw
 
-RATE_WINDOW = (-12.0, 6.0)
+LOG_RATE_BOUNDS = (-12.0, 6.0)
 """Bounds of the log rate of a term, or of an internal variable, about the measured one: at 1e-5 of the data it is
 absent, at 400 times it is wrong."""
 
 
-LOOKED_AT = 256
+EXPONENT_SAMPLES = 256
 """Draws from the bounds that show where local exponents lie."""
 
 
 @dataclass(frozen=True)
-class Box:
+class Bounds:
     """Bounds of the unknowns of a search, (unknowns,) each, and the scale on which it steps."""
 
-    low: Floats
-    high: Floats
+    lower: Floats
+    upper: Floats
 
     @classmethod
-    def of(cls, law: CreepLaw, coordinates: Coordinates, log_rate: float, log_pace: float) -> Box:
+    def from_law(cls, law: CreepLaw, coordinates: Coordinates, log_rate: float, log_internal_rate: float) -> Bounds:
         """The law's bounds, with rates within RATE_WINDOW of the measured ones.
 
         log_rate : of strain; log_pace : ln of one over the life of a test, that of internal variables.
         """
-        low, high = (np.array([p.to_internal(p.bounds[end]) for p in law.params.values()], float) for end in (0, 1))
-        for local in coordinates.exponents:
-            drawn = low + qmc.Sobol(low.size, seed=0).random(LOOKED_AT) * (high - low)
-            h = coordinates.u(drawn)[:, local.p]
-            h = h[np.isfinite(h)]
-            low[local.p], high[local.p] = float(h.min()), float(max(min(h.max(), LARGEST), h.min() + 1.0))
-        for k in coordinates.rates:
-            low[k], high[k] = log_rate + RATE_WINDOW[0], log_rate + RATE_WINDOW[1]
-        for k in coordinates.growths:
-            low[k], high[k] = log_pace + RATE_WINDOW[0], log_pace + RATE_WINDOW[1]
-        return cls(low, high)
+        lower, upper = (np.array([p.to_internal(p.bounds[index]) for p in law.params.values()], float) for index in (0, 1))
+        for local_exponent in coordinates.exponents:
+            sampled = lower + qmc.Sobol(lower.size, seed=0).random(EXPONENT_SAMPLES) * (upper - lower)
+            exponents = coordinates.u(sampled)[:, local_exponent.position]
+            exponents = exponents[np.isfinite(exponents)]
+            lower[local_exponent.position], upper[local_exponent.position] = float(exponents.min()), float(max(min(exponents.max(), LARGEST_EXPONENT), exponents.min() + 1.0))
+        for k in coordinates.term_rates:
+            lower[k], upper[k] = log_rate + LOG_RATE_BOUNDS[0], log_rate + LOG_RATE_BOUNDS[1]
+        for k in coordinates.state_rates:
+            lower[k], upper[k] = log_internal_rate + LOG_RATE_BOUNDS[0], log_internal_rate + LOG_RATE_BOUNDS[1]
+        return cls(lower, upper)
 
-    def beside(self, unknowns: Unknowns) -> Box:
+    def with_nuisances(self, nuisances: NuisanceParameters) -> Bounds:
         """The box of x = (u, e), with the limits of the unknowns of tests."""
-        n = unknowns.size
-        return Box(np.concatenate([self.low, unknowns.low[:n]]), np.concatenate([self.high, unknowns.high[:n]]))
+        count = nuisances.size
+        return Bounds(np.concatenate([self.lower, nuisances.low[:count]]), np.concatenate([self.upper, nuisances.high[:count]]))
 
     def clip(self, u: Floats) -> Floats:
         """The nearest point inside."""
-        return np.clip(u, self.low, self.high)
+        return np.clip(u, self.lower, self.upper)
 
     @property
     def width(self) -> Floats:
         """high - low."""
-        return self.high - self.low
+        return self.upper - self.lower
 
     @property
-    def middle(self) -> Floats:
+    def centre(self) -> Floats:
         """Half way."""
-        return 0.5 * (self.low + self.high)
+        return 0.5 * (self.lower + self.upper)

@@ -14,16 +14,16 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.search.polishing import SETTLED, Candidates, check_counts, polished
-from creepkit.inverse.search.trace import Trace
+from creepkit.inverse.search.polishing import CONVERGED_DECREASE, SearchCandidates, check_whole_numbers, refine_candidates
+from creepkit.inverse.search.trace import SearchTrace
 
 if TYPE_CHECKING:
     from cmaes import CMA
 
-    from creepkit.inverse.search.landscape import Found, Landscape
-    from creepkit.inverse.search.refining import Progress
+    from creepkit.inverse.search.landscape import SearchResult, CostFunction
+    from creepkit.inverse.search.refining import IterationCallback
 
-RECENT = 10
+STALL_GENERATIONS = 10
 """Generations whose lowest costs no longer differ when a run has arrived: least squares does the rest."""
 
 
@@ -39,75 +39,75 @@ class CmaEs:
 
     iterations: int = 200
     population: int | None = None
-    step: float = 0.25
+    initial_step_size: float = 0.25
     restarts: int = 1
-    polish: int = 3
+    refined_candidates: int = 3
 
     def __post_init__(self) -> None:
-        least = {"iterations": 1, "restarts": 0, "polish": 0} | ({} if self.population is None else {"population": 3})
-        check_counts("CMA-ES", {name: getattr(self, name) for name in least}, least)
-        if not 0 < self.step <= 1:
-            raise FitError(f"CMA-ES: step is {self.step:g} of the box; allowed are 0 (not itself) to 1")
+        minimum_values = {"iterations": 1, "restarts": 0, "polish": 0} | ({} if self.population is None else {"population": 3})
+        check_whole_numbers("CMA-ES", {name: getattr(self, name) for name in minimum_values}, minimum_values)
+        if not 0 < self.initial_step_size <= 1:
+            raise FitError(f"CMA-ES: step is {self.initial_step_size:g} of the box; allowed are 0 (not itself) to 1")
 
-    def minima(self, landscape: Landscape, progress: Progress | None = None) -> Found:
+    def minima(self, cost_function: CostFunction, progress: IterationCallback | None = None) -> SearchResult:
         """The refined best, best first, and the trace."""
-        run = _Runs(self, landscape)
+        runs = _CmaEsRuns(self, cost_function)
         for k in range(self.iterations):
-            run.generation()
+            runs.generation()
             if progress is not None:
                 progress("generation", k + 1, self.iterations)
-            if run.arrived() and not run.restart():
+            if runs.has_converged() and not runs.restart():
                 break
-        trace = Trace.of("CMA-ES", run.costs, run.restarts)
-        return polished(landscape, run.seen(), self.polish, trace, progress)
+        trace = SearchTrace.from_costs("CMA-ES", runs.costs, runs.restarts)
+        return refine_candidates(cost_function, runs.candidates(), self.refined_candidates, trace, progress)
 
-    def first_population(self, size: int) -> int:
+    def initial_population(self, size: int) -> int:
         """How many candidates the first run has in a generation, for so many parameters."""
         return self.population or 8 + int(6 * np.log(size))
 
 
-class _Runs:
+class _CmaEsRuns:
     """One run after another, and the best candidate of each generation."""
 
-    def __init__(self, rules: CmaEs, landscape: Landscape) -> None:
-        self.rules, self.landscape = rules, landscape
-        self.rng = np.random.default_rng(landscape.settings.seed)
+    def __init__(self, rules: CmaEs, cost_function: CostFunction) -> None:
+        self.rules, self.cost_function = rules, cost_function
+        self.rng = np.random.default_rng(cost_function.settings.seed)
         self.costs: list[Floats] = []
-        self.best: list[Floats] = []
+        self.best_points: list[Floats] = []
         self.restarts: list[int] = []
-        self.optimiser = self._new(np.full(landscape.box.low.size, 0.5))
+        self.optimiser = self._new_optimiser(np.full(cost_function.bounds.lower.size, 0.5))
 
     def generation(self) -> None:
         """Ask, evaluate all at once, and tell."""
-        box = self.landscape.box
-        asked = np.array([self.optimiser.ask() for _ in range(self.optimiser.population_size)])
-        cost = self.landscape.cost(box.low + asked * box.width)
-        self.optimiser.tell([(x, float(c)) for x, c in zip(asked, cost, strict=True)])
+        bounds = self.cost_function.bounds
+        points = np.array([self.optimiser.ask() for _ in range(self.optimiser.population_size)])
+        cost = self.cost_function.cost(bounds.lower + points * bounds.width)
+        self.optimiser.tell([(x, float(c)) for x, c in zip(points, cost, strict=True)])
         self.costs.append(cost)
-        self.best.append(asked[cost.argmin()])
+        self.best_points.append(points[cost.argmin()])
 
-    def arrived(self) -> bool:
+    def has_converged(self) -> bool:
         """Whether this run has nothing more to gain."""
-        mine = [float(cost.min()) for cost in self.costs[self.restarts[-1] if self.restarts else 0 :]]
-        settled = len(mine) > RECENT and np.ptp(mine[-RECENT:]) < SETTLED
-        return bool(settled or self.optimiser.should_stop())
+        lowest_costs = [float(cost.min()) for cost in self.costs[self.restarts[-1] if self.restarts else 0 :]]
+        stalled = len(lowest_costs) > STALL_GENERATIONS and np.ptp(lowest_costs[-STALL_GENERATIONS:]) < CONVERGED_DECREASE
+        return bool(stalled or self.optimiser.should_stop())
 
     def restart(self) -> bool:
         """Begin anew with twice the population, if that is allowed once more."""
         if len(self.restarts) == self.rules.restarts:
             return False
         self.restarts.append(len(self.costs))
-        self.optimiser = self._new(self.rng.random(self.landscape.box.low.size))
+        self.optimiser = self._new_optimiser(self.rng.random(self.cost_function.bounds.lower.size))
         return True
 
-    def seen(self) -> Candidates:
+    def candidates(self) -> SearchCandidates:
         """The best of each generation."""
-        box = self.landscape.box
-        return Candidates(box.low + np.array(self.best) * box.width, np.array([cost.min() for cost in self.costs]))
+        bounds = self.cost_function.bounds
+        return SearchCandidates(bounds.lower + np.array(self.best_points) * bounds.width, np.array([cost.min() for cost in self.costs]))
 
-    def _new(self, mean: Floats) -> CMA:
+    def _new_optimiser(self, mean: Floats) -> CMA:
         from cmaes import CMA
 
-        population = self.rules.first_population(mean.size) * 2 ** len(self.restarts)
+        population = self.rules.initial_population(mean.size) * 2 ** len(self.restarts)
         bounds, seed = np.tile([0.0, 1.0], (mean.size, 1)), int(self.rng.integers(2**32))
-        return CMA(mean, self.rules.step, bounds, seed=seed, population_size=population)
+        return CMA(mean, self.rules.initial_step_size, bounds, seed=seed, population_size=population)

@@ -11,22 +11,22 @@ import numpy as np
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.search.refining import Minimum
-from creepkit.inverse.search.subsets import Switches
-from creepkit.inverse.search.trace import Trace
+from creepkit.inverse.search.subsets import TermMask
+from creepkit.inverse.search.trace import SearchTrace
 
 if TYPE_CHECKING:
-    from creepkit.inverse.search.landscape import Found, Landscape
-    from creepkit.inverse.search.refining import Progress
+    from creepkit.inverse.search.landscape import SearchResult, CostFunction
+    from creepkit.inverse.search.refining import IterationCallback
 
-NEAR = 0.1
+SAME_BASIN = 0.1
 """Of the width of the box: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
 
-SETTLED = 1e-3
+CONVERGED_DECREASE = 1e-3
 """A fall of the cost, half of chi-square, below which a search has arrived."""
 
 
 @dataclass(frozen=True)
-class Candidates:
+class SearchCandidates:
     """What a search has seen and holds worth keeping: u (candidates, parameters), cost (candidates,).
 
     on : (candidates, terms) masks of the terms that `switches` may switch off, or None.
@@ -34,61 +34,61 @@ class Candidates:
 
     u: Floats
     cost: Floats
-    switches: Switches | None = None
-    on: Bools | None = None
+    term_mask: TermMask | None = None
+    masks: Bools | None = None
 
-    def held(self, k: int) -> dict[int, float]:
+    def fixed_values(self, k: int) -> dict[int, float]:
         """{position: value} of coordinates that rest in candidate k, because their term is off."""
-        return {} if self.switches is None or self.on is None else self.switches.held(self.on[k])
+        return {} if self.term_mask is None or self.masks is None else self.term_mask.fixed_values(self.masks[k])
 
-    def off(self, u: Floats) -> tuple[str, ...]:
+    def terms_off(self, u: Floats) -> tuple[str, ...]:
         """Terms that are off at u."""
-        return () if self.switches is None else self.switches.names_off(u)
+        return () if self.term_mask is None else self.term_mask.terms_off(u)
 
-    def different(self, width: Floats, most: int) -> list[int]:
+    def most_different(self, width: Floats, max_count: int) -> list[int]:
         """The best that differ, at most so many: a term that is off in one of two makes them differ."""
-        kept: list[int] = []
+        selected: list[int] = []
         for k in np.argsort(self.cost, kind="stable"):
-            if all((np.abs(self.u[k] - self.u[other]) > NEAR * width).any() for other in kept):
-                kept.append(int(k))
-            if len(kept) == most:
+            if all((np.abs(self.u[k] - self.u[other]) > SAME_BASIN * width).any() for other in selected):
+                selected.append(int(k))
+            if len(selected) == max_count:
                 break
-        return kept
+        return selected
 
 
-def polished(
-    landscape: Landscape, seen: Candidates, most: int, trace: Trace, progress: Progress | None = None
-) -> Found:
+def refine_candidates(
+    cost_function: CostFunction, candidates: SearchCandidates, max_count: int, trace: SearchTrace, progress: IterationCallback | None = None
+) -> SearchResult:
     """The best different candidates refined, best first; with most=0 the best one as it is."""
-    from creepkit.inverse.search.landscape import Found
+    from creepkit.inverse.search.landscape import SearchResult
 
-    chosen = seen.different(landscape.box.width, max(most, 1))
-    if most == 0:
-        k = chosen[0]
-        best, cost = seen.u[k], float(seen.cost[k])
-        return Found((Minimum(best, cost, converged=False, evaluations=0, off=seen.off(best)),), trace)
+    selected = candidates.most_different(cost_function.bounds.width, max(max_count, 1))
+    if max_count == 0:
+        k = selected[0]
+        best, cost = candidates.u[k], float(candidates.cost[k])
+        return SearchResult((Minimum(best, cost, converged=False, evaluations=0, terms_off=candidates.terms_off(best)),), trace)
     minima = []
-    for done, k in enumerate(chosen):
-        minimum = landscape.refine(seen.u[k], held=seen.held(k))
-        minima.append(replace(minimum, off=seen.off(minimum.u)))
+    for done, k in enumerate(selected):
+        minimum = cost_function.refine(candidates.u[k], fixed=candidates.fixed_values(k))
+        minima.append(replace(minimum, terms_off=candidates.terms_off(minimum.u)))
         if progress is not None:
-            progress("refinement", done + 1, len(chosen))
-    spent = sum(minimum.evaluations for minimum in minima)
+            progress("refinement", done + 1, len(selected))
+    evaluations = sum(minimum.evaluations for minimum in minima)
     minima.sort(key=lambda minimum: minimum.cost)
-    if seen.on is not None:
-        minima = _of_subsets(minima)
-    return Found(tuple(minima), replace(trace, polished=min(m.cost for m in minima), refinements=spent))
+    if candidates.masks is not None:
+        minima = _one_per_mask(minima)
+    return SearchResult(tuple(minima), replace(trace, refined_cost=min(m.cost for m in minima), refinement_evaluations=evaluations))
 
 
-def _of_subsets(minima: list[Minimum]) -> list[Minimum]:
+def _one_per_mask(minima: list[Minimum]) -> list[Minimum]:
     """One of each subset, for some end as another one; of those that are as good as the best, the simplest first."""
-    different = [m for k, m in enumerate(minima) if m.off not in [other.off for other in minima[:k]]]
-    best = different[0].cost + SETTLED
-    return sorted(different, key=lambda m: (m.cost > best, -len(m.off) if m.cost <= best else 0, m.cost))
+    different = [m for k, m in enumerate(minima) if m.terms_off not in [other.terms_off for other in minima[:k]]]
+    best = different[0].cost + CONVERGED_DECREASE
+    return sorted(different, key=lambda m: (m.cost > best, -len(m.terms_off) if m.cost <= best else 0, m.cost))
 
 
-def check_counts(search: str, values: Mapping[str, float], least: Mapping[str, int]) -> None:
+def check_whole_numbers(search: str, values: Mapping[str, float], minimum_values: Mapping[str, int]) -> None:
     """Refuse settings of a search that must be whole numbers of at least so many."""
     for name, value in values.items():
-        if value != int(value) or value < least[name]:
-            raise FitError(f"{search}: {name} is {value!r}; it must be a whole number of at least {least[name]}")
+        if value != int(value) or value < minimum_values[name]:
+            raise FitError(f"{search}: {name} is {value!r}; it must be a whole number of at least {minimum_values[name]}")

@@ -11,21 +11,21 @@ from scipy.optimize import least_squares
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.fences import Fences
-from creepkit.inverse.objective import Objective
-from creepkit.inverse.search.box import Box
+from creepkit.inverse.fences import BoundPenalties
+from creepkit.inverse.objective import ResidualFunction
+from creepkit.inverse.search.box import Bounds
 
-ANCHOR = 1e-4
+PRIOR_STRENGTH = 1e-4
 """How hard each unknown is drawn to the middle of its bounds, in standard deviations of data per width of the bounds.
 
 Far too weak to bias a value. Without it one unknown that moves nothing, as the share of the largest principal stress
 in tension, leaves the Jacobian short of its rank, and scipy's steps are then always as long as the trust region.
 """
 
-Progress = Callable[[str, int, int], None]
+IterationCallback = Callable[[str, int, int], None]
 
 
-class Extra(Protocol):
+class AdditionalResiduals(Protocol):
     """Residuals beside those of the data: half the sum of their squares is added to the cost."""
 
     def residuals(self, x: Floats) -> Floats:
@@ -49,69 +49,69 @@ class Minimum:
     cost: float
     converged: bool
     evaluations: int
-    white: Floats | None = field(default=None, repr=False)
-    off: tuple[str, ...] = ()
+    whitened_residuals: Floats | None = field(default=None, repr=False)
+    terms_off: tuple[str, ...] = ()
 
 
-def refine(
-    objective: Objective, box: Box, factor: Floats, start: Floats, *, loss: str = "linear",
-    steps: int = 80, tolerance: float = 1e-10, extra: Extra | None = None, held: Mapping[int, float] | None = None,
+def bounded_least_squares(
+    objective: ResidualFunction, bounds: Bounds, covariance_factor: Floats, start: Floats, *, loss: str = "linear",
+    max_steps: int = 80, tolerance: float = 1e-10, additional: AdditionalResiduals | None = None, fixed: Mapping[int, float] | None = None,
 ) -> Minimum:  # fmt: skip
     """Bounded least squares (scipy's trust region reflective).
 
     factor : (tests, entries, entries) Cholesky factors of the covariance, which stay as they are during the search.
     extra : further residuals; held : {position: value} of unknowns that stay where they are.
     """
-    fences, hold, middle = Fences(objective), ANCHOR / box.width, box.middle
-    memory: dict[bytes, tuple[Floats, Floats]] = {}
-    whole = np.array(start, float)
-    whole[list(held or {})] = list((held or {}).values())
-    free = np.setdiff1d(np.arange(whole.size), list(held or {}))
+    bound_penalties, prior_weight, centre = BoundPenalties(objective), PRIOR_STRENGTH / bounds.width, bounds.centre
+    cache: dict[bytes, tuple[Floats, Floats]] = {}
+    full = np.array(start, float)
+    full[list(fixed or {})] = list((fixed or {}).values())
+    free = np.setdiff1d(np.arange(full.size), list(fixed or {}))
 
-    def at(part: Floats) -> Floats:
-        x = whole.copy()
-        x[free] = part
+    def at(free_values: Floats) -> Floats:
+        x = full.copy()
+        x[free] = free_values
         return x
 
-    def evaluate(part: Floats) -> tuple[Floats, Floats]:
-        key = part.tobytes()
-        if key not in memory:
-            memory.clear()
-            x = at(part)
-            residuals = objective.at(x)
+    def evaluate(free_values: Floats) -> tuple[Floats, Floats]:
+        key = free_values.tobytes()
+        if key not in cache:
+            cache.clear()
+            x = at(free_values)
+            residuals = objective.evaluate(x)
             assert residuals.jacobian is not None
-            both = np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1)
-            white = np.linalg.solve(factor, both)[objective.entries.present]
-            values = [white[:, 0], fences.values(x), hold * (x - middle)]
-            slopes = [white[:, 1:], fences.jacobian(x), np.diag(hold)]
-            if extra is not None:
-                values.append(extra.residuals(x))
-                slopes.append(extra.jacobian(x))
-            memory[key] = np.concatenate(values), np.concatenate(slopes)[:, free]
-        return memory[key]
+            residuals_and_jacobian = np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1)
+            whitened = np.linalg.solve(covariance_factor, residuals_and_jacobian)[objective.observations.present]
+            values = [whitened[:, 0], bound_penalties.residuals(x), prior_weight * (x - centre)]
+            jacobians = [whitened[:, 1:], bound_penalties.jacobian(x), np.diag(prior_weight)]
+            if additional is not None:
+                values.append(additional.residuals(x))
+                jacobians.append(additional.jacobian(x))
+            cache[key] = np.concatenate(values), np.concatenate(jacobians)[:, free]
+        return cache[key]
 
-    begun = np.clip(whole, box.low + 1e-9 * box.width, box.high - 1e-9 * box.width)[free]
-    if not all(np.isfinite(part).all() for part in evaluate(begun)):
+    initial = np.clip(full, bounds.lower + 1e-9 * bounds.width, bounds.upper - 1e-9 * bounds.width)[free]
+    if not all(np.isfinite(part).all() for part in evaluate(initial)):
         raise FitError(
             f"law '{objective.law.name}': its prediction is no number where a refinement begins; narrow the bounds of "
             "its parameters, or give more starts"
         )
-    scale, own = 0.1 * box.width, objective.unknowns.size
-    if own:
-        scale[-own:] = np.minimum(objective.unknowns.sd, box.width[-own:])
+    scale, nuisance_count = 0.1 * bounds.width, objective.nuisance_parameters.size
+    if nuisance_count:
+        scale[-nuisance_count:] = np.minimum(objective.nuisance_parameters.sd, bounds.width[-nuisance_count:])
     result = least_squares(
         lambda part: evaluate(part)[0],
-        begun,
+        initial,
         jac=lambda part: evaluate(part)[1],
-        bounds=(box.low[free], box.high[free]),
+        bounds=(bounds.lower[free], bounds.upper[free]),
         x_scale=scale[free],
         loss=loss,
-        max_nfev=steps,
+        max_nfev=max_steps,
         ftol=tolerance,
         xtol=10 * tolerance,
         gtol=tolerance,
     )
-    data = int(objective.entries.present.sum())
+    observation_count = int(objective.observations.present.sum())
     return Minimum(
-        at(np.asarray(result.x)), float(result.cost), bool(result.status > 0), int(result.nfev), result.fun[:data]
+        at(np.asarray(result.x)), float(result.cost), bool(result.status > 0), int(result.nfev), result.fun[:observation_count]
     )

@@ -16,19 +16,19 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, nearest
 
 if TYPE_CHECKING:
-    from creepkit.inverse.search.landscape import Landscape
+    from creepkit.inverse.search.landscape import CostFunction
     from creepkit.language import CreepLaw
 
-ANY = "any"
+ANY_TERM = "any"
 """In place of names: every term may be switched off."""
-FLIPS = 0.5
+EXPECTED_FLIPS = 0.5
 """Switches that a candidate flips by chance in each draw, on average: enough to leave a wrong subset, not to drift."""
-AT_BOTTOM = 0.5
+OFF_MARGIN = 0.5
 """In ln of a rate: so near the bottom of the box it is at it."""
 
 
 @dataclass(frozen=True)
-class Switches:
+class TermMask:
     """Which terms may be off, and what that means for u.
 
     terms : names of those that may; rates : (terms,) positions of their rates; own : (terms, parameters) which
@@ -38,77 +38,77 @@ class Switches:
     """
 
     terms: tuple[str, ...]
-    rates: Ints
-    own: Bools
-    rest: Floats
-    always: bool
+    rate_positions: Ints
+    owned_parameters: Bools
+    resting_values: Floats
+    has_permanent_term: bool
 
     @classmethod
-    def of(cls, landscape: Landscape, off: str | Sequence[str]) -> Switches:
+    def from_cost_function(cls, cost_function: CostFunction, maskable: str | Sequence[str]) -> TermMask:
         """Those of a landscape; off : names of terms, or "any"."""
-        law, rates = landscape.objective.law, landscape.objective.coordinates.rates
+        law, rates = cost_function.objective.law, cost_function.objective.coordinates.term_rates
         positions = {label: [law.names.index(n) for n in law.only(label).names] for label in law.terms}
-        known = {label: [k for k in own if k in rates] for label, own in positions.items()}
-        chosen = _chosen(law, known, off)
-        own = np.zeros((len(chosen), landscape.box.low.size), bool)
-        for row, label in zip(own, chosen, strict=True):
-            others = {k for other, own_of in positions.items() if other != label for k in own_of}
-            row[[k for k in positions[label] if k not in others]] = True
-        rest = landscape.box.middle
-        rest[list(rates)] = landscape.box.low[list(rates)]
-        tuned = np.array([known[label][0] for label in chosen], np.int64)
-        return cls(chosen, tuned, own, rest, len(chosen) < len(law.terms))
+        rate_positions = {label: [k for k in owned if k in rates] for label, owned in positions.items()}
+        terms = _maskable_terms(law, rate_positions, maskable)
+        own = np.zeros((len(terms), cost_function.bounds.lower.size), bool)
+        for row, label in zip(own, terms, strict=True):
+            shared = {k for other, other_positions in positions.items() if other != label for k in other_positions}
+            row[[k for k in positions[label] if k not in shared]] = True
+        resting = cost_function.bounds.centre
+        resting[list(rates)] = cost_function.bounds.lower[list(rates)]
+        first_rates = np.array([rate_positions[label][0] for label in terms], np.int64)
+        return cls(terms, first_rates, own, resting, len(terms) < len(law.terms))
 
-    def sent(self, u: Floats, on: Bools) -> Floats:
+    def applied(self, u: Floats, masks: Bools) -> Floats:
         """u (..., parameters) with the coordinates of terms that are off at rest."""
-        return np.where(self.live(on), u, self.rest)
+        return np.where(self.active_parameters(masks), u, self.resting_values)
 
-    def live(self, on: Bools) -> Bools:
+    def active_parameters(self, masks: Bools) -> Bools:
         """(..., parameters) which coordinates mean something; on : (..., terms)."""
-        return np.asarray(~(~on[..., None] & self.own).any(axis=-2))
+        return np.asarray(~(~masks[..., None] & self.owned_parameters).any(axis=-2))
 
-    def held(self, on: Bools) -> dict[int, float]:
+    def fixed_values(self, mask: Bools) -> dict[int, float]:
         """{position: value} of the coordinates at rest, of one mask (terms,)."""
-        return {int(k): float(self.rest[k]) for k in np.flatnonzero(~self.live(on))}
+        return {int(k): float(self.resting_values[k]) for k in np.flatnonzero(~self.active_parameters(mask))}
 
-    def names_off(self, u: Floats) -> tuple[str, ...]:
+    def terms_off(self, u: Floats) -> tuple[str, ...]:
         """The terms that are off at u (parameters,): switched off, or driven to the bottom, which is the same."""
-        bottom = u[self.rates] <= self.rest[self.rates] + AT_BOTTOM
-        return tuple(term for term, is_off in zip(self.terms, bottom, strict=True) if is_off)
+        is_at_lower_bound = u[self.rate_positions] <= self.resting_values[self.rate_positions] + OFF_MARGIN
+        return tuple(term for term, is_off in zip(self.terms, is_at_lower_bound, strict=True) if is_off)
 
-    def drawn(self, count: int, rng: np.random.Generator) -> Bools:
+    def initial_masks(self, count: int, rng: np.random.Generator) -> Bools:
         """(count, terms) masks to begin from: all on in the first, every subset as likely as another in the rest."""
-        on = rng.random((count, len(self.terms))) < 0.5
-        on[:1] = True
-        return self._lit(on, rng)
+        masks = rng.random((count, len(self.terms))) < 0.5
+        masks[:1] = True
+        return self._never_empty(masks, rng)
 
-    def inherited(self, own: Bools, common: Bools, rng: np.random.Generator) -> Bools:
+    def recombined(self, personal_best: Bools, global_best: Bools, rng: np.random.Generator) -> Bools:
         """(candidates, terms) masks of the next draw: each switch from a candidate's own best mask (candidates, terms)
         or from the common one (terms,), as a coin falls; and now and then it flips.
         """
         if not self.terms:
-            return own
-        taken = np.where(rng.random(own.shape) < 0.5, own, common)
-        flipped = rng.random(own.shape) < FLIPS / len(self.terms)
-        return self._lit(taken ^ flipped, rng)
+            return personal_best
+        inherited = np.where(rng.random(personal_best.shape) < 0.5, personal_best, global_best)
+        flipped = rng.random(personal_best.shape) < EXPECTED_FLIPS / len(self.terms)
+        return self._never_empty(inherited ^ flipped, rng)
 
-    def _lit(self, on: Bools, rng: np.random.Generator) -> Bools:
+    def _never_empty(self, masks: Bools, rng: np.random.Generator) -> Bools:
         """A sum of nothing is no law: a mask without any term gets one, at random."""
-        dark = np.flatnonzero(~on.any(axis=1)) if self.terms and not self.always else np.zeros(0, int)
-        on[dark, rng.integers(max(len(self.terms), 1), size=dark.size)] = True
-        return on
+        empty = np.flatnonzero(~masks.any(axis=1)) if self.terms and not self.has_permanent_term else np.zeros(0, int)
+        masks[empty, rng.integers(max(len(self.terms), 1), size=empty.size)] = True
+        return masks
 
 
-def _chosen(law: CreepLaw, known: dict[str, list[int]], off: str | Sequence[str]) -> tuple[str, ...]:
+def _maskable_terms(law: CreepLaw, rate_positions: dict[str, list[int]], maskable: str | Sequence[str]) -> tuple[str, ...]:
     """The names meant by `off`, checked."""
-    if off == ANY:
-        return tuple(label for label, rate in known.items() if rate) if len(known) > 1 else ()
-    names = (off,) if isinstance(off, str) else tuple(off)
+    if maskable == ANY_TERM:
+        return tuple(label for label, positions in rate_positions.items() if positions) if len(rate_positions) > 1 else ()
+    names = (maskable,) if isinstance(maskable, str) else tuple(maskable)
     for name in names:
-        if name not in known:
-            raise FitError(f"law '{law.name}' has no term '{name}' to switch off; {nearest(name, known)}")
-        if len(known) == 1:
+        if name not in rate_positions:
+            raise FitError(f"law '{law.name}' has no term '{name}' to switch off; {nearest(name, rate_positions)}")
+        if len(rate_positions) == 1:
             raise FitError(f"law '{law.name}' has one term, '{name}', which cannot be switched off")
-        if not known[name]:
+        if not rate_positions[name]:
             raise FitError(f"term '{name}' of law '{law.name}' has no coefficient of its own that could be zero")
     return tuple(dict.fromkeys(names))

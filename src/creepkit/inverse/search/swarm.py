@@ -21,13 +21,13 @@ from scipy.stats import qmc
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import FitError
-from creepkit.inverse.search.polishing import SETTLED, Candidates, check_counts, polished
-from creepkit.inverse.search.subsets import Switches
-from creepkit.inverse.search.trace import Trace
+from creepkit.inverse.search.polishing import CONVERGED_DECREASE, SearchCandidates, check_whole_numbers, refine_candidates
+from creepkit.inverse.search.subsets import TermMask
+from creepkit.inverse.search.trace import SearchTrace
 
 if TYPE_CHECKING:
-    from creepkit.inverse.search.landscape import Found, Landscape
-    from creepkit.inverse.search.refining import Progress
+    from creepkit.inverse.search.landscape import SearchResult, CostFunction
+    from creepkit.inverse.search.refining import IterationCallback
 
 
 @dataclass(frozen=True)
@@ -53,124 +53,124 @@ class ParticleSwarm:
     particles: int = 300
     iterations: int = 100
     form: Literal["constriction", "inertia"] = "constriction"
-    own: float = 2.05
-    common: float = 2.05
+    cognitive: float = 2.05
+    social: float = 2.05
     inertia: tuple[float, float] = (0.9, 0.4)
-    velocity: float = 0.15
-    walls: Literal["absorb", "reflect"] = "absorb"
-    off: str | Sequence[str] = ()
-    polish: int = 3
+    max_velocity: float = 0.15
+    boundary: Literal["absorb", "reflect"] = "absorb"
+    maskable_terms: str | Sequence[str] = ()
+    refined_candidates: int = 3
     patience: int | None = None
 
     def __post_init__(self) -> None:
-        least = {"particles": 2, "iterations": 1, "polish": 0} | ({} if self.patience is None else {"patience": 1})
-        check_counts("particle swarm", {name: getattr(self, name) for name in least}, least)
+        minimum_values = {"particles": 2, "iterations": 1, "polish": 0} | ({} if self.patience is None else {"patience": 1})
+        check_whole_numbers("particle swarm", {name: getattr(self, name) for name in minimum_values}, minimum_values)
         for name, allowed in (("form", ("constriction", "inertia")), ("walls", ("absorb", "reflect"))):
-            found = getattr(self, name)
-            if found not in allowed:
-                raise FitError(f"particle swarm: {name} is {found!r}; allowed are {' and '.join(allowed)}")
-        if not 0 < self.velocity <= 1:
-            raise FitError(f"particle swarm: velocity is {self.velocity:g} of the box; allowed are 0 (not itself) to 1")
+            value = getattr(self, name)
+            if value not in allowed:
+                raise FitError(f"particle swarm: {name} is {value!r}; allowed are {' and '.join(allowed)}")
+        if not 0 < self.max_velocity <= 1:
+            raise FitError(f"particle swarm: velocity is {self.max_velocity:g} of the box; allowed are 0 (not itself) to 1")
         if not all(0 <= w <= 1 for w in self.inertia):
             raise FitError(f"particle swarm: inertia is {self.inertia}; both are from 0 to 1")
-        if min(self.own, self.common) < 0 or (self.form == "constriction" and self.own + self.common <= 4):
+        if min(self.cognitive, self.social) < 0 or (self.form == "constriction" and self.cognitive + self.social <= 4):
             raise FitError(
-                f"particle swarm: own and common pull with {self.own:g} and {self.common:g}; they must not be below "
+                f"particle swarm: own and common pull with {self.cognitive:g} and {self.social:g}; they must not be below "
                 "zero and, with form='constriction', must be more than 4 together"
             )
 
-    def minima(self, landscape: Landscape, progress: Progress | None = None) -> Found:
+    def minima(self, cost_function: CostFunction, progress: IterationCallback | None = None) -> SearchResult:
         """The refined best, best first, and the trace."""
-        flight, costs = _Flight(self, landscape), []
+        swarm, costs = _Swarm(self, cost_function), []
         for k in range(self.iterations):
-            costs.append(flight.look())
+            costs.append(swarm.evaluate())
             if progress is not None:
                 progress("swarm", k + 1, self.iterations)
-            if self._settled(flight.lowest):
+            if self._has_converged(swarm.lowest_costs):
                 break
-            flight.move(k)
-        trace = Trace.of(f"particle swarm of {self.particles}, {self.form} form", costs)
-        return polished(landscape, flight.seen(), self.polish, trace, progress)
+            swarm.move(k)
+        trace = SearchTrace.from_costs(f"particle swarm of {self.particles}, {self.form} form", costs)
+        return refine_candidates(cost_function, swarm.candidates(), self.refined_candidates, trace, progress)
 
-    def carried(self, velocity: Floats, pull: Floats, k: int) -> Floats:
+    def next_velocity(self, velocity: Floats, attraction: Floats, iteration: int) -> Floats:
         """The velocity after iteration k, from the one before and the pull of the best places, within its limit."""
         if self.form == "constriction":
-            c = self.own + self.common
-            moved = 2.0 / abs(2.0 - c - np.sqrt(c * c - 4.0 * c)) * (velocity + pull)
+            acceleration = self.cognitive + self.social
+            updated = 2.0 / abs(2.0 - acceleration - np.sqrt(acceleration * acceleration - 4.0 * acceleration)) * (velocity + attraction)
         else:
             first, last = self.inertia
-            moved = (first + (last - first) * k / max(self.iterations - 1, 1)) * velocity + pull
-        return np.asarray(np.clip(moved, -self.velocity, self.velocity))
+            updated = (first + (last - first) * iteration / max(self.iterations - 1, 1)) * velocity + attraction
+        return np.asarray(np.clip(updated, -self.max_velocity, self.max_velocity))
 
-    def _settled(self, lowest: Sequence[float]) -> bool:
-        if self.patience is None or len(lowest) <= self.patience:
+    def _has_converged(self, lowest_costs: Sequence[float]) -> bool:
+        if self.patience is None or len(lowest_costs) <= self.patience:
             return False
-        return lowest[-1 - self.patience] - lowest[-1] < SETTLED
+        return lowest_costs[-1 - self.patience] - lowest_costs[-1] < CONVERGED_DECREASE
 
 
-class _Flight:
+class _Swarm:
     """Where all particles are, in the unit cube, and the best that each has seen."""
 
-    def __init__(self, rules: ParticleSwarm, landscape: Landscape) -> None:
-        self.rules, self.landscape, seed = rules, landscape, landscape.settings.seed
-        self.rng, self.switches = np.random.default_rng(seed), Switches.of(landscape, rules.off)
-        count, size = rules.particles, landscape.box.low.size
-        self.x, self.velocity = _sobol(count, size, seed), np.zeros((count, size))
-        self.on = self.switches.drawn(count, self.rng)
-        self.best, self.best_on, self.cost = self.x.copy(), self.on.copy(), np.full(count, np.inf)
-        self.lowest: list[float] = []
-        self.subsets: dict[bytes, tuple[float, Floats, Bools]] = {}
+    def __init__(self, rules: ParticleSwarm, cost_function: CostFunction) -> None:
+        self.rules, self.cost_function, seed = rules, cost_function, cost_function.settings.seed
+        self.rng, self.term_mask = np.random.default_rng(seed), TermMask.from_cost_function(cost_function, rules.maskable_terms)
+        count, size = rules.particles, cost_function.bounds.lower.size
+        self.x, self.velocity = _sobol_points(count, size, seed), np.zeros((count, size))
+        self.masks = self.term_mask.initial_masks(count, self.rng)
+        self.best_position, self.best_masks, self.best_cost = self.x.copy(), self.masks.copy(), np.full(count, np.inf)
+        self.lowest_costs: list[float] = []
+        self.best_by_mask: dict[bytes, tuple[float, Floats, Bools]] = {}
 
-    def look(self) -> Floats:
+    def evaluate(self) -> Floats:
         """(particles,) costs where they are, in one prediction; the best are remembered."""
-        cost = self.landscape.cost(self._u(self.x, self.on))
-        better = cost < self.cost
-        self.best[better], self.best_on[better], self.cost[better] = self.x[better], self.on[better], cost[better]
-        self.lowest.append(float(self.cost.min()))
-        for k in np.flatnonzero(better) if self.switches.terms else ():
-            self._keep(self.on[k], float(cost[k]), self.x[k])
+        cost = self.cost_function.cost(self._coordinates(self.x, self.masks))
+        better = cost < self.best_cost
+        self.best_position[better], self.best_masks[better], self.best_cost[better] = self.x[better], self.masks[better], cost[better]
+        self.lowest_costs.append(float(self.best_cost.min()))
+        for k in np.flatnonzero(better) if self.term_mask.terms else ():
+            self._store_best_of_mask(self.masks[k], float(cost[k]), self.x[k])
         return cost
 
-    def _keep(self, on: Bools, cost: float, x: Floats) -> None:
+    def _store_best_of_mask(self, mask: Bools, cost: float, position: Floats) -> None:
         """The best of each subset."""
-        key = on.tobytes()
-        if key not in self.subsets or cost < self.subsets[key][0]:
-            self.subsets[key] = cost, x.copy(), on.copy()
+        key = mask.tobytes()
+        if key not in self.best_by_mask or cost < self.best_by_mask[key][0]:
+            self.best_by_mask[key] = cost, position.copy(), mask.copy()
 
-    def move(self, k: int) -> None:
+    def move(self, iteration: int) -> None:
         """One step of all; what a better one does not have, draws nobody."""
         shape, rules = self.x.shape, self.rules
-        self.on = self.switches.inherited(self.best_on, self.best_on[self.cost.argmin()], self.rng)
+        self.masks = self.term_mask.recombined(self.best_masks, self.best_masks[self.best_cost.argmin()], self.rng)
         leaders, masks = self._leaders()
-        own = np.where(self.switches.live(self.best_on), self.best - self.x, 0.0)
-        common = np.where(self.switches.live(masks), leaders - self.x, 0.0)
-        pull = rules.own * self.rng.random(shape) * own + rules.common * self.rng.random(shape) * common
-        self.velocity = rules.carried(self.velocity, pull, k)
-        self._at_walls(self.x + self.velocity)
+        to_personal_best = np.where(self.term_mask.active_parameters(self.best_masks), self.best_position - self.x, 0.0)
+        to_global_best = np.where(self.term_mask.active_parameters(masks), leaders - self.x, 0.0)
+        attraction = rules.cognitive * self.rng.random(shape) * to_personal_best + rules.social * self.rng.random(shape) * to_global_best
+        self.velocity = rules.next_velocity(self.velocity, attraction, iteration)
+        self._apply_boundary(self.x + self.velocity)
 
     def _leaders(self) -> tuple[Floats, Bools]:
         """Whom each particle follows, and with which terms: the best of its subset, or of all if it is the first."""
-        k = int(self.cost.argmin())
-        if not self.switches.terms:
-            return self.best[k], self.best_on[k]
-        of_all = (0.0, self.best[k], self.best_on[k])
-        _, places, masks = zip(*(self.subsets.get(on.tobytes(), of_all) for on in self.on), strict=True)
-        return np.array(places), np.array(masks)
+        k = int(self.best_cost.argmin())
+        if not self.term_mask.terms:
+            return self.best_position[k], self.best_masks[k]
+        global_best = (0.0, self.best_position[k], self.best_masks[k])
+        _, positions, masks = zip(*(self.best_by_mask.get(mask.tobytes(), global_best) for mask in self.masks), strict=True)
+        return np.array(positions), np.array(masks)
 
-    def seen(self) -> Candidates:
+    def candidates(self) -> SearchCandidates:
         """The best that each particle has seen; where terms may be off, the best of each subset."""
-        if self.switches.terms:
-            costs, places, masks = (np.array(each) for each in zip(*self.subsets.values(), strict=True))
-            return Candidates(self._u(places, masks), costs, self.switches, masks)
-        return Candidates(self._u(self.best, self.best_on), self.cost)
+        if self.term_mask.terms:
+            costs, positions, masks = (np.array(each) for each in zip(*self.best_by_mask.values(), strict=True))
+            return SearchCandidates(self._coordinates(positions, masks), costs, self.term_mask, masks)
+        return SearchCandidates(self._coordinates(self.best_position, self.best_masks), self.best_cost)
 
-    def _u(self, x: Floats, on: Bools) -> Floats:
-        box = self.landscape.box
-        return self.switches.sent(box.low + x * box.width, on)
+    def _coordinates(self, positions: Floats, masks: Bools) -> Floats:
+        bounds = self.cost_function.bounds
+        return self.term_mask.applied(bounds.lower + positions * bounds.width, masks)
 
-    def _at_walls(self, x: Floats) -> None:
+    def _apply_boundary(self, x: Floats) -> None:
         inside = np.clip(x, 0.0, 1.0)
-        if self.rules.walls == "absorb":
+        if self.rules.boundary == "absorb":
             self.velocity = np.where(x == inside, self.velocity, 0.0)
             self.x = inside
         else:
@@ -178,6 +178,6 @@ class _Flight:
             self.x = np.clip(2.0 * inside - x, 0.0, 1.0)
 
 
-def _sobol(count: int, size: int, seed: int) -> Floats:
+def _sobol_points(count: int, size: int, seed: int) -> Floats:
     """(count, size) the first points of a scrambled Sobol set, which is balanced in powers of two."""
     return np.asarray(qmc.Sobol(size, seed=seed).random_base2(int(np.ceil(np.log2(count))))[:count])

@@ -1,5 +1,5 @@
 """Which laws: candidates, their ranking under one covariance, what cannot be told apart, and what would tell it."""
 
-from creepkit.inverse.selection.ranking import CREDIBLE, CRITERIA, DECISIVE, Ranked, Ranking, rank
+from creepkit.inverse.selection.ranking import CREDIBLE_WEIGHT, CRITERIA, DECISIVE_WEIGHT, RankedLaw, Ranking, rank
 
-__all__ = ["CREDIBLE", "CRITERIA", "DECISIVE", "Ranked", "Ranking", "rank"]
+__all__ = ["CREDIBLE_WEIGHT", "CRITERIA", "DECISIVE_WEIGHT", "RankedLaw", "Ranking", "rank"]

@@ -13,32 +13,32 @@ def reductions(law: CreepLaw) -> list[CreepLaw]:
 
     Table 1 is the set of reductions of Eq. (2) to single terms.
     """
-    found: list[CreepLaw] = []
+    laws: list[CreepLaw] = []
     labels = list(law.terms)
     for count in range(len(labels), 0, -1):
-        for kept in combinations(labels, count):
-            part = law.without(*(label for label in labels if label not in kept)) if count < len(labels) else law
-            found += _with_exponents_off(part)
-    return _distinct(found)
+        for kept_labels in combinations(labels, count):
+            reduced = law.without(*(label for label in labels if label not in kept_labels)) if count < len(labels) else law
+            laws += _with_exponents_off(reduced)
+    return _distinct_laws(laws)
 
 
 def sums_of_two(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
     """Sums of every two of the laws, such as primary and steady creep of Norton's law beside strain hardening."""
-    return [a + b for a, b in combinations(_distinct(laws), 2)]
+    return [a + b for a, b in combinations(_distinct_laws(laws), 2)]
 
 
 def _with_exponents_off(law: CreepLaw) -> list[CreepLaw]:
     """The law with every set of its exponents switched off that may be."""
     names = [name for name, p in law.table.items() if p.scale != "log" and p.off == 0.0]
-    found = []
+    laws = []
     for count in range(len(names) + 1):
-        for gone in combinations(names, count):
-            found.append(law.fix(**dict.fromkeys(gone, 0.0)) if gone else law)
-    return found
+        for switched_off in combinations(names, count):
+            laws.append(law.fix(**dict.fromkeys(switched_off, 0.0)) if switched_off else law)
+    return laws
 
 
-def _distinct(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
-    kept: dict[str, CreepLaw] = {}
+def _distinct_laws(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
+    by_fingerprint: dict[str, CreepLaw] = {}
     for law in laws:
-        kept.setdefault(law.fingerprint, law)
-    return list(kept.values())
+        by_fingerprint.setdefault(law.fingerprint, law)
+    return list(by_fingerprint.values())

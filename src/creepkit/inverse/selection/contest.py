@@ -8,164 +8,164 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.alternation import free
-from creepkit.inverse.covariance import whitener
-from creepkit.inverse.effects import Unknowns
-from creepkit.inverse.entries import Entries
-from creepkit.inverse.fences import Fences
-from creepkit.inverse.frames import thinned
+from creepkit.inverse.alternation import starting_point
+from creepkit.inverse.covariance import cholesky_factors
+from creepkit.inverse.effects import NuisanceParameters
+from creepkit.inverse.entries import ObservationVector
+from creepkit.inverse.fences import BoundPenalties
+from creepkit.inverse.frames import thinned_history
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.nominal import measured_log_pace, measured_log_rate
-from creepkit.inverse.objective import Objective
-from creepkit.inverse.scales import usable
-from creepkit.inverse.scatter import Scatter
-from creepkit.inverse.search.box import Box
-from creepkit.inverse.search.refining import refine
-from creepkit.inverse.selection.designs import Design
-from creepkit.inverse.together import outputs_of, predict, predictor_of, screening_of
+from creepkit.inverse.nominal import median_log_inverse_duration, median_log_strain_rate
+from creepkit.inverse.objective import ResidualFunction
+from creepkit.inverse.scales import usable_frames
+from creepkit.inverse.scatter import NoiseModel
+from creepkit.inverse.search.box import Bounds
+from creepkit.inverse.search.refining import bounded_least_squares
+from creepkit.inverse.selection.designs import CandidateTest
+from creepkit.inverse.together import compared_outputs, predict, predictor_for, reduced_order_model_of
 from creepkit.records import History, Predictor
 
-STEPS = 8
+REFIT_STEPS = 8
 """Of a full refit."""
-LEAST_FRAMES = 5
+MIN_FRAMES = 5
 """A planned test with fewer frames before it bursts says nothing."""
-WEAK = 0.03
+WEAK_PRIOR = 0.03
 """Standard deviations of data per width of the bounds by which a Gauss-Newton step is held where nothing else does."""
-REACH = 2.0
+EXTRAPOLATION_LIMIT = 2.0
 """A planned test is followed until its growing output is so many times what was seen: beyond, other things happen."""
-ROWS = ("output", "frame", "present", "leading", "measured", "times", "loudness", "whole", "censored")
+OBSERVATION_FIELDS = ("output", "frame", "present", "leading", "measured", "times", "loudness", "whole", "censored")
 """Fields of entries with a row for each test."""
 
 
 @dataclass(frozen=True, eq=False)
-class Contest:
+class ModelDiscrimination:
     """Law b against law a.
 
     made : how many tests were; plans : those that could be. histories : of both, in this order, with a's predictions
     for outputs. fit : of b. entries, scatter : by which they are compared, the scatter being that of a's fit.
     """
 
-    made: int
-    plans: tuple[Design, ...]
+    measured_count: int
+    candidates: tuple[CandidateTest, ...]
     histories: tuple[History, ...]
-    using: Predictor
-    fit: Identification
-    entries: Entries
-    scatter: Scatter
+    predictor: Predictor
+    alternative: Identification
+    observations: ObservationVector
+    noise_model: NoiseModel
 
     @classmethod
-    def of(cls, a: Identification, b: Identification, plans: Sequence[Design]) -> Contest:
+    def from_identifications(cls, reference: Identification, alternative: Identification, candidates: Sequence[CandidateTest]) -> ModelDiscrimination:
         """Law b against what law a predicts; plans that burst at once are left out."""
-        assert a.using is not None
-        using, full = screening_of(a.using) or a.using, [_endless(h) for h in a.histories]
-        made = [thinned(h, a.settings.frames) for h in full]
-        base = Entries.of(made, using, full)
-        every = [*made, *(_with_outputs(d.history, using, base) for d in plans)]
-        told = _told(a, using, every, len(made), base)
-        most = {name: _most(made, name) for name in base.outputs}
-        kept = [(d, h) for d, h in zip(plans, (_cut(h, using, most) for h in told[len(made) :]), strict=True)
-                if h.used.sum() >= LEAST_FRAMES]  # fmt: skip
-        histories = (*told[: len(made)], *(h for _, h in kept))
-        entries = replace(Entries.of(histories, using), scales=base.scales, noise=base.noise)
-        scatter = Scatter({name: a.scatter[name] for name in base.outputs}, a.scatter.rate)
-        return cls(len(made), tuple(d for d, _ in kept), histories, using, b, entries, scatter)
+        assert reference.predictor is not None
+        predictor, measured_histories = reduced_order_model_of(reference.predictor) or reference.predictor, [_without_rupture(h) for h in reference.histories]
+        measured = [thinned_history(h, reference.settings.frames) for h in measured_histories]
+        base_observations = ObservationVector.from_histories(measured, predictor, measured_histories)
+        all_histories = [*measured, *(_with_placeholder_outputs(d.history, predictor, base_observations) for d in candidates)]
+        predicted = _with_predictions(reference, predictor, all_histories, len(measured), base_observations)
+        output_limits = {name: _output_limit(measured, name) for name in base_observations.outputs}
+        usable = [(d, h) for d, h in zip(candidates, (_with_usable_frames(h, predictor, output_limits) for h in predicted[len(measured) :]), strict=True)
+                if h.used.sum() >= MIN_FRAMES]  # fmt: skip
+        histories = (*predicted[: len(measured)], *(h for _, h in usable))
+        observations = replace(ObservationVector.from_histories(histories, predictor), transforms=base_observations.transforms, noise=base_observations.noise)
+        noise_model = NoiseModel({name: reference.noise_model[name] for name in base_observations.outputs}, reference.noise_model.rate)
+        return cls(len(measured), tuple(d for d, _ in usable), histories, predictor, alternative, observations, noise_model)
 
-    def linear(self, chosen: Sequence[int]) -> float:
+    def linearised_chi_square(self, candidate_indices: Sequence[int]) -> float:
         """The chi-square left after one Gauss-Newton step, with the chosen plans."""
-        objective, x, box, factor = self._posed(chosen)
-        residuals, fences = objective.at(x), Fences(objective)
+        objective, x, bounds, covariance_factor = self._problem(candidate_indices)
+        residuals, bound_penalties = objective.evaluate(x), BoundPenalties(objective)
         assert residuals.jacobian is not None
-        both = np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1)
-        white = np.linalg.solve(factor, both)[residuals.present]
-        rows = np.concatenate([white[:, 1:], fences.jacobian(x)])
-        g = np.concatenate([white[:, 0], fences.values(x)])
-        hold = np.diag(WEAK / box.width)
-        step = np.linalg.lstsq(np.concatenate([rows, hold]), np.concatenate([-g, np.zeros(x.size)]), rcond=None)[0]
-        return float(((g + rows @ step) ** 2).sum())
+        residuals_and_jacobian = np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1)
+        whitened = np.linalg.solve(covariance_factor, residuals_and_jacobian)[residuals.present]
+        jacobian_rows = np.concatenate([whitened[:, 1:], bound_penalties.jacobian(x)])
+        whitened_residuals = np.concatenate([whitened[:, 0], bound_penalties.residuals(x)])
+        weak_prior = np.diag(WEAK_PRIOR / bounds.width)
+        step = np.linalg.lstsq(np.concatenate([jacobian_rows, weak_prior]), np.concatenate([-whitened_residuals, np.zeros(x.size)]), rcond=None)[0]
+        return float(((whitened_residuals + jacobian_rows @ step) ** 2).sum())
 
-    def refitted(self, chosen: Sequence[int]) -> float:
+    def refitted_chi_square(self, candidate_indices: Sequence[int]) -> float:
         """The chi-square left after a full refit."""
-        objective, x, box, factor = self._posed(chosen)
-        return 2.0 * refine(objective, box, factor, x, steps=STEPS, tolerance=1e-5).cost
+        objective, x, bounds, covariance_factor = self._problem(candidate_indices)
+        return 2.0 * bounded_least_squares(objective, bounds, covariance_factor, x, max_steps=REFIT_STEPS, tolerance=1e-5).cost
 
-    def _posed(self, chosen: Sequence[int]) -> tuple[Objective, Floats, Box, Floats]:
+    def _problem(self, candidate_indices: Sequence[int]) -> tuple[ResidualFunction, Floats, Bounds, Floats]:
         """The problem of law b with the chosen plans: objective, where to begin, bounds, and covariance factors."""
-        own, b = [*range(self.made), *(self.made + k for k in chosen)], self.fit
-        histories, made = [self.histories[k] for k in own], self.histories[: self.made]
-        rows = {name: getattr(self.entries, name)[own] for name in ROWS}
-        unknowns = _unknowns(b, histories, self.made, self.using)
-        entries = replace(self.entries, **rows)
-        objective = Objective(b.law, histories, self.using, b.coordinates, entries, unknowns)
-        known = {(n.kind, n.member): n.value for n in b.nuisances}
-        rate = measured_log_rate(made, self.using)
-        box = Box.of(b.law, b.coordinates, rate, measured_log_pace(made)).beside(unknowns)
-        x = box.clip(free(unknowns, b.u, known))
-        factor = whitener(replace(objective.at(x), present=objective.entries.present), self.scatter)
-        return objective, x, box, factor
+        indices, alternative = [*range(self.measured_count), *(self.measured_count + k for k in candidate_indices)], self.alternative
+        histories, measured = [self.histories[k] for k in indices], self.histories[: self.measured_count]
+        fields = {name: getattr(self.observations, name)[indices] for name in OBSERVATION_FIELDS}
+        nuisances = _nuisances(alternative, histories, self.measured_count, self.predictor)
+        observations = replace(self.observations, **fields)
+        objective = ResidualFunction(alternative.law, histories, self.predictor, alternative.coordinates, observations, nuisances)
+        initial_values = {(nuisance.kind, nuisance.owner): nuisance.value for nuisance in alternative.nuisances}
+        log_rate = median_log_strain_rate(measured, self.predictor)
+        bounds = Bounds.from_law(alternative.law, alternative.coordinates, log_rate, median_log_inverse_duration(measured)).with_nuisances(nuisances)
+        x = bounds.clip(starting_point(nuisances, alternative.u, initial_values))
+        covariance_factor = cholesky_factors(replace(objective.evaluate(x), present=objective.observations.present), self.noise_model)
+        return objective, x, bounds, covariance_factor
 
 
-def _endless(history: History) -> History:
+def _without_rupture(history: History) -> History:
     """A history compared at its frames alone: when it would break is not what is asked."""
     return replace(history, rupture_time=None, unruptured=False)
 
 
-def _with_outputs(plan: History, using: Predictor, base: Entries) -> History:
+def _with_placeholder_outputs(candidate: History, predictor: Predictor, base_observations: ObservationVector) -> History:
     """A planned history with room for the outputs of those that were made, at their noise."""
-    known = getattr(predictor_of(using, plan), "outputs", base.outputs)
-    noise = {name: np.full(plan.times.size, base.noise[base.outputs.index(name)]) for name in known
-             if name in base.outputs}  # fmt: skip
-    return replace(_endless(plan), outputs={name: 0.0 * sd for name, sd in noise.items()}, standard_deviation=noise)
+    outputs = getattr(predictor_for(predictor, candidate), "outputs", base_observations.outputs)
+    noise = {name: np.full(candidate.times.size, base_observations.noise[base_observations.outputs.index(name)]) for name in outputs
+             if name in base_observations.outputs}  # fmt: skip
+    return replace(_without_rupture(candidate), outputs={name: 0.0 * sd for name, sd in noise.items()}, standard_deviation=noise)
 
 
-def _told(a: Identification, using: Predictor, every: Sequence[History], made: int, base: Entries) -> list[History]:
+def _with_predictions(fit: Identification, predictor: Predictor, histories: Sequence[History], measured_count: int, base_observations: ObservationVector) -> list[History]:
     """Histories with what law a predicts in the place of what was measured, at the noise of what was."""
-    effects = a.effects(every)
-    if "thickness" in effects:
-        effects["thickness"] = effects["thickness"].copy()
-        for k, own in _thicknesses(every, made):
-            effects["thickness"][0, k] = own
-    found = predict(using, a.law, a.values, every, effects=effects)
-    answer = []
-    for k, history in enumerate(every):
+    nuisance_values = fit.nuisance_values(histories)
+    if "thickness" in nuisance_values:
+        nuisance_values["thickness"] = nuisance_values["thickness"].copy()
+        for k, thickness in _stated_thicknesses(histories, measured_count):
+            nuisance_values["thickness"][0, k] = thickness
+    prediction = predict(predictor, fit.law, fit.values, histories, nuisances=nuisance_values)
+    predicted = []
+    for k, history in enumerate(histories):
         outputs, sd = {}, {}
-        for name in outputs_of(using, history):
-            there = np.isfinite(history.outputs[name])
-            outputs[name] = np.where(there, found.of(k)[:, found.outputs.index(name)], np.nan)
-            typical = np.full(there.size, base.noise[base.outputs.index(name)])
-            sd[name] = history.standard_deviation.get(name, typical)
-        answer.append(replace(history, outputs=outputs, standard_deviation=sd))
-    return answer
+        for name in compared_outputs(predictor, history):
+            is_measured = np.isfinite(history.outputs[name])
+            outputs[name] = np.where(is_measured, prediction.of(k)[:, prediction.outputs.index(name)], np.nan)
+            typical_noise = np.full(is_measured.size, base_observations.noise[base_observations.outputs.index(name)])
+            sd[name] = history.standard_deviation.get(name, typical_noise)
+        predicted.append(replace(history, outputs=outputs, standard_deviation=sd))
+    return predicted
 
 
-def _most(made: Sequence[History], name: str) -> float:
+def _output_limit(measured: Sequence[History], name: str) -> float:
     """How far the growing output of a planned test is followed: as far again as the tests that were made."""
-    seen = [h.outputs[name][usable(h, name)] for h in made if name in h.outputs]
-    values = np.concatenate([*seen, np.zeros(1)])
-    return float(values.min() + REACH * np.ptp(values))
+    used_values = [h.outputs[name][usable_frames(h, name)] for h in measured if name in h.outputs]
+    values = np.concatenate([*used_values, np.zeros(1)])
+    return float(values.min() + EXTRAPOLATION_LIMIT * np.ptp(values))
 
 
-def _cut(plan: History, using: Predictor, most: dict[str, float]) -> History:
+def _with_usable_frames(candidate: History, predictor: Predictor, output_limits: dict[str, float]) -> History:
     """A planned history with its frames before it bursts, and within reach, marked used."""
-    first, *_ = outputs_of(using, plan)
-    alive = np.isfinite(np.stack([*plan.outputs.values()])).all(axis=0)
-    near = np.nan_to_num(plan.outputs[first]) <= most[first]
-    return replace(plan, used=alive & near & (plan.times > 0))
+    first_output, *_ = compared_outputs(predictor, candidate)
+    is_finite = np.isfinite(np.stack([*candidate.outputs.values()])).all(axis=0)
+    is_within_limit = np.nan_to_num(candidate.outputs[first_output]) <= output_limits[first_output]
+    return replace(candidate, used=is_finite & is_within_limit & (candidate.times > 0))
 
 
-def _thicknesses(histories: Sequence[History], made: int) -> list[tuple[int, float]]:
+def _stated_thicknesses(histories: Sequence[History], measured_count: int) -> list[tuple[int, float]]:
     """(position, mm) of the planned tests whose apex thickness is stated: it is what they are about."""
     return [(k, h.geometry["apex_thickness"]) for k, h in enumerate(histories)
-            if k >= made and "apex_thickness" in h.geometry]  # fmt: skip
+            if k >= measured_count and "apex_thickness" in h.geometry]  # fmt: skip
 
 
-def _unknowns(fit: Identification, histories: Sequence[History], made: int, using: Predictor) -> Unknowns:
+def _nuisances(fit: Identification, histories: Sequence[History], measured_count: int, predictor: Predictor) -> NuisanceParameters:
     """Those of the fit's nuisances, with the spreads that it found; planned thicknesses are known as well as others."""
-    unknowns = Unknowns.of(fit.settings.nuisances, histories, using)
-    if not unknowns.mean.size:
-        return unknowns
-    spread, mean = {n.kind: n.spread for n in fit.nuisances}, unknowns.mean.copy()
-    for k, own in _thicknesses(histories, made) if "thickness" in unknowns.place else ():
-        place = int(unknowns.place["thickness"][k])
-        if place >= 0 and unknowns.nuisances[place].scope == "test":
-            mean[place] = own
-    return replace(unknowns, mean=mean, sd=np.array([spread[n.kind] for n in unknowns.nuisances], float))
+    nuisances = NuisanceParameters.from_histories(fit.settings.nuisances, histories, predictor)
+    if not nuisances.mean.size:
+        return nuisances
+    spread, mean = {nuisance.kind: nuisance.prior_sd for nuisance in fit.nuisances}, nuisances.mean.copy()
+    for k, thickness in _stated_thicknesses(histories, measured_count) if "thickness" in nuisances.test_index else ():
+        position = int(nuisances.test_index["thickness"][k])
+        if position >= 0 and nuisances.nuisances[position].scope == "test":
+            mean[position] = thickness
+    return replace(nuisances, mean=mean, sd=np.array([spread[n.kind] for n in nuisances.nuisances], float))

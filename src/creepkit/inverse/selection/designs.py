@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.together import predictor_of
+from creepkit.inverse.together import predictor_for
 from creepkit.records import (
     History,
     Loading,
@@ -23,105 +23,105 @@ from creepkit.records import (
 )
 from creepkit.records.loading import Quantity
 
-Control = Literal["load", "stress"]
+ControlledQuantity = Literal["load", "stress"]
 
-FRAMES = 40
+CANDIDATE_FRAMES = 40
 """Of a planned test, half spread over time and half over its logarithm."""
-LOWER, HIGHER, FAR = 0.7, 1.4, 2.0
+LOWER_LEVEL, HIGHER_LEVEL, EXTENSION = 0.7, 1.4, 2.0
 """Levels of further tests, over the lowest and the highest level of those made; and how much longer they may be."""
 
 
 @dataclass(frozen=True)
-class Design:
+class CandidateTest:
     """A test that could be made: its history, without outputs, and what it is in words."""
 
     description: str
     history: History
 
 
-def designs(histories: Sequence[History], exponent: float = 0.0, using: Predictor | None = None) -> tuple[Design, ...]:
+def candidate_tests(histories: Sequence[History], exponent: float = 0.0, predictor: Predictor | None = None) -> tuple[CandidateTest, ...]:
     """Variations of tests that were made: other levels, a change of level, longer; of bulge tests, other thickness.
 
     Each is made on the longest test of its kind of loading. A bar at another stress is tested for a time that goes
     with stress^-exponent, so that it strains as much, but never for more than twice as long. The thickness that is
     varied is that of the history, else that of the specimen `using`.
     """
-    found: list[Design] = []
+    candidates: list[CandidateTest] = []
     for quantity in dict.fromkeys(h.loading.quantity for h in histories):
         tests = [h for h in histories if h.loading.quantity == quantity]
         if quantity in _VARIATIONS:
-            base = _with_thickness(max(tests, key=lambda h: float(h.times[-1])), using)
+            longest = _with_apex_thickness(max(tests, key=lambda h: float(h.times[-1])), predictor)
             levels = np.concatenate([h.loading.program().values for h in tests])
-            found += _VARIATIONS[quantity](base, levels[levels > 0], exponent)
-    if not found:
+            candidates += _VARIATIONS[quantity](longest, levels[levels > 0], exponent)
+    if not candidates:
         kinds = ", ".join(dict.fromkeys(h.loading.quantity for h in histories))
         raise FitError(f"no further tests are known for a loading by {kinds}; give designs=, a list of histories")
-    return tuple(found)
+    return tuple(candidates)
 
 
-def _with_thickness(history: History, using: Predictor | None) -> History:
+def _with_apex_thickness(history: History, predictor: Predictor | None) -> History:
     """The history, stating the apex thickness of its specimen where that has one and the history does not say."""
-    specimen = None if using is None else getattr(predictor_of(using, history), "geometry", None)
-    usual = getattr(specimen, "apex_thickness", None)
-    if usual is None or "apex_thickness" in history.geometry:
+    specimen = None if predictor is None else getattr(predictor_for(predictor, history), "geometry", None)
+    nominal = getattr(specimen, "apex_thickness", None)
+    if nominal is None or "apex_thickness" in history.geometry:
         return history
-    return replace(history, geometry={**history.geometry, "apex_thickness": float(usual)})
+    return replace(history, geometry={**history.geometry, "apex_thickness": float(nominal)})
 
 
-def planned(base: History, description: str, loading: Loading, end: float, **changes: object) -> Design:
+def candidate_test(base_history: History, description: str, loading: Loading, end_time: float, **changes: object) -> CandidateTest:
     """A test like `base` under another loading, to the time `end`, s; without outputs."""
-    first = float(base.times[base.times > 0][0]) * end / float(base.times[-1])
-    times = np.unique(np.concatenate([np.geomspace(first, end, FRAMES // 2), np.linspace(first, end, FRAMES // 2 + 1)]))
-    blank = base.replace(times=times, outputs={}, standard_deviation={}, loading=loading, name=f"plan: {description}")
-    return Design(description, replace(blank, **changes) if changes else blank)  # type: ignore[arg-type]
+    first_time = float(base_history.times[base_history.times > 0][0]) * end_time / float(base_history.times[-1])
+    times = np.unique(np.concatenate([np.geomspace(first_time, end_time, CANDIDATE_FRAMES // 2), np.linspace(first_time, end_time, CANDIDATE_FRAMES // 2 + 1)]))
+    history = base_history.replace(times=times, outputs={}, standard_deviation={}, loading=loading, name=f"plan: {description}")
+    return CandidateTest(description, replace(history, **changes) if changes else history)  # type: ignore[arg-type]
 
 
-def _of_stress(base: History, levels: Floats, exponent: float) -> Iterator[Design]:
-    low, high, end = float(levels.min()), float(levels.max()), float(base.times[-1])
-    middle, own = float(np.sqrt(low * high)), float(base.loading.program().values.max())
-    control: Control = getattr(base.loading, "control", "stress")
-    for level in (LOWER * low, HIGHER * high, FAR * high):
-        lasting = end * min((level / own) ** -exponent, FAR)
-        yield planned(base, f"{level:.3g} MPa for {_hours(lasting)}", constant_stress(level, control), lasting)
-    for factor in (HIGHER, LOWER):
-        change = StressSteps(((0.0, middle), (0.5 * end, factor * middle)), control)
-        told = f"{middle:.3g} MPa, from {_hours(0.5 * end)} on {factor * middle:.3g} MPa, for {_hours(end)}"
-        yield planned(base, told, change, end)
-    yield planned(base, f"{middle:.3g} MPa for {_hours(FAR * end)}", constant_stress(middle, control), FAR * end)
+def _stress_variations(base_history: History, levels: Floats, exponent: float) -> Iterator[CandidateTest]:
+    lowest, highest, end_time = float(levels.min()), float(levels.max()), float(base_history.times[-1])
+    middle, base_level = float(np.sqrt(lowest * highest)), float(base_history.loading.program().values.max())
+    control: ControlledQuantity = getattr(base_history.loading, "control", "stress")
+    for level in (LOWER_LEVEL * lowest, HIGHER_LEVEL * highest, EXTENSION * highest):
+        duration = end_time * min((level / base_level) ** -exponent, EXTENSION)
+        yield candidate_test(base_history, f"{level:.3g} MPa for {_hours_text(duration)}", constant_stress(level, control), duration)
+    for factor in (HIGHER_LEVEL, LOWER_LEVEL):
+        change = StressSteps(((0.0, middle), (0.5 * end_time, factor * middle)), control)
+        description = f"{middle:.3g} MPa, from {_hours_text(0.5 * end_time)} on {factor * middle:.3g} MPa, for {_hours_text(end_time)}"
+        yield candidate_test(base_history, description, change, end_time)
+    yield candidate_test(base_history, f"{middle:.3g} MPa for {_hours_text(EXTENSION * end_time)}", constant_stress(middle, control), EXTENSION * end_time)
 
 
-def _of_pressure(base: History, levels: Floats, _: float) -> Iterator[Design]:
-    low, high, end = float(levels.min()), float(levels.max()), float(base.times[-1])
-    ramp = float(getattr(base.loading, "ramp", 5.0))
-    for level in (LOWER * low, LOWER * high, HIGHER * high):
-        told = f"a constant {level:.3g} MPa for {_hours(end)}"
-        yield planned(base, told, PressureJump(level, level, 0.5 * end, ramp), end)
-    for first, second in ((low, HIGHER * high), (LOWER * low, HIGHER * high)):
-        told = f"{first:.3g} MPa, from {_hours(0.5 * end)} on {second:.3g} MPa, for {_hours(end)}"
-        yield planned(base, told, PressureJump(first, second, 0.5 * end, ramp), end)
-    yield planned(base, f"the same loading for {_hours(FAR * end)}", base.loading, FAR * end)
-    thickness = base.geometry.get("apex_thickness")
-    for other in () if thickness is None else (0.9 * thickness, 1.1 * thickness):
-        geometry = {**base.geometry, "apex_thickness": other}
-        yield planned(base, f"a dimple of {other:.3g} mm under the same loading", base.loading, end, geometry=geometry)
+def _pressure_variations(base_history: History, levels: Floats, _: float) -> Iterator[CandidateTest]:
+    lowest, highest, end_time = float(levels.min()), float(levels.max()), float(base_history.times[-1])
+    ramp = float(getattr(base_history.loading, "ramp", 5.0))
+    for level in (LOWER_LEVEL * lowest, LOWER_LEVEL * highest, HIGHER_LEVEL * highest):
+        description = f"a constant {level:.3g} MPa for {_hours_text(end_time)}"
+        yield candidate_test(base_history, description, PressureJump(level, level, 0.5 * end_time, ramp), end_time)
+    for first, second in ((lowest, HIGHER_LEVEL * highest), (LOWER_LEVEL * lowest, HIGHER_LEVEL * highest)):
+        description = f"{first:.3g} MPa, from {_hours_text(0.5 * end_time)} on {second:.3g} MPa, for {_hours_text(end_time)}"
+        yield candidate_test(base_history, description, PressureJump(first, second, 0.5 * end_time, ramp), end_time)
+    yield candidate_test(base_history, f"the same loading for {_hours_text(EXTENSION * end_time)}", base_history.loading, EXTENSION * end_time)
+    thickness = base_history.geometry.get("apex_thickness")
+    for varied in () if thickness is None else (0.9 * thickness, 1.1 * thickness):
+        geometry = {**base_history.geometry, "apex_thickness": varied}
+        yield candidate_test(base_history, f"a dimple of {varied:.3g} mm under the same loading", base_history.loading, end_time, geometry=geometry)
 
 
-def _of_strain(base: History, levels: Floats, _: float) -> Iterator[Design]:
-    low, high, end = float(levels.min()), float(levels.max()), float(base.times[-1])
-    ramp = float(getattr(base.loading, "ramp", 0.0))
-    for level in (LOWER * low, HIGHER * high):
-        yield planned(base, f"a strain of {level:.3g} for {_hours(end)}", constant_strain(level, ramp), end)
-    change = StrainSteps(((0.0, low), (0.5 * end, FAR * high)), ramp)
-    yield planned(base, f"a strain of {low:.3g}, from {_hours(0.5 * end)} on {FAR * high:.3g}", change, end)
-    yield planned(base, f"the same strain for {_hours(FAR * end)}", base.loading, FAR * end)
+def _strain_variations(base_history: History, levels: Floats, _: float) -> Iterator[CandidateTest]:
+    lowest, highest, end_time = float(levels.min()), float(levels.max()), float(base_history.times[-1])
+    ramp = float(getattr(base_history.loading, "ramp", 0.0))
+    for level in (LOWER_LEVEL * lowest, HIGHER_LEVEL * highest):
+        yield candidate_test(base_history, f"a strain of {level:.3g} for {_hours_text(end_time)}", constant_strain(level, ramp), end_time)
+    change = StrainSteps(((0.0, lowest), (0.5 * end_time, EXTENSION * highest)), ramp)
+    yield candidate_test(base_history, f"a strain of {lowest:.3g}, from {_hours_text(0.5 * end_time)} on {EXTENSION * highest:.3g}", change, end_time)
+    yield candidate_test(base_history, f"the same strain for {_hours_text(EXTENSION * end_time)}", base_history.loading, EXTENSION * end_time)
 
 
-def _hours(seconds: float) -> str:
+def _hours_text(seconds: float) -> str:
     return f"{seconds / 3600.0:.3g} h"
 
 
-_VARIATIONS: dict[Quantity, Callable[[History, Floats, float], Iterator[Design]]] = {
-    "stress": _of_stress,
-    "pressure": _of_pressure,
-    "strain": _of_strain,
+_VARIATIONS: dict[Quantity, Callable[[History, Floats, float], Iterator[CandidateTest]]] = {
+    "stress": _stress_variations,
+    "pressure": _pressure_variations,
+    "strain": _strain_variations,
 }

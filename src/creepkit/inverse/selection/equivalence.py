@@ -21,20 +21,20 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import LawError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.intervals.mixture import Laws
+from creepkit.inverse.intervals.mixture import WeightedLaws
 from creepkit.inverse.intervals.quantities import local_exponent
-from creepkit.inverse.problem import reopened
-from creepkit.inverse.selection.judging import judged
+from creepkit.inverse.problem import least_squares_problem
+from creepkit.inverse.selection.judging import under_common_covariance
 from creepkit.language import CreepLaw, strain, time
 
-SEPARATED = 2.0 * float(np.log(0.95 / 0.05))
+DISTINGUISHABLE_CHI_SQUARE = 2.0 * float(np.log(0.95 / 0.05))
 """Chi-square between predictions from which on a test can be expected to decide."""
-GRID = 21
+STRESS_POINTS = 21
 """Stresses at which local exponents are compared."""
 
 
 @dataclass(frozen=True)
-class Equivalence:
+class EquivalentLaws:
     """Two laws that the tests cannot separate.
 
     first, second : their names, the better one first. chi_square : between their predictions on the tests.
@@ -45,50 +45,50 @@ class Equivalence:
     first: str
     second: str
     chi_square: float
-    reduced: str
+    reduction: str
     sentence: str
 
     def __str__(self) -> str:
         return self.sentence
 
 
-def equivalents(ranking: Laws) -> tuple[Equivalence, ...]:
+def equivalent_laws(ranking: WeightedLaws) -> tuple[EquivalentLaws, ...]:
     """The pairs of a ranking's laws that its tests cannot separate, nearest predictions first."""
     fits = [r.fit for r in ranking.laws]
-    white = _white(fits)
-    found = []
+    whitened = _whitened_residuals(fits)
+    pairs = []
     for a, b in combinations(range(len(fits)), 2):
-        d2 = float(((white[a] - white[b]) ** 2).sum())
-        richer, reduced = _reduction(fits[a], fits[b])
-        if d2 < SEPARATED or reduced:
-            told = _sentence(fits[a], fits[b], d2, richer, reduced)
-            found.append(Equivalence(fits[a].law.name, fits[b].law.name, d2, reduced, told))
-    return tuple(sorted(found, key=lambda pair: pair.chi_square))
+        chi_square = float(((whitened[a] - whitened[b]) ** 2).sum())
+        richer_law, reduction = _reduction_between(fits[a], fits[b])
+        if chi_square < DISTINGUISHABLE_CHI_SQUARE or reduction:
+            sentence = _equivalence_sentence(fits[a], fits[b], chi_square, richer_law, reduction)
+            pairs.append(EquivalentLaws(fits[a].law.name, fits[b].law.name, chi_square, reduction, sentence))
+    return tuple(sorted(pairs, key=lambda pair: pair.chi_square))
 
 
-def _white(fits: Sequence[Identification]) -> Floats:
+def _whitened_residuals(fits: Sequence[Identification]) -> Floats:
     """(laws, data) residuals of all laws at their optima over one scatter.
 
     Identifications by likelihood keep what that takes; others are predicted again, under the covariance of the first.
     """
-    if all(fit.linear is not None for fit in fits):
-        return judged(fits).white
-    problems = [reopened(fit) for fit in fits]
-    present = problems[0].objective.entries.present
-    whole = [np.linalg.solve(problems[0].factor, p.residuals.values[..., None])[..., 0][present] for p in problems]
-    return np.array(whole)
+    if all(fit.linearised is not None for fit in fits):
+        return under_common_covariance(fits).whitened
+    problems = [least_squares_problem(fit) for fit in fits]
+    present = problems[0].residual_function.observations.present
+    whitened = [np.linalg.solve(problems[0].covariance_factor, p.residuals.values[..., None])[..., 0][present] for p in problems]
+    return np.array(whitened)
 
 
-def _reduction(first: Identification, second: Identification) -> tuple[str, str]:
+def _reduction_between(first: Identification, second: Identification) -> tuple[str, str]:
     """(name of the richer law, "m = 0") where one law with a parameter off is the other, within its interval."""
-    for rich, plain in ((first, second), (second, first)):
-        for name, value, law in _switched_off(rich.law):
-            if _same(law, plain.law) and _within(rich, name, value):
-                return rich.law.name, f"{name} = {value:g}"
+    for richer, simpler in ((first, second), (second, first)):
+        for name, value, law in _laws_with_parameter_off(richer.law):
+            if _is_same_function(law, simpler.law) and _interval_contains(richer, name, value):
+                return richer.law.name, f"{name} = {value:g}"
     return "", ""
 
 
-def _switched_off(law: CreepLaw) -> Iterator[tuple[str, float, CreepLaw]]:
+def _laws_with_parameter_off(law: CreepLaw) -> Iterator[tuple[str, float, CreepLaw]]:
     """(parameter, its off value, the law that is left) for every parameter that can be switched off."""
     for name, param in law.table.items():
         if param.off is None:
@@ -99,51 +99,51 @@ def _switched_off(law: CreepLaw) -> Iterator[tuple[str, float, CreepLaw]]:
             continue
 
 
-def _same(first: CreepLaw, second: CreepLaw) -> bool:
+def _is_same_function(first: CreepLaw, second: CreepLaw) -> bool:
     """Whether two laws are the same function of point and parameters, whatever these are called."""
     return first.fingerprint.rpartition("-")[2] == second.fingerprint.rpartition("-")[2]
 
 
-def _within(fit: Identification, name: str, value: float) -> bool:
-    (own,) = (e for e in fit.estimates if e.name == name)
-    room = 1e-6 * (own.high - own.low)
-    return own.low - room <= value <= own.high + room
+def _interval_contains(fit: Identification, name: str, value: float) -> bool:
+    (estimate,) = (candidate for candidate in fit.estimates if candidate.name == name)
+    tolerance = 1e-6 * (estimate.high - estimate.low)
+    return estimate.low - tolerance <= value <= estimate.high + tolerance
 
 
-def _sentence(a: Identification, b: Identification, d2: float, richer: str, reduced: str) -> str:
+def _equivalence_sentence(a: Identification, b: Identification, chi_square: float, richer_law: str, reduction: str) -> str:
     """What is the same, in what sense, and where."""
     names = f"{a.law.name} and {b.law.name}"
-    parts = [f"{names} cannot be told apart by these tests: chi-square {d2:.2g} between their predictions"]
-    if reduced:
-        parts.append(f"{richer} with {reduced} is the other law, and the tests allow it")
-    low, high = a.ranges["stress"]
-    held = all(_constant(h.loading.program().values) for h in a.histories)
-    if high <= 1.001 * low:
-        parts.append(f"every test holds one stress, {low:.4g} MPa")
+    parts = [f"{names} cannot be told apart by these tests: chi-square {chi_square:.2g} between their predictions"]
+    if reduction:
+        parts.append(f"{richer_law} with {reduction} is the other law, and the tests allow it")
+    lowest, highest = a.ranges["stress"]
+    constant_loads = all(_is_constant(h.loading.program().values) for h in a.histories)
+    if highest <= 1.001 * lowest:
+        parts.append(f"every test holds one stress, {lowest:.4g} MPa")
     elif not any(fit.law.uses(symbol) for fit in (a, b) for symbol in (strain, time)):
-        parts.append(_of_exponents(a, b, low, high))
-    elif held and _hardens_otherwise(a.law, b.law):
+        parts.append(_exponent_sentence(a, b, lowest, highest))
+    elif constant_loads and _differ_in_hardening(a.law, b.law):
         parts.append("no test changes its load, and hardening by strain and by time differ only after a change")
     return "; ".join(parts)
 
 
-def _of_exponents(a: Identification, b: Identification, low: float, high: float) -> str:
-    grid = np.geomspace(low, high, GRID)
-    ours, theirs = (local_exponent(fit.coordinates, grid)(fit.u) for fit in (a, b))
-    spread = [f"{float(n.min()):.2f} to {float(n.max()):.2f}" if np.ptp(n) > 0.005 else f"{float(n[0]):.2f}"
-              for n in (ours, theirs)]  # fmt: skip
+def _exponent_sentence(a: Identification, b: Identification, lowest: float, highest: float) -> str:
+    grid = np.geomspace(lowest, highest, STRESS_POINTS)
+    first_exponents, second_exponents = (local_exponent(fit.coordinates, grid)(fit.u) for fit in (a, b))
+    ranges = [f"{float(exponents.min()):.2f} to {float(exponents.max()):.2f}" if np.ptp(exponents) > 0.005 else f"{float(exponents[0]):.2f}"
+              for exponents in (first_exponents, second_exponents)]  # fmt: skip
     return (
-        f"over {low:.4g} to {high:.4g} MPa their local exponents are {spread[0]} and {spread[1]}, never more than "
-        f"{float(np.abs(ours - theirs).max()):.2g} apart"
+        f"over {lowest:.4g} to {highest:.4g} MPa their local exponents are {ranges[0]} and {ranges[1]}, never more than "
+        f"{float(np.abs(first_exponents - second_exponents).max()):.2g} apart"
     )
 
 
-def _constant(levels: Floats) -> bool:
+def _is_constant(levels: Floats) -> bool:
     """Whether a program holds one level, but for the ramp that reaches it."""
     return bool(np.ptp(levels[levels > 0]) <= 1e-3 * levels.max()) if (levels > 0).any() else True
 
 
-def _hardens_otherwise(first: CreepLaw, second: CreepLaw) -> bool:
+def _differ_in_hardening(first: CreepLaw, second: CreepLaw) -> bool:
     """Whether one law hardens by its strain and the other by time."""
-    own = [(law.uses(strain), law.uses(time)) for law in (first, second)]
-    return own in ([(True, False), (False, True)], [(False, True), (True, False)])
+    hardening = [(law.uses(strain), law.uses(time)) for law in (first, second)]
+    return hardening in ([(True, False), (False, True)], [(False, True), (True, False)])

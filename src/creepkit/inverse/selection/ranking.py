@@ -18,21 +18,21 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.selection.judging import judged
+from creepkit.inverse.selection.judging import under_common_covariance
 
 if TYPE_CHECKING:
-    from creepkit.inverse.intervals.mixture import Mixture
-    from creepkit.inverse.selection.equivalence import Equivalence
-    from creepkit.inverse.selection.separation import Separation
+    from creepkit.inverse.intervals.mixture import ModelAverage
+    from creepkit.inverse.selection.equivalence import EquivalentLaws
+    from creepkit.inverse.selection.separation import DiscriminationDesign
 
-DECISIVE = 0.95
-CREDIBLE = 0.05
+DECISIVE_WEIGHT = 0.95
+CREDIBLE_WEIGHT = 0.05
 CRITERIA = ("bic", "aicc", "hold-out")
 Criterion = Literal["bic", "aicc", "hold-out"]
 
 
 @dataclass(frozen=True)
-class Ranked:
+class RankedLaw:
     """One law in a ranking: criterion less the best, its share of belief, and its chi-square under the covariance
     of the best (NaN for identifications that were not made by likelihood).
     """
@@ -50,9 +50,9 @@ class Ranking:
     by : the criterion; size : independent frames; failed : {law: why it could not be identified}.
     """
 
-    laws: tuple[Ranked, ...]
-    by: Criterion = "bic"
-    size: float = float("nan")
+    laws: tuple[RankedLaw, ...]
+    criterion: Criterion = "bic"
+    independent_frames: float = float("nan")
     failed: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
@@ -63,99 +63,99 @@ class Ranking:
     @property
     def decisive(self) -> bool:
         """Whether one law has more than 95 % of the weight."""
-        return self.laws[0].weight > DECISIVE
+        return self.laws[0].weight > DECISIVE_WEIGHT
 
     @property
-    def remaining(self) -> tuple[Ranked, ...]:
+    def credible(self) -> tuple[RankedLaw, ...]:
         """The laws that the tests cannot rule out: weight above 5 %."""
-        return tuple(r for r in self.laws if r.weight > CREDIBLE)
+        return tuple(r for r in self.laws if r.weight > CREDIBLE_WEIGHT)
 
     @property
     def verdict(self) -> str:
         """One sentence: which law, or which laws these tests cannot tell apart."""
-        names = [r.fit.law.name for r in self.remaining]
+        names = [r.fit.law.name for r in self.credible]
         if self.decisive:
             return f"decisive: {names[0]}" if len(self.laws) > 1 else f"only {names[0]} was fitted"
         return f"not decisive: these tests cannot tell apart {' and '.join(names)}"
 
     @property
-    def mixture(self) -> Mixture:
+    def model_average(self) -> ModelAverage:
         """All laws together, each with its weight: rate(), local_exponent(), with intervals that hold both doubts."""
-        from creepkit.inverse.intervals.mixture import Mixture
+        from creepkit.inverse.intervals.mixture import ModelAverage
 
-        return Mixture.of(self)
+        return ModelAverage.from_ranking(self)
 
-    def equivalents(self) -> tuple[Equivalence, ...]:
+    def equivalents(self) -> tuple[EquivalentLaws, ...]:
         """Pairs of laws that these tests cannot separate, be they good or bad."""
-        from creepkit.inverse.selection.equivalence import equivalents
+        from creepkit.inverse.selection.equivalence import equivalent_laws
 
-        return equivalents(self)
+        return equivalent_laws(self)
 
-    def further_tests(self) -> tuple[Separation, ...]:
+    def further_tests(self) -> tuple[DiscriminationDesign, ...]:
         """What tests would tell the remaining laws apart, and by how much (some seconds of simulations)."""
         from creepkit.inverse.selection.separation import further_tests
 
         return further_tests(self)
 
     def __str__(self) -> str:
-        from creepkit.inverse.selection.printing import text_of
+        from creepkit.inverse.selection.printing import ranking_text
 
-        return text_of(self)
+        return ranking_text(self)
 
 
-def rank(fits: Sequence[Identification], by: Criterion = "bic", failed: Mapping[str, str] | None = None) -> Ranking:
+def rank(fits: Sequence[Identification], criterion: Criterion = "bic", failed: Mapping[str, str] | None = None) -> Ranking:
     """Rank identifications made from the same histories; by : "bic" or "aicc"."""
     if not fits:
         raise FitError("there are no identifications to rank")
-    if by not in ("bic", "aicc"):
-        raise FitError(f"rank(by={by!r}) is not known: identifications are ranked by 'bic' or 'aicc'")
+    if criterion not in ("bic", "aicc"):
+        raise FitError(f"rank(by={criterion!r}) is not known: identifications are ranked by 'bic' or 'aicc'")
     if len({fit.provenance.get("data") for fit in fits}) > 1:
         raise FitError(
             "the identifications were made from different histories, frames, losses or nuisances and cannot be ranked; "
             "make them alike"
         )
     chi_square = np.full(len(fits), np.nan)
-    if all(fit.linear is not None for fit in fits):
-        common = judged(fits)
-        size, chi_square = common.size, common.chi_square
-        score = chi_square + common.occam
+    if all(fit.linearised is not None for fit in fits):
+        common_fits = under_common_covariance(fits)
+        independent_frames, chi_square = common_fits.independent_frames, common_fits.chi_square
+        score = chi_square + common_fits.log_determinant
     else:
-        size = max(fits, key=lambda fit: fit.log_likelihood).size
-        score = np.array([_deviance(fit, size) for fit in fits])
-    score = score + [_price(parameters_touched(fit), size, by) for fit in fits]
-    return ranked(fits, score, by, size=size, chi_square=chi_square, failed=failed)
+        independent_frames = max(fits, key=lambda fit: fit.log_likelihood).effective_frames
+        score = np.array([_effective_deviance(fit, independent_frames) for fit in fits])
+    score = score + [_complexity_penalty(determined_parameter_count(fit), independent_frames, criterion) for fit in fits]
+    return ranking_from_scores(fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed)
 
 
-def ranked(
-    fits: Sequence[Identification], score: Floats, by: Criterion, *, size: float, chi_square: Floats | None = None,
+def ranking_from_scores(
+    fits: Sequence[Identification], scores: Floats, criterion: Criterion, *, independent_frames: float, chi_square: Floats | None = None,
     failed: Mapping[str, str] | None = None,
 ) -> Ranking:  # fmt: skip
     """The ranking of identifications with these scores, -2 ln of their evidence."""
-    excess = score - score.min()
+    excess = scores - scores.min()
     weight = np.exp(-0.5 * excess)
     weight /= weight.sum()
-    squares = np.full(len(fits), np.nan) if chi_square is None else chi_square
+    chi_squares = np.full(len(fits), np.nan) if chi_square is None else chi_square
     order = np.argsort(excess, kind="stable")
-    laws = tuple(Ranked(fits[k], float(excess[k]), float(weight[k]), float(squares[k])) for k in order)
-    return Ranking(laws, by, float(size), MappingProxyType(dict(failed or {})))
+    laws = tuple(RankedLaw(fits[k], float(excess[k]), float(weight[k]), float(chi_squares[k])) for k in order)
+    return Ranking(laws, criterion, float(independent_frames), MappingProxyType(dict(failed or {})))
 
 
-def _deviance(fit: Identification, size: float) -> float:
+def _effective_deviance(fit: Identification, independent_frames: float) -> float:
     """-2 ln L, in which frames that move together count as one."""
-    frames = sum(m.frames for m in fit.misfits)
-    return -2.0 * fit.log_likelihood * min(size / max(frames, 1), 1.0)
+    frames = sum(m.frames for m in fit.tests)
+    return -2.0 * fit.log_likelihood * min(independent_frames / max(frames, 1), 1.0)
 
 
-def parameters_touched(fit: Identification) -> int:
+def determined_parameter_count(fit: Identification) -> int:
     """How many parameters the data touch: the others have the variance of their bounds, by themselves."""
-    ends = [[p.to_internal(b) for b in p.bounds] for p in fit.law.params.values()]
-    own = np.diag(fit.covariance)
-    by_itself = (fit.covariance != 0).sum(axis=1) == 1
-    return int((~(by_itself & np.isclose(own, np.ptp(ends, axis=1) ** 2 / 12.0, rtol=1e-6))).sum())
+    internal_bounds = [[p.to_internal(b) for b in p.bounds] for p in fit.law.params.values()]
+    variances = np.diag(fit.covariance)
+    is_uncorrelated = (fit.covariance != 0).sum(axis=1) == 1
+    return int((~(is_uncorrelated & np.isclose(variances, np.ptp(internal_bounds, axis=1) ** 2 / 12.0, rtol=1e-6))).sum())
 
 
-def _price(count: int, size: float, by: Criterion) -> float:
+def _complexity_penalty(parameter_count: int, independent_frames: float, criterion: Criterion) -> float:
     """What a criterion takes for `count` parameters."""
-    if by == "bic":
-        return count * float(np.log(size))
-    return 2.0 * count + 2.0 * count * (count + 1) / max(size - count - 1.0, 1.0)
+    if criterion == "bic":
+        return parameter_count * float(np.log(independent_frames))
+    return 2.0 * parameter_count + 2.0 * parameter_count * (parameter_count + 1) / max(independent_frames - parameter_count - 1.0, 1.0)

@@ -10,20 +10,20 @@ import numpy as np
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.search.refining import Progress
+from creepkit.inverse.search.refining import IterationCallback
 from creepkit.inverse.selection.candidates import sums_of_two
 from creepkit.inverse.selection.holding_out import hold_out_scores
-from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, rank, ranked
-from creepkit.inverse.settings import Settings
+from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, rank, ranking_from_scores
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
-FRAMES = 60
+SELECTION_FRAMES = 60
 """Frames of a history that are looked at, unless settings say otherwise."""
-FAR_BEHIND = 40.0
+RULED_OUT_EXCESS = 40.0
 """Criterion over the best from which a law is ruled out by a surrogate already: e^-20 of the weight, which the errors
 of a surrogate, some noise in chi-square, do not make up for."""
-BEYOND_NOISE = 2.0
+DRIFT_LIMIT = 2.0
 """Drift that the best single law leaves in its first output, in units of the noise there, from which sums are tried."""
 
 
@@ -32,11 +32,11 @@ def select(
     histories: Sequence[History],
     using: Predictor | Mapping[str, Predictor],
     *,
-    settings: Settings | None = None,
+    settings: IdentificationSettings | None = None,
     through: Predictor | None = None,
     sums: bool | None = False,
     by: Criterion = "bic",
-    progress: Progress | None = None,
+    progress: IterationCallback | None = None,
 ) -> Ranking:
     """Identify every candidate from the same histories by likelihood, and rank them.
 
@@ -44,68 +44,68 @@ def select(
     by : "bic", "aicc", or "hold-out" (the last 30 % of each history predicted from a refit to the first 70 %).
     A law that cannot be identified is named in `failed`; FitError if none can.
     """
-    settings = replace(settings or Settings(frames=FRAMES), weights="likelihood")
+    settings = replace(settings or IdentificationSettings(frames=SELECTION_FRAMES), weights="likelihood")
     if by not in CRITERIA:
         raise FitError(f"select(by={by!r}) is not known; allowed are {', '.join(CRITERIA)}")
     if not candidates:
         raise FitError("there are no candidate laws; give at least one, such as ck.law('norton')")
     failed: dict[str, str] = {}
-    fits = _identified(list(candidates), histories, using, settings, through, progress, failed)
-    if fits and (sums or (sums is None and _leaves_more_than_noise(rank(fits).best))):
+    fits = _identify_all(list(candidates), histories, using, settings, through, progress, failed)
+    if fits and (sums or (sums is None and _has_systematic_residuals(rank(fits).best))):
         pairs = sums_of_two([fit.law for fit in fits])
-        fits += _identified(pairs, histories, using, settings, through, progress, failed)
+        fits += _identify_all(pairs, histories, using, settings, through, progress, failed)
     if not fits:
         name, reason = next(iter(failed.items()))
         raise FitError(f"none of the {len(failed)} laws could be identified; {name}: {reason}")
     if by == "hold-out":
         scores = hold_out_scores(fits)
-        return ranked(fits, np.array(scores), by, size=float("nan"), failed=failed)
+        return ranking_from_scores(fits, np.array(scores), by, independent_frames=float("nan"), failed=failed)
     return rank(fits, by, failed)
 
 
-def _identified(
+def _identify_all(
     laws: Sequence[CreepLaw], histories: Sequence[History], using: Predictor | Mapping[str, Predictor],
-    settings: Settings, through: Predictor | None, progress: Progress | None, failed: dict[str, str],
+    settings: IdentificationSettings, through: Predictor | None, progress: IterationCallback | None, failed: dict[str, str],
 ) -> list[Identification]:  # fmt: skip
     """The laws that can be identified; the others go to `failed`.
 
     through : all laws are identified with it first, and those far behind go no further: they stay as it sees them.
     """
-    first, found = through or using, []
+    first_predictor, fits = through or using, []
     for k, law in enumerate(laws):
-        fit = _attempt(law, histories, first, settings, failed)
-        found += [fit] if fit is not None else []
+        fit = _try_to_identify(law, histories, first_predictor, settings, failed)
+        fits += [fit] if fit is not None else []
         if progress is not None:
             progress("law", k + 1, len(laws))
-    if through is None or not found:
-        return found
-    ahead = {id(r.fit) for r in rank(found).laws if r.excess < FAR_BEHIND}
-    refined = {id(fit): _attempt(fit.law, histories, using, settings, failed, fit) for fit in found if id(fit) in ahead}
-    return [refined.get(id(fit)) or _ruled_out(fit) for fit in found if fit.law.name not in failed]
+    if through is None or not fits:
+        return fits
+    competitive = {id(r.fit) for r in rank(fits).laws if r.excess < RULED_OUT_EXCESS}
+    refined = {id(fit): _try_to_identify(fit.law, histories, using, settings, failed, fit) for fit in fits if id(fit) in competitive}
+    return [refined.get(id(fit)) or _ruled_out(fit) for fit in fits if fit.law.name not in failed]
 
 
-def _attempt(
-    law: CreepLaw, histories: Sequence[History], using: Predictor | Mapping[str, Predictor], settings: Settings,
-    failed: dict[str, str], before: Identification | None = None,
+def _try_to_identify(
+    law: CreepLaw, histories: Sequence[History], using: Predictor | Mapping[str, Predictor], settings: IdentificationSettings,
+    failed: dict[str, str], previous_fit: Identification | None = None,
 ) -> Identification | None:  # fmt: skip
     """Identify one law, from where a cheaper predictor ended if it did; what goes wrong with it is told in `failed`."""
-    begun = {} if before is None else {"start": before.u, "known": before.nuisances, "reference": before.reference}
+    initial = {} if previous_fit is None else {"start": previous_fit.u, "known": previous_fit.nuisances, "reference": previous_fit.reference}
     try:
-        return identify(law, histories, using, settings=settings, **begun)  # type: ignore[arg-type]
+        return identify(law, histories, using, settings=settings, **initial)  # type: ignore[arg-type]
     except CreepkitError as error:
         failed[law.name] = str(error)
         return None
 
 
 def _ruled_out(fit: Identification) -> Identification:
-    told = f"ruled out as the {fit.provenance['specimen']} sees it, and not refined any further"
-    return replace(fit, notes=(*fit.notes, told))
+    note = f"ruled out as the {fit.provenance['specimen']} sees it, and not refined any further"
+    return replace(fit, notes=(*fit.notes, note))
 
 
-def _leaves_more_than_noise(fit: Identification) -> bool:
+def _has_systematic_residuals(fit: Identification) -> bool:
     """Whether the law leaves something in its first output that wanders by more than the noise."""
-    assert fit.linear is not None
-    name = next(iter(fit.scatter.outputs))
-    sizes, entries = fit.scatter[name], fit.linear.residuals
-    slope = float(np.median(np.abs(entries.slopes[entries.present & (entries.output == 0)])))
-    return sizes.drift > BEYOND_NOISE * sizes.noise * slope
+    assert fit.linearised is not None
+    name = next(iter(fit.noise_model.outputs))
+    components, residuals = fit.noise_model[name], fit.linearised.residuals
+    transform_derivative = float(np.median(np.abs(residuals.transform_derivatives[residuals.present & (residuals.output_index == 0)])))
+    return components.drift > DRIFT_LIMIT * components.noise * transform_derivative

@@ -16,21 +16,21 @@ import numpy as np
 
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.intervals.mixture import Laws
-from creepkit.inverse.selection.contest import Contest
-from creepkit.inverse.selection.designs import Design
-from creepkit.inverse.selection.designs import designs as variations
-from creepkit.inverse.selection.equivalence import SEPARATED
-from creepkit.inverse.selection.ranking import CREDIBLE
-from creepkit.inverse.threads import single_threaded_algebra
+from creepkit.inverse.intervals.mixture import WeightedLaws
+from creepkit.inverse.selection.contest import ModelDiscrimination
+from creepkit.inverse.selection.designs import CandidateTest
+from creepkit.inverse.selection.designs import candidate_tests as variations
+from creepkit.inverse.selection.equivalence import DISTINGUISHABLE_CHI_SQUARE
+from creepkit.inverse.selection.ranking import CREDIBLE_WEIGHT
+from creepkit.inverse.threads import single_threaded_blas
 from creepkit.records import History
 
-PROMISING = 3
+FULL_REFITS = 3
 """Designs that are refitted in full."""
 
 
 @dataclass(frozen=True)
-class Separating:
+class DiscriminatingExperiment:
     """One further test: what it is, and the chi-square by which the wrong law is expected to be worse with it."""
 
     description: str
@@ -39,74 +39,74 @@ class Separating:
 
 
 @dataclass(frozen=True)
-class Separation:
+class DiscriminationDesign:
     """Further tests, the most telling first, if law `true` holds and law `other` is fitted.
 
     now : expected chi-square by the tests that were made. left_out : designs that burst at once.
     """
 
-    true: str
-    other: str
-    now: float
-    tests: tuple[Separating, ...]
-    left_out: tuple[str, ...] = ()
+    reference_law: str
+    alternative_law: str
+    current_chi_square: float
+    experiments: tuple[DiscriminatingExperiment, ...]
+    excluded: tuple[str, ...] = ()
 
     @property
     def sentence(self) -> str:
         """The most telling test, or that none is."""
-        told = f"if {self.true} holds, {self.other} is worse by an expected chi-square of {self.now:.2g} in these tests"
-        if not self.tests or self.tests[0].chi_square < SEPARATED:
-            return f"{told}; none of the {len(self.tests)} further tests considered brings it above {SEPARATED:.2g}"
-        best = self.tests[0]
-        return f"{told}; one more test, {best.description}, would bring it to {best.chi_square:.2g}"
+        premise = f"if {self.reference_law} holds, {self.alternative_law} is worse by an expected chi-square of {self.current_chi_square:.2g} in these tests"
+        if not self.experiments or self.experiments[0].chi_square < DISTINGUISHABLE_CHI_SQUARE:
+            return f"{premise}; none of the {len(self.experiments)} further tests considered brings it above {DISTINGUISHABLE_CHI_SQUARE:.2g}"
+        best = self.experiments[0]
+        return f"{premise}; one more test, {best.description}, would bring it to {best.chi_square:.2g}"
 
     def __str__(self) -> str:
-        rows = [f"  {t.chi_square:9.3g}  {t.description}" for t in self.tests]
-        return "\n".join([self.sentence, *rows, *(f"      burst  {name}" for name in self.left_out)])
+        rows = [f"  {t.chi_square:9.3g}  {t.description}" for t in self.experiments]
+        return "\n".join([self.sentence, *rows, *(f"      burst  {name}" for name in self.excluded)])
 
 
-def what_separates(
-    fit_a: Identification, fit_b: Identification, designs: Sequence[Design | History] | None = None
-) -> Separation:
+def discriminating_experiments(
+    reference: Identification, alternative: Identification, candidates_or_histories: Sequence[CandidateTest | History] | None = None
+) -> DiscriminationDesign:
     """Further tests by how well they would separate law b from law a, if a is true.
 
     designs : planned tests (histories need no outputs); by default variations of the tests that were made.
     """
-    if fit_a.using is None or not fit_a.histories:
+    if reference.predictor is None or not reference.histories:
         raise FitError("this identification was loaded from a file: attach its histories and specimen with fit.on()")
-    if fit_a.provenance.get("data") != fit_b.provenance.get("data"):
+    if reference.provenance.get("data") != alternative.provenance.get("data"):
         raise FitError(
             "the two identifications were made from different histories, frames or nuisances; make them alike"
         )
-    plans = _planned(fit_a, designs)
-    with single_threaded_algebra():
-        contest = Contest.of(fit_a, fit_b, plans)
-        now = contest.refitted([])
-        found = _expected(contest, now)
-    left_out = tuple(d.description for d in plans if d not in contest.plans)
-    return Separation(fit_a.law.name, fit_b.law.name, now, found, left_out)
+    candidates = _candidates_given(reference, candidates_or_histories)
+    with single_threaded_blas():
+        discrimination = ModelDiscrimination.from_identifications(reference, alternative, candidates)
+        current_chi_square = discrimination.refitted_chi_square([])
+        experiments = _expected_chi_squares(discrimination, current_chi_square)
+    excluded = tuple(d.description for d in candidates if d not in discrimination.candidates)
+    return DiscriminationDesign(reference.law.name, alternative.law.name, current_chi_square, experiments, excluded)
 
 
-def further_tests(ranking: Laws) -> tuple[Separation, ...]:
+def further_tests(ranking: WeightedLaws) -> tuple[DiscriminationDesign, ...]:
     """What would separate the best law of a ranking, if it is true, from each other one of more than 5 % of weight."""
     best, *others = ranking.laws
-    return tuple(what_separates(best.fit, other.fit) for other in others if other.weight > CREDIBLE)
+    return tuple(discriminating_experiments(best.fit, other.fit) for other in others if other.weight > CREDIBLE_WEIGHT)
 
 
-def _planned(fit: Identification, designs: Sequence[Design | History] | None) -> tuple[Design, ...]:
+def _candidates_given(fit: Identification, candidates_or_histories: Sequence[CandidateTest | History] | None) -> tuple[CandidateTest, ...]:
     """The designs given, named so that they are no test that was made; else variations of those."""
-    if designs is None:
-        return variations(fit.histories, float(fit.local_exponent(fit.reference.stress)[0]), fit.using)
-    given = (d if isinstance(d, Design) else Design(d.name, d) for d in designs)
-    return tuple(Design(d.description, replace(d.history, name=f"plan: {d.description}")) for d in given)
+    if candidates_or_histories is None:
+        return variations(fit.histories, float(fit.local_exponent(fit.reference.stress)[0]), fit.predictor)
+    candidates = (candidate if isinstance(candidate, CandidateTest) else CandidateTest(candidate.name, candidate) for candidate in candidates_or_histories)
+    return tuple(CandidateTest(d.description, replace(d.history, name=f"plan: {d.description}")) for d in candidates)
 
 
-def _expected(contest: Contest, now: float) -> tuple[Separating, ...]:
+def _expected_chi_squares(discrimination: ModelDiscrimination, current_chi_square: float) -> tuple[DiscriminatingExperiment, ...]:
     """Every plan with its chi-square, by one step or, of the most promising, in full; never below that of now."""
-    found = [contest.linear([k]) for k in range(len(contest.plans))]
-    for k in np.argsort(found)[::-1][:PROMISING]:
-        found[k] = contest.refitted([int(k)])
-    tests = [
-        Separating(d.description, d.history, max(value, now)) for d, value in zip(contest.plans, found, strict=True)
+    chi_squares = [discrimination.linearised_chi_square([k]) for k in range(len(discrimination.candidates))]
+    for k in np.argsort(chi_squares)[::-1][:FULL_REFITS]:
+        chi_squares[k] = discrimination.refitted_chi_square([int(k)])
+    experiments = [
+        DiscriminatingExperiment(candidate.description, candidate.history, max(value, current_chi_square)) for candidate, value in zip(discrimination.candidates, chi_squares, strict=True)
     ]
-    return tuple(sorted(tests, key=lambda test: -test.chi_square))
+    return tuple(sorted(experiments, key=lambda test: -test.chi_square))

@@ -12,62 +12,62 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.objective import Objective
-from creepkit.inverse.sparsity.visited import Visited
+from creepkit.inverse.objective import ResidualFunction
+from creepkit.inverse.sparsity.visited import EvaluationPoints
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw
 
-STEP = 1e-6
+DIFFERENCE_STEP = 1e-6
 """Of differences, in conditioned coordinates: the ln of rates is smooth in them."""
-OFF = -1e30
+LOG_ZERO_RATE = -1e30
 """ln of a rate that is none."""
 
 
-class Contributions:
+class TermContributions:
     """Contributions of terms as functions of conditioned coordinates u, for any sum of terms.
 
     labels : names of the terms, in the order of the last axis of everything.
     """
 
-    def __init__(self, law: CreepLaw, coordinates: Coordinates, visited: Visited) -> None:
-        self.law, self.coordinates, self.visited = law, coordinates, visited
-        self.labels = tuple(law.terms)
-        singles = [law.only(label) for label in self.labels]
-        self._terms = [([law.names.index(name) for name in one.names], lower(one, "numpy")) for one in singles]
+    def __init__(self, law: CreepLaw, coordinates: Coordinates, points: EvaluationPoints) -> None:
+        self.law, self.coordinates, self.points = law, coordinates, points
+        self.terms = tuple(law.terms)
+        singles = [law.only(label) for label in self.terms]
+        self._terms = [([law.names.index(name) for name in single.names], lower(single, "numpy")) for single in singles]
 
     @classmethod
-    def of(cls, objective: Objective) -> Contributions:
+    def from_objective(cls, objective: ResidualFunction) -> TermContributions:
         """Those of the law of an objective, over its histories."""
-        visited = Visited.of(objective.histories, objective.using)
-        return cls(objective.law, objective.coordinates, visited)
+        points = EvaluationPoints.from_histories(objective.histories, objective.predictor)
+        return cls(objective.law, objective.coordinates, points)
 
     def log_rates(self, u: Floats) -> Floats:
         """ln of the rate of each term at each point, (candidates, points, terms), of u (candidates, parameters)."""
-        v = self.visited
-        point = (v.stress, v.strain, v.time, v.temperature, v.stress, v.stress / 3.0)
+        points = self.points
+        point = (points.stress, points.strain, points.time, points.temperature, points.stress, points.stress / 3.0)
         columns = np.moveaxis(self.coordinates.theta(u), -1, 0)[..., None]
-        found = np.empty((len(u), v.stress.size, len(self._terms)))
+        log_rates = np.empty((len(u), points.stress.size, len(self._terms)))
         for k, (positions, kernel) in enumerate(self._terms):
-            inner = [state.initial for state in kernel.law.states.values()]
-            found[..., k] = kernel.internal_log_rate(*point, *inner, *columns[positions])
-        return np.asarray(np.maximum(np.nan_to_num(found, nan=OFF), OFF))
+            initial_states = [state.initial for state in kernel.law.states.values()]
+            log_rates[..., k] = kernel.internal_log_rate(*point, *initial_states, *columns[positions])
+        return np.asarray(np.maximum(np.nan_to_num(log_rates, nan=LOG_ZERO_RATE), LOG_ZERO_RATE))
 
-    def shares(self, u: Floats) -> Floats:
+    def fractions(self, u: Floats) -> Floats:
         """f_i / sum_j f_j, (candidates, points, terms); from logarithms, so that nothing overflows."""
-        logs = self.log_rates(u)
-        rates = np.exp(logs - logs.max(axis=-1, keepdims=True))
+        log_rates = self.log_rates(u)
+        rates = np.exp(log_rates - log_rates.max(axis=-1, keepdims=True))
         return np.asarray(rates / rates.sum(axis=-1, keepdims=True))
 
     def values(self, u: Floats) -> Floats:
         """c, (candidates, terms), of u (candidates, parameters)."""
-        return np.asarray(np.sqrt(np.einsum("p,cpt->ct", self.visited.weight, self.shares(u) ** 2)))
+        return np.asarray(np.sqrt(np.einsum("p,cpt->ct", self.points.weight, self.fractions(u) ** 2)))
 
     def jacobian(self, u: Floats) -> Floats:
         """dc/du at one u, (terms, parameters), by central differences in one batch."""
-        moves = STEP * np.eye(u.size)
-        up, down = np.split(self.values(np.concatenate([u + moves, u - moves])), 2)
-        return np.asarray((up - down).T / (2 * STEP))
+        steps = DIFFERENCE_STEP * np.eye(u.size)
+        above, below = np.split(self.values(np.concatenate([u + steps, u - steps])), 2)
+        return np.asarray((above - below).T / (2 * DIFFERENCE_STEP))
 
-    def named(self, u: Floats) -> dict[str, float]:
+    def by_term(self, u: Floats) -> dict[str, float]:
         """{term: c} of one u."""
-        return dict(zip(self.labels, map(float, self.values(u[None])[0]), strict=True))
+        return dict(zip(self.terms, map(float, self.values(u[None])[0]), strict=True))

@@ -16,21 +16,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.search.refining import Minimum, Progress
-from creepkit.inverse.sparsity.fitting import penalised_fit, usual_starts
-from creepkit.inverse.sparsity.penalised import Penalised
-from creepkit.inverse.sparsity.penalties import Penalty
-from creepkit.inverse.sparsity.reduction import Reductions, Terms, kept_of
+from creepkit.inverse.search.refining import Minimum, IterationCallback
+from creepkit.inverse.sparsity.fitting import penalised_fit, penalised_starts
+from creepkit.inverse.sparsity.penalised import PenalisedTerms
+from creepkit.inverse.sparsity.penalties import ContributionPenalty
+from creepkit.inverse.sparsity.reduction import ReducedLaws, TermNames, terms_above
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-STRENGTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)
+PATH_STRENGTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)
 """Two a decade, in units of half a chi-square: from nothing to more than a dimple's whole test is worth."""
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class PenaltyPath:
     """One row for each strength, the first of which is 0.
 
     penalty : its formula in a word; labels : the terms.
@@ -40,69 +40,69 @@ class Path:
     """
 
     penalty: str
-    labels: Terms
+    terms: TermNames
     strengths: Floats
-    shares: Floats
+    contributions: Floats
     chi_square: Floats
-    kept: tuple[Terms, ...]
-    criterion: Floats
+    kept_terms: tuple[TermNames, ...]
+    bic_excess: Floats
     x: Floats
     chosen: int
 
-    def named(self, row: int | None = None) -> dict[str, float]:
+    def contributions_by_term(self, row: int | None = None) -> dict[str, float]:
         """{term: contribution} of one row, by default the chosen one."""
-        return dict(zip(self.labels, map(float, self.shares[self.chosen if row is None else row]), strict=True))
+        return dict(zip(self.terms, map(float, self.contributions[self.chosen if row is None else row]), strict=True))
 
-    def plot(self, path: str | File | None = None) -> Figure:
+    def plot(self, file: str | File | None = None) -> Figure:
         """Shares and misfit against the strength; written to `path` when given."""
-        from creepkit.inverse.sparsity.plotting import figure_of
+        from creepkit.inverse.sparsity.plotting import penalty_path_figure
 
-        return figure_of(self, path)
+        return penalty_path_figure(self, file)
 
     def __str__(self) -> str:
-        rows = [["strength", "chi-square", "BIC - least", *self.labels, "kept"]]
+        rows = [["strength", "chi-square", "BIC - least", *self.terms, "kept"]]
         for k, strength in enumerate(self.strengths):
-            numbers = [f"{strength:g}", f"{self.chi_square[k]:.1f}", f"{self.criterion[k]:.1f}"]
-            rows.append([*numbers, *(f"{c:.3f}" for c in self.shares[k]), ", ".join(self.kept[k])])
+            numbers = [f"{strength:g}", f"{self.chi_square[k]:.1f}", f"{self.bic_excess[k]:.1f}"]
+            rows.append([*numbers, *(f"{c:.3f}" for c in self.contributions[k]), ", ".join(self.kept_terms[k])])
         rows[1 + self.chosen][-1] += "   <- chosen"
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
 
 
-def path_of(
-    reductions: Reductions, penalty: Penalty, strengths: Sequence[float] = STRENGTHS, progress: Progress | None = None
-) -> Path:
+def trace_path(
+    reductions: ReducedLaws, penalty: ContributionPenalty, strengths: Sequence[float] = PATH_STRENGTHS, progress: IterationCallback | None = None
+) -> PenaltyPath:
     """The path over `strengths`, from the sum without penalty; each fit starts where the last ended, and in corners.
 
     It ends when one term is left.
     """
-    stage, labels = reductions.stage, reductions.labels
-    penalised, whole = Penalised.of(stage.objective, penalty, 0.0), reductions.whole()
-    corners = usual_starts(reductions)[-len(labels) :]
-    xs = [whole.x]
+    stage, labels = reductions.problem, reductions.terms
+    penalised, full = PenalisedTerms.from_objective(stage.objective, penalty, 0.0), reductions.full()
+    corners = penalised_starts(reductions)[-len(labels) :]
+    optima = [full.x]
     for k, strength in enumerate(sorted(strengths)):
-        xs.append(_next(reductions, penalised.stronger(strength), xs[-1], corners).u)
+        optima.append(_next_fit(reductions, penalised.with_strength(strength), optima[-1], corners).u)
         if progress is not None:
             progress("strength", k + 1, len(strengths))
-        if len(kept_of(stage.shares(xs[-1]))) == 1:
+        if len(terms_above(stage.contributions_at(optima[-1]))) == 1:
             break
-    shares = np.array([list(stage.shares(x).values()) for x in xs])
-    kept = tuple(kept_of(dict(zip(labels, own, strict=True))) for own in shares)
-    criterion = np.array([reductions.of(terms).criterion for terms in kept])
-    chi_square = np.array([2.0 * stage.misfit(x) for x in xs])
-    used = np.array([0.0, *sorted(strengths)])[: len(xs)]
-    excess = criterion - criterion.min()
-    return Path(
-        type(penalty).__name__, labels, used, shares, chi_square, kept, excess, np.array(xs), int(excess.argmin())
+    contributions = np.array([list(stage.contributions_at(x).values()) for x in optima])
+    kept_terms = tuple(terms_above(dict(zip(labels, row, strict=True))) for row in contributions)
+    bic = np.array([reductions.with_terms(terms).bic for terms in kept_terms])
+    chi_square = np.array([2.0 * stage.half_chi_square(x) for x in optima])
+    path_strengths = np.array([0.0, *sorted(strengths)])[: len(optima)]
+    excess = bic - bic.min()
+    return PenaltyPath(
+        type(penalty).__name__, labels, path_strengths, contributions, chi_square, kept_terms, excess, np.array(optima), int(excess.argmin())
     )
 
 
-def _next(reductions: Reductions, penalised: Penalised, last: Floats, corners: Sequence[Floats]) -> Minimum:
+def _next_fit(reductions: ReducedLaws, penalised: PenalisedTerms, previous: Floats, corners: Sequence[Floats]) -> Minimum:
     """The penalised fit from the last one, and from the corners that cost less there."""
-    stage = reductions.stage
+    stage = reductions.problem
 
     def cost(x: Floats) -> float:
-        return stage.misfit(x) + float(penalised.values(x[None])[0])
+        return stage.half_chi_square(x) + float(penalised.values(x[None])[0])
 
-    here = cost(last)
-    return penalised_fit(stage, penalised, [last, *(x for x in corners if cost(x) < here)])
+    previous_cost = cost(previous)
+    return penalised_fit(stage, penalised, [previous, *(x for x in corners if cost(x) < previous_cost)])

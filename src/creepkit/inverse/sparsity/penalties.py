@@ -18,13 +18,13 @@ from creepkit.errors import FitError
 Strength: TypeAlias = float | Literal["auto"]
 """A number, or chosen along the path from none to all (see path)."""
 
-USUAL = 24.0
+DEFAULT_STRENGTH = 24.0
 """Half the 48 frames of a bulge test of 12 h: what the penalty of square roots was tried with."""
-NOTHING = 1e-9
+MIN_CONTRIBUTION = 1e-9
 """A contribution below this counts as this in a weight."""
 
 
-class Penalty(Protocol):
+class ContributionPenalty(Protocol):
     """A function of contributions, (candidates, terms) to (candidates,), that is added to half the chi-square."""
 
     @property
@@ -55,7 +55,7 @@ class L2:
     determinate, no more.
     """
 
-    strength: Strength = USUAL
+    strength: Strength = DEFAULT_STRENGTH
     exponents: ClassVar[float] = 0.0
 
     def __post_init__(self) -> None:
@@ -79,7 +79,7 @@ class GroupL2:
     ever drops a term.
     """
 
-    strength: Strength = USUAL
+    strength: Strength = DEFAULT_STRENGTH
     exponents: ClassVar[float] = 0.0
 
     def __post_init__(self) -> None:
@@ -91,7 +91,7 @@ class GroupL2:
 
     def weights(self, c: Floats) -> Floats:
         """1 / (2 c_i)."""
-        return np.asarray(0.5 / np.maximum(c, NOTHING))
+        return np.asarray(0.5 / np.maximum(c, MIN_CONTRIBUTION))
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Sqrt:
     want it. Being concave it has a minimum at each corner, and asks for many starts.
     """
 
-    strength: Strength = USUAL
+    strength: Strength = DEFAULT_STRENGTH
     exponents: float = 1.0 / 3.0
 
     OFFSET: ClassVar[float] = 0.003
@@ -120,7 +120,7 @@ class Sqrt:
 
     def weights(self, c: Floats) -> Floats:
         """1 / (4 c_i (c_i + d)^(1/2))."""
-        return np.asarray(0.25 / (np.maximum(c, NOTHING) * np.sqrt(c + self.OFFSET)))
+        return np.asarray(0.25 / (np.maximum(c, MIN_CONTRIBUTION) * np.sqrt(c + self.OFFSET)))
 
 
 @dataclass(frozen=True)
@@ -131,14 +131,14 @@ class Subsets:
     and has no strength to choose; each set costs a fit.
     """
 
-    EVERY: ClassVar[int] = 4
+    EXHAUSTIVE_LIMIT: ClassVar[int] = 4
 
 
 def check_penalty(penalty: object) -> None:
     """A penalty is a record, such as L2(), and not its class or name."""
     if isinstance(penalty, (type, str)) or not (isinstance(penalty, Subsets) or hasattr(penalty, "weights")):
-        told = penalty.__name__ if isinstance(penalty, type) else repr(penalty)
-        raise FitError(f"penalty is {told}; write L2(), GroupL2(), Sqrt() or Subsets()")
+        text = penalty.__name__ if isinstance(penalty, type) else repr(penalty)
+        raise FitError(f"penalty is {text}; write L2(), GroupL2(), Sqrt() or Subsets()")
 
 
 def check_strength(strength: Strength) -> None:
@@ -153,11 +153,11 @@ def check_strength(strength: Strength) -> None:
 EXPONENT_OFFSET = 0.02
 
 
-def of_exponents(m: Floats) -> Floats:
+def exponent_penalty(distances: Floats) -> Floats:
     """sum (|m_j| + .02)^(1/2) of distances of exponents from where they are off, (candidates, exponents)."""
-    return np.asarray(np.sqrt(m + EXPONENT_OFFSET).sum(axis=-1))
+    return np.asarray(np.sqrt(distances + EXPONENT_OFFSET).sum(axis=-1))
 
 
-def weights_of_exponents(m: Floats) -> Floats:
+def exponent_weights(distances: Floats) -> Floats:
     """w, (candidates, exponents): the parabola w m^2 + const touches it at m."""
-    return np.asarray(0.25 / (np.maximum(m, 1e-6) * np.sqrt(m + EXPONENT_OFFSET)))
+    return np.asarray(0.25 / (np.maximum(distances, 1e-6) * np.sqrt(distances + EXPONENT_OFFSET)))

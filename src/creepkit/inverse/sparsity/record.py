@@ -8,13 +8,13 @@ from typing import Any
 
 from scipy.stats import chi2
 
-from creepkit.inverse.measures import Errors
-from creepkit.inverse.sparsity.path import Path
-from creepkit.inverse.sparsity.reduction import SHARE, Terms
+from creepkit.inverse.measures import OutputErrors
+from creepkit.inverse.sparsity.path import PenaltyPath
+from creepkit.inverse.sparsity.reduction import LEAST_CONTRIBUTION, TermNames
 
 
 @dataclass(frozen=True)
-class Misfit:
+class FitStatistics:
     """How well a law fits, on the covariance of the whole sum.
 
     chi_square : of all outputs, priors included; parameters : of the law that were fitted; bic : chi-square + K ln N.
@@ -24,7 +24,7 @@ class Misfit:
     chi_square: float
     parameters: int
     bic: float
-    errors: Mapping[str, Errors] = field(default_factory=dict)
+    errors: Mapping[str, OutputErrors] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -43,94 +43,94 @@ class Sparsity:
     law: str
     penalty: str
     strength: float | None
-    kept: Terms
-    dropped: Terms
-    off: tuple[str, ...]
-    proposed: Terms
-    shares_without: Mapping[str, float]
-    shares_with: Mapping[str, float]
-    shares_after: Mapping[str, float]
-    whole: Misfit
-    reduced: Misfit
-    frames: int
-    path: Path | None = field(default=None, repr=False, compare=False)
+    kept_terms: TermNames
+    dropped_terms: TermNames
+    exponents_off: tuple[str, ...]
+    proposed_terms: TermNames
+    contributions_without_penalty: Mapping[str, float]
+    contributions_with_penalty: Mapping[str, float]
+    contributions_after_refit: Mapping[str, float]
+    full: FitStatistics
+    reduced: FitStatistics
+    observations: int
+    path: PenaltyPath | None = field(default=None, repr=False, compare=False)
 
     @property
-    def rise(self) -> float:
+    def chi_square_rise(self) -> float:
         """Of chi-square, from the whole sum to the reduced law."""
-        return self.reduced.chi_square - self.whole.chi_square
+        return self.reduced.chi_square - self.full.chi_square
 
     @property
-    def fewer(self) -> int:
+    def parameters_dropped(self) -> int:
         """Parameters that the reduced law does without."""
-        return self.whole.parameters - self.reduced.parameters
+        return self.full.parameters - self.reduced.parameters
 
     @property
     def p_value(self) -> float:
         """Chance of such a rise, or more, if the reduced law is true; 1 where nothing was dropped."""
-        return float(chi2.sf(max(self.rise, 0.0), self.fewer)) if self.fewer > 0 else 1.0
+        return float(chi2.sf(max(self.chi_square_rise, 0.0), self.parameters_dropped)) if self.parameters_dropped > 0 else 1.0
 
     @property
-    def excess(self) -> float:
+    def bic_difference(self) -> float:
         """BIC of the reduced law less that of the whole sum; below zero where the reduced law is preferred."""
-        return self.reduced.bic - self.whole.bic
+        return self.reduced.bic - self.full.bic
 
     @property
     def confirmed(self) -> bool:
         """Whether what the penalty proposed stood the comparison with the whole sum."""
-        return self.proposed == self.kept
+        return self.proposed_terms == self.kept_terms
 
     @property
     def verdict(self) -> str:
         """What was dropped, what that cost, and whether it was too much, in one or two sentences."""
-        gone = _listed([*self.dropped, *(f"exponent {name}" for name in self.off)])
+        dropped = _quoted_list([*self.dropped_terms, *(f"exponent {name}" for name in self.exponents_off)])
         cost = (
-            f"chi-square rises by {max(self.rise, 0.0):.1f} for {self.fewer} parameters fewer (p = {self.p_value:.2g}) "
-            f"and BIC changes by {self.excess:+.1f}"
+            f"chi-square rises by {max(self.chi_square_rise, 0.0):.1f} for {self.parameters_dropped} parameters fewer (p = {self.p_value:.2g}) "
+            f"and BIC changes by {self.bic_difference:+.1f}"
         )
-        if not gone:
-            told = f"all terms of '{self.law}' are kept"
+        if not dropped:
+            sentence = f"all terms of '{self.law}' are kept"
         else:
-            told = f"without {gone} of '{self.law}' {cost}: {_listed(self.kept)} suffice{'s' * (len(self.kept) == 1)}"
+            sentence = f"without {dropped} of '{self.law}' {cost}: {_quoted_list(self.kept_terms)} suffice{'s' * (len(self.kept_terms) == 1)}"
         if self.confirmed:
-            return told
-        back = _listed([term for term in self.kept if term not in self.proposed])
-        return f"{told}. The penalty had dropped {back} too, but without BIC is higher than that of the whole sum"
+            return sentence
+        restored = _quoted_list([term for term in self.kept_terms if term not in self.proposed_terms])
+        return f"{sentence}. The penalty had dropped {restored} too, but without BIC is higher than that of the whole sum"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers and names, without the path."""
         names = ("law", "penalty", "strength", "kept", "dropped", "off", "proposed", "frames")
-        shares = {name: dict(getattr(self, name)) for name in ("shares_without", "shares_with", "shares_after")}
-        plain = {name: getattr(self, name) for name in names}
-        plain = {name: list(v) if isinstance(v, tuple) else v for name, v in plain.items()}
-        return {**plain, **shares, "whole": _plain(self.whole), "reduced": _plain(self.reduced)}
+        contributions = {name: dict(getattr(self, name)) for name in ("shares_without", "shares_with", "shares_after")}
+        values = {name: getattr(self, name) for name in names}
+        values = {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
+        return {**values, **contributions, "whole": _statistics_to_dict(self.full), "reduced": _statistics_to_dict(self.reduced)}
 
     @classmethod
-    def from_dict(cls, given: Mapping[str, Any]) -> Sparsity:
+    def from_dict(cls, data: Mapping[str, Any]) -> Sparsity:
         """The record that to_dict wrote."""
-        lists = {name: tuple(given[name]) for name in ("kept", "dropped", "off", "proposed")}
-        misfits = {
-            name: Misfit(**{**given[name], "errors": {k: Errors(**v) for k, v in given[name]["errors"].items()}})
+        lists = {name: tuple(data[name]) for name in ("kept", "dropped", "off", "proposed")}
+        statistics = {
+            name: FitStatistics(**{**data[name], "errors": {k: OutputErrors(**v) for k, v in data[name]["errors"].items()}})
             for name in ("whole", "reduced")
         }
-        return cls(**{**given, **lists, **misfits})
+        return cls(**{**data, **lists, **statistics})
 
     def __str__(self) -> str:
         strength = "" if self.strength is None else f" of strength {self.strength:g}"
-        width = max(map(len, self.shares_without))
+        width = max(map(len, self.contributions_without_penalty))
         lines = [f"{self.penalty}{strength}: {self.verdict}", f"{'':{width}}  without  with  after"]
-        for term, share in self.shares_without.items():
-            after = self.shares_after.get(term)
-            told = "dropped" if after is None else f"{after:.3f}"
-            lines.append(f"{term:{width}}  {share:.3f}  {self.shares_with[term]:.3f}  {told}")
-        return "\n".join([*lines, f"(contributions; below {SHARE:g} a term is dropped)"])
+        for term, contribution in self.contributions_without_penalty.items():
+            refitted = self.contributions_after_refit.get(term)
+            after_text = "dropped" if refitted is None else f"{refitted:.3f}"
+            lines.append(f"{term:{width}}  {contribution:.3f}  {self.contributions_with_penalty[term]:.3f}  {after_text}")
+        return "\n".join([*lines, f"(contributions; below {LEAST_CONTRIBUTION:g} a term is dropped)"])
 
 
-def _plain(misfit: Misfit) -> dict[str, Any]:
-    return {**asdict(misfit), "errors": {name: asdict(errors) for name, errors in misfit.errors.items()}}
+def _statistics_to_dict(statistics: FitStatistics) -> dict[str, Any]:
+    return {**asdict(statistics), "errors": {name: asdict(errors) for name, errors in statistics.errors.items()}}
 
 
-def _listed(names: list[str] | Terms) -> str:
+def _quoted_list(names: list[str] | TermNames) -> str:
     """'a', 'b' and 'c'."""
     quoted = [f"'{name}'" if not name.startswith("exponent ") else name for name in names]
     return quoted[0] if len(quoted) == 1 else " and ".join([", ".join(quoted[:-1]), quoted[-1]]) if quoted else ""

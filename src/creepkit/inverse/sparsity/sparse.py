@@ -8,26 +8,26 @@ from dataclasses import replace
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.search.landscape import Search
-from creepkit.inverse.search.refining import Progress
-from creepkit.inverse.settings import Settings
-from creepkit.inverse.sparsity.choosing import Choice, chosen
-from creepkit.inverse.sparsity.path import STRENGTHS, Path, path_of
-from creepkit.inverse.sparsity.penalties import Penalty, Subsets, check_penalty
-from creepkit.inverse.sparsity.record import Misfit, Sparsity
-from creepkit.inverse.sparsity.reduction import Reduced, Reductions
-from creepkit.inverse.sparsity.resampling import Frequencies, frequencies
-from creepkit.inverse.sparsity.stage import Stage
+from creepkit.inverse.search.landscape import GlobalSearch
+from creepkit.inverse.search.refining import IterationCallback
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sparsity.choosing import TermChoice, choose_terms
+from creepkit.inverse.sparsity.path import PATH_STRENGTHS, PenaltyPath, trace_path
+from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets, check_penalty
+from creepkit.inverse.sparsity.record import FitStatistics, Sparsity
+from creepkit.inverse.sparsity.reduction import ReducedLaw, ReducedLaws
+from creepkit.inverse.sparsity.resampling import SelectionFrequencies, selection_frequencies
+from creepkit.inverse.sparsity.stage import TermProblem
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
-Using = Predictor | Mapping[str, Predictor]
+PredictorOrMapping = Predictor | Mapping[str, Predictor]
 
 
-def sparse(
-    law: CreepLaw, histories: Sequence[History], using: Using, *, penalty: Penalty | Subsets,
-    search: Search | None = None, through: Predictor | None = None, settings: Settings | None = None,
-    progress: Progress | None = None,
+def identify_sparse(
+    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, *, penalty: ContributionPenalty | Subsets,
+    search: GlobalSearch | None = None, through: Predictor | None = None, settings: IdentificationSettings | None = None,
+    progress: IterationCallback | None = None,
 ) -> Identification:  # fmt: skip
     """Identify the law of those terms of a sum that the histories need; what was dropped stands in `sparsity`.
 
@@ -38,90 +38,90 @@ def sparse(
     through : a surrogate by which terms are chosen; values and intervals are those of `using`.
     """
     check_penalty(penalty)
-    dense, reductions = opened(law, histories, using, through, settings, progress)
-    return reduced_by(penalty, dense, reductions, search, progress)
+    full, reductions = identify_full(law, histories, using, through, settings, progress)
+    return identify_reduced(penalty, full, reductions, search, progress)
 
 
-def reduced_by(
-    penalty: Penalty | Subsets, dense: Identification, reductions: Reductions, search: Search | None = None,
-    progress: Progress | None = None,
+def identify_reduced(
+    penalty: ContributionPenalty | Subsets, full: Identification, reductions: ReducedLaws, search: GlobalSearch | None = None,
+    progress: IterationCallback | None = None,
 ) -> Identification:  # fmt: skip
     """The same from the whole sum, identified and opened before."""
-    choice = chosen(reductions, penalty, search, progress)
-    reduced = confirmed(reductions, choice)
-    size = len(reduced.law.params)
-    known = [replace(n, value=float(v)) for n, v in zip(dense.nuisances, reduced.x[size:], strict=True)]
-    assert dense.using is not None
+    choice = choose_terms(reductions, penalty, search, progress)
+    reduced = confirmed_law(reductions, choice)
+    parameter_count = len(reduced.law.params)
+    initial_nuisances = [replace(nuisance, value=float(nuisance_value)) for nuisance, nuisance_value in zip(full.nuisances, reduced.x[parameter_count:], strict=True)]
+    assert full.predictor is not None
     fit = identify(
-        reduced.law, dense.histories, dense.using, settings=dense.settings, start=reduced.x[:size], known=known,
-        reference=dense.reference, progress=progress,
+        reduced.law, full.histories, full.predictor, settings=full.settings, start=reduced.x[:parameter_count], known_nuisances=initial_nuisances,
+        reference=full.reference, progress=progress,
     )  # fmt: skip
-    record = _record(dense, fit, reductions, reduced, choice, penalty)
-    return replace(fit, trace=choice.trace or dense.trace, sparsity=record)
+    record = _sparsity_record(full, fit, reductions, reduced, choice, penalty)
+    return replace(fit, search_trace=choice.trace or full.search_trace, sparsity=record)
 
 
-def path(
-    law: CreepLaw, histories: Sequence[History], using: Using, penalty: Penalty, *,
-    strengths: Sequence[float] = STRENGTHS, settings: Settings | None = None, progress: Progress | None = None,
-) -> Path:  # fmt: skip
+def penalty_path(
+    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, penalty: ContributionPenalty, *,
+    strengths: Sequence[float] = PATH_STRENGTHS, settings: IdentificationSettings | None = None, progress: IterationCallback | None = None,
+) -> PenaltyPath:  # fmt: skip
     """The path of a penalty over its strength, from none to all, with the automatic choice."""
-    _, reductions = opened(law, histories, using, None, settings, progress)
-    return path_of(reductions, penalty, strengths, progress)
+    _, reductions = identify_full(law, histories, using, None, settings, progress)
+    return trace_path(reductions, penalty, strengths, progress)
 
 
-def resampled(
-    law: CreepLaw, histories: Sequence[History], using: Using, penalty: Penalty | Subsets, *, repeats: int = 20,
-    seed: int = 0, settings: Settings | None = None, progress: Progress | None = None,
-) -> Frequencies:  # fmt: skip
+def bootstrap_terms(
+    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, penalty: ContributionPenalty | Subsets, *, resamples: int = 20,
+    seed: int = 0, settings: IdentificationSettings | None = None, progress: IterationCallback | None = None,
+) -> SelectionFrequencies:  # fmt: skip
     """How often each term is kept when the tests (or the frames of the only one) are drawn again."""
-    _, reductions = opened(law, histories, using, None, settings, progress)
-    choice = chosen(reductions, penalty, None, progress)
-    return frequencies(reductions, penalty, choice.strength, choice.x, repeats=repeats, seed=seed, progress=progress)
+    _, reductions = identify_full(law, histories, using, None, settings, progress)
+    choice = choose_terms(reductions, penalty, None, progress)
+    return selection_frequencies(reductions, penalty, choice.strength, choice.x, resamples=resamples, seed=seed, progress=progress)
 
 
-def opened(
-    law: CreepLaw, histories: Sequence[History], using: Using, through: Predictor | None, settings: Settings | None,
-    progress: Progress | None,
-) -> tuple[Identification, Reductions]:  # fmt: skip
+def identify_full(
+    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, through: Predictor | None, settings: IdentificationSettings | None,
+    progress: IterationCallback | None,
+) -> tuple[Identification, ReducedLaws]:  # fmt: skip
     """The whole sum identified without penalty, and its terms ready to be dropped."""
     if len(law.terms) < 2:
         raise FitError(
             f"law '{law.name}' has one term, '{next(iter(law.terms))}', and a penalty chooses among terms: "
             "identify it without penalty, or a sum of laws with it"
         )
-    dense = identify(law, histories, using, settings=settings, through=through, progress=progress)
-    return dense, Reductions(Stage.of(dense, through))
+    full = identify(law, histories, using, settings=settings, through=through, progress=progress)
+    return full, ReducedLaws(TermProblem.from_identification(full, through))
 
 
-def confirmed(reductions: Reductions, choice: Choice) -> Reduced:
+def confirmed_law(reductions: ReducedLaws, choice: TermChoice) -> ReducedLaw:
     """The reduced law, to which dropped terms come back, the largest first, until its BIC is not above the sum's."""
-    kept = list(choice.kept)
+    kept_terms = list(choice.kept_terms)
     while True:
-        reduced = reductions.of(kept)
-        if reduced.criterion <= reductions.whole(reduced).criterion or len(kept) == len(reductions.labels):
+        reduced = reductions.with_terms(kept_terms)
+        if reduced.bic <= reductions.full(reduced).bic or len(kept_terms) == len(reductions.terms):
             return reduced
-        rest = [label for label in reductions.labels if label not in kept]
-        kept.append(max(rest, key=lambda label: choice.shares[label]))
+        dropped = [label for label in reductions.terms if label not in kept_terms]
+        kept_terms.append(max(dropped, key=lambda label: choice.contributions[label]))
 
 
-def _record(
-    dense: Identification, fit: Identification, reductions: Reductions, reduced: Reduced, choice: Choice,
-    penalty: Penalty | Subsets,
+def _sparsity_record(
+    full_fit: Identification, fit: Identification, reductions: ReducedLaws, reduced: ReducedLaw, choice: TermChoice,
+    penalty: ContributionPenalty | Subsets,
 ) -> Sparsity:  # fmt: skip
-    stage, whole = reductions.stage, reductions.whole(reduced)
+    problem, full = reductions.problem, reductions.full(reduced)
     return Sparsity(
-        law=stage.law.name,
+        law=problem.law.name,
         penalty=type(penalty).__name__,
         strength=choice.strength,
-        kept=reduced.kept,
-        dropped=tuple(label for label in reductions.labels if label not in reduced.kept),
-        off=reduced.off,
-        proposed=choice.kept,
-        shares_without=stage.shares(whole.x),
-        shares_with=choice.shares,
-        shares_after=reduced.stage.shares(reduced.x),
-        whole=Misfit(whole.chi_square, whole.parameters, whole.criterion, dense.errors),
-        reduced=Misfit(reduced.chi_square, reduced.parameters, reduced.criterion, fit.errors),
-        frames=stage.frames,
+        kept_terms=reduced.kept_terms,
+        dropped_terms=tuple(label for label in reductions.terms if label not in reduced.kept_terms),
+        exponents_off=reduced.exponents_off,
+        proposed_terms=choice.kept_terms,
+        contributions_without_penalty=problem.contributions_at(full.x),
+        contributions_with_penalty=choice.contributions,
+        contributions_after_refit=reduced.problem.contributions_at(reduced.x),
+        full=FitStatistics(full.chi_square, full.parameter_count, full.bic, full_fit.errors),
+        reduced=FitStatistics(reduced.chi_square, reduced.parameter_count, reduced.bic, fit.errors),
+        observations=problem.observation_count,
         path=choice.path,
     )
