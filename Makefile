@@ -14,7 +14,7 @@ SHELL := /bin/bash
 PYTHONS := python3.11 python3.12 python3.13
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check
-COMPILED := from creepkit.cli.compiled import compiled_folder; print(compiled_folder())
+COMPILED := from creepkit.cli import numba_cache_folder as folder; print(folder())
 PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/pyproject.toml))
 
 TORCH_CPU := torch==2.13.0+cpu
@@ -43,7 +43,7 @@ surrogate: .venv/.ok
 	mkdir -p build
 	$(BIN)/creepkit generate rate-family --samples 8000 --seed 1 --to build/rates.h5
 	$(BIN)/creepkit train build/rates.h5 --recipe rate-net --epochs 300 --seed 0 --to build/dimple.safetensors
-	cp build/dimple.safetensors src/creepkit/surrogate/weights/
+	cp build/dimple.safetensors src/creepkit/surrogates/weights/
 
 .venv/.ok: pyproject.toml $(PLUGINS:%=%/pyproject.toml)
 	@echo "set-up 1/5: virtual environment .venv"
@@ -63,7 +63,7 @@ endif
 	@echo "set-up 4/5: plugins"
 	@for plugin in $(PLUGINS); do $(PIP) --no-build-isolation --editable $$plugin; done
 	@echo "set-up 5/5: compile the solver"
-	@$(BIN)/python -c 'from creepkit.cli.compiled import share_compiled_code as share; share(); from creepkit.cli.demo import prepare; prepare()'
+	@$(BIN)/python -c 'from creepkit.cli import set_numba_cache; set_numba_cache(); from creepkit.cli.demo import compile_kernels; compile_kernels()'
 	@touch $@
 
 clean:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import creepkit as ck
-from creepkit.readers.writing import write_history
+from creepkit.readers.history_csv import write_history
 
 LAW = "strain-hardening"
 TRUTH = {"A": 4e-16, "n": 4.4, "m": -0.35}

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import creepkit as ck
-from creepkit.readers.writing import write_history
+from creepkit.readers.history_csv import write_history
 
 TRUTH = {"A": 6.0e-17, "n": 4.2, "m": -0.35, "Q": 340e3}
 T_REF = 800 + 273.15
@@ -37,7 +37,12 @@ def main(folder: Path) -> None:
             true_values = {**TRUTH, "A": TRUTH["A"] * np.exp(rng.normal(0, RATE_SCATTER))}
             times = np.concatenate([[0.0], np.geomspace(60, 2e7, 4000)])
             clean = ck.simulate(
-                law, specimen, true_values, loading=ck.StressSteps(tuple(steps)), times=times, temperature=celsius + 273.15
+                law,
+                specimen,
+                true_values,
+                loading=ck.StressSteps(tuple(steps)),
+                times=times,
+                temperature=celsius + 273.15,
             )
             strain = clean.outputs["strain"]
             end = times[: strain.size][strain < 0.03][-1]

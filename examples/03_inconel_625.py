@@ -21,8 +21,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import creepkit as ck
-from creepkit.inverse.holdout import leave_one_test_out, pooled_relative_squared_error, prediction_errors
-from creepkit.inverse.measures import relative_squared_error
+from creepkit.inverse.cross_validation import leave_one_test_out, pooled_relative_squared_error, prediction_errors
+from creepkit.inverse.goodness_of_fit import relative_squared_error
 
 T_REF = 1050.0
 R = 8.314462618
@@ -142,7 +142,12 @@ if folder is not None:
     held_out = leave_one_test_out(fits["robust"])
     pooled = pooled_relative_squared_error(held_out, tests, "amplitude")
     print(f"\nleft out in turn, predicted at nominal thickness: pooled loss {pooled:.3g}")
-    print("  " + ", ".join(f"{h.name.removeprefix('test_')} {h.errors['amplitude'].relative_squared_error:.2g}" for h in held_out))
+    print(
+        "  "
+        + ", ".join(
+            f"{h.name.removeprefix('test_')} {h.errors['amplitude'].relative_squared_error:.2g}" for h in held_out
+        )
+    )
 
 # ---- 5. What one test says alone, and the pressure jump (Fig. 6f) ---------------------------------------------------
 

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import creepkit as ck
-from creepkit.readers.writing import write_history
+from creepkit.readers.history_csv import write_history
 from creepkit.registry import default_registry
 from creepkit.testing import check_law
 
@@ -113,7 +113,13 @@ left.plot(again.times / HOUR, 100 * again.outputs["strain_11"], "C1.", label="id
 left.plot(again.times / HOUR, 100 * again.outputs["strain_12"], "C1.")
 left.set(xlabel="time, h", ylabel="creep strain, %", title="60 MPa tension, 35 MPa torsion after 10 h")
 relaxed = ck.simulate(
-    law, "relaxation", fit.values, loading=relaxation_run.loading, times=later, temperature=1073.15, elastic=relaxation_run.elastic
+    law,
+    "relaxation",
+    fit.values,
+    loading=relaxation_run.loading,
+    times=later,
+    temperature=1073.15,
+    elastic=relaxation_run.elastic,
 )
 right.plot(relaxation_run.times / HOUR, relaxation_run.outputs["stress"], "k-", label="truth")
 right.plot(relaxed.times / HOUR, relaxed.outputs["stress"], "C1.", label="identified from bars")

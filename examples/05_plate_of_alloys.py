@@ -15,8 +15,8 @@ from pathlib import Path
 
 import creepkit as ck
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.plates.planted import THICKNESS_MEAN_SD, planted_plate
-from creepkit.plates.screening import screen
+from creepkit.screening.planted import THICKNESS_MEAN_SD, planted_plate
+from creepkit.screening.screen import screen
 
 options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 options.add_argument("--alloys", type=int, default=3)

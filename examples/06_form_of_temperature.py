@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import creepkit as ck
-from creepkit.discovery.discover import discover
-from creepkit.discovery.temperature_study import group_by_temperature
+from creepkit.discovery.discover import discover, group_by_temperature
 
 T_REF = 1023.15  # K
 STRESSES = (60.0, 90.0, 120.0)  # MPa

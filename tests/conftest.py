@@ -1,5 +1,5 @@
 """What all tests share."""
 
-from creepkit.cli.compiled import set_numba_cache
+from creepkit.cli import set_numba_cache
 
 set_numba_cache()

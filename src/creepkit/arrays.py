@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
 
 Floats: TypeAlias = NDArray[np.float64]
+
+
 Ints: TypeAlias = NDArray[np.int64]
+
+
 Bools: TypeAlias = NDArray[np.bool_]
+
 
 __all__ = ["ArrayLike", "Bools", "Floats", "Ints", "frozen"]
 
@@ -20,3 +27,9 @@ def frozen(values: ArrayLike | Sequence[Any], dtype: type = np.float64) -> NDArr
     array: NDArray[Any] = np.array(values, dtype=dtype, order="C")
     array.flags.writeable = False
     return array
+
+
+def single_threaded_blas() -> AbstractContextManager[object]:
+    """Limit BLAS to one thread inside a with statement."""
+    manager: AbstractContextManager[object] = threadpool_limits(1, user_api="blas")
+    return manager

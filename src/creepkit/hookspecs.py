@@ -13,8 +13,13 @@ if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
     from creepkit.records import Exporter, Reader, Specimen
 
+
 PROJECT = "creepkit"
+
+
 hookspec = pluggy.HookspecMarker(PROJECT)
+
+
 hookimpl = pluggy.HookimplMarker(PROJECT)
 
 

@@ -32,7 +32,7 @@ from creepkit.language import CreepLaw, Elastic
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import Loading, PressureJump, Program, RecordedLoading
-from creepkit.specimens.dimple import DimpleGeometry
+from creepkit.specimens.bulge.geometry import DimpleGeometry
 
 TIMES = np.array([150, 600, 1800, 3600, 7200, 10800, 14400, 14550, 21600, 28800, 36000, 43200], dtype=float)
 LONGEST_WAIT = 3600.0
@@ -151,8 +151,8 @@ def theirs(case: Case, mesh: Mesh, cetols: list[float]) -> list[Result]:
 
 def ours(case: Case, refinement: float) -> tuple[Floats, float]:
     """Apex displacement, (times,) mm, and CPU seconds a run."""
-    from creepkit.specimens.bulge import Bulge
-    from creepkit.specimens.bulge_run import BulgeRun
+    from creepkit.specimens.bulge.run import BulgeRun
+    from creepkit.specimens.bulge.specimen import Bulge
 
     law, values = case.law
     specimen = Bulge(geometry=case.geometry, refinement=refinement)

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import creepkit as ck
-from creepkit.cli.compiled import set_numba_cache
-from creepkit.dataset.campaign import generate
+from creepkit.cli import set_numba_cache
 from creepkit.dataset.dataset import Dataset
-from creepkit.dataset.design import SamplingDesign, sampling_design
+from creepkit.dataset.generation import generate
+from creepkit.sampling.domains import SamplingDesign, sampling_design
 
 PAPER = 155_186
 """Samples of the paper's case 2."""

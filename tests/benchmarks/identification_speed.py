@@ -14,7 +14,7 @@ import numpy as np
 import planted
 
 import creepkit as ck
-from creepkit.cli.compiled import set_numba_cache
+from creepkit.cli import set_numba_cache
 
 
 def timed(function):

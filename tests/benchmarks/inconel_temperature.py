@@ -28,14 +28,18 @@ from pathlib import Path
 import numpy as np
 
 import creepkit as ck
-from creepkit.cli.compiled import set_numba_cache
-from creepkit.discovery.discover import discover
-from creepkit.discovery.libraries import law_with_forms
+from creepkit.cli import set_numba_cache
+from creepkit.discovery.discover import discover, group_by_temperature
+from creepkit.discovery.forms import law_with_forms
 from creepkit.discovery.refitting import refit
-from creepkit.discovery.temperature_study import group_by_temperature
 from creepkit.errors import CreepkitError
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.holdout import HeldOutTest, leave_one_test_out, pooled_relative_squared_error, prediction_errors
+from creepkit.inverse.cross_validation import (
+    HeldOutTest,
+    leave_one_test_out,
+    pooled_relative_squared_error,
+    prediction_errors,
+)
 from creepkit.inverse.identification import Identification, IdentificationSettings
 from creepkit.inverse.identify import identify
 
@@ -168,7 +172,10 @@ def table(how: str, found: dict[str, tuple[Identification, tuple[HeldOutTest, ..
 
 def verdict(found: dict[str, tuple[Identification, tuple[HeldOutTest, ...]]]) -> None:
     """Whether the discovered forms predict better than plain Arrhenius, test by test."""
-    one, other = (np.array([h.errors["amplitude"].relative_squared_error for h in found[n][1]]) for n in ("plain Arrhenius", "discovered"))
+    one, other = (
+        np.array([h.errors["amplitude"].relative_squared_error for h in found[n][1]])
+        for n in ("plain Arrhenius", "discovered")
+    )
     better, gain = int((other < one).sum()), np.log(other / one)
     error = gain.std(ddof=1) / np.sqrt(gain.size)
     print(
@@ -181,7 +188,9 @@ def verdict(found: dict[str, tuple[Identification, tuple[HeldOutTest, ...]]]) ->
         print(f"verdict: the forms predict {'better' if gain.mean() < 0 else 'worse'} than plain Arrhenius")
 
 
-def nested(alone: list[Identification], tests: list[ck.History], using: object, most: int, settings: IdentificationSettings) -> None:
+def nested(
+    alone: list[Identification], tests: list[ck.History], using: object, most: int, settings: IdentificationSettings
+) -> None:
     """Forms chosen without the test that is then predicted."""
     print("\nforms chosen anew without the test held out\n| test | forms | rse, amplitude |\n|-|-|-|")
     groups = group_by_temperature(tests)

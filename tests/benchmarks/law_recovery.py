@@ -31,13 +31,12 @@ import planted
 
 import creepkit as ck
 from creepkit import kernels
-from creepkit.cli.compiled import set_numba_cache
-from creepkit.inverse.covariance import covariance
-from creepkit.inverse.intervals.mixture import ModelAverage
+from creepkit.cli import set_numba_cache
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.problem import least_squares_problem
-from creepkit.inverse.restricted import scaled_inverse
-from creepkit.inverse.scatter import OutputNoise, NoiseModel
-from creepkit.inverse.selection.equivalence import equivalent_laws
+from creepkit.inverse.selection.discrimination import equivalent_laws
+from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+from creepkit.inverse.variance_components import scaled_inverse
 
 PAIRS = (("norton", "strain-hardening"), ("norton", "time-hardening"), ("hyperbolic-sine", "time-hardening"),
          ("hyperbolic-sine", "strain-hardening"))  # fmt: skip
@@ -118,7 +117,9 @@ def fisher(fit, u, design):
         scale = opened.residual_function.observations.transforms[0].size
         reach = -5.0 / 48 / np.log(coefficient)
         sizes["amplitude"] = OutputNoise(1e-6, drift=sd / scale, correlation_length=reach)
-    weights = np.linalg.inv(covariance(replace(residuals, loudness=np.ones_like(residuals.relative_noise)), NoiseModel(sizes)))
+    weights = np.linalg.inv(
+        covariance(replace(residuals, loudness=np.ones_like(residuals.relative_noise)), NoiseModel(sizes))
+    )
     own = np.einsum("tep,tef,tfq->pq", residuals.jacobian, weights, residuals.jacobian, optimize=True)
     wide = opened.bounds.width[: len(u)]
     prior = np.concatenate([12.0 / wide**2, opened.residual_function.nuisance_parameters.precision])

@@ -16,10 +16,15 @@ from pathlib import Path
 import numpy as np
 
 import creepkit as ck
+from creepkit.inverse.cross_validation import (
+    leave_one_condition_out,
+    loading_strains,
+    measured_time_to_strain,
+    times_to_strain,
+)
+from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures
 from creepkit.inverse.selection import rank
-from creepkit.inverse.validation import leave_one_condition_out, loading_strains, measured_time_to_strain, times_to_strain
-from creepkit.inverse.warmth import reference_temperature, spans_temperatures
-from creepkit.readers.duplicates import duplicate_tests
+from creepkit.quality.comparison import duplicate_tests
 
 LIMIT, LEVEL = 0.05, 0.01
 LAWS = (

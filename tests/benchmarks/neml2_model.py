@@ -17,7 +17,7 @@ from card_cases import CASES, HAS, STEEL
 from neml2 import SR2, Model, Scalar
 from neml2.factory import load_model
 
-from creepkit.export.cards.neml2 import Neml2Model
+from creepkit.exporters.moose_neml2 import Neml2Model
 from creepkit.kernels import lower
 from creepkit.records import LawWithValues
 

@@ -27,10 +27,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 import creepkit as ck
-from creepkit.cli.compiled import set_numba_cache
+from creepkit.cli import set_numba_cache
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.resampling import binomial_interval
-from creepkit.inverse.sparsity.sparse import identify_full, identify_reduced
+from creepkit.inverse.sparsity.bootstrap import binomial_interval
+from creepkit.inverse.sparsity.term_selection import identify_full, identify_reduced
 from creepkit.records import History
 
 SEED = 2026

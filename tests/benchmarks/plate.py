@@ -4,7 +4,7 @@
                                      [--unknown-thickness] [--workers 2] [--to FOLDER]
 
 Each alloy is one dimple, 8 then 10 MPa, 4 h, a frame a minute, with white noise as measured (1.5 um, .02 mm, .02), its
-law and values drawn around the three of Fig. 7a of Chen et al. (creepkit.plates.planted). The four laws of Table 1 are
+law and values drawn around the three of Fig. 7a of Chen et al. (creepkit.screening.planted). The four laws of Table 1 are
 identified with intervals, the best one is confirmed by finite elements, and Eq. (2) is fitted without sparsity unless
 --no-dense. --how through searches in the surrogate that comes with creepkit and ends with finite elements; surrogate
 has nothing else; finite-elements does without it. Planting is not timed. Started again with the same --to, it goes on,
@@ -27,9 +27,9 @@ import numpy as np
 from scipy.stats import binomtest
 
 import creepkit as ck
-from creepkit.cli.compiled import set_numba_cache
-from creepkit.plates.planted import THICKNESS_MEAN_SD, planted_plate
-from creepkit.plates.screening import screen
+from creepkit.cli import set_numba_cache
+from creepkit.screening.planted import THICKNESS_MEAN_SD, planted_plate
+from creepkit.screening.screen import screen
 
 MERGED = {"hyperbolic-sine": "norton"}
 """Laws that differ by a curvature alone, which one dimple hardly shows."""
@@ -98,9 +98,13 @@ def confirmed(plate):
     told = [a.confirmation for a in plate.identified if a.confirmation is not None]
     print(f"confirmed {sum(c.holds for c in told)} of {len(told)}; finite elements from the fit, times the noise: "
           f"{quantiles([c.distance for c in told])}")  # fmt: skip
-    from creepkit.plates.answer import mean_relative_squared_error
+    from creepkit.screening.results import mean_relative_squared_error
 
-    costs = [mean_relative_squared_error(a.reduced) / mean_relative_squared_error(a.dense) for a in plate.identified if a.dense is not None]
+    costs = [
+        mean_relative_squared_error(a.reduced) / mean_relative_squared_error(a.dense)
+        for a in plate.identified
+        if a.dense is not None
+    ]
     if costs:
         print(f"loss of the reduced law over that without sparsity: {quantiles(costs)}")
 

@@ -16,9 +16,8 @@ import torch
 from torch import nn
 
 import creepkit as ck
-from creepkit.surrogate.rate_inputs import LOCAL_INPUTS
-from creepkit.surrogate.rate_module import RateModule
-from creepkit.surrogate.rate_net import RateNet
+from creepkit.surrogates.rate_net import RateNet
+from creepkit.surrogates.rate_network import LOCAL_INPUTS, RateModule
 
 HIDDEN = 64
 

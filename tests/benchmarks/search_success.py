@@ -23,12 +23,12 @@ import numpy as np
 from scipy.stats import binomtest
 
 import creepkit as ck
-from creepkit.cli.compiled import set_numba_cache
-from creepkit.inverse.coordinates import Coordinates, ReferencePoint
+from creepkit.cli import set_numba_cache
+from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identify import identify
-from creepkit.inverse.search.evolution import CmaEs
+from creepkit.inverse.reference_conditions import ReferencePoint
+from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 from creepkit.inverse.search.multistart import MultiStart, distinct
-from creepkit.inverse.search.swarm import ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
 
 REFERENCE = ReferencePoint(stress=120.0, strain=0.01, time=1e4, temperature=1000.0)

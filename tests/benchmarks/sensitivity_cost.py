@@ -17,7 +17,7 @@ import time
 import numpy as np
 
 import creepkit as ck
-from creepkit.specimens.bulge import Bulge
+from creepkit.specimens.bulge.specimen import Bulge
 
 CASES = {
     "combined, jump": (

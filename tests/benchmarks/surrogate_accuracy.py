@@ -20,7 +20,7 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.records import Status
-from creepkit.surrogate.metrics import relative_squared_error
+from creepkit.surrogates.evaluation import relative_squared_error
 
 SEED = 77
 SETS = {

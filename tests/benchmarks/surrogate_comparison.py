@@ -19,8 +19,8 @@ import numpy as np
 from surrogate_accuracy import predicted
 
 import creepkit as ck
-from creepkit.surrogate.metrics import relative_squared_error
-from creepkit.surrogate.trainable import training_split, trainable_samples
+from creepkit.surrogates.evaluation import relative_squared_error
+from creepkit.surrogates.training_loop import trainable_samples, training_split
 
 
 def main():
@@ -36,7 +36,10 @@ def main():
     held = data.rows(rows[: given.samples])
     print("| model | Eq. (4) 1e-4 | D | S_d | S_p | largest um | 95 % | outside | ms | of 100 | runs | epochs |")
     print("|" + "-|" * 12)
-    models = {"one degree of freedom": ck.specimen("bulge").reduced_order_model(), "shipped RateNet": ck.surrogate("dimple")}
+    models = {
+        "one degree of freedom": ck.specimen("bulge").reduced_order_model(),
+        "shipped RateNet": ck.surrogate("dimple"),
+    }
     for name, model in (models | {path: ck.surrogate(path) for path in given.models}).items():
         print(line(name, model, held, scale), flush=True)
     each, _ = costs(ck.specimen("bulge").replace(threads=1), held, few=3)
@@ -50,7 +53,10 @@ def line(name, model, held, scale):
     true = held.values[:, 1:].astype(float)
     mask = np.isfinite(true[..., 0]) & np.isfinite(shown[:, 1:, 0])
     true, shown = np.where(mask[..., None], true, 0.0), np.where(mask[..., None], shown[:, 1:], 0.0)
-    errors = [relative_squared_error(true, shown, mask, scale), *(relative_squared_error(true[..., [k]], shown[..., [k]], mask) for k in range(3))]
+    errors = [
+        relative_squared_error(true, shown, mask, scale),
+        *(relative_squared_error(true[..., [k]], shown[..., [k]], mask) for k in range(3)),
+    ]
     largest = 1e3 * np.where(mask, np.abs(shown[..., 0] - true[..., 0]), 0).max(axis=1)
     each, of_many = costs(model, held)
     known = model.told.provenance if hasattr(model, "told") else {}

@@ -23,19 +23,17 @@ import torch
 
 import creepkit as ck
 from creepkit import kernels
-from creepkit.dataset.time_grid import TimeGrid
 from creepkit.records import History
-from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.observation import OBSERVED
-from creepkit.specimens.reduced_courses import WITHOUT_FEATURES, simulate_trajectories
-from creepkit.surrogate.domain import ApplicabilityDomain
-from creepkit.surrogate.parameter_module import ParameterModule
-from creepkit.surrogate.rate_inputs import input_names
-from creepkit.surrogate.rate_module import RateModule
-from creepkit.surrogate.rate_net import RateNet
-from creepkit.surrogate.rate_surrogate import RateSurrogate
-from creepkit.surrogate.recipe import SurrogateMetadata
-from creepkit.surrogate.surrogate import load_surrogate
+from creepkit.sampling.conditions import TimeGrid
+from creepkit.specimens.bulge.observation import OBSERVED
+from creepkit.specimens.bulge.reduced_order.trajectories import WITHOUT_FEATURES, simulate_trajectories
+from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.surrogates.applicability_domain import ApplicabilityDomain
+from creepkit.surrogates.loading import load_surrogate
+from creepkit.surrogates.parameter_network import ParameterModule
+from creepkit.surrogates.rate_net import RateNet, RateSurrogate
+from creepkit.surrogates.rate_network import RateModule, input_names
+from creepkit.surrogates.recipe import SurrogateMetadata
 
 LAWS = {
     "norton": {"A": 3e-15, "n": 3.5},

@@ -16,10 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 import creepkit as ck
-from creepkit.cli.compiled import set_numba_cache
-from creepkit.inverse.search.evolution import CmaEs
+from creepkit.cli import set_numba_cache
+from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 from creepkit.inverse.search.multistart import MultiStart
-from creepkit.inverse.search.swarm import ParticleSwarm
 
 LAWS = {
     "norton": {"A": 2e-16, "n": 4.5},

@@ -29,11 +29,10 @@ import numpy as np
 from scipy.stats import beta
 
 import creepkit as ck
-from creepkit.cli.compiled import set_numba_cache
-from creepkit.discovery.discover import discover
+from creepkit.cli import set_numba_cache
+from creepkit.discovery.discover import discover, group_by_temperature
 from creepkit.discovery.refitting import refit
-from creepkit.discovery.temperature_study import group_by_temperature
-from creepkit.discovery.trend import TemperatureLaw
+from creepkit.discovery.temperature_law import TemperatureLaw
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.stats import qmc
 
-from creepkit.integration import Integration, PointTest, IntegrationSettings, integrate
+from creepkit.integration import Integration, IntegrationSettings, PointTest, integrate
 from creepkit.kernels import lower
 from creepkit.laws.combined import COMBINED
 from creepkit.records import Program

@@ -26,7 +26,7 @@ from creepkit.arrays import Floats
 from creepkit.fem.mesh import Mesh
 from creepkit.language import CreepLaw, Elastic
 from creepkit.records import PressureJump, Program, RecordedLoading
-from creepkit.specimens.bulge import Bulge
+from creepkit.specimens.bulge.specimen import Bulge
 
 E, NU = 150e3, 0.3
 KELVIN = 1073.15

@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 
 import creepkit as ck
+from creepkit.inverse.cross_validation import leave_one_condition_out, times_to_rupture
+from creepkit.inverse.reference_conditions import reference_temperature, spans_temperatures
 from creepkit.inverse.selection import rank
-from creepkit.inverse.validation import leave_one_condition_out, times_to_rupture
-from creepkit.inverse.warmth import reference_temperature, spans_temperatures
-from creepkit.readers.duplicates import duplicate_tests
+from creepkit.quality.comparison import duplicate_tests
 
 HEAD = (
     "| law | K | rms distance | Z fitted | Z held out | predicted/measured, 95 % | stopped, broken early "
@@ -119,7 +119,12 @@ def main():
             quick = given.quick or len(histories) * len(law.params) > given.held_out
             rows.append(row(name, fit, histories, time.process_time() - before, quick))
             fits.append(fit)
-            print("done:", " | ".join(rows[-1]), f"| ln L {fit.log_likelihood:.1f}, size {fit.effective_frames:.1f}", flush=True)
+            print(
+                "done:",
+                " | ".join(rows[-1]),
+                f"| ln L {fit.log_likelihood:.1f}, size {fit.effective_frames:.1f}",
+                flush=True,
+            )
             if given.plots:
                 given.plots.mkdir(parents=True, exist_ok=True)
                 fit.plot(given.plots / f"{title}_{name.replace(' ', '_')}.png")

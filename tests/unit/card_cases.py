@@ -10,7 +10,7 @@ from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Units, LawWithValues
+from creepkit.records import LawWithValues, Units
 
 STEEL = Elastic(150e3, 0.3)
 

@@ -12,7 +12,7 @@ import numpy as np
 import sympy
 from foreign_laws import EQUATIONS
 
-from creepkit.kernels.exact import MultiprecisionLaw
+from creepkit.kernels.multiprecision import MultiprecisionLaw
 from creepkit.language import (
     CreepLaw,
     Param,
@@ -35,9 +35,8 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.registry import default_registry
 from creepkit.testing import LawSamples, draw_samples
-from creepkit.testing.parity import MultiprecisionReference, largest_differences
-from creepkit.testing.sampling import constraints_hold
-from creepkit.testing.tables import KernelTable
+from creepkit.testing.parity import KernelTable, MultiprecisionReference, largest_differences
+from creepkit.testing.sample_points import constraints_hold
 
 TOLERANCE = 1e-10
 SETS, POINTS = 2, 8

@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.optimize import minimize
 
-from creepkit.inverse.search.box import Bounds
-from creepkit.inverse.search.refining import Minimum
+from creepkit.inverse.search.local_refinement import Bounds, Minimum
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON

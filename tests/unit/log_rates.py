@@ -8,7 +8,7 @@ import numpy as np
 
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
-from creepkit.inverse.scatter import OutputNoise, NoiseModel
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from exported_laws import renamed
 
-from creepkit.export.mfront import MfrontExporter
+from creepkit.exporters.mfront import MfrontExporter
 from creepkit.language import Elastic
 from creepkit.language.symbols import POINT_VARIABLES
-from creepkit.records import Units, LawWithValues
+from creepkit.records import LawWithValues, Units
 
 STUB = Path(__file__).with_name("tfel_stub.hxx")
 ELASTIC = Elastic(150e3, 0.3)

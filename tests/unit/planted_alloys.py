@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from creepkit import study
+import creepkit as ck
 from creepkit.language import Elastic
 from creepkit.records import History, PressureJump, Status, constant_stress
 
@@ -20,7 +20,7 @@ def bars(alloy, stresses=(60.0, 80.0, 110.0), values=NORTON, seed=1):
 
 
 def _bar(name, alloy, stress, values, rng):
-    run = study.simulate("norton", "uniaxial", values, loading=constant_stress(stress, control="stress"), times=TIMES)
+    run = ck.simulate("norton", "uniaxial", values, loading=constant_stress(stress, control="stress"), times=TIMES)
     noisy = run.outputs["strain"] * (1.0 + 0.02 * rng.standard_normal(TIMES.size))
     return History(name, TIMES, {"strain": noisy}, run.loading, run.temperature, "uniaxial", alloy=alloy)
 
@@ -46,7 +46,7 @@ class Doubting:
 
     @property
     def specimen(self):
-        return study.specimen("uniaxial")
+        return ck.specimen("uniaxial")
 
     def predict(self, law, values, histories, *, jacobian=False, nuisances=None):
         found = self.specimen.predict(law, values, histories, jacobian=jacobian, nuisances=nuisances)

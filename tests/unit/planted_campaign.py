@@ -9,10 +9,8 @@ from pathlib import Path
 import numpy as np
 
 import creepkit as ck
-from creepkit.dataset.conditions import planned_test
-from creepkit.dataset.design import Draws
-from creepkit.dataset.sobol import additive_recurrence_step
-from creepkit.dataset.time_grid import TimeGrid
+from creepkit.sampling.conditions import TimeGrid, planned_test
+from creepkit.sampling.draws import Draws, additive_recurrence_step
 
 NORTON = ck.law("norton")
 BAR = ck.specimen("uniaxial")
@@ -97,7 +95,9 @@ class Planted:
 
     def draw(self, first, count, seed):
         rows = np.arange(first + 1, first + count + 1)[:, None]
-        unit = (rows * additive_recurrence_step(4) + 0.37 * seed) % 1.0  # no Sobol sequence: workers start quicker without scipy
+        unit = (
+            rows * additive_recurrence_step(4) + 0.37 * seed
+        ) % 1.0  # no Sobol sequence: workers start quicker without scipy
         parameters = np.stack([10.0 ** (-12.0 + 2.0 * unit[:, 0]), 1.0 + 2.0 * unit[:, 1]], axis=1)
         stresses = self.low + (150.0 - self.low) * unit[:, 2:]
         return Draws(parameters, np.column_stack([stresses, np.full(count, 2000.0)]), self.condition_names)

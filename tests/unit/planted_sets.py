@@ -9,10 +9,10 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.dataset.dataset import Dataset
-from creepkit.dataset.rate_family import rate_family
-from creepkit.dataset.simulating import empty_dataset, simulate_rows
-from creepkit.dataset.time_grid import TimeGrid
+from creepkit.dataset.simulation import empty_dataset, simulate_rows
 from creepkit.records import History
+from creepkit.sampling.conditions import TimeGrid
+from creepkit.sampling.rate_family import rate_family
 
 HOURS = 3600.0
 

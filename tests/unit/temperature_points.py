@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from creepkit.discovery.points import IsothermalEstimates
-from creepkit.inverse.coordinates import ReferencePoint
+from creepkit.discovery.regression import IsothermalEstimates
+from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.language import GAS_CONSTANT, CreepLaw
 from creepkit.laws.norton import NORTON
 

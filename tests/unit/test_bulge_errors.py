@@ -12,8 +12,8 @@ import creepkit as ck
 from creepkit.errors import HistoryError, LawError, SolveError
 from creepkit.language import CreepLaw, stress, temperature, time
 from creepkit.records import Loading, Program, RecordedLoading, Status
-from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.dimple import DimpleGeometry
+from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.specimens.bulge.specimen import Bulge
 
 N3 = {"A": 5e-13, "n": 3.0}
 TIMES = np.array([0.0, 600.0, 3600.0])

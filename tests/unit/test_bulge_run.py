@@ -12,10 +12,10 @@ from matplotlib.image import imread
 import creepkit as ck
 from creepkit.errors import SolveError
 from creepkit.language import stress
-from creepkit.readers.writing import write_history
+from creepkit.readers.history_csv import write_history
 from creepkit.records import Program, RecordedLoading, Specimen, Status
-from creepkit.specimens.bulge import creepkit_specimens
-from creepkit.specimens.bulge_run import BulgeRun
+from creepkit.specimens.bulge.run import BulgeRun
+from creepkit.specimens.bulge.specimen import creepkit_specimens
 
 N3 = {"A": 5e-13, "n": 3.0}
 TIMES = np.array([0.0, 150, 600, 1800, 3600, 7200, 14400, 28800, 43200])

@@ -16,17 +16,21 @@ from sympy import exp
 
 from creepkit import kernels
 from creepkit.arrays import Floats
-from creepkit.fem.body import finite_element_model
-from creepkit.fem.shape import geometry_derivative
+from creepkit.fem.banded_system import finite_element_model
+from creepkit.fem.mesh import geometry_derivative
 from creepkit.fem.simulation import Simulation, sensitivities, simulate
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.language import CreepLaw, Elastic, mean_stress, parameters, principal_stress, stress, temperature
 from creepkit.laws.combined import COMBINED
 from creepkit.records import History, PressureJump, Status
-from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.bulge_course import TestSetup, set_up_test
-from creepkit.specimens.bulge_prediction import solver_settings
-from creepkit.specimens.bulge_slopes import BulgeSensitivities, output_sensitivities
+from creepkit.specimens.bulge.finite_elements import (
+    BulgeSensitivities,
+    TestSetup,
+    output_sensitivities,
+    set_up_test,
+    solver_settings,
+)
+from creepkit.specimens.bulge.specimen import Bulge
 
 SPECIMEN = Bulge(refinement=0.5, threads=1)
 SETTINGS = solver_settings(SPECIMEN, exact=True)._replace(newton=1e-12)
@@ -77,7 +81,9 @@ def base(request) -> Base:
     made = set_up_test(SPECIMEN, history, {})
     found = simulate(kernel, theta, made.model, made.load_history, settings=SETTINGS, keep_stages=True)
     assert found.status == Status.COMPLETE
-    slopes = output_sensitivities(made, kernel, theta, history, found, found.displacements[:, made.model.top, 1], NAMES)[1]
+    slopes = output_sensitivities(
+        made, kernel, theta, history, found, found.displacements[:, made.model.top, 1], NAMES
+    )[1]
     return Base(kernel, theta, history, made, found, slopes)
 
 

@@ -5,9 +5,8 @@ import pytest
 from bells import beside, cross, profile_with_apex
 
 from creepkit.errors import FitError
-from creepkit.specimens.camera_field import fit_field
-from creepkit.specimens.observation import Observation
-from creepkit.specimens.top_profile import surface_interpolation
+from creepkit.fem.mesh import surface_interpolation
+from creepkit.specimens.bulge.observation import Observation, fit_field
 
 
 def pixels(points=50):

@@ -3,7 +3,7 @@
 from typer.testing import CliRunner
 
 from creepkit.cli.app import app
-from creepkit.specimens.reduced_files import read_tables
+from creepkit.specimens.bulge.reduced_order.tables import read_tables
 
 
 def test_tables_of_a_dimple_are_printed_drawn_and_written(tmp_path):

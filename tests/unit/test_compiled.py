@@ -4,14 +4,14 @@ import os
 
 import pytest
 
-from creepkit.cli import compiled
+from creepkit import cli
 
 
 @pytest.fixture
 def sources(tmp_path, monkeypatch):
     """A package of one compiled file, and an empty cache."""
     (tmp_path / "package" / "fem").mkdir(parents=True)
-    monkeypatch.setattr(compiled, "_SOURCES", tmp_path / "package")
+    monkeypatch.setattr(cli, "_SOURCES", tmp_path / "package")
     monkeypatch.setenv("CREEPKIT_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     source = tmp_path / "package" / "fem" / "band.py"
@@ -20,24 +20,24 @@ def sources(tmp_path, monkeypatch):
 
 
 def test_an_edit_moves_the_folder_and_its_undoing_moves_it_back(sources):
-    first = compiled.numba_cache_folder()
+    first = cli.numba_cache_folder()
     sources.write_text("a = 2")
-    assert compiled.numba_cache_folder() != first
+    assert cli.numba_cache_folder() != first
     sources.write_text("a = 1")
-    assert compiled.numba_cache_folder() == first
+    assert cli.numba_cache_folder() == first
 
 
 def test_a_folder_that_was_chosen_stays(sources, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", "elsewhere")
-    compiled.set_numba_cache()
+    cli.set_numba_cache()
     assert os.environ["NUMBA_CACHE_DIR"] == "elsewhere"
 
 
 def test_the_oldest_states_are_forgotten(sources):
-    made = compiled.numba_cache_folder().parent
+    made = cli.numba_cache_folder().parent
     for k in range(5):
         (made / str(k)).mkdir(parents=True)
         os.utime(made / str(k), (k, k))
-    compiled.set_numba_cache()
-    assert os.environ["NUMBA_CACHE_DIR"] == str(compiled.numba_cache_folder())
+    cli.set_numba_cache()
+    assert os.environ["NUMBA_CACHE_DIR"] == str(cli.numba_cache_folder())
     assert {path.name for path in made.iterdir()} == {"2", "3", "4"}

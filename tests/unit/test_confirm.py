@@ -8,14 +8,14 @@ import pytest
 from command_line import creepkit, one_line
 from planted_alloys import bars
 
-from creepkit import study
+import creepkit as ck
 from creepkit.errors import FitError
-from creepkit.inverse.confirm import confirm, outside_domain
-from creepkit.inverse.files import load_identification
-from creepkit.readers.writing import write_history
+from creepkit.inverse.confirmation import confirm, outside_domain
+from creepkit.inverse.identification_document import load_identification
+from creepkit.readers.history_csv import write_history
 from creepkit.records import Status
 
-BAR = study.specimen("uniaxial")
+BAR = ck.specimen("uniaxial")
 SD = 1e-4
 TESTS = [h.replace(standard_deviation={"strain": SD}) for h in bars("X")]
 
@@ -37,7 +37,7 @@ class Stranger:
 
 @pytest.fixture(scope="module")
 def fit():
-    return study.identify("norton", TESTS, starts=2)
+    return ck.identify("norton", TESTS, starts=2)
 
 
 def test_a_fit_by_the_specimen_itself_is_confirmed_with_its_own_misfit(fit):
@@ -45,7 +45,9 @@ def test_a_fit_by_the_specimen_itself_is_confirmed_with_its_own_misfit(fit):
     assert told.noise_ratio == 0.0
     for test in fit.misfits:
         assert told[test.name, "strain"].simulation_errors == told[test.name, "strain"].fit_errors
-        assert told[test.name, "strain"].simulation_errors.mean_squared_error == pytest.approx(test["strain"].errors.mse, rel=1e-9)
+        assert told[test.name, "strain"].simulation_errors.mean_squared_error == pytest.approx(
+            test["strain"].errors.mse, rel=1e-9
+        )
 
 
 @pytest.mark.parametrize("share", [0.5, 2.0])

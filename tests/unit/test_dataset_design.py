@@ -11,12 +11,11 @@ import pytest
 from scipy.stats import qmc
 
 import creepkit as ck
-from creepkit.dataset.conditions import hold_times, planned_test
-from creepkit.dataset.design import SamplingDesign, Draws, sampling_design
-from creepkit.dataset.sobol import sobol_rows
-from creepkit.dataset.time_grid import TimeGrid
 from creepkit.errors import DatasetError
 from creepkit.records import PressureJump
+from creepkit.sampling.conditions import TimeGrid, hold_times, planned_test
+from creepkit.sampling.domains import SamplingDesign, sampling_design
+from creepkit.sampling.draws import Draws, sobol_rows
 
 DIMPLE, BAR = ck.specimen("bulge"), ck.specimen("uniaxial")
 GRID = TimeGrid.every()

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.dataset.acceptance import acceptance
-from creepkit.dataset.design import sampling_design
-from creepkit.dataset.rate_family import rate_family
 from creepkit.errors import DatasetError
+from creepkit.sampling.domains import acceptance, sampling_design
+from creepkit.sampling.rate_family import rate_family
 
 DIMPLE = ck.specimen("bulge")
 
@@ -20,7 +19,9 @@ def test_what_criteria_1_and_2_reject_of_nortons_law():
     n = np.linspace(1, 8, 100_001)
     first = np.clip((-5 - (-20 - n * np.log10(600))) / 35, 0, 1).mean()
     second = np.clip((-n * np.log10(50) + 40) / 35, 0, 1).mean()
-    np.testing.assert_allclose([found.criteria_met["1"].mean(), found.criteria_met["2"].mean()], [first, second], atol=2e-3)
+    np.testing.assert_allclose(
+        [found.criteria_met["1"].mean(), found.criteria_met["2"].mean()], [first, second], atol=2e-3
+    )
     np.testing.assert_allclose(found.kept.mean(), first + second - 1, atol=4e-3)  # no law breaks both
 
 

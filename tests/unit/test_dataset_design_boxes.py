@@ -7,14 +7,14 @@ import pytest
 
 import creepkit as ck
 from creepkit import registry
-from creepkit.dataset.coefficients import term_groups
-from creepkit.dataset.conditions import hold_times, planned_test
-from creepkit.dataset.criteria import SimulationOutcome
-from creepkit.dataset.design import sampling_design
-from creepkit.dataset.rate_family import RATE_FAMILY_LAW, rate_family
 from creepkit.errors import DatasetError
 from creepkit.language import temperature
 from creepkit.records import Status
+from creepkit.sampling.coefficients import term_groups
+from creepkit.sampling.conditions import hold_times, planned_test
+from creepkit.sampling.criteria import SimulationOutcome
+from creepkit.sampling.domains import sampling_design
+from creepkit.sampling.rate_family import RATE_FAMILY_LAW, rate_family
 
 DIMPLE, BAR = ck.specimen("bulge"), ck.specimen("uniaxial")
 HOURS_12 = 43200.0

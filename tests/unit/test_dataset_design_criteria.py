@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.dataset.criteria import SimulationOutcome
-from creepkit.dataset.criteria_of_boxes import conditioned_criteria, paper_criteria
-from creepkit.dataset.design import Draws
 from creepkit.records import Status
+from creepkit.sampling.criteria import SimulationOutcome, conditioned_criteria, paper_criteria
+from creepkit.sampling.draws import Draws
 
 PAPER = {c.name: c for c in paper_criteria("bulge")}
 INFORMATIVE = {c.name: c for c in conditioned_criteria(ck.law("drifting-exponent"), "bulge", 43200.0)}

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.dataset.criteria import BURST_TIME_FACTOR, SimulationOutcome
-from creepkit.dataset.criteria_of_boxes import conditioned_criteria, paper_criteria
-from creepkit.dataset.design import sampling_design
 from creepkit.dataset.shards import Campaign
-from creepkit.dataset.simulating import empty_dataset, simulate_rows
-from creepkit.records import SupportsReducedOrderModel, Status
+from creepkit.dataset.simulation import empty_dataset, simulate_rows
+from creepkit.records import Status, SupportsReducedOrderModel
+from creepkit.sampling.criteria import BURST_TIME_FACTOR, SimulationOutcome, conditioned_criteria, paper_criteria
+from creepkit.sampling.domains import sampling_design
 
 DIMPLE, NORTON = ck.specimen("bulge").replace(threads=1), ck.law("norton")
 PAPER = {c.name: c for c in paper_criteria("bulge")}

@@ -13,10 +13,10 @@ import pytest
 from planted_campaign import BAR, GRID, Planted, Raising, strain, stress_of
 
 import creepkit as ck
-from creepkit.dataset import store
-from creepkit.dataset.columns import COLUMNS
+from creepkit.dataset import storage
+from creepkit.dataset.dataset import COLUMNS
 from creepkit.dataset.shards import Campaign
-from creepkit.dataset.simulating import rounded_outputs, simulate_rows
+from creepkit.dataset.simulation import rounded_outputs, simulate_rows
 from creepkit.errors import DatasetError
 
 
@@ -86,7 +86,7 @@ def test_histories_of_rejected_samples_keep_one_part_in_4000(tmp_path):
 
 
 def test_what_is_written_is_read(data, tmp_path):
-    again = store.read_dataset(store.write_dataset(data, tmp_path / "a.h5"))
+    again = storage.read_dataset(storage.write_dataset(data, tmp_path / "a.h5"))
     assert_same(again, data)
     assert again.law == data.law
     assert again.specimen == BAR
@@ -99,13 +99,13 @@ def test_what_is_written_is_read(data, tmp_path):
 
 
 def test_only_accepted_samples_may_be_read(data, tmp_path):
-    path = store.write_dataset(data, tmp_path / "a.h5")
-    assert_same(store.read_dataset(path, accepted_only=True), data.accepted)
+    path = storage.write_dataset(data, tmp_path / "a.h5")
+    assert_same(storage.read_dataset(path, accepted_only=True), data.accepted)
     assert len(data.accepted) == (data.reasons == 0).sum() > 0
 
 
 def test_h5py_alone_reads_a_data_set(data, tmp_path):
-    path = store.write_dataset(data, tmp_path / "a.h5")
+    path = storage.write_dataset(data, tmp_path / "a.h5")
     program = f"""
 import json, sys, h5py
 with h5py.File({str(path)!r}) as f:
@@ -131,7 +131,7 @@ assert "creepkit" not in sys.modules
 def test_a_bulge_is_rebuilt_with_its_geometry_but_for_its_threads(tmp_path):
     dimple = ck.specimen("bulge").replace(apex_thickness=0.48, threads=2, tolerance=0.02)
     data = replace(simulated(tmp_path), specimen=dimple)
-    again = store.read_dataset(store.write_dataset(data, tmp_path / "a.h5"))
+    again = storage.read_dataset(storage.write_dataset(data, tmp_path / "a.h5"))
     assert again.specimen == dimple.replace(threads=None)
 
 
@@ -183,7 +183,7 @@ def test_strangers_are_not_joined(data, change, message):
 
 def sentence(path):
     with pytest.raises(DatasetError) as caught:
-        store.read_dataset(path)
+        storage.read_dataset(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
     return str(caught.value)
@@ -220,19 +220,19 @@ def test_a_foreign_hdf5_file(tmp_path):
     ],
 )
 def test_attributes_that_say_something_else(data, tmp_path, name, value, message):
-    path = store.write_dataset(data, tmp_path / "a.h5")
+    path = storage.write_dataset(data, tmp_path / "a.h5")
     with h5py.File(path, "r+") as file:
         if value is None:
             del file.attrs[name]
         else:
             file.attrs[name] = value
     with pytest.raises(DatasetError, match=message):
-        store.read_dataset(path)
+        storage.read_dataset(path)
     sentence(path)
 
 
 def test_arrays_that_are_missing_or_of_another_length(data, tmp_path):
-    path = store.write_dataset(data, tmp_path / "a.h5")
+    path = storage.write_dataset(data, tmp_path / "a.h5")
     with h5py.File(path, "r+") as file:
         file["reasons"].resize(3, axis=0)
     assert "the array 'reasons' is int8 (3,), which does not fit the others" in sentence(path)
@@ -242,14 +242,16 @@ def test_arrays_that_are_missing_or_of_another_length(data, tmp_path):
 
 
 def test_columns_that_are_not_numbers(data, tmp_path):
-    path = store.write_dataset(replace(data, parameters=np.where(data.parameters > 0, np.nan, 0.0)), tmp_path / "a.h5")
+    path = storage.write_dataset(
+        replace(data, parameters=np.where(data.parameters > 0, np.nan, 0.0)), tmp_path / "a.h5"
+    )
     assert "parameters of sample 0 (A) are not finite" in sentence(path)
-    path = store.write_dataset(replace(data, reasons=np.full(32, 6)), tmp_path / "b.h5")
+    path = storage.write_dataset(replace(data, reasons=np.full(32, 6)), tmp_path / "b.h5")
     assert "reason of sample 0 is 6; allowed are -1 to 3" in sentence(path)
 
 
 def test_every_truncation_of_a_file_is_noticed(data, tmp_path):
-    whole = store.write_dataset(data, tmp_path / "a.h5").read_bytes()
+    whole = storage.write_dataset(data, tmp_path / "a.h5").read_bytes()
     for length in range(0, len(whole), max(len(whole) // 23, 1)):
         (tmp_path / "cut.h5").write_bytes(whole[:length])
         sentence(tmp_path / "cut.h5")
@@ -259,17 +261,17 @@ def test_a_target_that_cannot_be_written(data, tmp_path):
     (tmp_path / "file").touch()
     for target in (tmp_path / "no folder" / "a.h5", tmp_path / "file" / "a.h5"):
         with pytest.raises(DatasetError, match=r"a\.h5: cannot be written: "):
-            store.write_dataset(data, target)
+            storage.write_dataset(data, target)
 
 
 def half_written(path):
-    with store.replace_on_success(path) as temporary:
+    with storage.replace_on_success(path) as temporary:
         temporary.write_bytes(b"half")
         raise OSError(28, "nothing left")
 
 
 def test_a_writing_that_fails_leaves_what_was_there(data, tmp_path):
-    path = store.write_dataset(data, tmp_path / "a.h5")
+    path = storage.write_dataset(data, tmp_path / "a.h5")
     before = path.read_bytes()
     with pytest.raises(DatasetError, match="No space left on device; make room and start again"):
         half_written(path)
@@ -279,14 +281,14 @@ def test_a_writing_that_fails_leaves_what_was_there(data, tmp_path):
 
 def test_long_attributes_are_no_trouble(data, tmp_path):
     long = replace(data, design_document={"name": "long", "numbers": list(range(30_000))})
-    assert store.read_dataset(store.write_dataset(long, tmp_path / "a.h5")).design_document == long.design_document
+    assert storage.read_dataset(storage.write_dataset(long, tmp_path / "a.h5")).design_document == long.design_document
 
 
 def test_a_specimen_that_a_file_cannot_hold_is_refused(data, tmp_path):
     odd = ck.specimen("bulge")
     mesh = odd.geometry.mesh(0.5)
     with pytest.raises(DatasetError, match="bulge.mesh is a Mesh, which a data set cannot hold"):
-        store.write_dataset(replace(data, specimen=odd.replace(mesh=mesh)), tmp_path / "a.h5")
+        storage.write_dataset(replace(data, specimen=odd.replace(mesh=mesh)), tmp_path / "a.h5")
 
 
 # ---- files that mean harm ------------------------------------------------------------------------------------------
@@ -294,7 +296,7 @@ def test_a_specimen_that_a_file_cannot_hold_is_refused(data, tmp_path):
 
 def changed(data, path, change):
     """A file of the data set that `change` has had in its hands."""
-    store.write_dataset(data, path)
+    storage.write_dataset(data, path)
     with h5py.File(path, "r+") as file:
         change(file)
     return path
@@ -342,7 +344,7 @@ def enormous(file):
 )
 def test_what_a_file_promises_is_checked(data, tmp_path, change, message):
     with pytest.raises(DatasetError, match=message):
-        store.read_dataset(changed(data, tmp_path / "a.h5", change))
+        storage.read_dataset(changed(data, tmp_path / "a.h5", change))
     sentence(tmp_path / "a.h5")
 
 
@@ -350,13 +352,13 @@ def test_an_accepted_sample_needs_a_history(data, tmp_path):
     row = np.flatnonzero(data.reasons == 0)[0]
     values = np.array(data.values)
     values[row] = np.nan
-    path = store.write_dataset(replace(data, values=values), tmp_path / "a.h5")
+    path = storage.write_dataset(replace(data, values=values), tmp_path / "a.h5")
     assert f"sample {row} was accepted and has no history" in sentence(path)
 
 
 def test_nothing_from_a_file_is_unpickled():
     """Pickles travel between a campaign and its workers, through pipes; none is read from a file."""
-    folder = Path(store.__file__).parent
+    folder = Path(storage.__file__).parent
     assert {path.name for path in folder.glob("*.py") if "import pickle" in path.read_text()} == {
         "worker.py", "workers.py"
     }  # fmt: skip

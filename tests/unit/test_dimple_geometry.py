@@ -8,11 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from creepkit.errors import SolveError
-from creepkit.fem.mesh_checks import half_bandwidth, outline, mesh_quality
-from creepkit.fem.shape import discretize, refuse_inverted
-from creepkit.fem.strip import strip_nodes
-from creepkit.specimens.dimple import DimpleGeometry
-from creepkit.specimens.dimple_columns import mesh_layout, column_lines
+from creepkit.fem.mesh import discretize, half_bandwidth, mesh_quality, outline, refuse_inverted, strip_nodes
+from creepkit.specimens.bulge.geometry import DimpleGeometry, column_lines, mesh_layout
 
 TAPERED = DimpleGeometry()
 FILLET = DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",))
@@ -159,7 +156,9 @@ def test_velocities_of_the_nodes_are_the_differences_of_the_mesh(g, field):
     layouts = [mesh_layout(size, 1.0) for size in sizes]
     if layouts[0].counts != layouts[1].counts:
         layouts = [g._layout(1.0)] * 2
-    one, other = (strip_nodes(*column_lines(size, layout), layout.breaks) for size, layout in zip(sizes, layouts, strict=True))
+    one, other = (
+        strip_nodes(*column_lines(size, layout), layout.breaks) for size, layout in zip(sizes, layouts, strict=True)
+    )
     central = (one - other) / (2 * step)
     velocity = g.mesh_velocity(field)
     # at the ends of the allowed range, as roof_radial = cavity_radius, the curve goes on with another curvature

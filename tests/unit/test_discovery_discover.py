@@ -8,14 +8,14 @@ import pytest
 from steady import Steady, planted
 from typer.testing import CliRunner
 
-from creepkit import study
+import creepkit as ck
 from creepkit.cli.app import app
-from creepkit.discovery.discover import discover
+from creepkit.discovery.discover import discover, group_by_temperature, temperature_study
 from creepkit.discovery.refitting import refit
-from creepkit.discovery.temperature_study import group_by_temperature, temperature_study
 from creepkit.errors import FitError
-from creepkit.inverse.coordinates import Coordinates, ReferencePoint
+from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identify import identify
+from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.kernels import lower
 from creepkit.language import Elastic, arrhenius, linear, temperature
@@ -77,7 +77,7 @@ def test_the_curves_themselves_decide(trend):
 def test_the_law_is_an_ordinary_one(trend, tmp_path):
     assert trend.law.names == ("A", "Q", "n", "n_T")
     assert trend.law.uses(temperature)
-    text = study.export(trend, "python", to=tmp_path / "law.py")
+    text = ck.export(trend, "python", to=tmp_path / "law.py")
     space = {}
     exec(compile(text, "law.py", "exec"), space)
     for T in (980.0, 1050.0):
@@ -85,7 +85,7 @@ def test_the_law_is_an_ordinary_one(trend, tmp_path):
         assert space["rate"](80.0, temperature=T) == pytest.approx(expected, rel=1e-12)
         now = {name: float(v[0]) for name, v in trend.at(T).items()}
         assert float(lower(NORTON, "numpy").rate(now, stress=80.0)) == pytest.approx(expected, rel=1e-9)
-    assert "valid between 973 and 1083 K" in study.export(trend.valued, "latex")
+    assert "valid between 973 and 1083 K" in ck.export(trend.valued, "latex")
 
 
 def test_text_file_and_plot(trend, tmp_path):
@@ -218,13 +218,13 @@ def test_a_form_that_cannot_be_refitted_is_told(trend, tests, monkeypatch):
 
 
 def test_a_dimple_at_three_temperatures_through_the_surrogate():
-    model, rng = study.surrogate("dimple"), np.random.default_rng(8)
+    model, rng = ck.surrogate("dimple"), np.random.default_rng(8)
     law = NORTON.times(arrhenius(1033.15))
     truth = {"A": 1.5e-6 / 100.0**4.5, "n": 4.5, "Q": 4.2e5}
     sd = {"amplitude": 1.5e-3, "width": 0.02, "shape": 0.02}
     tests = []
     for T in (973.15, 1033.15, 1083.15):
-        run = study.simulate(
+        run = ck.simulate(
             law, model, truth, loading=PressureJump(8.0, 10.0, 7200.0), times=np.arange(1200.0, 14401.0, 1200.0),
             temperature=T, elastic=Elastic(E=100e3), name=f"{T:.0f} K",
         )  # fmt: skip

@@ -5,10 +5,10 @@ import pytest
 from temperature_points import NINE, T_REF, arrhenius_line, conditioned, points
 
 from creepkit import registry
-from creepkit.discovery.combining import CHI_SQUARE_95, rank_combinations, squared_mahalanobis
-from creepkit.discovery.libraries import candidate_forms, evaluate_forms, candidate_form
-from creepkit.discovery.mixture import mixture_interval
-from creepkit.discovery.regression import solve_with_pysindy, regress
+from creepkit.discovery.combinations import CHI_SQUARE_95, rank_combinations, squared_mahalanobis
+from creepkit.discovery.forms import candidate_form, candidate_forms, evaluate_forms
+from creepkit.discovery.regression import regress, solve_with_pysindy
+from creepkit.discovery.temperature_law import mixture_interval
 from creepkit.errors import FitError
 from creepkit.language import TemperatureForm, arrhenius
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
@@ -116,7 +116,9 @@ def test_planted_forms_remain_and_q_lies_in_its_interval():
         weights = np.array([one.weight for one in alike])
         value = np.array([one.regression.values["Q"] for one in alike])
         sd = np.array([np.sqrt(o.regression.covariance[(k := list(o.regression.values).index("Q")), k]) for o in alike])
-        low, high = mixture_interval(value, sd * np.sqrt(found.overdispersion), weights / weights.sum(), [1e9] * len(alike))
+        low, high = mixture_interval(
+            value, sd * np.sqrt(found.overdispersion), weights / weights.sum(), [1e9] * len(alike)
+        )
         inside += low <= Q <= high
     assert kept >= 16
     assert inside >= 16
@@ -200,7 +202,10 @@ def test_forms_of_plugins_are_candidates(own_registry, tmp_path):
     file.write_text(PLUGIN)
     registry.default_registry().load_file(file)
     bent = np.stack([arrhenius_line(NINE, LN_A, Q), N + 2e-4 * (NINE - T_REF) ** 2], axis=1)
-    own = {"A": candidate_forms(NORTON, "A", True, T_REF, NINE, FEW["A"]), "n": candidate_forms(NORTON, "n", False, T_REF, NINE)}
+    own = {
+        "A": candidate_forms(NORTON, "A", True, T_REF, NINE, FEW["A"]),
+        "n": candidate_forms(NORTON, "n", False, T_REF, NINE),
+    }
     found = rank_combinations(points(bent, conditioned(0.02, 0.02), seed=2), own)
     assert "square" in [form.name for form in found.plausible_forms["n"]]
     assert found.with_form("n", "square").values["n_2"] == pytest.approx(2e-4, rel=0.1)

@@ -9,15 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from creepkit.errors import CreepkitError, ExportError, LawError
-from creepkit.export import write_export
-from creepkit.export.builtin import creepkit_exporters
-from creepkit.export.document import JsonExporter, read_valued_law
-from creepkit.export.latex import LatexExporter, latex_number
+from creepkit.exporters import write_export
+from creepkit.exporters.builtin import creepkit_exporters
+from creepkit.exporters.latex import LatexExporter, latex_number
+from creepkit.exporters.law_files import JsonExporter, read_valued_law
 from creepkit.language import CreepLaw, Param, State, activated, arrhenius, linear, parameters, states, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
-from creepkit.records import Exporter, Units, LawWithValues
+from creepkit.records import Exporter, LawWithValues, Units
 
 A, n, k_max = parameters("A n k_max")
 (omega,) = states("omega")

@@ -10,14 +10,13 @@ import sympy
 from exported_laws import LAWS, TOLERANCE, case
 
 from creepkit.errors import ExportError
-from creepkit.export.c import CExporter
-from creepkit.export.c_text import STABLE_FUNCTIONS
+from creepkit.exporters.c import STABLE_FUNCTIONS, CExporter
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Units, LawWithValues
+from creepkit.records import LawWithValues, Units
 
 STRICT = ("gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 COEFFICIENT = Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", 0.0)

@@ -14,19 +14,18 @@ from scipy.stats import qmc
 
 import creepkit as ck
 from creepkit.errors import ExportError
-from creepkit.export.cards.abaqus import AbaqusCards
-from creepkit.export.cards.ansys import AnsysCards
-from creepkit.export.cards.code_aster import CodeAsterMaterial
-from creepkit.export.cards.moose import MooseBlock
-from creepkit.export.cards.neml2 import Neml2Model
+from creepkit.exporters.abaqus_cards import AbaqusCards
+from creepkit.exporters.ansys import AnsysCards
+from creepkit.exporters.code_aster import CodeAsterMaterial
+from creepkit.exporters.moose_neml2 import MooseBlock, Neml2Model
 from creepkit.kernels import lower
-from creepkit.kernels.exact import MultiprecisionLaw
+from creepkit.kernels.multiprecision import MultiprecisionLaw
 from creepkit.language import GAS_CONSTANT, Elastic, arrhenius, linear, wachtman
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Units, LawWithValues
+from creepkit.records import LawWithValues, Units
 from creepkit.registry import default_registry
 
 EXPORTERS = {e.name: e for e in (AbaqusCards(), AnsysCards(), MooseBlock(), CodeAsterMaterial(), Neml2Model())}

@@ -9,13 +9,13 @@ from card_cases import CASES
 from foreign_laws import EQUATIONS, POWER, RATE, A, B, Q, a, k, law, m, n, number, omega, s_0, scale
 
 from creepkit.errors import ExportError
-from creepkit.export.cards.forms import CreepForm, creep_forms_of
-from creepkit.kernels.exact import MultiprecisionLaw
+from creepkit.exporters.creep_forms import CreepForm, creep_forms_of
+from creepkit.kernels.multiprecision import MultiprecisionLaw
 from creepkit.language import GAS_CONSTANT, State, arrhenius, linear, strain, stress, temperature, time
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.records import Units, LawWithValues
+from creepkit.records import LawWithValues, Units
 from creepkit.registry import default_registry
 
 ALL = {name: default_registry().law(name) for name in default_registry().laws()} | EQUATIONS
@@ -33,7 +33,11 @@ def rate_of(form: CreepForm, s: float, e: float, t: float, T: float) -> mpmath.m
     shape = {"power": lambda: s**form.n, "sinh": lambda: mpmath.sinh(s / form.stress_scale) ** form.n}
     f = shape.get(form.stress_function, lambda: mpmath.exp(s / form.stress_scale))()
     return (
-        mpmath.exp(form.log_coefficient) * f * e**form.strain_exponent * t**form.time_exponent * mpmath.exp(-form.Q / (GAS_CONSTANT * T))
+        mpmath.exp(form.log_coefficient)
+        * f
+        * e**form.strain_exponent
+        * t**form.time_exponent
+        * mpmath.exp(-form.Q / (GAS_CONSTANT * T))
     )
 
 
@@ -78,7 +82,12 @@ def test_a_planted_form_is_found_to_the_last_digits():
     )
     params = {A: RATE, n: POWER, B: scale(1, 1e3), m: number(0, 1), Q: number(1e5, 5e5)}
     (form,) = forms(law(written, params), A=2e-9, n=4.3, B=37.0, m=0.35, Q=3.1e5)
-    assert (form.stress_function, form.n, form.strain_exponent, form.Q) == ("power", 4.3, -0.5, pytest.approx(3.1e5, rel=1e-14))
+    assert (form.stress_function, form.n, form.strain_exponent, form.Q) == (
+        "power",
+        4.3,
+        -0.5,
+        pytest.approx(3.1e5, rel=1e-14),
+    )
     assert form.time_exponent == pytest.approx(-0.65, rel=1e-14)
     assert form.log_coefficient == pytest.approx(math.log(6e-9) - 4.3 * math.log(37.0), rel=1e-14)
 

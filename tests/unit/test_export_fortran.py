@@ -11,17 +11,21 @@ from exported_laws import LAWS, TOLERANCE, case
 from fortran_library import PARAMETERS, compiled, pointer
 
 from creepkit.errors import ExportError
-from creepkit.export.fortran.creep import AbaqusCreepSubroutine, CalculixCreepSubroutine
-from creepkit.export.fortran.law_routine import law_subroutine
-from creepkit.export.fortran.text import FORTRAN_RESERVED, fortran_number, fortran_statement, fortran_expression
-from creepkit.export.identifiers import Identifiers
-from creepkit.export.program import LawCode
+from creepkit.exporters.creep_subroutine import AbaqusCreepSubroutine, CalculixCreepSubroutine
+from creepkit.exporters.fortran_code import (
+    FORTRAN_RESERVED,
+    fortran_expression,
+    fortran_number,
+    fortran_statement,
+    law_subroutine,
+)
+from creepkit.exporters.law_code import Identifiers, LawCode
 from creepkit.language import CreepLaw, Param, mean_stress, parameters, principal_stress, stress
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Units, LawWithValues
+from creepkit.records import LawWithValues, Units
 
 A, n, a = parameters("A n a")
 RATE = Param("rate coefficient", bounds=(1e-40, 1e-5), unit="1/s", scale="log", off=0.0)
@@ -82,7 +86,7 @@ def test_functions_that_fortran_lacks_keep_their_digits_near_zero(tmp_path):
         "double precision, intent(out) :: out(6)",
         *(f"out({k}) = {name}(a)" for k, name in enumerate(PROBED, 1)),
     ]
-    from creepkit.export.fortran.text import stable_function_definitions, fortran_statements
+    from creepkit.exporters.fortran_code import fortran_statements, stable_function_definitions
 
     text = fortran_statements([*lines, "contains", *stable_function_definitions(PROBED), "end subroutine probe"])
     library = compiled("\n".join(text) + "\n", tmp_path, "probe")[0]
@@ -165,7 +169,9 @@ def test_names_that_clash_without_case_are_renamed_openly():
 
 
 def test_a_name_is_made_an_identifier_and_short_enough():
-    text = AbaqusCreepSubroutine().text(LawWithValues(NORTON, NORTON_VALUES, name="2nd law of Würzburg, " + 9 * "long "))
+    text = AbaqusCreepSubroutine().text(
+        LawWithValues(NORTON, NORTON_VALUES, name="2nd law of Würzburg, " + 9 * "long ")
+    )
     assert re.search(r"subroutine x_2nd_law_of_wurzbur\w*_law\(x, out\)", text)
     assert max(len(name) for name in re.findall(r"subroutine (\w+)", text)) <= 31
 

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from exported_laws import LAWS, TOLERANCE, case, renamed
 
-from creepkit.export import write_export
-from creepkit.export.numpy import NumpyExporter
-from creepkit.export.python import PythonExporter
+from creepkit.exporters import write_export
+from creepkit.exporters.python import NumpyExporter, PythonExporter
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Units, LawWithValues
+from creepkit.records import LawWithValues, Units
 
 
 def module(law, folder, values=None, exporter=None, **more):

@@ -10,24 +10,15 @@ import sympy
 from exported_laws import LAWS, TOLERANCE, case, renamed
 
 from creepkit.errors import ExportError
-from creepkit.export import write_export
-from creepkit.export.python import PythonExporter
-from creepkit.language import (
-    CreepLaw,
-    Param,
-    State,
-    arrhenius,
-    linear,
-    parameters,
-    states,
-    stress,
-)
+from creepkit.exporters import write_export
+from creepkit.exporters.python import PythonExporter
+from creepkit.language import CreepLaw, Param, State, arrhenius, linear, parameters, states, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.records import Units, LawWithValues
+from creepkit.records import LawWithValues, Units
 
 A, n, C = parameters("A n C")
 (omega,) = states("omega")

@@ -8,14 +8,13 @@ import pytest
 from foreign_laws import EQUATIONS
 
 from creepkit.errors import ExportError
-from creepkit.export.latex import LatexExporter
-from creepkit.export.markdown import MarkdownExporter
-from creepkit.export.mathml import MATHML_NAMESPACE, MathmlExporter, MathmlPrinter
+from creepkit.exporters.latex import LatexExporter, MarkdownExporter
+from creepkit.exporters.mathml import MATHML_NAMESPACE, MathmlExporter, MathmlPrinter
 from creepkit.language import arrhenius, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
-from creepkit.records import Units, LawWithValues
+from creepkit.records import LawWithValues, Units
 from creepkit.registry import default_registry
 
 LAWS = {name: default_registry().law(name) for name in sorted(default_registry().laws())} | EQUATIONS
@@ -161,4 +160,6 @@ def test_a_law_that_no_numbers_convert_is_refused(exporter):
 
 def test_a_law_that_fails_says_when():
     law = EQUATIONS["Kachanov-Rabotnov"]
-    assert "The material has failed when omega reaches 0.99." in MarkdownExporter().text(LawWithValues(law, law.center()))
+    assert "The material has failed when omega reaches 0.99." in MarkdownExporter().text(
+        LawWithValues(law, law.center())
+    )

@@ -6,15 +6,15 @@ import sympy
 from foreign_laws import POWER, RATE, A, k, law, n, number
 
 from creepkit import kernels
-from creepkit.fem.body import FiniteElementModel, finite_element_model
-from creepkit.fem.record import DEFLECTION_LIMIT, LIMIT_LOAD, STRAIN_LIMIT, TOO_MANY_STEPS, SolverSettings
+from creepkit.fem.banded_system import FiniteElementModel, finite_element_model
 from creepkit.fem.simulation import REASONS, LoadHistory, Simulation, simulate
+from creepkit.fem.step_record import DEFLECTION_LIMIT, LIMIT_LOAD, STRAIN_LIMIT, TOO_MANY_STEPS, SolverSettings
 from creepkit.language import CreepLaw, Elastic, strain, stress, time
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, PressureJump, Program, Status
-from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.dimple import DimpleGeometry
+from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.specimens.bulge.specimen import Bulge
 
 FAST = {"A": 1e-11, "n": 3.0}
 RAMP = Program(np.array([0.0, 5.0]), np.array([0.0, 8.0]))
@@ -26,10 +26,14 @@ def body() -> FiniteElementModel:
     return finite_element_model(DimpleGeometry().mesh(0.5))
 
 
-def run(body: FiniteElementModel, creep: CreepLaw, values, pressure: Program = RAMP, end: float = END, **settings) -> Simulation:
+def run(
+    body: FiniteElementModel, creep: CreepLaw, values, pressure: Program = RAMP, end: float = END, **settings
+) -> Simulation:
     kernel = kernels.lower(creep, "numba")
     course = LoadHistory(pressure, Program.constant(300.0), Program.constant(150e3), end)
-    return simulate(kernel, kernel.to_internal(values)[0], body, course, settings=SolverSettings(**settings), keep_points=True)
+    return simulate(
+        kernel, kernel.to_internal(values)[0], body, course, settings=SolverSettings(**settings), keep_points=True
+    )
 
 
 def history_is_kept(made: Simulation, body: FiniteElementModel) -> None:

@@ -6,10 +6,20 @@ import numpy as np
 import pytest
 
 from creepkit.errors import SolveError
-from creepkit.fem.mesh import CORNERS, Mesh
-from creepkit.fem.mesh_checks import half_bandwidth, outline, mesh_quality
-from creepkit.fem.shape import GAUSS_POINTS, discretize, geometry_derivative, shape_functions, shape_gradients
-from creepkit.fem.strip import strip_mesh, strip_nodes
+from creepkit.fem.mesh import (
+    CORNERS,
+    GAUSS_POINTS,
+    Mesh,
+    discretize,
+    geometry_derivative,
+    half_bandwidth,
+    mesh_quality,
+    outline,
+    shape_functions,
+    shape_gradients,
+    strip_mesh,
+    strip_nodes,
+)
 
 MIDDLES = 0.5 * (CORNERS + np.roll(CORNERS, -1, axis=0))
 NODES = np.vstack([CORNERS, MIDDLES])

@@ -4,12 +4,19 @@ import numpy as np
 import pytest
 
 from creepkit import kernels
-from creepkit.fem.body import FiniteElementModel, finite_element_model
-from creepkit.fem.element import BALANCED, assemble, force_workspace, point_workspace, virgin_points
-from creepkit.fem.material import StageConditions
-from creepkit.fem.pressure import side_force, side_stiffness
+from creepkit.fem.assembly import (
+    BALANCED,
+    assemble,
+    force_workspace,
+    point_workspace,
+    side_force,
+    side_stiffness,
+    virgin_points,
+)
+from creepkit.fem.banded_system import FiniteElementModel, finite_element_model
+from creepkit.fem.material_point import StageConditions
 from creepkit.laws.norton import NORTON
-from creepkit.specimens.dimple import DimpleGeometry
+from creepkit.specimens.bulge.geometry import DimpleGeometry
 
 CLAMPED = DimpleGeometry()
 FILLET = DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",))

@@ -7,12 +7,12 @@ import pytest
 
 import creepkit as ck
 from creepkit import kernels
-from creepkit.fem.body import finite_element_model
-from creepkit.fem.march import SolverSettings
+from creepkit.fem.banded_system import finite_element_model
 from creepkit.fem.simulation import LoadHistory, simulate
-from creepkit.fem.timeline import TimeInterpolation
+from creepkit.fem.step_record import TimeInterpolation
+from creepkit.fem.time_integration import SolverSettings
 from creepkit.records import Program
-from creepkit.specimens.dimple import DimpleGeometry
+from creepkit.specimens.bulge.geometry import DimpleGeometry
 
 DIMPLE = finite_element_model(DimpleGeometry().mesh(0.5))
 LAWS = {
@@ -103,7 +103,9 @@ def run_of(law, pressure, few):
     kernel = kernels.lower(ck.law(law), "numba")
     theta = kernel.to_internal(ck.law(law).values(LAWS[law]))[0]
     course = LoadHistory(pressure, Program.constant(1000.0), Program.constant(150e3), 1200.0)
-    return simulate(kernel, theta, DIMPLE, course, settings=SolverSettings() if few else SolverSettings(1e-3, 1e-5, 1.0))
+    return simulate(
+        kernel, theta, DIMPLE, course, settings=SolverSettings() if few else SolverSettings(1e-3, 1e-5, 1.0)
+    )
 
 
 def apex(law, pressure, times, few):

@@ -9,8 +9,12 @@ from hypothesis import strategies as st
 from steady import Steady, planted
 
 from creepkit.errors import CreepkitError
-from creepkit.inverse.files import identification_from_json, load_identification, identification_to_json
 from creepkit.inverse.identification import Identification, IdentificationSettings
+from creepkit.inverse.identification_document import (
+    identification_from_json,
+    identification_to_json,
+    load_identification,
+)
 from creepkit.inverse.identify import identify
 from creepkit.laws.norton import NORTON
 

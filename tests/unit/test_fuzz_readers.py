@@ -8,9 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from creepkit.errors import HistoryError
-from creepkit.readers.history_csv import HISTORY_CSV
-from creepkit.readers.indexed import INDEXED_FILES, INDEXED_TABLE
-from creepkit.readers.writing import write_history
+from creepkit.readers.history_csv import HISTORY_CSV, write_history
+from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
 from creepkit.records import History, PressureJump, Program, Reader, StressSteps, constant_stress
 
 # The one folder of a test function serves all its examples, each of which writes its files anew.

@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from creepkit.integration.clock import SMALLEST_EXPONENT, TimeTransformation, transformed_time, linear_time, position, shifted_power_law_time, transformation_derivatives, power_law_time
+from creepkit.integration.time_discretisation import (
+    SMALLEST_EXPONENT,
+    TimeTransformation,
+    linear_time,
+    position,
+    power_law_time,
+    shifted_power_law_time,
+    transformation_derivatives,
+    transformed_time,
+)
 
 CLOCKS = [
     TimeTransformation(0.0, 1e5, 0.3, 0.0),

@@ -8,9 +8,14 @@ from scipy.integrate import quad
 
 from creepkit.errors import SolveError
 from creepkit.integration import IntegrationSettings
-from creepkit.integration.driver import COMPONENTS, prescribed_strain, prescribed_stress, integrate_tensor_point
-from creepkit.integration.tableau import SDIRK2, SDIRK4
+from creepkit.integration.tensor_integration import (
+    COMPONENTS,
+    integrate_tensor_point,
+    prescribed_strain,
+    prescribed_stress,
+)
 from creepkit.integration.tensor_point import TensorPoint
+from creepkit.integration.time_discretisation import SDIRK2, SDIRK4
 from creepkit.kernels import lower
 from creepkit.kernels.interface import TEMPERATURE, TIME
 from creepkit.language import (
@@ -54,7 +59,9 @@ KACHANOV = CreepLaw(
 def run(law, values, controls, times, temperature=300.0, settings=None, tableau=SDIRK2):
     kernel = lower(law, "numba")
     theta = kernel.to_internal(values)[0]
-    return integrate_tensor_point(kernel, theta, STEEL, controls, temperature, times, settings=settings, tableau=tableau)
+    return integrate_tensor_point(
+        kernel, theta, STEEL, controls, temperature, times, settings=settings, tableau=tableau
+    )
 
 
 @pytest.mark.parametrize("weight", [1.0, 30.0, 1e3], ids=["elastic", "half crept", "crept"])
@@ -80,7 +87,11 @@ def test_the_tangent_is_the_derivative_of_stress(weight: float) -> None:
 def test_the_order_is_that_of_the_tableau(tableau) -> None:
     """A strain and a stress that grow, in equal steps; the error falls by 2^order when the steps are halved."""
     ramp = Program(np.array([0.0, 100.0]), np.array([2e-4, 1.2e-3]))
-    controls = {"11": prescribed_strain(ramp), "12": prescribed_strain(3e-4), "22": prescribed_stress(Program(ramp.times, 6e4 * ramp.values))}
+    controls = {
+        "11": prescribed_strain(ramp),
+        "12": prescribed_strain(3e-4),
+        "22": prescribed_stress(Program(ramp.times, 6e4 * ramp.values)),
+    }
 
     def end(step: float) -> float:
         loose = IntegrationSettings(rtol=1e9, first=step, longest=step)
@@ -140,7 +151,9 @@ def test_without_load_nothing_happens() -> None:
 class TestEnds:
     def test_a_state_at_its_limit(self) -> None:
         """Kachanov: (1 - damage)^(v+1) = 1 - (v+1) C s^v t; outputs beyond are left out."""
-        result = run(KACHANOV, {"A": 1e-16, "n": 4, "C": 1e-13, "v": 4}, {"11": prescribed_stress(100.0)}, [5e3, 1.5e4, 1e5])
+        result = run(
+            KACHANOV, {"A": 1e-16, "n": 4, "C": 1e-13, "v": 4}, {"11": prescribed_stress(100.0)}, [5e3, 1.5e4, 1e5]
+        )
         expected = (1 - 0.1**5) / (5 * 1e-13 * 100**4)
         assert result.status == Status.RUPTURED
         assert result.reason == "an internal variable reached its limit"
@@ -179,7 +192,10 @@ class TestEnds:
         ({"times": [2.0, 1.0]}, "output times must be finite, at or after 0 s, and must not decrease"),
         ({"theta": [1.0]}, "theta has 1 numbers, but the law needs 2: A, n"),
         ({"elastic": (0.0, 0.3)}, "E is 0 MPa and nu 0.3; allowed are E above 0 and nu in \\(-1, 0.5\\)"),
-        ({"controls": {"21": prescribed_stress(1.0)}}, "no component '21' to drive; allowed are 11, 22, 33, 12, 23, 13"),
+        (
+            {"controls": {"21": prescribed_stress(1.0)}},
+            "no component '21' to drive; allowed are 11, 22, 33, 12, 23, 13",
+        ),
     ],
 )
 def test_what_cannot_be_driven_is_refused(change, message: str) -> None:

@@ -7,15 +7,9 @@ import pytest
 from kachanov import A, C, damage, kachanov, n, v
 
 from creepkit.errors import SolveError
-from creepkit.integration import PointTest, IntegrationSettings, integrate
-from creepkit.integration.endings import (
-    DIVERGED,
-    REACHED_END,
-    STATE_LIMIT,
-    STRAIN_LIMIT,
-    TOO_MANY_STEPS,
-)
-from creepkit.integration.tableau import SDIRK2
+from creepkit.integration import IntegrationSettings, PointTest, integrate
+from creepkit.integration.event_location import DIVERGED, REACHED_END, STATE_LIMIT, STRAIN_LIMIT, TOO_MANY_STEPS
+from creepkit.integration.time_discretisation import SDIRK2
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Param, State, parameters, stress
 from creepkit.laws.combined import COMBINED
@@ -50,7 +44,9 @@ def test_constant_load_bursts_when_the_closed_form_says() -> None:
     """Norton under constant load: p = -ln(1 - n A s^n t)/n, so p = 1 at t = (1 - exp(-n))/(n A s^n)."""
     values, rate = {"A": 1e-13, "n": 4.0}, 1e-13 * 100.0**4
     times = np.linspace(0, 1 / rate, 50)
-    result = run(NORTON, values, Program.constant(100.0), times, constant_load=True, settings=IntegrationSettings(rtol=1e-8))
+    result = run(
+        NORTON, values, Program.constant(100.0), times, constant_load=True, settings=IntegrationSettings(rtol=1e-8)
+    )
     burst = (1 - np.exp(-4.0)) / (4 * rate)
     assert result.terminations[0, 0] == STRAIN_LIMIT
     assert result.status[0, 0] == Status.RUPTURED
@@ -64,7 +60,12 @@ def test_a_rate_that_diverges_is_a_burst_not_an_error() -> None:
     """With the strain limit out of reach the point still ends where 1/(n A s^n) says."""
     values, rate = {"A": 1e-13, "n": 4.0}, 1e-13 * 100.0**4
     result = run(
-        NORTON, values, Program.constant(100.0), [1 / rate], constant_load=True, settings=IntegrationSettings(strain_limit=50.0)
+        NORTON,
+        values,
+        Program.constant(100.0),
+        [1 / rate],
+        constant_load=True,
+        settings=IntegrationSettings(strain_limit=50.0),
     )
     assert result.terminations[0, 0] == DIVERGED
     assert result.end_times[0, 0] == pytest.approx(1 / (4 * rate), rel=1e-4)
@@ -152,13 +153,17 @@ def test_answers_do_not_depend_on_when_they_are_asked_for() -> None:
 def test_the_two_tableaux_agree() -> None:
     times = np.linspace(1e3, 1e5, 20)
     fine = run(COMBINED, VALUES, Program.constant(100.0), times, settings=IntegrationSettings(rtol=1e-9)).strain
-    coarse = run(COMBINED, VALUES, Program.constant(100.0), times, settings=IntegrationSettings(rtol=1e-5), tableau=SDIRK2).strain
+    coarse = run(
+        COMBINED, VALUES, Program.constant(100.0), times, settings=IntegrationSettings(rtol=1e-5), tableau=SDIRK2
+    ).strain
     np.testing.assert_allclose(coarse, fine, rtol=2e-4)
 
 
 def test_the_cap_on_steps_keeps_the_history_so_far() -> None:
     times = np.linspace(0, 1e5, 100)
-    result = run(COMBINED, VALUES, Program.constant(100.0), times, settings=IntegrationSettings(rtol=1e-10, max_steps=60))
+    result = run(
+        COMBINED, VALUES, Program.constant(100.0), times, settings=IntegrationSettings(rtol=1e-10, max_steps=60)
+    )
     assert result.terminations[0, 0] == TOO_MANY_STEPS
     assert result.status[0, 0] == Status.NOT_CONVERGED
     alive = np.isfinite(result.strain[0])

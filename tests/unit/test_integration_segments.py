@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from creepkit.integration.segments import merge_programs
+from creepkit.integration.time_discretisation import merge_programs
 from creepkit.records import Program
 
 

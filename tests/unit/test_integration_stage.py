@@ -8,8 +8,7 @@ from kachanov import kachanov
 from numba import njit
 from scipy.stats import qmc
 
-from creepkit.integration.problem import NO_SOLUTION, SOLVED, UNIAXIAL, Axes, StageProblem
-from creepkit.integration.response import (
+from creepkit.integration.stage_problem import (
     BY_LOG_WEIGHT,
     BY_MEAN,
     BY_PRINCIPAL,
@@ -17,11 +16,16 @@ from creepkit.integration.response import (
     BY_TIME,
     BY_TRIAL,
     INPUTS,
+    NO_SOLUTION,
+    SOLVED,
+    UNIAXIAL,
+    Axes,
+    StageProblem,
+    differentiate_stage,
     gradient_of_sensitivity,
     gradient_of_update,
-    differentiate_stage,
 )
-from creepkit.integration.stage import solve_stage
+from creepkit.integration.stage_solver import solve_stage
 from creepkit.kernels import lower
 from creepkit.kernels.interface import MEAN_STRESS, PRINCIPAL_STRESS, STRAIN, STRESS, TIME, data_pointer
 from creepkit.language import Param, mean_stress, parameters, principal_stress
@@ -149,7 +153,11 @@ def responses(kernel, theta, problem, z0, axes, entry):
 @pytest.mark.parametrize("entry", ["update", "sensitivity"])
 @pytest.mark.parametrize(
     "problem",
-    [StageProblem(90.0, 0.0, 0.0, 1e4, 0.01), StageProblem(200.0, 1e5, 0.0, 3e4, 0.02), StageProblem(60.0, 0.0, 1.0, 3e4, 0.0)],
+    [
+        StageProblem(90.0, 0.0, 0.0, 1e4, 0.01),
+        StageProblem(200.0, 1e5, 0.0, 3e4, 0.02),
+        StageProblem(60.0, 0.0, 1.0, 3e4, 0.0),
+    ],
     ids=["prescribed stress", "prescribed strain", "constant load"],
 )
 def test_responses_are_the_derivatives_of_the_solution(problem: StageProblem, entry: str) -> None:

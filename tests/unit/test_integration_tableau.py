@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from creepkit.integration.clock import linear_time
-from creepkit.integration.dense import dense_value
-from creepkit.integration.problem import SOLVED, UNIAXIAL
-from creepkit.integration.segments import Segment
-from creepkit.integration.step import StressControl, advance, step_workspace
-from creepkit.integration.tableau import SDIRK2, SDIRK4, Tableau
+from creepkit.integration.runge_kutta_step import StressControl, advance, dense_value, step_workspace
+from creepkit.integration.stage_problem import SOLVED, UNIAXIAL
+from creepkit.integration.time_discretisation import SDIRK2, SDIRK4, Segment, Tableau, linear_time
 from creepkit.kernels import lower
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 

@@ -7,8 +7,8 @@ from steady import Steady, planted
 
 from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
-from creepkit.inverse.intervals.correlation import correlation, undetermined
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.uncertainty.correlation import correlation, undetermined
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 

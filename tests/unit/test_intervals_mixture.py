@@ -10,8 +10,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from creepkit.errors import FitError
-from creepkit.inverse.intervals.mixture import ModelAverage, MixtureDistribution
-from creepkit.inverse.intervals.temperature_band import rate_band
+from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution, ModelAverage, rate_band
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
 
@@ -54,7 +53,9 @@ def fit():
 def test_a_mixture_of_one_law_is_that_law(fit):
     for stress in (40.0, [30.0, 90.0]):
         assert ModelAverage.from_ranking(fit).rate(stress) == pytest.approx(np.array(fit.rate(stress)), rel=1e-8)
-        assert ModelAverage.from_ranking(fit).local_exponent(stress) == pytest.approx(np.array(fit.local_exponent(stress)), rel=1e-6)
+        assert ModelAverage.from_ranking(fit).local_exponent(stress) == pytest.approx(
+            np.array(fit.local_exponent(stress)), rel=1e-6
+        )
 
 
 def test_two_laws_that_disagree_widen_the_interval(fit):

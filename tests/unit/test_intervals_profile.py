@@ -11,10 +11,10 @@ from steady import Steady, planted
 
 from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
-from creepkit.inverse.intervals.opening import interval_problem
-from creepkit.inverse.intervals.profile import profile
-from creepkit.inverse.intervals.quantities import DerivedQuantity, exponent_at, rate_at
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.uncertainty.posterior import interval_problem
+from creepkit.inverse.uncertainty.profile_likelihood import profile
+from creepkit.inverse.uncertainty.quantities import DerivedQuantity, exponent_at, rate_at
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance
 

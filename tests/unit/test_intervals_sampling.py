@@ -12,11 +12,10 @@ from steady import Steady, planted
 
 from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
-from creepkit.inverse.intervals.posterior import Posterior
-from creepkit.inverse.intervals.quantities import exponent_at, rate_at
-from creepkit.inverse.intervals.sampling import sample_posterior
 from creepkit.inverse.problem import least_squares_problem
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.uncertainty.posterior import Posterior, sample_posterior
+from creepkit.inverse.uncertainty.quantities import exponent_at, rate_at
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance
 

@@ -10,11 +10,11 @@ from steady import Steady
 from steady import planted as planted_bars
 
 from creepkit.errors import FitError, SolveError
-from creepkit.inverse.files import load_identification, identification_to_json
-from creepkit.inverse.holdout import leave_one_test_out, pooled_relative_squared_error
+from creepkit.inverse.cross_validation import leave_one_test_out, pooled_relative_squared_error
+from creepkit.inverse.goodness_of_fit import relative_squared_error
 from creepkit.inverse.identification import IdentificationSettings
+from creepkit.inverse.identification_document import identification_to_json, load_identification
 from creepkit.inverse.identify import identify, refit
-from creepkit.inverse.measures import relative_squared_error
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.records import Nuisance

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from creepkit.inverse.coordinates import Coordinates, ReferencePoint
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.kernels import lower
 from creepkit.language import arrhenius, linear
 from creepkit.laws.combined import COMBINED

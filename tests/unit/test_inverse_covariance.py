@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from creepkit.inverse.covariance import covariance, effective_sample_size, predicted_random_effects, log_likelihood
-from creepkit.inverse.residuals import Residuals
-from creepkit.inverse.scatter import OutputNoise, NoiseModel
-from creepkit.inverse.sizes import estimate_variance_components
+from creepkit.inverse.noise_model import (
+    NoiseModel,
+    OutputNoise,
+    Residuals,
+    covariance,
+    effective_sample_size,
+    log_likelihood,
+    predicted_random_effects,
+)
+from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.records import Nuisance
 
 BOTH = (Nuisance("offset"), Nuisance("rate"))
@@ -74,7 +80,9 @@ def test_planted_scatter_is_found():
 
 def test_a_given_prior_stays():
     residuals = made(20, 20, 3, sizes(2e-5, 0, 1e-4, 0.4, 0.1, 1.5))
-    found = estimate_variance_components(residuals, sizes(2e-5, 0, 7e-5, 0.5, 0.1, 1.5), (Nuisance("offset", sd=7e-5), Nuisance("rate")))
+    found = estimate_variance_components(
+        residuals, sizes(2e-5, 0, 7e-5, 0.5, 0.1, 1.5), (Nuisance("offset", sd=7e-5), Nuisance("rate"))
+    )
     assert found["strain"].offset == 7e-5
 
 
@@ -135,13 +143,16 @@ def test_outputs_share_the_rate_alone():
 
 def test_a_test_of_little_trust_scatters_more():
     residuals, scatter = two_outputs()
-    plain, doubted = covariance(residuals, scatter), covariance(residuals.with_test_weights(np.array([1.0, 0.25])), scatter)
+    plain, doubted = (
+        covariance(residuals, scatter),
+        covariance(residuals.with_test_weights(np.array([1.0, 0.25])), scatter),
+    )
     np.testing.assert_allclose(doubted[0], plain[0])
     np.testing.assert_allclose(doubted[1], 4 * plain[1])
 
 
 def test_slopes_of_the_likelihood_are_its_differences():
-    from creepkit.inverse.sizes import _Likelihood
+    from creepkit.inverse.variance_components import _Likelihood
 
     residuals, scatter = two_outputs()
     free = [(o, n) for o in scatter.outputs for n in ("misfit", "offset", "drift", "reach")] + [("", "rate")]
@@ -153,5 +164,7 @@ def test_slopes_of_the_likelihood_are_its_differences():
         step[k] = 1e-5
         difference = (likelihood.cost(x + step)[0] - likelihood.cost(x - step)[0]) / 2e-5
         assert slope[k] == pytest.approx(difference, rel=1e-5, abs=1e-7)
-    ends = [likelihood.cost(x + d)[0] + log_likelihood(likelihood.residuals, likelihood.noise_model(x + d)) for d in (0, 1)]
+    ends = [
+        likelihood.cost(x + d)[0] + log_likelihood(likelihood.residuals, likelihood.noise_model(x + d)) for d in (0, 1)
+    ]
     assert ends[0] == pytest.approx(ends[1], rel=1e-12)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from creepkit.inverse.distance import orthogonal_distance
+from creepkit.inverse.residuals import orthogonal_distance
 
 
 @pytest.mark.parametrize("slope", [0.1, 1.0, 30.0])
@@ -25,15 +25,23 @@ def test_derivatives(a, b):
     def value(a, b):
         return orthogonal_distance(np.array(a), np.array(b), np.array(np.nan)).values
 
-    assert found.strain_derivative == pytest.approx((value(a + step, b) - value(a - step, b)) / (2 * step), rel=1e-6, abs=1e-9)
-    assert found.time_derivative == pytest.approx((value(a, b + step) - value(a, b - step)) / (2 * step), rel=1e-6, abs=1e-9)
+    assert found.strain_derivative == pytest.approx(
+        (value(a + step, b) - value(a - step, b)) / (2 * step), rel=1e-6, abs=1e-9
+    )
+    assert found.time_derivative == pytest.approx(
+        (value(a, b + step) - value(a, b - step)) / (2 * step), rel=1e-6, abs=1e-9
+    )
 
 
 def test_after_rupture_time_alone_counts_and_before_arrival_strain_alone():
     broke = orthogonal_distance(np.array(np.inf), np.array(0.7), np.array(np.inf))
-    assert (broke.values, broke.strain_derivative, broke.time_derivative) == pytest.approx((np.sqrt(2) * 0.7, 0, np.sqrt(2)))
+    assert (broke.values, broke.strain_derivative, broke.time_derivative) == pytest.approx(
+        (np.sqrt(2) * 0.7, 0, np.sqrt(2))
+    )
     never = orthogonal_distance(np.array(-0.7), np.array(-np.inf), np.array(np.nan))
-    assert (never.values, never.strain_derivative, never.time_derivative) == pytest.approx((-np.sqrt(2) * 0.7, np.sqrt(2), 0))
+    assert (never.values, never.strain_derivative, never.time_derivative) == pytest.approx(
+        (-np.sqrt(2) * 0.7, np.sqrt(2), 0)
+    )
 
 
 def test_it_is_continuous_where_a_curve_becomes_vertical():

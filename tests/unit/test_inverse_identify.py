@@ -8,11 +8,15 @@ import pytest
 from steady import Steady, planted
 
 from creepkit.errors import FitError
-from creepkit.inverse.files import identification_from_json, load_identification, identification_to_json
+from creepkit.inverse.cross_validation import leave_one_condition_out, measured_time_to_strain, times_to_strain
 from creepkit.inverse.identification import IdentificationSettings
+from creepkit.inverse.identification_document import (
+    identification_from_json,
+    identification_to_json,
+    load_identification,
+)
 from creepkit.inverse.identify import identify, refit
 from creepkit.inverse.selection import rank
-from creepkit.inverse.validation import leave_one_condition_out, measured_time_to_strain, times_to_strain
 from creepkit.language import arrhenius
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
@@ -48,7 +52,9 @@ def test_without_scatter_the_values_are_exact():
 
 
 def test_every_seed_reaches_the_same_minimum(tests, fit):
-    other = identify(LAW, tests, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20, seed=11))
+    other = identify(
+        LAW, tests, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20, seed=11)
+    )
     assert (np.abs(other.u - fit.u) < 0.05 * np.sqrt(np.diag(fit.covariance))).all()
 
 
@@ -171,7 +177,9 @@ def test_robust_loss_survives_a_wild_frame(tests):
     wild = [
         h.replace(outputs={"strain": np.where(np.arange(h.times.size) == 30, 0.5, h.outputs["strain"])}) for h in tests
     ]
-    fit = identify(LAW, wild, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20, loss="soft_l1"))
+    fit = identify(
+        LAW, wild, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20, loss="soft_l1")
+    )
     assert fit.values["n"] == pytest.approx(5.2, abs=0.6)
 
 
@@ -259,7 +267,7 @@ def test_settings_and_nuisances_that_mean_nothing_are_refused():
 
 def test_noise_of_a_smooth_sparse_curve_is_small():
     """Primary creep t^0.1 without noise at 12 frames even in ln t: under 0.1 % of the end strain is taken for noise."""
-    from creepkit.inverse.scales import frame_noise
+    from creepkit.inverse.observation_vector import frame_noise
     from creepkit.records import History, constant_stress
 
     times = np.geomspace(1e2, 1e6, 12)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.coordinates import Coordinates, ReferencePoint
-from creepkit.inverse.local_exponents import local_exponents
+from creepkit.inverse.coordinates import Coordinates, local_exponents
+from creepkit.inverse.reference_conditions import ReferencePoint
 
 AT = ReferencePoint(stress=110.0, strain=0.004, time=2.0e4, temperature=1050.0)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.inverse.measures import output_errors, relative_squared_error
+from creepkit.inverse.goodness_of_fit import output_errors, relative_squared_error
 
 MEASURED = [np.array([1.0, 3.0]), np.array([5.0, 7.0])]
 PREDICTED = [np.array([1.0, 4.0]), np.array([5.0, 5.0])]
@@ -36,4 +36,13 @@ def test_errors_of_one_output():
 
 def test_a_frame_that_was_not_predicted_leaves_no_number():
     found = output_errors(np.array([1.0, 3.0]), np.array([1.0, np.nan]), np.ones(2))
-    assert all(np.isnan(v) for v in (found.relative_squared_error, found.mean_squared_error, found.mean_absolute_error, found.relative_rms_error, found.chi_square))
+    assert all(
+        np.isnan(v)
+        for v in (
+            found.relative_squared_error,
+            found.mean_squared_error,
+            found.mean_absolute_error,
+            found.relative_rms_error,
+            found.chi_square,
+        )
+    )

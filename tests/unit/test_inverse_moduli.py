@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from one_degree import OneDegree, Plan, planted
 
+from creepkit.discovery.elastic_moduli import fit_wachtman, identify_moduli
 from creepkit.errors import FitError
 from creepkit.inverse.identification import IdentificationSettings
-from creepkit.inverse.moduli import identify_moduli, fit_wachtman
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from creepkit.cli.identify import parse_nuisances, parse_weights
+from creepkit.cli.options import parse_nuisances, parse_weights
 from creepkit.errors import FitError
 from creepkit.records import Nuisance
 
@@ -21,7 +21,11 @@ def test_nuisances_are_added_to_the_usual_two():
     assert parse_nuisances(None) is None
     usual = [Nuisance("offset"), Nuisance("rate")]
     assert parse_nuisances(["thickness=0.4935:0.027"]) == [*usual, Nuisance("thickness", mean=0.4935, sd=0.027)]
-    assert parse_nuisances(["temperature", "rate=0:0.2"]) == [usual[0], Nuisance("temperature"), Nuisance("rate", sd=0.2)]
+    assert parse_nuisances(["temperature", "rate=0:0.2"]) == [
+        usual[0],
+        Nuisance("temperature"),
+        Nuisance("rate", sd=0.2),
+    ]
     with pytest.raises(FitError, match="'width' is not known; allowed are offset, rate, thickness"):
         parse_nuisances(["width=3"])
     with pytest.raises(FitError, match="'thin' is not MEAN or MEAN:SD"):

@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from creepkit.inverse.residuals import Residuals
-from creepkit.inverse.restricted import LinearisedProblem, inverse_covariances, restricted_log_likelihood
-from creepkit.inverse.satterthwaite import restricted_covariance
-from creepkit.inverse.scales import LinearTransform
-from creepkit.inverse.scatter import OutputNoise, NoiseModel
+from creepkit.inverse.iterative_estimation import WorkingNoise
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
+from creepkit.inverse.observation_vector import LinearTransform
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sizes import estimate_variance_components
-from creepkit.inverse.weighting import WorkingNoise
+from creepkit.inverse.uncertainty.laplace_approximation import restricted_covariance
+from creepkit.inverse.variance_components import (
+    LinearisedProblem,
+    estimate_variance_components,
+    inverse_covariances,
+    restricted_log_likelihood,
+)
 
 
 def linear_model(values, design, clock=None, outputs=1):
@@ -41,7 +44,9 @@ def test_white_noise_is_the_sum_of_squares_over_the_degrees_of_freedom():
     """Patterson & Thompson: the restricted estimate of one variance is RSS / (n - p)."""
     rng, design = np.random.default_rng(0), polynomial(30, 3)
     values = 0.2 * rng.normal(size=(1, 30))
-    found = estimate_variance_components(*_model(values, design), white(0.15), (), fixed=(), linearised=linear_model(values, design))
+    found = estimate_variance_components(
+        *_model(values, design), white(0.15), (), fixed=(), linearised=linear_model(values, design)
+    )
     left = values[0] - design[0] @ np.linalg.lstsq(design[0], values[0], rcond=None)[0]
     assert found["strain"].noise ** 2 == pytest.approx((left**2).sum() / 26, rel=1e-4)
 
@@ -68,7 +73,9 @@ def test_what_a_predictor_states_of_its_error_is_not_asked_of_the_data():
     assert weighting.fixed_components(scatter) == {("amplitude", "drift"), ("amplitude", "reach")}
     assert weighting.fixed_components(white(0.3, ("amplitude",), drift=0.1)) == set()
     assert restricted_covariance(linear, scatter, ())[1] < 10.0
-    assert restricted_covariance(linear, scatter, (), weighting.fixed_components(scatter))[1] == pytest.approx(22.0, rel=1e-3)
+    assert restricted_covariance(linear, scatter, (), weighting.fixed_components(scatter))[1] == pytest.approx(
+        22.0, rel=1e-3
+    )
 
 
 def test_tests_that_share_their_values_share_one_freedom():

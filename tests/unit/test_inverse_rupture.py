@@ -8,15 +8,14 @@ from foreign_laws import EQUATIONS
 
 import creepkit as ck
 from creepkit.errors import FitError, HistoryError
-from creepkit.inverse.coordinates import Coordinates, ReferencePoint
-from creepkit.inverse.effects import NuisanceParameters
-from creepkit.inverse.entries import ObservationVector
-from creepkit.inverse.life import predict_to_rupture
-from creepkit.inverse.objective import ResidualFunction
-from creepkit.inverse.scales import RUPTURE_OUTPUT
+from creepkit.inverse.composite_predictor import CompositePredictor, predict_to_rupture
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.cross_validation import leave_one_condition_out, times_to_rupture
+from creepkit.inverse.nuisance_parameters import NuisanceParameters
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
+from creepkit.inverse.reference_conditions import ReferencePoint
+from creepkit.inverse.residuals import ResidualFunction
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.together import CompositePredictor
-from creepkit.inverse.validation import leave_one_condition_out, times_to_rupture
 from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Nuisance, constant_strain, constant_stress
@@ -70,7 +69,9 @@ def test_by_likelihood_ruptures_have_a_scatter_of_their_own_and_laws_are_ranked(
     how = {"using": BAR, "weights": "likelihood", "nuisances": [], "starts": 2, "frames": 20}
     fits = [ck.identify(one, tests, **how) for one in (law, NORTON)]
     assert fits[0].noise_model[RUPTURE_OUTPUT].drift == 0.0
-    assert fits[0].noise_model[RUPTURE_OUTPUT].misfit == pytest.approx(np.hypot(0.15, 0.08), rel=0.6)  # of four lives, rates in it
+    assert fits[0].noise_model[RUPTURE_OUTPUT].misfit == pytest.approx(
+        np.hypot(0.15, 0.08), rel=0.6
+    )  # of four lives, rates in it
     ends = [m.rupture for m in fits[0].tests if not m.rupture.censored]
     assert all(one.low < one.measured < one.high for one in ends)
     assert ck.rank(fits).best.law.name == law.name

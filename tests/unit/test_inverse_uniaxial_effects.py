@@ -42,7 +42,8 @@ def test_derivatives_are_those_of_differences():
     found = BAR.predict(LAW, VALUES, tests, nuisances=nuisances, jacobian=True)
     for kind, step in (("temperature", 0.5), ("modulus", 1e-3)):
         up, down = (
-            BAR.predict(LAW, VALUES, tests, nuisances={**nuisances, kind: nuisances[kind] + s}).values for s in (step, -step)
+            BAR.predict(LAW, VALUES, tests, nuisances={**nuisances, kind: nuisances[kind] + s}).values
+            for s in (step, -step)
         )
         np.testing.assert_allclose(found.nuisance_jacobian[kind], (up - down) / (2 * step), rtol=2e-3)
 

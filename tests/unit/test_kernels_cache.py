@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from foreign_laws import POWER, RATE, A, law, n
 
-from creepkit.kernels import disk_cache, lower
-from creepkit.kernels.disk_cache import CHECKSUM_FILE, SOURCE_FILE, is_intact
+from creepkit.kernels import compilation, lower
+from creepkit.kernels.compilation import CHECKSUM_FILE, SOURCE_FILE, is_intact
 from creepkit.language import CreepLaw, stress
 
 PROGRAM = """
@@ -47,7 +47,7 @@ NEW, KNOWN = (pytest.approx(1e-8, rel=1e-12), 0, 0), (pytest.approx(1e-8, rel=1e
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache folder; nothing is remembered in memory."""
     monkeypatch.setenv("CREEPKIT_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(disk_cache, "_loaded", {})
+    monkeypatch.setattr(compilation, "_loaded", {})
     return tmp_path / "cache"
 
 
@@ -101,12 +101,12 @@ def test_what_is_damaged_is_made_anew(cache: Path, suffix: str, damage: str, fac
         victim.write_bytes({"truncated": content[:-20], "emptied": b"", "changed": changed}[damage])
     assert not is_intact(folder_of(cache))
 
-    disk_cache._loaded_modules.clear()
+    compilation._loaded_modules.clear()
     again = lower(some_law(factor), "numba")
 
     assert is_intact(folder_of(cache))
     assert again.rate.cache_hits == 0
-    disk_cache._loaded_modules.clear()
+    compilation._loaded_modules.clear()
     assert lower(some_law(factor), "numba").rate.cache_hits == 1
     assert [p.name for p in (cache / "kernels").iterdir()] == [folder_of(cache).name]
 
@@ -116,7 +116,7 @@ def test_a_file_that_does_not_belong_makes_the_folder_suspect(cache: Path) -> No
     (folder_of(cache) / "extra.py").write_text("raise SystemExit('was run')")
 
     assert not is_intact(folder_of(cache))
-    disk_cache._loaded_modules.clear()
+    compilation._loaded_modules.clear()
     lower(some_law(23), "numba")
     assert is_intact(folder_of(cache))
 
@@ -135,8 +135,8 @@ def test_without_a_folder_to_write_to_each_process_compiles_for_itself(tmp_path:
 def test_a_folder_that_is_read_only_still_serves_what_it_holds(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     lower(some_law(29), "numba")
     before = folder_of(cache)
-    monkeypatch.setattr(disk_cache, "_writable", lambda folder: False)
-    disk_cache._loaded_modules.clear()
+    monkeypatch.setattr(compilation, "_writable", lambda folder: False)
+    compilation._loaded_modules.clear()
 
     known, new = lower(some_law(29), "numba"), lower(some_law(31), "numba")
 
@@ -146,7 +146,7 @@ def test_a_folder_that_is_read_only_still_serves_what_it_holds(cache: Path, monk
 
 def test_a_failure_leaves_nothing_half_made(cache: Path) -> None:
     with pytest.raises(SyntaxError):
-        disk_cache.load_module("broken", lambda: "def rate(:")
+        compilation.load_module("broken", lambda: "def rate(:")
 
     assert list((cache / "kernels").iterdir()) == []
 
@@ -162,4 +162,4 @@ def test_the_cache_has_a_home_without_the_variable(tmp_path: Path, monkeypatch: 
     monkeypatch.delenv("CREEPKIT_CACHE", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
 
-    assert disk_cache.cache_folder() == tmp_path / "creepkit" / "kernels"
+    assert compilation.cache_folder() == tmp_path / "creepkit" / "kernels"

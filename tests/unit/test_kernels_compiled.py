@@ -7,13 +7,7 @@ from numba import float64, int64, njit
 
 from creepkit.arrays import Floats
 from creepkit.kernels import CompiledLaw, lower
-from creepkit.kernels.calling import call_entry
-from creepkit.kernels.interface import (
-    DERIVATIVE_NOT_FINITE,
-    ENTRY_TYPE,
-    RATE_NOT_FINITE,
-    data_pointer,
-)
+from creepkit.kernels.interface import DERIVATIVE_NOT_FINITE, ENTRY_TYPE, RATE_NOT_FINITE, call_entry, data_pointer
 from creepkit.language import CreepLaw, strain, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT

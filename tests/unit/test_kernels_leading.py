@@ -16,7 +16,9 @@ from creepkit.laws.time_hardening import TIME_HARDENING
 def leading(of: CreepLaw, point: list[float] | None = None, **values: float) -> float:
     compiled = lower(of, "numba")
     theta = compiled.to_internal({**of.center(), **values})
-    return float(compiled.leading_exponent(theta)[0] if point is None else compiled.leading_exponent(theta, np.array([point]))[0])
+    return float(
+        compiled.leading_exponent(theta)[0] if point is None else compiled.leading_exponent(theta, np.array([point]))[0]
+    )
 
 
 @pytest.mark.parametrize(

@@ -12,17 +12,25 @@ from numba import njit
 from sympy import Piecewise, exp, gamma, sinh
 
 from creepkit.errors import LawError
-from creepkit.kernels import numba_functions, numpy_functions, stable_functions, torch_functions
-from creepkit.kernels.exponentials import with_exponential_differences
-from creepkit.kernels.logform import FLOOR, COMPOSITE_FLOOR, log_form
-from creepkit.kernels.printing import TARGET_FUNCTION_NAMES
-from creepkit.kernels.stable_functions import ExpDifference, Expm1, LogFloor, LogRise, LogSinh, StableFunction
+from creepkit.kernels import kernel_functions, numba_functions, numpy_functions, torch_functions
+from creepkit.kernels.kernel_functions import (
+    TARGET_FUNCTION_NAMES,
+    ExpDifference,
+    Expm1,
+    LogFloor,
+    LogRise,
+    LogSinh,
+    StableFunction,
+)
+from creepkit.kernels.log_form import COMPOSITE_FLOOR, FLOOR, log_form, with_exponential_differences
 from creepkit.language import parameters, strain, stress, time
 
 x, y = sympy.symbols("x y", real=True)
 ln_A, ln_B = sympy.symbols("ln_A ln_B", real=True)
 FUNCTIONS = [
-    f for f in vars(stable_functions).values() if isinstance(f, type) and issubclass(f, StableFunction) and f != StableFunction
+    f
+    for f in vars(kernel_functions).values()
+    if isinstance(f, type) and issubclass(f, StableFunction) and f != StableFunction
 ]
 ONE_ARGUMENT = [f for f in FUNCTIONS if f.nargs == sympy.FiniteSet(1)]
 
@@ -48,7 +56,7 @@ def test_slopes_are_those_of_the_plain_forms(function: type[StableFunction], at:
     values = dict(zip((x, y), at, strict=True))
 
     for argument in (x, y)[: 2 if function is ExpDifference else 1]:
-        slope = stable_functions.in_sympy_functions(sympy.diff(function(*arguments), argument))
+        slope = kernel_functions.in_sympy_functions(sympy.diff(function(*arguments), argument))
         plain = sympy.diff(function.sympy_form(*arguments), argument)
         assert abs(slope.evalf(60, subs=values) / plain.evalf(60, subs=values) - 1) < 1e-14
 
@@ -80,7 +88,10 @@ def test_exp_difference_keeps_its_digits(functions: Any, a: float, b: float) -> 
 
 def test_sums_that_vanish_as_a_whole_are_paired() -> None:
     assert with_exponential_differences(1 - exp(-x)) == -Expm1(-x)
-    assert with_exponential_differences(y * exp(-x) - y * exp(-2 * x)) in (y * ExpDifference(-x, -2 * x), -y * ExpDifference(-2 * x, -x))
+    assert with_exponential_differences(y * exp(-x) - y * exp(-2 * x)) in (
+        y * ExpDifference(-x, -2 * x),
+        -y * ExpDifference(-2 * x, -x),
+    )
 
 
 def test_sums_that_do_not_vanish_stay_as_the_author_wrote_them() -> None:

@@ -6,8 +6,8 @@ import pytest
 from foreign_laws import EQUATIONS, POWER, RATE, A, law, n
 
 from creepkit.kernels import lower
-from creepkit.kernels.entries import symbolic_kernel
-from creepkit.kernels.module_text import module_source
+from creepkit.kernels.compilation import module_source
+from creepkit.kernels.symbolic_kernel import symbolic_kernel
 from creepkit.language import CreepLaw, parameters, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON

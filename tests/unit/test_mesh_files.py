@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from creepkit.errors import SolveError
-from creepkit.fem.drafts import renumbered
-from creepkit.fem.mesh import Mesh
-from creepkit.fem.mesh_checks import half_bandwidth, mesh_quality
+from creepkit.fem.mesh import Mesh, discretize, half_bandwidth, mesh_quality
+from creepkit.fem.mesh_builder import renumbered
 from creepkit.fem.mesh_files import read_input_deck, read_mesh
-from creepkit.fem.shape import discretize
-from creepkit.specimens.dimple import DimpleGeometry
+from creepkit.specimens.bulge.geometry import DimpleGeometry
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 beside = pytest.mark.skipif(not DATA.is_dir(), reason="the mesh files do not lie beside this checkout")

@@ -11,9 +11,9 @@ from command_line import creepkit, one_line
 import creepkit as ck
 from creepkit.errors import LawError
 from creepkit.language import CreepLaw, Param, parameters, stress
-from creepkit.language.tree import law_from_json, law_to_json
+from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.registry import Registry, default_registry
-from creepkit.registry.packages import LAWS_BY_PACKAGE, package_with_law
+from creepkit.registry.plugin_registry import LAWS_BY_PACKAGE, package_with_law
 
 ROOT = Path(__file__).parents[2]
 A, n = parameters("A n")
@@ -72,10 +72,10 @@ def test_a_new_law_needs_a_new_name() -> None:
 
 
 def test_a_missing_law_names_the_package_that_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    from creepkit.registry import sources
+    from creepkit.registry import plugin_sources
 
-    own = [pair for pair in sources.installed_entry_points() if pair[0].origin.startswith("creepkit ")]
-    monkeypatch.setattr(sources, "installed", lambda: own)
+    own = [pair for pair in plugin_sources.installed_entry_points() if pair[0].origin.startswith("creepkit ")]
+    monkeypatch.setattr(plugin_sources, "installed", lambda: own)
     with pytest.raises(LawError) as raised:
         Registry().law("kachanov-rabotnov")
     package = "package creepkit-damage has it: pip install creepkit-damage"

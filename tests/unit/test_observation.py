@@ -7,7 +7,7 @@ from bells import FINE, LOOKED_AT, NODES, bell, beside, cross, plates, profile_w
 from scipy.optimize import curve_fit
 
 from creepkit.errors import SolveError
-from creepkit.specimens.observation import Observation
+from creepkit.specimens.bulge.observation import Observation
 
 FORMS = [Observation(), Observation("field"), Observation("profile", 5.3, 51), Observation("field", 4.7)]
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from planted_alloys import bars, bulge
 
-from creepkit import study
+import creepkit as ck
 from creepkit.errors import FitError
-from creepkit.inverse.growth import detect_creep
-from creepkit.inverse.together import CompositePredictor
-from creepkit.plates.alloys import Alloy, group_by_alloy, check_tests, limitations
-from creepkit.plates.profiles import profile_displacement
+from creepkit.inverse.composite_predictor import CompositePredictor
+from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.records import PressureJump
+from creepkit.report.screening import profile_displacement
+from creepkit.screening.alloys import Alloy, check_tests, group_by_alloy, limitations
 
-BULGE = study.specimen("bulge")
+BULGE = ck.specimen("bulge")
 
 
 def test_tests_are_grouped_by_alloy_and_one_without_is_its_own():
@@ -53,7 +53,7 @@ def test_tests_of_another_specimen_need_a_predictor_of_their_own():
         check_tests(mixed, BULGE)
     with pytest.raises(FitError, match="using= names predictors for bulge; add it"):
         check_tests(mixed, CompositePredictor({"bulge": BULGE}))
-    both = CompositePredictor({"bulge": BULGE, "uniaxial": study.specimen("uniaxial")})
+    both = CompositePredictor({"bulge": BULGE, "uniaxial": ck.specimen("uniaxial")})
     check_tests(mixed, both)
     assert "tests of several specimens (bulge, uniaxial) are identified together" in limitations(mixed, both)
 

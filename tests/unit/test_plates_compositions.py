@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import HistoryError
-from creepkit.plates.compositions import Compositions, atomic_percent, read_compositions
-from creepkit.plates.elements import ATOMIC_WEIGHTS
+from creepkit.screening.alloys import ATOMIC_WEIGHTS, Compositions, atomic_percent, read_compositions
 
 
 def written(folder, text):

@@ -5,10 +5,10 @@ import csv
 import numpy as np
 import pytest
 
-from creepkit import study
-from creepkit.inverse.scales import frame_noise
-from creepkit.plates.compositions import read_compositions
-from creepkit.plates.planted import BASE_ALLOYS, FIGURE_7A, OUTPUT_SD, mix_base_alloys, planted_plate
+import creepkit as ck
+from creepkit.inverse.observation_vector import frame_noise
+from creepkit.screening.alloys import read_compositions
+from creepkit.screening.planted import BASE_ALLOYS, FIGURE_7A, OUTPUT_SD, mix_base_alloys, planted_plate
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def test_the_three_laws_are_those_of_the_caption_of_figure_7():
     from creepkit.kernels import lower
 
     for name, values in FIGURE_7A.items():
-        told = lower(study.law(name), "numpy").rate(values, stress=100.0, strain=0.01)
+        told = lower(ck.law(name), "numpy").rate(values, stress=100.0, strain=0.01)
         assert float(told) == pytest.approx(rates[name], rel=1e-12)
 
 
@@ -58,7 +58,7 @@ def test_tests_are_noisy_as_measured_and_rise_visibly(planted):
 
 def test_the_files_read_back_as_they_were(planted, tmp_path):
     tests, compositions = planted.write(tmp_path)
-    for found, one in zip(study.read_histories(tests), planted.histories, strict=True):
+    for found, one in zip(ck.read_histories(tests), planted.histories, strict=True):
         assert (found.alloy, found.geometry) == (one.alloy, one.geometry)
         np.testing.assert_array_equal(found.outputs["amplitude"], one.outputs["amplitude"])
     assert read_compositions(compositions).class_of("A01") == planted.compositions.class_of("A01")

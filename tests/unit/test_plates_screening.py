@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from planted_alloys import NORTON, Deadly, Doubting, bars, bulge
 
+from creepkit.api.simulation import specimen
 from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import Sqrt
-from creepkit.plates import files
-from creepkit.plates.compositions import Compositions
-from creepkit.plates.screening import screen
-from creepkit.readers.writing import write_history
-from creepkit.study import specimen
+from creepkit.readers.history_csv import write_history
+from creepkit.screening import files
+from creepkit.screening.alloys import Compositions
+from creepkit.screening.screen import screen
 
 QUICK = IdentificationSettings(starts=2, sobol_points=16)
 COMPOSITIONS = Compositions({"X": {"Fe": 70.0, "Cr": 30.0}, "Y": {"Ni": 40.0, "Co": 38.0, "Cr": 22.0}})
@@ -84,7 +84,7 @@ def test_a_confirmation_that_fails_is_a_note_and_no_failure(monkeypatch):
     def fail(fit, tests, using):
         raise FitError("the mesh is torn")
 
-    monkeypatch.setattr("creepkit.plates.one_alloy.confirm", fail)
+    monkeypatch.setattr("creepkit.screening.job.confirm", fail)
     found = screened(TWO[:3], confirm=True)["X"]
     assert found.identified
     assert "not confirmed: the mesh is torn" in found.notes
@@ -188,7 +188,9 @@ def test_all_laws_failing_is_told_with_a_reason():
     few = [h.replace(times=h.times[:2], outputs={"strain": h.outputs["strain"][:2]}) for h in bars("Z", (80.0,))]
     found = screened([*few, *TWO[:3]], laws=["norton", "strain-hardening"])
     assert found["X"].identified
-    assert found.failures["Z"].startswith("none of the 2 laws could be identified; norton: law 'norton' has 2 parameters")
+    assert found.failures["Z"].startswith(
+        "none of the 2 laws could be identified; norton: law 'norton' has 2 parameters"
+    )
     with pytest.raises(FitError, match="no alloy of this plate has a law, so there is nothing to draw"):
         screened(few).plot("pictures")
 

@@ -6,15 +6,14 @@ from kachanov import A, kachanov, n
 
 import creepkit as ck
 from creepkit.errors import SolveError
+from creepkit.integration.tensor_point import proportional_loading
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 from creepkit.language import CreepLaw, mean_stress, principal_stress, stress
 from creepkit.laws.norton import NORTON
-from creepkit.readers.writing import write_history
+from creepkit.readers.history_csv import write_history
 from creepkit.records import History, PointLoading, Program, Specimen, Status
-from creepkit.specimens.point import OUTPUTS, MaterialPoint, creepkit_specimens
-from creepkit.specimens.point_run import PointRun
-from creepkit.specimens.proportional import proportional_loading
+from creepkit.specimens.material_point import OUTPUTS, MaterialPoint, PointRun, creepkit_specimens
 
 E, NU = 1.6e5, 0.3
 STEEL = ck.Elastic(E, NU)
@@ -276,5 +275,7 @@ def test_planted_values_are_found_by_differences():
     clean = shown(loading, times=times, specimen=MaterialPoint())["strain"]
     test = plan(loading, times=times).replace(outputs={"strain": clean})
     law = NORTON.fix(n=4.0)
-    fit = identify(law, [test], MaterialPoint(), settings=IdentificationSettings(starts=1, sobol_points=2, nuisances=()))
+    fit = identify(
+        law, [test], MaterialPoint(), settings=IdentificationSettings(starts=1, sobol_points=2, nuisances=())
+    )
     assert fit.values["A"] == pytest.approx(VALUES["A"], rel=1e-3)

@@ -7,7 +7,7 @@ import pytest
 
 from creepkit.language import Elastic
 from creepkit.readers.history_csv import HISTORY_CSV, HistoryCsvReader
-from creepkit.readers.words import HeaderVocabulary
+from creepkit.readers.vocabulary import HeaderVocabulary
 from creepkit.records import History, PressureJump, Program, RecordedLoading, StressSteps
 
 CREEP = "# temperature_C: 850\n# stress_MPa: 60\n"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from creepkit.errors import HistoryError
-from creepkit.readers.indexed import INDEXED_FILES, INDEXED_TABLE, IndexedFolderReader
-from creepkit.readers.words import HeaderVocabulary
+from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE, IndexedFolderReader
+from creepkit.readers.vocabulary import HeaderVocabulary
 
 INDEX = "key,temperature_C,stress_MPa,youngs_MPa,state\na/1,900,25,149000,Ruptured\na/2,950,20,144000,\n"
 CURVES = (
@@ -78,7 +78,9 @@ def test_another_laboratory_is_a_declaration(tmp_path):
         key_column="Probe",
         frames_file="{key}.csv",
         index_file="Liste.csv",
-        vocabulary=HeaderVocabulary(synonyms={"T_C": "temperature_C", "Spannung_MPa": "stress_MPa", "Dehnung_pct": "strain_pct"}),
+        vocabulary=HeaderVocabulary(
+            synonyms={"T_C": "temperature_C", "Spannung_MPa": "stress_MPa", "Dehnung_pct": "strain_pct"}
+        ),
     )
     made = folder(
         tmp_path, {"Liste.csv": "Probe,T_C,Spannung_MPa\nx,600,90\n", "x.csv": "time_h,Dehnung_pct\n0,0\n1,2\n"}

@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from creepkit.errors import HistoryError
-from creepkit.readers.builtin import creepkit_readers
-from creepkit.readers.duplicates import duplicate_tests
-from creepkit.readers.reading import read_histories
+from creepkit.quality.comparison import duplicate_tests
+from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.records import History, Program, constant_stress
 
 READERS = creepkit_readers()

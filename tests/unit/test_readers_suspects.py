@@ -8,9 +8,8 @@ import pytest
 import creepkit as ck
 from creepkit.errors import HistoryError
 from creepkit.language import Elastic
-from creepkit.readers.builtin import creepkit_readers
-from creepkit.readers.reading import read_histories
-from creepkit.readers.suspects import check_data_quality, exclude_suspect_frames
+from creepkit.quality import check_data_quality, exclude_suspect_frames
+from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.records import History, Prediction, PressureJump, StressSteps
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"

@@ -7,8 +7,7 @@ import pytest
 
 from creepkit.errors import HistoryError
 from creepkit.language import Elastic, wachtman
-from creepkit.readers.history_csv import HISTORY_CSV
-from creepkit.readers.writing import history_text, write_history
+from creepkit.readers.history_csv import HISTORY_CSV, history_text, write_history
 from creepkit.records import History, PressureJump, Program, RecordedLoading, StressSteps, constant_stress
 
 TIMES = np.array([0.1, 1 / 3, 7e5])

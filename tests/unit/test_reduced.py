@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import SolveError
-from creepkit.inverse.together import reduced_order_model_of
+from creepkit.inverse.composite_predictor import reduced_order_model_of
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Elastic, Param, State, linear, parameters, states, stress
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
@@ -13,12 +13,11 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import History, Predictor, PressureJump, Program, RecordedLoading, Status, constant_stress
-from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.reduced import BulgeReducedOrderModel
-from creepkit.specimens.reduced_courses import simulate_trajectories
-from creepkit.specimens.reduced_curves import LOG_GROWTH, LOG_STRESS, curve_value, grid_position
-from creepkit.specimens.reduced_files import read_tables, write_tables
-from creepkit.specimens.reduced_tables import build_tables
+from creepkit.specimens.bulge.reduced_order.deflection_curves import LOG_GROWTH, LOG_STRESS, curve_value, grid_position
+from creepkit.specimens.bulge.reduced_order.predictor import BulgeReducedOrderModel
+from creepkit.specimens.bulge.reduced_order.tables import build_tables, read_tables, write_tables
+from creepkit.specimens.bulge.reduced_order.trajectories import simulate_trajectories
+from creepkit.specimens.bulge.specimen import Bulge
 
 BULGE = Bulge(threads=1)
 REDUCED = BulgeReducedOrderModel(BULGE)
@@ -59,7 +58,9 @@ def known():
 def at(which, thickness, deflections):
     """A curve of the tables, as the march reads it."""
     dimple = known().dimple(thickness)
-    return np.array([curve_value(which, grid_position(float(d), dimple), dimple, 0.0) for d in np.atleast_1d(deflections)])
+    return np.array(
+        [curve_value(which, grid_position(float(d), dimple), dimple, 0.0) for d in np.atleast_1d(deflections)]
+    )
 
 
 def k_and_kappa(deflection, thickness=0.5):

@@ -11,10 +11,10 @@ from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import History, PressureJump, Program, RecordedLoading
-from creepkit.specimens.bulge import Bulge
-from creepkit.specimens.reduced_courses import simulate_trajectories
-from creepkit.specimens.reduced_march import NUISANCE_DIRECTIONS, FeatureFactors
-from creepkit.specimens.reduced_observed import TRAJECTORY_COLUMNS
+from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
+from creepkit.specimens.bulge.reduced_order.time_integration import NUISANCE_DIRECTIONS, FeatureFactors
+from creepkit.specimens.bulge.reduced_order.trajectories import simulate_trajectories
+from creepkit.specimens.bulge.specimen import Bulge
 
 BULGE = Bulge(threads=1)
 HOURS = 3600.0
@@ -88,7 +88,9 @@ def test_threads_do_the_same():
     law, values = CASES["strain hardening"]
     compiled = kernels.lower(law, "numba")
     theta = compiled.to_internal({**values, "n": np.linspace(2.5, 3.5, 7)})
-    one, three = (simulate_trajectories(BULGE, compiled, theta, [JUMP, DOWN], factors=FACTORS, threads=n) for n in (1, 3))
+    one, three = (
+        simulate_trajectories(BULGE, compiled, theta, [JUMP, DOWN], factors=FACTORS, threads=n) for n in (1, 3)
+    )
     assert np.array_equal(one.values, three.values)
 
 

@@ -8,7 +8,7 @@ from creepkit.errors import SolveError
 from creepkit.language import wachtman
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.readers.writing import write_history
+from creepkit.readers.history_csv import write_history
 from creepkit.records import History, Program, RecordedLoading, Specimen, Status, StrainSteps
 from creepkit.specimens.relaxation import Relaxation, creepkit_specimens
 from creepkit.specimens.uniaxial import Uniaxial

@@ -6,8 +6,7 @@ import pytest
 import creepkit as ck
 from creepkit.inverse.identify import identify
 from creepkit.inverse.problem import IdentificationProblem
-from creepkit.inverse.search.evolution import CmaEs
-from creepkit.inverse.search.swarm import ParticleSwarm
+from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
 
 TRUTH = {"A": 2e-16, "n": 4.5}
@@ -68,7 +67,9 @@ def test_of_a_sum_the_swarm_keeps_the_best_of_each_subset(stand_in, test):
     swarm = ParticleSwarm(particles=80, iterations=25, maskable_terms="any")
     found = {m.terms_off: m for m in swarm.minima(problem.cost_function(stand_in)).minima}
     _, hardening = SUM.terms
-    single = IdentificationProblem.from_histories(NORTON, [test], stand_in, IdentificationSettings(), problem.residual_function.coordinates.reference)
+    single = IdentificationProblem.from_histories(
+        NORTON, [test], stand_in, IdentificationSettings(), problem.residual_function.coordinates.reference
+    )
     alone = found[(hardening,)]
     (expected,) = ParticleSwarm(40, 15, refined_candidates=1).minima(single.cost_function(stand_in)).minima
     assert alone.cost == pytest.approx(expected.cost, abs=0.01)

@@ -5,9 +5,9 @@ import pytest
 from landscapes import Known, cube, quadratic, rastrigin, rosenbrock
 
 from creepkit.errors import FitError
-from creepkit.inverse.search.box import Bounds
-from creepkit.inverse.search.evolution import CmaEs
-from creepkit.inverse.search.trace import SearchTrace
+from creepkit.inverse.search.cost_function import SearchTrace
+from creepkit.inverse.search.derivative_free import CmaEs
+from creepkit.inverse.search.local_refinement import Bounds
 from creepkit.inverse.settings import IdentificationSettings
 
 BARE = CmaEs(refined_candidates=0)

@@ -5,9 +5,9 @@ import pytest
 
 import creepkit as ck
 from creepkit.inverse.problem import IdentificationProblem
-from creepkit.inverse.search.landscape import robust_loss, robust_weight
+from creepkit.inverse.search.cost_function import robust_loss, robust_weight
+from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
 from creepkit.inverse.search.multistart import MultiStart, distinct, screened_starts
-from creepkit.inverse.search.side_by_side import batched_levenberg_marquardt
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import History
 

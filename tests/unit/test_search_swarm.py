@@ -7,9 +7,9 @@ import pytest
 from landscapes import SUM, TRIPLE, Known, cube, quadratic, rastrigin, rosenbrock
 
 from creepkit.errors import FitError
-from creepkit.inverse.search.box import Bounds
-from creepkit.inverse.search.subsets import TermMask
-from creepkit.inverse.search.swarm import ParticleSwarm
+from creepkit.inverse.search.derivative_free import ParticleSwarm
+from creepkit.inverse.search.local_refinement import Bounds
+from creepkit.inverse.search.term_mask import TermMask
 from creepkit.inverse.settings import IdentificationSettings
 
 BARE = ParticleSwarm(refined_candidates=0)
@@ -25,7 +25,12 @@ def paths(landscape):
 
 
 @pytest.mark.parametrize(
-    "swarm", [BARE, ParticleSwarm(refined_candidates=0, form="inertia"), ParticleSwarm(refined_candidates=0, boundary="reflect")]
+    "swarm",
+    [
+        BARE,
+        ParticleSwarm(refined_candidates=0, form="inertia"),
+        ParticleSwarm(refined_candidates=0, boundary="reflect"),
+    ],
 )
 @pytest.mark.parametrize(
     ("cost", "box", "at"),
@@ -90,7 +95,7 @@ def test_an_optimum_beyond_a_wall_is_found_on_it():
 
 def test_walls_absorb_or_reflect():
     """Pushed through a wall by .1 of the box, a particle stops there, or comes back by what it went too far."""
-    from creepkit.inverse.search.swarm import _Swarm
+    from creepkit.inverse.search.derivative_free import _Swarm
 
     for walls, place, speed in (("absorb", 1.0, 0.0), ("reflect", 0.93, -0.1)):
         flight = _Swarm(ParticleSwarm(particles=2, boundary=walls), Known(quadratic, cube(2)))
@@ -127,7 +132,9 @@ def test_a_seed_gives_the_same_answer_twice_and_another_seed_another():
 
 def test_progress_is_told_of_each_iteration_and_refinement():
     told = []
-    ParticleSwarm(particles=8, iterations=5, refined_candidates=1).minima(Known(quadratic, cube(2)), lambda *a: told.append(a))
+    ParticleSwarm(particles=8, iterations=5, refined_candidates=1).minima(
+        Known(quadratic, cube(2)), lambda *a: told.append(a)
+    )
     assert told == [("swarm", k, 5) for k in range(1, 6)] + [("refinement", 1, 1)]
 
 
@@ -269,4 +276,10 @@ def test_a_single_term_cannot_be_off():
     (term,) = ("power law",)
     with pytest.raises(FitError, match="has one term, 'power law', which cannot be switched off"):
         ParticleSwarm(maskable_terms=term).minima(Known(quadratic, cube(2)))
-    assert ParticleSwarm(particles=8, iterations=3, maskable_terms="any").minima(Known(quadratic, cube(2))).minima[0].terms_off == ()
+    assert (
+        ParticleSwarm(particles=8, iterations=3, maskable_terms="any")
+        .minima(Known(quadratic, cube(2)))
+        .minima[0]
+        .terms_off
+        == ()
+    )

@@ -7,7 +7,7 @@ from steady import Steady, planted
 
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection import rank
-from creepkit.inverse.selection.equivalence import DISTINGUISHABLE_CHI_SQUARE, equivalent_laws
+from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE, equivalent_laws
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON

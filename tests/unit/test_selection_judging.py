@@ -6,10 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from creepkit.inverse.residuals import Residuals
-from creepkit.inverse.restricted import LinearisedProblem
-from creepkit.inverse.scatter import OutputNoise, NoiseModel
-from creepkit.inverse.selection.judging import under_common_covariance
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
+from creepkit.inverse.selection.discrimination import under_common_covariance
+from creepkit.inverse.variance_components import LinearisedProblem
 
 TESTS, ENTRIES = 3, 12
 

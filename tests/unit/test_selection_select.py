@@ -6,7 +6,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.selection import rank
-from creepkit.inverse.selection.candidates import reductions, sums_of_two
+from creepkit.inverse.selection.select import reductions, sums_of_two
 from creepkit.records import History
 
 TIMES = np.geomspace(600.0, 4e5, 40)

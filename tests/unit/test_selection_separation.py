@@ -6,16 +6,16 @@ from log_rates import END, known_scatter, measured
 from planted_bars import BAR, SPL, bars
 
 from creepkit.errors import FitError
+from creepkit.experiments.candidate_tests import candidate_tests
+from creepkit.experiments.discriminating_experiments import discriminating_experiments, further_tests
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection import rank
-from creepkit.inverse.selection.designs import candidate_tests
-from creepkit.inverse.selection.separation import further_tests, discriminating_experiments
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import PressureJump, StressSteps, constant_strain, constant_stress
-from creepkit.specimens.bulge import Bulge
+from creepkit.specimens.bulge.specimen import Bulge
 
 TRUTH = {"A": float(np.exp(-15.0 - 5.0 * np.log(50.0))), "n": 5.0}
 SD = 0.2
@@ -117,7 +117,10 @@ def test_variations_of_bulge_tests_change_pressure_and_thickness():
     assert {d.history.geometry["apex_thickness"] for d in found} == {0.5, 0.45, 0.55}
     bare = bulge.replace(geometry={})
     assert len(candidate_tests([bare])) == len(found) - 2
-    assert {d.history.geometry["apex_thickness"] for d in candidate_tests([bare], predictor=Bulge())} >= {0.9 * APEX, 1.1 * APEX}
+    assert {d.history.geometry["apex_thickness"] for d in candidate_tests([bare], predictor=Bulge())} >= {
+        0.9 * APEX,
+        1.1 * APEX,
+    }
 
 
 def test_variations_of_relaxation_change_the_strain_and_others_are_asked_for():

@@ -5,9 +5,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from creepkit.errors import FitError
-from creepkit.inverse.coordinates import Coordinates, ReferencePoint
-from creepkit.inverse.sparsity.contributions import TermContributions
-from creepkit.inverse.sparsity.visited import STRESS_FACTORS, EvaluationPoints, strain_history, stress_history
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.reference_conditions import ReferencePoint
+from creepkit.inverse.sparsity.contributions import (
+    STRESS_FACTORS,
+    EvaluationPoints,
+    TermContributions,
+    strain_history,
+    stress_history,
+)
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
@@ -23,7 +29,9 @@ def bar(stress, name="bar", T=1000.0, frames=10):
 
 
 def contributions(law, tests):
-    return TermContributions(law, Coordinates(law, ReferencePoint.from_histories(tests)), EvaluationPoints.from_histories(tests))
+    return TermContributions(
+        law, Coordinates(law, ReferencePoint.from_histories(tests)), EvaluationPoints.from_histories(tests)
+    )
 
 
 def internal(law, **values):
@@ -148,6 +156,8 @@ def test_strain_of_a_dimple_is_its_growth_over_30_mm():
 
 def test_a_test_without_load_is_left_out_and_none_is_an_error():
     idle = bar(30.0, "idle").replace(loading=constant_stress(0.0, "stress"))
-    assert_allclose(np.unique(EvaluationPoints.from_histories([idle, bar(40.0)]).stress), 40.0 * np.array(STRESS_FACTORS))
+    assert_allclose(
+        np.unique(EvaluationPoints.from_histories([idle, bar(40.0)]).stress), 40.0 * np.array(STRESS_FACTORS)
+    )
     with pytest.raises(FitError, match="no test is ever under load"):
         EvaluationPoints.from_histories([idle])

@@ -9,8 +9,15 @@ from scipy.optimize import approx_fprime
 from test_sparsity_contributions import bar, contributions, internal
 
 from creepkit.errors import FitError
-from creepkit.inverse.sparsity.penalised import PenalisedTerms, switchable_exponents
-from creepkit.inverse.sparsity.penalties import L2, GroupL2, Sqrt, Subsets, check_penalty
+from creepkit.inverse.sparsity.penalties import (
+    L2,
+    GroupL2,
+    PenalisedTerms,
+    Sqrt,
+    Subsets,
+    check_penalty,
+    switchable_exponents,
+)
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 

@@ -9,16 +9,26 @@ import pytest
 from one_degree import OneDegree, Plan, planted
 
 from creepkit.errors import FitError
-from creepkit.inverse.search.swarm import ParticleSwarm
+from creepkit.inverse.search.derivative_free import ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.sparsity.choosing import TermChoice, choose_terms
-from creepkit.inverse.sparsity.path import trace_path
-from creepkit.inverse.sparsity.penalised import PenalisedTerms
-from creepkit.inverse.sparsity.penalties import L2, Sqrt, Subsets
-from creepkit.inverse.sparsity.record import Sparsity
-from creepkit.inverse.sparsity.reduction import terms_above
-from creepkit.inverse.sparsity.resampling import binomial_interval, bootstrap_weights, selection_frequencies, with_weights
-from creepkit.inverse.sparsity.sparse import confirmed_law, identify_full, identify_reduced, identify_sparse
+from creepkit.inverse.sparsity.bootstrap import (
+    binomial_interval,
+    bootstrap_weights,
+    selection_frequencies,
+    with_weights,
+)
+from creepkit.inverse.sparsity.penalties import L2, PenalisedTerms, Sqrt, Subsets
+from creepkit.inverse.sparsity.reduced_laws import terms_above
+from creepkit.inverse.sparsity.result import Sparsity
+from creepkit.inverse.sparsity.term_selection import (
+    TermChoice,
+    choose_terms,
+    confirmed_law,
+    identify_full,
+    identify_reduced,
+    identify_sparse,
+    trace_path,
+)
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING

@@ -10,7 +10,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.errors import ExportError, HistoryError, LawError, SolveError
-from creepkit.records import History, Prediction, Status, LawWithValues
+from creepkit.records import History, LawWithValues, Prediction, Status
 from creepkit.registry import default_registry
 
 READERS = """
@@ -79,7 +79,7 @@ def simulate(using: Steady, times: Sequence[float] = (1.0, 2.0, 4.0)) -> History
 
 def test_a_law_is_found_by_name() -> None:
     assert ck.law("norton").names == ("A", "n")
-    assert ck.laws()["norton"] == ck.law("norton")
+    assert ck.available("laws")["norton"] == ck.law("norton")
     with pytest.raises(LawError, match="did you mean 'combined'"):
         ck.law("combind")
 

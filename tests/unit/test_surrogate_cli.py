@@ -8,10 +8,10 @@ from command_line import creepkit, one_line
 from planted_sets import bars
 
 import creepkit as ck
-from creepkit.dataset.store import write_dataset
-from creepkit.surrogate import sweep as sweeping
-from creepkit.surrogate.evaluation import evaluate
-from creepkit.surrogate.trainable import training_split
+from creepkit.dataset.storage import write_dataset
+from creepkit.surrogates import training as sweeping
+from creepkit.surrogates.evaluation import evaluate
+from creepkit.surrogates.training_loop import training_split
 
 PNG = b"\x89PNG"
 

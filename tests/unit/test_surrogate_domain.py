@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import SurrogateError
-from creepkit.surrogate.domain import ApplicabilityDomain
+from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 
 
 def mahalanobis(row: np.ndarray, others: np.ndarray) -> float:
@@ -27,7 +27,9 @@ def test_training_rows_are_inside() -> None:
 
 
 def test_one_input_beyond_its_range_is_outside_and_named() -> None:
-    domain = ApplicabilityDomain.from_rows(("log10 A", "n"), np.random.default_rng(2).uniform(size=(100, 2)) * [10, 1] + [-20, 3])
+    domain = ApplicabilityDomain.from_rows(
+        ("log10 A", "n"), np.random.default_rng(2).uniform(size=(100, 2)) * [10, 1] + [-20, 3]
+    )
     assert domain.outside(np.array([-15.0, 4.2]))
     assert domain.reason(np.array([-15.0, 4.2])).startswith("n = 4.2 (trained on 3.0")
     assert domain.reason(np.array([-15.0, 3.5])) == ""

@@ -8,17 +8,18 @@ import torch
 from safetensors.torch import save_file
 
 from creepkit.errors import SurrogateError
-from creepkit.surrogate import files
-from creepkit.surrogate.shipped import surrogate_by_name
-from creepkit.surrogate.surrogate import load_surrogate
+from creepkit.files import safetensors_files
+from creepkit.surrogates.loading import load_surrogate, surrogate_by_name
 
 HEADER = {"kind": "parameter-gru"}
 WEIGHTS = {"a": torch.arange(6.0).reshape(2, 3), "b": torch.tensor(3, dtype=torch.int64)}
 
 
 def test_tensors_and_header_come_back(tmp_path: Path) -> None:
-    path = files.write_safetensors(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "curves": {"loss": [1.0, 0.5]}})
-    tensors, header = files.read_safetensors(path)
+    path = safetensors_files.write_safetensors(
+        tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "curves": {"loss": [1.0, 0.5]}}
+    )
+    tensors, header = safetensors_files.read_safetensors(path)
     assert all(
         torch.equal(tensors[name], WEIGHTS[name]) and tensors[name].dtype == WEIGHTS[name].dtype for name in WEIGHTS
     )
@@ -27,13 +28,13 @@ def test_tensors_and_header_come_back(tmp_path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
-    path = files.write_safetensors(tmp_path / "m.safetensors", WEIGHTS, HEADER)
+    path = safetensors_files.write_safetensors(tmp_path / "m.safetensors", WEIGHTS, HEADER)
     before = path.read_bytes()
     with pytest.raises(ValueError, match="JSON"):
-        files.write_safetensors(path, WEIGHTS, {**HEADER, "loss": float("nan")})
+        safetensors_files.write_safetensors(path, WEIGHTS, {**HEADER, "loss": float("nan")})
     assert path.read_bytes() == before
     with pytest.raises(SurrogateError, match="cannot be written"):
-        files.write_safetensors(tmp_path / "nowhere" / "m.safetensors", WEIGHTS, HEADER)
+        safetensors_files.write_safetensors(tmp_path / "nowhere" / "m.safetensors", WEIGHTS, HEADER)
 
 
 @pytest.mark.parametrize(
@@ -49,7 +50,7 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> Non
     ],
 )  # fmt: skip
 def test_a_file_that_is_not_a_surrogate_says_why(tmp_path: Path, spoil, told: str) -> None:
-    path = files.write_safetensors(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "config": {}})
+    path = safetensors_files.write_safetensors(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "config": {}})
     path.write_bytes(spoil(path.read_bytes()))
     with pytest.raises(SurrogateError, match=told) as caught:
         load_surrogate(path)
@@ -64,7 +65,9 @@ def test_weights_of_another_program_are_told_apart(tmp_path: Path) -> None:
 
 
 def test_a_header_without_its_parts_says_so(tmp_path: Path) -> None:
-    path = files.write_safetensors(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "config": {"training": {}}})
+    path = safetensors_files.write_safetensors(
+        tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "config": {"training": {}}}
+    )
     with pytest.raises(SurrogateError, match="its header and its weights do not belong together"):
         load_surrogate(path)
 
@@ -77,7 +80,7 @@ def test_names_that_nobody_knows(tmp_path: Path) -> None:
 
 
 def test_the_header_is_plain_json(tmp_path: Path) -> None:
-    raw = files.write_safetensors(tmp_path / "m.safetensors", WEIGHTS, HEADER).read_bytes()
+    raw = safetensors_files.write_safetensors(tmp_path / "m.safetensors", WEIGHTS, HEADER).read_bytes()
     size = int.from_bytes(raw[:8], "little")
     told = json.loads(raw[8 : 8 + size])["__metadata__"]["creepkit"]
     assert json.loads(told) == {"format": "creepkit-surrogate", "version": 1, "kind": "parameter-gru"}

@@ -3,11 +3,20 @@
 import numpy as np
 import pytest
 
-from creepkit.dataset.time_grid import TimeGrid
-from creepkit.surrogate.metrics import PAPER_EVALUATION_TIMES, PredictionComparison, evaluation_times, error_metrics, comparison_metrics, relative_squared_error
+from creepkit.sampling.conditions import TimeGrid
+from creepkit.surrogates.evaluation import (
+    PAPER_EVALUATION_TIMES,
+    PredictionComparison,
+    comparison_metrics,
+    error_metrics,
+    evaluation_times,
+    relative_squared_error,
+)
 
 
-def compared(true: np.ndarray, predicted: np.ndarray, mask: np.ndarray | None = None, **more: object) -> PredictionComparison:
+def compared(
+    true: np.ndarray, predicted: np.ndarray, mask: np.ndarray | None = None, **more: object
+) -> PredictionComparison:
     count, frames = true.shape[:2]
     given = {
         "times": np.tile(100.0 * np.arange(frames), (count, 1)),

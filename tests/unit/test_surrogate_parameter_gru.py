@@ -10,16 +10,16 @@ from torch import nn
 
 import creepkit as ck
 from creepkit.dataset.dataset import Dataset
-from creepkit.dataset.time_grid import TimeGrid
 from creepkit.errors import SurrogateError
 from creepkit.records import Program, RecordedLoading, Status
-from creepkit.surrogate.course_inputs import LoadHistoryInputs
-from creepkit.surrogate.law_inputs import LawInputs
-from creepkit.surrogate.parameter_gru import ParameterGru
-from creepkit.surrogate.recipe import Training
-from creepkit.surrogate.recurrent_tangent import recurrent_with_derivatives
-from creepkit.surrogate.surrogate import Surrogate, load_surrogate
-from creepkit.surrogate.train import train
+from creepkit.sampling.conditions import TimeGrid
+from creepkit.surrogates.loading import load_surrogate
+from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.parameter_inputs import LawInputs, LoadHistoryInputs
+from creepkit.surrogates.parameter_network import recurrent_with_derivatives
+from creepkit.surrogates.recipe import Training
+from creepkit.surrogates.surrogate import Surrogate
+from creepkit.surrogates.training import train
 
 BRIEF = Training(epochs=2, batch=32, rate=1e-2)
 
@@ -70,7 +70,9 @@ def differences(model: Surrogate, data: Dataset, row: int, step: float = 1e-5) -
         ends = []
         for sign in (step, -step):
             internal = param.to_internal(values[name]) + sign
-            ends.append(model.predict(law, {**values, name: param.from_internal(internal)}, [data.planned_test(row)]).values)
+            ends.append(
+                model.predict(law, {**values, name: param.from_internal(internal)}, [data.planned_test(row)]).values
+            )
         out.append((ends[0] - ends[1]) / (2 * step))
     return np.stack(out, axis=-1)
 
@@ -198,7 +200,9 @@ def test_a_grid_that_stretches_serves_tests_of_any_length() -> None:
 
 
 def test_training_rows_are_inside_and_others_are_flagged_with_values(learnt: Surrogate, tension: Dataset) -> None:
-    status = [learnt.predict(tension.law, tension.values_of(k), [tension.planned_test(k)]).status[0, 0] for k in range(20)]
+    status = [
+        learnt.predict(tension.law, tension.values_of(k), [tension.planned_test(k)]).status[0, 0] for k in range(20)
+    ]
     assert np.mean(np.array(status) == Status.COMPLETE) >= 0.9
     steep = {**tension.values_of(0), "n": 9.0}
     found = learnt.predict(tension.law, steep, [tension.planned_test(0)])
@@ -253,7 +257,9 @@ def test_a_reduction_of_the_law_is_the_law_with_its_terms_off(two_terms: tuple[S
     model, data = two_terms
     alone = data.law.only("power law")
     values = data.values_of(0)
-    whole = model.predict(data.law, {**values, "A_2": 0.0, "n_2": 4.5, "m": -0.5}, [data.planned_test(0)], jacobian=True)
+    whole = model.predict(
+        data.law, {**values, "A_2": 0.0, "n_2": 4.5, "m": -0.5}, [data.planned_test(0)], jacobian=True
+    )
     found = model.predict(alone, {n: values[n] for n in alone.names}, [data.planned_test(0)], jacobian=True)
     assert found.jacobian.shape[-1] == 2
     assert found.values[0, 0, -1, 0] == pytest.approx(whole.values[0, 0, -1, 0], rel=0.5)
@@ -316,7 +322,9 @@ def test_a_few_dimples_are_learnt_and_the_file_predicts_the_same(bulging: Surrog
         assert found.values[0, 0, -1, 0] == pytest.approx(plates.values[3, -1, 0], rel=0.5)
     assert str(again) == str(bulging)
     assert again.file_header == bulging.file_header
-    assert again.reference_stress(plates.planned_test(3)) == pytest.approx(plates.specimen.reference_stress(plates.planned_test(3)))
+    assert again.reference_stress(plates.planned_test(3)) == pytest.approx(
+        plates.specimen.reference_stress(plates.planned_test(3))
+    )
 
 
 def test_a_network_on_a_base_is_near_before_it_has_learnt_much(plates: Dataset) -> None:
@@ -334,7 +342,9 @@ def test_identify_with_a_network_finds_what_was_planted(learnt: Surrogate, tensi
     for k, row in enumerate((7, 8, 9, 10)):
         shown = learnt.predict(tension.law, truth, [tension.planned_test(row)]).values[0, 0]
         tests.append(
-            measured(tension.planned_test(row), shown * (1 + 1e-3 * noise.normal(size=shown.shape)), ("strain",), f"t{k}")
+            measured(
+                tension.planned_test(row), shown * (1 + 1e-3 * noise.normal(size=shown.shape)), ("strain",), f"t{k}"
+            )
         )
     fit = ck.identify(tension.law, tests, using=learnt, starts=3)
     by_name = {e.name: e.value for e in fit.estimates}

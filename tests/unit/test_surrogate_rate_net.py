@@ -13,13 +13,12 @@ from creepkit.dataset.dataset import Dataset
 from creepkit.errors import DatasetError, SolveError, SurrogateError
 from creepkit.language import symbols
 from creepkit.records import History, Program, RecordedLoading, Status
-from creepkit.surrogate import rate_gradient
-from creepkit.surrogate.rate_net import RateNet
-from creepkit.surrogate.rate_surrogate import RateSurrogate
-from creepkit.surrogate.recipe import Training
-from creepkit.surrogate.surrogate import load_surrogate
-from creepkit.surrogate.train import train
-from creepkit.surrogate.trainable import training_split
+from creepkit.surrogates import rate_net
+from creepkit.surrogates.loading import load_surrogate
+from creepkit.surrogates.rate_net import RateNet, RateSurrogate
+from creepkit.surrogates.recipe import Training
+from creepkit.surrogates.training import train
+from creepkit.surrogates.training_loop import training_split
 
 HOW = Training(epochs=60, batch=8, rate=3e-3, schedule="cosine", clip=1.0)
 RECIPE = RateNet(hidden=24, layers=2, training=HOW)
@@ -142,9 +141,11 @@ def test_gradients_in_torch_are_the_jacobian(exact: RateSurrogate) -> None:
     values, test = norton(5.0), dimple()
     theta = torch.tensor([[p.to_internal(values[n]) for n, p in NORTON.table.items()]], dtype=torch.float64)
     found = exact.predict(NORTON, values, [test], jacobian=True)
-    slopes = torch.autograd.functional.jacobian(lambda t: rate_gradient.differentiable_outputs(exact, NORTON, t, test), theta)
+    slopes = torch.autograd.functional.jacobian(
+        lambda t: rate_net.differentiable_outputs(exact, NORTON, t, test), theta
+    )
     assert slopes[0, :, :, 0].numpy() == pytest.approx(found.jacobian[0, 0], rel=1e-9, abs=1e-12)
-    shown = rate_gradient.differentiable_outputs(exact, NORTON, theta, test)[0]
+    shown = rate_net.differentiable_outputs(exact, NORTON, theta, test)[0]
     assert shown.detach().numpy() == pytest.approx(found.values[0, 0], rel=1e-12)
 
 

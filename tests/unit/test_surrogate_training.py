@@ -11,14 +11,12 @@ from planted_sets import bars
 
 from creepkit.dataset.dataset import Dataset
 from creepkit.errors import DatasetError, SurrogateError
-from creepkit.surrogate.checkpoint import dataset_fingerprint
-from creepkit.surrogate.evaluation import evaluate
-from creepkit.surrogate.parameter_gru import ParameterGru
-from creepkit.surrogate.parameter_module import ParameterModule
-from creepkit.surrogate.recipe import Training
-from creepkit.surrogate.schedule import learning_rate, epochs_since_best
-from creepkit.surrogate.train import train
-from creepkit.surrogate.trainable import training_split
+from creepkit.surrogates.evaluation import evaluate
+from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.parameter_network import ParameterModule
+from creepkit.surrogates.recipe import Training
+from creepkit.surrogates.training import train
+from creepkit.surrogates.training_loop import dataset_fingerprint, epochs_since_best, learning_rate, training_split
 
 SMALL = ParameterGru(hidden=8, layers=1, training=Training(epochs=6, batch=16, rate=1e-2))
 
@@ -106,7 +104,9 @@ def test_early_stop_and_the_best_epoch(data: Dataset) -> None:
     assert known["epochs"] == len(losses) < 50
     assert epochs_since_best(losses) == 3
     assert known["best_epoch"] == int(np.argmin(losses)) + 1
-    assert model.metadata.metrics["loss"] == pytest.approx(model.metadata.curves["rse"][known["best_epoch"] - 1], rel=1e-5)
+    assert model.metadata.metrics["loss"] == pytest.approx(
+        model.metadata.curves["rse"][known["best_epoch"] - 1], rel=1e-5
+    )
 
 
 def test_training_learns_and_the_file_holds_the_same_network(data: Dataset, tmp_path: Path) -> None:

@@ -9,14 +9,19 @@ import torch
 from foreign_laws import EQUATIONS, POWER, RATE, A, B, law, m, n, number, s_0, scale
 from sympy import Piecewise, exp, gamma, sinh, sqrt
 
-from creepkit.kernels import lowering, numpy_target, torch_target
-from creepkit.kernels.exact import MultiprecisionLaw
+from creepkit.kernels import lowering, numpy_functions, torch_functions
+from creepkit.kernels.multiprecision import MultiprecisionLaw
 from creepkit.language import CreepLaw, strain, stress, time
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.testing import check_law, draw_samples
-from creepkit.testing.parity import DERIVATIVE_TOLERANCE, MultiprecisionReference, largest_differences
-from creepkit.testing.tables import KernelTable, evaluate_numpy
+from creepkit.testing.parity import (
+    DERIVATIVE_TOLERANCE,
+    KernelTable,
+    MultiprecisionReference,
+    evaluate_numpy,
+    largest_differences,
+)
 
 # ---- what passes ---------------------------------------------------------------------------------------------------
 
@@ -126,7 +131,7 @@ def failures(of: CreepLaw) -> set[str]:
 
 
 def test_a_wrong_eleventh_digit_of_one_target_is_caught(fresh: pytest.MonkeyPatch) -> None:
-    fresh.setitem(numpy_target.FUNCTIONS, "exp", lambda x: np.exp(x) * (1 + 3e-11))
+    fresh.setitem(numpy_functions.FUNCTIONS, "exp", lambda x: np.exp(x) * (1 + 3e-11))
 
     assert "numpy value against 50 digits" in failures(STRAIN_HARDENING)
     assert "torch value against 50 digits" not in failures(STRAIN_HARDENING)
@@ -134,7 +139,7 @@ def test_a_wrong_eleventh_digit_of_one_target_is_caught(fresh: pytest.MonkeyPatc
 
 def test_a_wrong_derivative_is_caught(fresh: pytest.MonkeyPatch) -> None:
     """The floor in 1/max(strain, floor) is only called by derivatives."""
-    fresh.setitem(torch_target.FUNCTIONS, "floored", lambda x, floor: torch.clamp(x, min=floor) * (1 + 1e-9))
+    fresh.setitem(torch_functions.FUNCTIONS, "floored", lambda x, floor: torch.clamp(x, min=floor) * (1 + 1e-9))
 
     assert failures(STRAIN_HARDENING) == {"torch derivatives against 50 digits", "torch gradients"} | {
         "torch gradients at zero strain and time"
@@ -142,7 +147,7 @@ def test_a_wrong_derivative_is_caught(fresh: pytest.MonkeyPatch) -> None:
 
 
 def test_a_gradient_that_is_nan_at_zero_is_caught(fresh: pytest.MonkeyPatch) -> None:
-    fresh.setitem(torch_target.FUNCTIONS, "floored", lambda x, floor: x)
+    fresh.setitem(torch_functions.FUNCTIONS, "floored", lambda x, floor: x)
 
     assert "torch gradients at zero strain and time" in failures(STRAIN_HARDENING)
 
@@ -152,13 +157,13 @@ def test_a_missing_floor_is_caught(fresh: pytest.MonkeyPatch) -> None:
         with np.errstate(divide="ignore"):
             return np.log(x)
 
-    fresh.setitem(numpy_target.FUNCTIONS, "log_floor", without_floor)
+    fresh.setitem(numpy_functions.FUNCTIONS, "log_floor", without_floor)
 
     assert "ln rate and its derivatives are finite at zero strain" in failures(STRAIN_HARDENING)
 
 
 def test_a_mistake_in_the_kit_is_not_taken_for_one_of_the_law(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("creepkit.testing.promises.worst", None)
+    monkeypatch.setattr("creepkit.testing.law_checks.worst", None)
 
     with pytest.raises(TypeError):
         check_law(NORTON, samples=16)

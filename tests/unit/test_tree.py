@@ -23,8 +23,14 @@ from creepkit.language import (
     temperature,
     time,
 )
-from creepkit.language.nodes import DEPTH_LIMIT
-from creepkit.language.tree import condition_from_tree, expression_from_tree, law_from_json, law_to_json, expression_to_tree
+from creepkit.language.expression_trees import DEPTH_LIMIT
+from creepkit.language.law_codec import (
+    condition_from_tree,
+    expression_from_tree,
+    expression_to_tree,
+    law_from_json,
+    law_to_json,
+)
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE

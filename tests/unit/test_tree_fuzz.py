@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from creepkit.errors import LawError
 from creepkit.language import CreepLaw, arrhenius, parameters, stress, time
-from creepkit.language.nodes import _NODE_TYPES
-from creepkit.language.tree import expression_from_tree, law_from_json, law_to_json
+from creepkit.language.expression_trees import _NODE_TYPES
+from creepkit.language.law_codec import expression_from_tree, law_from_json, law_to_json
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON

@@ -10,16 +10,8 @@ from creepkit.errors import LawError, SolveError
 from creepkit.language import Elastic, arrhenius, wachtman
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
-from creepkit.records import (
-    History,
-    PressureJump,
-    Program,
-    Specimen,
-    Status,
-    StressSteps,
-    constant_stress,
-)
-from creepkit.specimens.elastic_part import elastic_strain
+from creepkit.records import History, PressureJump, Program, Specimen, Status, StressSteps, constant_stress
+from creepkit.specimens.bar import elastic_strain
 from creepkit.specimens.uniaxial import Uniaxial, creepkit_specimens
 
 TIMES = np.array([0.0, 10.0, 100.0, 1000.0])

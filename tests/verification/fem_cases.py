@@ -9,12 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from creepkit import kernels
-from creepkit.fem.body import finite_element_model
-from creepkit.fem.mesh import Mesh
-from creepkit.fem.record import SolverSettings
-from creepkit.fem.shape import discretize
+from creepkit.fem.banded_system import finite_element_model
+from creepkit.fem.mesh import Mesh, StripMesh, discretize, strip_mesh
 from creepkit.fem.simulation import LoadHistory, Simulation, simulate
-from creepkit.fem.strip import StripMesh, strip_mesh
+from creepkit.fem.step_record import SolverSettings
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.language import CreepLaw
 from creepkit.laws.norton import NORTON
@@ -75,12 +73,16 @@ def course(pressure, end: float, modulus: float, poisson: float = 0.3, **more) -
     return LoadHistory(pressure, Program.constant(293.15), Program.constant(modulus), end, poisson, **more)
 
 
-def run(mesh: Mesh, way: LoadHistory, law: CreepLaw = NORTON, values=STILL, like=None, keep=False, **settings) -> Simulation:
+def run(
+    mesh: Mesh, way: LoadHistory, law: CreepLaw = NORTON, values=STILL, like=None, keep=False, **settings
+) -> Simulation:
     """Simulate without limits on deflection or strain, unless settings give them."""
     kernel = lowered(law)
     theta = kernel.to_internal(values)[0]
     settings = SolverSettings(**{**FREE, **settings})
-    return simulate(kernel, theta, finite_element_model(mesh), way, settings=settings, same_steps_as=like, keep_points=keep)
+    return simulate(
+        kernel, theta, finite_element_model(mesh), way, settings=settings, same_steps_as=like, keep_points=keep
+    )
 
 
 def steady_velocity(mesh: Mesh, pressure, values, *, modulus: float, elastic: float, speed: float) -> np.ndarray:

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.export.fortran.creep import AbaqusCreepSubroutine, CalculixCreepSubroutine
+from creepkit.exporters.creep_subroutine import AbaqusCreepSubroutine, CalculixCreepSubroutine
 from creepkit.language import CreepLaw, Param, State, mean_stress, parameters, states, strain, stress
-from creepkit.records import Program, Units, LawWithValues
+from creepkit.records import LawWithValues, Program, Units
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
 from fortran_library import Routine

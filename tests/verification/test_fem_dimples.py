@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from fem_cases import BENCHMARKS, course, run
 
+from creepkit.fem.mesh import surface_interpolation
 from creepkit.fem.simulation import LoadHistory, Simulation
 from creepkit.language import CreepLaw
 from creepkit.laws.combined import COMBINED
@@ -17,9 +18,8 @@ from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import PressureJump, Program, Status
-from creepkit.specimens.dimple import DimpleGeometry
-from creepkit.specimens.observation import Observation
-from creepkit.specimens.top_profile import surface_interpolation
+from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.specimens.bulge.observation import Observation
 
 if not BENCHMARKS.is_dir():
     pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)

@@ -8,7 +8,7 @@ from fem_cases import STILL, course, equal_steps, mesh_of, orders, run, shell, s
 
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
-from creepkit.specimens.dimple import DimpleGeometry
+from creepkit.specimens.bulge.geometry import DimpleGeometry
 
 MESHES = (2, 4, 8, 16)
 

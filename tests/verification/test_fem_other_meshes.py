@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 from fem_cases import BENCHMARKS, course, run
 
+from creepkit.fem.mesh import discretize, surface_interpolation
 from creepkit.fem.mesh_files import read_input_deck, read_mesh
-from creepkit.fem.shape import discretize
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import PressureJump, Program, Status
-from creepkit.specimens.dimple import DimpleGeometry
-from creepkit.specimens.observation import Observation
-from creepkit.specimens.top_profile import surface_interpolation
+from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.specimens.bulge.observation import Observation
 
 if not BENCHMARKS.is_dir():
     pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from fem_cases import BENCHMARKS, block, course, mesh_of, run, steady_velocity
 
-from creepkit.fem.mesh import Mesh
-from creepkit.fem.strip import StripMesh
+from creepkit.fem.mesh import Mesh, StripMesh
 from creepkit.records import Program
 
 if not BENCHMARKS.is_dir():

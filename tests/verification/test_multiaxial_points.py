@@ -10,7 +10,12 @@ import numpy as np
 import pytest
 
 from creepkit.integration import IntegrationSettings
-from creepkit.integration.driver import PointTrajectory, prescribed_strain, prescribed_stress, integrate_tensor_point
+from creepkit.integration.tensor_integration import (
+    PointTrajectory,
+    integrate_tensor_point,
+    prescribed_strain,
+    prescribed_stress,
+)
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Param, mean_stress, parameters, principal_stress, stress
 from creepkit.laws.norton import NORTON
@@ -28,7 +33,9 @@ G, K = E / (2 * (1 + NU)), E / (3 * (1 - 2 * NU))
 
 def driven(law: CreepLaw, values, controls, times, elastic=STEEL, temperature=300.0) -> PointTrajectory:
     kernel = lower(law, "numba")
-    run = integrate_tensor_point(kernel, kernel.to_internal(values)[0], elastic, controls, temperature, times, settings=ENDLESS)
+    run = integrate_tensor_point(
+        kernel, kernel.to_internal(values)[0], elastic, controls, temperature, times, settings=ENDLESS
+    )
     assert run.status == Status.COMPLETE
     assert run.reason == ""
     return run

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 import creepkit
-from creepkit.kernels.exact import MultiprecisionLaw
+from creepkit.kernels.multiprecision import MultiprecisionLaw
 from creepkit.language import CreepLaw
 from creepkit.testing import draw_samples
-from creepkit.testing.parity import MultiprecisionReference, largest_differences
-from creepkit.testing.tables import KERNEL_EVALUATORS
+from creepkit.testing.parity import KERNEL_EVALUATORS, MultiprecisionReference, largest_differences
 
 SAMPLES = 1024
 SHIPPED = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine", "drifting-exponent", "combined")

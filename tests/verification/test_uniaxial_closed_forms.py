@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.stats import qmc
 
-from creepkit.integration import PointTest, IntegrationSettings, integrate
+from creepkit.integration import IntegrationSettings, PointTest, integrate
 from creepkit.kernels import lower
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
@@ -225,7 +225,9 @@ def test_sensitivities_are_the_derivatives_of_the_solution(loading):
             marks = end * np.array([0.0, 0.3, 0.3, 0.6, 0.7, 1.0])
             program = Program(marks, stress * np.array([1.0, 1.0, 1.15, 1.15, 0.8, 0.8]))
         test = PointTest(program, ROOM, end * GRID, constant_load=loading == "load")
-        result = integrate(kernel, theta, [test], settings=IntegrationSettings(rtol=1e-8, strain_limit=10.0), jacobian=True)
+        result = integrate(
+            kernel, theta, [test], settings=IntegrationSettings(rtol=1e-8, strain_limit=10.0), jacobian=True
+        )
         if result.status[0, 0] != 0:
             continue  # differences mean nothing where a neighbour bursts
         reached = result.strain[0] < 0.3

@@ -12,11 +12,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
 
 from planted_campaign import BAR, Planted
 
-from creepkit.dataset import campaign
-from creepkit.dataset.campaign import generate
-from creepkit.dataset.columns import COLUMNS
+from creepkit.dataset import generation
+from creepkit.dataset.dataset import COLUMNS
+from creepkit.dataset.generation import generate
 from creepkit.dataset.shards import Campaign
-from creepkit.dataset.worker import run_task
+from creepkit.jobs.worker import run_task
 
 ROWS = 16
 
@@ -31,7 +31,7 @@ def run(to, design=None, **how):
 class Here:
     """A worker that is this very process: where no process matters, none is started."""
 
-    campaign: Campaign
+    generation: Campaign
     asked: list = field(default_factory=list)
 
     @property
@@ -50,7 +50,7 @@ class Here:
 def run_here(to, design=None, **how):
     """The same campaign without processes."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(campaign, "_crew", lambda one, workers, cluster: nullcontext(Here(one)))
+        patched.setattr(generation, "_crew", lambda one, workers, cluster: nullcontext(Here(one)))
         return run(to, design, **how)
 
 

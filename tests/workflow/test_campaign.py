@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from campaigns import ROWS, assert_same, left_behind, run, run_here, shards_of, whole_of
 from planted_campaign import Deadly, Planted, Strong, Visible, strain, stress_of
 
-from creepkit.dataset import store
+from creepkit.dataset import storage
 
 
 @pytest.fixture(scope="module")
@@ -183,9 +183,9 @@ def test_two_campaigns_in_one_folder_share_the_work(whole, tmp_path):
     to, log = tmp_path / "a.h5", tmp_path / "log"
     both = [started(to, log, seconds=0.02, workers=1) for _ in range(2)]
     assert [process.communicate()[1] for process in both] == ["", ""]
-    data = store.read_dataset(to)
+    data = storage.read_dataset(to)
     assert_same(data, whole)
-    made = [store.read_dataset(path) for path in shards_of(to)]
+    made = [storage.read_dataset(path) for path in shards_of(to)]
     assert log.stat().st_size == sum((part.status >= 0).sum() for part in made)
     assert len(made) <= len(data) // ROWS + 2
 

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from campaigns import ROWS, assert_same, left_behind, run, run_here, shards_of, whole_of
 from planted_campaign import Planted, Raising
 
-from creepkit.dataset import store
+from creepkit.dataset import storage
 from creepkit.errors import DatasetError
 
 
@@ -71,7 +71,7 @@ def test_a_target_that_is_something_else_is_refused_before_any_work(tmp_path, wh
     with pytest.raises(DatasetError, match=r"a\.h5: not an HDF5 file"):
         run_here(to)
     assert to.read_text() == "precious"
-    store.write_dataset(whole, to)
+    storage.write_dataset(whole, to)
     with pytest.raises(
         DatasetError, match=r"holds another data set \(there and here seed is 0 and 1\); choose another name"
     ):
@@ -136,13 +136,13 @@ def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
     ],
 )
 def test_what_cannot_be_asked_for(tmp_path, how, message, monkeypatch):
-    monkeypatch.setattr("creepkit.dataset.cluster.WAIT", 0.5)
+    monkeypatch.setattr("creepkit.jobs.workers.WAIT", 0.5)
     with pytest.raises(DatasetError, match=message):
         run(tmp_path / "a.h5", **how)
 
 
 def test_a_design_of_which_nothing_is_accepted_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr("creepkit.dataset.ledger.HOPELESS", 64)
+    monkeypatch.setattr("creepkit.jobs.shard_progress.HOPELESS", 64)
     with pytest.raises(
         DatasetError, match="none of the first 64 draws was accepted; see 'creepkit generate --dry-run'"
     ):

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import creepkit as ck
 from creepkit.cli.app import app
-from creepkit.inverse.validation import leave_one_condition_out, loading_strains, times_to_strain
+from creepkit.inverse.cross_validation import leave_one_condition_out, loading_strains, times_to_strain
 from creepkit.language import CreepLaw, Param, parameters, strain, stress
 
 CURVES = Path(__file__).parents[3] / "shared" / "data" / "uniaxial" / "cmsx6"

@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from creepkit.cli.app import app
-from creepkit.plates.planted import planted_plate
-from creepkit.readers.writing import write_history
+from creepkit.readers.history_csv import write_history
+from creepkit.screening.planted import planted_plate
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
 

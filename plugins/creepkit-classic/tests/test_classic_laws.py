@@ -15,7 +15,9 @@ LAWS = [
 
 
 def test_they_come_through_their_entry_points() -> None:
-    ours = [name for name, law in default_registry().laws().items() if law.provenance.origin.startswith("creepkit-classic ")]
+    ours = [
+        name for name, law in default_registry().laws().items() if law.provenance.origin.startswith("creepkit-classic ")
+    ]
 
     assert sorted(ours) == LAWS
 

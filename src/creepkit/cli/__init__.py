@@ -1,12 +1,63 @@
-"""The command line: one command a file, and nothing heavy is imported before a command runs."""
+"""The command line: one command a file, and nothing heavy is imported before a command runs.
+
+Compiled code has a folder of its own for each state of the sources: numba looks at the file of a compiled function
+alone, not at those it calls, so code cached beside the sources would outlive an edit or an upgrade. The command line,
+the set-up and the tests share this folder.
+"""
 
 from __future__ import annotations
+
+import os
+import shutil
+import zlib
+from pathlib import Path
+
+_SOURCES = Path(__file__).parents[1]
+
+
+_COMPILED_SOURCES = (
+    "integration/*.py",
+    "kernels/*.py",
+    "fem/*.py",
+    "specimens/bulge/**/*.py",
+)
+
+
+_KEPT_CACHES = 3
+
+
+def set_numba_cache() -> None:
+    """Let numba keep its code in that folder unless NUMBA_CACHE_DIR is set; numba must not be imported yet."""
+    if "NUMBA_CACHE_DIR" not in os.environ:
+        folder = numba_cache_folder()
+        os.environ["NUMBA_CACHE_DIR"] = str(folder)
+        _remove_old_caches(folder)
+
+
+def numba_cache_folder() -> Path:
+    """The folder for these sources, in CREEPKIT_CACHE or the user's cache folder."""
+    checksum = 0
+    for pattern in _COMPILED_SOURCES:
+        for path in sorted(_SOURCES.glob(pattern)):
+            checksum = zlib.crc32(path.read_bytes(), checksum)
+    configured = os.environ.get("CREEPKIT_CACHE")
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "creepkit"
+    return Path(configured or cache) / "compiled" / f"{checksum:08x}"
+
+
+def _remove_old_caches(folder: Path) -> None:
+    """Remove what the oldest states of the sources have left; another process may be at it too."""
+    if folder.is_dir():
+        os.utime(folder)
+        return
+    other_folders = sorted(folder.parent.glob("*"), key=lambda path: path.stat().st_mtime, reverse=True)
+    for old in other_folders[_KEPT_CACHES:]:
+        shutil.rmtree(old, ignore_errors=True)
 
 
 def main() -> None:
     """Run the command line; the entry point of the script `creepkit`."""
     from creepkit.cli.app import app
-    from creepkit.cli.compiled import set_numba_cache
 
     set_numba_cache()
     app()

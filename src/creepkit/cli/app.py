@@ -13,7 +13,6 @@ import typer
 from typer.core import TyperGroup
 
 from creepkit.cli import (
-    base,
     check,
     confirm,
     data,
@@ -25,6 +24,7 @@ from creepkit.cli import (
     laws,
     new_law,
     plugins,
+    reduced_model,
     screen,
     simulate,
     specimens,
@@ -70,6 +70,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+
 COMMANDS: dict[str, Callable[..., None]] = {
     "laws": laws.command,
     "specimens": specimens.command,
@@ -77,7 +78,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "check": check.command,
     "new-law": new_law.command,
     "simulate": simulate.command,
-    "base": base.command,
+    "reduced-model": reduced_model.command,
     "train": train.command,
     "sweep": sweep.command,
     "generate": generate.command,
@@ -89,6 +90,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "export": export.command,
     "demo": demo.command,
 }
+
 
 for name, command in COMMANDS.items():
     app.command(name)(command)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.printing import print_json, print_table
+from creepkit.report.terminal import print_json, print_table
 
 if TYPE_CHECKING:
-    from creepkit.inverse.confirm import Confirmation, ConfirmedOutput
+    from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
 
 
 def command(
@@ -26,16 +26,20 @@ def command(
     """Simulate an identified law for each test."""
     from dataclasses import replace
 
-    from creepkit import study
+    import creepkit as ck
 
-    identification, histories = study.load(fit), study.read_histories(tests)
+    identification, histories = ck.load(fit), ck.read_histories(tests)
     if surrogate is not None:
-        identification = replace(identification, predictor=study.surrogate(surrogate))
-    confirmation = study.confirm(identification, histories)
+        identification = replace(identification, predictor=ck.surrogate(surrogate))
+    confirmation = ck.confirm(identification, histories)
     if as_json:
-        print_json({"holds": confirmation.confirmed, "verdict": confirmation.verdict, **_json_value(asdict(confirmation))})
+        print_json(
+            {"holds": confirmation.confirmed, "verdict": confirmation.verdict, **_json_value(asdict(confirmation))}
+        )
         return
-    print_table(f"{confirmation.law} by {confirmation.predictor_name}", CONFIRMATION_COLUMNS, confirmation_rows(confirmation))
+    print_table(
+        f"{confirmation.law} by {confirmation.predictor_name}", CONFIRMATION_COLUMNS, confirmation_rows(confirmation)
+    )
     typer.echo(confirmation.verdict)
 
 
@@ -50,7 +54,14 @@ def confirmation_rows(confirmation: Confirmation) -> list[tuple[str, ...]]:
 def _row(test: str, comparison: ConfirmedOutput) -> tuple[str, ...]:
     fit_chi_square = "" if comparison.fit_errors is None else _number_text(comparison.fit_errors.chi_square)
     rms = _number_text(math.sqrt(comparison.simulation_errors.mean_squared_error))
-    return test, comparison.output, _number_text(comparison.simulation_errors.chi_square), fit_chi_square, rms, _number_text(comparison.rms_difference)
+    return (
+        test,
+        comparison.output,
+        _number_text(comparison.simulation_errors.chi_square),
+        fit_chi_square,
+        rms,
+        _number_text(comparison.rms_difference),
+    )
 
 
 def _number_text(number: float) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from creepkit.cli.printing import print_json
+from creepkit.report.terminal import print_json
 
 
 def command(
@@ -19,16 +19,16 @@ def command(
     seed: Annotated[int, typer.Option(min=0, help="Which handful.")] = 0,
 ) -> None:
     """Describe a data set: counts, reasons, ranges."""
-    from creepkit import study
-    from creepkit.dataset.describe import summary
+    import creepkit as ck
+    from creepkit.dataset.dataset import summary
 
-    data = study.read_dataset(file)
+    data = ck.read_dataset(file)
     if as_json:
         print_json(summary(data))
     else:
         typer.echo(str(data))
     if plots is not None:
-        from creepkit.dataset.plotting import write_dataset_figures
+        from creepkit.report.dataset import write_dataset_figures
 
         for path in write_dataset_figures(data, plots, seed):
             typer.echo(f"wrote {path}", err=as_json)

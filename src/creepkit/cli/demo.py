@@ -8,20 +8,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.identified import file_stem, print_ranking, write_ranking
-from creepkit.cli.identify import rank_laws
-from creepkit.cli.printing import print_table
+from creepkit.cli.identify import file_stem, print_ranking, rank_laws, write_ranking
+from creepkit.report.terminal import print_table
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.selection import Ranking
     from creepkit.records import History
 
+
 PLANTED = Path(__file__).parent / "planted"
 """Nine creep curves of bars, and the truth behind them."""
+
+
 PLANTED_BULGE = Path(__file__).parent / "planted_bulge"
 """A bulge test of one dimple, and the truth behind it."""
+
+
 UNIAXIAL_LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
+
+
 BULGE_LAWS = ("norton", "strain-hardening", "time-hardening")
 
 
@@ -33,11 +39,11 @@ def command(
 
     The truth is printed beside the answer.
     """
-    from creepkit import study
+    import creepkit as ck
 
     folder = PLANTED if uniaxial else PLANTED_BULGE
     truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
-    histories = study.read_histories(sorted(folder.glob("*.csv")))
+    histories = ck.read_histories(sorted(folder.glob("*.csv")))
     ranking = _rank_uniaxial_laws(histories) if uniaxial else _rank_bulge_laws(histories)
     written_files = write_ranking(ranking, to)
     if not uniaxial:
@@ -48,14 +54,16 @@ def command(
 
 def compile_kernels() -> None:
     """Compile what the demo needs and keep it on disk, as part of setting up."""
-    from creepkit import study
-    from creepkit.inverse.together import reduced_order_model_of
+    import creepkit as ck
+    from creepkit.inverse.composite_predictor import reduced_order_model_of
 
-    (test,) = study.read_histories(sorted(PLANTED_BULGE.glob("*.csv")))
-    shortened_test = test.replace(times=test.times[:3], outputs={name: values[:3] for name, values in test.outputs.items()})
-    law = study.law(BULGE_LAWS[0])
+    (test,) = ck.read_histories(sorted(PLANTED_BULGE.glob("*.csv")))
+    shortened_test = test.replace(
+        times=test.times[:3], outputs={name: values[:3] for name, values in test.outputs.items()}
+    )
+    law = ck.law(BULGE_LAWS[0])
     values = {name: param.center for name, param in law.table.items()}
-    bulge = study.specimen("bulge")
+    bulge = ck.specimen("bulge")
     bulge.predict(law, values, [shortened_test], jacobian=True)
     reduced_model = reduced_order_model_of(bulge)
     assert reduced_model is not None
@@ -63,18 +71,18 @@ def compile_kernels() -> None:
 
 
 def _rank_uniaxial_laws(histories: list[History]) -> Ranking:
-    from creepkit import study
-    from creepkit.inverse.warmth import with_arrhenius
+    import creepkit as ck
+    from creepkit.inverse.reference_conditions import with_arrhenius
 
     typer.echo(f"{len(histories)} creep curves made by this package, with noise, from a law that is now forgotten:")
     for history in histories:
         typer.echo(f"  {history.condition:16} {history.times.size} frames to {history.times[-1] / 3600:.0f} h")
-    laws = [with_arrhenius(study.law(name), histories) for name in UNIAXIAL_LAWS]
+    laws = [with_arrhenius(ck.law(name), histories) for name in UNIAXIAL_LAWS]
     return rank_laws(laws, histories, starts=8, seed=0, loss="linear")
 
 
 def _rank_bulge_laws(histories: list[History]) -> Ranking:
-    from creepkit import study
+    import creepkit as ck
     from creepkit.records import Nuisance
 
     (test,) = histories
@@ -84,15 +92,15 @@ def _rank_bulge_laws(histories: list[History]) -> Ranking:
         f"  {' then '.join(pressures)} MPa, {test.times.size} frames to {test.times[-1] / 3600:.0f} h, top raised by "
         f"{test.outputs['amplitude'][-1]:.2f} mm; every candidate is simulated by finite elements"
     )
-    laws = [study.law(name) for name in BULGE_LAWS]
+    laws = [ck.law(name) for name in BULGE_LAWS]
     return rank_laws(laws, histories, nuisances=[Nuisance("offset")], starts=1, seed=0, loss="linear")
 
 
 def _plot_section(fit: Identification, test: History, folder: Path) -> Path:
     """Draw the section of the dimple at the end of the test, as the identified law has it."""
-    from creepkit import study
+    import creepkit as ck
 
-    run = study.simulate(
+    run = ck.simulate(
         fit.law, "bulge", fit.values, loading=test.loading, times=test.times, temperature=test.temperature,
         elastic=test.elastic, name=f"{test.name}, {fit.law.name} as identified",
     )  # fmt: skip

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.printing import print_json
-from creepkit.cli.progress import ProgressBar
+from creepkit.report.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from creepkit.discovery.trend import TemperatureLaw
+    from creepkit.discovery.temperature_law import TemperatureLaw
     from creepkit.inverse.identification import Identification
 
 
@@ -54,7 +53,7 @@ def command(
     From saved identifications forms are found alone, for want of the tests. JSON, a plot, LaTeX and Python go to a
     folder.
     """
-    from creepkit.cli.identify import check_folder
+    from creepkit.cli.options import check_folder
 
     check_folder(to)
     forms, prior_odds = parse_forms(form), parse_prior_odds(prior)
@@ -62,7 +61,17 @@ def command(
         temperature_law = _discover_from_identifications(files, forms, prior_odds)
     else:
         temperature_law = _discover_from_tests(
-            files, reader, law, through, forms, prior_odds, nuisance, within=within, starts=starts, seed=seed, moduli=moduli
+            files,
+            reader,
+            law,
+            through,
+            forms,
+            prior_odds,
+            nuisance,
+            within=within,
+            starts=starts,
+            seed=seed,
+            moduli=moduli,
         )
     written = write_temperature_law(temperature_law, to)
     if as_json:
@@ -102,10 +111,10 @@ def parse_prior_odds(texts: Sequence[str] | None) -> dict[str, dict[str, float]]
 
 
 def _discover_from_identifications(files: Sequence[str], forms: Any, prior: Any) -> TemperatureLaw:
-    from creepkit import study
+    import creepkit as ck
     from creepkit.discovery.discover import discover
 
-    fits: list[Identification] = [study.load(Path(name)) for name in files]
+    fits: list[Identification] = [ck.load(Path(name)) for name in files]
     with ProgressBar() as progress:
         return discover(fits, forms=forms, prior=prior, progress=progress.tick)
 
@@ -114,15 +123,15 @@ def _discover_from_tests(
     files: Sequence[str], reader: str | None, law: str, through: str | None, forms: Any, prior: Any,
     nuisance: Sequence[str] | None, *, within: float, starts: int, seed: int, moduli: bool,
 ) -> TemperatureLaw:  # fmt: skip
-    from creepkit import study
-    from creepkit.cli.identify import parse_nuisances
-    from creepkit.discovery.temperature_study import temperature_study
+    import creepkit as ck
+    from creepkit.api.simulation import specimens_of_histories
+    from creepkit.cli.options import parse_nuisances
+    from creepkit.discovery.discover import temperature_study
     from creepkit.errors import FitError
     from creepkit.inverse.settings import IdentificationSettings
-    from creepkit.study.nouns import specimens_of_histories
 
-    tests = study.read_histories(list(files), reader)
-    using = study.surrogate(through) if through else specimens_of_histories(tests)
+    tests = ck.read_histories(list(files), reader)
+    using = ck.surrogate(through) if through else specimens_of_histories(tests)
     if isinstance(using, dict):
         raise FitError(f"the tests are of several specimens, {', '.join(using)}; discover() takes those of one")
     nuisances = parse_nuisances(nuisance)
@@ -131,7 +140,7 @@ def _discover_from_tests(
         settings = IdentificationSettings(starts=starts, seed=seed, nuisances=tuple(nuisances))
     with ProgressBar() as progress:
         result = temperature_study(
-            study.law(law), tests, using, moduli=moduli, within=within, forms=forms, prior=prior, settings=settings,
+            ck.law(law), tests, using, moduli=moduli, within=within, forms=forms, prior=prior, settings=settings,
             progress=progress.tick,
         )  # fmt: skip
     for note in result.notes:
@@ -143,14 +152,14 @@ def _discover_from_tests(
 
 def write_temperature_law(temperature_law: TemperatureLaw, folder: Path) -> list[Path]:
     """Write the answer as JSON, plot, LaTeX and Python; returns the paths."""
-    from creepkit import study
+    import creepkit as ck
 
     folder.mkdir(parents=True, exist_ok=True)
     written = [temperature_law.save(folder / "temperature.json"), folder / "temperature.png"]
     temperature_law.plot(written[1])
     for language, suffix in (("latex", ".tex"), ("python", ".py")):
         path = folder / f"law{suffix}"
-        study.export(temperature_law.valued, language, to=path, force=True)
+        ck.export(temperature_law.valued, language, to=path, force=True)
         written.append(path)
     return written
 
@@ -162,9 +171,15 @@ def _json_result(temperature_law: TemperatureLaw, written: Sequence[Path]) -> di
         "range_K": list(temperature_law.temperature_range),
         "T_ref_K": temperature_law.T_ref,
         "forms": temperature_law.forms,
-        "sets": {name: [vars(form_weight) for form_weight in form_weights] for name, form_weights in temperature_law.plausible_forms.items()},
+        "sets": {
+            name: [vars(form_weight) for form_weight in form_weights]
+            for name, form_weights in temperature_law.plausible_forms.items()
+        },
         "parameters": {e.name: {k: v for k, v in vars(e).items() if k != "name"} for e in temperature_law.estimates},
-        "candidates": [{"forms": candidate.forms, "excess": candidate.criterion_difference, "weight": candidate.weight} for candidate in temperature_law.candidates],
+        "candidates": [
+            {"forms": candidate.forms, "excess": candidate.criterion_difference, "weight": candidate.weight}
+            for candidate in temperature_law.candidates
+        ],
         "notes": list(temperature_law.notes),
         "files": [str(path) for path in written],
     }

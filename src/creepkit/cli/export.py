@@ -38,16 +38,16 @@ def command(
 
     Intervals and the range of validity travel as comments.
     """
-    from creepkit import study
+    import creepkit as ck
     from creepkit.language import Elastic
     from creepkit.records import ZERO_CELSIUS
 
     if to == "list":
-        for target in study.exporters().values():
+        for target in ck.available("exporters").values():
             typer.echo(f"{target.name:16} {target.suffix:8} {target.title}")
         return
     law_source = _resolve_source(source)
-    text = study.export(
+    text = ck.export(
         law_source,
         to,
         _merged_values(law_source, value),
@@ -63,22 +63,26 @@ def command(
 
 def _resolve_source(text: str) -> CreepLaw | Identification | LawWithValues:
     """A file where there is one, or where its name says so; else a law by name."""
-    from creepkit import study
+    import creepkit as ck
 
     path = Path(text)
     if path.suffix.lower() == ".json" or path.is_file():
-        from creepkit.export.document import read_law_file
+        from creepkit.exporters.law_files import read_law_file
 
         return read_law_file(path)
-    return study.law(text)
+    return ck.law(text)
 
 
-def _merged_values(law_source: CreepLaw | Identification | LawWithValues, assignments: list[str] | None) -> dict[str, float] | None:
+def _merged_values(
+    law_source: CreepLaw | Identification | LawWithValues, assignments: list[str] | None
+) -> dict[str, float] | None:
     """The values of the source with those given in their place; None for a source's own."""
-    from creepkit.cli.loads import parse_numbers
+    from creepkit.cli.options import parse_numbers
 
     given_values = parse_numbers(assignments or [], "--set", "n=5.2")
-    source_values: Mapping[str, float] | None = getattr(law_source, "values", None) if hasattr(law_source, "law") else None
+    source_values: Mapping[str, float] | None = (
+        getattr(law_source, "values", None) if hasattr(law_source, "law") else None
+    )
     if source_values is None:
         return given_values
     return {**source_values, **given_values} if given_values else None

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.loads import BULGE
-from creepkit.cli.printing import print_json
-from creepkit.cli.progress import ProgressBar
+from creepkit.cli.options import BULGE
+from creepkit.report.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
-    from creepkit.dataset.design import SamplingDesign
     from creepkit.records import Specimen
+    from creepkit.sampling.domains import SamplingDesign
+
 
 RATE_FAMILY = "rate-family"
 """What is asked for in the place of a law, to have rate functions of many laws."""
@@ -55,18 +55,20 @@ def command(
 
     Interrupted, it goes on where it was when it is started again in the same way.
     """
-    from creepkit import study
+    import creepkit as ck
     from creepkit.errors import DatasetError
 
-    specimen_record = study.specimen(specimen)
-    design = select_design(law, specimen_record, domain, design_changes(ranges or [], end_h, domain, unscreened), interval)
+    specimen_record = ck.specimen(specimen)
+    design = select_design(
+        law, specimen_record, domain, design_changes(ranges or [], end_h, domain, unscreened), interval
+    )
     if dry_run:
         print_acceptance(design, seed, to, as_json)
         return
     if to is None:
         raise DatasetError("--to FILE is missing: name the HDF5 file to write, such as --to combined.h5")
     with ProgressBar() as progress:
-        data = study.generate(
+        data = ck.generate(
             design, specimen_record, samples, draws=draws, seed=seed, to=to, workers=workers, cluster=cluster,
             part=parse_part(part), progress=progress.tick,
         )  # fmt: skip
@@ -103,15 +105,17 @@ def parse_range(text: str) -> tuple[str, tuple[float, float]]:
     return name.strip(), (low, high)
 
 
-def select_design(law: str, specimen: Specimen, domain: str | None, changes: dict[str, Any], interval: float | None) -> SamplingDesign:
+def select_design(
+    law: str, specimen: Specimen, domain: str | None, changes: dict[str, Any], interval: float | None
+) -> SamplingDesign:
     """The design that these options name; interval : s between frames."""
     import numpy as np
 
-    from creepkit import study
-    from creepkit.dataset.rate_family import END_TIME_RANGE
-    from creepkit.dataset.time_grid import TimeGrid
+    import creepkit as ck
+    from creepkit.api.simulation import resolve_design
     from creepkit.errors import DatasetError
-    from creepkit.study.sets import resolve_design
+    from creepkit.sampling.conditions import TimeGrid
+    from creepkit.sampling.rate_family import END_TIME_RANGE
 
     if law != RATE_FAMILY:
         return resolve_design(law, specimen, domain, changes if interval is None else {**changes, "every": interval})
@@ -119,7 +123,7 @@ def select_design(law: str, specimen: Specimen, domain: str | None, changes: dic
         raise DatasetError(f"--box {domain}: {RATE_FAMILY} has a box of its own; leave --box out")
     if interval is not None:
         changes["grid"] = TimeGrid.every(interval, np.max(changes.get("end_time", END_TIME_RANGE[1])))
-    return study.rate_family(specimen, **changes)
+    return ck.rate_family(specimen, **changes)
 
 
 def parse_part(text: str | None) -> tuple[int, int] | None:
@@ -136,8 +140,7 @@ def parse_part(text: str | None) -> tuple[int, int] | None:
 
 def print_acceptance(design: SamplingDesign, seed: int, to: Path | None, as_json: bool) -> None:
     """Print what the design would draw, and draw the rates of its samples."""
-    from creepkit.dataset.acceptance import acceptance
-    from creepkit.dataset.box import SamplingDomain
+    from creepkit.sampling.domains import SamplingDomain, acceptance
 
     assert isinstance(design, SamplingDomain)  # the command line knows no others
     acceptance_rates = acceptance(design, seed=seed)
@@ -146,7 +149,9 @@ def print_acceptance(design: SamplingDesign, seed: int, to: Path | None, as_json
     if as_json:
         criterion_fractions = {name: float(passed.mean()) for name, passed in acceptance_rates.criteria_met.items()}
         fractions = {"simulated": float(acceptance_rates.kept.mean()), "useful": float(acceptance_rates.useful.mean())}
-        print_json({"draws": len(acceptance_rates.draws), "met": criterion_fractions, **fractions, "picture": str(plot_file)})
+        print_json(
+            {"draws": len(acceptance_rates.draws), "met": criterion_fractions, **fractions, "picture": str(plot_file)}
+        )
     else:
         typer.echo(f"{acceptance_rates}\nwrote {plot_file}; nothing was simulated")
 
@@ -154,7 +159,7 @@ def print_acceptance(design: SamplingDesign, seed: int, to: Path | None, as_json
 def print_dataset(data: Dataset, to: Path, part: str | None, as_json: bool) -> None:
     """Print what was made, and where it lies."""
     if as_json:
-        from creepkit.dataset.describe import summary
+        from creepkit.dataset.dataset import summary
 
         print_json({**summary(data), "file": str(to), "part": part})
         return

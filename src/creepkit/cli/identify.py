@@ -1,24 +1,115 @@
-"""`creepkit identify`: from a folder of creep curves to a named law with intervals and a plot."""
+"""`creepkit identify`: from a folder of creep curves to a ranking of laws with intervals, and its files."""
 
 from __future__ import annotations
 
-import os
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.choices import penalty_named, search_named
-from creepkit.cli.identified import ranking_to_json, print_ranking, write_ranking
-from creepkit.cli.printing import print_json
-from creepkit.cli.progress import ProgressBar
+from creepkit.cli.options import check_folder, parse_nuisances, parse_weights, penalty_named, search_named
+from creepkit.report.terminal import ProgressBar, print_json, print_table
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection import Ranking
+    from creepkit.records import History
+
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from creepkit.inverse.selection import Ranking
     from creepkit.language import CreepLaw
-    from creepkit.records import History, Nuisance
+    from creepkit.records import History
+
+
+def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
+    """Write every law's JSON and plot, and the best law as LaTeX and Python; returns the paths."""
+    import creepkit as ck
+
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for entry in ranking.laws:
+        name = file_stem(entry.fit.law.name)
+        written.append(entry.fit.save(folder / f"{name}.json"))
+        entry.fit.plot(folder / f"{name}.png")
+        written.append(folder / f"{name}.png")
+    best = ranking.best
+    for language, suffix in (("latex", ".tex"), ("python", ".py")):
+        path = folder / f"{file_stem(best.law.name)}{suffix}"
+        ck.export(best, language, to=path, force=True)
+        written.append(path)
+    return written
+
+
+def file_stem(name: str) -> str:
+    """A law's name as a file name."""
+    return re.sub(r"[^A-Za-z0-9.=-]+", "-", name).strip("-") or "law"
+
+
+def print_ranking(ranking: Ranking, written: list[Path], histories: list[History]) -> None:
+    """Print the table of laws, the verdict, the best law and what was written."""
+    rows = [
+        (
+            entry.fit.law.name,
+            str(len(entry.fit.law.params)),
+            *_misfit_cells(entry.fit),
+            f"{entry.excess:.1f}",
+            f"{entry.weight:.3f}",
+        )
+        for entry in ranking.laws
+    ]
+    columns = ("law", "parameters", *_misfit_columns(ranking.best), "BIC - best", "weight")
+    print_table(f"{len(histories)} tests", columns, rows)
+    typer.echo(f"{ranking.verdict}\n\n{ranking.best}\n")
+    for path in written:
+        typer.echo(f"wrote {path}")
+
+
+def _misfit_columns(fit: Identification) -> tuple[str, ...]:
+    output = next(iter(fit.errors))
+    return ("rms ln strain" if output == "strain" else f"error of {output}", "test to test", "not followed")
+
+
+def _misfit_cells(fit: Identification) -> tuple[str, ...]:
+    output = next(iter(fit.errors))
+    misfit = f"{fit.rms:.3f}" if output == "strain" else f"{fit.errors[output].relative_squared_error:.3g}"
+    return misfit, f"{100 * fit.noise_model.rate:.0f} %", f"{100 * fit.noise_model[output].drift:.0f} %"
+
+
+def ranking_to_json(ranking: Ranking, written: list[Path]) -> dict[str, Any]:
+    """The same for JSON."""
+    return {
+        "verdict": ranking.verdict,
+        "laws": [
+            {**_fit_to_json(ranked.fit), "bic_excess": ranked.excess, "weight": ranked.weight}
+            for ranked in ranking.laws
+        ],
+        "files": [str(path) for path in written],
+    }
+
+
+def _fit_to_json(fit: Identification) -> dict[str, Any]:
+    return {
+        "law": fit.law.name,
+        **({"rms_ln_strain": fit.rms} if "strain" in fit.errors else {}),
+        "errors": {name: _json_numbers(vars(e)) for name, e in fit.errors.items()},
+        "parameters": {e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
+                       for e in fit.estimates},
+        "nuisances": [_json_numbers(vars(n)) for n in fit.nuisances],
+        "scatter": fit.noise_model.to_dict(),
+        "notes": list(fit.notes),
+    }  # fmt: skip
+
+
+def _json_numbers(record: dict[str, Any]) -> dict[str, Any]:
+    """The same with null for what JSON cannot hold."""
+    import math
+
+    return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in record.items()}
+
 
 DEFAULT_METHOD = ("likelihood", "multi-start", None, "linear", "gaussian")
 """Weights, search, penalty, loss and loss of tests with which laws are selected, sums among them."""
@@ -61,7 +152,7 @@ def command(
 
     Every law is fitted to all curves at once; JSON and plots of each, LaTeX and Python of the best, go to a folder.
     """
-    from creepkit import study
+    import creepkit as ck
     from creepkit.errors import FitError
 
     if temperature not in ("auto", "none"):
@@ -69,13 +160,13 @@ def command(
     if up_to is not None and not up_to > 0:
         raise FitError(f"--up-to {up_to:g} is not a strain above zero; write 0.05 for 5 %")
     check_folder(to)
-    candidate_laws = [study.law(name) for name in dict.fromkeys(law)]
-    histories = study.read_histories(files, reader)
+    candidate_laws = [ck.law(name) for name in dict.fromkeys(law)]
+    histories = ck.read_histories(files, reader)
     if up_to is not None:
         histories = _truncate_at_strain(histories, up_to)
     _warn_of_duplicates(histories)
     if temperature == "auto":
-        from creepkit.inverse.warmth import with_arrhenius
+        from creepkit.inverse.reference_conditions import with_arrhenius
 
         candidate_laws = [with_arrhenius(candidate_law, histories) for candidate_law in candidate_laws]
     options: dict[str, Any] = {"starts": starts, "seed": seed, "nuisances": parse_nuisances(nuisance)}
@@ -90,7 +181,9 @@ def command(
         ranking = select_laws(candidate_laws, histories, sums=sums, **options)
     else:
         options |= {"loss": loss, "test_loss": test_loss, "weights": parse_weights(weights)}
-        ranking = rank_laws(candidate_laws, histories, search=search_named(search), penalty=penalty_named(penalty), **options)
+        ranking = rank_laws(
+            candidate_laws, histories, search=search_named(search), penalty=penalty_named(penalty), **options
+        )
     written = write_ranking(ranking, to)
     if as_json:
         print_json(ranking_to_json(ranking, written))
@@ -99,17 +192,6 @@ def command(
     if further:
         for proposed_test in ranking.further_tests():
             typer.echo(str(proposed_test), err=as_json)
-
-
-def check_folder(folder: Path) -> None:
-    """Say now, not after all the work, that results cannot be written there."""
-    from creepkit.errors import FitError
-
-    existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
-    if not existing.is_dir():
-        raise FitError(f"--to {folder}: {existing} is a file; name a folder for the results")
-    if not os.access(existing, os.W_OK):
-        raise FitError(f"--to {folder}: {existing} cannot be written to; name another folder for the results")
 
 
 def _truncate_at_strain(histories: list[History], limit: float) -> list[History]:
@@ -129,64 +211,23 @@ def _truncate_at_strain(histories: list[History], limit: float) -> list[History]
 
 
 def _warn_of_duplicates(histories: list[History]) -> None:
-    from creepkit.readers.duplicates import duplicate_tests
+    from creepkit.quality.comparison import duplicate_tests
 
     for first, second in duplicate_tests(histories):
         typer.echo(f"note: {first} and {second} look like one test published twice; both count", err=True)
 
 
-def parse_weights(text: str) -> Any:
-    """The weights of outputs, from text such as amplitude=0.99,width=0.01; or a word."""
-    from creepkit.errors import FitError
-    from creepkit.inverse.settings import WEIGHTINGS
-
-    if text in WEIGHTINGS:
-        return text
-    pairs = [part.partition("=") for part in text.split(",")]
-    try:
-        return {name.strip(): float(value) for name, _, value in pairs}
-    except ValueError:
-        words = f"{', '.join(WEIGHTINGS)} or amplitude=0.99,width=0.005"
-        raise FitError(f"--weights {text} is not known; write {words}") from None
-
-
-def parse_nuisances(texts: Sequence[str] | None) -> list[Nuisance] | None:
-    """The usual offset and rate, and those named: temperature, thickness=0.4935 or thickness=0.4935:0.027."""
-    from typing import get_args
-
-    from creepkit.errors import FitError
-    from creepkit.records import Nuisance
-    from creepkit.records.prediction import NuisanceKind
-
-    if not texts:
-        return None
-    nuisances = [Nuisance("offset"), Nuisance("rate")]
-    for text in texts:
-        kind, _, numbers_text = text.partition("=")
-        mean, _, sd = numbers_text.partition(":")
-        try:
-            numbers = float(mean or 0.0), float(sd) if sd else None
-        except ValueError:
-            raise FitError(f"--nuisance {text}: '{numbers_text}' is not MEAN or MEAN:SD, such as 0.4935:0.027") from None
-        matching_kinds = [known_kind for known_kind in get_args(NuisanceKind) if known_kind == kind]
-        if not matching_kinds:
-            raise FitError(f"--nuisance {text}: '{kind}' is not known; allowed are {', '.join(get_args(NuisanceKind))}")
-        nuisances = [n for n in nuisances if n.kind != kind]
-        nuisances.append(Nuisance(matching_kinds[0], mean=numbers[0], sd=numbers[1]))
-    return nuisances
-
-
 def select_laws(laws: Sequence[CreepLaw], histories: list[History], **options: Any) -> Ranking:
     """Identify the laws by likelihood and rank them, showing progress."""
-    from creepkit import study
+    import creepkit as ck
 
     with ProgressBar() as progress:
-        return study.select(laws, histories, progress=progress.tick, **options)
+        return ck.select(laws, histories, progress=progress.tick, **options)
 
 
 def rank_laws(laws: Sequence[CreepLaw], histories: list[History], **options: Any) -> Ranking:
     """Fit each law, showing progress, and rank them."""
-    from creepkit import study
+    import creepkit as ck
     from creepkit.inverse.selection import rank
 
     fits = []
@@ -196,5 +237,5 @@ def rank_laws(laws: Sequence[CreepLaw], histories: list[History], **options: Any
             def tick(task: str, done: int, total: int, name: str = law.name) -> None:
                 progress.tick(f"{name}, {task}", done, total)
 
-            fits.append(study.identify(law, histories, progress=tick, **options))
+            fits.append(ck.identify(law, histories, progress=tick, **options))
     return rank(fits)

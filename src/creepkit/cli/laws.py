@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.printing import print_json, print_table
+from creepkit.report.terminal import print_json, print_table
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw

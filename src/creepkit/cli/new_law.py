@@ -4,12 +4,82 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
     from string import Template
+
+
+LAW_TEMPLATE = Template('''\
+"""$title: say here in one line what the law describes."""
+
+from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress
+
+A, n = parameters("A n")
+
+$constant = CreepLaw(
+    name="$name",
+    title="$title",
+    terms={"power law": A * stress**n},
+    params={
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log", off=0.0),
+        n: Param("stress exponent", bounds=(1, 8)),
+    },
+    references=("Author (year), journal volume, page",),
+)
+
+
+@hookimpl
+def creepkit_laws():
+    return [$constant]
+''')
+
+
+PROJECT_TEMPLATE = Template("""\
+[build-system]
+requires = ["hatchling>=1.26"]
+build-backend = "hatchling.build"
+
+[project]
+name = "$package"
+version = "0.1.0"
+description = "$title, a creep law as a plugin of creepkit"
+readme = "README.md"
+requires-python = ">=3.11"
+dependencies = ["creepkit"]
+
+[project.entry-points.creepkit]
+$name = "$module"
+
+[tool.hatch.build]
+include = ["$module.py"]
+""")
+
+
+README_TEMPLATE = Template("""\
+# $package
+
+$title: say here what it describes, and where it was published.
+
+    pip install -e .
+    creepkit laws $name
+    creepkit check $name
+    pytest
+""")
+
+
+TEST_TEMPLATE = Template("""\
+import creepkit
+from creepkit.testing import check_law
+
+
+def test_it_keeps_what_every_law_promises() -> None:
+    report = check_law(creepkit.law("$name"))
+    assert report.ok, str(report)
+""")
 
 
 def command(
@@ -29,8 +99,6 @@ def command(
 
 def _write_file(name: str) -> str:
     """Write the law alone; say what to do next."""
-    from creepkit.cli.new_law_texts import LAW_TEMPLATE
-
     path = Path(f"{name.replace('-', '_')}.py")
     _check_absent(path)
     path.write_text(_fill_template(LAW_TEMPLATE, name), encoding="utf-8")
@@ -42,8 +110,6 @@ def _write_file(name: str) -> str:
 
 def _write_package(name: str) -> str:
     """Write a folder with the law, its project file, README and test; say what to do next."""
-    from creepkit.cli.new_law_texts import LAW_TEMPLATE, PROJECT_TEMPLATE, README_TEMPLATE, TEST_TEMPLATE
-
     folder, module = Path(name), _module_name(name)
     _check_absent(folder)
     (folder / "tests").mkdir(parents=True)
@@ -70,7 +136,9 @@ def _module_name(name: str) -> str:
 def _fill_template(text: Template, name: str) -> str:
     title = name.replace("-", " ").capitalize()
     constant = name.replace("-", "_").upper()
-    return text.substitute(name=name, title=title, constant=constant, module=_module_name(name), package=f"creepkit-{name}")
+    return text.substitute(
+        name=name, title=title, constant=constant, module=_module_name(name), package=f"creepkit-{name}"
+    )
 
 
 def _check_absent(path: Path) -> None:

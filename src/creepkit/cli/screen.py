@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from creepkit.cli.choices import penalty_named
-from creepkit.cli.identify import parse_nuisances
-from creepkit.cli.printing import print_json, print_table
-from creepkit.cli.progress import ProgressBar
+from creepkit.cli.options import parse_nuisances, penalty_named
+from creepkit.report.terminal import ProgressBar, print_json, print_table
 
 if TYPE_CHECKING:
-    from creepkit.plates.plate import Plate
     from creepkit.records import Predictor
+    from creepkit.screening.results import Plate
+
 
 CONFIRMATION_CHOICES = {"when-in-doubt": "when in doubt", "always": True, "never": False}
 
@@ -59,7 +58,7 @@ def command(
     """
     from creepkit.inverse.selection.select import SELECTION_FRAMES
     from creepkit.inverse.settings import IdentificationSettings
-    from creepkit.plates.screening import screen
+    from creepkit.screening.screen import screen
 
     with ProgressBar() as progress:
         plate = screen(
@@ -76,7 +75,7 @@ def command(
 
 def print_screening(plate: Plate, written: list[Path], as_json: bool) -> None:
     """Print the table, what it sums up to, and what was written."""
-    from creepkit.plates.table import TABLE_COLUMNS, table_rows, summary_lines
+    from creepkit.report.screening import TABLE_COLUMNS, summary_lines, table_rows
 
     if as_json:
         print_json(_json_result(plate, written))
@@ -87,7 +86,7 @@ def print_screening(plate: Plate, written: list[Path], as_json: bool) -> None:
 
 
 def _json_result(plate: Plate, written: list[Path]) -> dict[str, Any]:
-    from creepkit.plates.table import result_columns
+    from creepkit.screening.files import result_columns
 
     return {
         "alloys": [result_columns(plate, result) for result in plate.results],
@@ -101,9 +100,9 @@ def _json_result(plate: Plate, written: list[Path]) -> dict[str, Any]:
 def _surrogate_named(name: str | None) -> Predictor | None:
     if name is None:
         return None
-    from creepkit import study
+    import creepkit as ck
 
-    return study.surrogate(name)
+    return ck.surrogate(name)
 
 
 def _confirmation_choice(text: str) -> bool | Literal["when in doubt"]:

@@ -8,12 +8,22 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit.cli.loads import BULGE, MATERIAL_POINT, RELAXATION, UNIAXIAL, parse_loading, parse_numbers, check_options, parse_steps
+from creepkit.cli.options import (
+    BULGE,
+    MATERIAL_POINT,
+    RELAXATION,
+    UNIAXIAL,
+    check_options,
+    parse_loading,
+    parse_numbers,
+    parse_steps,
+)
 
 if TYPE_CHECKING:
     from creepkit.arrays import Floats
     from creepkit.language import CreepLaw
     from creepkit.records import History, Program, Specimen
+
 
 DEFAULT_FRAMES, DEFAULT_INTERVAL = 200, 150.0
 """Frames of a bar; s between those of a dimple, as its cameras take them."""
@@ -56,14 +66,20 @@ def command(
     ] = None,
 ) -> None:
     """Simulate a test of a bar, a material point or a dimple."""
-    from creepkit import study
+    import creepkit as ck
     from creepkit.errors import SolveError
     from creepkit.language import Elastic
 
-    specimen_record = study.specimen(specimen)
-    load_options = {"--stress": stress, "--strain": strain, "--pressure": pressure, "--control": control, "--ramp": ramp}
+    specimen_record = ck.specimen(specimen)
+    load_options = {
+        "--stress": stress,
+        "--strain": strain,
+        "--pressure": pressure,
+        "--control": control,
+        "--ramp": ramp,
+    }
     check_options(specimen, {**load_options, "--geometry": geometry, "--picture": picture})
-    chosen = study.law(law)
+    chosen = ck.law(law)
     if not 0 < end_h < 1e9:
         raise SolveError(f"--end-h {end_h:g} is not a time above zero (and below 1e9 h)")
     times = _frame_times(3600.0 * end_h, points, every, specimen)
@@ -71,7 +87,7 @@ def command(
     if modulus_gpa is None and (specimen in (BULGE, RELAXATION) or (specimen == MATERIAL_POINT and strain)):
         requirement = "a dimple" if specimen == BULGE else "a prescribed strain"
         raise SolveError(f"{requirement} needs a modulus: give --modulus-gpa, such as 150")
-    run = study.simulate(
+    run = ck.simulate(
         chosen,
         _with_geometry(specimen_record, geometry),
         parse_numbers(value, "--set", "n=5.2"),
@@ -108,7 +124,7 @@ def _parse_temperature(law: CreepLaw, texts: Sequence[str] | None) -> float | Pr
 
 
 def _write_history(run: History, to: Path | None) -> None:
-    from creepkit.readers.writing import history_text, write_history
+    from creepkit.readers.history_csv import history_text, write_history
 
     if to is None:
         typer.echo(history_text(run), nl=False)

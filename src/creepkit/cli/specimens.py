@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.printing import print_json, print_table
+from creepkit.report.terminal import print_json, print_table
 
 if TYPE_CHECKING:
     from creepkit.records import Specimen
@@ -21,7 +21,10 @@ def command(as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")]
     if as_json:
         print_json([_specimen_to_json(entry) for entry in registered.values()])
         return
-    rows = [(specimen.name, specimen.title, " ".join(specimen.outputs)) for specimen in (found.value for found in registered.values())]
+    rows = [
+        (specimen.name, specimen.title, " ".join(specimen.outputs))
+        for specimen in (found.value for found in registered.values())
+    ]
     print_table(f"{len(rows)} specimens", ("name", "title", "outputs"), rows)
 
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from creepkit.cli.printing import print_json, print_table
-from creepkit.cli.progress import ProgressBar
+from creepkit.report.terminal import ProgressBar, print_json, print_table
 
 
 def command(
@@ -36,9 +35,10 @@ def command(
     import torch
 
     from creepkit.cli.train import select_recipe
-    from creepkit.dataset.store import read_dataset
-    from creepkit.surrogate.parameter_gru import ParameterGru
-    from creepkit.surrogate.sweep import size_study_figure, size_study_rows, size_study
+    from creepkit.dataset.storage import read_dataset
+    from creepkit.report.surrogate import size_study_figure, size_study_rows
+    from creepkit.surrogates.parameter_gru import ParameterGru
+    from creepkit.surrogates.training import size_study
 
     if threads is not None:
         torch.set_num_threads(threads)

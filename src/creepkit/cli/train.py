@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.printing import print_json
-from creepkit.cli.progress import ProgressBar
+from creepkit.report.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
-    from creepkit.surrogate.recipe import Recipe
-    from creepkit.surrogate.surrogate import Surrogate
+    from creepkit.surrogates.surrogate import Recipe, Surrogate
+
 
 RECIPE_NAMES = ("parameter-gru", "rate-net")
 
@@ -51,17 +50,27 @@ def command(
     """
     import torch
 
-    from creepkit import study
-    from creepkit.dataset.store import read_dataset
+    import creepkit as ck
+    from creepkit.dataset.storage import read_dataset
 
     if threads is not None:
         torch.set_num_threads(threads)
     network_options = {"hidden": hidden, "layers": layers, "cell": cell, "target": target, "base": base,
              "inputs": None if inputs is None else tuple(inputs.split(","))}  # fmt: skip
-    training_options = {"epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule, "early_stop": early_stop, "clip": clip}
-    selected_recipe, samples = select_recipe(recipe, network_options, training_options), read_dataset(data, accepted_only=True)
+    training_options = {
+        "epochs": epochs,
+        "batch": batch,
+        "rate": rate,
+        "schedule": schedule,
+        "early_stop": early_stop,
+        "clip": clip,
+    }
+    selected_recipe, samples = (
+        select_recipe(recipe, network_options, training_options),
+        read_dataset(data, accepted_only=True),
+    )
     with ProgressBar() as progress:
-        model = study.train(samples, selected_recipe, to=to, seed=seed, device=device, progress=progress.tick)
+        model = ck.train(samples, selected_recipe, to=to, seed=seed, device=device, progress=progress.tick)
     plot_files = plot_surrogate(model, samples, plots or to.parent, to.stem)
     if as_json:
         print_json({"file": str(to), "metrics": model.metadata.metrics, "pictures": [str(path) for path in plot_files]})
@@ -84,21 +93,25 @@ def select_recipe(recipe_name: str, network_options: dict[str, Any], training_op
     field_names = {f.name for f in fields(default_recipe) if f.init}
     given_options = {name: value for name, value in network_options.items() if value is not None}
     for name in given_options.keys() - field_names:
-        raise SurrogateError(f"--{name} means nothing to {recipe_name}; it has {', '.join(sorted(field_names - {'training'}))}")
-    training = replace(default_recipe.training, **{name: value for name, value in training_options.items() if value is not None})
+        raise SurrogateError(
+            f"--{name} means nothing to {recipe_name}; it has {', '.join(sorted(field_names - {'training'}))}"
+        )
+    training = replace(
+        default_recipe.training, **{name: value for name, value in training_options.items() if value is not None}
+    )
     recipe: Recipe = replace(default_recipe, **given_options, training=training)
     return recipe
 
 
 def plot_surrogate(model: Surrogate, data: Dataset, folder: Path, name: str) -> list[Path]:
     """Draw the curves, the parity plot and the worst samples; returns their paths."""
-    from creepkit.surrogate import plotting
-    from creepkit.surrogate.evaluation import evaluate
+    from creepkit.report import surrogate
+    from creepkit.surrogates.evaluation import evaluate
 
     folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / f"{name}-{what}.png" for what in ("curves", "parity", "worst")]
     evaluation = evaluate(model, data)
-    plotting.training_curves(model.metadata, paths[0])
-    plotting.parity_figure(evaluation.comparison, evaluation.times, paths[1])
-    plotting.worst_samples_figure(evaluation.comparison, paths[2])
+    surrogate.training_curves(model.metadata, paths[0])
+    surrogate.parity_figure(evaluation.comparison, evaluation.times, paths[1])
+    surrogate.worst_samples_figure(evaluation.comparison, paths[2])
     return paths

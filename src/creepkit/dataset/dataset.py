@@ -1,28 +1,67 @@
-"""A data set: simulated tests of one law on one specimen, with what was drawn, what came out and why some fell out."""
+"""Data sets: simulated tests of one law on one specimen, with the draws, the outputs and the reasons of rejection."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.dataset.columns import COLUMNS
-from creepkit.dataset.conditions import planned_test
-from creepkit.dataset.describe import dataset_text
-from creepkit.dataset.joining import join
 from creepkit.errors import DatasetError
+from creepkit.records import Status
+from creepkit.report.dataset import dataset_text
+from creepkit.sampling.conditions import CONDITION_UNITS, planned_test
+from creepkit.specimens.documents import specimen_to_json
 
 if TYPE_CHECKING:
-    from creepkit.dataset.time_grid import TimeGrid
     from creepkit.language import CreepLaw
     from creepkit.records import History, Specimen
+    from creepkit.sampling.conditions import TimeGrid
+
+
+class Column(NamedTuple):
+    """An array whose first axis is the sample.
+
+    stored, held : types in a file and in memory. axes : the other axes, named for the sizes of a data set.
+    chunk : samples that are compressed together.
+    """
+
+    file_type: type
+    memory_type: type
+    axes: tuple[str, ...] = ()
+    chunk: int = 4096
+
+
+COLUMNS = {
+    "parameters": Column(np.float64, np.float64, ("parameter_names",), 256),
+    "conditions": Column(np.float64, np.float64, ("condition_names",), 256),
+    "values": Column(np.float32, np.float32, ("frames", "outputs"), 64),
+    "hold_outputs": Column(np.float32, np.float32, ("holds", "outputs"), 256),
+    "status": Column(np.int8, np.int64),
+    "end_times": Column(np.float64, np.float64),
+    "reasons": Column(np.int8, np.int64),
+    "index": Column(np.int64, np.int64),
+}
+
+
+HOLD_TIMES = 4
+"""Ends of the first ramp, of the first hold, of the second ramp, and of the test."""
+
+
+def empty_columns(sizes: Mapping[str, int]) -> dict[str, Any]:
+    """Every column with no samples in it yet; sizes : of its axes, by their names."""
+    shapes = {name: tuple(sizes[axis] for axis in column.axes) for name, column in COLUMNS.items()}
+    return {name: np.empty((0, *shapes[name]), column.memory_type) for name, column in COLUMNS.items()}
+
 
 FAILED = -1
 """The reason of a sample whose simulation did not work; its text says why."""
+
+
 NOT_SIMULATED = -1
 """The status of a sample that was rejected before it was simulated."""
 
@@ -115,3 +154,175 @@ class Dataset:
     def joined(self, other: Dataset) -> Dataset:
         """Both data sets as one; DatasetError when they are not of one kind, or share samples."""
         return join(self, other)
+
+
+def join(one: Dataset, other: Dataset) -> Dataset:
+    """The samples of both, one after the other; designs and seeds may differ, what was simulated may not."""
+    _check_compatible(one, other)
+    _check_no_shared_rows(one, other)
+    columns: dict[str, Any] = {name: np.concatenate([getattr(one, name), getattr(other, name)]) for name in COLUMNS}
+    failures = {**one.failures, **{len(one) + row: text for row, text in other.failures.items()}}
+    same = one.design_document == other.design_document
+    design = (
+        one.design_document
+        if same
+        else {"joined": [*_joined_documents(one.design_document), *_joined_documents(other.design_document)]}
+    )
+    provenance = {"joined": [*_joined_documents(one.provenance), *_joined_documents(other.provenance)]}
+    return replace(one, **columns, failures=failures, design_document=design, provenance=provenance)
+
+
+def _joined_documents(document: Any) -> list[Any]:
+    joined = document.get("joined")
+    return list(joined) if isinstance(joined, list) else [dict(document)]
+
+
+def _check_compatible(one: Dataset, other: Dataset) -> None:
+    """DatasetError that names the first thing in which two data sets differ."""
+    if one.law.fingerprint != other.law.fingerprint:
+        raise DatasetError(
+            f"data sets of the laws '{one.law.name}' and '{other.law.name}' cannot be joined: their equations differ"
+        )
+    specimens = specimen_to_json(one.specimen), specimen_to_json(other.specimen)
+    if specimens[0] != specimens[1]:
+        raise DatasetError(
+            f"data sets of different specimens cannot be joined: {first_difference(*specimens, 'specimen')}"
+        )
+    for name in ("parameter_names", "condition_names", "outputs", "reason_names"):
+        if getattr(one, name) != getattr(other, name):
+            raise DatasetError(
+                f"data sets with different {name.replace('_', ' ')} cannot be joined: "
+                f"{', '.join(getattr(one, name))} and {', '.join(getattr(other, name))}"
+            )
+    if one.grid != other.grid:
+        raise DatasetError("data sets with different time grids cannot be joined; generate them with the same grid")
+
+
+def _check_no_shared_rows(one: Dataset, other: Dataset) -> None:
+    """The same row of the same sequence must not count twice."""
+    if one.design_document != other.design_document or one.provenance.get("seed") != other.provenance.get("seed"):
+        return
+    shared = np.intersect1d(one.index, other.index)
+    if shared.size:
+        raise DatasetError(
+            f"both data sets hold {shared.size} samples of the same design and seed (Sobol row {shared[0]} is one), "
+            "which would count twice; generate one of them with another seed"
+        )
+
+
+def first_difference(one: Any, other: Any, name: str) -> str:
+    """Where two documents first differ: 'specimen.tolerance is 0.01 and 0.02'; '' when they do not.
+
+    place : what both are called; "" when only what is within has a name.
+    """
+    if isinstance(one, dict) and isinstance(other, dict):
+        for key in sorted({*one, *other}):
+            path = f"{name}.{key}" if name else key
+            if key not in one or key not in other:
+                return f"{path} is only in one of them"
+            if difference := first_difference(one[key], other[key], path):
+                return difference
+        return ""
+    if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+        pairs = (first_difference(a, b, f"{name}[{k}]") for k, (a, b) in enumerate(zip(one, other, strict=True)))
+        return next((found for found in pairs if found), "")
+    return "" if one == other else f"{name} is {_shortened(one)} and {_shortened(other)}"
+
+
+def _shortened(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+OUTPUT_UNITS = {"amplitude": "mm", "width": "mm"}
+"""Of outputs that have one."""
+
+
+def summary(data: Dataset) -> dict[str, Any]:
+    """What there is to know of a data set, as JSON-able data; ranges are those of its accepted samples."""
+    accepted = data.reasons == 0
+    return {
+        "law": data.law.name,
+        "law_fingerprint": data.law.fingerprint,
+        "specimen": data.specimen.name,
+        "design": design_name(data),
+        "samples": len(data),
+        "accepted": int(accepted.sum()),
+        "failed": int((data.reasons < 0).sum()),
+        "simulated": int((data.status >= 0).sum()),
+        "burst_accepted": int((data.status[accepted] == Status.RUPTURED).sum()),
+        "reasons": rejection_counts(data),
+        "failures": dict(Counter(data.failures.values()).most_common(5)),
+        "frames": data.grid.frames,
+        "times": {
+            "from": float(data.grid.values[0]),
+            "to": float(data.grid.values[-1]),
+            "relative": data.grid.relative,
+        },
+        "ranges": dict(accepted_ranges(data)),
+        "units": column_units(data),
+        "provenance": dict(data.provenance),
+    }
+
+
+def design_name(data: Dataset) -> str:
+    """The design that drew the samples; of a joined set, all of them."""
+    sources = data.provenance.get("joined", [data.provenance])
+    return ", ".join(dict.fromkeys(str(source.get("design", "unknown")) for source in sources))
+
+
+def rejection_counts(data: Dataset) -> list[dict[str, Any]]:
+    """How many samples each criterion rejected, those that others had not; and how many of them without simulation."""
+    pairs = list(zip(data.reason_names, data.reason_texts or data.reason_names, strict=True))[1:]
+    not_simulated = data.status < 0
+    return [
+        {
+            "criterion": name,
+            "text": text,
+            "rejected": int((data.reasons == k).sum()),
+            "not_simulated": int((not_simulated & (data.reasons == k)).sum()),
+        }
+        for k, (name, text) in enumerate(pairs, start=1)
+    ]
+
+
+def accepted_ranges(data: Dataset) -> Iterator[tuple[str, dict[str, float]]]:
+    """Least, middle and largest value of every parameter, condition and last output of the accepted samples."""
+    accepted = data.reasons == 0
+    if not accepted.any():
+        return
+    for name, column in summary_columns(data):
+        finite_values = column[accepted]
+        finite_values = finite_values[np.isfinite(finite_values)]
+        if finite_values.size:
+            yield (
+                name,
+                {
+                    "least": float(finite_values.min()),
+                    "median": float(np.median(finite_values)),
+                    "most": float(finite_values.max()),
+                },
+            )
+
+
+def summary_columns(data: Dataset) -> Iterator[tuple[str, Floats]]:
+    """What samples are drawn by and what they end with: {name: (n,)}."""
+    for names, values in ((data.parameter_names, data.parameters), (data.condition_names, data.conditions)):
+        yield from ((name, values[:, k]) for k, name in enumerate(names))
+    yield "end of simulation", np.where(data.status >= 0, data.end_times, np.nan)
+    for k, name in enumerate(data.outputs):
+        yield f"last {name}", last_values(data.values[..., k])
+
+
+def last_values(values: Any) -> Floats:
+    """(n,) the last value of each row that is a number; NaN where there is none."""
+    finite = np.isfinite(values)
+    frame = values.shape[1] - 1 - np.argmax(finite[:, ::-1], axis=1)
+    return np.where(finite.any(axis=1), values[np.arange(len(values)), frame], np.nan).astype(float)
+
+
+def column_units(data: Dataset) -> dict[str, str]:
+    """{name: unit} of every column of `ranges`; "" of a pure number."""
+    units = {name: param.unit for name, param in data.law.table.items()}
+    units |= {name: CONDITION_UNITS.get(name, "") for name in data.condition_names}
+    return units | {"end of simulation": "s"} | {f"last {name}": OUTPUT_UNITS.get(name, "") for name in data.outputs}

@@ -1,7 +1,6 @@
-"""Shards: blocks of rows of a design, each simulated once and kept in a file of its own until all are merged.
+"""Shards: blocks of rows of a design, each simulated once, kept in its own file, and merged into one data set.
 
-A shard is done when its file is there, belongs to this campaign and is whole. It is written under another name and then
-renamed, by whoever holds its claim.
+A shard is done when its file exists, belongs to this campaign and is complete. The file is written under a temporary name and renamed by the holder of the shard lock.
 """
 
 from __future__ import annotations
@@ -9,8 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-import os
-import secrets
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -23,25 +21,35 @@ import h5py
 import numpy as np
 
 from creepkit import registry
-from creepkit.dataset import store
-from creepkit.dataset.claims import ShardLock
-from creepkit.dataset.columns import COLUMNS
-from creepkit.dataset.dataset import Dataset
-from creepkit.dataset.joining import first_difference
-from creepkit.dataset.layout import LAYOUT_VERSION
-from creepkit.dataset.simulating import SampleFailedError, empty_dataset, simulate_rows
-from creepkit.dataset.specimen_document import specimen_to_json
+from creepkit.dataset import storage
+from creepkit.dataset.dataset import COLUMNS, Dataset, first_difference
+from creepkit.dataset.simulation import SampleFailedError, empty_dataset, simulate_rows
+from creepkit.dataset.storage import LAYOUT_VERSION
 from creepkit.errors import DatasetError
-from creepkit.language.tree import law_to_json
+from creepkit.files.fault_tolerant import create_hdf5
+from creepkit.files.writing import remove_temporary_files, replace_on_success, write_if_absent
+from creepkit.jobs.shard_progress import ShardLock
+from creepkit.jobs.worker import TaskResult
+from creepkit.language.law_codec import law_to_json
+from creepkit.specimens.documents import specimen_to_json
 
 if TYPE_CHECKING:
-    from creepkit.dataset.design import SamplingDesign
     from creepkit.records import Specimen
+    from creepkit.sampling.domains import SamplingDesign
+
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+    from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord
+
 
 SHARD_ROWS = 256
 """Rows of a shard: some seconds of a dimple, so that little is lost when a process dies."""
+
+
 MOST_PROCESS_DEATHS = 2
 """How often a sample may kill its process before it counts as failed."""
+
 
 _log = logging.getLogger("creepkit.dataset")
 
@@ -131,37 +139,6 @@ class Campaign:
             )
 
 
-def write_if_absent(path: Path, text: str) -> None:
-    """Write a file that is whole or absent, and that the first of several writers decides."""
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        try:
-            os.link(temporary, path)
-        except FileExistsError:
-            pass  # another campaign was faster; what it wrote is compared
-        except OSError:  # a file system without links
-            os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-# ---- one shard -----------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class TaskResult:
-    """What became of a shard that was asked for.
-
-    kind : "done"; "taken", by another process; "died", its own process did; "error", as text says.
-    """
-
-    number: int
-    status: str
-    accepted: int = 0
-    text: str = ""
-
-
 def run_shard(campaign: Campaign, number: int) -> TaskResult:
     """Simulate a shard and write its file, unless it is done or another process is at it."""
     path = campaign.path(number)
@@ -170,7 +147,7 @@ def run_shard(campaign: Campaign, number: int) -> TaskResult:
             return TaskResult(number, "taken")
         accepted = accepted_count(campaign, number, quiet=True)
         if accepted is None:
-            store.remove_temporary_files(path)
+            remove_temporary_files(path)
             first, rows = number * campaign.rows, campaign.rows
             samples = simulate_rows(campaign.design, campaign.header, campaign.seed, first, rows, _start_guard(lock))
             write_shard(campaign, number, samples)
@@ -192,9 +169,9 @@ def _start_guard(lock: ShardLock) -> Callable[[int], None]:
 
 def write_shard(campaign: Campaign, number: int, samples: Dataset) -> None:
     """Write the file of a shard."""
-    with store.replace_on_success(campaign.path(number)) as temporary, store.create_hdf5(temporary) as file:
-        store.write_header(file, samples)
-        store.append_samples(file, samples)
+    with replace_on_success(campaign.path(number)) as temporary, create_hdf5(temporary) as file:
+        storage.write_header(file, samples)
+        storage.append_samples(file, samples)
         file.attrs.update({"campaign": campaign.fingerprint, "shard": number, "checksum": sample_checksum(samples)})
 
 
@@ -209,10 +186,10 @@ def sample_checksum(samples: Dataset) -> str:
 def read_shard(campaign: Campaign, number: int) -> Dataset:
     """The samples of a shard; DatasetError when it is not whole, or of another campaign."""
     path = campaign.path(number)
-    with store.open_hdf5(path) as file:
+    with storage.open_hdf5(path) as file:
         if file.attrs.get("campaign") != campaign.fingerprint or file.attrs.get("shard") != number:
             raise DatasetError(f"{path}: a shard of another campaign")
-        samples = store.read_samples(file, campaign.header)
+        samples = storage.read_samples(file, campaign.header)
         expected = file.attrs["checksum"]
     if sample_checksum(samples) != expected:
         raise DatasetError(f"{path}: damaged, its checksum is not that of what it holds")
@@ -242,3 +219,63 @@ def read_shards(campaign: Campaign, numbers: Sequence[int]) -> Dataset:
         failures.update({offset + row: text for row, text in shard_samples.failures.items()})
         offset += len(shard_samples)
     return replace(campaign.header, **columns, failures=failures)
+
+
+POLL_INTERVAL = 0.5
+"""s, after which what another process is at is looked at again."""
+
+
+def is_complete(campaign: Campaign, record: ProgressRecord, path: Path) -> bool:
+    """Whether the file is there already and holds what is wanted; DatasetError when it is something else."""
+    if not path.exists():
+        return False
+    if path.is_dir():
+        raise DatasetError(f"{path}: is a folder; name a file for the data set")
+    with storage.open_hdf5(path) as file:
+        header = storage.read_header(file, str(path))
+        if header.provenance.get("fingerprint") != campaign.fingerprint:
+            difference = first_difference(_identity(header), _identity(campaign.header), "")
+            description = f"there and here {difference}" if difference else "of shards of another size"
+            raise DatasetError(f"{path}: holds another data set ({description}); choose another name")
+        reasons = file["reasons"][:]
+    if record.samples is None:
+        return len(reasons) >= (record.draws or 0)
+    return int((reasons == 0).sum()) >= record.samples
+
+
+def merge_shards(campaign: Campaign, record: ProgressRecord, path: Path, progress: ProgressCallback | None) -> None:
+    """Write the shortest leading run of shards that is enough, unless another process does so meanwhile."""
+    while True:
+        with ShardLock(campaign.folder / "merging.claim") as lock:
+            if lock.held:
+                if not is_complete(campaign, record, path):
+                    remove_temporary_files(path)
+                    _write_merged(campaign, record, path, progress)
+                    for number in record.done:  # of processes that died between writing a shard and saying so
+                        campaign.path(number).with_suffix(".claim").unlink(missing_ok=True)
+                return
+        time.sleep(POLL_INTERVAL)
+
+
+def _write_merged(campaign: Campaign, record: ProgressRecord, path: Path, progress: ProgressCallback | None) -> None:
+    numbers, remaining = record.leading_run() or [], record.draws
+    with replace_on_success(path) as temporary, create_hdf5(temporary) as file:
+        storage.write_header(file, campaign.header)
+        for done, number in enumerate(numbers, start=1):
+            samples = read_shard(campaign, number)
+            storage.append_samples(file, samples if remaining is None else samples.rows(slice(0, remaining)))
+            remaining = None if remaining is None else remaining - len(samples)
+            if progress is not None:
+                progress("shards merged", done, len(numbers), "")
+
+
+def _identity(data: Dataset) -> dict[str, Any]:
+    """What decides a data set, as far as its file says it."""
+    document = {
+        "law": law_to_json(data.law),
+        "specimen": specimen_to_json(data.specimen),
+        "design": data.design_document,
+        "seed": data.provenance.get("seed"),
+        "creepkit": data.provenance.get("creepkit"),
+    }
+    return dict(json.loads(json.dumps(document)))

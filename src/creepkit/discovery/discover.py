@@ -1,21 +1,30 @@
-"""discover: from identifications at single temperatures to the law with temperature in it."""
+"""discover: a law with temperature in it, from identifications at single temperatures; temperature_study: from tests."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
-from creepkit.discovery.combining import rank_combinations
-from creepkit.discovery.libraries import CONSTANT, CandidateForm, candidate_forms
-from creepkit.discovery.points import IsothermalEstimates
+import numpy as np
+
+from creepkit.discovery.combinations import rank_combinations
+from creepkit.discovery.elastic_moduli import FIRST_FRAMES, ModulusEstimates, identify_moduli
+from creepkit.discovery.forms import CONSTANT, CandidateForm, candidate_forms
 from creepkit.discovery.refitting import refit
-from creepkit.discovery.trend import TemperatureLaw, temperature_law_from_combinations
-from creepkit.errors import FitError
+from creepkit.discovery.regression import IsothermalEstimates, check_temperatures
+from creepkit.discovery.temperature_law import TemperatureLaw, temperature_law_from_combinations
+from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.identify import identify
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_temperature, with_arrhenius
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.language import CreepLaw, temperature
 from creepkit.records import History, Predictor
 
 PriorOdds = Mapping[str, Mapping[str, float]]
+
+
 ProgressCallback = Callable[[str, int, int], None]
 
 
@@ -43,7 +52,10 @@ def discover(
     estimates = IsothermalEstimates.from_identifications(fits)
     candidates = candidate_forms_of(estimates, forms, prior or {}, parameters)
     combinations = rank_combinations(estimates, candidates, progress)
-    odds = {name: {form.name: form.prior_odds for form in forms_of_parameter} for name, forms_of_parameter in candidates.items()}
+    odds = {
+        name: {form.name: form.prior_odds for form in forms_of_parameter}
+        for name, forms_of_parameter in candidates.items()
+    }
     temperature_law = temperature_law_from_combinations(estimates, combinations, odds)
     if histories is None:
         return temperature_law
@@ -71,6 +83,121 @@ def candidate_forms_of(
         if parameters is not None and name not in parameters:
             form_names = (CONSTANT,)
         forms_by_parameter[name] = candidate_forms(
-            law, name, name in rate_coefficients, estimates.reference.temperature, estimates.temperatures, form_names, prior.get(name)
+            law,
+            name,
+            name in rate_coefficients,
+            estimates.reference.temperature,
+            estimates.temperatures,
+            form_names,
+            prior.get(name),
         )
     return forms_by_parameter
+
+
+StudyProgress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class TemperatureStudy:
+    """The answer of temperature_study().
+
+    tests : with the moduli found, where they were. moduli : None where no modulus could be asked for.
+    joint : the law times Arrhenius' factor, from all tests at once. alone : one identification a temperature.
+    trend : None where there are too few temperatures, which notes then say.
+    """
+
+    tests: tuple[History, ...]
+    moduli_fit: ModulusEstimates | None
+    joint_fit: Identification
+    isothermal_fits: tuple[Identification, ...]
+    temperature_law: TemperatureLaw | None
+    notes: tuple[str, ...]
+
+    def __str__(self) -> str:
+        parts = [self.moduli_fit, self.joint_fit, self.temperature_law]
+        texts = [str(part) for part in parts if part is not None]
+        return "\n\n".join([*texts, *(f"note: {note}" for note in self.notes)])
+
+
+def temperature_study(
+    law: CreepLaw, tests: Sequence[History], predictor: Predictor, *, moduli: bool | None = None,
+    within: float = ISOTHERMAL_RANGE, forms: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
+    prior: Mapping[str, Mapping[str, float]] | None = None,
+    settings: IdentificationSettings | None = None, progress: StudyProgress | None = None,
+) -> TemperatureStudy:  # fmt: skip
+    """Identify moduli, then the law times Arrhenius, then each temperature alone, and discover forms of temperature.
+
+    law : without temperature. moduli : whether to find them from the first 15 frames of each test; by default where
+    every test states one and the predictor knows that effect. within : K, tests that near to the coldest of a group
+    are at one temperature. forms, prior : as discover() takes them. A temperature that cannot be identified alone is
+    noted and left out of the forms.
+    """
+    if law.uses(temperature):
+        raise FitError(f"law '{law.name}' depends on temperature already; give it without: forms are what is sought")
+    if not tests:
+        raise FitError("there are no histories to study")
+    settings, histories, notes = settings or IdentificationSettings(), list(tests), []
+    moduli_fit = None
+    if moduli if moduli is not None else _can_identify_moduli(histories, predictor):
+        moduli_fit = identify_moduli(with_arrhenius(law, histories), histories, predictor, frames=FIRST_FRAMES)
+        if moduli_fit.elastic is not None:
+            histories = [h.replace(elastic=moduli_fit.elastic) for h in histories]
+    joint_fit = identify(with_arrhenius(law, histories), histories, predictor, settings=settings, progress=progress)
+    isothermal_fits, failures = _isothermal_fits(law, histories, predictor, within, settings, progress)
+    notes += failures
+    temperature_law = None
+    try:
+        check_temperatures([fit.reference.temperature for fit in isothermal_fits] or [reference_temperature(histories)])
+    except FitError as error:
+        notes.append(str(error))
+    else:
+        temperature_law = discover(
+            isothermal_fits,
+            forms=forms,
+            prior=prior,
+            histories=histories,
+            using=predictor,
+            settings=settings,
+            progress=progress,
+        )
+    return TemperatureStudy(
+        tuple(histories), moduli_fit, joint_fit, tuple(isothermal_fits), temperature_law, tuple(notes)
+    )
+
+
+def group_by_temperature(
+    tests: Sequence[History], temperature_tolerance: float = ISOTHERMAL_RANGE
+) -> list[list[History]]:
+    """Tests by temperature, ascending; each within so many K of the coldest of its group."""
+    groups: list[list[History]] = []
+    for test in sorted(tests, key=_mean_temperature):
+        if groups and _mean_temperature(test) - _mean_temperature(groups[-1][0]) <= temperature_tolerance:
+            groups[-1].append(test)
+        else:
+            groups.append([test])
+    return groups
+
+
+def _isothermal_fits(
+    law: CreepLaw, tests: Sequence[History], predictor: Predictor, temperature_tolerance: float, settings: IdentificationSettings,
+    progress: StudyProgress | None,
+) -> tuple[list[Identification], list[str]]:  # fmt: skip
+    fits, failures = [], []
+    groups = group_by_temperature(tests, temperature_tolerance)
+    for k, group in enumerate(groups):
+        try:
+            fits.append(identify(law, group, predictor, settings=settings))
+        except CreepkitError as error:
+            failures.append(f"at {_mean_temperature(group[0]):.0f} K alone: {error}")
+        if progress is not None:
+            progress("temperature", k + 1, len(groups))
+    return fits, failures
+
+
+def _can_identify_moduli(tests: Sequence[History], predictor: Predictor) -> bool:
+    has_modulus = "modulus" in getattr(predictor, "nuisances", ())
+    return has_modulus and all(h.elastic is not None and "amplitude" in h.outputs for h in tests)
+
+
+def _mean_temperature(history: History) -> float:
+    return float(np.mean(history.temperature_program().values))

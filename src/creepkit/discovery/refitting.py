@@ -1,10 +1,11 @@
-"""Forms put back into the law and refitted to the tests themselves: n(T), tau(T), A(T) judged by displacement.
+"""Forms put back into the law, refitted to the tests themselves, and weighed by BIC and prior odds.
 
 Regression on estimates inherits how badly single temperatures determine them; the tests together do not. Each
-combination of forms makes an ordinary law, which is identified from all tests at once, beginning where the regression
-ended, and ranked by BIC. Where more forms of a parameter remain than are to be tried, one stands for those that the
-points cannot tell from it. One parameter's form is changed at a time, the others as they are best so far; then each is
-put back to the plain one, to see whether it was needed; the winner is searched for anew.
+combination of forms makes an ordinary law, which is identified from all tests at once, starting where the regression
+ended, and ranked by BIC under one covariance. Where more forms of a parameter are plausible than are to be tried, one
+represents those that the estimates cannot distinguish from it. One parameter's form is changed at a time with the
+others as they are best so far; then each is reset to the simplest one, to see whether it was needed; the best law is
+searched for again over the whole of its bounds.
 """
 
 from __future__ import annotations
@@ -15,11 +16,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.discovery.judging import RefittedCombination, curve_distance, weigh_refits
-from creepkit.discovery.libraries import ARRHENIUS, CandidateForm, law_with_forms
-from creepkit.discovery.points import IsothermalEstimates, check_temperatures
-from creepkit.discovery.regression import Regression, regress
-from creepkit.discovery.trend import TemperatureLaw
+from creepkit.discovery.combinations import CREDIBLE_MASS, FormWeight, squared_mahalanobis
+from creepkit.discovery.forms import ARRHENIUS, CandidateForm, law_with_forms
+from creepkit.discovery.regression import IsothermalEstimates, Regression, check_temperatures, regress
+from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw, averaged_estimates
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
@@ -29,10 +29,98 @@ from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
+
+@dataclass(frozen=True, eq=False)
+class RefittedCombination:
+    """A combination of forms, its regression on the points, and the identification of its law."""
+
+    forms: tuple[CandidateForm, ...]
+    regression: Regression
+    fit: Identification
+
+
+def curve_distance(temperature_law: TemperatureLaw, first: Regression, second: Regression) -> float:
+    """chi^2 between the curves of two combinations, by the covariances of the points."""
+    return squared_mahalanobis(
+        first, second, temperature_law.isothermal_estimates, temperature_law.combinations.overdispersion
+    )
+
+
+def weigh_refits(
+    temperature_law: TemperatureLaw, refits: Sequence[RefittedCombination], failed: Mapping[tuple[str, ...], str]
+) -> TemperatureLaw:
+    """The trend as the tests see it; failed : {forms: why they could not be refitted}, which become notes."""
+    ranking = rank([refit.fit for refit in refits])
+    bic_differences = {id(entry.fit): entry.excess for entry in ranking.laws}
+    odds = np.array([one.regression.prior_odds for one in refits])
+    scores = np.array([bic_differences[id(one.fit)] for one in refits]) - 2.0 * np.log(odds)
+    weights = np.exp(-0.5 * (scores - scores.min()))
+    weights /= weights.sum()
+    order = np.argsort(scores, kind="stable")
+    candidates = tuple(_candidate_law(refits[k], float(scores[k] - scores.min()), float(weights[k])) for k in order)
+    best = candidates[0]
+    assert best.fit is not None
+    return replace(
+        temperature_law,
+        law=best.fit.law,
+        estimates=averaged_estimates(best.fit.law, candidates),
+        criterion_data="histories",
+        plausible_forms={
+            name: _plausible_forms_of_refits(temperature_law, candidates, name)
+            for name in temperature_law.isothermal_law.names
+        },
+        candidates=candidates,
+        fit=best.fit,
+        notes=(
+            *temperature_law.notes,
+            *(f"not refitted: {', '.join(key)}: {reason}" for key, reason in failed.items()),
+        ),
+    )
+
+
+def _candidate_law(refit: RefittedCombination, criterion_difference: float, weight: float) -> CandidateLaw:
+    fit, names = refit.fit, [name for library in refit.forms for name in library.parameter_names]
+    theta = dict(zip(fit.law.names, fit.coordinates.theta(fit.u), strict=True))
+    jacobian = fit.coordinates.jacobian(fit.u)
+    covariance = jacobian @ fit.covariance @ jacobian.T
+    indices = [fit.law.names.index(name) for name in names]
+    internal = {name: float(theta[name]) for name in names}
+    return CandidateLaw(
+        refit.forms, internal, covariance[np.ix_(indices, indices)], fit.freedom, criterion_difference, weight, fit
+    )
+
+
+def _plausible_forms_of_refits(
+    temperature_law: TemperatureLaw, candidates: Sequence[CandidateLaw], name: str
+) -> tuple[FormWeight, ...]:
+    """Forms that hold 95 % of the belief, then those not refitted whose nearest neighbour is among them."""
+    weights: dict[str, float] = {}
+    for candidate in candidates:
+        weights[candidate.forms[name]] = weights.get(candidate.forms[name], 0.0) + candidate.weight
+    ranked = sorted(weights, key=lambda form: -weights[form])
+    cumulative_weight = np.cumsum([0.0, *(weights[form] for form in ranked)])
+    retained = [
+        form for form, mass_before in zip(ranked, cumulative_weight, strict=False) if mass_before < CREDIBLE_MASS
+    ]
+    not_refitted = [form.name for form in temperature_law.plausible_forms[name] if form.name not in weights]
+    with_form = temperature_law.combinations.with_form
+
+    def nearest(form: str) -> str:
+        return min(
+            weights, key=lambda tried: curve_distance(temperature_law, with_form(name, form), with_form(name, tried))
+        )
+
+    represented = [form for form in not_refitted if nearest(form) in retained]
+    return tuple(FormWeight(form, weights.get(form, 0.0), form in represented) for form in (*retained, *represented))
+
+
 RefitProgress = Callable[[str, int, int], None]
+
 
 MAX_FORMS = 6
 """Forms of one parameter that are refitted."""
+
+
 SIMILAR_CHI_SQUARE = 0.5
 """chi^2 between the curves of two forms below which other forms are tried first."""
 
@@ -56,8 +144,16 @@ def refit(
     confirm : whether the best law is searched for anew from the whole of its bounds.
     """
     check_temperatures([float(np.mean(h.temperature_program().values)) for h in histories])
-    cache = _RefitCache(temperature_law.isothermal_estimates, list(histories), using, _likelihood_settings(settings or IdentificationSettings()), progress)
-    forms_to_try = {name: _forms_to_try(temperature_law, name, max_forms) for name in temperature_law.isothermal_law.names}
+    cache = _RefitCache(
+        temperature_law.isothermal_estimates,
+        list(histories),
+        using,
+        _likelihood_settings(settings or IdentificationSettings()),
+        progress,
+    )
+    forms_to_try = {
+        name: _forms_to_try(temperature_law, name, max_forms) for name in temperature_law.isothermal_law.names
+    }
     current = {form.parameter: form for form in temperature_law.candidates[0].candidate_forms}
     baseline = {name: _baseline_form(temperature_law, name) for name in temperature_law.isothermal_law.names}
     cache.total = 2 + sum(len(forms) for forms in forms_to_try.values())
@@ -111,7 +207,9 @@ class _RefitCache:
         if self.progress is not None:
             self.progress("form of temperature", min(len(self.fitted) + len(self.failed), self.total), self.total)
 
-    def try_forms(self, current: Mapping[str, CandidateForm], name: str, forms: Sequence[CandidateForm]) -> dict[str, CandidateForm]:
+    def try_forms(
+        self, current: Mapping[str, CandidateForm], name: str, forms: Sequence[CandidateForm]
+    ) -> dict[str, CandidateForm]:
         """Other forms of one parameter put in the place of its form now; returns the best combination so far."""
         for form in forms:
             self(list({**current, name: form}.values()))
@@ -134,7 +232,9 @@ class _RefitCache:
         elif self.estimates.has_undetermined_parameters():
             fit = self.best.fit
             best_values = dict(zip(fit.law.names, fit.coordinates.theta(fit.u), strict=True))
-            inactive_values = {name: p.to_internal(p.center if p.off is None else p.off) for name, p in law.table.items()}
+            inactive_values = {
+                name: p.to_internal(p.center if p.off is None else p.off) for name, p in law.table.items()
+            }
             starts.append(_coordinates_within_bounds(law, {**inactive_values, **best_values}, self.estimates))
         return [start if start is not None and np.isfinite(start).all() else None for start in starts]
 
@@ -169,7 +269,11 @@ def _forms_to_try(temperature_law: TemperatureLaw, name: str, max_forms: int) ->
     chosen: list[Regression] = []
     forms = [form.name for form in temperature_law.plausible_forms[name]]
     if temperature_law.isothermal_estimates.has_undetermined_parameters():
-        forms += dict.fromkeys(regression.forms[name] for regression in temperature_law.combinations.combinations if regression.forms[name] not in forms)
+        forms += dict.fromkeys(
+            regression.forms[name]
+            for regression in temperature_law.combinations.combinations
+            if regression.forms[name] not in forms
+        )
     regressions = [temperature_law.combinations.with_form(name, form) for form in forms]
     for one in regressions:
         if all(curve_distance(temperature_law, one, other) > SIMILAR_CHI_SQUARE for other in chosen):

@@ -1,16 +1,19 @@
-"""One form for each parameter, through all points at once: generalised least squares, with pysindy on small libraries.
+"""Regression of parameters on temperature: estimates at single temperatures, and one form for each parameter.
 
-The rows are all parameters at all temperatures, multiplied by the inverse Cholesky factor of each temperature's
-covariance; the columns are the functions of the libraries. pysindy regresses one on the other without threshold or
-ridge: with ten per cent of temperature its functions are collinear, and a threshold on one wide library keeps all of
-them with coefficients of +-1000. What stands inside exponentials is found by variable projection (Golub and Pereyra
-(1973), SIAM J. Numer. Anal. 10, 413): the coefficients are solved for at each trial of it.
+A coefficient and its exponent are correlated to -0.99999 at one temperature, so that estimates with separate error bars
+would mislead: all parameters of one temperature stay together, with their whole covariance. The rows of the generalised
+least squares are all parameters at all temperatures, multiplied by the inverse Cholesky factor of each temperature's
+covariance; the columns are the functions of the forms. pysindy solves it without threshold or ridge: over ten per cent
+of temperature the functions are collinear, and a threshold on one wide library keeps all of them with coefficients of
++-1000. Parameters inside exponentials are found by variable projection (Golub and Pereyra (1973), SIAM J. Numer. Anal.
+10, 413): the coefficients are solved for at each trial of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import sympy
@@ -18,12 +21,154 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from creepkit.arrays import Floats
-from creepkit.discovery.libraries import CandidateForm, evaluate_forms
-from creepkit.discovery.points import IsothermalEstimates
-from creepkit.language import Param
+from creepkit.discovery.forms import CandidateForm, evaluate_forms
+from creepkit.errors import FitError
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, ReferencePoint
+from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
+from creepkit.language import CreepLaw, Param, temperature
+from creepkit.records import ZERO_CELSIUS
+
+UNDETERMINED_WIDTH = 0.15
+"""Standard deviation over the width of the bounds above which a parameter is hardly known; .29 is that of nothing."""
+
+
+INFINITE_FREEDOM = 1e9
+"""Degrees of freedom of a normal distribution."""
+
+
+MIN_TEMPERATURES = 3
+"""Temperatures: two give a slope, which any form can have."""
+
+
+@dataclass(frozen=True, eq=False)
+class IsothermalEstimates:
+    """One law's parameters at several temperatures.
+
+    temperatures : (fits,) K. theta : (fits, parameters) internal values (the logarithm where the scale is log).
+    covariance : (fits, parameters, parameters) of theta, that of the normal distribution with the same 95 % intervals
+        where an identification has few degrees of freedom; wide where a bound holds the value.
+    reference : the point where rates are compared.
+    ranges : {"stress", "temperature", "strain", "time": (low, high)} that they cover together.
+    """
+
+    law: CreepLaw
+    temperatures: Floats
+    theta: Floats
+    covariance: Floats
+    reference: ReferencePoint
+    ranges: dict[str, tuple[float, float]]
+
+    @classmethod
+    def from_identifications(cls, fits: Sequence[Identification]) -> IsothermalEstimates:
+        """The points of identifications of one law, each at one temperature; FitError where they are not that."""
+        check_identifications(fits)
+        order = np.argsort([fit.reference.temperature for fit in fits])
+        ordered = [fits[int(k)] for k in order]
+        return cls(
+            ordered[0].law,
+            np.array([fit.reference.temperature for fit in ordered]),
+            np.stack([fit.coordinates.theta(fit.u) for fit in ordered]),
+            np.stack([_theta_covariance(fit) for fit in ordered]),
+            _central_reference([fit.reference for fit in ordered]),
+            _joint_ranges([dict(fit.ranges) for fit in ordered]),
+        )
+
+    @cached_property
+    def whitening(self) -> Floats:
+        """(fits, parameters, parameters) inverse Cholesky factors of the covariances."""
+        sd = np.sqrt(np.einsum("kii->ki", self.covariance))
+        scaled = self.covariance / (sd[:, :, None] * sd[:, None, :])
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(scaled)) / sd[:, None, :])
+
+    def has_undetermined_parameters(self) -> bool:
+        """Whether some parameter is hardly known at most temperatures, but for a coefficient: that goes with others."""
+        coordinates = Coordinates(self.law, self.reference)
+        bound_widths = np.array(
+            [p.to_internal(p.bounds[1]) - p.to_internal(p.bounds[0]) for p in self.law.params.values()]
+        )
+        determined = np.sqrt(np.einsum("kii->ki", self.covariance)) < UNDETERMINED_WIDTH * bound_widths
+        determined[:, list(coordinates.coefficients)] = True
+        return bool((np.median(determined, axis=0) < 0.5).any())
+
+
+def check_identifications(fits: Sequence[Identification]) -> None:
+    """Identifications of one law without temperature, at three temperatures or more."""
+    if isinstance(fits, Identification) or not fits:
+        raise FitError("discover() takes a list of identifications, one for each temperature")
+    law = fits[0].law
+    if law.uses(temperature):
+        raise FitError(
+            f"law '{law.name}' depends on temperature already; identify it without, at each temperature by itself"
+        )
+    other = next((fit.law.name for fit in fits if fit.law.fingerprint != law.fingerprint), None)
+    if other is not None:
+        raise FitError(f"the identifications are of '{law.name}' and of '{other}'; give those of one law")
+    for fit in fits:
+        low, high = fit.ranges["temperature"]
+        if high - low > ISOTHERMAL_RANGE:
+            raise FitError(
+                f"an identification of '{law.name}' spans {low:.0f} to {high:.0f} K; identify each temperature alone"
+            )
+    check_temperatures([fit.reference.temperature for fit in fits])
+
+
+def check_temperatures(temperatures: Sequence[float]) -> None:
+    """Say what fewer than three temperatures leave unknown."""
+    distinct = _distinct_temperatures(temperatures)
+    if len(distinct) == 1:
+        raise FitError(
+            f"all tests are at {distinct[0]:.0f} K: from one temperature neither an activation energy nor how any other "
+            "parameter depends on temperature can be known; add tests at two other temperatures or more"
+        )
+    if len(distinct) < MIN_TEMPERATURES:
+        raise FitError(
+            f"the tests are at {distinct[0]:.0f} and {distinct[1]:.0f} K alone: two temperatures give an activation energy "
+            "but no form; identify the law times arrhenius(), or add a third temperature"
+        )
+
+
+def _distinct_temperatures(temperatures: Sequence[float]) -> list[float]:
+    """Temperatures that differ by more than ONE_TEMPERATURE, ascending."""
+    distinct: list[float] = []
+    for T in sorted(temperatures):
+        if not distinct or T - distinct[-1] > ISOTHERMAL_RANGE:
+            distinct.append(float(T))
+    return distinct
+
+
+def _theta_covariance(fit: Identification) -> Floats:
+    jacobian, variance_factor = (
+        fit.coordinates.jacobian(fit.u),
+        (interval_quantile(fit.freedom) / interval_quantile(INFINITE_FREEDOM)) ** 2,
+    )
+    return np.asarray(variance_factor * jacobian @ fit.covariance @ jacobian.T + _bound_variance(fit))
+
+
+def _bound_variance(fit: Identification) -> Floats:
+    """(parameters, parameters) variance to add where an estimate lies at its bound, which says nothing but that."""
+    bounds = [[p.to_internal(b) for b in p.bounds] for p in fit.law.params.values()]
+    at_bound = [e.verdict == "at its bound" for e in fit.estimates]
+    return np.asarray(np.diag(np.where(at_bound, np.ptp(bounds, axis=1) ** 2 / 12.0, 0.0)))
+
+
+def _central_reference(references: Sequence[ReferencePoint]) -> ReferencePoint:
+    stress, strain, time = (
+        float(np.exp(np.mean([np.log(getattr(r, name)) for r in references]))) for name in ("stress", "strain", "time")
+    )
+    celsius = float(np.median([r.temperature for r in references])) - ZERO_CELSIUS
+    return ReferencePoint(stress, strain, time, float(round(celsius / 10.0) * 10.0 + ZERO_CELSIUS))
+
+
+def _joint_ranges(ranges: Sequence[dict[str, tuple[float, float]]]) -> dict[str, tuple[float, float]]:
+    return {name: (min(r[name][0] for r in ranges), max(r[name][1] for r in ranges)) for name in ranges[0]}
+
 
 SOBOL_STARTS = 8
 """Trials from which what is inside exponentials is searched."""
+
+
 BOUND_TOLERANCE_SD = 2.0
 """Standard deviations that a number may lie outside its bounds."""
 
@@ -68,7 +213,11 @@ class Regression:
         standard_deviations = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         for (name, value), standard_deviation in zip(self.values.items(), standard_deviations, strict=True):
             low, high = (self.table[name].to_internal(b) for b in self.table[name].bounds)
-            if not low - BOUND_TOLERANCE_SD * standard_deviation <= value <= high + BOUND_TOLERANCE_SD * standard_deviation:
+            if (
+                not low - BOUND_TOLERANCE_SD * standard_deviation
+                <= value
+                <= high + BOUND_TOLERANCE_SD * standard_deviation
+            ):
                 return False
         return True
 
@@ -78,18 +227,28 @@ class _DesignMatrix:
 
     def __init__(self, forms: Sequence[CandidateForm]) -> None:
         self.forms = tuple(forms)
-        self.parameter_of_column = np.concatenate([np.full(len(form.terms), parameter_index) for parameter_index, form in enumerate(forms)])
-        self.nonlinear_parameters: dict[sympy.Symbol, Param] = {s: p for one in forms for s, p in one.nonlinear_parameters.items()}
+        self.parameter_of_column = np.concatenate(
+            [np.full(len(form.terms), parameter_index) for parameter_index, form in enumerate(forms)]
+        )
+        self.nonlinear_parameters: dict[sympy.Symbol, Param] = {
+            s: p for one in forms for s, p in one.nonlinear_parameters.items()
+        }
 
     def unweighted(self, T: Floats, nonlinear_values: Sequence[float] | Floats) -> tuple[Floats, Floats]:
         """Functions (temperatures, terms) and offsets (temperatures, parameters)."""
         basis, start = [], 0
         for form in self.forms:
-            basis.append(form.basis_values(T, [float(v) for v in nonlinear_values[start : start + len(form.nonlinear_parameters)]]))
+            basis.append(
+                form.basis_values(
+                    T, [float(v) for v in nonlinear_values[start : start + len(form.nonlinear_parameters)]]
+                )
+            )
             start += len(form.nonlinear_parameters)
         return np.concatenate([p[:, :-1] for p in basis], axis=1), np.stack([p[:, -1] for p in basis], axis=1)
 
-    def whitened(self, estimates: IsothermalEstimates, nonlinear_values: Sequence[float] | Floats) -> tuple[Floats, Floats]:
+    def whitened(
+        self, estimates: IsothermalEstimates, nonlinear_values: Sequence[float] | Floats
+    ) -> tuple[Floats, Floats]:
         """Features (temperatures * parameters, terms) and target (rows,) after multiplication by the whiteners."""
         functions, offsets = self.unweighted(estimates.temperatures, nonlinear_values)
         features = np.concatenate(estimates.whitening[:, :, self.parameter_of_column] * functions[:, None, :])
@@ -102,7 +261,9 @@ def regress(estimates: IsothermalEstimates, forms: Sequence[CandidateForm]) -> R
     nonlinear_values = _variable_projection(design, estimates) if design.nonlinear_parameters else np.zeros(0)
     features, target = design.whitened(estimates, nonlinear_values)
     coefficients = solve_with_pysindy(features, target)
-    sensitivities = np.concatenate([features, _nonlinear_sensitivities(design, estimates, nonlinear_values, coefficients)], axis=1)
+    sensitivities = np.concatenate(
+        [features, _nonlinear_sensitivities(design, estimates, nonlinear_values, coefficients)], axis=1
+    )
     names = [name for form in forms for name in form.terms] + [s.name for s in design.nonlinear_parameters]
     values = dict(zip(names, map(float, (*coefficients, *nonlinear_values)), strict=True))
     return Regression(
@@ -142,14 +303,20 @@ def _variable_projection(design: _DesignMatrix, estimates: IsothermalEstimates) 
     return np.asarray(low + solution.x * scale)
 
 
-def _nonlinear_sensitivities(design: _DesignMatrix, estimates: IsothermalEstimates, nonlinear_values: Floats, coefficients: Floats) -> Floats:
+def _nonlinear_sensitivities(
+    design: _DesignMatrix, estimates: IsothermalEstimates, nonlinear_values: Floats, coefficients: Floats
+) -> Floats:
     """Derivatives of the white curves to what is inside exponentials, (rows, inner), by central differences."""
     sensitivities = np.zeros((estimates.theta.size, nonlinear_values.size))
     for k, param in enumerate(design.nonlinear_parameters.values()):
         step = np.zeros(nonlinear_values.size)
         step[k] = 1e-5 * (param.bounds[1] - param.bounds[0])
-        (features_above, target_above), (features_below, target_below) = (design.whitened(estimates, nonlinear_values + s * step) for s in (1.0, -1.0))
-        sensitivities[:, k] = ((features_above - features_below) @ coefficients - (target_above - target_below)) / (2 * step[k])
+        (features_above, target_above), (features_below, target_below) = (
+            design.whitened(estimates, nonlinear_values + s * step) for s in (1.0, -1.0)
+        )
+        sensitivities[:, k] = ((features_above - features_below) @ coefficients - (target_above - target_below)) / (
+            2 * step[k]
+        )
     return sensitivities
 
 

@@ -1,12 +1,16 @@
-"""Mesh: nodes, eight-node elements, what is held, where the pressure acts, and where the surface is looked at."""
+"""Meshes of eight-node quadrilaterals: shape functions, integration points, quality, structured strips, surface interpolation.
+
+Serendipity functions as in Zienkiewicz and Taylor, The Finite Element Method, vol. 1, with 2 x 2 integration points.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from creepkit.arrays import Bools, Floats, Ints, frozen
+from creepkit.arrays import ArrayLike, Bools, Floats, Ints, frozen
 from creepkit.errors import SolveError
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -54,3 +58,280 @@ class Mesh:
     def moved(self, nodes: Floats) -> Mesh:
         """The same mesh with its nodes elsewhere."""
         return replace(self, nodes=nodes)
+
+
+GAUSS_POINTS = CORNERS / np.sqrt(3.0)
+"""The 2 x 2 Gauss points (4, 2) of the reference element, each near the corner of its number; all weights are 1."""
+
+
+class Discretization(NamedTuple):
+    """A mesh at its integration points: (elements, 4 points, 8 nodes) unless said otherwise; mm.
+
+    by_radius, by_height : derivatives of the shape functions to r and to z, 1/mm.
+    over_radius : shape functions divided by the radius of the point, 1/mm.
+    weights : (elements, 4) area of the section that belongs to a point, times its radius, mm^3.
+    points : (elements, 4, 2) r and z, mm.
+    """
+
+    by_radius: Floats
+    by_height: Floats
+    over_radius: Floats
+    weights: Floats
+    points: Floats
+
+
+class GeometryDerivative(NamedTuple):
+    """How the points move with a number of the geometry, for each unit of it.
+
+    gradient : (elements, 4, 2, 2) derivative of the velocity's component (first of the two) to r and z.
+    hoop : (elements, 4) radial velocity over the radius.
+    """
+
+    gradient: Floats
+    hoop: Floats
+
+
+def shape_functions(places: Floats) -> Floats:
+    """Values (places, 8) at places (places, 2) of the reference element."""
+    x, y = places[:, :1], places[:, 1:]
+    cx, cy = CORNERS.T
+    corner = 0.25 * (1 + x * cx) * (1 + y * cy) * (x * cx + y * cy - 1)
+    below_above = 0.5 * (1 - x**2) * (1 + y * np.array([-1.0, 1.0]))
+    right_left = 0.5 * (1 + x * np.array([1.0, -1.0])) * (1 - y**2)
+    return np.hstack([corner, _alternate(below_above, right_left)])
+
+
+def shape_gradients(places: Floats) -> Floats:
+    """Derivatives (places, 8, 2) to the two local coordinates at places (places, 2)."""
+    x, y = places[:, :1], places[:, 1:]
+    cx, cy = CORNERS.T
+    up, right = np.array([-1.0, 1.0]), np.array([1.0, -1.0])
+    by_x = 0.25 * cx * (1 + y * cy) * (2 * x * cx + y * cy)
+    by_y = 0.25 * cy * (1 + x * cx) * (x * cx + 2 * y * cy)
+    by_x = np.hstack([by_x, _alternate(-x * (1 + y * up), 0.5 * right * (1 - y**2))])
+    by_y = np.hstack([by_y, _alternate(0.5 * (1 - x**2) * up, -(1 + x * right) * y)])
+    return np.stack([by_x, by_y], axis=2)
+
+
+def discretize(mesh: Mesh) -> Discretization:
+    """Everything an integral over the mesh needs; an inverted element is refused."""
+    refuse_inverted(mesh)
+    nodes = mesh.nodes[mesh.elements]
+    values = shape_functions(GAUSS_POINTS)
+    points = np.einsum("pa,eai->epi", values, nodes)
+    tangents = local_tangents(nodes, GAUSS_POINTS)
+    slopes = np.einsum("epji,pai->epja", np.linalg.inv(tangents), shape_gradients(GAUSS_POINTS))
+    return Discretization(
+        by_radius=np.ascontiguousarray(slopes[:, :, 0]),
+        by_height=np.ascontiguousarray(slopes[:, :, 1]),
+        over_radius=values / points[:, :, :1],
+        weights=np.linalg.det(tangents) * points[:, :, 0],
+        points=points,
+    )
+
+
+def geometry_derivative(mesh: Mesh, velocity: Floats) -> GeometryDerivative:
+    """What exact shape derivatives need when the nodes move with `velocity` (nodes, 2), mm a unit of the number."""
+    at = discretize(mesh)
+    moves = velocity[mesh.elements]
+    gradient = np.stack([np.einsum("epa,eai->epi", slopes, moves) for slopes in (at.by_radius, at.by_height)], axis=3)
+    return GeometryDerivative(gradient, np.einsum("epa,ea->ep", at.over_radius, moves[:, :, 0]))
+
+
+def local_tangents(nodes: Floats, places: Floats) -> Floats:
+    """Derivatives (elements, places, 2 local, 2) of r and z, for nodes (elements, 8, 2)."""
+    return np.asarray(np.einsum("pai,eaj->epij", shape_gradients(places), nodes))
+
+
+def refuse_inverted(mesh: Mesh) -> None:
+    """Raise SolveError when an element is turned inside out at a corner or at an integration point."""
+    places = np.vstack([CORNERS, GAUSS_POINTS])
+    areas = np.linalg.det(local_tangents(mesh.nodes[mesh.elements], places))
+    bad = np.flatnonzero(~(areas > 0).all(axis=1))
+    if bad.size:
+        worst = mesh.nodes[mesh.elements[bad[0], :4]].mean(axis=0)
+        raise SolveError(
+            f"element {bad[0]} of the mesh, near r = {worst[0]:.4g} mm, z = {worst[1]:.4g} mm, is inverted "
+            f"({bad.size} of {len(areas)} elements are); number its corners anticlockwise and keep its middle nodes "
+            "near the middle of its sides, or change the refinement of a mesh that was made here"
+        )
+
+
+def _alternate(first: Floats, second: Floats) -> Floats:
+    """Columns of two arrays (places, 2) in turn: the middles of the sides 1-2, 2-3, 3-4, 4-1."""
+    return np.stack([first, second], axis=2).reshape(len(first), 4)
+
+
+SIDES = np.array([[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]])
+"""First, middle and last node of each side of an element."""
+
+
+class MeshQuality(NamedTuple):
+    """The worst of each element over its corners and integration points, 1 for a rectangle and 0 for a collapsed one.
+
+    sine : (elements,) sine of the angle between its two local directions.
+    evenness : (elements,) smallest over largest local area.
+    """
+
+    sine: Floats
+    evenness: Floats
+
+
+def mesh_quality(mesh: Mesh) -> MeshQuality:
+    """How far the elements of a mesh are from parallelograms with right angles."""
+    tangents = local_tangents(mesh.nodes[mesh.elements], np.vstack([CORNERS, GAUSS_POINTS]))
+    areas = np.linalg.det(tangents)
+    lengths = np.linalg.norm(tangents, axis=3).prod(axis=2)
+    return MeshQuality((areas / lengths).min(axis=1), areas.min(axis=1) / areas.max(axis=1))
+
+
+def half_bandwidth(elements: Ints) -> int:
+    """Diagonals beside the main one in a matrix of two unknowns a node."""
+    return int(2 * np.ptp(elements, axis=1).max() + 1)
+
+
+def outline(elements: Ints) -> Ints:
+    """Element and side number (sides, 2) of the sides that belong to one element only."""
+    ends = np.sort(elements[:, SIDES[:, [0, 2]]].reshape(-1, 2), axis=1)
+    _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
+    alone = np.sort(first[count == 1])
+    return np.stack([alone // 4, alone % 4], axis=1)
+
+
+class StripMesh(NamedTuple):
+    """Nodes and elements of a strip, and its four sides as node numbers.
+
+    nodes : (nodes, 2) mm. elements : (elements, 8), in the order that `Mesh` asks for.
+    inner, outer : (columns, 3) element sides along the two lines, the solid to their left.
+    first, last : (2 layers + 1,) nodes of the first and of the last column line, from the inner side.
+    inner_line, outer_line : (2 columns + 1,) corner and middle nodes along the two lines, from the first column on.
+    """
+
+    nodes: Floats
+    elements: Ints
+    inner: Ints
+    outer: Ints
+    first: Ints
+    last: Ints
+    inner_line: Ints
+    outer_line: Ints
+
+
+def strip_mesh(inner: Floats, outer: Floats, breaks: Floats) -> StripMesh:
+    """The strip whose column lines run straight from `inner` to `outer`.
+
+    inner, outer : (2 columns + 1, 2) ends of the column lines, those of mid-columns included; each lies on its curve,
+        so the sides of the elements are parabolas through three points of it.
+    breaks : (layers + 1,) rising from 0 on the inner side to 1 on the outer side.
+    With `layers` layers the half-bandwidth of a matrix of two unknowns a node is 6 layers + 9.
+    """
+    columns, layers = len(inner) // 2, len(breaks) - 1
+    start = (3 * layers + 2) * np.arange(columns + 1)
+    middle = start[:-1] + 2 * layers + 1
+    a, b, j = start[:-1, None], start[1:, None], np.arange(layers)
+    corners = [a + 2 * j, b + 2 * j, b + 2 * j + 2, a + 2 * j + 2]
+    middles = [middle[:, None] + j, b + 2 * j + 1, middle[:, None] + j + 1, a + 2 * j + 1]
+    elements = np.stack(corners + middles, axis=2)
+    inner_line = _interleaved(start, middle)
+    outer_line = _interleaved(start + 2 * layers, middle + layers)
+    return StripMesh(
+        nodes=strip_nodes(inner, outer, breaks),
+        elements=elements.reshape(-1, 8),
+        inner=elements[:, 0, [0, 4, 1]],
+        outer=elements[:, -1, [2, 6, 3]],
+        first=np.arange(2 * layers + 1),
+        last=start[-1] + np.arange(2 * layers + 1),
+        inner_line=inner_line,
+        outer_line=outer_line,
+    )
+
+
+def strip_nodes(inner: Floats, outer: Floats, breaks: Floats) -> Floats:
+    """The nodes of a strip, (nodes, 2); linear in the two sides, so velocities of the sides give those of the nodes."""
+    fine = np.empty(2 * len(breaks) - 1)
+    fine[::2], fine[1::2] = breaks, 0.5 * (breaks[:-1] + breaks[1:])
+    lines = [_points_across(inner[k], outer[k], breaks if k % 2 else fine) for k in range(len(inner))]
+    return np.concatenate(lines)
+
+
+def _points_across(inner: Floats, outer: Floats, breaks: Floats) -> Floats:
+    return np.asarray((1 - breaks[:, None]) * inner + breaks[:, None] * outer)
+
+
+def _interleaved(corners: Ints, middles: Ints) -> Ints:
+    line = np.empty(corners.size + middles.size, dtype=np.int64)
+    line[::2], line[1::2] = corners, middles
+    return line
+
+
+_ROUNDING = 1e-9
+"""mm by which a wanted radius may lie outside the nodes: a window that ends on a node ends inside."""
+
+
+class SurfaceInterpolation(NamedTuple):
+    """Matrices (wanted, nodes) from the displacement of the nodes to that at wanted radii, and to its slope d/dr."""
+
+    values: Floats
+    slopes: Floats
+
+
+def surface_interpolation(radii_nodes: ArrayLike, wanted: ArrayLike) -> Floats:
+    """Matrix (wanted, nodes) from the displacement of the top nodes to that at `wanted` radii, mm.
+
+    radii_nodes : (nodes,) mm, corner and middle nodes in turn from the axis outwards, in the undeformed plate.
+
+        >>> interpolation([0, 1, 2], [0.5]) @ [0.0, 1.0, 4.0]
+        array([0.25])
+    """
+    return surface_interpolation_with_slopes(radii_nodes, wanted).values
+
+
+def surface_interpolation_with_slopes(radii_nodes: ArrayLike, wanted: ArrayLike) -> SurfaceInterpolation:
+    """As `interpolation`, with the slopes; where two sides meet, the mean of theirs."""
+    nodes, radii = checked_surface_radii(radii_nodes), np.atleast_1d(np.asarray(wanted, dtype=float))
+    outside = ~((radii >= nodes[0] - _ROUNDING) & (radii <= nodes[-1] + _ROUNDING))
+    if outside.any():
+        raise SolveError(
+            f"no displacement is known at a radius of {radii[outside][0]:g} mm; the observed surface reaches from "
+            f"{nodes[0]:g} to {nodes[-1]:g} mm, ask for radii within it"
+        )
+    inner, outer = (
+        _on_sides(nodes, radii, np.searchsorted(nodes[::2], radii + nudge) - 1) for nudge in (-_ROUNDING, _ROUNDING)
+    )
+    return SurfaceInterpolation(0.5 * (inner.values + outer.values), 0.5 * (inner.slopes + outer.slopes))
+
+
+def checked_surface_radii(radii: ArrayLike) -> Floats:
+    """Radii of top nodes as an array; SolveError unless they can be corner and middle nodes of sides."""
+    nodes = np.asarray(radii, dtype=float)
+    if nodes.ndim != 1 or nodes.size < 3 or nodes.size % 2 == 0:
+        raise SolveError(
+            f"the observed surface has radii of shape {nodes.shape}; it needs corner and middle nodes in turn, an odd "
+            "number of three or more"
+        )
+    if not np.isfinite(nodes).all() or nodes[0] < 0.0 or (np.diff(nodes) <= 0.0).any():
+        raise SolveError("the radii of the observed surface must be finite, not negative and increasing outwards")
+    share = (nodes[1::2] - nodes[:-2:2]) / (nodes[2::2] - nodes[:-2:2])
+    if not ((share > 0.25) & (share < 0.75)).all():
+        k = 2 * int(np.argmax(np.abs(share - 0.5))) + 1
+        raise SolveError(
+            f"node {k} of the observed surface, at a radius of {nodes[k]:g} mm, is not in the middle half of its side; "
+            "middle and corner nodes must come in turn"
+        )
+    return nodes
+
+
+def _on_sides(nodes: Floats, radii: Floats, side: Ints) -> SurfaceInterpolation:
+    """The matrices at radii that lie on the sides of these numbers, or at an end of them."""
+    side = np.clip(side, 0, nodes.size // 2 - 1)
+    first, middle, last = nodes[2 * side], nodes[2 * side + 1], nodes[2 * side + 2]
+    bend, reach = 0.5 * (first + last) - middle, 0.5 * (last - first)
+    ahead = radii - middle
+    c = 2.0 * ahead / (reach + np.sqrt(np.maximum(reach**2 + 4.0 * bend * ahead, 0.0)))
+    shapes = np.stack([0.5 * c * (c - 1.0), 1.0 - c**2, 0.5 * c * (c + 1.0)], axis=1)
+    slopes = np.stack([c - 0.5, -2.0 * c, c + 0.5], axis=1) / (reach + 2.0 * bend * c)[:, None]
+    columns = 2 * side[:, None] + np.arange(3)
+    matrices = SurfaceInterpolation(np.zeros((radii.size, nodes.size)), np.zeros((radii.size, nodes.size)))
+    np.put_along_axis(matrices.values, columns, shapes, axis=1)
+    np.put_along_axis(matrices.slopes, columns, slopes, axis=1)
+    return matrices

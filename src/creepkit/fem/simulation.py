@@ -1,4 +1,4 @@
-"""simulate: one body under a load program, and what came of it."""
+"""Simulation of a body under a load history, and its sensitivities."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
-from creepkit.fem.body import FiniteElementModel
-from creepkit.fem.columns import SensitivityDirections, sensitivity_workspace
-from creepkit.fem.element import point_workspace
-from creepkit.fem.march import integrate_program
-from creepkit.fem.record import (
+from creepkit.fem.assembly import point_workspace
+from creepkit.fem.banded_system import FiniteElementModel
+from creepkit.fem.mesh import GeometryDerivative
+from creepkit.fem.point_sensitivities import SensitivityDirections, sensitivity_workspace
+from creepkit.fem.step_record import (
     DEFLECTION_LIMIT,
     LAW_FAILED,
     LIMIT_LOAD,
@@ -23,16 +23,14 @@ from creepkit.fem.record import (
     STATE_LIMIT,
     STRAIN_LIMIT,
     TOO_MANY_STEPS,
-    StepRecord,
     SolverSettings,
+    StepRecord,
+    TimeInterpolation,
     solver_workspace,
 )
-from creepkit.fem.sensitivity import DONE
-from creepkit.fem.sensitivity import differentiate_program as replay
-from creepkit.fem.shape import GeometryDerivative
-from creepkit.fem.timeline import TimeInterpolation
-from creepkit.integration.segments import merge_programs
-from creepkit.integration.tableau import SDIRK2
+from creepkit.fem.time_integration import DONE, integrate_program
+from creepkit.fem.time_integration import differentiate_program as replay
+from creepkit.integration.time_discretisation import SDIRK2, merge_programs
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.records import Program, Status
 
@@ -47,6 +45,7 @@ REASONS = {
     LAW_FAILED: "the law gave no finite rate at a point",
 }
 """What each ending means, in words."""
+
 
 _STATUS = {
     REACHED_END: Status.COMPLETE,
@@ -147,10 +146,19 @@ def simulate(
 
 
 def _record(
-    law: CompiledLaw, body: FiniteElementModel, load_history: LoadHistory, settings: SolverSettings, keep_points: bool, keep_stages: bool
+    law: CompiledLaw,
+    body: FiniteElementModel,
+    load_history: LoadHistory,
+    settings: SolverSettings,
+    keep_points: bool,
+    keep_stages: bool,
 ) -> StepRecord:
     """Room for as many steps as the settings allow; memory is only taken where it is written."""
-    rows, size, points = settings.max_steps + len(load_history.segments) + 2, body.equations.size, 4 * len(body.elements)
+    rows, size, points = (
+        settings.max_steps + len(load_history.segments) + 2,
+        body.equations.size,
+        4 * len(body.elements),
+    )
     kept, values = rows if keep_stages else 0, 4 + law.states
     return StepRecord(
         times=np.zeros(rows),

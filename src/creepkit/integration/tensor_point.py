@@ -1,13 +1,6 @@
-"""The stage of one point in six components: Newton's method in the strains that are free.
+"""The implicit stage of one material point in six components, and its reduction to a scalar problem.
 
-Small strain, isotropic elasticity, creep along the deviator of stress:
-
-    sigma = C (eps - eps_cr)        d(eps_cr)/dt = 3/2 f(q, p, t, T, states) s/q        dp/dt = f
-
-with q the von Mises stress and s the deviator. The direction of s is that of the trial stress, so what remains is the
-scalar problem of `integration.stage` with k = 3G; its derivatives come from `integration.response`. A finite element
-does the same at each of its points. Tensors are vectors of the components 11, 22, 33, 12, 23, 13, with shear strains
-of the tensor, half of the engineering ones.
+Small strain, isotropic elasticity, creep along the deviator of stress. Under proportional loading the problem is a scalar one with exact derivatives. Tensors are vectors of the components 11, 22, 33, 12, 23, 13, with tensor shear strains (half of the engineering ones).
 """
 
 from __future__ import annotations
@@ -18,23 +11,47 @@ from typing import NamedTuple
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
-from creepkit.integration.problem import SOLVED, Axes, StageProblem
-from creepkit.integration.response import BY_MEAN, BY_PRINCIPAL, BY_TRIAL, INPUTS, gradient_of_update, differentiate_stage
-from creepkit.integration.stage import solve_stage
-from creepkit.kernels.calling import call_entry
-from creepkit.kernels.interface import POINT_SIZE, STRESS, TEMPERATURE, TIME, CompiledLaw
+from creepkit.integration.stage_problem import (
+    BY_MEAN,
+    BY_PRINCIPAL,
+    BY_TRIAL,
+    INPUTS,
+    SOLVED,
+    Axes,
+    StageProblem,
+    differentiate_stage,
+    gradient_of_update,
+)
+from creepkit.integration.stage_solver import solve_stage
+from creepkit.integration.time_discretisation import merge_programs
+from creepkit.kernels.interface import POINT_SIZE, STRESS, TEMPERATURE, TIME, CompiledLaw, call_entry
+from creepkit.records import COMPONENTS, PointLoading, Program
 
 EQUIVALENT_STRAIN = 6
 """Place of the equivalent creep strain in a point's vector: six creep strains, then this, then the states."""
 
+
 _UNIT = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+
+
 _TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+
+
 _ROWS, _COLUMNS = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
+
+
 _DEVIATOR = np.eye(6) - np.outer(_UNIT, _UNIT) / 3.0
 
+
 _ITERATIONS = 30
+
+
 _BALANCE, _NO_STRESS = 1e-9, 1e-12
+
+
 _LAST_CORRECTION = 1e-8
+
+
 _FIRST_INCREMENT = 1e-6
 
 
@@ -112,7 +129,9 @@ class TensorPoint:
             strain[free] -= np.linalg.solve(answer.tangent[np.ix_(free, free)], residual)
         return None
 
-    def constitutive_response(self, strain: Floats, base: Floats, guess: Floats, weight: float) -> ConstitutiveResponse | None:
+    def constitutive_response(
+        self, strain: Floats, base: Floats, guess: Floats, weight: float
+    ) -> ConstitutiveResponse | None:
         """What follows from a strain at the end of the stage whose time and temperature stand in the row."""
         trial = trial_stress(self.stiffness @ (strain - base[:6]))
         if not isfinite(trial.q):
@@ -165,5 +184,87 @@ class TensorPoint:
         gradient, response = np.zeros((size, self.row.size)), np.zeros((size, INPUTS + size - 1))
         gradient_of_update(out[0], problem, increment, gradient)
         rates, stress = out[0, 1:size].copy(), float(self.row[STRESS])
-        regular = differentiate_stage(axes, problem, increment, stress, rates, gradient, np.zeros((size, size)), response)
+        regular = differentiate_stage(
+            axes, problem, increment, stress, rates, gradient, np.zeros((size, size)), response
+        )
         return response[0] if regular and np.isfinite(response[0]).all() else None
+
+
+_PROPORTIONALITY_TOLERANCE = 1e-9
+"""Of the largest stress: what differs by less is the same direction."""
+
+
+_SHEAR_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+
+
+_MEAN_DIRECTION = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+
+
+class ProportionalLoading(NamedTuple):
+    """A scalar problem.
+
+    driving : von Mises stress if nothing crept, over time, MPa; stiffness : k, MPa; axes : of the scalar problem.
+    flow : (6,) d(creep strain)/d(equivalent); along : (6,) stress by von Mises stress, where a strain is prescribed.
+    """
+
+    driving: Program
+    stiffness: float
+    axes: Axes
+    flow: Floats
+    along: Floats
+
+
+def proportional_loading(
+    loading: PointLoading, end: float, elastic: tuple[float, float] | None = None
+) -> ProportionalLoading | None:
+    """The scalar problem of a loading up to `end`, s; None where there is none. elastic : E, MPa, and nu."""
+    if loading.strain:
+        return None if elastic is None else _single_strain(loading, elastic)
+    programs = [loading.stress.get(name, Program.constant(0.0)) for name in COMPONENTS]
+    times, stresses = _segment_ends(programs, end)
+    means = stresses[:, :3].mean(axis=1)
+    deviators = stresses - means[:, None] * _MEAN_DIRECTION
+    size, room = (
+        np.sqrt(1.5 * (deviators**2 @ _SHEAR_WEIGHTS)),
+        _PROPORTIONALITY_TOLERANCE * max(float(np.abs(stresses).max()), 1e-300),
+    )
+    along = deviators[np.argmax(size)] / size.max() if size.max() > room else np.zeros(6)
+    level = 1.5 * (deviators * _SHEAR_WEIGHTS) @ along
+    line = _line(level, means, room)
+    if line is None or np.abs(deviators - level[:, None] * along).max() > room or level.min() < -room:
+        return None
+    offset, slope = line
+    axes = Axes(offset, trial_stress(along).axes.principal_slope + slope, offset, slope)
+    return ProportionalLoading(Program(times, np.maximum(level, 0.0)), 0.0, axes, 1.5 * along, np.zeros(6))
+
+
+def _single_strain(loading: PointLoading, elastic: tuple[float, float]) -> ProportionalLoading | None:
+    """One strain that never falls, and no stress but its own."""
+    if loading.stress or len(loading.strain) > 1:
+        return None
+    ((name, strain),) = loading.strain.items()
+    if (np.diff(strain.values) < 0.0).any() or strain.values[0] < 0.0:
+        return None
+    (E, nu), shear = elastic, name[0] != name[1]
+    along = np.where(np.arange(6) == COMPONENTS.index(name), 1.0 / np.sqrt(3.0) if shear else 1.0, 0.0)
+    stiffness = 1.5 * E / (1.0 + nu) if shear else E
+    driving = stiffness * strain.values * (2.0 / np.sqrt(3.0) if shear else 1.0)
+    trial = trial_stress(along)
+    axes = Axes(0.0, trial.axes.principal_slope + trial.mean, 0.0, trial.mean)
+    return ProportionalLoading(Program(strain.times, driving), stiffness, axes, 1.5 * trial.s, along)
+
+
+def _segment_ends(programs: list[Program], end: float) -> tuple[Floats, Floats]:
+    """Times and values (times, programs) at both ends of every segment."""
+    rows = merge_programs(*programs, end=end)
+    if not len(rows):
+        return np.zeros(1), np.array([[float(p.at(0.0)) for p in programs]])
+    values = np.stack([rows[:, 2::2], rows[:, 3::2]], axis=1)
+    return rows[:, :2].reshape(-1), values.reshape(-1, len(programs))
+
+
+def _line(x: Floats, y: Floats, room: float) -> tuple[float, float] | None:
+    """Offset and slope of y over x, where it is a straight line."""
+    slope = float(np.polyfit(x, y, 1)[0]) if float(np.ptp(x)) > room else 0.0
+    offset = float(np.mean(y - slope * x))
+    return (offset, slope) if np.abs(y - offset - slope * x).max() <= 10 * room else None

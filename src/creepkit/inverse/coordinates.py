@@ -1,50 +1,119 @@
-"""Well-conditioned coordinates: the log rate of each term and state at a reference point instead of its coefficient.
-
-A and n are correlated to -0.99999 in raw form; ln of the term's rate at the middle of the measured stresses, and n,
-are nearly independent. With theta the internal parameters, u equals theta but for each term's coefficient ln A_i,
-which becomes u_i = ln f_i(reference; theta). The map is linear in ln A_i, so it inverts at once. The coefficient of an
-internal variable's rate becomes, likewise, the ln of that rate for the virgin material. Where a term's stress exponent
-is not a parameter itself, as that of sinh, the local exponent at the reference takes the place of one (see
-inverse.local_exponents).
-"""
+"""Conditioned coordinates: the log rate of each term at a reference point and local stress exponents, in the place of raw parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import sympy
+from scipy.stats import qmc
 
 from creepkit.arrays import Floats
 from creepkit.errors import LawError
-from creepkit.inverse.local_exponents import local_exponents
-from creepkit.inverse.nominal import reference_end_strain, reference_stresses
+from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.kernels import ArrayKernel, lower
-from creepkit.language import CreepLaw
-from creepkit.records import History, Predictor
+from creepkit.language import CreepLaw, stress, temperature
+from creepkit.language.symbols import POINT_VARIABLES
+
+SAMPLE_POINTS = 64
+"""Points of the bounds at which a candidate parameter is looked at."""
+
+
+MINIMUM_DERIVATIVE = 0.2
+"""Of dh/dp over the bounds: a parameter that the local exponent hardly feels cannot stand for it."""
+
+
+LARGEST_EXPONENT = 30.0
+"""Local exponents above this are not looked for."""
 
 
 @dataclass(frozen=True)
-class ReferencePoint:
-    """The point at which term rates are stated: stress MPa, strain, time s, temperature K."""
+class LocalExponent:
+    """h = a + b p of one term: p : the parameter's position; others : positions that a and b depend on.
 
-    stress: float
-    strain: float
-    time: float
-    temperature: float
+    parts : point and internal parameters of `others` to (a, b, da, db), the latter with one entry for each of them.
+    """
 
-    @classmethod
-    def from_histories(cls, histories: Sequence[History], predictor: Predictor | None = None) -> ReferencePoint:
-        """The middle of what was measured: geometric means of stress and time, of half the end strain; median T.
+    position: int
+    others: tuple[int, ...]
+    coefficients: Callable[..., tuple[object, ...]]
 
-        using : where it states reference stresses, they count (see inverse.nominal).
-        """
-        mean_stresses = [float(np.exp(np.mean(np.log(np.maximum(reference_stresses(h, predictor), 1e-6))))) for h in histories]
-        times = [float(h.times[h.used][-1]) for h in histories]
-        strains = [reference_end_strain(h, predictor) for h in histories]
-        temperatures = [float(np.mean(h.temperature_program().values)) for h in histories]
-        central_values = [float(np.exp(np.mean(np.log(v)))) for v in (mean_stresses, strains, times)]
-        return cls(central_values[0], 0.5 * central_values[1], 0.5 * central_values[2], float(np.median(temperatures)))
+    def evaluate(self, point: Sequence[float], theta: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """a, b (...,) and their derivatives to the internal parameters `others`, (..., others)."""
+        other_values = [theta[..., k] for k in self.others]
+        with np.errstate(all="ignore"):
+            evaluated = self.coefficients(*point, *other_values)
+        shape, count = theta.shape[:-1], len(self.others)
+        broadcast = [np.broadcast_to(np.asarray(v, float), shape) for v in evaluated]
+        da, db = (
+            np.stack(broadcast[k : k + count], axis=-1) if count else np.zeros((*shape, 0)) for k in (2, 2 + count)
+        )
+        return broadcast[0], broadcast[1], da, db
+
+
+def local_exponents(law: CreepLaw) -> tuple[LocalExponent, ...]:
+    """Those of a law's terms that are worth a coordinate; none for terms that mention internal variables."""
+    key = (law.fingerprint, tuple(param.bounds for param in law.params.values()))
+    if key not in _CACHE:
+        _CACHE[key] = _derived(law)
+    return _CACHE[key]
+
+
+_CACHE: dict[tuple[str, tuple[tuple[float, float], ...]], tuple[LocalExponent, ...]] = {}
+"""What was derived in this process, by fingerprint and bounds."""
+
+
+def _derived(law: CreepLaw) -> tuple[LocalExponent, ...]:
+    used_positions: set[int] = set()
+    exponents = []
+    for label in law.terms:
+        exponent = _exponent_of_term(law, law.terms[label], used_positions)
+        if exponent is not None:
+            exponents.append(exponent)
+            used_positions |= {exponent.position, *exponent.others}
+    return tuple(exponents)
+
+
+def _exponent_of_term(law: CreepLaw, term: sympy.Expr, used_positions: set[int]) -> LocalExponent | None:
+    if term.free_symbols & set(law.states) or not term.has(stress):
+        return None
+    exponent = sympy.simplify(stress * sympy.diff(term, stress) / term)
+    parameters = [symbol for symbol in law.params if symbol in exponent.free_symbols]
+    if exponent in law.params or {law.names.index(s.name) for s in parameters} & used_positions:
+        return None
+    candidates = [p for p in parameters if law.params[p].scale != "log" and sympy.diff(exponent, p, 2) == 0]
+    candidates = [p for p in candidates if not sympy.diff(exponent, p).has(temperature)]  # a slope may be 0 at T_ref
+    scored = [(_smallest_derivative(law, exponent, p), p) for p in candidates]
+    scored = [(score, p) for score, p in scored if score > MINIMUM_DERIVATIVE]
+    if not scored:
+        return None
+    p = max(scored, key=lambda pair: pair[0])[1]
+    return _compiled(law, exponent, p, [symbol for symbol in parameters if symbol != p])
+
+
+def _compiled(law: CreepLaw, exponent: sympy.Expr, p: sympy.Symbol, others: list[sympy.Symbol]) -> LocalExponent:
+    a, b = exponent.subs(p, 0), sympy.diff(exponent, p)
+    internal = {s: sympy.exp(s) if law.params[s].scale == "log" else s for s in others}
+    a, b = a.subs(internal, simultaneous=True), b.subs(internal, simultaneous=True)
+    parts = [a, b, *(sympy.diff(a, s) for s in others), *(sympy.diff(b, s) for s in others)]
+    function = sympy.lambdify((*POINT_VARIABLES, *others), parts, "numpy", cse=True)
+    names = law.names
+    return LocalExponent(names.index(p.name), tuple(names.index(s.name) for s in others), function)
+
+
+def _smallest_derivative(law: CreepLaw, exponent: sympy.Expr, p: sympy.Symbol) -> float:
+    """The smallest |dh/dp| over the bounds, at 100 MPa, strain .01, 2e4 s, 1000 K."""
+    derivative = sympy.diff(exponent, p)
+    symbols = [s for s in law.params if s in derivative.free_symbols]
+    function = sympy.lambdify((*POINT_VARIABLES, *symbols), derivative, "numpy")
+    unit = qmc.Sobol(max(len(symbols), 1), seed=0).random(SAMPLE_POINTS)
+    internal_bounds = [[law.params[s].to_internal(b) for b in law.params[s].bounds] for s in symbols]
+    internal = [low + unit[:, k] * (high - low) for k, (low, high) in enumerate(internal_bounds)]
+    sampled = [np.exp(v) if law.params[s].scale == "log" else v for s, v in zip(symbols, internal, strict=True)]
+    with np.errstate(all="ignore"):
+        magnitudes = np.abs(np.broadcast_to(function(100.0, 0.01, 2e4, 1000.0, 100.0, 33.0, *sampled), SAMPLE_POINTS))
+    return float(np.min(magnitudes)) if np.isfinite(magnitudes).all() else 0.0
 
 
 class Coordinates:
@@ -58,7 +127,9 @@ class Coordinates:
             single_term = law.only(label)
             position = _coefficient_position(law, single_term)
             if position is not None:
-                self._rate_kernels.append((position, [law.names.index(n) for n in single_term.names], lower(single_term, "numpy")))
+                self._rate_kernels.append(
+                    (position, [law.names.index(n) for n in single_term.names], lower(single_term, "numpy"))
+                )
         self.exponents = local_exponents(law)
         """Parameters whose place the local exponent of their term takes."""
         self.term_rates = tuple(k for k, _, _ in self._rate_kernels)
@@ -148,7 +219,9 @@ class Coordinates:
 
     def _has_finite_rate(self, kernel: ArrayKernel, rate_law: CreepLaw) -> bool:
         """Whether a virgin internal variable grows at all in the middle of the bounds."""
-        central_theta = [0.5 * (p.to_internal(p.bounds[0]) + p.to_internal(p.bounds[1])) for p in rate_law.params.values()]
+        central_theta = [
+            0.5 * (p.to_internal(p.bounds[0]) + p.to_internal(p.bounds[1])) for p in rate_law.params.values()
+        ]
         return bool(np.isfinite(self._log_rate(kernel, np.array(central_theta))))
 
     def _log_rate(self, kernel: ArrayKernel, theta: Floats) -> Floats:
@@ -164,13 +237,16 @@ def _state_rate_laws(law: CreepLaw) -> list[CreepLaw]:
     state_parameters = {p: param for p, param in law.params.items() if p in rate_parameters}
     for symbol, state in law.states.items():
         term_name = f"rate of {symbol}"
-        signed_rate_laws = (replace(law, terms={term_name: sign * state.rate}, params=state_parameters, constraints=()) for sign in (1, -1))
+        signed_rate_laws = (
+            replace(law, terms={term_name: sign * state.rate}, params=state_parameters, constraints=())
+            for sign in (1, -1)
+        )
         rate_laws += list(filter(_has_log_form, signed_rate_laws))[:1]
     return rate_laws
 
 
 def _has_log_form(rate_law: CreepLaw) -> bool:
-    from creepkit.kernels.logform import log_form
+    from creepkit.kernels.log_form import log_form
 
     try:
         log_form(rate_law)
@@ -181,11 +257,13 @@ def _has_log_form(rate_law: CreepLaw) -> bool:
 
 def _coefficient_position(law: CreepLaw, single_term: CreepLaw) -> int | None:
     """Position of the one log-scale parameter that multiplies this rate and stands in no other, if there is one."""
-    from creepkit.kernels.logform import log_form
+    from creepkit.kernels.log_form import log_form
 
     (coefficients,) = log_form(single_term).coefficients
     names = [single_term.names[k] for k in coefficients]
     expressions = [*law.terms.values(), *(state.rate for state in law.states.values())]
-    occurrences = [sum(symbol in each.free_symbols for each in expressions) for symbol in (law.symbol(n) for n in names)]
+    occurrences = [
+        sum(symbol in each.free_symbols for each in expressions) for symbol in (law.symbol(n) for n in names)
+    ]
     unshared = [n for n, count in zip(names, occurrences, strict=True) if count == 1]
     return law.names.index(unshared[0]) if unshared else None

@@ -1,4 +1,4 @@
-"""Identification: the law of a set of tests, its values with intervals, how tests scatter, and how well it fits."""
+"""Identification: the law of a set of tests, its values with intervals, the noise model, and the goodness of fit."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
-from creepkit.inverse.coordinates import Coordinates, ReferencePoint
-from creepkit.inverse.effects import owner_of, prior_mean
-from creepkit.inverse.findings import NuisanceEstimate, OutputFit, TestFit
-from creepkit.inverse.measures import OutputErrors
-from creepkit.inverse.scatter import NoiseModel
+from creepkit.inverse.composite_predictor import predict
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
+from creepkit.inverse.noise_model import NoiseModel
+from creepkit.inverse.nuisance_parameters import NuisanceEstimate, owner_of, prior_mean
+from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.together import predict
-from creepkit.inverse.uncertainty import Estimate, delta_method, interval_quantile
+from creepkit.inverse.uncertainty.laplace_approximation import Estimate, delta_method, interval_quantile
 from creepkit.language import CreepLaw
 from creepkit.records import SIMULATED_NUISANCES, History, Nuisance, Prediction, Predictor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from creepkit.inverse.intervals.correlation import Correlation
-    from creepkit.inverse.intervals.profile import ProfileLikelihood
-    from creepkit.inverse.intervals.quantities import DerivedQuantity
-    from creepkit.inverse.intervals.sampling import PosteriorSamples
-    from creepkit.inverse.restricted import LinearisedProblem
-    from creepkit.inverse.search.trace import SearchTrace
-    from creepkit.inverse.sparsity.record import Sparsity
+    from creepkit.inverse.search.cost_function import SearchTrace
+    from creepkit.inverse.sparsity.result import Sparsity
+    from creepkit.inverse.uncertainty.correlation import Correlation
+    from creepkit.inverse.uncertainty.posterior import PosteriorSamples
+    from creepkit.inverse.uncertainty.profile_likelihood import ProfileLikelihood
+    from creepkit.inverse.uncertainty.quantities import DerivedQuantity
+    from creepkit.inverse.variance_components import LinearisedProblem
 
 
-__all__ = ["Identification", "NuisanceEstimate", "OutputFit", "IdentificationSettings", "TestFit"]
+__all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "OutputFit", "TestFit"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ class Identification:
 
         stress MPa, temperature K; strain and time default to those of the reference point.
         """
-        from creepkit.inverse.intervals.quantities import log_rate
+        from creepkit.inverse.uncertainty.quantities import log_rate
 
         function = log_rate(self.coordinates, stress, temperature, strain, time)
         log_rate_value, sd = delta_method(function, self.u, self.covariance)
@@ -112,7 +112,7 @@ class Identification:
         time: ArrayLike | None = None,
     ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
         """Local stress exponent d ln rate / d ln stress with its 95 % interval."""
-        from creepkit.inverse.intervals.quantities import local_exponent
+        from creepkit.inverse.uncertainty.quantities import local_exponent
 
         function = local_exponent(self.coordinates, stress, temperature, strain, time)
         exponent, sd = delta_method(function, self.u, self.covariance)
@@ -129,7 +129,7 @@ class Identification:
         scatter : whether the interval is that of a single test, which has its own rate, or that of the law alone.
         Infinite where nothing breaks within some thousand times the longest test.
         """
-        from creepkit.inverse.rupture import constant_stress_tests
+        from creepkit.inverse.goodness_of_fit import constant_stress_tests
 
         T = self.reference.temperature if temperature is None else temperature
         tests, shape = constant_stress_tests(stress, T, self.ranges["time"][1], control)
@@ -140,13 +140,15 @@ class Identification:
         self, histories: Sequence[History] | None = None, *, test_scatter: bool = True, using: Predictor | None = None
     ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
         """The same for histories (by default those that were fitted), whatever their loading: (tests,) each."""
-        from creepkit.inverse.rupture import predict_rupture_times
+        from creepkit.inverse.goodness_of_fit import predict_rupture_times
 
         predictor = using or self.predictor
         if predictor is None:
             raise FitError("this identification was loaded from a file: give using=, the specimen it was made with")
         tests, noise_model = list(histories or self.histories), self.noise_model if test_scatter else None
-        return predict_rupture_times(self.coordinates, self.u, self.covariance, noise_model, self._quantile, tests, predictor)
+        return predict_rupture_times(
+            self.coordinates, self.u, self.covariance, noise_model, self._quantile, tests, predictor
+        )
 
     def predict(
         self, histories: Sequence[History] | None = None, using: Predictor | None = None, *, own_nuisances: bool = True
@@ -160,7 +162,13 @@ class Identification:
         if predictor is None:
             raise FitError("this identification was loaded from a file: give using=, the specimen it was made with")
         tests = list(histories or self.histories)
-        prediction = predict(predictor, self.law, self.values, tests, nuisances=self.nuisance_values(tests, own_nuisances=own_nuisances, using=predictor))
+        prediction = predict(
+            predictor,
+            self.law,
+            self.values,
+            tests,
+            nuisances=self.nuisance_values(tests, own_nuisances=own_nuisances, using=predictor),
+        )
         by_name = {m.name: m for m in self.tests} if own_nuisances else {}
         for k, history in enumerate(tests):
             for output_fit in by_name[history.name].outputs if history.name in by_name else ():
@@ -179,7 +187,9 @@ class Identification:
             return known if known is not None else n.mean if using is None else prior_mean(n, history, using)
 
         return {
-            n.kind: np.array([[of(n, h) for h in histories]]) for n in self.settings.nuisances if n.kind in SIMULATED_NUISANCES
+            n.kind: np.array([[of(n, h) for h in histories]])
+            for n in self.settings.nuisances
+            if n.kind in SIMULATED_NUISANCES
         }
 
     def with_histories(self, histories: Sequence[History], using: Predictor) -> Identification:
@@ -192,42 +202,44 @@ class Identification:
 
     def profile(self, quantity: str | DerivedQuantity, *, level: float = 0.95) -> ProfileLikelihood:
         """Profile likelihood of a parameter, or of another quantity (see inverse.intervals.quantities)."""
-        from creepkit.inverse.intervals.profile import profile
+        from creepkit.inverse.uncertainty.profile_likelihood import profile
 
         return profile(self, quantity, level=level)
 
-    def sample(self, *, walkers: int = 32, steps: int = 1000, seed: int = 0, using: Predictor | None = None) -> PosteriorSamples:
+    def sample(
+        self, *, walkers: int = 32, steps: int = 1000, seed: int = 0, using: Predictor | None = None
+    ) -> PosteriorSamples:
         """Draw from the posterior by Markov chains (emcee, an optional dependency); `using` may be a surrogate."""
-        from creepkit.inverse.intervals.sampling import sample_posterior
+        from creepkit.inverse.uncertainty.posterior import sample_posterior
 
         return sample_posterior(self, walkers=walkers, steps=steps, seed=seed, using=using)
 
     def correlation(self, frame: Literal["author", "conditioned"] = "author") -> Correlation:
         """How estimates hang together, of the author's parameters or of the conditioned coordinates."""
-        from creepkit.inverse.intervals.correlation import correlation
+        from creepkit.inverse.uncertainty.correlation import correlation
 
         return correlation(self, frame)
 
     def undetermined(self) -> tuple[str, ...]:
         """What these tests do not determine, and which combination they do, one sentence each."""
-        from creepkit.inverse.intervals.correlation import undetermined
+        from creepkit.inverse.uncertainty.correlation import undetermined
 
         return undetermined(self)
 
     def save(self, path: str | Path) -> Path:
         """Write the identification as JSON (to a temporary name, then renamed)."""
-        from creepkit.inverse.files import save_identification
+        from creepkit.inverse.identification_document import save_identification
 
         return save_identification(self, Path(path))
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Measured against identified, and residuals; written to `path` when given."""
-        from creepkit.inverse.plotting import identification_figure
+        from creepkit.report.identification_plot import identification_figure
 
         return identification_figure(self, path)
 
     def __str__(self) -> str:
-        from creepkit.inverse.printing import identification_text
+        from creepkit.report.identification_text import identification_text
 
         return identification_text(self)
 

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
-    from creepkit.kernels.lowering import RateDerivatives, ArrayKernel, lower
+    from creepkit.kernels.lowering import ArrayKernel, RateDerivatives, lower
 
-__all__ = ["CompiledLaw", "RateDerivatives", "ArrayKernel", "lower"]
+
+__all__ = ["ArrayKernel", "CompiledLaw", "RateDerivatives", "lower"]
 
 
 def __getattr__(name: str) -> Any:

@@ -17,9 +17,10 @@ The returned flags add up: 1 a rate is not finite, 2 a derivative is not finite.
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numba import types
@@ -28,14 +29,24 @@ from numba.extending import intrinsic
 from creepkit.arrays import Floats
 
 POINT_SIZE = 6
+
+
 STRESS, STRAIN, TIME, TEMPERATURE, PRINCIPAL_STRESS, MEAN_STRESS = range(POINT_SIZE)
 
+
 _DOUBLES: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
+
+
 SIGNATURE = types.int64(types.int64, _DOUBLES, _DOUBLES, _DOUBLES)
+
+
 ENTRY_TYPE = types.FunctionType(SIGNATURE)
 """The numba type of an entry: a function compiled once for it accepts any law."""
 
+
 RATE_NOT_FINITE = 1
+
+
 DERIVATIVE_NOT_FINITE = 2
 
 
@@ -88,3 +99,24 @@ class CompiledLaw:
         with np.errstate(divide="ignore"):
             theta[:, self.log_scale] = np.log(theta[:, self.log_scale])
         return np.ascontiguousarray(theta)
+
+
+_DOUBLE_POINTER = ctypes.POINTER(ctypes.c_double)
+
+
+_C_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, _DOUBLE_POINTER, _DOUBLE_POINTER, _DOUBLE_POINTER)
+
+
+def call_entry(
+    law: CompiledLaw, entry: Literal["rate", "update", "sensitivity"], points: Floats, theta: Floats
+) -> tuple[Floats, int]:
+    """Return an entry's output, (rows, columns) as `interface` lays it out, and its flags.
+
+    points : (rows, 6 + S); theta : (P,).
+    """
+    points, theta = np.ascontiguousarray(points, float), np.ascontiguousarray(theta, float)
+    rows, width = points.shape
+    columns = {"rate": 1, "update": 1 + width, "sensitivity": 1 + width + theta.size}[entry]
+    out = np.empty((rows, (1 + law.states) * columns))
+    pointers = (array.ctypes.data_as(_DOUBLE_POINTER) for array in (points, theta, out))
+    return out, int(_C_FUNCTION(getattr(law, entry).address)(rows, *pointers))

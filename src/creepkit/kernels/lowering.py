@@ -12,25 +12,35 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from creepkit.errors import LawError, nearest
-from creepkit.kernels.entries import SymbolicKernel, symbolic_kernel
-from creepkit.kernels.printing import array_function_source, law_comments
+from creepkit.kernels.kernel_functions import assignment_lines, expression_source, law_comments
+from creepkit.kernels.symbolic_kernel import SymbolicKernel, symbolic_kernel
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
 
+
+if TYPE_CHECKING:
+    from creepkit.kernels.symbolic_kernel import KernelFunction
+    from creepkit.language.law import CreepLaw
+
+
 KernelTarget = Literal["numpy", "torch", "numba"]
 
 
 @overload
 def lower(law: CreepLaw, target: Literal["numpy", "torch"]) -> ArrayKernel: ...
+
+
 @overload
 def lower(law: CreepLaw, target: Literal["numba"]) -> CompiledLaw: ...
+
+
 def lower(law: CreepLaw, target: KernelTarget = "numpy") -> ArrayKernel | CompiledLaw:
     """Return the law as a numeric kernel for "numpy", "torch" or "numba" (compiled, for integrators)."""
     if target == "numba":
-        from creepkit.kernels.compiled import compile_law
+        from creepkit.kernels.compilation import compile_law
 
         return compile_law(law)
     if target not in ("numpy", "torch"):
@@ -73,7 +83,7 @@ class ArrayKernel:
         self.law = law
         self.source = "\n".join([*law_comments(law), "\n", *map(array_function_source, printed)])
         self._target = target
-        self._entries = target.bound(self._execute_source(), len(lowered.names.inputs) - len(law.params))
+        self._entries = target.broadcast_functions(self._execute_source(), len(lowered.names.inputs) - len(law.params))
         self._states = [s.name for s in law.states]
         self._variables = [*(s.name for s in POINT_VARIABLES), *self._states]
 
@@ -132,7 +142,7 @@ class ArrayKernel:
             raise LawError(f"law '{self.law.name}' needs a stress, in MPa")
         if self.law.uses(POINT_VARIABLES[3]) and "temperature" not in point:
             raise LawError(f"law '{self.law.name}' depends on temperature: give temperature in K")
-        given = {name: self._target.number(value) for name, value in point.items()}
+        given = {name: self._target.as_array(value) for name, value in point.items()}
         defaults = {"principal_stress": given["stress"], "mean_stress": given["stress"] / 3.0, "temperature": 1.0}
         defaults |= {s.name: z.initial for s, z in self.law.states.items()}
         return [*(given.get(n, defaults.get(n, 0.0)) for n in self._variables), *self._internal_values(values)]
@@ -144,10 +154,18 @@ class ArrayKernel:
         if missing:
             raise LawError(f"law '{self.law.name}' needs a value for {', '.join(missing)}")
         log = self._target.FUNCTIONS["log_or_off"]
-        numbers = {n: self._target.number(values[n]) for n in self.law.names}
+        numbers = {n: self._target.as_array(values[n]) for n in self.law.names}
         return [log(numbers[n]) if p.scale == "log" else numbers[n] for n, p in self.law.table.items()]
 
 
 @lru_cache(maxsize=256)
 def _array_kernel(law: CreepLaw, target: KernelTarget) -> ArrayKernel:
-    return ArrayKernel(symbolic_kernel(law), import_module(f"creepkit.kernels.{target}_target"))
+    return ArrayKernel(symbolic_kernel(law), import_module(f"creepkit.kernels.{target}_functions"))
+
+
+def array_function_source(entry: KernelFunction) -> str:
+    """An entry as a function of arrays or tensors that returns a tuple."""
+    arguments = ", ".join(s.name for s in entry.inputs)
+    lines = [f"def {entry.name}({arguments}):", *assignment_lines((*entry.constants, *entry.steps), "    ")]
+    outputs = "".join(f"        {expression_source(output)},\n" for output in entry.outputs)
+    return "\n".join(lines) + f"\n    return (\n{outputs}    )\n"

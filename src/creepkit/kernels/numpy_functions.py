@@ -1,7 +1,8 @@
-"""The functions of printed kernels for NumPy arrays."""
+"""The NumPy target: the functions that printed kernels call, and kernels as functions of arrays."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,13 @@ __all__ = [
     "log_tanh", "power", "sin", "sinh", "smaller", "sqrt", "square", "tanh",
 ]  # fmt: skip
 
+
 asinh, atan, choose, power = np.arcsinh, np.arctan, np.where, np.power
+
+
 both, either, larger, smaller = np.logical_and, np.logical_or, np.maximum, np.minimum
+
+
 _LN2 = float(np.log(2.0))
 
 
@@ -88,3 +94,33 @@ def exp_difference(a: Any, b: Any) -> Any:
     size = np.expm1(size)
     size *= np.exp(high)
     return np.copysign(size, np.subtract(a, b))
+
+
+FUNCTIONS = {name: globals()[name] for name in __all__}
+"""What printed text calls."""
+
+
+def broadcast_functions(printed: Mapping[str, Callable[..., Any]], width: int) -> dict[str, Callable[..., list[Any]]]:
+    """Return the printed entries with results that have the shape of all arguments together."""
+    return {name: _broadcast_results(entry) for name, entry in printed.items()}
+
+
+def as_array(value: Any) -> Any:
+    """A number or array, from what a user gives."""
+    return value if isinstance(value, float) else np.asarray(value)
+
+
+def _broadcast_results(entry: Callable[..., Any]) -> Callable[..., list[Any]]:
+    def call(*arguments: Any) -> list[Any]:
+        with np.errstate(over="ignore", under="ignore", divide="ignore"):
+            results = entry(*arguments)
+        shapes = {np.shape(x) for x in arguments} - {()}
+        shape = shapes.pop() if len(shapes) == 1 else np.broadcast_shapes(*shapes)
+        numbers = {y: np.broadcast_to(y, shape) for y in {y for y in results if type(y) is float}}
+        return [numbers[y] if type(y) is float else _broadcast(y, shape) for y in results]
+
+    return call
+
+
+def _broadcast(y: Any, shape: tuple[int, ...]) -> Any:
+    return y if np.shape(y) == shape else np.broadcast_to(y, shape)

@@ -1,11 +1,12 @@
 """The language in which creep laws are written: all that a law plugin imports."""
 
 from creepkit.hookspecs import hookimpl
-from creepkit.language.elastic import Elastic
+from creepkit.language.elastic import Elastic, wachtman
 from creepkit.language.law import CreepLaw
-from creepkit.language.params import Param, State
 from creepkit.language.symbols import (
     GAS_CONSTANT,
+    Param,
+    State,
     mean_stress,
     parameters,
     principal_stress,
@@ -15,19 +16,16 @@ from creepkit.language.symbols import (
     temperature,
     time,
 )
-from creepkit.language.thermal import (
+from creepkit.language.temperature_forms import (
     TemperatureFactor,
     TemperatureForm,
     activated,
     arrhenius,
+    boltzmann,
+    curved,
     exponential,
     inverse_temperature,
     linear,
-    wachtman,
-)
-from creepkit.language.thermal_shapes import (
-    boltzmann,
-    curved,
     logarithmic,
     modified_arrhenius,
     t_log_t,
@@ -38,9 +36,9 @@ __all__ = [
     "GAS_CONSTANT",
     "CreepLaw",
     "Elastic",
-    "TemperatureFactor",
     "Param",
     "State",
+    "TemperatureFactor",
     "TemperatureForm",
     "activated",
     "arrhenius",

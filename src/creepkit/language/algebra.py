@@ -10,9 +10,8 @@ import sympy
 
 from creepkit.errors import LawError, nearest
 from creepkit.language.law import CreepLaw
-from creepkit.language.params import Param, State
-from creepkit.language.symbols import POINT_VARIABLES, temperature
-from creepkit.language.thermal import TemperatureFactor, TemperatureForm
+from creepkit.language.symbols import POINT_VARIABLES, Param, State, temperature
+from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
 
 _INDEXED_NAME = re.compile(r"^(?P<stem>.+?)_(?P<index>[1-9]\d*)$")
 
@@ -137,7 +136,9 @@ def at(law: CreepLaw, T: float) -> CreepLaw:
     if not 0 < kelvin < 1e4:
         raise LawError(f"law '{law.name}': {T!r} is not a temperature in K (allowed: above 0, below 10000)")
     description = f"{kelvin:g}"
-    return _substituted(law, {temperature: sympy.Float(kelvin)}, f"{law.name}@{description}K", f"{law.title} at {description} K")
+    return _substituted(
+        law, {temperature: sympy.Float(kelvin)}, f"{law.name}@{description}K", f"{law.title} at {description} K"
+    )
 
 
 # ---- mechanisms ----------------------------------------------------------------------------------------------------
@@ -161,7 +162,9 @@ def _restricted_to_terms(law: CreepLaw, labels: list[str]) -> CreepLaw:
         raise LawError(f"law '{law.name}': no term would be left; its terms are {', '.join(law.terms)}")
     terms = {label: law.terms[label] for label in labels}
     description = " + ".join(labels)
-    return _pruned(law, terms, dict(law.states), law.constraints, f"{law.name}[{description}]", f"{law.title}: {description} only")
+    return _pruned(
+        law, terms, dict(law.states), law.constraints, f"{law.name}[{description}]", f"{law.title}: {description} only"
+    )
 
 
 def _pruned(
@@ -183,7 +186,9 @@ def _pruned(
     params = {s: p for s, p in law.params.items() if s in needed}
     declared = {*params, *needed_states, *POINT_VARIABLES}
     remaining_constraints = tuple(c for c in constraints if c.free_symbols <= declared)
-    return replace(law, name=name, title=title, terms=terms, states=needed_states, params=params, constraints=remaining_constraints)
+    return replace(
+        law, name=name, title=title, terms=terms, states=needed_states, params=params, constraints=remaining_constraints
+    )
 
 
 def _sign_constraints(expression: sympy.Expr, param: Param) -> list[sympy.Basic]:
@@ -194,7 +199,9 @@ def _sign_constraints(expression: sympy.Expr, param: Param) -> list[sympy.Basic]
     return [expression >= 0] if low >= 0 else [expression <= 0]
 
 
-def _numbered(groups: list[list[str]], separator: str = "_", pattern: re.Pattern[str] = _INDEXED_NAME) -> list[list[str]]:
+def _numbered(
+    groups: list[list[str]], separator: str = "_", pattern: re.Pattern[str] = _INDEXED_NAME
+) -> list[list[str]]:
     """Number the names that collide across groups; names that stand alone stay as they are."""
 
     def stem(name: str) -> str:

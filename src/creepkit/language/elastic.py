@@ -37,3 +37,11 @@ class Elastic:
         """The same record with numbers, at temperature `T` in K."""
         E, nu = (float(v.subs(temperature, T)) if isinstance(v, sympy.Expr) else float(v) for v in (self.E, self.nu))
         return Elastic(E, nu)
+
+
+def wachtman(E0: float, b: float, T0: float) -> sympy.Expr:
+    """Young's modulus E0 - b T exp(-T0/T) as an expression of temperature; E0 in MPa, b in MPa/K, T0 and T in K.
+
+    Wachtman et al. (1961), Phys. Rev. 122, 1754.
+    """
+    return sympy.Float(E0) - sympy.Float(b) * temperature * sympy.exp(-sympy.Float(T0) / temperature)

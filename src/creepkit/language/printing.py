@@ -14,6 +14,7 @@ from creepkit.language.symbols import GAS_CONSTANT, LATEX_SYMBOLS, temperature
 if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
 
+
 _LATEX_NAMES = {"n_inf": r"n_\infty"}
 
 
@@ -80,7 +81,9 @@ class LatexLawPrinter(LatexPrinter):  # type: ignore[misc]
 
 def law_latex(law: CreepLaw) -> str:
     r"""Return ``\dot{\varepsilon}_{cr} = ...`` with one summand a term; states follow as further equations."""
-    return r",\quad ".join(f"{left} = {' + '.join(right)}" for left, right in latex_equations(law, LatexLawPrinter(law)))
+    return r",\quad ".join(
+        f"{left} = {' + '.join(right)}" for left, right in latex_equations(law, LatexLawPrinter(law))
+    )
 
 
 def latex_equations(law: CreepLaw, printer: LatexLawPrinter) -> list[tuple[str, list[str]]]:

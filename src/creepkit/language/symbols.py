@@ -1,4 +1,4 @@
-"""The symbols of the language: what a rate equation may mention.
+"""The symbols of the language, and the parameters and internal variables of a law's table.
 
 Plain real sympy symbols throughout: sympy orders its arguments by class name, so a subclass of Symbol would
 change printed laws, and assumptions such as `positive` would let sympy rewrite what the author wrote.
@@ -10,20 +10,39 @@ strain (logarithmic), `time` the time since the first load ramp began over 1 s, 
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+from typing import Literal
+
 import sympy
 
+from creepkit.errors import LawError
+
 stress = sympy.Symbol("stress", real=True)
+
+
 strain = sympy.Symbol("strain", real=True)
+
+
 time = sympy.Symbol("time", real=True)
+
+
 temperature = sympy.Symbol("temperature", real=True)
+
+
 principal_stress = sympy.Symbol("principal_stress", real=True)
+
+
 mean_stress = sympy.Symbol("mean_stress", real=True)
+
 
 POINT_VARIABLES = (stress, strain, time, temperature, principal_stress, mean_stress)
 """The symbols that describe a material point, in the order of every compiled kernel."""
 
+
 GAS_CONSTANT = 8.314462618
 """R in J/(mol K), CODATA 2018; the paper used 8.31."""
+
 
 LATEX_SYMBOLS = {
     stress: r"\sigma_e",
@@ -46,3 +65,149 @@ def parameters(names: str) -> tuple[sympy.Symbol, ...]:
 def states(names: str) -> tuple[sympy.Symbol, ...]:
     """Return the symbols of internal variables, named in `names`, as a tuple."""
     return parameters(names)
+
+
+ParameterScale = Literal["linear", "log"]
+
+
+@dataclass(frozen=True)
+class Param:
+    """One parameter of a law: its meaning, unit, bounds and how it is to be searched.
+
+    meaning : what the parameter is, in words.
+    unit : its unit ("1" for none); a parameter of log scale must state one.
+    bounds : (low, high) of the fitted range, in `unit`.
+    scale : "log" when the search and the kernels should use its logarithm.
+    off : a value, usually outside the bounds, that switches the parameter off ({0} of the paper's Table 1).
+    limits : (low, high) of what is physical, such as (0, math.inf) of a modulus or (0, 1) of a fraction; no value
+        outside is ever taken but `off`. The bounds lie within. None where anything goes.
+    """
+
+    meaning: str
+    bounds: tuple[float, float]
+    unit: str = ""
+    scale: ParameterScale = "linear"
+    off: float | None = None
+    limits: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if self.scale not in ("linear", "log"):
+            raise LawError(f"parameter '{self.meaning}': scale is '{self.scale}'; allowed are 'linear' and 'log'")
+        _check_text("parameter", self.meaning, self.unit)
+        try:
+            low, high = (float(b) for b in self.bounds)
+        except (TypeError, ValueError):
+            raise LawError(
+                f"parameter '{self.meaning}': bounds are {self.bounds!r}; write two numbers (low, high)"
+            ) from None
+        if not (math.isfinite(low) and math.isfinite(high)):
+            raise LawError(f"parameter '{self.meaning}': bounds ({low:g}, {high:g}) must be finite")
+        if low >= high:
+            raise LawError(
+                f"parameter '{self.meaning}': bounds are reversed or empty, ({low:g}, {high:g}); write (low, high)"
+            )
+        if self.scale == "log" and low <= 0:
+            raise LawError(f"parameter '{self.meaning}': a log scale needs bounds above zero, found low = {low:g}")
+        if self.scale == "log" and not self.unit:
+            raise LawError(f'parameter \'{self.meaning}\': missing unit; write unit="1/s", or unit="1" if it has none')
+        object.__setattr__(self, "bounds", (low, high))
+        object.__setattr__(self, "unit", self.unit or "1")
+        if self.off is not None:
+            if not math.isfinite(self.off):
+                raise LawError(f"parameter '{self.meaning}': off = {self.off} must be a finite number")
+            object.__setattr__(self, "off", float(self.off))
+        if self.limits is not None:
+            object.__setattr__(self, "limits", _checked_limits(self.meaning, self.limits, self.bounds))
+
+    @property
+    def center(self) -> float:
+        """The middle of the bounds on the parameter's own scale, in `unit`."""
+        low, high = self.bounds
+        return math.sqrt(low) * math.sqrt(high) if self.scale == "log" else 0.5 * (low + high)
+
+    def to_internal(self, value: float) -> float:
+        """Return the kernel's form of `value`: its natural logarithm on a log scale (off: -inf)."""
+        if self.scale == "linear":
+            return float(value)
+        return math.log(value) if value > 0 else -math.inf
+
+    def from_internal(self, value: float) -> float:
+        """Return the author's value of a kernel's parameter."""
+        return math.exp(value) if self.scale == "log" else float(value)
+
+    def is_physical(self, value: float) -> bool:
+        """Say whether `value` is physical: within the limits, if there are any, or the off value."""
+        if self.limits is None or (self.off is not None and value == self.off):
+            return True
+        return self.limits[0] <= value <= self.limits[1]
+
+    @property
+    def physical_range_text(self) -> str:
+        """The limits in words."""
+        low, high = self.limits or (-math.inf, math.inf)
+        off = "" if self.off is None else f" (or {self.off:g}, off)"
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"from {low:g} to {high:g}{unit}{off}"
+
+    def within_bounds(self, value: float, relative_tolerance: float = 1e-9) -> bool:
+        """Say whether `value` lies within the bounds (to a relative `slack`) or is the off value."""
+        if self.off is not None and value == self.off:
+            return True
+        low, high = self.bounds
+        if self.scale == "log":
+            return low * (1 - relative_tolerance) <= value <= high * (1 + relative_tolerance)
+        tolerance = relative_tolerance * max(abs(low), abs(high))
+        return low - tolerance <= value <= high + tolerance
+
+
+@dataclass(frozen=True)
+class State:
+    """One internal variable of a law: how it starts, how it grows, and where the material ends.
+
+    initial : value at time zero.
+    rate : sympy expression for its rate, per second.
+    limit : value at which the material point has failed (rupture), or None.
+    """
+
+    initial: float
+    rate: sympy.Expr
+    meaning: str = "internal variable"
+    unit: str = "1"
+    limit: float | None = None
+
+    def __post_init__(self) -> None:
+        _check_text("state", self.meaning, self.unit)
+        for name in ("initial", "limit"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(float(value)):
+                raise LawError(f"state '{self.meaning}': {name} = {value!r} must be a finite number")
+        object.__setattr__(self, "initial", float(self.initial))
+        object.__setattr__(self, "limit", None if self.limit is None else float(self.limit))
+        if self.limit == self.initial:
+            raise LawError(
+                f"state '{self.meaning}': it starts at its limit, {self.limit:g}, so the material would never last; "
+                "write limit=None for a state without one"
+            )
+        try:
+            object.__setattr__(self, "rate", sympy.sympify(self.rate, strict=True))
+        except sympy.SympifyError:
+            raise LawError(f"state '{self.meaning}': {self.rate!r} is not a sympy expression") from None
+
+
+def _checked_limits(meaning: str, given: tuple[float, float], bounds: tuple[float, float]) -> tuple[float, float]:
+    """Limits as floats, around the bounds."""
+    try:
+        low, high = (float(limit) for limit in given)
+    except (TypeError, ValueError):
+        raise LawError(f"parameter '{meaning}': limits are {given!r}; write two numbers (low, high)") from None
+    if not low <= bounds[0] < bounds[1] <= high:
+        description = f"bounds ({bounds[0]:g}, {bounds[1]:g}) must lie within the limits ({low:g}, {high:g})"
+        raise LawError(f"parameter '{meaning}': {description}")
+    return low, high
+
+
+def _check_text(what: str, meaning: str, unit: str) -> None:
+    if not isinstance(meaning, str) or not meaning.strip():
+        raise LawError(f"a {what} has an empty meaning: say in words what it is")
+    if not meaning.isprintable() or not unit.isprintable():
+        raise LawError(f"{what} {meaning!r}: meaning and unit must each be one line of text")

@@ -18,13 +18,19 @@ linear, and a column of that name was recorded. `_sd` names a standard deviation
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from creepkit.readers.assemble import assemble_history
-from creepkit.readers.tables import peek_columns, read_table
-from creepkit.readers.words import HeaderVocabulary
-from creepkit.records import History
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import HistoryError
+from creepkit.readers.assembly import assemble_history
+from creepkit.readers.text_tables import peek_columns, read_table
+from creepkit.readers.vocabulary import LENGTH, SPECIMEN_NAME_PATTERN, HeaderVocabulary, QuantityKind
+from creepkit.records import History, PointLoading, PressureJump, Program, RecordedLoading, StrainSteps, StressSteps
 
 
 @dataclass(frozen=True)
@@ -53,3 +59,148 @@ class HistoryCsvReader:
 
 
 HISTORY_CSV = HistoryCsvReader("csv", "one history a file: `# key: value` lines, then columns such as time_s,strain")
+
+
+def write_history(history: History, path: str | Path) -> Path:
+    """Write a history as CSV, in s, MPa, mm, K, and return the path; nothing is half-written.
+
+    All is kept but `source`, which is the file from then on. A loading without words of its own is written as its
+    program, and elastic data that depend on temperature as their values at the temperature of the test.
+    """
+    text = history_text(history)
+    path = Path(path)
+    try:
+        with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
+            temporary_file = Path(folder) / path.name
+            temporary_file.write_text(text, encoding="utf-8", newline="\n")
+            temporary_file.replace(path)
+    except OSError as error:
+        raise HistoryError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
+    return path
+
+
+def history_text(history: History) -> str:
+    """The text of the CSV file of a history; HistoryError when it could not be read back."""
+    if history.times.size < 2:
+        raise HistoryError(f"history '{history.name}' has one frame; at least two can be written and read back")
+    columns = dict(_frame_columns(history, HeaderVocabulary().output_kinds()))
+    for name, values in columns.items():
+        if not np.isfinite(values).all():
+            raise HistoryError(f"history '{history.name}': '{name}' holds a number that is not finite; drop that frame")
+    lines = [f"# {key}: {_one_line(history, text)}" for key, text in _header_lines(history)]
+    lines.append(",".join(columns))
+    lines += [",".join(map(_number_text, row)) for row in zip(*columns.values(), strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def _header_lines(history: History) -> Iterator[tuple[str, str]]:
+    """Key and text of every line of the head."""
+    yield "name", history.name
+    if not SPECIMEN_NAME_PATTERN.fullmatch(history.specimen):
+        raise HistoryError(f"history '{history.name}': specimen '{history.specimen}' is not a name in small letters")
+    yield "specimen", history.specimen
+    if history.alloy:
+        yield "alloy", history.alloy
+    yield from _loading_lines(history)
+    yield from _temperature_lines(history)
+    yield from _elastic_lines(history)
+    yield "strain_measure", history.strain_measure
+    yield "includes_elastic", "yes" if history.includes_elastic else "no"
+    if history.rupture_time is not None:
+        yield "rupture_s", _number_text(history.rupture_time)
+    if history.unruptured:
+        yield "ended", "stopped"
+    if history.operator:
+        yield "operator", history.operator
+    for key, value in history.geometry.items():
+        # A bare number is read as it stands, but a name that ends in a unit would lose it.
+        unit = "_mm" if key.rpartition("_")[2] in LENGTH.units else ""
+        yield f"geometry {_header_key(history, key)}{unit}", _number_text(value)
+    for key, text in history.labels.items():
+        yield f"label {_header_key(history, key)}", text
+
+
+def _loading_lines(history: History) -> Iterator[tuple[str, str]]:
+    loading = history.loading
+    if isinstance(loading, PressureJump):
+        yield "pressure_1_MPa", _number_text(loading.P1)
+        yield "pressure_2_MPa", _number_text(loading.P2)
+        yield "jump_time_s", _number_text(loading.Tj)
+        yield "ramp_s", _number_text(loading.ramp)
+    elif isinstance(loading, StressSteps) and len(loading.steps) == 1:
+        yield "stress_MPa", _number_text(loading.steps[0][1])
+    elif isinstance(loading, StressSteps):
+        yield "stress_steps", _pairs_text(loading.steps, "MPa")
+    elif isinstance(loading, PointLoading):
+        yield from ((f"stress_{name}_program", _program_text(p, "MPa")) for name, p in loading.stress.items())
+        yield from ((f"strain_{name}_program", _program_text(p, "")) for name, p in loading.strain.items())
+    elif isinstance(loading, StrainSteps) and loading.ramp == 0.0:
+        yield "strain_steps", _pairs_text(loading.steps, "")
+    elif loading.quantity == "strain":
+        yield "strain_program", _program_text(loading.program(), "")
+    else:
+        yield f"{loading.quantity}_program", _program_text(loading.program(), "MPa")
+    if loading.quantity == "stress":
+        yield "control", loading.control if isinstance(loading, (StressSteps, RecordedLoading)) else "load"
+
+
+def _temperature_lines(history: History) -> Iterator[tuple[str, str]]:
+    if isinstance(history.temperature, Program):
+        yield "temperature_program", _program_text(history.temperature, "K")
+    else:
+        yield "temperature_K", _number_text(history.temperature)
+
+
+def _elastic_lines(history: History) -> Iterator[tuple[str, str]]:
+    if history.elastic is None:
+        return
+    elastic = history.elastic
+    if not (isinstance(elastic.E, float) and isinstance(elastic.nu, float)):
+        if isinstance(history.temperature, Program):
+            raise HistoryError(
+                f"history '{history.name}': elastic data that change with the temperature during a test cannot be "
+                "written; replace them by elastic.at(T)"
+            )
+        elastic = elastic.at(history.temperature)
+    yield "modulus_MPa", _number_text(float(elastic.E))
+    yield "poisson", _number_text(float(elastic.nu))
+
+
+def _frame_columns(history: History, kinds: Mapping[str, QuantityKind]) -> Iterator[tuple[str, Floats]]:
+    yield "time_s", history.times
+    standard_deviations = {f"{name}_sd": values for name, values in history.standard_deviation.items()}
+    for name, values in {**history.outputs, **standard_deviations}.items():
+        kind = kinds.get(name.removesuffix("_sd"))
+        if kind is None:
+            raise HistoryError(f"history '{history.name}': no unit is known for '{name}'; known: {', '.join(kinds)}")
+        unit = next(iter(kind.units))
+        yield f"{name}_{unit}" if unit else name, values
+    used = np.asarray(history.used)
+    if not used.all():
+        yield "used", used.astype(float)
+
+
+def _number_text(number: float) -> str:
+    """The shortest text that reads back as the same number."""
+    return repr(float(number))
+
+
+def _program_text(program: Program, unit: str) -> str:
+    return _pairs_text(zip(program.times, program.values, strict=True), unit)
+
+
+def _pairs_text(pairs: Iterator[tuple[float, float]] | tuple[tuple[float, float], ...], unit: str) -> str:
+    return "; ".join(f"{_number_text(time)} s {_number_text(value)} {unit}".rstrip() for time, value in pairs)
+
+
+def _one_line(history: History, text: str) -> str:
+    """Refuse what would not survive as part of one line."""
+    if text != text.strip() or not text.isprintable():
+        raise HistoryError(f"history '{history.name}': {text!r} cannot be written in one line; use plain words there")
+    return text
+
+
+def _header_key(history: History, key: str) -> str:
+    if ":" in key or not key:
+        raise HistoryError(f"history '{history.name}': {key!r} cannot name a line; use words without a colon")
+    return _one_line(history, key)

@@ -1,4 +1,4 @@
-"""Files, folders and patterns to histories, whichever reader understands them."""
+"""Files, folders and patterns to histories, whichever reader accepts them; and the built-in readers."""
 
 from __future__ import annotations
 
@@ -8,8 +8,17 @@ from glob import glob
 from pathlib import Path
 
 from creepkit.errors import HistoryError, nearest
+from creepkit.hookspecs import hookimpl
 from creepkit.readers.history_csv import HISTORY_CSV
+from creepkit.readers.indexed_folders import INDEXED_FILES, INDEXED_TABLE
 from creepkit.records import History, Reader
+
+
+@hookimpl
+def creepkit_readers() -> list[Reader]:
+    """Return the built-in readers."""
+    return [INDEXED_TABLE, INDEXED_FILES, HISTORY_CSV]
+
 
 PathsLike = str | Path | Iterable[str | Path]
 

@@ -1,9 +1,19 @@
 """The nouns: what goes into and comes out of the verbs. Frozen records; MPa, mm, s, K throughout."""
 
-from creepkit.records.doors import Exporter, Reader
 from creepkit.records.history import EVERY_FRAME, ZERO_CELSIUS, History
+from creepkit.records.interfaces import (
+    Exporter,
+    Predictor,
+    Reader,
+    Specimen,
+    SupportsReducedOrderModel,
+    SupportsRupturePrediction,
+)
+from creepkit.records.law_with_values import LawWithValues, Units
 from creepkit.records.loading import (
+    COMPONENTS,
     Loading,
+    PointLoading,
     PressureJump,
     Program,
     RecordedLoading,
@@ -12,34 +22,28 @@ from creepkit.records.loading import (
     constant_strain,
     constant_stress,
 )
-from creepkit.records.point_loading import COMPONENTS, PointLoading
 from creepkit.records.prediction import (
     LENGTH_NUISANCES,
     SIMULATED_NUISANCES,
-    NuisanceValues,
-    TimesToStrain,
     Nuisance,
+    NuisanceValues,
     Prediction,
-    Predictor,
-    SupportsReducedOrderModel,
-    Specimen,
     Status,
-    SupportsRupturePrediction,
+    TimesToStrain,
 )
-from creepkit.records.valued import Units, LawWithValues
 
 __all__ = [
-    "LENGTH_NUISANCES",
     "COMPONENTS",
     "EVERY_FRAME",
+    "LENGTH_NUISANCES",
     "SIMULATED_NUISANCES",
     "ZERO_CELSIUS",
-    "NuisanceValues",
     "Exporter",
     "History",
-    "TimesToStrain",
+    "LawWithValues",
     "Loading",
     "Nuisance",
+    "NuisanceValues",
     "PointLoading",
     "Prediction",
     "Predictor",
@@ -47,14 +51,14 @@ __all__ = [
     "Program",
     "Reader",
     "RecordedLoading",
-    "SupportsReducedOrderModel",
     "Specimen",
     "Status",
     "StrainSteps",
     "StressSteps",
-    "Units",
-    "LawWithValues",
+    "SupportsReducedOrderModel",
     "SupportsRupturePrediction",
+    "TimesToStrain",
+    "Units",
     "constant_strain",
     "constant_stress",
 ]

@@ -11,16 +11,18 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import HistoryError
-from creepkit.records.loading import Loading, Program
-from creepkit.records.point_loading import loading_text
+from creepkit.records.loading import Loading, Program, loading_text
 
 if TYPE_CHECKING:
     from creepkit.language.elastic import Elastic
 
+
 ZERO_CELSIUS = 273.15
+
 
 RUPTURE_TIME_TOLERANCE = 0.01
 """By how much of a rupture time frames may lie after it: laboratories round it to three digits."""
+
 
 EVERY_FRAME: Bools = frozen([], dtype=bool)
 """The value of History.used that marks every frame."""

@@ -1,20 +1,19 @@
-"""What a model says of histories, and who may say it: predictors and specimens, with what is unknown about a test."""
+"""Predictions, their status and times to strain, and the nuisance parameters of a test."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Floats, Ints
+from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
-from creepkit.records.history import History
 
 if TYPE_CHECKING:
-    from creepkit.language.law import CreepLaw
+    pass
 
 
 NuisanceValues: TypeAlias = Mapping[str, Floats]
@@ -81,79 +80,13 @@ class Prediction:
         return np.asarray(self.values[candidate, test, : int(self.lengths[test])])
 
 
-@runtime_checkable
-class Predictor(Protocol):
-    """Anything that predicts histories from a law and its values: specimen, surrogate or closed form.
-
-    Optional attributes, looked for by name: `outputs`, the names of what is predicted, first the one that grows with
-    creep; `nuisances`, the kinds of explicit nuisances that predict() understands (none without it);
-    `reference_stress(history)`, the von Mises stress, MPa, that stands for the test (a number, or one for each level
-    of its loading); `screening()`, see Screened.
-    """
-
-    def predict(
-        self,
-        law: CreepLaw,
-        values: Mapping[str, ArrayLike],
-        histories: Sequence[History],
-        *,
-        jacobian: bool = False,
-        nuisances: NuisanceValues | None = None,
-    ) -> Prediction:
-        """Predict each history's outputs at its times.
-
-        values : {parameter: number or (candidates,)} in the author's units; 0 may switch a parameter off.
-        nuisances : {kind: (candidates or 1, tests)} of what differs from test to test, measured as Nuisance says. A
-            kind that the predictor does not know is a SolveError. With `jacobian` the prediction has the derivatives
-            to the kinds given in `nuisance_jacobian`.
-        """
-        ...
-
-
-@runtime_checkable
-class SupportsRupturePrediction(Predictor, Protocol):
-    """A predictor that follows a specimen to its rupture, beyond the last time of its history."""
-
-    def predict_to_rupture(
-        self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], *, jacobian: bool = False
-    ) -> Prediction:
-        """Predict as predict() does, with `life`: when measured strains are arrived at, and when it breaks."""
-        ...
-
-
-@runtime_checkable
-class SupportsReducedOrderModel(Predictor, Protocol):
-    """A predictor too expensive for a global search, with a cheap stand-in of the same outputs and nuisances."""
-
-    def reduced_order_model(self) -> Predictor:
-        """Return the stand-in; it may be some per cent off and need not know derivatives."""
-        ...
-
-
-@runtime_checkable
-class Specimen(Predictor, Protocol):
-    """A frozen record of a test piece: which outputs are observed, and how to predict them."""
-
-    @property
-    def name(self) -> str:
-        """Short, lower case, unique in the registry."""
-        ...
-
-    @property
-    def title(self) -> str:
-        """One line for people."""
-        ...
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of what is observed."""
-        ...
-
-
 NuisanceKind: TypeAlias = Literal["offset", "rate", "thickness", "modulus", "temperature", "window"]
+
 
 SIMULATED_NUISANCES: tuple[NuisanceKind, ...] = ("thickness", "modulus", "temperature", "window")
 """Kinds that change the simulation; "offset" and "rate" only change how its residuals scatter."""
+
+
 LENGTH_NUISANCES: tuple[NuisanceKind, ...] = ("thickness", "window")
 """Kinds that are lengths in themselves, so that their prior mean is one too; the others are deviations, about zero."""
 

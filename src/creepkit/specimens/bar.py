@@ -1,8 +1,8 @@
-"""What all bars share: a material point under a program of stress or strain, and an observation of its creep strain."""
+"""What uniaxial tests and relaxation share: prediction at a material point, nuisance parameters, elastic strain."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar, Self
@@ -12,16 +12,23 @@ import numpy as np
 from creepkit import integration, kernels
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError
-from creepkit.records import NuisanceValues, History, Prediction, Status
+from creepkit.records import History, NuisanceValues, Prediction, Program, Status
 from creepkit.specimens.run import Run, run_from_outputs
-from creepkit.specimens.uniaxial_effects import NUISANCES, predict_with_nuisances
 
 if TYPE_CHECKING:
     from creepkit.integration import Integration, PointTest
     from creepkit.language import CreepLaw
 
+
+if TYPE_CHECKING:
+    from creepkit.language import Elastic
+
+
 STEPS_PER_BREAKPOINT = 20
 """Each straight piece of a program takes some 7 steps of its own; a logged temperature has thousands of pieces."""
+
+
+NUISANCES = ("temperature", "modulus")
 
 
 @dataclass(frozen=True)
@@ -71,7 +78,9 @@ class Bar:
         """Derivative of the output to the creep strain."""
         raise NotImplementedError
 
-    def modulus_derivative(self, result: Prediction, histories: Sequence[History], modulus_changes: Floats) -> Floats | None:
+    def modulus_derivative(
+        self, result: Prediction, histories: Sequence[History], modulus_changes: Floats
+    ) -> Floats | None:
         """Derivative of the values to the relative change of the modulus; None leaves it to differences."""
         return None
 
@@ -95,7 +104,15 @@ class Bar:
         nuisances : "temperature" (K above what the history says) and "modulus" (relative change).
         """
         predict_plain = partial(self._predict, law)
-        return predict_with_nuisances(predict_plain, values, histories, nuisances, jacobian, modulus_derivative=self.modulus_derivative, specimen=self.name)
+        return predict_with_nuisances(
+            predict_plain,
+            values,
+            histories,
+            nuisances,
+            jacobian,
+            modulus_derivative=self.modulus_derivative,
+            specimen=self.name,
+        )
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> Run:
         """Run one test: what its history would show at its times, and how it ended."""
@@ -123,7 +140,9 @@ class Bar:
             creep = result.of(k)
             shown[:, k, :frames, 0] = self.observed_output(history, creep)
             if changes is not None and result.jacobian is not None:
-                changes[:, k, :frames, 0] = result.jacobian[:, reach] * self.output_derivative(history, creep)[..., None]
+                changes[:, k, :frames, 0] = (
+                    result.jacobian[:, reach] * self.output_derivative(history, creep)[..., None]
+                )
         return Prediction(
             values=shown,
             outputs=self.outputs,
@@ -145,3 +164,145 @@ class Bar:
             max_steps=int(self.max_steps) + STEPS_PER_BREAKPOINT * breaks,
         )
         return integration.integrate(kernel, kernel.to_internal(values), tests, settings=settings, jacobian=jacobian)
+
+
+DIFFERENCE_STEPS = {"temperature": 0.1, "modulus": 1e-3}
+"""Of central differences: K, and relative."""
+
+
+PlainPredict = Callable[[Mapping[str, ArrayLike], Sequence[History], bool], Prediction]
+"""Predict values and histories, with derivatives or without."""
+
+
+ModulusDerivative = Callable[[Prediction, Sequence[History], Floats], Floats | None]
+"""Derivative of the values to the relative change of the modulus; None where it is not known exactly."""
+
+
+def predict_with_nuisances(
+    predict_plain: PlainPredict,
+    values: Mapping[str, ArrayLike],
+    histories: Sequence[History],
+    nuisances: NuisanceValues | None,
+    jacobian: bool,
+    *,
+    modulus_derivative: ModulusDerivative | None = None,
+    specimen: str = "uniaxial",
+) -> Prediction:
+    """Predict with nuisances, if there are any, a candidate at a time where they differ from candidate to candidate.
+
+    Derivatives are central differences, of 0.1 K and of a thousandth of the modulus to each side, but for that to the
+    modulus where `softening` gives it.
+    """
+    if not nuisances:
+        return predict_plain(values, histories, jacobian)
+    for kind in nuisances:
+        if kind not in NUISANCES:
+            known = " and ".join(NUISANCES)
+            raise SolveError(f"a {specimen} specimen does not know the nuisance '{kind}'; it knows {known}")
+    rows = max(len(v) for v in nuisances.values())
+    if rows == 1:
+        return _predict_one(
+            predict_plain,
+            values,
+            histories,
+            {kind: v[0] for kind, v in nuisances.items()},
+            jacobian,
+            modulus_derivative,
+        )
+    parts = []
+    for row in range(rows):
+        candidate_values = {n: np.broadcast_to(np.asarray(v, float), (rows,))[row] for n, v in values.items()}
+        candidate_nuisances = {kind: np.broadcast_to(v, (rows, len(histories)))[row] for kind, v in nuisances.items()}
+        parts.append(
+            _predict_one(predict_plain, candidate_values, histories, candidate_nuisances, jacobian, modulus_derivative)
+        )
+    return _concatenated(parts)
+
+
+def _predict_one(
+    predict_plain: PlainPredict, values: Mapping[str, ArrayLike], histories: Sequence[History], nuisances: Mapping[str, Floats],
+    jacobian: bool, modulus_derivative: ModulusDerivative | None,
+) -> Prediction:  # fmt: skip
+    result = predict_plain(values, _perturbed_histories(histories, nuisances), jacobian)
+    if not jacobian:
+        return result
+    slopes = {}
+    for kind in nuisances:
+        exact = modulus_derivative if kind == "modulus" else None
+        slope = None if exact is None else exact(result, _perturbed_histories(histories, nuisances), nuisances[kind])
+        if slope is not None:
+            slopes[kind] = slope
+            continue
+        ends = (
+            _perturbed_histories(histories, {**nuisances, kind: nuisances[kind] + s})
+            for s in (DIFFERENCE_STEPS[kind], -DIFFERENCE_STEPS[kind])
+        )
+        up, down = (predict_plain(values, moved, False).values for moved in ends)
+        slopes[kind] = (up - down) / (2 * DIFFERENCE_STEPS[kind])
+    return replace(result, nuisance_jacobian=slopes)
+
+
+def _perturbed_histories(histories: Sequence[History], nuisances: Mapping[str, Floats]) -> list[History]:
+    """Histories that are so many K warmer, with moduli larger by these shares."""
+    zeros = np.zeros(len(histories))
+    temperature_changes, modulus_changes = nuisances.get("temperature", zeros), nuisances.get("modulus", zeros)
+    changed = []
+    for history, T, share in zip(histories, temperature_changes, modulus_changes, strict=True):
+        program = history.temperature_program()
+        elastic = None if history.elastic is None else _with_modulus_change(history.elastic, float(share))
+        changed.append(history.replace(temperature=Program(program.times, program.values + T), elastic=elastic))
+    return changed
+
+
+def _with_modulus_change(elastic: Elastic, share: float) -> Elastic:
+    return replace(elastic, E=elastic.E * (1.0 + share))
+
+
+def _concatenated(parts: Sequence[Prediction]) -> Prediction:
+    def joined(arrays: Sequence[Floats]) -> Floats:
+        return np.concatenate(arrays)
+
+    jacobians = [p.jacobian for p in parts if p.jacobian is not None]
+    return replace(
+        parts[0],
+        values=joined([p.values for p in parts]),
+        status=np.concatenate([p.status for p in parts]),
+        end_times=joined([p.end_times for p in parts]),
+        jacobian=joined(jacobians) if jacobians else None,
+        nuisance_jacobian={
+            kind: joined([p.nuisance_jacobian[kind] for p in parts]) for kind in parts[0].nuisance_jacobian
+        },
+    )
+
+
+def observed_strain(history: History, creep: Floats) -> Floats:
+    """The strain that a history's instrument shows, (candidates, times), from logarithmic creep strain."""
+    strain = np.expm1(creep) if history.strain_measure == "engineering" else creep
+    return strain + elastic_strain(history) if history.includes_elastic else strain
+
+
+def elastic_strain(history: History) -> Floats:
+    """Nominal stress over the modulus at each time, (times,)."""
+    if history.elastic is None:
+        return np.zeros(history.times.size)
+    temperatures, which = np.unique(history.temperature_program().at(history.times), return_inverse=True)
+    moduli = np.array([float(history.elastic.at(float(T)).E) for T in temperatures])
+    return np.asarray(history.loading.program().at(history.times) / moduli[which])
+
+
+def isothermal_elasticity(history: History, specimen: str) -> tuple[float, float]:
+    """E, MPa, and nu of a test whose strain is prescribed: they must be the same at all its temperatures."""
+    where = history.source or f"history '{history.name}'"
+    if history.elastic is None:
+        raise SolveError(
+            f"{where}: a {specimen} specimen under prescribed strain needs elastic data; set elastic=Elastic(E=150e3), "
+            "in MPa"
+        )
+    result = [history.elastic.at(float(T)) for T in np.unique(history.temperature_program().values)]
+    moduli = [float(one.E) for one in result]
+    if max(moduli) - min(moduli) > 1e-12 * max(moduli):
+        raise SolveError(
+            f"{where}: the modulus changes from {moduli[0]:g} to {moduli[-1]:g} MPa with the temperature of the test; "
+            f"a {specimen} specimen takes one modulus a test, such as elastic.at(T)"
+        )
+    return moduli[0], float(result[0].nu)

@@ -19,11 +19,11 @@ from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
 from creepkit.records import History, Program, Specimen
-from creepkit.specimens.bar import Bar
-from creepkit.specimens.elastic_part import isothermal_elasticity
+from creepkit.specimens.bar import Bar, isothermal_elasticity
 
 if TYPE_CHECKING:
     from creepkit.integration import PointTest
+
 
 STRESS_TOLERANCE = 1e-3
 """Of the largest elastic stress: a stress below zero by more than this is no rounding."""
@@ -53,7 +53,7 @@ class Relaxation(Bar):
 
     def end_reason(self, history: History, reason: str, output: Floats, end: float) -> str:
         """Says so where the bar would be compressed: steps get stuck where a fall of strain takes away all stress."""
-        from creepkit.integration.endings import STEP_TOO_SMALL
+        from creepkit.integration.event_location import STEP_TOO_SMALL
 
         driving, moment = point_test(history).driving, 1e-9 * max(end, 1e-3)
         stuck = reason == integration.REASONS[STEP_TOO_SMALL]

@@ -1,4 +1,4 @@
-"""Run: what one simulated test gave; a history like a measured one, that also says how it ended."""
+"""Run: the result of one simulated test, a history that also says how it ended."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from creepkit.records import History, Status
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
 
+
 STATUS_TEXT = {
     Status.COMPLETE: "",
     Status.RUPTURED: "burst",
@@ -22,6 +23,7 @@ STATUS_TEXT = {
     Status.OUTSIDE_DOMAIN: "outside the domain",
 }
 """What a status means where nobody gives a reason."""
+
 
 _RunType = TypeVar("_RunType", bound="Run")
 

@@ -1,8 +1,6 @@
 """Uniaxial tension: a bar under steps of stress or load and of temperature, observed by its creep strain.
 
-Under constant load the true stress is the nominal one times exp(creep strain): creep keeps the volume, and the
-elastic change of the cross-section is neglected. An engineering strain is exp(creep strain) - 1; a strain that
-includes the elastic part has stress/E(T) added, with the nominal stress and the modulus at the temperature of the time.
+Under constant load the true stress is the nominal one times exp(creep strain). An engineering strain is exp(creep strain) - 1; a strain that includes the elastic part has stress/E(T) added. Times to given strains and to rupture are predicted too.
 """
 
 from __future__ import annotations
@@ -15,17 +13,19 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from creepkit import integration
-from creepkit.arrays import ArrayLike, Floats
+from creepkit.arrays import ArrayLike, Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
-from creepkit.records import History, Prediction, Specimen, Status
-from creepkit.specimens.bar import Bar
-from creepkit.specimens.elastic_part import elastic_strain, observed_strain
-from creepkit.specimens.uniaxial_life import predicted_life, strain_levels
+from creepkit.records import History, Prediction, Specimen, Status, TimesToStrain
+from creepkit.specimens.bar import Bar, elastic_strain, observed_strain
 
 if TYPE_CHECKING:
     from creepkit.integration import PointTest
     from creepkit.language import CreepLaw
+
+
+if TYPE_CHECKING:
+    from creepkit.integration import Integration, PointTest
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,18 @@ class Uniaxial(Bar):
         """Predict as predict() does, and follow each bar to its rupture: by a state's limit, or by the strain limit."""
         levels = [strain_levels(history, self.point_test(history)) for history in histories]
         result = self._integrate(law, values, [own_values.test for own_values in levels], jacobian)
-        values_found, last = self._observed_prediction(law, histories, result), np.array([h.times[-1] for h in histories])
+        values_found, last = (
+            self._observed_prediction(law, histories, result),
+            np.array([h.times[-1] for h in histories]),
+        )
         after_last_frame = (result.end_times > last) & (values_found.status == int(Status.RUPTURED))
-        status, ends = np.where(after_last_frame, int(Status.COMPLETE), values_found.status), np.minimum(values_found.end_times, last)
-        return replace(values_found, status=status, end_times=ends, times_to_strain=predicted_life(histories, levels, result))
+        status, ends = (
+            np.where(after_last_frame, int(Status.COMPLETE), values_found.status),
+            np.minimum(values_found.end_times, last),
+        )
+        return replace(
+            values_found, status=status, end_times=ends, times_to_strain=predicted_life(histories, levels, result)
+        )
 
     def modulus_derivative(self, result: Prediction, histories: Sequence[History], modulus_changes: Floats) -> Floats:
         """Derivative of the strain to the relative change of the modulus: that of its elastic part."""
@@ -91,3 +99,76 @@ def point_test(history: History) -> PointTest:
 def creepkit_specimens() -> list[Specimen]:
     """The uniaxial specimen with its default settings."""
     return [Uniaxial()]
+
+
+HORIZON = 100.0
+"""How far beyond the last frame, and the measured rupture, a bar is followed, as a factor on time."""
+
+
+SMALLEST_STRAIN = 1e-12
+"""Creep strains below this are there from the beginning."""
+
+
+EARLIEST_RUPTURE = 1e-12
+"""s; a bar that breaks at once does so then, for rupture times are compared by their logarithms."""
+
+
+@dataclass(frozen=True)
+class StrainLevels:
+    """The creep strains of a history's frames as levels to arrive at.
+
+    test : the point test that is followed to the horizon.
+    frames : of each level its frame; creep : (frames,) logarithmic creep strain that was measured; where not finite or
+        not above LEAST a frame has no level.
+    """
+
+    test: PointTest
+    frames: Ints
+    creep: Floats
+
+
+@lru_cache(maxsize=4096)
+def strain_levels(history: History, test: PointTest) -> StrainLevels:
+    """The levels of a history; `test` is what its material point goes through."""
+    creep = _measured_creep_strain(history)
+    frames = np.flatnonzero(np.isfinite(creep) & (creep > SMALLEST_STRAIN))
+    frames = frames[np.argsort(creep[frames], kind="stable")]
+    last = max(float(history.times[-1]), history.rupture_time or 0.0)
+    return StrainLevels(replace(test, levels=creep[frames], until=HORIZON * last), frames, creep)
+
+
+def _measured_creep_strain(history: History) -> Floats:
+    """Measured logarithmic creep strain, (frames,); nothing where the history only plans."""
+    if "strain" not in history.outputs:
+        return np.full(history.times.size, np.nan)
+    strain = history.outputs["strain"] - (elastic_strain(history) if history.includes_elastic else 0.0)
+    if history.strain_measure == "logarithmic":
+        return np.asarray(strain)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.log1p(strain)
+
+
+def predicted_life(histories: Sequence[History], levels: Sequence[StrainLevels], result: Integration) -> TimesToStrain:
+    """Arrivals and ruptures on the axes of a prediction."""
+    candidates, longest = result.terminations.shape[0], max((h.times.size for h in histories), default=0)
+    shape = candidates, len(histories), longest
+    ruptured = result.status == int(Status.RUPTURED)
+    ruptures = np.where(ruptured, np.maximum(result.end_times, EARLIEST_RUPTURE), np.nan)
+    level_times, level_rates = np.repeat(ruptures[..., None], longest, axis=2), np.full(shape, np.inf)
+    jacobian = None
+    if result.end_jacobian is not None:
+        jacobian = np.repeat(result.end_jacobian[:, :, None], longest, axis=2)
+    start = 0
+    for k, (history, own_values) in enumerate(zip(histories, levels, strict=True)):
+        reach, frames = slice(start, start + own_values.frames.size), own_values.frames
+        start = reach.stop
+        level_times[:, k, np.flatnonzero(own_values.creep <= SMALLEST_STRAIN)] = 0.0
+        reached = np.isfinite(result.level_times[:, reach])
+        output_factor = np.exp(own_values.creep[frames]) if history.strain_measure == "engineering" else 1.0
+        level_times[:, k, frames] = np.where(reached, result.level_times[:, reach], level_times[:, k, frames])
+        level_rates[:, k, frames] = np.where(reached, result.level_rates[:, reach] * output_factor, np.inf)
+        if jacobian is not None and result.level_time_jacobian is not None:
+            level_jacobian = result.level_time_jacobian[:, reach]
+            jacobian[:, k, frames] = np.where(reached[..., None], level_jacobian, jacobian[:, k, frames])
+    horizon = np.array([own.test.end for own in levels])
+    return TimesToStrain(level_times, level_rates, ruptures, horizon, jacobian, result.end_jacobian)

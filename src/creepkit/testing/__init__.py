@@ -15,26 +15,36 @@ import numpy as np
 from creepkit.errors import CreepkitError
 from creepkit.kernels.lowering import lower
 from creepkit.language.law import CreepLaw
-from creepkit.testing import promises
+from creepkit.testing import law_checks
+from creepkit.testing.law_checks import ConformanceCheck, ConformanceReport
 from creepkit.testing.parity import DERIVATIVE_TOLERANCE, VALUE_TOLERANCE
-from creepkit.testing.report import ConformanceCheck, ConformanceReport
-from creepkit.testing.sampling import LawSamples, draw_samples
+from creepkit.testing.sample_points import LawSamples, draw_samples
 
-__all__ = ["DERIVATIVE_TOLERANCE", "VALUE_TOLERANCE", "ConformanceCheck", "ConformanceReport", "LawSamples", "check_law", "draw_samples"]
+__all__ = [
+    "DERIVATIVE_TOLERANCE",
+    "VALUE_TOLERANCE",
+    "ConformanceCheck",
+    "ConformanceReport",
+    "LawSamples",
+    "check_law",
+    "draw_samples",
+]
+
 
 _FEWEST_SAMPLES = 8
 """Samples at which the constraints must hold for a verdict to mean something."""
 
+
 _LAW_CHECKS: dict[str, Callable[[CreepLaw, LawSamples], Iterator[ConformanceCheck]]] = {
-    "table": promises.check_declarations,
-    "printing": promises.check_printing,
-    "signs": promises.check_signs,
-    "finite": promises.check_finite,
-    "monotone": promises.check_monotonic,
-    "parity": promises.check_parity,
-    "torch gradients": promises.check_torch_gradients,
-    "switches": promises.check_switches,
-    "leading exponent": promises.check_leading_exponent,
+    "table": law_checks.check_declarations,
+    "printing": law_checks.check_printing,
+    "signs": law_checks.check_signs,
+    "finite": law_checks.check_finite,
+    "monotone": law_checks.check_monotonic,
+    "parity": law_checks.check_parity,
+    "torch gradients": law_checks.check_torch_gradients,
+    "switches": law_checks.check_switches,
+    "leading exponent": law_checks.check_leading_exponent,
 }
 
 

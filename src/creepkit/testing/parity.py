@@ -1,33 +1,100 @@
-"""Parity: every target against 50-digit arithmetic, straight from the author's expression.
+"""Kernels of every target against arithmetic with 50 digits, straight from the author's expression.
 
-Values and derivatives are compared relatively wherever float64 can hold them (and the rate, which derivatives are
-multiples of); the rate itself is compared in ln rate everywhere. Where a result is a small difference of large parts,
-no formula in float64 can keep ten digits of it; such a result is told from a wrong one by its error, which is no more
-than the last bits of the inputs make.
+Values and derivatives are compared relatively wherever float64 can hold them; the rate itself is compared in ln rate
+everywhere. Where a result is a small difference of large parts no formula in float64 keeps ten digits; such a result is
+accepted when its error is no more than the last bits of the inputs make.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import mpmath
 import numpy as np
 
-from creepkit.kernels.exact import MultiprecisionLaw
+from creepkit.arrays import Floats
+from creepkit.kernels.interface import POINT_SIZE, call_entry
+from creepkit.kernels.lowering import ArrayKernel, lower
+from creepkit.kernels.multiprecision import MultiprecisionLaw
+from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES
-from creepkit.testing.sampling import LawSamples
-from creepkit.testing.tables import KernelTable
+from creepkit.testing.sample_points import LawSamples
+
+
+@dataclass(frozen=True)
+class KernelTable:
+    """rows : (samples, 1 + S, 1 + 6 + S + P) value and derivatives of the rate and of each state rate.
+
+    logs : (samples,) ln rate.
+    """
+
+    rows: Floats
+    log_rates: Floats
+
+
+def evaluate_numpy(law: CreepLaw, samples: LawSamples) -> KernelTable:
+    """Evaluate the NumPy kernel."""
+    return _kernel_table(lower(law, "numpy"), samples.arguments())
+
+
+def evaluate_torch(law: CreepLaw, samples: LawSamples) -> KernelTable:
+    """Evaluate the torch kernel."""
+    import torch
+
+    return _kernel_table(lower(law, "torch"), [torch.tensor(column) for column in samples.arguments()])
+
+
+def evaluate_numba(law: CreepLaw, samples: LawSamples) -> KernelTable:
+    """Evaluate the compiled entries."""
+    compiled = lower(law, "numba")
+    rows, width, count = 1 + compiled.states, POINT_SIZE + compiled.states, len(law.params)
+    blocks, log_rates = [], []
+    for point, theta in zip(samples.points, samples.theta, strict=True):
+        out = call_entry(compiled, "sensitivity", point[None], theta)[0][0]
+        to_point = out[rows : rows + rows * width].reshape(rows, width)
+        to_theta = out[rows + rows * width :].reshape(rows, count)
+        blocks.append(np.hstack([out[:rows, None], to_point, to_theta]))
+        log_rates.append(call_entry(compiled, "update", point[None], theta)[0][0, 0])
+    return KernelTable(np.array(blocks), np.array(log_rates))
+
+
+def _kernel_table(kernel: ArrayKernel, arguments: Sequence[Any]) -> KernelTable:
+    result = kernel.internal_derivatives(*arguments)
+    values = [result.rate, *kernel.internal_rates(*arguments)[1:]]
+    derivatives = [{**result.point, **result.params}, *result.state_rates.values()]
+    rows = [
+        [value, *derivatives_of_row.values()] for value, derivatives_of_row in zip(values, derivatives, strict=True)
+    ]
+    columns = np.array([[np.asarray(column, float) for column in row] for row in rows])
+    return KernelTable(np.moveaxis(columns, -1, 0), np.asarray(kernel.internal_log_rate(*arguments), float))
+
+
+KERNEL_EVALUATORS: dict[str, Callable[[CreepLaw, LawSamples], KernelTable]] = {
+    "numpy": evaluate_numpy,
+    "torch": evaluate_torch,
+    "numba": evaluate_numba,
+}
+"""{target: function that evaluates it}."""
+
 
 VALUE_TOLERANCE = 1e-12
+
+
 DERIVATIVE_TOLERANCE = 1e-10
+
+
 NEGLIGIBLE_RATE = 1e-100
 """Rates below this, 1/s, count as zero: what floors leave of a term that is exactly zero."""
 
+
 _Rows = Sequence[Sequence[Any]]
 
+
 _SMALLEST, _LARGEST = mpmath.mpf("2.3e-308"), mpmath.mpf("1.7e308")
+
+
 _ROUNDING_FACTOR = 4.0
 """How many times the change from the last bit of every input an error may be where a result cancels."""
 
@@ -55,7 +122,9 @@ class MultiprecisionReference:
         """The rows of one sample to twenty times the digits, where exp(-500) next to 1 still counts."""
         if sample not in self._high_precision_rows:
             more = MultiprecisionLaw(self.exact.law, 20 * self.exact.digits)
-            self._high_precision_rows[sample] = more.values_and_derivatives(self.samples.points[sample], self.samples.theta[sample])
+            self._high_precision_rows[sample] = more.values_and_derivatives(
+                self.samples.points[sample], self.samples.theta[sample]
+            )
         return self._high_precision_rows[sample]
 
     def rounding_sensitivity(self, sample: int) -> _Rows:
@@ -81,7 +150,9 @@ class MultiprecisionReference:
         return f"{of} at {', '.join(f'{names[k]} {point[k]:.4g}' for k in used)}"
 
 
-def largest_differences(reference: MultiprecisionReference, table: KernelTable, allow_cancellation: bool = False) -> tuple[RelativeDifference, RelativeDifference]:
+def largest_differences(
+    reference: MultiprecisionReference, table: KernelTable, allow_cancellation: bool = False
+) -> tuple[RelativeDifference, RelativeDifference]:
     """Return the largest relative difference of values (ln rate among them) and of derivatives.
 
     forgive : leave out results that cancel, whose error is no more than the last bits of the inputs make.
@@ -91,7 +162,11 @@ def largest_differences(reference: MultiprecisionReference, table: KernelTable, 
         values = max(values, RelativeDifference(_log_difference(rows[0][0], log), k), key=_size)
         for difference in _differences(k, rows, computed):
             limit = VALUE_TOLERANCE if difference.column == 0 else DERIVATIVE_TOLERANCE
-            checked = difference if difference.size <= limit else _recheck_difference(reference, table, difference, allow_cancellation)
+            checked = (
+                difference
+                if difference.size <= limit
+                else _recheck_difference(reference, table, difference, allow_cancellation)
+            )
             if checked.column == 0:
                 values = max(values, checked, key=_size)
             else:
@@ -99,11 +174,16 @@ def largest_differences(reference: MultiprecisionReference, table: KernelTable, 
     return values, derivatives
 
 
-def _recheck_difference(reference: MultiprecisionReference, table: KernelTable, difference: RelativeDifference, allow_cancellation: bool) -> RelativeDifference:
+def _recheck_difference(
+    reference: MultiprecisionReference, table: KernelTable, difference: RelativeDifference, allow_cancellation: bool
+) -> RelativeDifference:
     """A difference beyond the tolerance, looked at again with more digits and, if so wished, for cancellation."""
     k, row, column = difference.sample, difference.row, difference.column
     exact, computed = reference.rows_at_high_precision(k)[row][column], float(table.rows[k, row, column])
-    if allow_cancellation and abs(mpmath.mpf(computed) - exact) <= _ROUNDING_FACTOR * reference.rounding_sensitivity(k)[row][column]:
+    if (
+        allow_cancellation
+        and abs(mpmath.mpf(computed) - exact) <= _ROUNDING_FACTOR * reference.rounding_sensitivity(k)[row][column]
+    ):
         return RelativeDifference(0.0, k, row, column)
     return RelativeDifference(_relative_difference(exact, computed), k, row, column)
 

@@ -1,1 +1,1 @@
-"""Where identifications begin: global searches over a landscape, each polished by least squares."""
+"""Global searches for the minima of a cost function, each followed by least squares."""

@@ -1,4 +1,4 @@
-"""Which laws: candidates, their ranking under one covariance, what cannot be told apart, and what would tell it."""
+"""Model selection: candidate laws, their ranking under a common covariance, and pairs that the tests cannot separate."""
 
 from creepkit.inverse.selection.ranking import CREDIBLE_WEIGHT, CRITERIA, DECISIVE_WEIGHT, RankedLaw, Ranking, rank
 

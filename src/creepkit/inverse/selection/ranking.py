@@ -1,9 +1,9 @@
-"""Ranking of identified laws, with weights: a set of laws, "decisive" only above 0.95.
+"""Ranking of identified laws with weights: a set of laws, "decisive" only above 0.95.
 
-Identifications by likelihood are judged under one covariance (see selection.judging): chi-square + K ln n (BIC), or
-+ 2K + 2K(K+1)/(n-K-1) (AICc), with n the independent frames and unknowns of tests integrated out. For others, whose
-values and scatter come from different rules, -2 ln L is weighed by independent frames over frames, as one does for
-correlated residuals; that is a rule, not a theorem. Weights are exp(-excess / 2) over their sum.
+Identifications by likelihood are compared under a common covariance (see selection.discrimination): chi-square + K ln n
+(BIC), or + 2K + 2K(K+1)/(n-K-1) (AICc), with n the independent frames and nuisance parameters integrated out. For
+others -2 ln L is multiplied by independent frames over frames, as is done for correlated residuals; that is a rule, not
+a theorem. Weights are exp(-excess / 2) over their sum.
 """
 
 from __future__ import annotations
@@ -18,16 +18,23 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.selection.judging import under_common_covariance
+from creepkit.inverse.selection.discrimination import under_common_covariance
 
 if TYPE_CHECKING:
-    from creepkit.inverse.intervals.mixture import ModelAverage
-    from creepkit.inverse.selection.equivalence import EquivalentLaws
-    from creepkit.inverse.selection.separation import DiscriminationDesign
+    from creepkit.experiments.discriminating_experiments import DiscriminationDesign
+    from creepkit.inverse.selection.discrimination import EquivalentLaws
+    from creepkit.inverse.uncertainty.model_averaging import ModelAverage
+
 
 DECISIVE_WEIGHT = 0.95
+
+
 CREDIBLE_WEIGHT = 0.05
+
+
 CRITERIA = ("bic", "aicc", "hold-out")
+
+
 Criterion = Literal["bic", "aicc", "hold-out"]
 
 
@@ -81,29 +88,31 @@ class Ranking:
     @property
     def model_average(self) -> ModelAverage:
         """All laws together, each with its weight: rate(), local_exponent(), with intervals that hold both doubts."""
-        from creepkit.inverse.intervals.mixture import ModelAverage
+        from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 
         return ModelAverage.from_ranking(self)
 
     def equivalents(self) -> tuple[EquivalentLaws, ...]:
         """Pairs of laws that these tests cannot separate, be they good or bad."""
-        from creepkit.inverse.selection.equivalence import equivalent_laws
+        from creepkit.inverse.selection.discrimination import equivalent_laws
 
         return equivalent_laws(self)
 
     def further_tests(self) -> tuple[DiscriminationDesign, ...]:
         """What tests would tell the remaining laws apart, and by how much (some seconds of simulations)."""
-        from creepkit.inverse.selection.separation import further_tests
+        from creepkit.experiments.discriminating_experiments import further_tests
 
         return further_tests(self)
 
     def __str__(self) -> str:
-        from creepkit.inverse.selection.printing import ranking_text
+        from creepkit.report.ranking_text import ranking_text
 
         return ranking_text(self)
 
 
-def rank(fits: Sequence[Identification], criterion: Criterion = "bic", failed: Mapping[str, str] | None = None) -> Ranking:
+def rank(
+    fits: Sequence[Identification], criterion: Criterion = "bic", failed: Mapping[str, str] | None = None
+) -> Ranking:
     """Rank identifications made from the same histories; by : "bic" or "aicc"."""
     if not fits:
         raise FitError("there are no identifications to rank")
@@ -122,8 +131,12 @@ def rank(fits: Sequence[Identification], criterion: Criterion = "bic", failed: M
     else:
         independent_frames = max(fits, key=lambda fit: fit.log_likelihood).effective_frames
         score = np.array([_effective_deviance(fit, independent_frames) for fit in fits])
-    score = score + [_complexity_penalty(determined_parameter_count(fit), independent_frames, criterion) for fit in fits]
-    return ranking_from_scores(fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed)
+    score = score + [
+        _complexity_penalty(determined_parameter_count(fit), independent_frames, criterion) for fit in fits
+    ]
+    return ranking_from_scores(
+        fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed
+    )
 
 
 def ranking_from_scores(
@@ -151,11 +164,15 @@ def determined_parameter_count(fit: Identification) -> int:
     internal_bounds = [[p.to_internal(b) for b in p.bounds] for p in fit.law.params.values()]
     variances = np.diag(fit.covariance)
     is_uncorrelated = (fit.covariance != 0).sum(axis=1) == 1
-    return int((~(is_uncorrelated & np.isclose(variances, np.ptp(internal_bounds, axis=1) ** 2 / 12.0, rtol=1e-6))).sum())
+    return int(
+        (~(is_uncorrelated & np.isclose(variances, np.ptp(internal_bounds, axis=1) ** 2 / 12.0, rtol=1e-6))).sum()
+    )
 
 
 def _complexity_penalty(parameter_count: int, independent_frames: float, criterion: Criterion) -> float:
     """What a criterion takes for `count` parameters."""
     if criterion == "bic":
         return parameter_count * float(np.log(independent_frames))
-    return 2.0 * parameter_count + 2.0 * parameter_count * (parameter_count + 1) / max(independent_frames - parameter_count - 1.0, 1.0)
+    return 2.0 * parameter_count + 2.0 * parameter_count * (parameter_count + 1) / max(
+        independent_frames - parameter_count - 1.0, 1.0
+    )

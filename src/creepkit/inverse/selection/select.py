@@ -1,28 +1,129 @@
-"""select: which of several laws the histories speak for."""
+"""select: several laws are identified from the same histories and ranked.
+
+Candidates are the reductions of a law and sums of two laws. Criteria are BIC, AICc and the predictive likelihood of the
+end of every history, given a fit to its beginning: with C the covariance of all observations, that of the best law, and
+C_1 its part of the beginning,
+
+    -2 ln p(end | beginning) = (r' C^-1 r + ln|C|) - (r_1' C_1^-1 r_1 + ln|C_1|)
+
+but for a constant, r the residuals at the values that the beginning alone gave.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import identify
-from creepkit.inverse.search.refining import IterationCallback
-from creepkit.inverse.selection.candidates import sums_of_two
-from creepkit.inverse.selection.holding_out import hold_out_scores
+from creepkit.inverse.identify import identify, refit
+from creepkit.inverse.noise_model import NoiseModel, Residuals
+from creepkit.inverse.problem import IdentificationProblem
+from creepkit.inverse.search.local_refinement import IterationCallback
+from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, rank, ranking_from_scores
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.variance_components import inverse_covariances
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
+
+def reductions(law: CreepLaw) -> list[CreepLaw]:
+    """The law, and all that it reduces to: each non-empty set of its terms, exponents whose `off` is 0 in or out.
+
+    Table 1 is the set of reductions of Eq. (2) to single terms.
+    """
+    laws: list[CreepLaw] = []
+    labels = list(law.terms)
+    for count in range(len(labels), 0, -1):
+        for kept_labels in combinations(labels, count):
+            reduced = (
+                law.without(*(label for label in labels if label not in kept_labels)) if count < len(labels) else law
+            )
+            laws += _with_exponents_off(reduced)
+    return _distinct_laws(laws)
+
+
+def sums_of_two(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
+    """Sums of every two of the laws, such as primary and steady creep of Norton's law beside strain hardening."""
+    return [a + b for a, b in combinations(_distinct_laws(laws), 2)]
+
+
+def _with_exponents_off(law: CreepLaw) -> list[CreepLaw]:
+    """The law with every set of its exponents switched off that may be."""
+    names = [name for name, p in law.table.items() if p.scale != "log" and p.off == 0.0]
+    laws = []
+    for count in range(len(names) + 1):
+        for switched_off in combinations(names, count):
+            laws.append(law.fix(**dict.fromkeys(switched_off, 0.0)) if switched_off else law)
+    return laws
+
+
+def _distinct_laws(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
+    by_fingerprint: dict[str, CreepLaw] = {}
+    for law in laws:
+        by_fingerprint.setdefault(law.fingerprint, law)
+    return list(by_fingerprint.values())
+
+
+FITTED_FRACTION = 0.7
+"""Share of each history's duration that the fit sees."""
+
+
+def hold_out_scores(fits: Sequence[Identification], fitted_fraction: float = FITTED_FRACTION) -> list[float]:
+    """-2 ln of the predictive likelihood of what comes after `kept` of each history, for each law."""
+    noise_model = fits[under_common_covariance(fits).reference_law].noise_model
+    scores = []
+    for fit in fits:
+        histories = list(fit.histories)
+        partial = refit(fit, [_first_part(h, fitted_fraction) for h in histories])
+        problem = IdentificationProblem.from_histories(
+            fit.law, histories, _required_predictor(fit.predictor), fit.settings, fit.reference
+        )
+        residuals = problem.residual_function.evaluate(
+            np.concatenate([partial.u, [n.value for n in partial.nuisances]])
+        )
+        is_early = problem.residual_function.observations.times <= fitted_fraction * np.array(
+            [[h.times[-1]] for h in histories]
+        )
+        beginning = replace(
+            residuals, present=residuals.present & is_early, values=np.where(is_early, residuals.values, 0.0)
+        )
+        scores.append(
+            _negative_log_likelihood(residuals, noise_model) - _negative_log_likelihood(beginning, noise_model)
+        )
+    return scores
+
+
+def _negative_log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:
+    """r' C^-1 r + ln|C|."""
+    inverses, log_det = inverse_covariances(residuals, noise_model)
+    return float(np.einsum("te,tef,tf->", residuals.values, inverses, residuals.values) + log_det)
+
+
+def _first_part(history: History, fitted_fraction: float) -> History:
+    """The first part of a history, which does not know how the test will end."""
+    used = history.used & (history.times <= fitted_fraction * float(history.times[-1]))
+    return history.replace(used=used, rupture_time=None, unruptured=False)
+
+
+def _required_predictor(using: Predictor | None) -> Predictor:
+    assert using is not None
+    return using
+
+
 SELECTION_FRAMES = 60
 """Frames of a history that are looked at, unless settings say otherwise."""
+
+
 RULED_OUT_EXCESS = 40.0
 """Criterion over the best from which a law is ruled out by a surrogate already: e^-20 of the weight, which the errors
 of a surrogate, some noise in chi-square, do not make up for."""
+
+
 DRIFT_LIMIT = 2.0
 """Drift that the best single law leaves in its first output, in units of the noise there, from which sums are tried."""
 
@@ -80,7 +181,11 @@ def _identify_all(
     if through is None or not fits:
         return fits
     competitive = {id(r.fit) for r in rank(fits).laws if r.excess < RULED_OUT_EXCESS}
-    refined = {id(fit): _try_to_identify(fit.law, histories, using, settings, failed, fit) for fit in fits if id(fit) in competitive}
+    refined = {
+        id(fit): _try_to_identify(fit.law, histories, using, settings, failed, fit)
+        for fit in fits
+        if id(fit) in competitive
+    }
     return [refined.get(id(fit)) or _ruled_out(fit) for fit in fits if fit.law.name not in failed]
 
 
@@ -89,7 +194,11 @@ def _try_to_identify(
     failed: dict[str, str], previous_fit: Identification | None = None,
 ) -> Identification | None:  # fmt: skip
     """Identify one law, from where a cheaper predictor ended if it did; what goes wrong with it is told in `failed`."""
-    initial = {} if previous_fit is None else {"start": previous_fit.u, "known": previous_fit.nuisances, "reference": previous_fit.reference}
+    initial = (
+        {}
+        if previous_fit is None
+        else {"start": previous_fit.u, "known": previous_fit.nuisances, "reference": previous_fit.reference}
+    )
     try:
         return identify(law, histories, using, settings=settings, **initial)  # type: ignore[arg-type]
     except CreepkitError as error:
@@ -107,5 +216,7 @@ def _has_systematic_residuals(fit: Identification) -> bool:
     assert fit.linearised is not None
     name = next(iter(fit.noise_model.outputs))
     components, residuals = fit.noise_model[name], fit.linearised.residuals
-    transform_derivative = float(np.median(np.abs(residuals.transform_derivatives[residuals.present & (residuals.output_index == 0)])))
+    transform_derivative = float(
+        np.median(np.abs(residuals.transform_derivatives[residuals.present & (residuals.output_index == 0)]))
+    )
     return components.drift > DRIFT_LIMIT * components.noise * transform_derivative

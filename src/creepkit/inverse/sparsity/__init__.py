@@ -1,1 +1,1 @@
-"""Which terms of a sum a fit needs: their contributions, penalties on these, and the reduced law confirmed."""
+"""Sparse laws: contributions of the terms of a sum, penalties on them, and the reduced law compared with the sum."""

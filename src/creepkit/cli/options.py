@@ -1,0 +1,259 @@
+"""Texts of the command line as values: loadings, numbers, nuisance parameters, weights, searches, penalties."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from creepkit.inverse.search.cost_function import GlobalSearch
+    from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
+
+
+if TYPE_CHECKING:
+    from creepkit.records import Loading
+
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from creepkit.records import Nuisance
+
+
+SEARCHES = ("multi-start", "swarm", "cma-es")
+
+
+def search_named(name: str) -> GlobalSearch | None:
+    """The search of this name; None for the default."""
+    from creepkit.errors import FitError
+    from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
+
+    if name not in SEARCHES:
+        raise FitError(f"--search {name} is not known; allowed are {', '.join(SEARCHES)}")
+    return {"multi-start": None, "swarm": ParticleSwarm(), "cma-es": CmaEs()}[name]
+
+
+def penalty_named(name: str | None) -> ContributionPenalty | Subsets | None:
+    """The penalty of this name, its strength chosen automatically; None for none."""
+    from creepkit.errors import FitError
+    from creepkit.inverse.sparsity.penalties import L2, GroupL2, Sqrt, Subsets
+
+    penalties: dict[str, Callable[[], ContributionPenalty | Subsets]] = {
+        "l2": L2, "group-l2": GroupL2, "sqrt": Sqrt, "subsets": Subsets,
+    }  # fmt: skip
+    if name is not None and name not in penalties:
+        raise FitError(f"--penalty {name} is not known; allowed are {', '.join(penalties)}")
+    return None if name is None else penalties[name]()
+
+
+BULGE, UNIAXIAL, RELAXATION, MATERIAL_POINT = "bulge", "uniaxial", "relaxation", "point"
+
+
+RAMP_TIME = 5.0
+"""s, in which each pressure is reached."""
+
+
+SPECIMENS_OF_OPTION = {
+    "--stress": (UNIAXIAL, MATERIAL_POINT),
+    "--strain": (RELAXATION, MATERIAL_POINT),
+    "--pressure": (BULGE,),
+    "--control": (UNIAXIAL,),
+    "--ramp": (RELAXATION,),
+    "--geometry": (BULGE,),
+    "--picture": (BULGE,),
+}
+"""Which specimens an option is for."""
+
+
+def check_options(specimen: str, options: dict[str, object]) -> None:
+    """Options of another specimen would go unheard; what a plugin's specimen takes is its own affair."""
+    from creepkit.errors import SolveError
+
+    if specimen not in {name for specimens in SPECIMENS_OF_OPTION.values() for name in specimens}:
+        return
+    for option, option_value in options.items():
+        if option_value not in (None, []) and specimen not in SPECIMENS_OF_OPTION[option]:
+            allowed_specimens = " or ".join(SPECIMENS_OF_OPTION[option])
+            raise SolveError(
+                f"{option} belongs to --specimen {allowed_specimens}, found --specimen {specimen}; leave one of them out"
+            )
+
+
+def parse_loading(
+    specimen: str,
+    stress: Sequence[str] | None,
+    strain: Sequence[str] | None,
+    pressure: Sequence[str] | None,
+    control: str | None,
+    ramp: float | None,
+    end: float,
+) -> Loading:
+    """The loading of a test that ends at `end`, s."""
+    from creepkit.errors import SolveError
+
+    component_texts = [text for text in (*(stress or ()), *(strain or ())) if "=" in text]
+    if component_texts and specimen in (UNIAXIAL, RELAXATION):
+        raise SolveError(
+            f"{component_texts[0]} names a component, which --specimen {specimen} has not; give --specimen point"
+        )
+    if component_texts or specimen == MATERIAL_POINT:
+        return _point_loading(stress, strain)
+    if specimen == BULGE or pressure:
+        return _pressure_loading(pressure, end)
+    if specimen == RELAXATION or strain:
+        if not strain:
+            raise SolveError("a bar in relaxation needs a strain: give --strain, such as 0.002, or 3600:0.003 later on")
+        from creepkit.records import StrainSteps
+
+        return StrainSteps(tuple(parse_steps(strain, "--strain")), ramp or 0.0)
+    return _stress_loading(stress, control)
+
+
+def _stress_loading(texts: Sequence[str] | None, control: str | None) -> Loading:
+    from creepkit.errors import SolveError
+    from creepkit.records import StressSteps
+
+    if not texts:
+        raise SolveError("a bar needs a stress: give --stress, such as 100, or --specimen bulge with --pressure")
+    if control not in (None, "load", "stress"):
+        raise SolveError(f"--control {control} is not known; allowed are load and stress")
+    return StressSteps(tuple(parse_steps(texts, "--stress")), "stress" if control == "stress" else "load")
+
+
+def _point_loading(stress: Sequence[str] | None, strain: Sequence[str] | None) -> Loading:
+    from creepkit.errors import SolveError
+    from creepkit.records import PointLoading
+
+    if not (stress or strain):
+        raise SolveError("a material point needs a component: give --stress 11=100, or --strain 12=0.001")
+    return PointLoading(_component_steps(stress, "--stress"), _component_steps(strain, "--strain"))
+
+
+def _component_steps(texts: Sequence[str] | None, option: str) -> dict[str, list[tuple[float, float]]]:
+    """Steps by component, in the order in which they were given."""
+    from creepkit.errors import SolveError
+
+    steps_by_component: dict[str, list[tuple[float, float]]] = {}
+    for text in texts or ():
+        name, separator, value_text = text.partition("=")
+        if not separator:
+            raise SolveError(f"{option} {text}: name the component of a material point, such as 11={text}")
+        steps_by_component.setdefault(name.strip(), []).extend(parse_steps([value_text], option))
+    for name, pairs in steps_by_component.items():
+        if pairs[0][0] != 0.0:
+            pairs.insert(0, (0.0, 0.0))  # until its first step a component is at rest
+        if sorted(pairs) != pairs:
+            raise SolveError(f"{option}: the steps of component {name} must follow one another in time")
+    return steps_by_component
+
+
+def _pressure_loading(texts: Sequence[str] | None, end: float) -> Loading:
+    """One or two pressures as a PressureJump, more as the program that they are."""
+    import numpy as np
+
+    from creepkit.errors import SolveError
+    from creepkit.records import PressureJump, Program, RecordedLoading
+
+    if not texts:
+        raise SolveError("a dimple needs a pressure: give --pressure, such as 8, or 7200:10 for a later step")
+    starts, pressures = np.array(parse_steps(texts, "--pressure")).T
+    if starts[0] != 0.0 or (np.diff(starts) < RAMP_TIME).any() or pressures.min() < 0.0:
+        raise SolveError(
+            f"--pressure {' '.join(texts)}: the first pressure starts at 0 s, none is negative, and each comes "
+            f"{RAMP_TIME:g} s or more after the one before, for the ramp takes that long"
+        )
+    if len(texts) <= 2 and pressures.min() > 0.0 and (len(texts) == 1 or starts[1] > RAMP_TIME):
+        jump_time = starts[1] if len(texts) == 2 else max(end, 2 * RAMP_TIME)
+        return PressureJump(float(pressures[0]), float(pressures[-1]), float(jump_time), RAMP_TIME)
+    times = np.stack([starts, starts + RAMP_TIME], axis=1).ravel()
+    values = np.repeat(np.append(0.0, pressures), 2)[1:-1]
+    return RecordedLoading(Program(times, values), "pressure")
+
+
+def parse_steps(texts: Sequence[str], option: str) -> list[tuple[float, float]]:
+    """(start in s, value) pairs from texts such as 100 and 3600:120."""
+    from creepkit.errors import SolveError
+
+    pairs = []
+    for text in texts:
+        start, _, value = text.rpartition(":")
+        try:
+            pairs.append((float(start or 0.0), float(value)))
+        except ValueError:
+            raise SolveError(f"{option} {text}: write a number, or SECONDS:NUMBER for a later step") from None
+    return pairs
+
+
+def parse_numbers(texts: Sequence[str], option: str, example: str) -> dict[str, float]:
+    """{name: value} from texts such as n=5.2."""
+    from creepkit.errors import SolveError
+
+    values: dict[str, float] = {}
+    for text in texts:
+        name, _, number = text.partition("=")
+        name = name.strip()
+        if name in values:
+            raise SolveError(f"{option} {text}: {name} is given twice; keep one of them")
+        try:
+            values[name] = float(number)
+        except ValueError:
+            raise SolveError(f"{option} {text}: write NAME=NUMBER, such as {example}") from None
+    return values
+
+
+def check_folder(folder: Path) -> None:
+    """Say now, not after all the work, that results cannot be written there."""
+    from creepkit.errors import FitError
+
+    existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
+    if not existing.is_dir():
+        raise FitError(f"--to {folder}: {existing} is a file; name a folder for the results")
+    if not os.access(existing, os.W_OK):
+        raise FitError(f"--to {folder}: {existing} cannot be written to; name another folder for the results")
+
+
+def parse_weights(text: str) -> Any:
+    """The weights of outputs, from text such as amplitude=0.99,width=0.01; or a word."""
+    from creepkit.errors import FitError
+    from creepkit.inverse.settings import WEIGHTINGS
+
+    if text in WEIGHTINGS:
+        return text
+    pairs = [part.partition("=") for part in text.split(",")]
+    try:
+        return {name.strip(): float(value) for name, _, value in pairs}
+    except ValueError:
+        words = f"{', '.join(WEIGHTINGS)} or amplitude=0.99,width=0.005"
+        raise FitError(f"--weights {text} is not known; write {words}") from None
+
+
+def parse_nuisances(texts: Sequence[str] | None) -> list[Nuisance] | None:
+    """The usual offset and rate, and those named: temperature, thickness=0.4935 or thickness=0.4935:0.027."""
+    from typing import get_args
+
+    from creepkit.errors import FitError
+    from creepkit.records import Nuisance
+    from creepkit.records.prediction import NuisanceKind
+
+    if not texts:
+        return None
+    nuisances = [Nuisance("offset"), Nuisance("rate")]
+    for text in texts:
+        kind, _, numbers_text = text.partition("=")
+        mean, _, sd = numbers_text.partition(":")
+        try:
+            numbers = float(mean or 0.0), float(sd) if sd else None
+        except ValueError:
+            raise FitError(
+                f"--nuisance {text}: '{numbers_text}' is not MEAN or MEAN:SD, such as 0.4935:0.027"
+            ) from None
+        matching_kinds = [known_kind for known_kind in get_args(NuisanceKind) if known_kind == kind]
+        if not matching_kinds:
+            raise FitError(f"--nuisance {text}: '{kind}' is not known; allowed are {', '.join(get_args(NuisanceKind))}")
+        nuisances = [n for n in nuisances if n.kind != kind]
+        nuisances.append(Nuisance(matching_kinds[0], mean=numbers[0], sd=numbers[1]))
+    return nuisances

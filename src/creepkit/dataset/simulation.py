@@ -1,0 +1,198 @@
+"""Simulation of the rows of a sampling design, with screening by the reduced-order model and the acceptance criteria.
+
+Where the specimen has a reduced-order model, a sample that bursts far too early in it is rejected without a simulation. Samples are simulated one at a time on one thread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from creepkit.arrays import Ints
+from creepkit.dataset.dataset import FAILED, HOLD_TIMES, NOT_SIMULATED, Dataset, empty_columns
+from creepkit.errors import DatasetError
+from creepkit.jobs.worker import error_text
+from creepkit.records import Predictor, Status, SupportsReducedOrderModel
+from creepkit.sampling.conditions import hold_times, planned_test
+from creepkit.sampling.criteria import CreepInEachHold, SimulationOutcome, SurvivesTime
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+    from creepkit.sampling.domains import SamplingDesign
+
+
+if TYPE_CHECKING:
+    from creepkit.records import Specimen
+    from creepkit.sampling.domains import SamplingDesign
+    from creepkit.sampling.draws import Draws
+
+
+def rejected_by_screening(design: SamplingDesign, samples: Dataset) -> Ints:
+    """(rows,) the number of the criterion that a sample cannot meet, 0 where it must be simulated to know."""
+    reasons = np.zeros(len(samples), dtype=np.int64)
+    if not getattr(design, "screened", False) or not isinstance(samples.specimen, SupportsReducedOrderModel):
+        return reasons
+    reduced_model = samples.specimen.reduced_order_model()
+    for row in np.flatnonzero(samples.reasons == 0).tolist():
+        try:
+            reasons[row] = _first_rejection(design, _screening_outcome(design, samples, row, reduced_model))
+        except (MemoryError, OSError):
+            raise
+        except Exception:
+            continue  # whatever a law of a plugin raises: its simulation comes next, and says it
+    return reasons
+
+
+def _screening_outcome(
+    design: SamplingDesign, samples: Dataset, row: int, reduced_model: Predictor
+) -> SimulationOutcome:
+    """What the stand-in makes of one sample, looked at when the holds begin and end."""
+    conditions = samples.conditions_of(row)
+    test = planned_test(samples.specimen, conditions, design.grid)
+    hold_instants = hold_times(test)
+    times = np.unique(hold_instants)
+    prediction = reduced_model.predict(samples.law, samples.values_of(row), [test.replace(times=times)])
+    outputs = prediction.of(0)
+    status, end_time = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
+    return SimulationOutcome(
+        times, outputs, outputs[np.searchsorted(times, hold_instants)], status, end_time, conditions
+    )
+
+
+def _first_rejection(design: SamplingDesign, screening_outcome: SimulationOutcome) -> int:
+    for number, criterion in enumerate(design.criteria, start=1):
+        if isinstance(criterion, SurvivesTime | CreepInEachHold) and criterion.rejects_early(screening_outcome):
+            return number
+    return 0
+
+
+TOO_MANY_FAILURES = 8
+"""Samples of a shard of which all fail: something is wrong with all of them, and nobody wants a file of that."""
+
+
+REJECTED_DIGITS = 12
+"""Of the histories of rejected samples: 1 part in 4000, for a look at what was rejected, not for learning."""
+
+
+class SampleFailedError(Exception):
+    """A simulation that left nothing; its text is kept."""
+
+
+def empty_dataset(design: SamplingDesign, specimen: Specimen, provenance: dict[str, object]) -> Dataset:
+    """The data set of a design with no samples in it yet."""
+    sizes = {
+        "parameter_names": len(design.law.names),
+        "condition_names": len(design.condition_names),
+        "outputs": len(specimen.outputs),
+        "frames": design.grid.frames,
+        "holds": HOLD_TIMES,
+    }
+    return Dataset(
+        law=design.law,
+        specimen=specimen,
+        design_document=design.document(),
+        grid=design.grid,
+        outputs=tuple(specimen.outputs),
+        parameter_names=tuple(design.law.names),
+        condition_names=tuple(design.condition_names),
+        reason_names=("accepted", *(c.name for c in design.criteria)),
+        reason_texts=("all criteria are met", *(c.text for c in design.criteria)),
+        provenance=provenance,
+        **empty_columns(sizes),
+    )
+
+
+def simulate_rows(
+    design: SamplingDesign, header: Dataset, seed: int, first: int, count: int, before_sample: Callable[[int], None]
+) -> Dataset:
+    """Rows first to first + count of a design, simulated.
+
+    starting : called with the row that is about to be simulated; may raise SampleFailed.
+    """
+    draws = design.draw(first, count, seed)
+    samples = _unsimulated(header, draws, _reasons_before(design, draws), first)
+    samples.reasons[:] += rejected_by_screening(design, samples)
+    failures: dict[int, str] = {}
+    for attempt, row in enumerate(np.flatnonzero(samples.reasons == 0).tolist(), start=1):
+        try:
+            before_sample(first + row)
+            samples.reasons[row] = _simulate_sample(design, samples, row)
+        except (MemoryError, OSError):
+            raise
+        except Exception as error:  # a failed sample is data, whatever a law or a specimen of a plugin raises
+            samples.reasons[row] = FAILED
+            failures[row] = error_text(error)
+            if len(failures) == attempt == TOO_MANY_FAILURES:
+                raise DatasetError(f"the first {attempt} simulations all failed: {failures[row]}") from error
+    rejected = samples.reasons != 0
+    samples.values[rejected] = rounded_outputs(samples.values[rejected])
+    return replace(samples, failures=failures)
+
+
+def rounded_outputs(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The same to DIGITS binary digits, which take a third of the room in a compressed file."""
+    fractions, exponents = np.frexp(values)
+    return np.asarray(
+        np.ldexp(np.round(fractions * 2**REJECTED_DIGITS) / 2**REJECTED_DIGITS, exponents), dtype=np.float32
+    )
+
+
+def _reasons_before(design: SamplingDesign, draws: Draws) -> Ints:
+    """The first criterion that a draw does not meet, 0 where it meets all that need no simulation."""
+    reasons = np.zeros(len(draws), dtype=np.int64)
+    for number, criterion in enumerate(design.criteria, start=1):
+        if criterion.stage == "before":
+            met = criterion.passes(design.law, draws)
+            reasons[(reasons == 0) & ~met] = number
+    return reasons
+
+
+def _unsimulated(header: Dataset, draws: Draws, reasons: Ints, first: int) -> Dataset:
+    """Samples with nothing simulated yet."""
+    rows = len(draws)
+
+    def not_available(name: str) -> NDArray[np.float32]:
+        return np.full((rows, *getattr(header, name).shape[1:]), np.nan, dtype=np.float32)
+
+    return replace(
+        header,
+        parameters=np.array(draws.parameters),
+        conditions=np.array(draws.conditions),
+        values=not_available("values"),
+        hold_outputs=not_available("hold_outputs"),
+        status=np.full(rows, NOT_SIMULATED, dtype=np.int64),
+        end_times=np.zeros(rows),
+        reasons=reasons,
+        index=np.arange(first, first + rows, dtype=np.int64),
+    )
+
+
+def _simulate_sample(design: SamplingDesign, samples: Dataset, row: int) -> int:
+    """Simulate one sample, write its history into its row and return its reason."""
+    conditions = samples.conditions_of(row)
+    test = planned_test(samples.specimen, conditions, design.grid)
+    hold_instants = hold_times(test)
+    times = np.union1d(test.times, hold_instants)
+    prediction = samples.specimen.predict(samples.law, samples.values_of(row), [test.replace(times=times)])
+    observed = prediction.of(0)
+    outputs = np.full(samples.values.shape[1:], np.nan)
+    outputs[: test.times.size] = observed[np.searchsorted(times, test.times)]
+    hold_outputs = observed[np.searchsorted(times, hold_instants)]
+    status, end_time = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
+    samples.values[row], samples.hold_outputs[row] = outputs, hold_outputs
+    samples.status[row], samples.end_times[row] = status, end_time
+    if status == Status.NOT_CONVERGED and not np.isfinite(observed[times > 0, 0]).any():
+        raise SampleFailedError(f"not converged from {end_time:g} s on, with nothing to show before")
+    outcome = SimulationOutcome(test.times, outputs[: test.times.size], hold_outputs, status, end_time, conditions)
+    return _reason_after(design, outcome)
+
+
+def _reason_after(design: SamplingDesign, outcome: SimulationOutcome) -> int:
+    for number, criterion in enumerate(design.criteria, start=1):
+        if criterion.stage == "after" and not criterion.passes(outcome):
+            return number
+    return 0

@@ -1,0 +1,289 @@
+"""Data sets as HDF5 files, readable without creepkit.
+
+Layout 1. Attributes of the file: `format` is "creepkit-dataset" and `layout` 1; `units` says "MPa, mm, s, K" of
+everything that follows; lists of strings `outputs`, `parameter_names`, `condition_names`, `reason_names`, `reason_texts`;
+JSON texts `law` (creepkit.language.law_codec), `specimen` (its name and fields), `design` (what decided the draws) and
+`provenance` (versions, seed, when, fingerprint).
+
+Arrays, the first axis being the sample, in the order of the Sobol sequence, rejected and failed samples included:
+
+    parameters   (n, P)                float64  the law's parameters in the author's values; 0 = switched off
+    conditions   (n, C)                float64  what the test was: modulus, P1, P2 (MPa), Tj (s) ...
+    values       (n, frames, outputs)  float32  NaN after the end, and where nothing was simulated; 12 binary digits
+                                                of rejected samples
+    hold_outputs (n, 4, outputs)       float32  at the ends of first ramp, first hold, second ramp and test
+    status       (n,)                  int8     0 complete, 1 burst, 2 not converged, 3 outside the domain, -1 not run
+    end_times    (n,)                  float64  s, where the simulation ended
+    reasons      (n,)                  int8     0 accepted, k rejected for reason_names[k], -1 failed
+    index        (n,)                  int64    row of the Sobol sequence
+
+and time_grid (frames,) float64, in s, or, where its attribute `relative` is true, in shares of the sample's end_time.
+The group `failures` has `rows` (k,) int64 and `texts` (k,): which samples failed, and why.
+
+    with h5py.File("combined.h5") as f:
+        good = f["reasons"][:] == 0
+        amplitude = f["values"][good][:, :, list(f.attrs["outputs"]).index("amplitude")]
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from creepkit.arrays import Bools
+from creepkit.dataset.dataset import COLUMNS, HOLD_TIMES, Dataset, empty_columns
+from creepkit.errors import DatasetError, LawError
+from creepkit.files.fault_tolerant import create_hdf5
+from creepkit.files.writing import replace_on_success
+from creepkit.language import CreepLaw
+from creepkit.language.law_codec import law_from_json, law_to_json
+from creepkit.sampling.conditions import MOST_FRAMES, TimeGrid
+from creepkit.specimens.documents import specimen_from_json, specimen_to_json
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+
+
+FORMAT = "creepkit-dataset"
+
+
+LAYOUT_VERSION = 1
+
+
+FILE_UNITS = "MPa, mm, s, K"
+
+
+NAME_LISTS = ("outputs", "parameter_names", "condition_names", "reason_names", "reason_texts")
+
+
+LARGEST_COMPRESSION = 1032
+"""Bytes that one of gzip's may stand for, at most."""
+
+
+def check_format(file: h5py.File, source: str) -> None:
+    """DatasetError when the file is not one of ours, or of another layout or unit."""
+    format_name = file.attrs.get("format")
+    if format_name != FORMAT:
+        raise DatasetError(f"{source}: an HDF5 file, but no data set of creepkit (its format is {format_name!r})")
+    layout = file.attrs.get("layout")
+    if layout != LAYOUT_VERSION:
+        newer = isinstance(layout, int | np.integer) and layout > LAYOUT_VERSION
+        advice = "upgrade creepkit" if newer else "generate it again"
+        raise DatasetError(f"{source}: its layout is {layout}, this creepkit reads layout {LAYOUT_VERSION}; {advice}")
+    if file.attrs.get("units") != FILE_UNITS:
+        raise DatasetError(f"{source}: its units are {file.attrs.get('units')!r}; allowed are '{FILE_UNITS}'")
+    for name in (*NAME_LISTS, "law", "specimen", "design", "provenance"):
+        if name not in file.attrs:
+            raise DatasetError(f"{source}: the attribute '{name}' is missing; the file is damaged")
+
+
+def check_shapes(file: h5py.File, expected: dict[str, Any], source: str) -> None:
+    """DatasetError when an array is missing, or does not fit the words of the file."""
+    for name, empty in expected.items():
+        array = file.get(name)
+        if not isinstance(array, h5py.Dataset):
+            raise DatasetError(f"{source}: the array '{name}' is missing; the file is damaged")
+        kind = np.dtype(COLUMNS[name].file_type).kind
+        if array.shape != (len(file["index"]), *empty.shape[1:]) or array.dtype.kind != kind:
+            description = f"{array.dtype} {array.shape}"
+            raise DatasetError(f"{source}: the array '{name}' is {description}, which does not fit the others")
+        if array.nbytes > LARGEST_COMPRESSION * array.id.get_storage_size():
+            raise DatasetError(f"{source}: the array '{name}' says to be {array.shape}, and is not all there")
+
+
+def check_attributes(attributes: dict[str, Any], source: str) -> None:
+    """DatasetError when the words of a file do not fit each other; told : attributes by name, documents parsed."""
+    for name in ("design", "provenance"):
+        if not isinstance(attributes[name], dict):
+            raise DatasetError(f"{source}: the attribute '{name}' is no record; the file is damaged")
+    if not attributes["outputs"] or len(attributes["reason_names"]) != len(attributes["reason_texts"]):
+        raise DatasetError(f"{source}: names no output, or not a text for each reason; the file is damaged")
+
+
+def check_values(columns: dict[str, Any], header: Dataset, source: str) -> None:
+    """DatasetError when what was drawn is not finite, a reason is none, or an accepted sample has no history."""
+    for name in ("parameters", "conditions"):
+        invalid = np.argwhere(~np.isfinite(columns[name]))
+        if invalid.size:
+            column_name = getattr(header, COLUMNS[name].axes[0])[invalid[0, 1]]
+            raise DatasetError(
+                f"{source}: {name} of sample {invalid[0, 0]} ({column_name}) are not finite; the file is damaged"
+            )
+    invalid_reasons = np.flatnonzero((columns["reasons"] < -1) | (columns["reasons"] >= len(header.reason_names)))
+    if invalid_reasons.size:
+        raise DatasetError(
+            f"{source}: the reason of sample {invalid_reasons[0]} is {columns['reasons'][invalid_reasons[0]]}; allowed are -1 to "
+            f"{len(header.reason_names) - 1}; the file is damaged"
+        )
+    accepted = columns["reasons"] == 0
+    has_history = np.isfinite(columns["values"][accepted, :, 0]).any(axis=1) & np.isfinite(
+        columns["end_times"][accepted]
+    )
+    if not has_history.all():
+        row = np.flatnonzero(accepted)[~has_history][0]
+        raise DatasetError(f"{source}: sample {row} was accepted and has no history; the file is damaged")
+
+
+COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
+
+
+# ---- writing -------------------------------------------------------------------------------------------------------
+
+
+def write_dataset(data: Dataset, path: str | Path) -> Path:
+    """Write a data set; the file is whole or absent, and one that is there is replaced."""
+    path = Path(path)
+    with replace_on_success(path) as temporary, create_hdf5(temporary) as file:
+        write_header(file, data)
+        append_samples(file, data)
+    return path
+
+
+def write_header(file: h5py.File, data: Dataset) -> None:
+    """Write everything but the samples, with room for these."""
+    file.attrs.update({"format": FORMAT, "layout": LAYOUT_VERSION, "units": FILE_UNITS})
+    text = h5py.string_dtype()
+    for name in NAME_LISTS:
+        file.attrs.create(name, np.array(getattr(data, name), dtype=object), dtype=text)
+    documents = {
+        "law": law_to_json(data.law),
+        "specimen": specimen_to_json(data.specimen),
+        "design": data.design_document,
+        "provenance": data.provenance,
+    }
+    for name, document in documents.items():
+        file.attrs[name] = json.dumps(document, sort_keys=True)
+    grid = file.create_dataset("time_grid", data=data.grid.values, dtype=np.float64)
+    grid.attrs["relative"] = bool(data.grid.relative)
+    sizes = {**{name: len(getattr(data, name)) for name in NAME_LISTS}, "holds": HOLD_TIMES, "frames": grid.size}
+    for name, column in COLUMNS.items():
+        shape = tuple(sizes[axis] for axis in column.axes)
+        # the last axis apart: neighbours in a chunk are then neighbours in time, which compress better
+        chunks = (column.chunk, *(max(size, 1) for size in shape[:-1]), *(1 for _ in shape[-1:]))
+        file.create_dataset(name, (0, *shape), column.file_type, maxshape=(None, *shape), chunks=chunks, **COMPRESSION)
+    failures = file.create_group("failures")
+    failures.create_dataset("rows", (0,), np.int64, maxshape=(None,), chunks=(1024,))
+    failures.create_dataset("texts", (0,), text, maxshape=(None,), chunks=(1024,))
+
+
+def append_samples(file: h5py.File, data: Dataset) -> None:
+    """Write the samples of a data set behind those that are there."""
+    before = len(file["index"])
+    for name in COLUMNS:
+        _extend(file[name], getattr(data, name))
+    if data.failures:
+        _extend(file["failures/rows"], np.array([before + row for row in data.failures], dtype=np.int64))
+        _extend(file["failures/texts"], np.array(list(data.failures.values()), dtype=object))
+
+
+def _extend(dataset: h5py.Dataset, values: Any) -> None:
+    before = len(dataset)
+    dataset.resize(before + len(values), axis=0)
+    dataset[before:] = values
+
+
+# ---- reading -------------------------------------------------------------------------------------------------------
+
+
+def read_dataset(path: str | Path, *, accepted_only: bool = False) -> Dataset:
+    """Read a data set that `write` or a campaign wrote; DatasetError, in one sentence, when the file is another.
+
+    accepted_only : leave rejected and failed samples in the file, which spares their memory.
+    """
+    with open_hdf5(Path(path)) as file:
+        return read_samples(file, read_header(file, str(path)), accepted_only)
+
+
+@contextmanager
+def open_hdf5(path: Path) -> Iterator[h5py.File]:
+    """The file open for reading; DatasetError when there is none, when it is no HDF5, or when it is damaged."""
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except FileNotFoundError:
+        raise DatasetError(f"{path}: there is no such file") from None
+    except MemoryError:
+        raise DatasetError(f"{path}: holds more than there is memory for") from None
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        if path.is_dir():
+            raise DatasetError(f"{path}: is a folder; give a data set that creepkit generated") from None
+        if path.is_file() and not h5py.is_hdf5(path):
+            raise DatasetError(f"{path}: not an HDF5 file; give a data set that creepkit generated") from None
+        raise DatasetError(f"{path}: cannot be read, it seems damaged: {' '.join(str(error).split())}") from None
+
+
+def read_header(file: h5py.File, source: str) -> Dataset:
+    """The data set of a file with no samples in it yet."""
+    check_format(file, source)
+    name_lists: dict[str, Any] = {name: tuple(str(word) for word in file.attrs[name]) for name in NAME_LISTS}
+    documents = {name: json.loads(file.attrs[name]) for name in ("law", "specimen", "design", "provenance")}
+    check_attributes({**name_lists, **documents}, source)
+    sizes = {
+        **{name: len(values) for name, values in name_lists.items()},
+        "holds": HOLD_TIMES,
+        "frames": len(file["time_grid"]),
+    }
+    columns = empty_columns(sizes)
+    check_shapes(file, columns, source)
+    return Dataset(
+        law=_read_law(documents["law"], name_lists["parameter_names"], source),
+        specimen=specimen_from_json(documents["specimen"], source),
+        design_document=documents["design"],
+        grid=_read_grid(file["time_grid"], source),
+        provenance=documents["provenance"],
+        **name_lists,
+        **columns,
+    )
+
+
+def _read_law(document: Any, names: tuple[str, ...], source: str) -> CreepLaw:
+    try:
+        law = law_from_json(document, source)
+    except LawError as error:
+        raise DatasetError(str(error)) from None
+    if tuple(law.names) != names:
+        found = f"its parameters are {', '.join(names)}, those of its law {', '.join(law.names)}"
+        raise DatasetError(f"{source}: {found}; the file is damaged")
+    return law
+
+
+def _read_grid(array: h5py.Dataset, source: str) -> TimeGrid:
+    if array.size > MOST_FRAMES or array.dtype.kind != "f":
+        raise DatasetError(f"{source}: its time grid is {array.dtype} {array.shape}; the file is damaged")
+    try:
+        return TimeGrid(array[:], bool(array.attrs["relative"]))
+    except DatasetError as error:
+        raise DatasetError(f"{source}: {error}") from None
+
+
+def read_samples(file: h5py.File, header: Dataset, accepted_only: bool = False) -> Dataset:
+    """The header with the samples of a file, in blocks that spare memory."""
+    reasons = file["reasons"][:]
+    selected = reasons == 0 if accepted_only else np.ones(len(reasons), dtype=bool)
+    columns: dict[str, Any] = {name: _read_rows(file[name], selected, COLUMNS[name].memory_type) for name in COLUMNS}
+    new_row = {int(row): k for k, row in enumerate(np.flatnonzero(selected))}
+    rows, texts = file["failures/rows"][:], file["failures/texts"].asstr()[:]
+    failures = {new_row[row]: str(text) for row, text in zip(rows.tolist(), texts, strict=True) if row in new_row}
+    check_values(columns, header, file.filename)
+    return replace(header, **columns, failures=failures)
+
+
+def _read_rows(dataset: h5py.Dataset, selected: Bools, dtype: type, block: int = 4096) -> NDArray[Any]:
+    """The wanted rows; reading by mask is slow in HDF5, and the whole may be many times larger."""
+    rows = np.empty((int(selected.sum()), *dataset.shape[1:]), dtype)
+    filled = 0
+    for start in range(0, len(selected), block):
+        mask = selected[start : start + block]
+        if mask.any():
+            chunk = dataset[start : start + block][mask]
+            rows[filled : filled + len(chunk)] = chunk
+            filled += len(chunk)
+    return rows

@@ -1,0 +1,201 @@
+"""Combinations of forms, one for each parameter: Akaike weights, and which forms the estimates cannot distinguish.
+
+The score of a combination is the quasi AICc (Burnham and Anderson (2002), Model Selection and Multimodel Inference,
+sec. 2.5),
+
+    chi^2 / c + 2 k + 2 k (k + 1)/(N - k - 1) - 2 ln(prior odds),
+
+with k numbers, N rows and c = max(1, least chi^2/(N - k)), which widens covariances that are too small for every form.
+Few combinations are all tried; many are searched greedily, one parameter at a time with the others fixed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.discovery.forms import ARRHENIUS, CandidateForm
+from creepkit.discovery.regression import IsothermalEstimates, Regression, regress
+from creepkit.errors import FitError
+
+MAX_EXHAUSTIVE = 150
+"""Up to so many combinations are all tried."""
+
+
+MAX_SWEEPS = 4
+
+
+CREDIBLE_MASS = 0.95
+
+
+CHI_SQUARE_95 = 3.84
+"""chi^2 of one degree of freedom at 95 %: curves closer than that, by the points' own covariances, are equivalent."""
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedCombination:
+    """One combination of forms, its quasi AICc less the best, and its Akaike weight."""
+
+    regression: Regression
+    criterion_difference: float
+    weight: float
+
+    @property
+    def forms(self) -> dict[str, str]:
+        """{parameter: name of its form}."""
+        return self.regression.forms
+
+
+@dataclass(frozen=True)
+class FormWeight:
+    """A form of one parameter: its share of belief, and whether the points can tell it from the best one."""
+
+    name: str
+    weight: float
+    equivalent: bool
+
+
+@dataclass(frozen=True, eq=False)
+class RankedCombinations:
+    """All combinations that were tried, best first.
+
+    inflation : c, by which the covariances of the points fell short. sets : {parameter: forms that remain, best
+        first}: those that hold 95 % of the belief, and those equivalent to the best that have no more numbers.
+    """
+
+    combinations: tuple[WeightedCombination, ...]
+    overdispersion: float
+    plausible_forms: Mapping[str, tuple[FormWeight, ...]]
+
+    @property
+    def best(self) -> Regression:
+        """The combination of the highest weight."""
+        return self.combinations[0].regression
+
+    def with_form(self, parameter: str, form: str) -> Regression:
+        """The best combination that has this form of a parameter."""
+        return next(combination.regression for combination in self.combinations if combination.forms[parameter] == form)
+
+
+def rank_combinations(
+    points: IsothermalEstimates,
+    candidates: Mapping[str, Sequence[CandidateForm]],
+    progress: Callable[[str, int, int], None] | None = None,
+) -> RankedCombinations:
+    """Fit combinations of one library for each parameter, and weigh them."""
+    names, combination_count = list(candidates), int(np.prod([len(forms) for forms in candidates.values()]))
+    cache = _RegressionCache(
+        points, min(combination_count, MAX_SWEEPS * sum(len(own) for own in candidates.values())), progress
+    )
+    if combination_count <= MAX_EXHAUSTIVE:
+        cache.total = combination_count
+        for forms_of_combination in product(*candidates.values()):
+            cache(forms_of_combination)
+    else:
+        _coordinate_search(cache, candidates)
+    admissible = [
+        regression
+        for regression in cache.regressions
+        if regression.parameter_count < regression.rows - 1 and regression.within_bounds()
+    ]
+    if not admissible:
+        raise FitError(f"no form of {', '.join(names)} within its bounds has fewer numbers than these points allow")
+    overdispersion = max(1.0, min(one.chi_square / (one.rows - one.parameter_count) for one in admissible))
+    scores = np.array([_quasi_aicc(one, overdispersion) for one in admissible])
+    weights = np.exp(-0.5 * (scores - scores.min()))
+    weights /= weights.sum()
+    order = np.argsort(scores, kind="stable")
+    combinations = [
+        WeightedCombination(admissible[k], float(scores[k] - scores.min()), float(weights[k])) for k in order
+    ]
+    plausible_forms = {name: _plausible_forms(name, combinations, points, overdispersion) for name in names}
+    return RankedCombinations(tuple(combinations), overdispersion, plausible_forms)
+
+
+class _RegressionCache:
+    """Regressions of combinations, each made once; total : how many there may be."""
+
+    def __init__(
+        self, points: IsothermalEstimates, total: int, progress: Callable[[str, int, int], None] | None
+    ) -> None:
+        self.points, self.total, self.progress = points, total, progress
+        self._regressions: dict[tuple[str, ...], Regression] = {}
+
+    def __call__(self, forms: Sequence[CandidateForm]) -> Regression:
+        key = tuple(form.name for form in forms)
+        if key not in self._regressions:
+            self._regressions[key] = regress(self.points, forms)
+            if self.progress is not None:
+                self.progress("combination of forms", len(self._regressions), self.total)
+        return self._regressions[key]
+
+    @property
+    def regressions(self) -> list[Regression]:
+        return list(self._regressions.values())
+
+
+def _coordinate_search(cache: _RegressionCache, candidates: Mapping[str, Sequence[CandidateForm]]) -> None:
+    """From Arrhenius and constants, change one parameter's form at a time for the better until none is."""
+    current = [next((form for form in forms if form.name == ARRHENIUS), forms[0]) for forms in candidates.values()]
+    for _ in range(MAX_SWEEPS):
+        previous = [one.name for one in current]
+        for k, own in enumerate(candidates.values()):
+            combinations = [[*current[:k], one, *current[k + 1 :]] for one in own]
+            current = min(combinations, key=lambda chosen: _quasi_aicc(cache(chosen), 1.0))
+        if [one.name for one in current] == previous:
+            return
+
+
+def _quasi_aicc(regression: Regression, overdispersion: float) -> float:
+    k, rows = regression.parameter_count, regression.rows
+    if rows - k - 1 <= 0:
+        return np.inf
+    small_sample_correction = 2.0 * k * (k + 1) / (rows - k - 1)
+    return float(
+        regression.chi_square / overdispersion + 2.0 * k + small_sample_correction - 2.0 * np.log(regression.prior_odds)
+    )
+
+
+def squared_mahalanobis(
+    first: Regression, second: Regression, points: IsothermalEstimates, overdispersion: float
+) -> float:
+    """chi^2 between the curves of two combinations, by the covariances of the points.
+
+    It is by how much chi^2 would rise on average if one were true and the other fitted.
+    """
+    whitened: Floats = np.einsum("kij,kj->ki", points.whitening, first.fitted_theta - second.fitted_theta)
+    return float((whitened**2).sum() / overdispersion)
+
+
+def _plausible_forms(
+    name: str, combinations: Sequence[WeightedCombination], points: IsothermalEstimates, overdispersion: float
+) -> tuple[FormWeight, ...]:
+    weights: dict[str, float] = {}
+    best_regression: dict[str, Regression] = {}
+    for combination in combinations:
+        form = combination.forms[name]
+        weights[form] = weights.get(form, 0.0) + combination.weight
+        best_regression.setdefault(form, combination.regression)
+    ranked = sorted(weights, key=lambda form: -weights[form])
+    cumulative_weight = np.cumsum([0.0, *(weights[form] for form in ranked)])
+    equivalent = {
+        form: squared_mahalanobis(best_regression[form], best_regression[ranked[0]], points, overdispersion)
+        < CHI_SQUARE_95
+        for form in ranked
+    }
+    sizes = {form: _parameter_count(best_regression[form], name) for form in ranked}
+    equivalent_and_no_larger = {form: equivalent[form] and sizes[form] <= sizes[ranked[0]] for form in ranked}
+    retained = [
+        form
+        for form, mass_before in zip(ranked, cumulative_weight, strict=False)
+        if mass_before < CREDIBLE_MASS or equivalent_and_no_larger[form]
+    ]
+    return tuple(FormWeight(form, weights[form], equivalent[form]) for form in retained)
+
+
+def _parameter_count(regression: Regression, parameter: str) -> int:
+    return next(library.parameter_count for library in regression.candidate_forms if library.parameter == parameter)

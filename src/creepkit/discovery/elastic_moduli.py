@@ -1,0 +1,107 @@
+"""Young's moduli from the first frames of tests, and Wachtman's form through them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from creepkit.arrays import Floats
+from creepkit.errors import FitError
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.identify import identify
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.language import CreepLaw
+from creepkit.language.elastic import Elastic, wachtman
+from creepkit.records import History, Nuisance, Predictor
+
+FIRST_FRAMES = 15
+
+
+MODULUS_BOUNDS = (-0.7, 2.0)
+"""Bounds of a modulus, relative to what the history states."""
+
+
+_T0_BOUNDS = (100.0, 3000.0)
+"""K, bounds of T0: below, the form is a straight line in T; above, a constant over any test."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModulusEstimates:
+    """What the first frames say of the modulus.
+
+    names : of the tests. temperatures : (tests,) K; values, sd : (tests,) MPa.
+    elastic : Wachtman's form through them, with the first history's Poisson's ratio, or None for fewer than three
+        temperatures. fit : the identification that they come from; its law holds for these frames alone.
+    """
+
+    names: tuple[str, ...]
+    temperatures: Floats
+    values: Floats
+    sd: Floats
+    elastic: Elastic | None
+    fit: Identification
+
+    def __str__(self) -> str:
+        rows = zip(self.names, self.temperatures, self.values, self.sd, strict=True)
+        lines = [f"  {name}: {E / 1e3:.1f} +- {s / 1e3:.1f} GPa at {T:.1f} K" for name, T, E, s in rows]
+        return "\n".join(
+            ["modulus from the first frames", *lines, f"  E(T) = {self.elastic.E if self.elastic else '-'}"]
+        )
+
+
+def identify_moduli(
+    law: CreepLaw, histories: Sequence[History], using: Predictor, *, frames: int = FIRST_FRAMES,
+    settings: IdentificationSettings | None = None,
+) -> ModulusEstimates:  # fmt: skip
+    """Identify the modulus of each test from its first used frames; every history states a modulus to begin from."""
+    without_modulus = [h.name for h in histories if h.elastic is None]
+    if without_modulus:
+        raise FitError(f"history '{without_modulus[0]}' states no modulus to begin from; set elastic=Elastic(E=...)")
+    if frames < 3:
+        raise FitError(f"frames is {frames}; at least 3 are needed to tell a modulus from creep")
+    first_frames = [h.replace(used=h.used & (np.cumsum(h.used) <= frames)) for h in histories]
+    modulus = Nuisance("modulus", sd=np.inf, bounds=MODULUS_BOUNDS)
+    fit = identify(
+        law, first_frames, using, settings=replace(settings or IdentificationSettings(starts=4), nuisances=(modulus,))
+    )
+    estimates = {n.owner: n for n in fit.nuisances if n.kind == "modulus"}
+    stated = np.array([_stated_modulus(h) for h in histories])
+    values = stated * (1.0 + np.array([estimates[h.name].value for h in histories]))
+    sd = stated * np.array([estimates[h.name].sd for h in histories])
+    temperatures = np.array([_mean_temperature(h) for h in histories])
+    first_elastic = histories[0].elastic
+    poisson_ratio = first_elastic.at(float(temperatures[0])).nu if first_elastic is not None else 0.3
+    elastic = (
+        Elastic(wachtman(*fit_wachtman(temperatures, values, sd)), poisson_ratio)
+        if np.unique(temperatures).size > 2
+        else None
+    )
+    return ModulusEstimates(tuple(h.name for h in histories), temperatures, values, sd, elastic, fit)
+
+
+def fit_wachtman(temperatures: Floats, values: Floats, sd: Floats) -> tuple[float, float, float]:
+    """E0 MPa, b MPa/K and T0 K of Wachtman's form through moduli (tests,) in MPa, weighted by their sd."""
+    weights = 1.0 / np.maximum(sd, 1e-3 * values)
+
+    def linear(T0: float) -> tuple[Floats, Floats]:
+        columns = np.stack([np.ones_like(temperatures), -temperatures * np.exp(-T0 / temperatures)], axis=1)
+        coefficients, *_ = np.linalg.lstsq(columns * weights[:, None], values * weights, rcond=None)
+        return np.asarray(coefficients, float), np.asarray((columns @ coefficients - values) * weights, float)
+
+    start = np.log(np.clip(np.median(temperatures), *_T0_BOUNDS))
+    result = least_squares(lambda x: linear(float(np.exp(x[0])))[1], [start], bounds=np.log(_T0_BOUNDS))
+    T0 = float(np.exp(result.x[0]))
+    E0, b = linear(T0)[0]
+    return float(E0), float(b), T0
+
+
+def _mean_temperature(history: History) -> float:
+    return float(np.mean(history.temperature_program().values))
+
+
+def _stated_modulus(history: History) -> float:
+    assert history.elastic is not None
+    return float(history.elastic.at(_mean_temperature(history)).E)

@@ -1,0 +1,208 @@
+"""Candidate forms of a parameter: linear combinations of functions of temperature.
+
+A form is taken on the parameter's own scale, x(T), where it is a sum of coefficients times functions of temperature;
+a regression finds the coefficients, and the functions are named: {name: sympy term}. A parameter inside an exponential
+(Q of a linear parameter, T0) enters nonlinearly and is found by variable projection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy
+
+from creepkit import registry
+from creepkit.arrays import Floats
+from creepkit.errors import FitError, LawError, nearest
+from creepkit.language import CreepLaw, Param, TemperatureFactor, TemperatureForm, temperature
+from creepkit.laws.temperature_forms import creepkit_temperature_forms
+
+CONSTANT = "constant"
+
+
+ARRHENIUS = "arrhenius"
+
+
+ARRHENIUS_ODDS = 4.0
+"""Prior odds of 1/T over any other form of a rate coefficient: that creep is thermally activated."""
+
+
+_RANK_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateForm:
+    """A candidate form of one parameter.
+
+    terms : {coefficient: sympy function of temperature (and of what is inside exponentials)}; the first coefficient
+        is the parameter itself, at T_ref. inner : {symbol: Param} inside exponentials. offset : a function of
+        temperature that has no coefficient. form : None for a constant. odds : prior odds of the form.
+    """
+
+    name: str
+    parameter: str
+    form: TemperatureForm | None
+    terms: Mapping[str, sympy.Expr]
+    table: Mapping[str, Param]
+    nonlinear_parameters: Mapping[sympy.Symbol, Param] = field(default_factory=dict)
+    offset: sympy.Expr = sympy.S.Zero
+    prior_odds: float = 1.0
+
+    @property
+    def parameter_count(self) -> int:
+        """How many numbers the form has."""
+        return len(self.terms) + len(self.nonlinear_parameters)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Its numbers by name: coefficients, then what is inside exponentials."""
+        return (*self.terms, *(s.name for s in self.nonlinear_parameters))
+
+    @cached_property
+    def functions(self) -> list[Callable[..., Any]]:
+        """One function of (T, *inner) for each term, and one for the offset."""
+        expressions = (*self.terms.values(), self.offset)
+        return [sympy.lambdify((temperature, *self.nonlinear_parameters), term, "numpy") for term in expressions]
+
+    def basis_values(self, T: Floats, nonlinear_values: Sequence[float]) -> Floats:
+        """(temperatures, terms + 1) values of the terms, then of the offset."""
+        values = [np.broadcast_to(np.asarray(f(T, *nonlinear_values), float), T.shape) for f in self.functions]
+        return np.stack(values, axis=1)
+
+
+def evaluate_forms(forms: Sequence[CandidateForm], values: Mapping[str, float], T: Floats) -> Floats:
+    """(temperatures, parameters) of internal parameters, from the internal values {name: value} of all numbers."""
+    columns = []
+    for form in forms:
+        basis = form.basis_values(np.asarray(T, float), [values[s.name] for s in form.nonlinear_parameters])
+        columns.append(basis @ np.array([*(values[name] for name in form.terms), 1.0]))
+    return np.stack(columns, axis=1)
+
+
+def law_with_forms(law: CreepLaw, forms: Sequence[CandidateForm]) -> CreepLaw:
+    """The law with its parameters in these forms."""
+    return law.with_temperature(**{form.parameter: form.form for form in forms if form.form is not None})
+
+
+def candidate_forms(
+    law: CreepLaw, parameter: str, is_rate_coefficient: bool, T_ref: float, temperatures: Floats, forms: Sequence[str] | None = None,
+    prior: Mapping[str, float] | None = None,
+) -> list[CandidateForm]:  # fmt: skip
+    """The forms that a parameter may take, the constant first, each with its prior odds.
+
+    rate : whether the parameter is the coefficient of a rate, which Arrhenius' factor is for.
+    forms : names of those wanted; by default all that are registered. Two that span the same functions are one.
+    prior : {form: odds}; in the others' place the default: forms of equally many numbers share equal odds, and for
+        rates 1/T counts PREFERRED times.
+    """
+    param, registered = law.table[parameter], registry.default_registry().temperature_forms()
+    form_names = _checked_form_names(forms, [CONSTANT, *registered])
+    forms_found = [CandidateForm(CONSTANT, parameter, None, {parameter: sympy.S.One}, {parameter: param})]
+    for name in sorted(form_names, key=lambda n: (n != ARRHENIUS, n not in creepkit_temperature_forms(), n)):
+        temperature_form = registered[name].value(T_ref) if name != CONSTANT else None
+        suitable = (
+            None
+            if temperature_form is None
+            else candidate_form(name, law, parameter, temperature_form, is_rate_coefficient)
+        )
+        if (
+            suitable is not None
+            and suitable.parameter_count < len(temperatures)
+            and not _is_duplicate(suitable, forms_found, temperatures)
+        ):
+            forms_found.append(suitable)
+    retained = [candidate for candidate in forms_found if candidate.name in form_names]
+    if not retained:
+        raise FitError(f"none of the forms {', '.join(form_names)} suits parameter '{parameter}' of law '{law.name}'")
+    for name in prior or {}:
+        if name not in {one.name for one in retained}:
+            suggestion = nearest(name, [one.name for one in retained])
+            raise FitError(
+                f"prior odds are given for '{name}', no form that parameter '{parameter}' may take: {suggestion}"
+            )
+    return _with_prior_odds(retained, is_rate_coefficient, prior or {})
+
+
+def factor_as_form(factor: TemperatureFactor, keep_names: bool) -> TemperatureForm:
+    """A factor of rates as a form of one rate coefficient; its parameters keep their names where it stands alone."""
+
+    def build(symbol: sympy.Symbol, param: Param) -> tuple[sympy.Expr, dict[sympy.Symbol, Param]]:
+        renamed = {s: s if keep_names else sympy.Symbol(f"{s.name}_{symbol.name}", real=True) for s in factor.params}
+        return symbol * factor.expression.xreplace(renamed), {renamed[s]: p for s, p in factor.params.items()}
+
+    return TemperatureForm(factor.name, build, factor.reference, factor.T_ref)
+
+
+def candidate_form(
+    name: str, law: CreepLaw, parameter: str, temperature_form: Any, is_rate_coefficient: bool
+) -> CandidateForm | None:
+    """A form's library; None where it does not suit the parameter, as inverse() does none of log scale."""
+    param, symbol = law.table[parameter], law.symbol(parameter)
+    if isinstance(temperature_form, TemperatureFactor):
+        if not is_rate_coefficient:
+            return None
+        temperature_form = factor_as_form(temperature_form, len(law.terms) == 1 and "Q" not in law.names)
+    try:
+        expression, extra = temperature_form.build(symbol, param)
+    except LawError:
+        return None
+    if param.scale == "log":
+        expression = symbol + sympy.expand_log(sympy.log(sympy.powsimp(expression / symbol)), force=True)
+    table = {parameter: param, **{s.name: p for s, p in extra.items()}}
+    terms, offset, nonlinear = _separate_linear_terms(expression, [symbol, *extra])
+    return CandidateForm(name, parameter, temperature_form, terms, table, {s: extra[s] for s in nonlinear}, offset)
+
+
+def _separate_linear_terms(
+    expression: sympy.Expr, symbols: Sequence[sympy.Symbol]
+) -> tuple[dict[str, sympy.Expr], sympy.Expr, list[sympy.Symbol]]:
+    """What stands in a sum as a factor, what is left without, and the symbols that stand elsewhere."""
+    terms: dict[str, sympy.Expr] = {}
+    linear: list[sympy.Symbol] = []
+    for s in symbols:
+        derivative = sympy.diff(expression, s)
+        if s not in derivative.free_symbols and not derivative.free_symbols & {*linear}:
+            terms[s.name] = derivative
+            linear.append(s)
+    return terms, expression.subs(dict.fromkeys(linear, 0)), [s for s in symbols if s not in linear]
+
+
+def _is_duplicate(candidate: CandidateForm, accepted: Sequence[CandidateForm], T: Floats) -> bool:
+    """Whether another form spans the same functions, as exponential() and activated() do none but 1/T twice does."""
+    if candidate.nonlinear_parameters or candidate.offset != 0:
+        return False
+    own_basis = candidate.basis_values(T, ())
+    for other in accepted:
+        if other.nonlinear_parameters or other.offset != 0 or other.parameter_count != candidate.parameter_count:
+            continue
+        joint_basis = np.concatenate([own_basis[:, :-1], other.basis_values(T, ())[:, :-1]], axis=1)
+        singular_values = np.linalg.svd(joint_basis / np.linalg.norm(joint_basis, axis=0), compute_uv=False)
+        if singular_values[candidate.parameter_count] < _RANK_TOLERANCE * singular_values[0]:
+            return True
+    return False
+
+
+def _checked_form_names(forms: Sequence[str] | None, known: Sequence[str]) -> list[str]:
+    for name in forms or ():
+        if name not in known:
+            raise FitError(f"there is no temperature form '{name}': {nearest(name, known)}")
+    return list(forms) if forms is not None else list(known)
+
+
+def _with_prior_odds(
+    candidates: Sequence[CandidateForm], is_rate_coefficient: bool, prior: Mapping[str, float]
+) -> list[CandidateForm]:
+    sizes = [candidate.parameter_count for candidate in candidates]
+    default_odds = [ARRHENIUS_ODDS if is_rate_coefficient and one.name == ARRHENIUS else 1.0 for one in candidates]
+    odds = [
+        prior.get(one.name, o / sizes.count(one.parameter_count))
+        for one, o in zip(candidates, default_odds, strict=True)
+    ]
+    if min(odds) <= 0:
+        bad = candidates[int(np.argmin(odds))].name
+        raise FitError(f"the prior odds of '{bad}' are {min(odds):g}; they must be above zero, or leave the form out")
+    return [replace(one, prior_odds=o) for one, o in zip(candidates, odds, strict=True)]

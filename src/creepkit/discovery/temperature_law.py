@@ -1,0 +1,313 @@
+"""TemperatureLaw: a law with temperature-dependent parameters, its plausible forms, validity and JSON file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import t as student
+
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.discovery.combinations import FormWeight, RankedCombinations
+from creepkit.discovery.forms import CandidateForm, evaluate_forms, law_with_forms
+from creepkit.discovery.regression import INFINITE_FREEDOM, IsothermalEstimates
+from creepkit.errors import FitError, nearest
+from creepkit.files.writing import write_text_atomically
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.identification_document import identification_to_json as fit_to_json
+from creepkit.inverse.uncertainty.laplace_approximation import Estimate
+from creepkit.language import CreepLaw
+from creepkit.language.law_codec import law_to_json
+from creepkit.records import LawWithValues
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+if TYPE_CHECKING:
+    from creepkit.discovery.combinations import FormWeight
+
+
+FILE_KIND = "creepkit temperature law"
+
+
+FILE_VERSION = 1
+
+
+MAX_COMBINATIONS_WRITTEN = 20
+"""Combinations that are written, best first."""
+
+
+def temperature_law_to_json(temperature_law: TemperatureLaw) -> dict[str, Any]:
+    """The answer as JSON-able data."""
+    estimates = temperature_law.isothermal_estimates
+    return {
+        "kind": FILE_KIND,
+        "version": FILE_VERSION,
+        "creepkit": version("creepkit"),
+        "law": law_to_json(temperature_law.law),
+        "base": law_to_json(temperature_law.isothermal_law),
+        "T_ref": temperature_law.T_ref,
+        "range": list(temperature_law.temperature_range),
+        "judged_by": temperature_law.criterion_data,
+        "estimates": [vars(e) for e in temperature_law.estimates],
+        "sets": {name: [vars(form) for form in forms] for name, forms in temperature_law.plausible_forms.items()},
+        "odds": {name: dict(own) for name, own in temperature_law.prior_odds.items()},
+        "candidates": [
+            _candidate_to_json(candidate) for candidate in temperature_law.candidates[:MAX_COMBINATIONS_WRITTEN]
+        ],
+        "points": {
+            "temperatures": estimates.temperatures.tolist(),
+            "internal": estimates.theta.tolist(),
+            "covariance": estimates.covariance.tolist(),
+            "inflation": temperature_law.combinations.overdispersion,
+        },
+        "reference": vars(estimates.reference),
+        "fit": None if temperature_law.fit is None else fit_to_json(temperature_law.fit),
+        "notes": list(temperature_law.notes),
+    }
+
+
+def _candidate_to_json(candidate: CandidateLaw) -> dict[str, Any]:
+    return {
+        "forms": candidate.forms,
+        "internal": dict(candidate.internal_values),
+        "covariance": candidate.covariance.tolist(),
+        "excess": candidate.criterion_difference,
+        "weight": candidate.weight,
+    }
+
+
+def write_temperature_law(temperature_law: TemperatureLaw, path: Path) -> Path:
+    """Write a file that is whole or absent."""
+    return write_text_atomically(
+        json.dumps(temperature_law_to_json(temperature_law), indent=1, allow_nan=False) + "\n", path
+    )
+
+
+TAIL_PROBABILITY = 0.025
+
+
+def mixture_interval(
+    values: Floats, standard_deviations: Floats, weights: Floats, degrees_of_freedom: Sequence[float]
+) -> tuple[float, float]:
+    """The 95 % interval of a mixture of Student distributions, (candidates,) each; weights sum to 1."""
+    scales, freedom_of_each = (
+        np.maximum(standard_deviations, 1e-300),
+        np.maximum(np.asarray(degrees_of_freedom, float), 1.0),
+    )
+
+    def below(x: float) -> float:
+        return float(weights @ student.cdf((x - values) / scales, freedom_of_each))
+
+    half_widths = student.ppf(1 - TAIL_PROBABILITY / 100, freedom_of_each) * scales
+    bracket = float((values - half_widths).min()), float((values + half_widths).max())
+    low, high = (float(brentq(lambda x, p=p: below(x) - p, *bracket)) for p in (TAIL_PROBABILITY, 1 - TAIL_PROBABILITY))
+    return low, high
+
+
+NOTED_OVERDISPERSION = 1.5
+"""Inflation of covariances that is worth a word."""
+
+
+UNDETERMINED_FRACTION = 0.8
+"""Share of the bounds that an interval fills which says nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateLaw:
+    """One combination of forms with its numbers.
+
+    internal : {name: value} of all numbers, the logarithm where the scale is log; covariance in the same order.
+    excess : of the criterion over the best's; weight : share of belief. fit : the identification, once refitted.
+    """
+
+    candidate_forms: tuple[CandidateForm, ...]
+    internal_values: Mapping[str, float]
+    covariance: Floats
+    degrees_of_freedom: float
+    criterion_difference: float
+    weight: float
+    fit: Identification | None = None
+
+    @property
+    def forms(self) -> dict[str, str]:
+        """{parameter: name of its form}."""
+        return {form.parameter: form.name for form in self.candidate_forms}
+
+    def theta(self, T: Floats) -> Floats:
+        """(temperatures, parameters) of internal parameters."""
+        return evaluate_forms(self.candidate_forms, self.internal_values, T)
+
+    def standard_deviation(self, name: str) -> float:
+        """Standard deviation of one number."""
+        k = list(self.internal_values).index(name)
+        return float(np.sqrt(max(self.covariance[k, k], 0.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class TemperatureLaw:
+    """The answer of discover() and of refit().
+
+    law : an ordinary law with temperature in it, printed and exported like any other; `valued` has its numbers.
+    base : the law without. T_ref : K, where its parameters have the values stated.
+    estimates : its numbers with 95 % intervals, over all candidates that share the form they belong to.
+    range : K, the temperatures it was found from. judged_by : "points" when regression on estimates chose the forms,
+        "histories" when the tests themselves did.
+    sets : {parameter: forms that remain, best first}. candidates : combinations of forms, best first.
+    odds : {parameter: {form: prior odds}}. fit : the identification of `law` from all tests, once refitted.
+    """
+
+    law: CreepLaw
+    isothermal_law: CreepLaw
+    T_ref: float
+    estimates: tuple[Estimate, ...]
+    temperature_range: tuple[float, float]
+    criterion_data: Literal["points", "histories"]
+    plausible_forms: Mapping[str, tuple[FormWeight, ...]]
+    candidates: tuple[CandidateLaw, ...]
+    prior_odds: Mapping[str, Mapping[str, float]]
+    isothermal_estimates: IsothermalEstimates
+    combinations: RankedCombinations
+    fit: Identification | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def values(self) -> dict[str, float]:
+        """{parameter: value} of `law`, in the author's units."""
+        return {e.name: e.value for e in self.estimates}
+
+    @property
+    def forms(self) -> dict[str, str]:
+        """{parameter: name of its best form}."""
+        return self.candidates[0].forms
+
+    @property
+    def valued(self) -> LawWithValues:
+        """The law with its numbers, intervals and range of validity: what every exporter takes."""
+        return LawWithValues(self.law, self.values, tuple(export_notes(self)), ranges=self.isothermal_estimates.ranges)
+
+    def estimate(self, name: str) -> Estimate:
+        """One number of the law, such as Q, with its interval."""
+        for estimate in self.estimates:
+            if estimate.name == name:
+                return estimate
+        raise FitError(f"law '{self.law.name}' has no parameter '{name}': {nearest(name, self.law.names)}")
+
+    def parameters_at(self, T: ArrayLike) -> dict[str, Floats]:
+        """{parameter of `base`: (temperatures,) its values} at temperatures in K; FitError outside the range."""
+        temperatures = np.atleast_1d(np.asarray(T, float))
+        low, high = self.temperature_range
+        if ((temperatures < low - 1e-6) | (temperatures > high + 1e-6)).any():
+            raise FitError(f"law '{self.law.name}' holds between {low:.0f} and {high:.0f} K; it was asked beyond")
+        theta = self.candidates[0].theta(temperatures)
+        scale = [p.scale for p in self.isothermal_law.params.values()]
+        values = np.where([s == "log" for s in scale], np.exp(np.minimum(theta, 700.0)), theta)
+        return dict(zip(self.isothermal_law.names, values.T, strict=True))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the answer as JSON (to a temporary name, then renamed)."""
+        return write_temperature_law(self, Path(path))
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Parameters against temperature, with intervals and the curves of the forms that remain."""
+        from creepkit.report.temperature_law import plot_temperature_law
+
+        return plot_temperature_law(self, path)
+
+    def __str__(self) -> str:
+        from creepkit.report.temperature_law import temperature_law_text
+
+        return temperature_law_text(self)
+
+
+def temperature_law_from_combinations(
+    estimates: IsothermalEstimates, combinations: RankedCombinations, prior_odds: Mapping[str, Mapping[str, float]]
+) -> TemperatureLaw:
+    """The answer that the points alone give."""
+    degrees_of_freedom = [INFINITE_FREEDOM if combinations.overdispersion == 1.0 else max(combination.regression.rows - combination.regression.parameter_count, 1)
+               for combination in combinations.combinations]  # fmt: skip
+    candidates = tuple(
+        CandidateLaw(
+            weighted.regression.candidate_forms,
+            weighted.regression.values,
+            weighted.regression.covariance * combinations.overdispersion,
+            float(freedom_of_one),
+            weighted.criterion_difference,
+            weighted.weight,
+        )
+        for weighted, freedom_of_one in zip(combinations.combinations, degrees_of_freedom, strict=True)
+    )
+    law = law_with_forms(estimates.law, candidates[0].candidate_forms)
+    notes = []
+    if combinations.overdispersion > NOTED_OVERDISPERSION:
+        widening = np.sqrt(combinations.overdispersion)
+        notes.append(f"no form follows the points within their errors, which were taken {widening:.2g} times wider")
+    return TemperatureLaw(
+        law=law,
+        isothermal_law=estimates.law,
+        T_ref=estimates.reference.temperature,
+        estimates=averaged_estimates(law, candidates),
+        temperature_range=(float(estimates.temperatures.min()), float(estimates.temperatures.max())),
+        criterion_data="points",
+        plausible_forms=combinations.plausible_forms,
+        candidates=candidates,
+        prior_odds=prior_odds,
+        isothermal_estimates=estimates,
+        combinations=combinations,
+        notes=tuple(notes),
+    )
+
+
+def averaged_estimates(law: CreepLaw, candidates: Sequence[CandidateLaw]) -> tuple[Estimate, ...]:
+    """The best candidate's numbers; intervals over all that have the same form of the parameter concerned."""
+    best, estimates = candidates[0], {}
+    for form in best.candidate_forms:
+        same_form = [candidate for candidate in candidates if candidate.forms[form.parameter] == form.name]
+        for name in form.parameter_names:
+            estimates[name] = _estimate(name, form, same_form)
+    return tuple(estimates[name] for name in law.names)
+
+
+def _estimate(name: str, form: CandidateForm, candidates: Sequence[CandidateLaw]) -> Estimate:
+    param, value = form.table[name], candidates[0].internal_values[name]
+    weights = np.array([candidate.weight for candidate in candidates])
+    values, standard_deviations = (
+        np.array(v)
+        for v in zip(*[(one.internal_values[name], one.standard_deviation(name)) for one in candidates], strict=True)
+    )
+    low, high = mixture_interval(
+        values, standard_deviations, weights / weights.sum(), [one.degrees_of_freedom for one in candidates]
+    )
+    lower_bound, upper_bound = (param.to_internal(b) for b in param.bounds)
+    value, low, high = (float(np.clip(v, lower_bound, upper_bound)) for v in (value, low, high))
+    verdict = "determined"
+    if high - low >= UNDETERMINED_FRACTION * (upper_bound - lower_bound):
+        verdict = "not determined"
+    elif min(value - lower_bound, upper_bound - value) <= 1e-4 * (upper_bound - lower_bound):
+        verdict = "at its bound"
+    from_internal = param.from_internal
+    return Estimate(name, from_internal(value), from_internal(low), from_internal(high), param.unit, verdict)
+
+
+def export_notes(temperature_law: TemperatureLaw) -> list[str]:
+    """What must travel with an exported law."""
+    low, high = temperature_law.temperature_range
+    parameter_lines = [
+        f"{e.name} = {e.value:.8g} [{e.low:.4g}, {e.high:.4g}] {e.unit}: {e.verdict}" for e in temperature_law.estimates
+    ]
+    forms = [
+        f"{name}: {', '.join(form.name for form in form_weights)}"
+        for name, form_weights in temperature_law.plausible_forms.items()
+    ]
+    return [
+        f"valid between {low:.0f} and {high:.0f} K; 95 % intervals in brackets",
+        *parameter_lines,
+        *(f"forms of temperature that remain for {line}" for line in forms),
+    ]

@@ -1,0 +1,1 @@
+"""Design of further tests: candidates, and those that discriminate between laws."""

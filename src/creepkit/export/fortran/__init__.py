@@ -1,1 +1,0 @@
-"""Laws as Fortran: the law's own subroutine, and subroutine CREEP around it."""

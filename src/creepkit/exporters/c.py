@@ -1,0 +1,333 @@
+"""C: one file of C99 that needs math.h only, with the rate, its logarithm with derivatives, and internal variables.
+
+The printer, the numerically stable functions and the reserved words serve C++ (MFront) as well.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy
+
+from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode
+from creepkit.exporters.law_description import comment_lines, heading, printable_text
+from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
+from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
+from creepkit.records import LawWithValues
+
+_KEYWORDS = """
+auto break case char const continue default do double else enum extern float for goto if inline int long register
+restrict return short signed sizeof static struct switch typedef union unsigned void volatile while _Bool _Complex
+_Imaginary asm typeof main
+"""
+"""C99, with the words that compilers add."""
+
+
+_CPP_KEYWORDS = """
+alignas alignof and and_eq bitand bitor bool catch char8_t char16_t char32_t class co_await co_return co_yield compl
+concept const_cast consteval constexpr constinit decltype delete dynamic_cast explicit export false friend mutable
+namespace new noexcept not not_eq nullptr operator or or_eq private protected public reinterpret_cast requires
+static_assert static_cast template this thread_local throw true try typeid typename using virtual wchar_t xor xor_eq
+std min max abs eval
+"""
+"""What C++20 has beside C99, and names that code for it calls unqualified."""
+
+
+_MATH_FUNCTIONS = """
+acos asin atan atan2 cos sin tan acosh asinh atanh cosh sinh tanh exp exp2 expm1 frexp ilogb ldexp log log10 log1p log2
+logb modf scalbn scalbln cbrt fabs hypot pow sqrt erf erfc lgamma tgamma ceil floor nearbyint rint lrint llrint round
+lround llround trunc fmod remainder remquo copysign nan nextafter nexttoward fdim fmax fmin fma cabs cacos cacosh carg
+casin casinh catan catanh ccos ccosh cexp cimag clog conj cpow cproj creal csin csinh csqrt ctan ctanh gamma j0 j1 jn y0
+y1 yn drem scalb significand exp10 pow10
+"""
+"""math.h and complex.h, with what Unix adds: compilers know these as functions, included or not; also with f and l."""
+
+
+_LIBRARY_NAMES = """
+fpclassify isfinite isinf isnan isnormal signbit isgreater isgreaterequal isless islessequal islessgreater isunordered
+signgam matherr math_errhandling float_t double_t INFINITY NAN HUGE_VAL abort atexit atof atoi atol atoll bsearch calloc
+div exit free getenv labs ldiv llabs lldiv malloc qsort rand realloc srand strtod strtol system isalnum isalpha isblank
+iscntrl isdigit isgraph islower isprint ispunct isspace isupper isxdigit tolower toupper fclose fopen fprintf fputc
+fputs fread fscanf fwrite printf putc putchar puts remove rename rewind scanf snprintf sprintf sscanf vfprintf vprintf
+vscanf vsnprintf vsprintf memchr memcmp memcpy memmove memset strcat strchr strcmp strcpy strcspn strlen strncat strncmp
+strncpy strpbrk strrchr strspn strstr strftime alloca bcmp bcopy bzero dcgettext dgettext execl execlp execle execv
+execve execvp ffs fork gettext imaxabs index isascii mempcpy rindex stpcpy strdup toascii iswalnum iswalpha towlower
+towupper
+"""
+"""Macros and types of math.h, and functions of other headers that compilers know without them."""
+
+
+C_RESERVED = frozenset(f"{_KEYWORDS} {_CPP_KEYWORDS} {_LIBRARY_NAMES}".split()) | {
+    name + suffix for name in _MATH_FUNCTIONS.split() for suffix in ("", "f", "l")
+}
+
+
+STABLE_FUNCTIONS: dict[str, tuple[tuple[str, ...], str]] = {
+    "square": (("value",), "value * value"),
+    "larger": (("value", "other"), "value >= other || value != value ? value : other"),
+    "smaller": (("value", "other"), "value <= other || value != value ? value : other"),
+    "heaviside": (("value",), "value > 0.0 ? 1.0 : 0.0"),
+    "floored": (("value", "least"), "value < least ? least : value"),
+    "log_floor": (("value", "least"), "log(floored(value, least))"),
+    "log_sinh": (("value",), "floored(value, 1e-30) + log(-0.5 * expm1(-2.0 * floored(value, 1e-30)))"),
+    "near_log_cosh": (("value",), "log1p(2.0 * sinh(0.5 * value) * sinh(0.5 * value))"),
+    "far_log_cosh": (("value",), "fabs(value) + log1p(exp(-2.0 * fabs(value))) - log(2.0)"),
+    "log_cosh": (("value",), "fabs(value) < 1.0 ? near_log_cosh(value) : far_log_cosh(value)"),
+    "log_rise": (("value",), "value > log(2.0) ? log1p(-exp(-value)) : log(-expm1(-floored(value, 1e-30)))"),
+    "log_tanh": (("value",), "log_rise(2.0 * floored(value, 1e-30)) - log1p(exp(-2.0 * floored(value, 1e-30)))"),
+    "coth": (("value",), "1.0 / tanh(floored(value, 1e-30))"),
+    "exp_difference": (
+        ("value", "other"),
+        "value >= other ? -exp(value) * expm1(other - value) : exp(other) * expm1(value - other)",
+    ),
+}
+"""{name: (arguments, result)}, each after those it calls; the formulas are those of kernels.numba_functions."""
+
+
+STABLE_FUNCTION_NAMES = frozenset((*TARGET_FUNCTIONS, *STABLE_FUNCTIONS, "value", "other", "least"))
+
+
+class CPrinter(KernelPrinter):
+    """Print lowered expressions as C, which is C++ too; branches are taken lazily."""
+
+    reserved_words = ()
+
+    def _print_Pow(self, e: Any, rational: bool = False, **_: Any) -> str:
+        return re.sub(r"^power\(", "pow(", super()._print_Pow(e, rational))
+
+    def _print_And(self, e: Any) -> str:
+        return f"({' && '.join(self._print(a) for a in e.args)})"
+
+    def _print_Or(self, e: Any) -> str:
+        return f"({' || '.join(self._print(a) for a in e.args)})"
+
+    def _print_Piecewise(self, e: Any) -> str:
+        branches = [f"{self._print(condition)} ? {self._print(branch)} : " for branch, condition in e.args[:-1]]
+        return f"({''.join(branches)}{self._print(e.args[-1].expr)})"
+
+
+_PRINTER = CPrinter({"standard": "python3"})
+
+
+def c_expression(expression: sympy.Basic) -> str:
+    """An expression as C."""
+    return str(_PRINTER.doprint(expression))
+
+
+def c_assignments(definitions: Iterable[tuple[sympy.Symbol, sympy.Expr]], type_name: str = "const double") -> list[str]:
+    """Steps as definitions."""
+    return [f"{type_name} {symbol} = {c_expression(expression)};" for symbol, expression in definitions]
+
+
+def stable_functions_in(texts: Sequence[str]) -> list[str]:
+    """The names of the helpers that texts call, and of those that they call in turn, in order."""
+    required = _called_names(texts)
+    for name in reversed([*STABLE_FUNCTIONS]):
+        if name in required:
+            required |= _called_names([STABLE_FUNCTIONS[name][1]])
+    return [name for name in STABLE_FUNCTIONS if name in required]
+
+
+def c_function_definition(name: str) -> str:
+    """A helper as a function of this file."""
+    arguments, result = STABLE_FUNCTIONS[name]
+    return f"static double {name}({', '.join(f'double {a}' for a in arguments)}) {{ return {result}; }}"
+
+
+def cpp_lambda_definition(name: str) -> str:
+    """A helper as a C++ lambda of MFront's `real`."""
+    arguments, result = STABLE_FUNCTIONS[name]
+    return f"const auto {name} = [&](const real {', const real '.join(arguments)}) -> real {{ return {result}; }};"
+
+
+def c_block_comment(lines: Iterable[str]) -> list[str]:
+    """Lines, each made ` * ...`, between comment marks; whatever could end a comment is taken apart."""
+    return ["/*", *(comment_safe(line) for line in lines), " */"]
+
+
+def comment_safe(text: str) -> str:
+    """Text in which no comment ends or starts, nor a trigraph."""
+    return text.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
+
+
+def _called_names(texts: Iterable[str]) -> set[str]:
+    return {name for text in texts for name in re.findall(r"(\w+)\(", text)}
+
+
+_LINE_LENGTH = 120
+
+
+@dataclass(frozen=True)
+class CExporter:
+    """A C file: NAME_rate, NAME_log_rate with slopes and, for laws with internal variables, NAME_state_rates."""
+
+    name: str = "c"
+    title: str = "C99 file with the rate and its derivatives"
+    suffix: str = ".c"
+
+    def text(self, source: LawWithValues) -> str:
+        """Return the file's text; stress and time are converted on entry, rates on exit."""
+        return _CFile(source).text()
+
+
+class _CFile:
+    """One law as C."""
+
+    def __init__(self, source: LawWithValues) -> None:
+        identifiers = Identifiers(C_RESERVED | STABLE_FUNCTION_NAMES | {"rates", "slopes"})
+        self.prefix = identifiers.unique(source.name or source.law.name)
+        identifiers.unique_names(
+            f"{self.prefix}_{ending}" for ending in ("rate", "log_rate", "state_rates", "initial", "limit")
+        )
+        self.code = LawCode(source, identifiers)
+        self.source, self.law, self.units = self.code.source, self.code.law, source.units
+        used = [k for k, s in enumerate(POINT_VARIABLES) if s == stress or self.law.uses(s)]
+        self.input_indices = [*used, *(len(POINT_VARIABLES) + k for k in range(len(self.law.states)))]
+        inputs = (*self.code.point, *self.code.states)
+        self.arguments = [inputs[k] for k in self.input_indices]
+        factors = dict.fromkeys((stress, principal_stress, mean_stress), self.units.megapascals)
+        factors[time] = self.units.seconds
+        self.unit_factors = [factors.get(s, 1.0) for s in (*POINT_VARIABLES, *self.law.states)]
+        self.rate, self.update = self.code.function("rate").with_outputs([0]), self.code.function("update")
+
+    def text(self) -> str:
+        """The whole file."""
+        functions = [
+            self._rate_function(),
+            self._log_rate_function(),
+            *([self._state_rates_function()] if self.law.states else []),
+        ]
+        helpers = [
+            c_function_definition(name) for name in stable_functions_in([line for body in functions for line in body])
+        ]
+        blocks = [
+            self._header(),
+            ["#include <math.h>"],
+            ["/* The parameters, for stress as a ratio to 1 MPa and time to 1 s. */", *self._parameters()],
+            *([self._state_constants()] if self.law.states else []),
+            *([helpers] if helpers else []),
+            *functions,
+        ]
+        return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+
+    # ---- what is told ----------------------------------------------------------------------------------------------
+
+    def _header(self) -> list[str]:
+        mentions_floors = any(
+            "log_floor" in line or "floored" in line for line in (*self._rate_function(), *self._log_rate_function())
+        )
+        header_lines = [
+            *heading(self.source, mentions_floors=mentions_floors),
+            *self.code.renaming_notes(),
+            "A result beyond 1.8e308 is INFINITY.",
+        ]
+        declared = [
+            "",
+            "Declarations for the code that calls this file (exported by creepkit; link with -lm):",
+            f"  {self._declaration('double', 'rate')};",
+            f"  {self._declaration('double', 'log_rate', self._derivative_argument())};",
+            *([f"  {self._declaration('void', 'state_rates', *self._state_arguments())};"] if self.law.states else []),
+            f"Slopes are derivatives to {', '.join(map(str, self.arguments))}, in this order.",
+        ]
+        return c_block_comment([*comment_lines(header_lines, " *", _LINE_LENGTH), *comment_lines(declared, " *")])
+
+    def _parameters(self) -> list[str]:
+        lines = []
+        for (symbol, value), param in zip(self.code.parameters.items(), self.law.params.values(), strict=True):
+            unit = "" if param.unit == "1" else f"{param.unit}, "
+            lines.append(f"static const double {symbol} = {value!r}; /* {comment_safe(unit + param.meaning)} */")
+        return lines
+
+    def _state_constants(self) -> list[str]:
+        """Where internal variables start, and where the material has failed."""
+        states, count = self.law.states.values(), len(self.law.states)
+        limits = ["INFINITY" if state.limit is None else repr(state.limit) for state in states]
+        names = ", ".join(map(str, self.code.states))
+        return [
+            f"/* Start of {names}, and the value at which the material has failed. */",
+            f"const double {self.prefix}_initial[{count}] = {{{', '.join(repr(state.initial) for state in states)}}};",
+            f"const double {self.prefix}_limit[{count}] = {{{', '.join(limits)}}};",
+        ]
+
+    # ---- the functions ---------------------------------------------------------------------------------------------
+
+    def _rate_function(self) -> list[str]:
+        labels = [comment_safe(printable_text(label)) for label in self.law.terms]
+        comment = f"/* Rate of equivalent creep strain, 1/{self.units.time}: {' + '.join(labels)}. */"
+        body = [f"return {self._time_factor()}{_factor_operand(self.rate.outputs[0], self.units.seconds)};"]
+        return self._function_definition(comment, self._declaration("double", "rate"), self.rate, body)
+
+    def _log_rate_function(self) -> list[str]:
+        function = self.update.with_outputs([0, *(self._output_index(0, k) for k in self.input_indices)])
+        comment = f"/* ln of the rate in 1/{self.units.time}, and its derivatives. */"
+        shift = "" if self.units.seconds == 1 else f"log({self.units.seconds!r}) + "
+        body = [
+            *self._derivative_lines("slopes", function.outputs[1:], 1.0),
+            f"return {shift}{c_expression(function.outputs[0])};",
+        ]
+        return self._function_definition(
+            comment, self._declaration("double", "log_rate", self._derivative_argument()), function, body
+        )
+
+    def _state_rates_function(self) -> list[str]:
+        count, width = len(self.law.states), len(self.input_indices)
+        rows = [self._output_index(row, k) for row in range(1, count + 1) for k in self.input_indices]
+        function = self.update.with_outputs([*range(1, count + 1), *rows])
+        body = []
+        for k in range(count):
+            derivatives = function.outputs[count + k * width : count + (k + 1) * width]
+            body += [f"rates[{k}] = {self._time_factor()}{_factor_operand(function.outputs[k], self.units.seconds)};"]
+            body += self._derivative_lines(f"slopes[{k}]", derivatives, self.units.seconds)
+        comment = f"/* Rates of internal variables, 1/{self.units.time}, and their derivatives, a row each. */"
+        return self._function_definition(
+            comment, self._declaration("void", "state_rates", *self._state_arguments()), function, body
+        )
+
+    def _function_definition(
+        self, comment: str, declaration: str, function: CodeFunction, results: Sequence[str]
+    ) -> list[str]:
+        logs = [f"const double {ln} = log({plain});" for ln, plain in self.code.logarithms_used(function).items()]
+        unused = [f"(void){s};" for s in self.arguments if s not in function.inputs]
+        body = [*unused, *self._unit_conversions(function), *logs, *c_assignments(function.assignments), *results]
+        return [comment, declaration, "{", *(f"    {line}" for line in body), "}"]
+
+    def _unit_conversions(self, function: CodeFunction) -> list[str]:
+        """Stress and time on entry, in the law's own units."""
+        pairs = [(s, self.unit_factors[k]) for k, s in zip(self.input_indices, self.arguments, strict=True)]
+        return [f"{s} *= {scale!r};" for s, scale in pairs if scale != 1 and s in function.inputs]
+
+    def _derivative_lines(self, target: str, derivatives: Sequence[sympy.Expr], factor: float) -> list[str]:
+        """One row of derivatives, to the arguments in the units in which they come."""
+        factors = [self.unit_factors[k] * factor for k in self.input_indices]
+        texts = [
+            f"{'' if f == 1 or e == 0 else f'{f!r} * '}{_factor_operand(e, f)}"
+            for f, e in zip(factors, derivatives, strict=True)
+        ]
+        return [f"{target}[{k}] = {text};" for k, text in enumerate(texts)]
+
+    def _output_index(self, row: int, column: int) -> int:
+        """Where a derivative stands in the update entry."""
+        rows = 1 + len(self.law.states)
+        return rows + row * (len(POINT_VARIABLES) + rows - 1) + column
+
+    def _declaration(self, kind: str, name: str, *outputs: str) -> str:
+        inputs = [f"double {s}" for s in self.arguments]
+        return f"{kind} {self.prefix}_{name}({', '.join((*inputs, *outputs))})"
+
+    def _derivative_argument(self) -> str:
+        return f"double slopes[{len(self.input_indices)}]"
+
+    def _state_arguments(self) -> tuple[str, str]:
+        count = len(self.law.states)
+        return f"double rates[{count}]", f"double slopes[{count}][{len(self.input_indices)}]"
+
+    def _time_factor(self) -> str:
+        return "" if self.units.seconds == 1 else f"{self.units.seconds!r} * "
+
+
+def _factor_operand(expression: sympy.Expr, factor: float) -> str:
+    """An expression after a factor, in brackets where that is needed."""
+    return f"({c_expression(expression)})" if factor != 1 and expression.is_Add else c_expression(expression)

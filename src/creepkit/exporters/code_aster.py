@@ -1,0 +1,119 @@
+"""code_aster: DEFI_MATERIAU with LEMAITRE, whose limit UN_SUR_M = 0 is Norton's law.
+
+R5.03.08: rate = (UN_SUR_K s / e^UN_SUR_M)^N, so that A s^n e^m has N = n, UN_SUR_K = A^(1/n), UN_SUR_M = -m/n. With
+an activation energy, LEMAITRE_FO takes UN_SUR_K as a formula of TEMP.
+"""
+
+from __future__ import annotations
+
+import keyword
+from dataclasses import dataclass
+
+import sympy
+
+from creepkit.errors import ExportError
+from creepkit.exporters.creep_forms import (
+    CreepForm,
+    card_heading,
+    creep_forms_of,
+    elastic_constants,
+    exp_in_range,
+    format_number,
+)
+from creepkit.exporters.law_code import Identifiers
+from creepkit.language.symbols import temperature
+from creepkit.records import LawWithValues
+
+_ALTERNATIVE = "export it as 'mfront', which code_aster reads with RELATION='MFRONT'"
+
+
+_FORMULA = "LEMAITRE: rate = (UN_SUR_K s / e^UN_SUR_M)^N, of equivalent stress s and creep strain e."
+
+
+_RESERVED = (*keyword.kwlist, "_F", "DEFI_CONSTANTE", "DEFI_MATERIAU", "FORMULE")
+
+
+@dataclass(frozen=True)
+class CodeAsterMaterial:
+    """A material for COMPORTEMENT=_F(RELATION='LEMAITRE')."""
+
+    name: str = "code_aster"
+    title: str = "code_aster DEFI_MATERIAU with LEMAITRE (and Norton's law as its limit)"
+    suffix: str = ".comm"
+
+    def text(self, source: LawWithValues) -> str:
+        """Return DEFI_MATERIAU, with ELAS where moduli are given, and the formulas that it needs."""
+        form = _lemaitre_form(source, creep_forms_of(source, "code_aster's LEMAITRE", _ALTERNATIVE))
+        names = Identifiers(_RESERVED, max_length=6)
+        requested = source.name or source.law.name
+        label = names.unique(requested)
+        creep_formulas, creep_keyword = _creep_keyword(source, form, label)
+        elastic_formulas, elastic_keywords = _elastic_keywords(source, label)
+        comments = [_FORMULA, "Use it with COMPORTEMENT=_F(RELATION='LEMAITRE')."]
+        comments += (
+            ["TEMP, a variable de commande of the material field, must be in K."]
+            if creep_formulas or elastic_formulas
+            else []
+        )
+        call = [f"{label} = DEFI_MATERIAU(", *(f"    {line}," for line in (*elastic_keywords, creep_keyword)), ")"]
+        return (
+            "\n".join(
+                [
+                    *card_heading(source, "#", [*comments, *names.renaming_notes([requested])]),
+                    *elastic_formulas,
+                    *creep_formulas,
+                    *call,
+                ]
+            )
+            + "\n"
+        )
+
+
+def _lemaitre_form(source: LawWithValues, forms: tuple[CreepForm, ...]) -> CreepForm:
+    """The one form that LEMAITRE has."""
+    form = forms[0]
+    if len(forms) > 1:
+        reason = f"it is a sum ({' + '.join(f.label for f in forms)})"
+    elif form.stress_function != "power":
+        reason = f"{form.label} is a {form.stress_function} of stress"
+    elif form.time_exponent:
+        reason = f"{form.label} depends on time"
+    elif not (form.n > 0.0 and form.strain_exponent <= 0.0):
+        reason = f"it asks for a positive stress exponent and hardening (n = {form.n:g}, m = {form.strain_exponent:g})"
+    else:
+        return form
+    raise ExportError(f"law '{source.law.name}' is not code_aster's LEMAITRE: {reason}; {_ALTERNATIVE}")
+
+
+def _creep_keyword(source: LawWithValues, form: CreepForm, label: str) -> tuple[list[str], str]:
+    """Formulas, and the keyword that reads them."""
+    hardening = abs(form.strain_exponent) / form.n
+    inverse_K = exp_in_range(form.log_coefficient / form.n, "UN_SUR_K", source)
+    if not form.Q:
+        constants = (
+            f"N={format_number(form.n)}, UN_SUR_K={format_number(inverse_K)}, UN_SUR_M={format_number(hardening)}"
+        )
+        return [], f"LEMAITRE=_F({constants})"
+    slope = form.activation_temperature / form.n
+    formulas = [
+        f"{label}_N = DEFI_CONSTANTE(VALE={format_number(form.n)})",
+        f"{label}_K = FORMULE(NOM_PARA='TEMP', VALE='{format_number(inverse_K)} * exp({format_number(-slope)} / TEMP)')",
+        f"{label}_M = DEFI_CONSTANTE(VALE={format_number(hardening)})",
+    ]
+    return formulas, f"LEMAITRE_FO=_F(N={label}_N, UN_SUR_K={label}_K, UN_SUR_M={label}_M)"
+
+
+def _elastic_keywords(source: LawWithValues, label: str) -> tuple[list[str], list[str]]:
+    """Formulas of moduli that depend on temperature, and the keyword for the moduli."""
+    elastic = source.elastic
+    if elastic is None:
+        return [], []
+    varies = [isinstance(v, sympy.Expr) and bool(v.free_symbols) for v in (elastic.E, elastic.nu)]
+    if not any(varies):
+        ((constants),) = elastic_constants(source)
+        return [], [f"ELAS=_F(E={format_number(constants.E)}, NU={format_number(constants.nu)})"]
+    scaled = (sympy.sympify(elastic.E) / source.units.megapascals, sympy.sympify(elastic.nu))
+    texts = [sympy.sstr(e.xreplace({temperature: sympy.Symbol("TEMP")}), full_prec=False) for e in scaled]
+    named_texts = zip((f"{label}_E", f"{label}_P"), texts, strict=True)
+    formulas = [f"{name} = FORMULE(NOM_PARA='TEMP', VALE='{text}')" for name, text in named_texts]
+    return formulas, [f"ELAS_FO=_F(E={label}_E, NU={label}_P)"]

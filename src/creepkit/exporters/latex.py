@@ -1,0 +1,211 @@
+"""LaTeX and Markdown: the equation, a table of values with units, and Arrhenius' law in both of its forms.
+
+LaTeX needs amsmath. Markdown holds the equation between $$, as GitHub and Jupyter show it, with notes and references.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mpmath
+import sympy
+
+from creepkit.exporters import law_description
+from creepkit.exporters.law_description import comment_lines
+from creepkit.exporters.unit_conversion import ConvertedValues, convert_values
+from creepkit.language.law import CreepLaw
+from creepkit.language.printing import ArrheniusExponent, LatexLawPrinter, arrhenius_exponent, latex_equations
+from creepkit.language.symbols import GAS_CONSTANT
+from creepkit.records import LawWithValues
+
+_LATEX_ESCAPES = {
+    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "%": r"\%", "_": r"\_",
+    "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LatexExporter:
+    """Equation and table of values for a paper."""
+
+    name: str = "latex"
+    title: str = "LaTeX equation and table of values"
+    suffix: str = ".tex"
+
+    def text(self, source: LawWithValues) -> str:
+        """Return an align environment and a tabular; notes and references become comments."""
+        law, converted_values, printer = source.law, convert_values(source), LatexLawPrinter(source.law)
+        comments_text = (source.title, *source.notes, *(f"Source: {reference}" for reference in law.references))
+        lines = comment_lines(comments_text, "%")
+        lines += _align_environment(
+            [row for left, right in latex_equations(law, printer) for row in _equation_rows(left, right)]
+        )
+        lines += [rf"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
+        lines += _value_table(source, converted_values, printer)
+        lines += (
+            [] if source.units.is_native else [f"In this table, {latex_escaped(converted_values.reference_sentence)}."]
+        )
+        lines += _arrhenius_equations(law, converted_values, printer)
+        return "\n".join(lines) + "\n"
+
+
+def _equation_rows(left: str, summands: Sequence[str]) -> list[str]:
+    """One equation, a summand a row."""
+    first, *rest = summands
+    return [f"{left} &= {first}", *(rf"&\quad + {summand}" for summand in rest)]
+
+
+def _align_environment(rows: Sequence[str]) -> list[str]:
+    return [r"\begin{align*}", " \\\\\n".join(f"  {row}" for row in rows), r"\end{align*}"]
+
+
+def _value_table(source: LawWithValues, converted_values: ConvertedValues, printer: LatexLawPrinter) -> list[str]:
+    rows = [
+        (f"{printer.doprint(row.symbol)}{'(0)' if row.is_initial else ''}", row.meaning, row.value, row.unit)
+        for row in law_description.parameter_rows(source, converted_values)
+    ]
+    return [
+        r"\begin{tabular}{llll}",
+        r"  \hline",
+        r"  Symbol & Meaning & Value & Unit \\",
+        r"  \hline",
+        *(
+            rf"  ${name}$ & {latex_escaped(meaning)} & ${latex_number(value)}$ & {latex_unit(u)} \\"
+            for name, meaning, value, u in rows
+        ),
+        r"  \hline",
+        r"\end{tabular}",
+    ]
+
+
+def latex_escaped(text: str) -> str:
+    """Text with LaTeX's special characters made plain."""
+    return "".join(_LATEX_ESCAPES.get(c, c) for c in text)
+
+
+def latex_unit(text: str) -> str:
+    """A unit for the table, where there is one."""
+    return "" if not text else f"${_upright_unit(text)}$"
+
+
+def latex_number(value: float | mpmath.mpf, digits: int = 6) -> str:
+    r"""A number of any size as 4.2 \times 10^{5}."""
+    mantissa, _, exponent = mpmath.nstr(mpmath.mpf(value), digits, strip_zeros=True).partition("e")
+    mantissa = mantissa.removesuffix(".0")
+    return rf"{mantissa} \times 10^{{{int(exponent)}}}" if exponent else mantissa
+
+
+def _upright_unit(text: str) -> str:
+    numerator, _, denominator = text.partition("/")
+    if numerator == "1" and re.fullmatch(r"\w+", denominator):
+        return rf"\mathrm{{{latex_escaped(denominator)}}}^{{-1}}"
+    return rf"\mathrm{{{latex_escaped(text)}}}".replace(" ", r"\,")
+
+
+# ---- Arrhenius' law without a reference temperature ----------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _ArrheniusTerm:
+    """A term as coefficient x Arrhenius factors x rest."""
+
+    coefficient: sympy.Symbol
+    factors: tuple[ArrheniusExponent, ...]
+    rest: sympy.Expr
+
+
+def _arrhenius_term(law: CreepLaw, term: sympy.Expr) -> _ArrheniusTerm | None:
+    """Take a term apart; None when it has no Arrhenius factor or not exactly one rate coefficient."""
+    factors = sympy.Mul.make_args(term)
+    coefficients = [f for f in factors if f in law.params and law.params[f].scale == "log"]
+    exponents = [a for f in factors if isinstance(f, sympy.exp) for a in sympy.Add.make_args(f.args[0])]
+    activations = {exponent: arrhenius_exponent(exponent) for exponent in exponents}
+    arrhenius_factors = tuple(activation for activation in activations.values() if activation)
+    if len(coefficients) != 1 or not arrhenius_factors:
+        return None
+    others = [f for f in factors if f not in coefficients and not isinstance(f, sympy.exp)]
+    remaining = [exponent for exponent, activation in activations.items() if not activation]
+    return _ArrheniusTerm(coefficients[0], arrhenius_factors, sympy.Mul(*others, sympy.exp(sympy.Add(*remaining))))
+
+
+def _arrhenius_equations(law: CreepLaw, converted_values: ConvertedValues, printer: LatexLawPrinter) -> list[str]:
+    """The law with A_inf exp(-Q/(R T)) in place of A exp[-(Q/R)(1/T - 1/T_ref)], and the value of every A_inf."""
+    parts = {term: _arrhenius_term(law, term) for term in law.terms.values()}
+    if not any(parts.values()):
+        return []
+    right = [_term_without_reference(part, printer) if part else printer.doprint(term) for term, part in parts.items()]
+    rows = _equation_rows(r"\dot{\varepsilon}_{cr}", right)
+    rows += [_coefficient_at_infinity(law, part, converted_values, printer) for part in parts.values() if part]
+    return [f"% The same without a reference temperature, R = {GAS_CONSTANT} J/(mol K):", *_align_environment(rows)]
+
+
+def _term_without_reference(part: _ArrheniusTerm, printer: LatexLawPrinter) -> str:
+    """A_inf times the rest times exp(-Q/(R T))."""
+    rest = "" if part.rest == 1 else printer.doprint(part.rest) + " "
+    factors = " ".join(rf"\exp\!\left[-\frac{{{printer.doprint(f.Q)}}}{{R T}}\right]" for f in part.factors)
+    return f"{_infinity_symbol(printer.doprint(part.coefficient))} {rest}{factors}"
+
+
+def _coefficient_at_infinity(
+    law: CreepLaw, part: _ArrheniusTerm, converted_values: ConvertedValues, printer: LatexLawPrinter
+) -> str:
+    """A_inf = A exp[Q/(R T_ref)] and its number, which may lie far outside double range."""
+    name = printer.doprint(part.coefficient)
+    fractions = [rf"\frac{{{printer.doprint(f.Q)}}}{{R \cdot {f.T_ref:g}\,\mathrm{{K}}}}" for f in part.factors]
+    coefficient = mpmath.mpf(converted_values.values[part.coefficient.name])
+    for factor in part.factors:
+        energy = factor.Q.xreplace({s: sympy.Float(converted_values.values[s.name]) for s in law.params})
+        coefficient *= mpmath.exp(mpmath.mpf(float(energy)) / (GAS_CONSTANT * factor.T_ref))
+    value_text = f"{latex_number(coefficient)} \\; {_upright_unit(converted_values.units[part.coefficient.name])}"
+    return rf"{_infinity_symbol(name)} &= {name} \exp\!\left[{' + '.join(fractions)}\right] = {value_text}"
+
+
+def _infinity_symbol(name: str) -> str:
+    return rf"{name[:-1]},\infty}}" if re.search(r"_\{[^{}]*\}$", name) else rf"{name}_{{\infty}}"
+
+
+@dataclass(frozen=True)
+class MarkdownExporter:
+    """A section of a report."""
+
+    name: str = "markdown"
+    title: str = "Markdown with the equation, a table of values, notes and references"
+    suffix: str = ".md"
+
+    def text(self, source: LawWithValues) -> str:
+        """Return the section, under a heading of the first level."""
+        law, converted_values, printer = source.law, convert_values(source), LatexLawPrinter(source.law)
+        lines = [f"# {markdown_escaped(source.title)}", "", "$$", r"\begin{aligned}"]
+        lines.append(" \\\\\n".join(_aligned_equation(*pair) for pair in latex_equations(law, printer)))
+        lines += [r"\end{aligned}", "$$", "", "| Symbol | Meaning | Value | Unit |", "| --- | --- | --- | --- |"]
+        lines += [_markdown_row(row, printer) for row in law_description.parameter_rows(source, converted_values)]
+        lines += ["", *(markdown_escaped(sentence) for sentence in law_description.remarks(source, converted_values))]
+        lines += [f"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
+        lines += _markdown_section("Notes", law_description.note_lines(source)) + _markdown_section(
+            "References", law.references
+        )
+        return "\n".join(lines) + "\n"
+
+
+def markdown_escaped(text: str) -> str:
+    """Text with Markdown's signs made plain."""
+    return re.sub(r"([\\`*_\[\]<>#|$~])", r"\\\1", " ".join(text.split()))
+
+
+def _aligned_equation(left: str, summands: Sequence[str]) -> str:
+    """One equation, a summand a row."""
+    first, *rest = summands
+    return " \\\\\n".join([f"{left} &= {first}", *(rf"&\quad + {summand}" for summand in rest)])
+
+
+def _markdown_row(row: law_description.ParameterRow, printer: LatexLawPrinter) -> str:
+    symbol = f"{printer.doprint(row.symbol)}{'(0)' if row.is_initial else ''}"
+    return (
+        f"| ${symbol}$ | {markdown_escaped(row.meaning)} | ${latex_number(row.value)}$ | {markdown_escaped(row.unit)} |"
+    )
+
+
+def _markdown_section(title: str, items: Sequence[str]) -> list[str]:
+    return ["", f"## {title}", "", *(f"- {markdown_escaped(item)}" for item in items)] if items else []

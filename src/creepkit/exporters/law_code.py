@@ -1,0 +1,187 @@
+"""A law as code: assignments and outputs in identifiers of the target language, ready for a printer of that language.
+
+Whatever the target's syntax is, the formulas are those of the compiled kernels: terms in log form, nothing that
+overflows, exact derivatives. The parameters keep the author's values. Names that the target cannot keep are renamed,
+and the exported text says so.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import sympy
+
+from creepkit.errors import ExportError, LawError
+from creepkit.kernels.log_form import leading_exponents
+from creepkit.kernels.symbolic_kernel import KernelFunction, SymbolicKernel, symbolic_kernel
+from creepkit.language.symbols import POINT_VARIABLES
+from creepkit.records import LawWithValues
+
+
+class Identifiers:
+    """Hands out identifiers, each once.
+
+    reserved : words of the language and names that the text uses itself. ignore_case : whether A and a are the same
+    name (Fortran). longest : characters allowed.
+    """
+
+    def __init__(self, reserved: Collection[str], *, ignore_case: bool = False, max_length: int = 63) -> None:
+        self._normalise = str.lower if ignore_case else str
+        self._taken = {self._normalise(word) for word in reserved}
+        self._max_length = max_length
+        self.renamings: dict[str, str] = {}
+
+    def unique(self, requested: str) -> str:
+        """The identifier for `wanted`: itself where the language allows it and it is free."""
+        ascii_name = unicodedata.normalize("NFKD", requested).encode("ascii", "ignore").decode()
+        stem = (
+            ascii_name
+            if re.fullmatch(r"[A-Za-z]\w*", ascii_name)
+            else re.sub(r"\W+", "_", ascii_name).strip("_") or "unnamed"
+        )
+        stem = (stem if stem[0].isalpha() else f"x_{stem}")[: self._max_length]
+        candidate, count = stem, 1
+        while self._normalise(candidate) in self._taken:
+            count += 1
+            candidate = f"{stem[: self._max_length - 1 - len(str(count))]}_{count}"
+        self._taken.add(self._normalise(candidate))
+        if candidate != requested:
+            self.renamings[requested] = candidate
+        return candidate
+
+    def unique_names(self, requested: Iterable[str]) -> list[str]:
+        """Identifiers for several names, in order."""
+        return [self.unique(name) for name in requested]
+
+    def renaming_notes(self, original_names: Collection[str]) -> list[str]:
+        """One line for each of the author's names `of` that had to change."""
+        return [f"'{old}' is called {new} here" for old, new in self.renamings.items() if old in original_names]
+
+
+Assignments = tuple[tuple[sympy.Symbol, sympy.Expr], ...]
+
+
+_kernel_entries = lru_cache(maxsize=128)(symbolic_kernel)
+
+
+@dataclass(frozen=True)
+class CodeFunction:
+    """One function to be printed, in names of the target.
+
+    read : the variables of the point and states that it reads. steps : named subexpressions, each after those it needs.
+    outputs : expressions, in the order of creepkit.kernels.interface.
+    """
+
+    inputs: tuple[sympy.Symbol, ...]
+    assignments: Assignments
+    outputs: tuple[sympy.Expr, ...]
+
+    def with_outputs(self, indices: Sequence[int]) -> CodeFunction:
+        """The same for some of its outputs, with the steps that those need."""
+        outputs = tuple(self.outputs[k] for k in indices)
+        used = set().union(*(e.free_symbols for e in outputs))
+        assignments = []
+        for symbol, expression in reversed(self.assignments):
+            if symbol in used:
+                assignments.append((symbol, expression))
+                used |= expression.free_symbols
+        return CodeFunction(tuple(s for s in self.inputs if s in used), tuple(reversed(assignments)), outputs)
+
+
+class LawCode:
+    """A law with its values, reduced of what is off, as functions in names of a target's language.
+
+    source : what is exported, reduced. point, states : symbols of the six variables of the point and of the states.
+    parameters : {symbol: the author's value}; logarithms : {symbol: the parameter it is the logarithm of}.
+    """
+
+    def __init__(
+        self, source: LawWithValues, identifiers: Identifiers, target_names: Mapping[str, str] | None = None
+    ) -> None:
+        """called : {name of a variable of the point or of a state: what the target's code calls it}."""
+        self.source = source.without_inactive_terms()
+        self.law, self.identifiers = self.source.law, identifiers
+        try:
+            self._lowered: SymbolicKernel = _kernel_entries(self.law)
+        except LawError as error:
+            raise ExportError(f"cannot be written as a program: {error}") from None
+        self._symbols: dict[sympy.Symbol, sympy.Symbol] = {}
+        inputs, size = self._lowered.rate.inputs, len(POINT_VARIABLES) + len(self.law.states)
+        requested = [(target_names or {}).get(s.name, s.name) for s in (*POINT_VARIABLES, *self.law.states)]
+        input_symbols = [
+            self._new_symbol(symbol, name_requested) for symbol, name_requested in zip(inputs, requested, strict=False)
+        ]
+        self.point, self.states = (
+            tuple(input_symbols[: len(POINT_VARIABLES)]),
+            tuple(input_symbols[len(POINT_VARIABLES) :]),
+        )
+        self.parameters: dict[sympy.Symbol, float] = {}
+        self.logarithms: dict[sympy.Symbol, sympy.Symbol] = {}
+        for theta, (name, param) in zip(inputs[size:], self.law.table.items(), strict=True):
+            symbol = sympy.Symbol(identifiers.unique(name), real=True)
+            self.parameters[symbol] = self.source.values[name]
+            if param.scale == "log":
+                self.logarithms[self._new_symbol(theta, f"ln_{name}")] = symbol
+            else:
+                self._symbols[theta] = symbol
+        self._parameter_of_exp = {sympy.exp(ln): symbol for ln, symbol in self.logarithms.items()}
+
+    def function(self, entry_name: str) -> CodeFunction:
+        """Return an entry of the kernel: rate, log_rate or update."""
+        entry: KernelFunction = getattr(self._lowered, entry_name)
+        return self._in_target_names((*entry.constants, *entry.steps), entry.outputs)
+
+    def leading_time_exponent(self) -> float:
+        """The exponent beta of time in strain ~ t^beta as t -> 0+ from a virgin state; 1 where nothing is singular.
+
+        Taken at 100 MPa and 1000 K where it varies with the point, as integrators do.
+        """
+        point_values = dict(zip(POINT_VARIABLES, (100.0, 0.0, 0.0, 1000.0, 100.0, 100.0 / 3.0), strict=True))
+        point_values |= {s: state.initial for s, state in self.law.states.items()}
+        values = {s: self.source.values[s.name] for s in self.law.params}
+        logs = {ln: sympy.log(values[s]) for s, ln in self._lowered.form.logs.items()}
+        exponents_found = []
+        for time, strain in leading_exponents(self._lowered.form):
+            time_exponent, strain_exponent = (
+                float(e.subs(logs).subs(values).subs(point_values)) for e in (time, strain)
+            )
+            exponents_found.append((1.0 + time_exponent) / (1.0 - strain_exponent))
+        return min(exponents_found)
+
+    def _new_symbol(self, symbol: sympy.Symbol, requested: str) -> sympy.Symbol:
+        self._symbols[symbol] = sympy.Symbol(self.identifiers.unique(requested), real=True)
+        return self._symbols[symbol]
+
+    def _in_target_names(
+        self, assignments: Sequence[tuple[sympy.Symbol, sympy.Expr]], outputs: Sequence[sympy.Expr]
+    ) -> CodeFunction:
+        for symbol, expression in assignments:
+            if symbol not in self._symbols:
+                parameter = self._parameter_of_exp.get(expression.xreplace(self._symbols))
+                if parameter is None:
+                    self._new_symbol(symbol, symbol.name)
+                else:
+                    self._symbols[symbol] = parameter  # B = exp(ln_B) is the author's B, free of a logarithm's rounding
+        definitions = {
+            self._symbols[s]: e.xreplace(self._symbols)
+            for s, e in assignments
+            if self._symbols[s] not in self.parameters
+        }
+        results = tuple(e.xreplace(self._symbols) for e in outputs)
+        used = set().union(*(e.free_symbols for e in (*definitions.values(), *results)))
+        inputs = tuple(s for s in (*self.point, *self.states) if s in used)
+        return CodeFunction(inputs, tuple(definitions.items()), results)
+
+    def logarithms_used(self, function: CodeFunction) -> dict[sympy.Symbol, sympy.Symbol]:
+        """The logarithms of parameters that a function reads: {ln_A: A}."""
+        used = set().union(*(e.free_symbols for e in (*(e for _, e in function.assignments), *function.outputs)))
+        return {ln: symbol for ln, symbol in self.logarithms.items() if ln in used}
+
+    def renaming_notes(self) -> list[str]:
+        """One line for each name of the author's that the target could not keep."""
+        original_names = {*self.law.names, *(s.name for s in (*POINT_VARIABLES, *self.law.states))}
+        return self.identifiers.renaming_notes(original_names)

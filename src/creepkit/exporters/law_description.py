@@ -1,0 +1,127 @@
+"""What exported texts state about their law: heading comments, the table of parameters, remarks on units and failure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import sympy
+
+from creepkit.exporters.unit_conversion import ConvertedValues, reference_sentence
+from creepkit.kernels.log_form import FLOOR, TIME_FLOOR
+from creepkit.language.law import CreepLaw
+from creepkit.language.printing import expression_text
+from creepkit.language.symbols import GAS_CONSTANT, temperature
+from creepkit.records import LawWithValues
+
+
+def heading(source: LawWithValues, *, units: str = "", mentions_floors: bool = False) -> Iterator[str]:
+    """Title, equation, parameters with values and units, where the law holds, its notes and references.
+
+    units : the sentence on units; by default that of `source.units`, for texts that convert on entry.
+    floors : whether to say what bases of powers act as below their floors.
+    """
+    law = source.law
+    yield f"{law.name}: {law.title}" if law.title else law.name
+    yield ""
+    yield from equation_lines(law)
+    yield ""
+    yield units or units_sentence(source)
+    yield "Parameters, for stress as a ratio to 1 MPa and time to 1 s:"
+    yield from parameter_lines(law, source.values)
+    if mentions_floors:
+        yield (
+            f"Stress, strain and internal variables that are bases of powers act as {FLOOR:g} below it, "
+            f"time as {TIME_FLOOR:g}."
+        )
+    yield from (f"Valid where {sympy.sstr(relation)}." for relation in law.constraints)
+    yield from (f"Note: {note}" for note in source.notes)
+    yield from (f"Source: {reference}" for reference in law.references)
+
+
+def units_sentence(source: LawWithValues) -> str:
+    """The units of a text that converts stress and time on entry, and rates on exit."""
+    sentence = f"Stress in {source.units.stress}, time in {source.units.time}, rates in 1/{source.units.time}"
+    if source.law.uses(temperature):
+        sentence += f", temperature in K (R = {GAS_CONSTANT} J/(mol K))"
+    return f"{sentence}. {'' if source.units.is_native else 'Converted on entry: '}{reference_sentence(type(source.units)())}."
+
+
+def equation_lines(law: CreepLaw) -> Iterator[str]:
+    """The rate, a term a line under its name, and the rates of internal variables."""
+    prefixes = ["rate =", *["     +"] * (len(law.terms) - 1)]
+    for prefix, (label, term) in zip(prefixes, law.terms.items(), strict=True):
+        yield f"{prefix} {expression_text(term)}    [{label}]"
+    for symbol, state in law.states.items():
+        failure = "" if state.limit is None else f" to failure at {state.limit:g}"
+        yield f"d{symbol}/dt = {expression_text(state.rate)}, from {state.initial:g}{failure}    [{state.meaning}]"
+
+
+def parameter_lines(law: CreepLaw, values: Mapping[str, float]) -> Iterator[str]:
+    """One line a parameter: name, value, unit, meaning."""
+    for name, param in law.table.items():
+        unit = "" if param.unit == "1" else f" {param.unit}"
+        yield f"  {name} = {values[name]!r}{unit}, {param.meaning}"
+
+
+def comment_lines(lines: Iterable[str], marker: str, width: int = 0) -> list[str]:
+    """Each line after a comment mark; whatever could end a comment, or carry it on to the next line, is taken out.
+
+    width : 0, or the longest line allowed; longer ones are broken between words.
+    """
+    pieces = [printable_text(piece_text) for line in lines for piece_text in (line.splitlines() or [""])]
+    return [
+        f"{marker} {wrapped}".rstrip("\\ ") for part in pieces for wrapped in _wrapped(part, width - len(marker) - 1)
+    ]
+
+
+def printable_text(text: str) -> str:
+    """Text with every character that is no letter, digit, sign or blank made a blank."""
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    if width <= 0 or len(text) <= width:
+        return [text]
+    import textwrap
+
+    indent = " " * (len(text) - len(text.lstrip()) + 4)
+    return textwrap.wrap(text, width, subsequent_indent=indent, drop_whitespace=True) or [text]
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """One line of the table: a parameter, or the start of an internal variable."""
+
+    symbol: sympy.Symbol
+    meaning: str
+    value: float
+    unit: str
+    is_initial: bool = False
+
+
+def parameter_rows(source: LawWithValues, converted_values: ConvertedValues) -> Iterator[ParameterRow]:
+    """Parameters in the author's order, then internal variables at time zero; no unit is told as an empty text."""
+    for symbol, param in source.law.params.items():
+        unit = converted_values.units[symbol.name]
+        yield ParameterRow(symbol, param.meaning, converted_values.values[symbol.name], "" if unit == "1" else unit)
+    for symbol, state in source.law.states.items():
+        yield ParameterRow(
+            symbol, state.meaning, state.initial, "" if state.unit == "1" else state.unit, is_initial=True
+        )
+
+
+def remarks(source: LawWithValues, converted_values: ConvertedValues) -> Iterator[str]:
+    """Sentences on units, temperature and failure."""
+    yield f"Here {converted_values.reference_sentence}."
+    if source.law.uses(temperature):
+        yield f"Temperature in K, R = {GAS_CONSTANT} J/(mol K)."
+    for symbol, state in source.law.states.items():
+        if state.limit is not None:
+            yield f"The material has failed when {symbol} reaches {state.limit:g}."
+
+
+def note_lines(source: LawWithValues) -> list[str]:
+    """The notes, a line each."""
+    lines = (printable_text(line).strip() for note in source.notes for line in note.splitlines())
+    return [line for line in lines if line]

@@ -1,0 +1,333 @@
+"""Python: a module with `rate` and `state_rates`, for numbers (needs `math` only) or for arrays (needs NumPy only).
+
+The formulas are those of the kernels, terms in log form; the author's parameter values are defaults of arguments.
+"""
+
+from __future__ import annotations
+
+import ast
+import keyword
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+import sympy
+
+from creepkit.errors import ExportError, LawError
+from creepkit.exporters.law_code import Identifiers
+from creepkit.exporters.law_description import comment_lines, heading, printable_text
+from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
+from creepkit.kernels.log_form import FLOOR, TIME_FLOOR, log_form
+from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
+from creepkit.records import LawWithValues, Units
+
+STRESS_SYMBOLS = (stress, principal_stress, mean_stress)
+"""The variables of a point that are in the units of stress."""
+
+
+_MODULE_NAMES = ("INITIAL", "LIMIT", "errstate", "inf", "max", "min", "np", "rate", "state_rates")
+
+
+LogSymbols = Mapping[sympy.Symbol, sympy.Symbol]
+
+
+@dataclass(frozen=True)
+class PythonDialect:
+    """What sets one kind of module apart.
+
+    printer : of its expressions. helpers : {name: text} of the functions that the module takes along where needed.
+    imports : import statements for the names that a module reads.
+    log : text of a parameter's logarithm, from its name. guard : statement around the body, or nothing.
+    overflow : the sentence on results that no double holds.
+    """
+
+    printer: KernelPrinter
+    helpers: Mapping[str, str]
+    import_lines: Callable[[set[str]], str]
+    log_expression: Callable[[str], str]
+    context_manager: str
+    overflow_sentence: str
+
+
+def module_text(source: LawWithValues, dialect: PythonDialect) -> str:
+    """Return the module of a law; ExportError when it holds what no kernel can evaluate."""
+    source = source.without_inactive_terms()
+    try:
+        functions = _ModuleFunctions(source, dialect)
+    except LawError as error:
+        raise ExportError(f"cannot be written as Python: {error}") from None
+    body = functions.text()
+    floors = any(f"{floor!r})" in body for floor in (FLOOR, TIME_FLOOR))
+    lines = [*heading(source, mentions_floors=floors), *functions.renaming_notes(), dialect.overflow_sentence]
+    opening_lines = ['"""A creep law with its values, exported by creepkit."""', "", *comment_lines(lines, "#"), ""]
+    return "\n".join([*opening_lines, _with_helpers(body, dialect)]) + "\n"
+
+
+# ---- the functions -------------------------------------------------------------------------------------------------
+
+
+class _ModuleFunctions:
+    """The code of one law: its log form, with the author's parameters wherever a logarithm is not needed."""
+
+    def __init__(self, source: LawWithValues, dialect: PythonDialect) -> None:
+        self.source, self.law, self.dialect = source, source.law, dialect
+        form = log_form(self.law)
+        self._identifiers = Identifiers((*keyword.kwlist, *TARGET_FUNCTIONS, *dialect.helpers, *_MODULE_NAMES))
+        symbols = (*POINT_VARIABLES, *self.law.states, *self.law.params)
+        self.names = {s: self._symbol(s.name) for s in symbols}
+        self.logs = {self._symbol(theta.name): self.names[s] for s, theta in form.logs.items()}
+        renamed = self.names | dict(zip(form.logs.values(), self.logs, strict=True))
+        self.terms = [_with_author_parameters(e.xreplace(renamed), self.logs) for e in form.terms]
+        self.state_rates = [_with_author_parameters(e.xreplace(renamed), self.logs) for e in form.state_rates]
+
+    def renaming_notes(self) -> list[str]:
+        """One line for each name of the author's that had to change."""
+        return self._identifiers.renaming_notes([s.name for s in (*self.law.states, *self.law.params)])
+
+    def text(self) -> str:
+        """The functions, and where internal variables start and end."""
+        title = f"Rate of equivalent creep strain, 1/{self.source.units.time}."
+        rate = self._function_text("rate", title, self._return_statement(), self.terms)
+        if not self.law.states:
+            return rate
+        factor = self._factor_text(self.source.units.seconds)
+        rates = [f"{factor}({text})" if factor else text for text in map(self._printed, self.state_rates)]
+        lines = [f'    "{s.name}": {text},' for s, text in zip(self.law.states, rates, strict=True)]
+        title = f"Rates of the internal variables, 1/{self.source.units.time}."
+        states = self._function_text("state_rates", title, ["return {", *lines, "}"], self.state_rates)
+        initial = {symbol.name: state.initial for symbol, state in self.law.states.items()}
+        limits = {symbol.name: state.limit for symbol, state in self.law.states.items()}
+        return f"INITIAL = {initial!r}\nLIMIT = {limits!r}\n\n\n{rate}\n\n\n{states}"
+
+    def _return_statement(self) -> list[str]:
+        """The return statement, each term under its name."""
+        texts = [self._printed(sympy.exp(term, evaluate=False)) for term in self.terms]
+        labels, factor = (
+            [printable_text(label) for label in self.law.terms],
+            self._factor_text(self.source.units.seconds),
+        )
+        if len(texts) == 1:
+            return [f"# {labels[0]}", f"return {factor}{texts[0]}"]
+        signs = ["", *["+ "] * (len(texts) - 1)]
+        pairs = zip(signs, labels, texts, strict=True)
+        lines = [line for sign, label, text in pairs for line in (f"    # {label}", f"    {sign}{text}")]
+        return [f"return {factor}(", *lines, ")"]
+
+    def _function_text(self, name: str, title: str, result: list[str], expressions: Sequence[sympy.Expr]) -> str:
+        used = set().union(*(e.free_symbols for e in expressions))
+        logs = [f"{theta} = {self.dialect.log_expression(s.name)}" for theta, s in self.logs.items() if theta in used]
+        body = [*self._unit_conversions(used), *logs, *result]
+        if self.dialect.context_manager:
+            body = [f"{self.dialect.context_manager}:", *(f"    {line}" for line in body)]
+        signature_lines = [
+            f"def {name}(",
+            *self._signature_lines(),
+            "):",
+            f'    """{title}',
+            "",
+            *self._argument_docs(),
+            '    """',
+        ]
+        return "\n".join([*signature_lines, *(f"    {line}" for line in body)])
+
+    def _unit_conversions(self, used: set[sympy.Basic]) -> list[str]:
+        """Stress and time on entry, in the law's own units."""
+        units = self.source.units
+        pairs = [*((s, units.megapascals) for s in STRESS_SYMBOLS), (time, units.seconds)]
+        return [f"{s} = {factor!r} * {s}" for s, factor in pairs if factor != 1 and s in used]
+
+    def _signature_lines(self) -> list[str]:
+        """Variables of the point by keyword, needed where the law uses them; then parameters with their values."""
+        required = [s for s in POINT_VARIABLES[1:] if self.law.uses(s)] + list(self.law.states)
+        optional = [s for s in POINT_VARIABLES[1:4] if not self.law.uses(s)]
+        return [
+            "    stress,",
+            "    *,",
+            *(f"    {self.names[s]}," for s in required),
+            *(f"    {self.names[s]}=None," for s in optional),
+            *(f"    {self.names[s]}={self.source.values[s.name]!r}," for s in self.law.params),
+        ]
+
+    def _argument_docs(self) -> list[str]:
+        meanings = _argument_meanings(self.source.units)
+        lines = [f"    {s.name} : {meanings[s.name]}" for s in POINT_VARIABLES if self.law.uses(s)]
+        lines += [f"    {self.names[s]} : {_docstring_safe(state.meaning)}" for s, state in self.law.states.items()]
+        unused = [s.name for s in POINT_VARIABLES[:4] if not self.law.uses(s)]
+        return [*lines, f"    {', '.join(unused)} : not used by this law"] if unused else lines
+
+    def _symbol(self, requested: str) -> sympy.Symbol:
+        return sympy.Symbol(self._identifiers.unique(requested), real=True)
+
+    def _printed(self, expression: sympy.Expr) -> str:
+        return str(self.dialect.printer.doprint(expression))
+
+    @staticmethod
+    def _factor_text(factor: float) -> str:
+        return "" if factor == 1 else f"{factor!r} * "
+
+
+def _docstring_safe(text: str) -> str:
+    """Text that neither ends a docstring nor escapes in it."""
+    return printable_text(text).replace("\\", "/").replace('"', "'")
+
+
+def _argument_meanings(units: Units) -> dict[str, str]:
+    return {
+        "stress": f"von Mises stress, {units.stress}",
+        "strain": "accumulated equivalent creep strain, logarithmic",
+        "time": f"time since the load was first applied, {units.time}",
+        "temperature": "temperature, K",
+        "principal_stress": f"largest principal stress, {units.stress}",
+        "mean_stress": f"mean stress, {units.stress}",
+    }
+
+
+def _with_author_parameters(expression: sympy.Expr, logs: LogSymbols) -> sympy.Expr:
+    """Write exp(ln_B) as B again, free of the rounding of a logarithm."""
+
+    def factored(e: sympy.Expr) -> sympy.Expr:
+        summands = sympy.Add.make_args(e.args[0])
+        powers_of_parameters = {
+            a: p for a in summands for t, s in logs.items() for sign, p in ((1, s), (-1, 1 / s)) if a == sign * t
+        }
+        rest = sympy.Add(*(a for a in summands if a not in powers_of_parameters))
+        return sympy.Mul(*powers_of_parameters.values(), sympy.exp(rest))
+
+    return expression.replace(lambda e: isinstance(e, sympy.exp), factored)
+
+
+# ---- imports and helpers -------------------------------------------------------------------------------------------
+
+
+def _with_helpers(code: str, dialect: PythonDialect) -> str:
+    """Put the imports and the functions that the code calls before it."""
+    helpers, required = dialect.helpers, _free_names(code)
+    for name in reversed([*helpers]):
+        if name in required:
+            required |= _free_names(helpers[name])
+    body = "\n\n\n".join([*(text for name, text in helpers.items() if name in required), code])
+    return f"{dialect.import_lines(_free_names(body))}\n\n\n{body}"
+
+
+def kernel_functions(file: str) -> dict[str, str]:
+    """{name: text} of the functions that kernels call, from a file of creepkit.kernels, without annotations."""
+    source = resources.files("creepkit.kernels").joinpath(file).read_text(encoding="utf-8")
+    result: dict[str, str] = {}
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.FunctionDef):
+            node.decorator_list, node.returns = [], None
+            for argument in node.args.args:
+                argument.annotation = None
+            result[node.name] = ast.unparse(node)
+        elif isinstance(node, ast.Assign):
+            result |= _assignments_of(node)
+    return result
+
+
+def _assignments_of(node: ast.Assign) -> dict[str, str]:
+    """{name: statement} of an assignment to a name, or to several at once."""
+    target, value = node.targets[0], node.value
+    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+        pairs: list[tuple[Any, Any]] = list(zip(target.elts, value.elts, strict=True))
+    else:
+        pairs = [(target, value)]
+    return {t.id: f"{t.id} = {ast.unparse(v)}" for t, v in pairs if t.id != "__all__"}
+
+
+def _free_names(code: str) -> set[str]:
+    """Every name that top-level functions and statements read from outside themselves."""
+    return set().union(*(_free_names_of_statement(node) for node in ast.parse(code).body))
+
+
+def _free_names_of_statement(node: ast.stmt) -> set[str]:
+    nodes = list(ast.walk(node))
+    bound_names = {n.arg for n in nodes if isinstance(n, ast.arg)}
+    bound_names |= {n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    return {n.id for n in nodes if isinstance(n, ast.Name)} - bound_names
+
+
+@dataclass(frozen=True)
+class PythonExporter:
+    """A Python module with `rate` (and `state_rates`), the values as defaults."""
+
+    name: str = "python"
+    title: str = "Python module that needs nothing but the standard library"
+    suffix: str = ".py"
+
+    def text(self, source: LawWithValues) -> str:
+        """Return the module's text; stress and time are converted on entry, rates on exit."""
+        return module_text(source, _scalar_dialect())
+
+
+class _ScalarPrinter(KernelPrinter):
+    """Kernel text for one number at a time: branches are taken lazily, maxima are Python's."""
+
+    def _print_Max(self, e: Any) -> str:
+        return f"max({', '.join(self._print(a) for a in e.args)})"
+
+    def _print_Min(self, e: Any) -> str:
+        return f"min({', '.join(self._print(a) for a in e.args)})"
+
+    def _print_And(self, e: Any) -> str:
+        return f"({' and '.join(self._print(a) for a in e.args)})"
+
+    def _print_Or(self, e: Any) -> str:
+        return f"({' or '.join(self._print(a) for a in e.args)})"
+
+    def _print_Piecewise(self, e: Any) -> str:
+        branches = [f"{self._print(branch)} if {self._print(condition)} else " for branch, condition in e.args[:-1]]
+        return f"({''.join(branches)}{self._print(e.args[-1].expr)})"
+
+
+def _math_imports(names: set[str]) -> str:
+    return f"from math import {', '.join(sorted(name for name in names if hasattr(math, name)))}"
+
+
+@cache
+def _scalar_dialect() -> PythonDialect:
+    """One number at a time."""
+    return PythonDialect(
+        printer=_ScalarPrinter({"standard": "python3"}),
+        helpers=kernel_functions("numba_functions.py"),
+        import_lines=_math_imports,
+        log_expression=lambda name: f"log({name}) if {name} != 0.0 else -inf",
+        context_manager="",
+        overflow_sentence="A result beyond 1.8e308 raises OverflowError.",
+    )
+
+
+@dataclass(frozen=True)
+class NumpyExporter:
+    """A Python module of arrays with `rate` (and `state_rates`), the values as defaults."""
+
+    name: str = "numpy"
+    title: str = "Python module for arrays that needs nothing but NumPy"
+    suffix: str = ".py"
+
+    def text(self, source: LawWithValues) -> str:
+        """Return the module's text; stress and time are converted on entry, rates on exit."""
+        return module_text(source, _array_dialect())
+
+
+def _numpy_imports(names: set[str]) -> str:
+    """The error function is the standard library's: NumPy has none."""
+    imported = sorted(name for name in names & {*TARGET_FUNCTIONS, "errstate"} if hasattr(np, name))
+    lines = ["import numpy as np", *([f"from numpy import {', '.join(imported)}"] if imported else [])]
+    return "\n".join(["import math", "", *lines] if "math" in names else lines)
+
+
+@cache
+def _array_dialect() -> PythonDialect:
+    """Whole arrays; branches are evaluated everywhere, hence the guard against warnings of those not taken."""
+    return PythonDialect(
+        printer=KernelPrinter({"standard": "python3"}),
+        helpers=kernel_functions("numpy_functions.py") | {"erf": "erf = np.vectorize(math.erf, otypes=[float])"},
+        import_lines=_numpy_imports,
+        log_expression=lambda name: f"log_or_off({name})",
+        context_manager='with errstate(over="ignore", divide="ignore", invalid="ignore")',
+        overflow_sentence="Arguments and parameters broadcast as arrays do. A result beyond 1.8e308 is inf.",
+    )

@@ -1,0 +1,285 @@
+"""Predictors of several specimens as one, what a predictor offers, and finite-difference sensitivities of predictors that have none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.errors import FitError, SolveError
+from creepkit.language import CreepLaw
+from creepkit.records import (
+    History,
+    NuisanceValues,
+    Prediction,
+    Predictor,
+    Status,
+    SupportsReducedOrderModel,
+    SupportsRupturePrediction,
+    TimesToStrain,
+)
+
+
+@dataclass(frozen=True)
+class CompositePredictor:
+    """Predictors of different specimens as one: each history goes to the predictor of its specimen."""
+
+    predictors: Mapping[str, Predictor]
+
+    @property
+    def name(self) -> str:
+        """The names of all, joined."""
+        return " + ".join(getattr(p, "name", type(p).__name__) for p in self.predictors.values())
+
+    def predictor_for(self, history: History) -> Predictor:
+        """The predictor of one history."""
+        if history.specimen not in self.predictors:
+            raise FitError(
+                f"history '{history.name}' is of specimen '{history.specimen}', for which using= names no predictor; "
+                f"it names {', '.join(self.predictors)}"
+            )
+        return self.predictors[history.specimen]
+
+    def predict(
+        self,
+        law: CreepLaw,
+        values: Mapping[str, ArrayLike],
+        histories: Sequence[History],
+        *,
+        jacobian: bool = False,
+        nuisances: NuisanceValues | None = None,
+    ) -> Prediction:
+        """Predict each group of histories with its predictor; outputs that a test does not have are NaN."""
+        predictions = []
+        for predictor, tests in self.groups(histories):
+            group_nuisances = {k: v[:, tests] for k, v in (nuisances or {}).items() if supports_nuisance(predictor, k)}
+            group_histories = [histories[k] for k in tests]
+            prediction = predict(predictor, law, values, group_histories, jacobian=jacobian, nuisances=group_nuisances)
+            predictions.append((tests, prediction))
+        for kind in nuisances or {}:
+            if not any(supports_nuisance(self.predictor_for(h), kind) for h in histories):
+                raise SolveError(f"none of the predictors {self.name} knows the nuisance '{kind}'")
+        return self.concatenate(predictions, histories)
+
+    def groups(self, histories: Sequence[History]) -> list[tuple[Predictor, list[int]]]:
+        """Each predictor with the positions of its histories."""
+        chosen = [self.predictor_for(h) for h in histories]
+        distinct = list({id(p): p for p in chosen}.values())
+        return [(one, [k for k, p in enumerate(chosen) if p is one]) for one in distinct]
+
+    @staticmethod
+    def concatenate(groups: Sequence[tuple[list[int], Prediction]], histories: Sequence[History]) -> Prediction:
+        """The predictions of groups as one."""
+        return _concatenated(groups, histories)
+
+
+def _concatenated(groups: Sequence[tuple[list[int], Prediction]], histories: Sequence[History]) -> Prediction:
+    """One prediction in the order of the histories, with the union of outputs."""
+    outputs = tuple(dict.fromkeys(name for _, found in groups for name in found.outputs))
+    candidates, longest = len(groups[0][1].values), max(h.times.size for h in histories)
+    shape = (candidates, len(histories), longest, len(outputs))
+    values, status = np.full(shape, np.nan), np.full(shape[:2], int(Status.COMPLETE))
+    end_times = np.full(shape[:2], np.inf)
+    differentiable = all(found.jacobian is not None for _, found in groups)
+    jacobian = None
+    kinds = {kind for _, found in groups for kind in found.nuisance_jacobian}
+    nuisance_jacobian = {kind: np.zeros(shape) for kind in kinds}
+    for tests, found in groups:
+        columns = [outputs.index(name) for name in found.outputs]
+        index = np.ix_(range(candidates), tests, range(found.values.shape[2]), columns)
+        values[index] = found.values
+        status[:, tests], end_times[:, tests] = found.status, found.end_times
+        for kind, sensitivity in found.nuisance_jacobian.items():
+            nuisance_jacobian[kind][index] = sensitivity
+        if differentiable and found.jacobian is not None:
+            jacobian = np.full((*shape, found.jacobian.shape[-1]), np.nan) if jacobian is None else jacobian
+            jacobian[index] = found.jacobian
+    lengths = np.array([h.times.size for h in histories], np.int64)
+    times = tuple(h.times for h in histories)
+    return Prediction(
+        values,
+        outputs,
+        lengths,
+        status,
+        end_times,
+        jacobian,
+        times,
+        nuisance_jacobian,
+        _concatenated_life(groups, shape),
+    )
+
+
+def _concatenated_life(groups: Sequence[tuple[list[int], Prediction]], shape: tuple[int, ...]) -> TimesToStrain | None:
+    """The lives of groups as one, if they have any; shape : (candidates, tests, times, outputs)."""
+    life_predictions = [(tests, found.times_to_strain) for tests, found in groups if found.times_to_strain is not None]
+    if len(life_predictions) < len(groups):
+        return None
+
+    def gathered(name: str, axes: int, fill: float) -> Any:
+        arrays = [getattr(life, name) for _, life in life_predictions]
+        if any(array is None for array in arrays):
+            return None
+        out = np.full((*shape[:axes], *arrays[0].shape[axes:]), fill)
+        for (tests, _), array in zip(life_predictions, arrays, strict=True):
+            if axes == 3:
+                out[:, tests, : array.shape[2]] = array
+            else:
+                out[:, tests] = array
+        return out
+
+    horizon = np.zeros(shape[1])
+    for tests, life in life_predictions:
+        horizon[tests] = life.horizon
+    return TimesToStrain(
+        gathered("times", 3, np.nan), gathered("log_time_derivatives", 3, np.inf), gathered("rupture_times", 2, np.nan), horizon,
+        gathered("time_jacobian", 3, np.nan), gathered("rupture_jacobian", 2, np.nan),
+    )  # fmt: skip
+
+
+def predict(
+    predictor: Predictor, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], *,
+    jacobian: bool = False, nuisances: NuisanceValues | None = None,
+) -> Prediction:  # fmt: skip
+    """Predict, mentioning nuisances only where there are any: a closed form need not know of them."""
+    if nuisances:
+        return predictor.predict(law, values, histories, jacobian=jacobian, nuisances=nuisances)
+    return predictor.predict(law, values, histories, jacobian=jacobian)
+
+
+def prediction_errors_of(predictor: Predictor) -> dict[str, float]:
+    """{output: standard deviation} of what a predictor says that it is wrong by; the largest of several predictors."""
+    largest: dict[str, float] = {}
+    for one in predictor.predictors.values() if isinstance(predictor, CompositePredictor) else (predictor,):
+        for name, standard_deviation in getattr(one, "error", {}).items():
+            largest[name] = max(standard_deviation, largest.get(name, 0.0))
+    return largest
+
+
+def supports_nuisance(predictor: Predictor, kind: str) -> bool:
+    """Whether a predictor knows an explicit nuisance: it names those it does in `nuisances`."""
+    return kind in getattr(predictor, "nuisances", ())
+
+
+def predicts_rupture(predictor: Predictor, history: History) -> bool:
+    """Whether the predictor of a history follows specimens to their rupture."""
+    return isinstance(predictor_for(predictor, history), SupportsRupturePrediction)
+
+
+def predictor_for(predictor: Predictor, history: History) -> Predictor:
+    """Which predictor a history goes to."""
+    return predictor.predictor_for(history) if isinstance(predictor, CompositePredictor) else predictor
+
+
+def compared_outputs(predictor: Predictor, history: History) -> tuple[str, ...]:
+    """What is both measured and predicted of a history, in the predictor's order; the first grows with creep."""
+    known: Iterable[str] = getattr(predictor_for(predictor, history), "outputs", tuple(history.outputs))
+    return tuple(name for name in known if name in history.outputs)
+
+
+def reduced_order_model_of(predictor: Predictor) -> Predictor | None:
+    """The cheap stand-in of a predictor, or None where it needs none."""
+    if isinstance(predictor, CompositePredictor):
+        reduced = {name: reduced_order_model_of(p) or p for name, p in predictor.predictors.items()}
+        changed = any(reduced[name] is not p for name, p in predictor.predictors.items())
+        return CompositePredictor(reduced) if changed else None
+    return predictor.reduced_order_model() if isinstance(predictor, SupportsReducedOrderModel) else None
+
+
+RELATIVE_STEP = 1e-4
+"""Of internal parameters (ln of a coefficient, an exponent), relative to the larger of their size and one."""
+
+
+NUISANCE_STEPS = {"thickness": 1e-3, "window": 1e-2, "modulus": 1e-3, "temperature": 0.1}
+"""mm, mm, relative, K: far above what the error of a solver's steps is, and bending outputs by under 1e-6 of them."""
+
+
+def predict_with_sensitivities(
+    predictor: Predictor, law: CreepLaw, theta: Floats, histories: Sequence[History], nuisances: NuisanceValues
+) -> Prediction:
+    """The prediction of one candidate with its derivatives to parameters and nuisances.
+
+    theta : (parameters,) internal. What the predictor does not differentiate itself comes from differences.
+    """
+    prediction = predict(predictor, law, author_values(law, theta[None]), histories, jacobian=True, nuisances=nuisances)
+    numeric = prediction.jacobian is None
+    kinds = [kind for kind in nuisances if kind not in prediction.nuisance_jacobian]
+    if not (numeric or kinds):
+        return prediction
+    steps = RELATIVE_STEP * np.maximum(np.abs(theta), 1.0) if numeric else np.zeros(0)
+    nuisance_steps = [NUISANCE_STEPS[kind] for kind in kinds]
+    points, shifted_nuisances = _difference_points(theta, steps, nuisances, kinds, nuisance_steps)
+    batch = predict(predictor, law, author_values(law, points), histories, nuisances=shifted_nuisances)
+    count = len(points) // 2
+    differences = batch.values[:count] - batch.values[count:]
+    jacobian = np.moveaxis(differences[: steps.size], 0, -1) / (2 * steps) if numeric else None
+    nuisance_jacobian = {
+        kind: differences[steps.size + k][None] / (2 * nuisance_steps[k]) for k, kind in enumerate(kinds)
+    }
+    return replace(
+        prediction,
+        jacobian=prediction.jacobian if jacobian is None else jacobian[None],
+        nuisance_jacobian={**prediction.nuisance_jacobian, **nuisance_jacobian},
+    )
+
+
+def _difference_points(
+    theta: Floats, steps: Floats, nuisances: NuisanceValues, kinds: Sequence[str], nuisance_steps: Sequence[float]
+) -> tuple[Floats, dict[str, Floats]]:
+    """Candidates one step up, then one step down, in each parameter and then in each effect of all tests at once."""
+    count = steps.size + len(kinds)
+    points = np.tile(theta, (2 * count, 1))
+    for sign, offset in ((1.0, 0), (-1.0, count)):
+        points[offset : offset + steps.size] += sign * np.diag(steps)
+    shifted_nuisances = {kind: np.tile(values, (2 * count, 1)) for kind, values in nuisances.items()}
+    for k, kind in enumerate(kinds):
+        shifted_nuisances[kind][steps.size + k] += nuisance_steps[k]
+        shifted_nuisances[kind][count + steps.size + k] -= nuisance_steps[k]
+    return points, shifted_nuisances
+
+
+def author_values(law: CreepLaw, theta: Floats) -> dict[str, Floats]:
+    """{parameter: (candidates,)} in the author's units, from internal parameters (candidates, parameters)."""
+    return {
+        name: np.exp(theta[:, k]) if param.scale == "log" else theta[:, k]
+        for k, (name, param) in enumerate(law.table.items())
+    }
+
+
+def predict_to_rupture(
+    using: Predictor, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], *,
+    jacobian: bool = False,
+) -> Prediction:  # fmt: skip
+    """Predict with `life`; tests whose predictor follows none to rupture arrive nowhere and never break."""
+    groups = (
+        using.groups(histories) if isinstance(using, CompositePredictor) else [(using, list(range(len(histories))))]
+    )
+    group_predictions = []
+    for predictor, tests in groups:
+        group_histories = [histories[k] for k in tests]
+        if isinstance(predictor, SupportsRupturePrediction):
+            group_predictions.append(
+                (tests, predictor.predict_to_rupture(law, values, group_histories, jacobian=jacobian))
+            )
+        else:
+            prediction = predict(predictor, law, values, group_histories, jacobian=jacobian)
+            group_predictions.append(
+                (tests, replace(prediction, times_to_strain=_without_rupture(prediction, len(law.names))))
+            )
+    return (
+        group_predictions[0][1]
+        if len(group_predictions) == 1
+        else CompositePredictor.concatenate(group_predictions, histories)
+    )
+
+
+def _without_rupture(prediction: Prediction, parameters: int) -> TimesToStrain:
+    """The life of what never ends."""
+    shape = prediction.values.shape[:3]
+    no_arrivals, no_ruptures = np.full(shape, np.nan), np.full(shape[:2], np.nan)
+    jacobians = np.full((*shape, parameters), np.nan), np.full((*shape[:2], parameters), np.nan)
+    return TimesToStrain(
+        no_arrivals, np.full(shape, np.inf), no_ruptures, np.array([t[-1] for t in prediction.times]), *jacobians
+    )

@@ -1,0 +1,185 @@
+"""confirm: the identified law simulated by the specimen itself and compared with the tests and with the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import FitError
+from creepkit.inverse.composite_predictor import CompositePredictor
+from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, output_errors
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
+from creepkit.records import History, Prediction, Predictor, Status
+
+AGREEMENT_LIMIT = 1.0
+"""Largest rms difference to what the fit predicts, in standard deviations of the noise, that confirms it."""
+
+
+ACCEPTABLE_CHI_SQUARE = 2.0
+"""Mean chi-square above which a law does not follow a test, whoever predicts it."""
+
+
+INCOMPLETE_STATUS = {Status.RUPTURED: "the specimen bursts", Status.NOT_CONVERGED: "the simulation stops"}
+
+
+@dataclass(frozen=True)
+class ConfirmedOutput:
+    """One output of one test.
+
+    simulated : errors of the simulation against the measurement; fitted : the fit's own, or None of a test it has not
+        seen and cannot predict.
+    difference : rms of simulated less fitted frames over their noise; NaN where the fit's own prediction is not at hand
+        or no noise is known.
+    """
+
+    output: str
+    simulation_errors: OutputErrors
+    fit_errors: OutputErrors | None
+    rms_difference: float
+
+    @property
+    def noise_ratio(self) -> float:
+        """How far the simulation is from the fit, in noise: the difference, or what chi-square says it must be."""
+        if np.isfinite(self.rms_difference) or self.fit_errors is None:
+            return self.rms_difference
+        return float(np.sqrt(max(self.simulation_errors.chi_square - self.fit_errors.chi_square, 0.0)))
+
+
+@dataclass(frozen=True)
+class ConfirmedTest:
+    """One test, how its simulation ended, and when, s."""
+
+    name: str
+    status: Status
+    end_time: float
+    outputs: tuple[ConfirmedOutput, ...]
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """The answer of confirm(). law, using : names of what was simulated, and by what."""
+
+    law: str
+    predictor_name: str
+    tests: tuple[ConfirmedTest, ...]
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the simulation reaches the end of each test and says of it what the fit says."""
+        return not self._incomplete_tests and not self.noise_ratio > AGREEMENT_LIMIT
+
+    @property
+    def noise_ratio(self) -> float:
+        """The largest distance of simulation and fit, in noise; NaN where nothing is known of it."""
+        known = [o.noise_ratio for t in self.tests for o in t.outputs if np.isfinite(o.noise_ratio)]
+        return max(known, default=float("nan"))
+
+    @property
+    def verdict(self) -> str:
+        """One sentence: whether the simulation confirms the fit, and whether the law follows the tests."""
+        if self._incomplete_tests:
+            test = self._incomplete_tests[0]
+            how = f"{INCOMPLETE_STATUS[test.status]} at {test.end_time:g} s of test '{test.name}'"
+            return f"not confirmed: by {self.predictor_name}, {how}; identify again with using= this specimen"
+        if not self.confirmed:
+            test_name, output = self._largest(lambda o: o.noise_ratio)
+            return (
+                f"not confirmed: {self.predictor_name} differs from the fit by {self.noise_ratio:.2g} times the noise ({output} of "
+                f"'{test_name}'); identify again with using= this specimen"
+            )
+        test_name, output = self._largest(lambda o: o.simulation_errors.chi_square)
+        worst = self[test_name, output].simulation_errors.chi_square
+        if worst > ACCEPTABLE_CHI_SQUARE:
+            return (
+                f"confirmed, but the law does not follow the tests: chi-square {worst:.3g} in {output} of "
+                f"'{test_name}'; try another law"
+            )
+        difference_text = (
+            f", {self.noise_ratio:.2g} times the noise from the fit" if np.isfinite(self.noise_ratio) else ""
+        )
+        return f"confirmed by {self.predictor_name}: chi-square at most {worst:.3g}{difference_text}"
+
+    def __getitem__(self, place: tuple[str, str]) -> ConfirmedOutput:
+        for test in self.tests:
+            for one in test.outputs:
+                if (test.name, one.output) == place:
+                    return one
+        raise FitError(f"no output '{place[1]}' of a test '{place[0]}' was confirmed")
+
+    def __str__(self) -> str:
+        rows = [f"{self.law}: {self.verdict}"]
+        for test in self.tests:
+            for o in test.outputs:
+                fit_text = "" if o.fit_errors is None else f", of the fit {o.fit_errors.chi_square:.3g}"
+                difference_text = f"; apart {o.rms_difference:.2g} noise" if np.isfinite(o.rms_difference) else ""
+                rows.append(
+                    f"  {test.name}, {o.output}: chi-square {o.simulation_errors.chi_square:.3g}{fit_text}{difference_text}"
+                )
+        return "\n".join(rows)
+
+    @property
+    def _incomplete_tests(self) -> list[ConfirmedTest]:
+        return [t for t in self.tests if t.status in INCOMPLETE_STATUS]
+
+    def _largest(self, measure: Callable[[ConfirmedOutput], float]) -> tuple[str, str]:
+        """Test and output of the largest size."""
+        measured = [(measure(o), t.name, o.output) for t in self.tests for o in t.outputs]
+        _, test, output = max(measured, key=lambda s: -np.inf if np.isnan(s[0]) else s[0])
+        return test, output
+
+
+def confirm(fit: Identification, tests: Sequence[History], using: Predictor | Mapping[str, Predictor]) -> Confirmation:
+    """Simulate the identified law for each test, with the nuisances and offsets that the fit found for it.
+
+    tests : those of the fit, known by name, or others, which are predicted with what is known of all tests.
+    using : the specimen, such as study.specimen("bulge"), or {specimen: predictor}.
+    """
+    if not tests:
+        raise FitError(f"law '{fit.law.name}': there are no tests to confirm it with")
+    predictor = CompositePredictor(dict(using)) if isinstance(using, Mapping) else using
+    prediction = fit.predict(tests, predictor)
+    fit_prediction = None if fit.predictor is None else fit.predict(tests)
+    name = getattr(predictor, "name", type(predictor).__name__)
+    return Confirmation(
+        fit.law.name, name, tuple(_confirmed_test(fit, prediction, fit_prediction, k, h) for k, h in enumerate(tests))
+    )
+
+
+def outside_domain(fit: Identification) -> bool:
+    """Whether the guard of a surrogate doubts what it said of some test at the identified values."""
+    return fit.predictor is not None and bool((fit.predict().status == Status.OUTSIDE_DOMAIN).any())
+
+
+def _confirmed_test(
+    fit: Identification, prediction: Prediction, fit_prediction: Prediction | None, k: int, history: History
+) -> ConfirmedTest:
+    reported = {o.output: o for m in fit.tests if m.name == history.name for o in m.outputs}
+    names = [name for name in prediction.outputs if name in history.outputs and usable_frames(history, name).any()]
+    fitted = {} if fit_prediction is None else {name: _output_column(fit_prediction, k, name) for name in names}
+    outputs = tuple(
+        _confirmed_output(history, name, _output_column(prediction, k, name), fitted.get(name), reported.get(name))
+        for name in names
+    )
+    return ConfirmedTest(history.name, Status(int(prediction.status[0, k])), float(prediction.end_times[0, k]), outputs)
+
+
+def _output_column(prediction: Prediction, k: int, name: str) -> Floats:
+    return prediction.of(k)[:, prediction.outputs.index(name)]
+
+
+def _confirmed_output(
+    history: History, name: str, simulated: Floats, fitted: Floats | None, reported: OutputFit | None
+) -> ConfirmedOutput:
+    used, noise = usable_frames(history, name), noise_standard_deviation(history, name)
+    measured, sd = history.outputs[name][used], noise[used]
+    simulation_errors = output_errors(measured, simulated[used], sd)
+    if fitted is None:
+        return ConfirmedOutput(name, simulation_errors, None if reported is None else reported.errors, float("nan"))
+    known = sd > 0
+    difference = ((simulated - fitted)[used] / np.where(known, sd, np.nan))[known]
+    rms = float(np.sqrt(np.mean(difference**2))) if difference.size else float("nan")
+    return ConfirmedOutput(name, simulation_errors, output_errors(measured, fitted[used], sd), rms)

@@ -1,0 +1,337 @@
+"""Goodness of fit: error measures of every output, of every test and of all tests, and predicted against measured rupture times."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.errors import FitError
+from creepkit.inverse.composite_predictor import compared_outputs, predict_to_rupture, predictor_for, predicts_rupture
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.noise_model import NoiseModel, Residuals
+from creepkit.inverse.observation_vector import (
+    LOGARITHMIC_OUTPUTS,
+    RUPTURE_OUTPUT,
+    noise_standard_deviation,
+    usable_frames,
+)
+from creepkit.inverse.residuals import ResidualFunction
+from creepkit.records import History, Prediction, Predictor, constant_stress
+
+if TYPE_CHECKING:
+    pass
+
+
+def relative_squared_error(
+    measured: Sequence[ArrayLike], predicted: Sequence[ArrayLike], about: Literal["all", "test", "frame"] = "all"
+) -> float:
+    """Return sum (p - m)^2 / sum (m - mean)^2 over all frames of all tests; each test a (frames,) array."""
+    measured_arrays = [np.asarray(m, float) for m in measured]
+    squares = sum(
+        float(((np.asarray(p, float) - m) ** 2).sum()) for m, p in zip(measured_arrays, predicted, strict=True)
+    )
+    return (
+        squares / total_sum_of_squares(measured_arrays, about)
+        if total_sum_of_squares(measured_arrays, about) > 0
+        else float("nan")
+    )
+
+
+def total_sum_of_squares(tests: Sequence[Floats], about: Literal["all", "test", "frame"] = "all") -> float:
+    """Sum of (m - mean)^2 over all frames of all tests."""
+    if about == "test":
+        return sum(float(((m - m.mean()) ** 2).sum()) for m in tests if m.size)
+    if about == "all":
+        joined = np.concatenate(tests) if tests else np.zeros(0)
+        return float(((joined - joined.mean()) ** 2).sum()) if joined.size else 0.0
+    if len({m.size for m in tests}) > 1:
+        raise FitError('about="frame" needs tests of as many frames each; use "all" or "test"')
+    table = np.stack(tests)
+    return float(((table - table.mean(axis=0)) ** 2).sum())
+
+
+@dataclass(frozen=True)
+class OutputErrors:
+    """Errors of one output, of one test or of all.
+
+    frames : how many were compared. rse : relative squared error (about the mean of just these frames).
+    mse, mae : mean squared and mean absolute error, in the output's unit. relative : rms error over the rms of what was
+    measured. chi_square : mean of (error / noise)^2; one would be noise alone. NaN where a frame was not predicted.
+    """
+
+    frames: int
+    relative_squared_error: float
+    mean_squared_error: float
+    mean_absolute_error: float
+    relative_rms_error: float
+    chi_square: float
+
+
+def output_errors(measured: Floats, predicted: Floats, noise: Floats) -> OutputErrors:
+    """Errors of predicted against measured values, (frames,) each; noise : (frames,) standard deviations."""
+    nan = float("nan")
+    if measured.size == 0:
+        return OutputErrors(0, nan, nan, nan, nan, nan)
+    deviation = predicted - measured
+    mse = float(np.mean(deviation**2))
+    mean_square = float(np.mean(measured**2))
+    known = noise > 0
+    chi_square = float(np.mean((deviation[known] / noise[known]) ** 2)) if known.any() else nan
+    return OutputErrors(
+        measured.size, relative_squared_error([measured], [predicted]), mse, float(np.mean(np.abs(deviation))),
+        float(np.sqrt(mse / mean_square)) if mean_square > 0 else nan, chi_square,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class OutputFit:
+    """One output of one test.
+
+    errors : over all used frames of the history, with the test's own offset and nuisances.
+    offset : estimated offset that the law does not explain (loading strain), in the output's unit.
+    noise : typical standard deviation of a frame, in the output's unit.
+    """
+
+    output: str
+    errors: OutputErrors
+    offset: float = 0.0
+    noise: float = 0.0
+
+
+@dataclass(frozen=True)
+class RuptureComparison:
+    """The end of one test.
+
+    measured : s, when it ruptured, or how long it lasted where it was `stopped` before.
+    predicted : s, by the law alone; infinite where the law never breaks it.
+    low, high : 95 % interval for a single test, from the parameters and the scatter between tests.
+    """
+
+    measured: float
+    censored: bool
+    predicted: float
+    low: float
+    high: float
+
+    @property
+    def ratio(self) -> float:
+        """Predicted over measured."""
+        return self.predicted / self.measured
+
+
+@dataclass(frozen=True)
+class TestFit:
+    """One test in the fit.
+
+    frames : how many entries count (strains above twice the floor of their scale, all frames of other outputs).
+    rms, bias : root mean square and mean of ln((predicted + offset) / measured) over its fitted strains, else NaN.
+        For a test compared over its whole life, of its distance in ln strain and ln time (see inverse.distance).
+    rate_factor : estimated factor of this test's creep rate on the law's (heat-to-heat scatter).
+    weight : of the test in the fit; below one where test_loss="student" found it far from the others.
+    rupture : its end, where that is known and predicted.
+    """
+
+    __test__ = False  # not a test case, whatever its name says to pytest
+
+    name: str
+    condition: str
+    frames: int
+    log_strain_rms: float
+    log_strain_bias: float
+    rate_factor: float = 1.0
+    weight: float = 1.0
+    outputs: tuple[OutputFit, ...] = ()
+    rupture: RuptureComparison | None = None
+
+    def __getitem__(self, output: str) -> OutputFit:
+        for one in self.outputs:
+            if one.output == output:
+                return one
+        raise FitError(
+            f"test '{self.name}' has no output '{output}'; it has {', '.join(o.output for o in self.outputs)}"
+        )
+
+    @property
+    def offset(self) -> float:
+        """Offset of its first output."""
+        return self.outputs[0].offset if self.outputs else 0.0
+
+
+def goodness_of_tests(
+    residual_function: ResidualFunction, residuals: Residuals, random_effects: tuple[Floats, Floats], histories: Sequence[History],
+    prediction: Prediction, ruptures: Sequence[RuptureComparison | None],
+) -> tuple[TestFit, ...]:  # fmt: skip
+    """One TestMisfit for each test.
+
+    nuisances : offsets (tests, outputs) and ln rate factors (tests,); found : the prediction of the `full` histories;
+    ruptures : how each of them ended.
+    """
+    offsets, log_factors = random_effects
+    observations = residual_function.observations
+    ratios = _log_ratios(residual_function, residuals, np.take_along_axis(offsets, observations.output_index, axis=1))
+    logarithmic = (
+        observations.per_observation([float(name in LOGARITHMIC_OUTPUTS) for name in observations.outputs]) > 0
+    )
+    test_fits = []
+    for k, history in enumerate(histories):
+        test_ratios = ratios[k][np.isfinite(ratios[k])]
+        rms, bias = (
+            (float(np.sqrt(np.mean(test_ratios**2))), float(np.mean(test_ratios)))
+            if test_ratios.size
+            else (np.nan, np.nan)
+        )
+        linear = int((observations.present[k] & ~logarithmic[k]).sum())
+        offset_by_output = {name: float(v) for name, v in zip(observations.outputs, offsets[k], strict=True)}
+        outputs = tuple(
+            _output_fit(history, name, prediction.of(k)[:, prediction.outputs.index(name)], offset_by_output[name])
+            for name in compared_outputs(residual_function.predictor, history) if name in offset_by_output and usable_frames(history, name).any()
+        )  # fmt: skip
+        rate_factor, weight = float(np.exp(log_factors[k])), float(residuals.test_weights[k])
+        test_fits.append(
+            TestFit(
+                history.name,
+                history.condition,
+                test_ratios.size + linear,
+                rms,
+                bias,
+                rate_factor,
+                weight,
+                outputs,
+                ruptures[k],
+            )
+        )
+    return tuple(test_fits)
+
+
+def _output_fit(history: History, name: str, predicted: Floats, offset: float) -> OutputFit:
+    frames, noise = usable_frames(history, name), noise_standard_deviation(history, name)
+    errors_of_output = output_errors(history.outputs[name][frames], predicted[frames] + offset, noise[frames])
+    return OutputFit(name, errors_of_output, offset, float(np.median(noise[frames])))
+
+
+def _log_ratios(residual_function: ResidualFunction, residuals: Residuals, offset: Floats) -> Floats:
+    """ln((predicted + the test's offset) / measured) where the measured strain is above twice the floor, else NaN.
+
+    For tests compared over their whole life, the distance instead.
+    """
+    observations = residual_function.observations
+    floor = observations.per_observation([s.floor if n in LOGARITHMIC_OUTPUTS else np.inf for n, s in zip(observations.outputs, observations.transforms,
+                                                                                  strict=True)])  # fmt: skip
+    vertical = np.where(observations.followed_to_rupture[:, None], 0.0, residuals.values)
+    predicted = observations.inverse(vertical + residual_function.observed) + offset
+    above_floor = observations.present & (observations.values > 2 * floor)
+    measured = np.where(above_floor, observations.values, 1.0)
+    predicted_strain = np.where(above_floor, np.maximum(predicted, floor), 1.0)
+    log_ratio = np.where(
+        observations.followed_to_rupture[:, None],
+        residuals.values + residuals.transform_derivatives * offset,
+        np.log(predicted_strain / measured),
+    )
+    return np.where(above_floor, log_ratio, np.nan)
+
+
+def pooled_log_strain_rms(tests: Sequence[TestFit]) -> float:
+    """Root mean square of ln strain over the fitted strains of all tests; NaN without any."""
+    with_strain = [m for m in tests if np.isfinite(m.log_strain_rms)]
+    frames = np.array([m.frames for m in with_strain], float)
+    if not frames.sum() > 0:
+        return float("nan")
+    return float(np.sqrt((frames * np.array([m.log_strain_rms**2 for m in with_strain])).sum() / frames.sum()))
+
+
+def pooled_errors(
+    histories: Sequence[History], prediction: Prediction, tests: Sequence[TestFit]
+) -> Mapping[str, OutputErrors]:
+    """{output: errors over all used frames of all tests}, offsets included."""
+    names = dict.fromkeys(output_fit.output for m in tests for output_fit in m.outputs)
+    errors_by_output = {}
+    for name in names:
+        measured, predicted, noise = [], [], []
+        for k, (history, test) in enumerate(zip(histories, tests, strict=True)):
+            for one in (o for o in test.outputs if o.output == name):
+                used = usable_frames(history, name)
+                measured.append(history.outputs[name][used])
+                predicted.append(prediction.of(k)[used, prediction.outputs.index(name)] + one.offset)
+                noise.append(noise_standard_deviation(history, name)[used])
+        errors_by_output[name] = output_errors(*(np.concatenate(v) for v in (measured, predicted, noise)))
+    return errors_by_output
+
+
+EXTRAPOLATION_FACTOR = 1000.0
+"""How far beyond the longest measured test, or its own last time, a test is followed to its rupture; the predictor's
+own horizon comes on top."""
+
+
+def predict_rupture_times(
+    coordinates: Coordinates, u: Floats, covariance: Floats, noise_model: NoiseModel | None, quantile: float,
+    histories: Sequence[History], predictor: Predictor,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    """Rupture times of histories, s, with intervals: (time, low, high), (tests,) each; infinite where none comes.
+
+    By the delta method on ln t, from the covariance of u; with `scatter` that of a single test's life comes on top.
+    """
+    for history in histories:
+        if not predicts_rupture(predictor, history):
+            name = getattr(predictor_for(predictor, history), "name", "predictor")
+            raise FitError(
+                f"history '{history.name}': {name} follows no test to rupture; give using=, such as uniaxial"
+            )
+    extended = [_extended_to_rupture(history) for history in histories]
+    prediction = predict_to_rupture(predictor, coordinates.law, coordinates.values(u), extended, jacobian=True)
+    assert prediction.times_to_strain is not None
+    assert prediction.times_to_strain.rupture_jacobian is not None
+    median_times = prediction.times_to_strain.rupture_times[0]
+    sensitivities = np.nan_to_num(prediction.times_to_strain.rupture_jacobian[0]) @ coordinates.jacobian(u)
+    variance = np.einsum("ti,ij,tj->t", sensitivities, covariance, sensitivities)
+    if noise_model is not None:
+        rupture_sd = noise_model[RUPTURE_OUTPUT].misfit if RUPTURE_OUTPUT in noise_model.outputs else 0.0
+        variance = variance + noise_model.rate**2 + rupture_sd**2
+    interval_factor = np.exp(quantile * np.sqrt(variance))
+    ruptured = np.isfinite(median_times)
+    return tuple(
+        np.where(ruptured, each, np.inf)
+        for each in (median_times, median_times / interval_factor, median_times * interval_factor)
+    )  # type: ignore[return-value]
+
+
+def _extended_to_rupture(history: History) -> History:
+    """What is asked of a test is when it breaks, however long after its last frame that may be."""
+    last_time = max(float(history.times[-1]), history.rupture_time or 0.0)
+    return history.replace(times=np.array([EXTRAPOLATION_FACTOR * last_time]), outputs={}, standard_deviation={})
+
+
+def constant_stress_tests(
+    stress: ArrayLike, temperature: ArrayLike, duration: float, control: str
+) -> tuple[list[History], tuple[int, ...]]:
+    """Uniaxial tests at constant load or stress for every pair of stress (MPa) and temperature (K), and their shape."""
+    stresses, temperatures = np.broadcast_arrays(np.asarray(stress, float), np.asarray(temperature, float))
+    if control not in ("load", "stress"):
+        raise FitError(f"control is '{control}'; allowed are load and stress")
+    if not (stresses > 0).all():
+        raise FitError("a rupture time was asked for at a stress that is not above zero; give tensile stresses, in MPa")
+    tests = [
+        History(f"{s:g} MPa, {T:g} K", np.array([duration]), {}, constant_stress(float(s), control), float(T))  # type: ignore[arg-type]
+        for s, T in zip(stresses.ravel(), temperatures.ravel(), strict=True)
+    ]
+    return tests, stresses.shape
+
+
+def compare_rupture_times(
+    coordinates: Coordinates, u: Floats, covariance: Floats, noise_model: NoiseModel, quantile: float,
+    histories: Sequence[History], predictor: Predictor,
+) -> list[RuptureComparison | None]:  # fmt: skip
+    """Measured against predicted, for every history; None where its end is not known or not predicted."""
+    followed = [k for k, h in enumerate(histories) if h.end_known and predicts_rupture(predictor, h)]
+    comparisons: list[RuptureComparison | None] = [None] * len(histories)
+    if not followed:
+        return comparisons
+    tests = [histories[k] for k in followed]
+    times = predict_rupture_times(coordinates, u, covariance, noise_model, quantile, tests, predictor)
+    for k, history, time, low, high in zip(followed, tests, *times, strict=True):
+        measured = history.rupture_time or float(history.times[-1])
+        comparisons[k] = RuptureComparison(measured, history.unruptured, float(time), float(low), float(high))
+    return comparisons

@@ -1,0 +1,392 @@
+"""Observation vector of an identification: usable and thinned frames, frame noise, output transforms, and the measured values of all tests end to end.
+
+Each test is one row: the frames of all its outputs, then its rupture time where that is known, padded to the longest test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats, Ints
+from creepkit.errors import FitError, SolveError
+from creepkit.inverse.composite_predictor import compared_outputs, predicts_rupture
+from creepkit.records import History, Prediction, Predictor
+
+LOGARITHMIC_OUTPUTS = ("strain",)
+"""Outputs that span decades."""
+
+
+RUPTURE_OUTPUT = "rupture"
+"""The output of tests that were followed to their end: the time of rupture, s. It has no frames of its own."""
+
+
+class OutputTransform(Protocol):
+    """A monotone map g from an output to the quantity in which it is compared."""
+
+    @property
+    def floor(self) -> float:
+        """The size, in the output's unit, below which a difference is nothing."""
+        ...
+
+    @property
+    def ceiling(self) -> float:
+        """The compared quantity at which a test that burst goes on."""
+        ...
+
+    def forward(self, y: Floats) -> Floats:
+        """The compared quantity."""
+        ...
+
+    def inverse(self, g: Floats) -> Floats:
+        """The output whose compared quantity is g."""
+        ...
+
+    def derivative(self, y: Floats) -> Floats:
+        """dg/dy."""
+        ...
+
+
+@dataclass(frozen=True)
+class LogTransform:
+    """g(y) = asinh(y / 2 floor): ln(y / floor) well above the floor, linear below it, finite for y <= 0."""
+
+    floor: float
+
+    @property
+    def ceiling(self) -> float:
+        """That of a strain of one."""
+        return float(np.arcsinh(1.0 / (2.0 * self.floor)))
+
+    def forward(self, y: Floats) -> Floats:
+        """The compared quantity."""
+        return np.arcsinh(y / (2.0 * self.floor))
+
+    def inverse(self, g: Floats) -> Floats:
+        """The output whose compared quantity is g."""
+        return 2.0 * self.floor * np.sinh(g)
+
+    def derivative(self, y: Floats) -> Floats:
+        """dg/dy; 1/y well above the floor."""
+        return 1.0 / np.hypot(y, 2.0 * self.floor)
+
+
+@dataclass(frozen=True)
+class LinearTransform:
+    """g(y) = y / size: with size the spread of what was measured, one means as wrong as the mean of all frames is.
+
+    largest : largest value measured.
+    """
+
+    scale: float
+    largest: float
+
+    @property
+    def floor(self) -> float:
+        """One per cent of the size."""
+        return 0.01 * self.scale
+
+    @property
+    def ceiling(self) -> float:
+        """That of the largest value measured."""
+        return self.largest / self.scale
+
+    def forward(self, y: Floats) -> Floats:
+        """The compared quantity."""
+        return y / self.scale
+
+    def inverse(self, g: Floats) -> Floats:
+        """The output whose compared quantity is g."""
+        return g * self.scale
+
+    def derivative(self, y: Floats) -> Floats:
+        """dg/dy."""
+        return np.full(np.shape(y), 1.0 / self.scale)
+
+
+@dataclass(frozen=True)
+class LogTimeTransform:
+    """g(t) = -ln t of a rupture time t in s: larger where a test breaks earlier, as strains are where it is faster."""
+
+    floor: float = 0.0
+    ceiling: float = 0.0
+
+    def forward(self, y: Floats) -> Floats:
+        """The compared quantity."""
+        return -np.log(y)
+
+    def inverse(self, g: Floats) -> Floats:
+        """The rupture time whose compared quantity is g."""
+        return np.exp(-g)
+
+    def derivative(self, y: Floats) -> Floats:
+        """dg/dy."""
+        return -1.0 / y
+
+
+def transform_for(histories: Sequence[History], output: str) -> OutputTransform:
+    """The scale of one output of these histories, all of which have it."""
+    if output == RUPTURE_OUTPUT:
+        return LogTimeTransform()
+    return (
+        log_transform_for(histories, output)
+        if output in LOGARITHMIC_OUTPUTS
+        else linear_transform_for(histories, output)
+    )
+
+
+def log_transform_for(histories: Sequence[History], output: str) -> LogTransform:
+    """A floor at 1 % of the median end value, and never below three times the frame-to-frame noise."""
+    largest_values = [float(np.max(h.outputs[output][usable_frames(h, output)], initial=0.0)) for h in histories]
+    noise = np.median([frame_noise(h, output) for h in histories])
+    median_largest = float(np.median(largest_values))
+    return LogTransform(max(0.01 * median_largest, 3.0 * float(noise), 1e-14))
+
+
+def linear_transform_for(histories: Sequence[History], output: str) -> LinearTransform:
+    """The standard deviation of all frames of all tests about their one mean."""
+    values = np.concatenate([h.outputs[output][usable_frames(h, output)] for h in histories])
+    scale = float(np.std(values)) if values.size else 0.0
+    largest = float(np.max(values, initial=0.0))
+    return LinearTransform(max(scale, 1e-6 * abs(largest), 1e-14), largest)
+
+
+def usable_frames(history: History, output: str) -> Bools:
+    """(frames,) which frames of one output may be used: marked so, after time zero, and a number."""
+    return np.asarray(history.used & (history.times > 0) & np.isfinite(history.outputs[output]))
+
+
+def frame_noise(history: History, output: str) -> float:
+    """Standard deviation of one output from frame to frame; 0 for under 6 frames.
+
+    From third differences, robustly, in time or in its logarithm, whichever calls less of the curve noise.
+    """
+    used = usable_frames(history, output)
+    times, values = history.times[used], history.outputs[output][used]
+    if times.size < 6:
+        return 0.0
+    return min(_noise_from_third_differences(x, values) for x in (times, np.log(times)))
+
+
+def _noise_from_third_differences(x: Floats, y: Floats) -> float:
+    """Spread of what is left of four neighbours once a parabola is taken off, in units of one frame's error."""
+    windows = np.lib.stride_tricks.sliding_window_view(x, 4)
+    differences = windows[:, :, None] - windows[:, None, :] + np.eye(4)
+    weights = 1.0 / differences.prod(axis=2)
+    remainders = (weights * np.lib.stride_tricks.sliding_window_view(y, 4)).sum(axis=1)
+    return float(1.4826 * np.median(np.abs(remainders / np.sqrt((weights**2).sum(axis=1)))))
+
+
+def noise_standard_deviation(history: History, output: str) -> Floats:
+    """(frames,) standard deviation of one output's error: as the history states it, else from frame to frame."""
+    stated = history.standard_deviation.get(output)
+    estimated = np.full(history.times.size, frame_noise(history, output))
+    if stated is None:
+        return estimated
+    return np.where(np.isfinite(stated) & (stated > 0), stated, estimated)
+
+
+def selected_frames(history: History, count: int) -> Ints:
+    """Indices of at most `count` used frames after time zero, half spread in ln t and half in t."""
+    candidates = np.flatnonzero(history.used & (history.times > 0) & frames_with_data(history))
+    if candidates.size <= count:
+        return candidates
+    times = history.times[candidates]
+    targets = np.concatenate(
+        [np.geomspace(times[0], times[-1], count - count // 2), np.linspace(times[0], times[-1], count // 2)]
+    )
+    nearest = np.abs(times[:, None] - targets[None, :]).argmin(axis=0)
+    return np.asarray(candidates[np.unique(nearest)])
+
+
+def frames_with_data(history: History) -> Bools:
+    """(frames,) whether any output has a number there."""
+    finite = [np.isfinite(values) for values in history.outputs.values()]
+    return np.asarray(np.any(finite, axis=0)) if finite else np.zeros(history.times.size, bool)
+
+
+def thinned_history(history: History, count: int) -> History:
+    """The history at its chosen frames only, all outputs of a frame together."""
+    selected = selected_frames(history, count)
+    return replace(
+        history,
+        times=history.times[selected],
+        outputs={name: values[selected] for name, values in history.outputs.items()},
+        standard_deviation={name: values[selected] for name, values in history.standard_deviation.items()},
+        used=np.ones(selected.size, bool),
+    )
+
+
+LINEAR_TEST_DURATION = 5.0
+"""Length of a test on the clock of outputs that are compared as they are, about that of a decade and a half of ln t."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObservationVector:
+    """Measured values of all tests, (tests, entries) each.
+
+    outputs, scales : names of what is compared, and on which scale.
+    output, frame : of each entry, positions in `outputs` and among the frames of its history.
+    present : which entries are data; the others pad, with zeros (times with ones).
+    leading : which belong to the output that grows with creep, the first that the predictor names.
+    measured, times : in the output's unit, and s.
+    noise : typical standard deviation of a frame of each output, (outputs,), in its unit.
+    loudness : noise of each entry over that.
+    whole : (tests,) which tests are compared over their whole life.
+    censored : (tests,) which of them were stopped before rupture.
+    """
+
+    outputs: tuple[str, ...]
+    transforms: tuple[OutputTransform, ...]
+    output_index: Ints
+    frame_index: Ints
+    present: Bools
+    leading_output: Bools
+    values: Floats
+    times: Floats
+    noise: Floats
+    relative_noise: Floats
+    followed_to_rupture: Bools
+    censored: Bools
+
+    @classmethod
+    def from_histories(
+        cls, histories: Sequence[History], predictor: Predictor, full: Sequence[History] | None = None
+    ) -> ObservationVector:
+        """The entries of histories; their noise is read off `full`, the same histories before frames were left out."""
+        full = histories if full is None else full
+        followed_to_rupture = np.array([h.end_known and predicts_rupture(predictor, h) for h in histories])
+        outputs_by_test = [
+            (*_observed_outputs(h, predictor), *[RUPTURE_OUTPUT][: int(w)])
+            for h, w in zip(histories, followed_to_rupture, strict=True)
+        ]
+        outputs = tuple(dict.fromkeys(name for names in outputs_by_test for name in names))
+        tests_by_output = {name: [k for k, names in enumerate(outputs_by_test) if name in names] for name in outputs}
+        transforms = tuple(transform_for([histories[k] for k in tests_by_output[name]], name) for name in outputs)
+        noise, noise_levels = np.zeros(len(outputs)), {}
+        for position, name in ((k, n) for k, n in enumerate(outputs) if n != RUPTURE_OUTPUT):
+            noise_by_test = [_noise_at_frames(full[k], histories[k], name) for k in tests_by_output[name]]
+            noise[position] = np.median([np.median(v) for v in noise_by_test])
+            noise_levels.update({(k, name): v for k, v in zip(tests_by_output[name], noise_by_test, strict=True)})
+        rows = [
+            [(n, _observed_frames(h, n)) for n in names] for h, names in zip(histories, outputs_by_test, strict=True)
+        ]
+        shape = len(histories), max(sum(f.size for _, f in row) for row in rows)
+        observations = cls(
+            outputs, transforms, np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros(shape, bool),
+            np.zeros(shape, bool), np.zeros(shape), np.ones(shape), noise, np.ones(shape),
+            followed_to_rupture, followed_to_rupture & np.array([h.unruptured for h in histories]),
+        )  # fmt: skip
+        for k, (history, row) in enumerate(zip(histories, rows, strict=True)):
+            observations._fill_test(k, history, row, noise_levels)
+        return observations
+
+    def _fill_test(
+        self, k: int, history: History, row: Sequence[tuple[str, Ints]], noise_levels: dict[tuple[int, str], Floats]
+    ) -> None:
+        start = 0
+        for rank, (name, frames) in enumerate(row):
+            columns, position = slice(start, start + frames.size), self.outputs.index(name)
+            self.output_index[k, columns], self.frame_index[k, columns], self.present[k, columns] = (
+                position,
+                frames,
+                True,
+            )
+            self.leading_output[k, columns] = rank == 0
+            if name == RUPTURE_OUTPUT:
+                self.values[k, columns] = self.times[k, columns] = history.rupture_time or history.times[-1]
+                continue
+            self.values[k, columns], self.times[k, columns] = history.outputs[name][frames], history.times[frames]
+            noise = noise_levels[k, name][frames]
+            if name not in LOGARITHMIC_OUTPUTS or name in history.standard_deviation:
+                typical_noise = self.noise[position]
+                self.relative_noise[k, columns] = (
+                    np.where(noise > 0, noise, typical_noise) / typical_noise if typical_noise > 0 else 1.0
+                )
+            start += frames.size
+
+    @property
+    def log_times(self) -> Floats:
+        """(tests, entries) ln of time."""
+        return np.log(self.times)
+
+    @property
+    def correlation_time(self) -> Floats:
+        """(tests, entries) ln of time where an output is compared by its logarithm, else WHOLE t / its last time."""
+        last_times = np.where(self.present, self.times, 0.0).max(axis=1, keepdims=True)
+        logarithmic = (
+            self.per_observation([float(name in (*LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT)) for name in self.outputs]) > 0
+        )
+        return np.where(logarithmic, self.log_times, LINEAR_TEST_DURATION * self.times / np.maximum(last_times, 1e-300))
+
+    def forward(self, y: Floats) -> Floats:
+        """What is compared, of outputs (..., tests, entries)."""
+        return self._transformed(y, lambda scale: scale.forward)
+
+    def inverse(self, g: Floats) -> Floats:
+        """Outputs, of what is compared (..., tests, entries)."""
+        return self._transformed(g, lambda scale: scale.inverse)
+
+    def derivative(self, y: Floats) -> Floats:
+        """Derivative of what is compared to the output, (..., tests, entries)."""
+        return self._transformed(y, lambda scale: scale.derivative)
+
+    def per_observation(self, values: Sequence[float] | Floats) -> Floats:
+        """(outputs,) numbers at each entry, (tests, entries)."""
+        return np.asarray(values, float)[self.output_index]
+
+    @property
+    def rupture_mask(self) -> Bools:
+        """(tests, entries) which entries are rupture times, or times lasted."""
+        return np.asarray(
+            self.present & self.per_observation([float(n == RUPTURE_OUTPUT) for n in self.outputs]).astype(bool)
+        )
+
+    def select_outputs(self, array: Floats, prediction: Prediction) -> Floats:
+        """The entries out of an array like found.values: (candidates, tests, times, outputs, ...).
+
+        Those of ruptures hold what stands first in the test: they are not among the outputs.
+        """
+        observed = [name for name in self.outputs if name != RUPTURE_OUTPUT]
+        missing = [name for name in observed if name not in prediction.outputs]
+        if missing:
+            raise SolveError(
+                f"the predictor gave no output '{missing[0]}', which the histories have; it gave "
+                f"{', '.join(prediction.outputs)}"
+            )
+        places = [prediction.outputs.index(name) if name != RUPTURE_OUTPUT else 0 for name in self.outputs]
+        columns = np.array(places)[self.output_index]
+        return np.asarray(array[:, np.arange(len(columns))[:, None], self.frame_index, columns])
+
+    def select_frames(self, array: Floats) -> Floats:
+        """The entries out of an array (candidates, tests, times, ...) that knows no outputs."""
+        return np.asarray(array[:, np.arange(len(self.frame_index))[:, None], self.frame_index])
+
+    def _transformed(self, y: Floats, method: Callable[[OutputTransform], Callable[[Floats], Floats]]) -> Floats:
+        out = np.empty_like(y)
+        for position, transform in enumerate(self.transforms):
+            mask = self.output_index == position
+            out[..., mask] = method(transform)(y[..., mask])
+        return out
+
+
+def _observed_outputs(history: History, predictor: Predictor) -> tuple[str, ...]:
+    names = tuple(n for n in compared_outputs(predictor, history) if usable_frames(history, n).any())
+    if not names:
+        raise FitError(
+            f"history '{history.name}' has no output that is predicted; it has {', '.join(history.outputs) or 'none'}"
+        )
+    return names
+
+
+def _observed_frames(history: History, name: str) -> Ints:
+    return np.zeros(1, np.int64) if name == RUPTURE_OUTPUT else np.flatnonzero(usable_frames(history, name))
+
+
+def _noise_at_frames(full: History, thinned: History, name: str) -> Floats:
+    """(frames of `seen`,) noise as the whole history shows it."""
+    noise = noise_standard_deviation(full, name)
+    return noise[np.searchsorted(full.times, thinned.times)]

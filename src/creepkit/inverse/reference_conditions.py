@@ -1,0 +1,191 @@
+"""Reference conditions of the tests: stress, strain and temperature that stand for a test, and whether a test shows creep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats, Ints
+from creepkit.inverse.composite_predictor import predictor_for
+from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
+from creepkit.language import CreepLaw, arrhenius, temperature
+from creepkit.records import ZERO_CELSIUS, History, Predictor
+
+LOAD_TOLERANCE = 0.02
+"""Relative change of a load within which it is held."""
+
+
+MINIMUM_FRAMES = 6
+"""Frames of a hold that say something of growth."""
+
+
+SIGNIFICANT_ERRORS = 5.0
+"""Standard errors that a growth must exceed; and it must exceed the noise of one frame."""
+
+
+@dataclass(frozen=True)
+class CreepDetection:
+    """By how much an output grows during the holds, its standard error, and the noise of a frame, in its unit.
+
+    All are NaN where no hold has frames enough.
+    """
+
+    increase: float
+    standard_error: float
+    noise: float
+
+    @property
+    def shows_creep(self) -> bool:
+        """Whether it is creep; true also where nothing can be said."""
+        return not self.increase <= max(SIGNIFICANT_ERRORS * self.standard_error, self.noise)
+
+
+def detect_creep(history: History, output: str) -> CreepDetection:
+    """Mean of the last third of each hold less that of its first, summed over holds."""
+    noise = float(np.median(noise_standard_deviation(history, output)))
+    values, holds = history.outputs[output], list(_load_holds(history, usable_frames(history, output)))
+    if not holds:
+        return CreepDetection(float("nan"), float("nan"), noise)
+    thirds = [np.array_split(frames, 3) for frames in holds]
+    increase = sum(
+        float(values[last_third].mean() - values[first_third].mean()) for first_third, _, last_third in thirds
+    )
+    variance = sum(1.0 / first.size + 1.0 / last.size for first, _, last in thirds)
+    return CreepDetection(increase, noise * float(np.sqrt(variance)), noise)
+
+
+def distinct_loads(histories: Sequence[History]) -> list[float]:
+    """The loads at the used frames of tests, one for all that lie within 2 % of it."""
+    loads: list[float] = []
+    for history in histories:
+        program = history.loading.program()
+        for load in np.interp(history.times[history.used], program.times, program.values):
+            if load > 0 and not any(abs(load - level) <= LOAD_TOLERANCE * level for level in loads):
+                loads.append(float(load))
+    return loads
+
+
+def _load_holds(history: History, used: Bools) -> Iterator[Ints]:
+    """The frames of each hold of the load that has enough of them."""
+    frames = np.flatnonzero(used)
+    program = history.loading.program()
+    load = np.interp(history.times[frames], program.times, program.values)
+    start = 0
+    for k in range(1, frames.size + 1):
+        if k == frames.size or abs(load[k] - load[start]) > LOAD_TOLERANCE * abs(load[start]):
+            if k - start >= MINIMUM_FRAMES:
+                yield frames[start:k]
+            start = k
+
+
+STRESS_PER_PRESSURE = 12.5
+
+
+AMPLITUDE_PER_STRAIN = 30.0
+"""mm."""
+
+
+def reference_stresses(history: History, predictor: Predictor | None = None) -> Floats:
+    """The reference stresses that a test visits, MPa."""
+    reference_stress = (
+        None if predictor is None else getattr(predictor_for(predictor, history), "reference_stress", None)
+    )
+    loads = history.loading.program().values
+    if reference_stress is not None:
+        return np.atleast_1d(np.asarray(reference_stress(history), float))
+    if history.loading.quantity == "stress":
+        return loads
+    return STRESS_PER_PRESSURE * np.unique(loads[loads > 0])
+
+
+def reference_end_strain(history: History, predictor: Predictor | None = None) -> float:
+    """The largest strain that a test reached, as far as its outputs tell; `using` may know what they mean."""
+    reference_strain = (
+        None if predictor is None else getattr(predictor_for(predictor, history), "reference_strain", None)
+    )
+    if reference_strain is not None:
+        return max(float(reference_strain(history)), 1e-7)
+    if "strain" in history.outputs:
+        return max(float(np.max(history.outputs["strain"][usable_frames(history, "strain")], initial=0.0)), 1e-7)
+    return max(_output_increase(history)[0] / AMPLITUDE_PER_STRAIN, 1e-7)
+
+
+def median_log_strain_rate(histories: Sequence[History], predictor: Predictor | None = None) -> float:
+    """Median over tests of the log of strain over time: the scale of rates that the data speak of."""
+    log_rates = []
+    for history in histories:
+        if predictor is not None and hasattr(predictor_for(predictor, history), "reference_strain"):
+            strain, time = reference_end_strain(history, predictor), float(history.times[history.used][-1])
+        elif "strain" in history.outputs:
+            last = int(np.flatnonzero(usable_frames(history, "strain"))[-1])
+            strain, time = float(history.outputs["strain"][last]), float(history.times[last])
+        else:
+            increase, time = _output_increase(history)
+            strain = increase / AMPLITUDE_PER_STRAIN
+        log_rates.append(np.log(max(strain, 1e-9) / time))
+    return float(np.median(log_rates))
+
+
+def median_log_inverse_duration(histories: Sequence[History]) -> float:
+    """Median over tests of -ln of how long they lasted, s: the pace of whatever ends them."""
+    return float(-np.median([np.log(h.rupture_time or h.times[-1]) for h in histories]))
+
+
+def _output_increase(history: History) -> tuple[float, float]:
+    """How much the output that grows with creep did so between the first and last usable frame, and in which time."""
+    output = "amplitude" if "amplitude" in history.outputs else next(iter(history.outputs))
+    used = np.flatnonzero(usable_frames(history, output))
+    values, times = history.outputs[output][used], history.times[used]
+    if used.size < 2:
+        return 0.0, float(history.times[-1])
+    return abs(float(values[-1] - values[0])), float(times[-1] - times[0])
+
+
+ISOTHERMAL_RANGE = 5.0
+"""K; tests within this range are taken to be at one temperature."""
+
+
+def reference_temperature(histories: Sequence[History]) -> float:
+    """The median temperature of the tests, rounded to 10 C, in K."""
+    temperatures = [float(np.mean(h.temperature_program().values)) for h in histories]
+    return float(round((np.median(temperatures) - ZERO_CELSIUS) / 10.0) * 10.0 + ZERO_CELSIUS)
+
+
+def spans_temperatures(histories: Sequence[History]) -> bool:
+    """Whether the tests span more than 5 K."""
+    temperatures = [float(v) for h in histories for v in h.temperature_program().values]
+    return max(temperatures) - min(temperatures) > ISOTHERMAL_RANGE
+
+
+def with_arrhenius(law: CreepLaw, histories: Sequence[History]) -> CreepLaw:
+    """The law times an Arrhenius factor about the median temperature, if the tests call for one and it has none."""
+    if law.uses(temperature) or not spans_temperatures(histories):
+        return law
+    return law.times(arrhenius(T_ref=reference_temperature(histories)))
+
+
+@dataclass(frozen=True)
+class ReferencePoint:
+    """The point at which term rates are stated: stress MPa, strain, time s, temperature K."""
+
+    stress: float
+    strain: float
+    time: float
+    temperature: float
+
+    @classmethod
+    def from_histories(cls, histories: Sequence[History], predictor: Predictor | None = None) -> ReferencePoint:
+        """The middle of what was measured: geometric means of stress and time, of half the end strain; median T.
+
+        using : where it states reference stresses, they count (see inverse.nominal).
+        """
+        mean_stresses = [
+            float(np.exp(np.mean(np.log(np.maximum(reference_stresses(h, predictor), 1e-6))))) for h in histories
+        ]
+        times = [float(h.times[h.used][-1]) for h in histories]
+        strains = [reference_end_strain(h, predictor) for h in histories]
+        temperatures = [float(np.mean(h.temperature_program().values)) for h in histories]
+        central_values = [float(np.exp(np.mean(np.log(v)))) for v in (mean_stresses, strains, times)]
+        return cls(central_values[0], 0.5 * central_values[1], 0.5 * central_values[2], float(np.median(temperatures)))

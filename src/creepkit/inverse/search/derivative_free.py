@@ -1,0 +1,313 @@
+"""Derivative-free global searches: particle swarm, as in the paper, and CMA-ES; each iteration is one batched prediction.
+
+A particle at x (in the unit cube of the bounds) with velocity v is attracted by the best position that it has visited,
+p, and by the best that any particle has visited, g:
+
+    v <- K [v + c1 r1 (p - x) + c2 r2 (g - x)],   K = 2 / |2 - c - sqrt(c^2 - 4 c)|,   c = c1 + c2    "constriction"
+    v <- w v + c1 r1 (p - x) + c2 r2 (g - x),     w falling linearly over the iterations               "inertia"
+    x <- x + v,                                   r1, r2 uniform in [0, 1], one for each coordinate
+
+(Kennedy & Eberhart 1995; Shi & Eberhart 1999; Clerc & Kennedy 2002.) CMA-ES adapts the covariance of its samples and
+uses only the order of the costs: Hansen (2016), The CMA Evolution Strategy: A Tutorial; restarts with twice the
+population: Auger & Hansen (2005), IPOP-CMA-ES. The best candidates that differ are refined by least squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from scipy.stats import qmc
+
+from creepkit.arrays import Bools, Floats
+from creepkit.errors import FitError
+from creepkit.inverse.search.cost_function import SearchTrace
+from creepkit.inverse.search.term_mask import (
+    CONVERGED_DECREASE,
+    SearchCandidates,
+    TermMask,
+    check_whole_numbers,
+    refine_candidates,
+)
+
+if TYPE_CHECKING:
+    from cmaes import CMA
+
+    from creepkit.inverse.search.cost_function import CostFunction, SearchResult
+    from creepkit.inverse.search.local_refinement import IterationCallback
+
+
+if TYPE_CHECKING:
+    from creepkit.inverse.search.cost_function import CostFunction, SearchResult
+    from creepkit.inverse.search.local_refinement import IterationCallback
+
+
+STALL_GENERATIONS = 10
+"""Generations whose lowest costs no longer differ when a run has arrived: least squares does the rest."""
+
+
+@dataclass(frozen=True)
+class CmaEs:
+    """CMA-ES in the unit cube of the box, with restarts.
+
+    iterations : generations of all runs together. population : of the first run, None for 8 + 6 ln(parameters), twice
+    the package's own, as landscapes of creep have valleys beside the right one. step : first standard deviation, in
+    widths of the box. restarts : further runs at most, each of twice the population. polish : how many of the best
+    candidates, different ones, are refined by least squares; 0 leaves the best as it is.
+    """
+
+    iterations: int = 200
+    population: int | None = None
+    initial_step_size: float = 0.25
+    restarts: int = 1
+    refined_candidates: int = 3
+
+    def __post_init__(self) -> None:
+        minimum_values = {"iterations": 1, "restarts": 0, "refined_candidates": 0} | (
+            {} if self.population is None else {"population": 3}
+        )
+        check_whole_numbers("CMA-ES", {name: getattr(self, name) for name in minimum_values}, minimum_values)
+        if not 0 < self.initial_step_size <= 1:
+            raise FitError(f"CMA-ES: step is {self.initial_step_size:g} of the box; allowed are 0 (not itself) to 1")
+
+    def minima(self, cost_function: CostFunction, progress: IterationCallback | None = None) -> SearchResult:
+        """The refined best, best first, and the trace."""
+        runs = _CmaEsRuns(self, cost_function)
+        for k in range(self.iterations):
+            runs.generation()
+            if progress is not None:
+                progress("generation", k + 1, self.iterations)
+            if runs.has_converged() and not runs.restart():
+                break
+        trace = SearchTrace.from_costs("CMA-ES", runs.costs, runs.restarts)
+        return refine_candidates(cost_function, runs.candidates(), self.refined_candidates, trace, progress)
+
+    def initial_population(self, size: int) -> int:
+        """How many candidates the first run has in a generation, for so many parameters."""
+        return self.population or 8 + int(6 * np.log(size))
+
+
+class _CmaEsRuns:
+    """One run after another, and the best candidate of each generation."""
+
+    def __init__(self, rules: CmaEs, cost_function: CostFunction) -> None:
+        self.rules, self.cost_function = rules, cost_function
+        self.rng = np.random.default_rng(cost_function.settings.seed)
+        self.costs: list[Floats] = []
+        self.best_points: list[Floats] = []
+        self.restarts: list[int] = []
+        self.optimiser = self._new_optimiser(np.full(cost_function.bounds.lower.size, 0.5))
+
+    def generation(self) -> None:
+        """Ask, evaluate all at once, and tell."""
+        bounds = self.cost_function.bounds
+        points = np.array([self.optimiser.ask() for _ in range(self.optimiser.population_size)])
+        cost = self.cost_function.cost(bounds.lower + points * bounds.width)
+        self.optimiser.tell([(x, float(c)) for x, c in zip(points, cost, strict=True)])
+        self.costs.append(cost)
+        self.best_points.append(points[cost.argmin()])
+
+    def has_converged(self) -> bool:
+        """Whether this run has nothing more to gain."""
+        lowest_costs = [float(cost.min()) for cost in self.costs[self.restarts[-1] if self.restarts else 0 :]]
+        stalled = (
+            len(lowest_costs) > STALL_GENERATIONS and np.ptp(lowest_costs[-STALL_GENERATIONS:]) < CONVERGED_DECREASE
+        )
+        return bool(stalled or self.optimiser.should_stop())
+
+    def restart(self) -> bool:
+        """Begin anew with twice the population, if that is allowed once more."""
+        if len(self.restarts) == self.rules.restarts:
+            return False
+        self.restarts.append(len(self.costs))
+        self.optimiser = self._new_optimiser(self.rng.random(self.cost_function.bounds.lower.size))
+        return True
+
+    def candidates(self) -> SearchCandidates:
+        """The best of each generation."""
+        bounds = self.cost_function.bounds
+        return SearchCandidates(
+            bounds.lower + np.array(self.best_points) * bounds.width, np.array([cost.min() for cost in self.costs])
+        )
+
+    def _new_optimiser(self, mean: Floats) -> CMA:
+        from cmaes import CMA
+
+        population = self.rules.initial_population(mean.size) * 2 ** len(self.restarts)
+        bounds, seed = np.tile([0.0, 1.0], (mean.size, 1)), int(self.rng.integers(2**32))
+        return CMA(mean, self.rules.initial_step_size, bounds, seed=seed, population_size=population)
+
+
+@dataclass(frozen=True)
+class ParticleSwarm:
+    """A swarm and its rules; numbers of particles and iterations are the paper's.
+
+    own, common : c1, c2; velocity : the largest, in widths of the box. 2.05, 2.05, .15, form="constriction" and a start
+        at rest from a Sobol set are the settings of the authors' published code (NIMSI-NU/DABI-Property-Extraction).
+        That one is for finite elements in the loop: 70 particles, each told of a new best at once; here an iteration is
+        one prediction, so that all hear of it together. The table of the paper's 300 x 100 (S1) is not at hand, nor is
+        it said what happens at the walls.
+    inertia : w of the first and of the last iteration, for form="inertia" (Shi & Eberhart 1999).
+    walls : "absorb" stops a particle there, which suits optima on bounds; "reflect" sends it back.
+    off : names of terms of a sum, or "any", that a particle may switch off: a coefficient in {0} U [bounds]. A particle
+        has a mask beside its position, inherited from its own best and the common best by the toss of a coin, with a
+        flip now and then, and follows the best of its subset. This makes zero possible, not preferred: more terms never
+        fit worse, so that it takes a penalty to choose among subsets. The minima are the best of each of the best
+        subsets, and say which terms are off.
+    polish : how many of the best particles, different ones, are refined; 0 leaves the best as it is.
+    patience : end after so many iterations in which the best cost fell by less than 1e-3 (half of chi-square), or None.
+    """
+
+    particles: int = 300
+    iterations: int = 100
+    form: Literal["constriction", "inertia"] = "constriction"
+    cognitive: float = 2.05
+    social: float = 2.05
+    inertia: tuple[float, float] = (0.9, 0.4)
+    max_velocity: float = 0.15
+    boundary: Literal["absorb", "reflect"] = "absorb"
+    maskable_terms: str | Sequence[str] = ()
+    refined_candidates: int = 3
+    patience: int | None = None
+
+    def __post_init__(self) -> None:
+        minimum_values = {"particles": 2, "iterations": 1, "refined_candidates": 0} | (
+            {} if self.patience is None else {"patience": 1}
+        )
+        check_whole_numbers("particle swarm", {name: getattr(self, name) for name in minimum_values}, minimum_values)
+        for name, allowed in (("form", ("constriction", "inertia")), ("walls", ("absorb", "reflect"))):
+            value = getattr(self, name)
+            if value not in allowed:
+                raise FitError(f"particle swarm: {name} is {value!r}; allowed are {' and '.join(allowed)}")
+        if not 0 < self.max_velocity <= 1:
+            raise FitError(
+                f"particle swarm: velocity is {self.max_velocity:g} of the box; allowed are 0 (not itself) to 1"
+            )
+        if not all(0 <= w <= 1 for w in self.inertia):
+            raise FitError(f"particle swarm: inertia is {self.inertia}; both are from 0 to 1")
+        if min(self.cognitive, self.social) < 0 or (self.form == "constriction" and self.cognitive + self.social <= 4):
+            raise FitError(
+                f"particle swarm: own and common pull with {self.cognitive:g} and {self.social:g}; they must not be below "
+                "zero and, with form='constriction', must be more than 4 together"
+            )
+
+    def minima(self, cost_function: CostFunction, progress: IterationCallback | None = None) -> SearchResult:
+        """The refined best, best first, and the trace."""
+        swarm, costs = _Swarm(self, cost_function), []
+        for k in range(self.iterations):
+            costs.append(swarm.evaluate())
+            if progress is not None:
+                progress("swarm", k + 1, self.iterations)
+            if self._has_converged(swarm.lowest_costs):
+                break
+            swarm.move(k)
+        trace = SearchTrace.from_costs(f"particle swarm of {self.particles}, {self.form} form", costs)
+        return refine_candidates(cost_function, swarm.candidates(), self.refined_candidates, trace, progress)
+
+    def next_velocity(self, velocity: Floats, attraction: Floats, iteration: int) -> Floats:
+        """The velocity after iteration k, from the one before and the pull of the best places, within its limit."""
+        if self.form == "constriction":
+            acceleration = self.cognitive + self.social
+            updated = (
+                2.0
+                / abs(2.0 - acceleration - np.sqrt(acceleration * acceleration - 4.0 * acceleration))
+                * (velocity + attraction)
+            )
+        else:
+            first, last = self.inertia
+            updated = (first + (last - first) * iteration / max(self.iterations - 1, 1)) * velocity + attraction
+        return np.asarray(np.clip(updated, -self.max_velocity, self.max_velocity))
+
+    def _has_converged(self, lowest_costs: Sequence[float]) -> bool:
+        if self.patience is None or len(lowest_costs) <= self.patience:
+            return False
+        return lowest_costs[-1 - self.patience] - lowest_costs[-1] < CONVERGED_DECREASE
+
+
+class _Swarm:
+    """Where all particles are, in the unit cube, and the best that each has seen."""
+
+    def __init__(self, rules: ParticleSwarm, cost_function: CostFunction) -> None:
+        self.rules, self.cost_function, seed = rules, cost_function, cost_function.settings.seed
+        self.rng, self.term_mask = (
+            np.random.default_rng(seed),
+            TermMask.from_cost_function(cost_function, rules.maskable_terms),
+        )
+        count, size = rules.particles, cost_function.bounds.lower.size
+        self.x, self.velocity = _sobol_points(count, size, seed), np.zeros((count, size))
+        self.masks = self.term_mask.initial_masks(count, self.rng)
+        self.best_position, self.best_masks, self.best_cost = self.x.copy(), self.masks.copy(), np.full(count, np.inf)
+        self.lowest_costs: list[float] = []
+        self.best_by_mask: dict[bytes, tuple[float, Floats, Bools]] = {}
+
+    def evaluate(self) -> Floats:
+        """(particles,) costs where they are, in one prediction; the best are remembered."""
+        cost = self.cost_function.cost(self._coordinates(self.x, self.masks))
+        better = cost < self.best_cost
+        self.best_position[better], self.best_masks[better], self.best_cost[better] = (
+            self.x[better],
+            self.masks[better],
+            cost[better],
+        )
+        self.lowest_costs.append(float(self.best_cost.min()))
+        for k in np.flatnonzero(better) if self.term_mask.terms else ():
+            self._store_best_of_mask(self.masks[k], float(cost[k]), self.x[k])
+        return cost
+
+    def _store_best_of_mask(self, mask: Bools, cost: float, position: Floats) -> None:
+        """The best of each subset."""
+        key = mask.tobytes()
+        if key not in self.best_by_mask or cost < self.best_by_mask[key][0]:
+            self.best_by_mask[key] = cost, position.copy(), mask.copy()
+
+    def move(self, iteration: int) -> None:
+        """One step of all; what a better one does not have, draws nobody."""
+        shape, rules = self.x.shape, self.rules
+        self.masks = self.term_mask.recombined(self.best_masks, self.best_masks[self.best_cost.argmin()], self.rng)
+        leaders, masks = self._leaders()
+        to_personal_best = np.where(self.term_mask.active_parameters(self.best_masks), self.best_position - self.x, 0.0)
+        to_global_best = np.where(self.term_mask.active_parameters(masks), leaders - self.x, 0.0)
+        attraction = (
+            rules.cognitive * self.rng.random(shape) * to_personal_best
+            + rules.social * self.rng.random(shape) * to_global_best
+        )
+        self.velocity = rules.next_velocity(self.velocity, attraction, iteration)
+        self._apply_boundary(self.x + self.velocity)
+
+    def _leaders(self) -> tuple[Floats, Bools]:
+        """Whom each particle follows, and with which terms: the best of its subset, or of all if it is the first."""
+        k = int(self.best_cost.argmin())
+        if not self.term_mask.terms:
+            return self.best_position[k], self.best_masks[k]
+        global_best = (0.0, self.best_position[k], self.best_masks[k])
+        _, positions, masks = zip(
+            *(self.best_by_mask.get(mask.tobytes(), global_best) for mask in self.masks), strict=True
+        )
+        return np.array(positions), np.array(masks)
+
+    def candidates(self) -> SearchCandidates:
+        """The best that each particle has seen; where terms may be off, the best of each subset."""
+        if self.term_mask.terms:
+            costs, positions, masks = (np.array(each) for each in zip(*self.best_by_mask.values(), strict=True))
+            return SearchCandidates(self._coordinates(positions, masks), costs, self.term_mask, masks)
+        return SearchCandidates(self._coordinates(self.best_position, self.best_masks), self.best_cost)
+
+    def _coordinates(self, positions: Floats, masks: Bools) -> Floats:
+        bounds = self.cost_function.bounds
+        return self.term_mask.applied(bounds.lower + positions * bounds.width, masks)
+
+    def _apply_boundary(self, x: Floats) -> None:
+        inside = np.clip(x, 0.0, 1.0)
+        if self.rules.boundary == "absorb":
+            self.velocity = np.where(x == inside, self.velocity, 0.0)
+            self.x = inside
+        else:
+            self.velocity = np.where(x == inside, self.velocity, -self.velocity)
+            self.x = np.clip(2.0 * inside - x, 0.0, 1.0)
+
+
+def _sobol_points(count: int, size: int, seed: int) -> Floats:
+    """(count, size) the first points of a scrambled Sobol set, which is balanced in powers of two."""
+    return np.asarray(qmc.Sobol(size, seed=seed).random_base2(int(np.ceil(np.log2(count))))[:count])

@@ -1,0 +1,162 @@
+"""Batched Levenberg-Marquardt: least squares from several starts, all of which share each prediction.
+
+Steps are projected on the bounds: a coordinate that stands at its bound and is pushed outwards is left out of the step
+(Kanzow, Yamashita & Fukushima (2004), J. Comput. Appl. Math. 172, 375); a step is accepted only if the cost falls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from creepkit.arrays import Floats, Ints
+from creepkit.inverse.bound_penalties import BoundPenalties
+from creepkit.inverse.search.cost_function import FAILED_COST, CostFunction, robust_loss, robust_weight
+from creepkit.inverse.search.local_refinement import PRIOR_STRENGTH, IterationCallback, Minimum
+
+MAX_STEPS = 40
+
+
+TOLERANCE = 1e-5
+"""Relative fall of the cost below which a start has arrived, twice in turn."""
+
+
+CONTINUED = 4
+"""Of the best ends, how many go on where they have not arrived."""
+
+
+DAMPING_RANGE = (1e-3, 1e8)
+"""First damping, relative to the diagonal of J'J over the box, and the one at which a start has nowhere to go."""
+
+
+def batched_levenberg_marquardt(
+    cost_function: CostFunction, starts: Sequence[Floats], *, max_steps: int = MAX_STEPS, progress: IterationCallback | None = None,
+    costs: list[Floats] | None = None,
+) -> list[Minimum]:  # fmt: skip
+    """The minima that the starts lead to, best first; costs : is given the costs of all starts after each step.
+
+    Damage that runs away makes a cost with kinks, at which projected steps come to rest: laws with internal variables,
+    and tests that are followed to rupture, are refined one by one in a trust region.
+    """
+    if cost_function.objective.observations.followed_to_rupture.any() or cost_function.objective.law.states:
+        minima = []
+        for k, u in enumerate(starts):
+            minima.append(cost_function.refine(u, max_steps=30))
+            if progress is not None:
+                progress("start", k + 1, len(starts))
+        return sorted(minima, key=lambda minimum: minimum.cost)
+    ends = _BatchedLevenbergMarquardt(cost_function, np.array(starts, float)).run(
+        max_steps, progress, [] if costs is None else costs
+    )
+    return sorted([*_continued(cost_function, ends[:CONTINUED]), *ends[CONTINUED:]], key=lambda minimum: minimum.cost)
+
+
+def _continued(cost_function: CostFunction, minima: Sequence[Minimum]) -> list[Minimum]:
+    """Minima that have not arrived go on by themselves, in a trust region that follows bent valleys better."""
+    finished = []
+    for minimum in minima:
+        if not minimum.converged:
+            continued = cost_function.refine(minimum.u)
+            minimum = (
+                replace(continued, evaluations=continued.evaluations + minimum.evaluations)
+                if continued.cost < minimum.cost
+                else minimum
+            )
+        finished.append(minimum)
+    return finished
+
+
+class _BatchedLevenbergMarquardt:
+    """The state of all starts: where they are, their residuals and Jacobians, and how damped they step."""
+
+    def __init__(self, cost_function: CostFunction, starts: Floats) -> None:
+        self.cost_function, self.bounds = cost_function, cost_function.bounds
+        self.bound_penalties = BoundPenalties(cost_function.objective)
+        self.u = self.bounds.clip(starts)
+        count, size = self.u.shape
+        self.cost, self.whitened = np.full(count, np.inf), [np.zeros(0)] * count
+        self.gradient, self.hessian = np.zeros((count, size)), np.zeros((count, size, size))
+        self.damping, self.stalled_steps = np.full(count, DAMPING_RANGE[0]), np.zeros(count, int)
+        self.evaluations = np.zeros(count, int)
+        self._evaluate(np.arange(count), self.u)
+
+    def run(self, max_steps: int, progress: IterationCallback | None, costs: list[Floats]) -> list[Minimum]:
+        """Step until all have arrived."""
+        for _ in range(max_steps):
+            costs.append(self.cost.copy())
+            active = np.flatnonzero((self.stalled_steps < 2) & (self.damping < DAMPING_RANGE[1]))
+            if progress is not None:
+                progress("start", len(self.u) - active.size, len(self.u))
+            if not active.size:
+                break
+            self._evaluate(active, np.stack([self._trial_point(int(k)) for k in active]))
+        minima = [
+            Minimum(
+                self.u[k],
+                float(self.cost[k]),
+                bool(self.stalled_steps[k] >= 2),
+                int(self.evaluations[k]),
+                self.whitened[k],
+            )
+            for k in range(len(self.u))
+        ]
+        return sorted(minima, key=lambda minimum: minimum.cost)
+
+    def _trial_point(self, k: int) -> Floats:
+        """Where a start tries to go next."""
+        scale = self.bounds.width
+        gradient, hessian = self.gradient[k] * scale, self.hessian[k] * np.outer(scale, scale)
+        blocked = ((self.u[k] <= self.bounds.lower) & (gradient > 0)) | (
+            (self.u[k] >= self.bounds.upper) & (gradient < 0)
+        )
+        free = np.flatnonzero(~blocked)
+        if not free.size:
+            return np.asarray(self.u[k])
+        free_hessian = hessian[np.ix_(free, free)]
+        free_hessian = free_hessian + self.damping[k] * np.diag(
+            np.maximum(np.diag(free_hessian), 1e-12 * np.trace(free_hessian) + 1e-300)
+        )
+        step = np.zeros(scale.size)
+        step[free] = -np.linalg.solve(free_hessian, gradient[free])
+        return np.asarray(self.bounds.clip(self.u[k] + np.clip(step, -0.3, 0.3) * scale))
+
+    def _evaluate(self, indices: Ints, points: Floats) -> None:
+        """Look at points, and move there the starts whose cost falls."""
+        residuals, jacobians = self.cost_function.objective.batch_jacobian(points)
+        present = self.cost_function.objective.observations.present
+        covariance_factor = self.cost_function.covariance_factor
+        for k, u, residual, jacobian in zip(indices, points, residuals, jacobians, strict=True):
+            self.evaluations[k] += 1
+            residuals_and_jacobian = np.concatenate([residual[..., None], jacobian], axis=-1)
+            whitened = np.linalg.solve(covariance_factor, residuals_and_jacobian)[present]
+            self._accept_or_reject(int(k), u, whitened[:, 0], whitened[:, 1:])
+
+    def _accept_or_reject(self, k: int, u: Floats, whitened: Floats, jacobian: Floats) -> None:
+        prior_weight = PRIOR_STRENGTH / self.bounds.width
+        penalty_residuals = np.concatenate([self.bound_penalties.residuals(u), prior_weight * (u - self.bounds.centre)])
+        cost = 0.5 * float(robust_loss(whitened**2, self.cost_function.loss).sum() + (penalty_residuals**2).sum())
+        penalty = self.cost_function.penalty
+        cost += 0.0 if penalty is None else float(penalty.values(u[None])[0])
+        finite = np.isfinite(cost) and np.isfinite(jacobian).all()
+        cost = cost if finite else FAILED_COST
+        if not cost < self.cost[k]:
+            self.damping[k] *= 8.0
+            self.stalled_steps[k] += int(cost <= self.cost[k] * (1.0 + TOLERANCE))
+            return
+        decrease = (self.cost[k] - cost) / max(cost, 1e-300)
+        self.stalled_steps[k] = self.stalled_steps[k] + 1 if decrease < TOLERANCE else 0
+        self.damping[k] = max(self.damping[k] * 0.1, 1e-12)
+        self.u[k], self.cost[k], self.whitened[k] = u, cost, whitened
+        if not finite:
+            return  # without a direction it stays where it is
+        weight = robust_weight(whitened**2, self.cost_function.loss)
+        penalty_jacobian = np.concatenate([self.bound_penalties.jacobian(u), np.diag(prior_weight)])
+        self.gradient[k] = jacobian.T @ (weight * whitened) + penalty_jacobian.T @ penalty_residuals
+        self.hessian[k] = (jacobian.T * weight) @ jacobian + penalty_jacobian.T @ penalty_jacobian
+        if penalty is not None:
+            local_penalty = penalty.frozen_weights_at(u)
+            local_jacobian = local_penalty.jacobian(u)
+            self.gradient[k] += local_jacobian.T @ local_penalty.residuals(u)
+            self.hessian[k] += local_jacobian.T @ local_jacobian

@@ -1,0 +1,217 @@
+"""Term masks: a rate coefficient in {0} U [bounds]; and the local refinement of the candidates of a search.
+
+A term that is masked has its rate at the lower bound, 1e-5 of the measured rate, where it has no effect. Parameters
+that only this term uses stay in the middle of their bounds, so that no bound penalty acts on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats, Ints
+from creepkit.errors import FitError, nearest
+from creepkit.inverse.search.cost_function import SearchTrace
+from creepkit.inverse.search.local_refinement import Minimum
+
+if TYPE_CHECKING:
+    from creepkit.inverse.search.cost_function import CostFunction
+    from creepkit.language import CreepLaw
+
+
+if TYPE_CHECKING:
+    from creepkit.inverse.search.cost_function import CostFunction, SearchResult
+    from creepkit.inverse.search.local_refinement import IterationCallback
+
+
+ANY_TERM = "any"
+"""In place of names: every term may be switched off."""
+
+
+EXPECTED_FLIPS = 0.5
+"""Switches that a candidate flips by chance in each draw, on average: enough to leave a wrong subset, not to drift."""
+
+
+OFF_MARGIN = 0.5
+"""In ln of a rate: so near the bottom of the box it is at it."""
+
+
+@dataclass(frozen=True)
+class TermMask:
+    """Which terms may be off, and what that means for u.
+
+    terms : names of those that may; rates : (terms,) positions of their rates; own : (terms, parameters) which
+    coordinates mean nothing while a term is off; rest : (parameters,) where those then are; always : whether some term
+    stays on anyhow.
+    Masks are (..., terms), true where a term is on.
+    """
+
+    terms: tuple[str, ...]
+    rate_positions: Ints
+    owned_parameters: Bools
+    resting_values: Floats
+    has_permanent_term: bool
+
+    @classmethod
+    def from_cost_function(cls, cost_function: CostFunction, maskable: str | Sequence[str]) -> TermMask:
+        """Those of a landscape; off : names of terms, or "any"."""
+        law, rates = cost_function.objective.law, cost_function.objective.coordinates.term_rates
+        positions = {label: [law.names.index(n) for n in law.only(label).names] for label in law.terms}
+        rate_positions = {label: [k for k in owned if k in rates] for label, owned in positions.items()}
+        terms = _maskable_terms(law, rate_positions, maskable)
+        own = np.zeros((len(terms), cost_function.bounds.lower.size), bool)
+        for row, label in zip(own, terms, strict=True):
+            shared = {k for other, other_positions in positions.items() if other != label for k in other_positions}
+            row[[k for k in positions[label] if k not in shared]] = True
+        resting = cost_function.bounds.centre
+        resting[list(rates)] = cost_function.bounds.lower[list(rates)]
+        first_rates = np.array([rate_positions[label][0] for label in terms], np.int64)
+        return cls(terms, first_rates, own, resting, len(terms) < len(law.terms))
+
+    def applied(self, u: Floats, masks: Bools) -> Floats:
+        """u (..., parameters) with the coordinates of terms that are off at rest."""
+        return np.where(self.active_parameters(masks), u, self.resting_values)
+
+    def active_parameters(self, masks: Bools) -> Bools:
+        """(..., parameters) which coordinates mean something; on : (..., terms)."""
+        return np.asarray(~(~masks[..., None] & self.owned_parameters).any(axis=-2))
+
+    def fixed_values(self, mask: Bools) -> dict[int, float]:
+        """{position: value} of the coordinates at rest, of one mask (terms,)."""
+        return {int(k): float(self.resting_values[k]) for k in np.flatnonzero(~self.active_parameters(mask))}
+
+    def terms_off(self, u: Floats) -> tuple[str, ...]:
+        """The terms that are off at u (parameters,): switched off, or driven to the bottom, which is the same."""
+        is_at_lower_bound = u[self.rate_positions] <= self.resting_values[self.rate_positions] + OFF_MARGIN
+        return tuple(term for term, is_off in zip(self.terms, is_at_lower_bound, strict=True) if is_off)
+
+    def initial_masks(self, count: int, rng: np.random.Generator) -> Bools:
+        """(count, terms) masks to begin from: all on in the first, every subset as likely as another in the rest."""
+        masks = rng.random((count, len(self.terms))) < 0.5
+        masks[:1] = True
+        return self._never_empty(masks, rng)
+
+    def recombined(self, personal_best: Bools, global_best: Bools, rng: np.random.Generator) -> Bools:
+        """(candidates, terms) masks of the next draw: each switch from a candidate's own best mask (candidates, terms)
+        or from the common one (terms,), as a coin falls; and now and then it flips.
+        """
+        if not self.terms:
+            return personal_best
+        inherited = np.where(rng.random(personal_best.shape) < 0.5, personal_best, global_best)
+        flipped = rng.random(personal_best.shape) < EXPECTED_FLIPS / len(self.terms)
+        return self._never_empty(inherited ^ flipped, rng)
+
+    def _never_empty(self, masks: Bools, rng: np.random.Generator) -> Bools:
+        """A sum of nothing is no law: a mask without any term gets one, at random."""
+        empty = np.flatnonzero(~masks.any(axis=1)) if self.terms and not self.has_permanent_term else np.zeros(0, int)
+        masks[empty, rng.integers(max(len(self.terms), 1), size=empty.size)] = True
+        return masks
+
+
+def _maskable_terms(
+    law: CreepLaw, rate_positions: dict[str, list[int]], maskable: str | Sequence[str]
+) -> tuple[str, ...]:
+    """The names meant by `off`, checked."""
+    if maskable == ANY_TERM:
+        return (
+            tuple(label for label, positions in rate_positions.items() if positions) if len(rate_positions) > 1 else ()
+        )
+    names = (maskable,) if isinstance(maskable, str) else tuple(maskable)
+    for name in names:
+        if name not in rate_positions:
+            raise FitError(f"law '{law.name}' has no term '{name}' to switch off; {nearest(name, rate_positions)}")
+        if len(rate_positions) == 1:
+            raise FitError(f"law '{law.name}' has one term, '{name}', which cannot be switched off")
+        if not rate_positions[name]:
+            raise FitError(f"term '{name}' of law '{law.name}' has no coefficient of its own that could be zero")
+    return tuple(dict.fromkeys(names))
+
+
+SAME_BASIN = 0.1
+"""Of the width of the box: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
+
+
+CONVERGED_DECREASE = 1e-3
+"""A fall of the cost, half of chi-square, below which a search has arrived."""
+
+
+@dataclass(frozen=True)
+class SearchCandidates:
+    """What a search has seen and holds worth keeping: u (candidates, parameters), cost (candidates,).
+
+    on : (candidates, terms) masks of the terms that `switches` may switch off, or None.
+    """
+
+    u: Floats
+    cost: Floats
+    term_mask: TermMask | None = None
+    masks: Bools | None = None
+
+    def fixed_values(self, k: int) -> dict[int, float]:
+        """{position: value} of coordinates that rest in candidate k, because their term is off."""
+        return {} if self.term_mask is None or self.masks is None else self.term_mask.fixed_values(self.masks[k])
+
+    def terms_off(self, u: Floats) -> tuple[str, ...]:
+        """Terms that are off at u."""
+        return () if self.term_mask is None else self.term_mask.terms_off(u)
+
+    def most_different(self, width: Floats, max_count: int) -> list[int]:
+        """The best that differ, at most so many: a term that is off in one of two makes them differ."""
+        selected: list[int] = []
+        for k in np.argsort(self.cost, kind="stable"):
+            if all((np.abs(self.u[k] - self.u[other]) > SAME_BASIN * width).any() for other in selected):
+                selected.append(int(k))
+            if len(selected) == max_count:
+                break
+        return selected
+
+
+def refine_candidates(
+    cost_function: CostFunction,
+    candidates: SearchCandidates,
+    max_count: int,
+    trace: SearchTrace,
+    progress: IterationCallback | None = None,
+) -> SearchResult:
+    """The best different candidates refined, best first; with most=0 the best one as it is."""
+    from creepkit.inverse.search.cost_function import SearchResult
+
+    selected = candidates.most_different(cost_function.bounds.width, max(max_count, 1))
+    if max_count == 0:
+        k = selected[0]
+        best, cost = candidates.u[k], float(candidates.cost[k])
+        return SearchResult(
+            (Minimum(best, cost, converged=False, evaluations=0, terms_off=candidates.terms_off(best)),), trace
+        )
+    minima = []
+    for done, k in enumerate(selected):
+        minimum = cost_function.refine(candidates.u[k], fixed=candidates.fixed_values(k))
+        minima.append(replace(minimum, terms_off=candidates.terms_off(minimum.u)))
+        if progress is not None:
+            progress("refinement", done + 1, len(selected))
+    evaluations = sum(minimum.evaluations for minimum in minima)
+    minima.sort(key=lambda minimum: minimum.cost)
+    if candidates.masks is not None:
+        minima = _one_per_mask(minima)
+    return SearchResult(
+        tuple(minima), replace(trace, refined_cost=min(m.cost for m in minima), refinement_evaluations=evaluations)
+    )
+
+
+def _one_per_mask(minima: list[Minimum]) -> list[Minimum]:
+    """One of each subset, for some end as another one; of those that are as good as the best, the simplest first."""
+    different = [m for k, m in enumerate(minima) if m.terms_off not in [other.terms_off for other in minima[:k]]]
+    best = different[0].cost + CONVERGED_DECREASE
+    return sorted(different, key=lambda m: (m.cost > best, -len(m.terms_off) if m.cost <= best else 0, m.cost))
+
+
+def check_whole_numbers(search: str, values: Mapping[str, float], minimum_values: Mapping[str, int]) -> None:
+    """Refuse settings of a search that must be whole numbers of at least so many."""
+    for name, value in values.items():
+        if value != int(value) or value < minimum_values[name]:
+            raise FitError(
+                f"{search}: {name} is {value!r}; it must be a whole number of at least {minimum_values[name]}"
+            )

@@ -1,0 +1,281 @@
+"""Model discrimination: identified laws under one common covariance, and pairs of laws that the tests cannot separate.
+
+The common covariance is that of the law which explains the histories best. With a covariance of its own each law would
+count as noise what it cannot describe. The problems are linear about their optima, so that no simulation is needed to
+move each law to its optimum under the common covariance.
+
+With r_a and r_b the residuals of two laws on the same frames and C the common covariance,
+
+    d2 = (r_a - r_b)' C^-1 (r_a - r_b)
+
+is the chi-square between their predictions: if one of them is true, the other is expected to be worse by d2. Below
+2 ln 19 = 5.9 no weight of 0.95 is to be expected even then. A law that another one becomes where a parameter takes its
+`off` value (m = 0) is equivalent too where the parameter's interval contains it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import LawError
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.noise_model import NEGLIGIBLE_DRIFT, Residuals, effective_sample_size
+from creepkit.inverse.problem import least_squares_problem
+from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
+from creepkit.inverse.uncertainty.quantities import local_exponent
+from creepkit.inverse.variance_components import LinearisedProblem, inverse_covariances
+from creepkit.language import CreepLaw, strain, time
+
+
+@dataclass(frozen=True, eq=False)
+class CommonCovarianceFits:
+    """Chi-squares of laws under one covariance, (laws,), with priors; evidence of nuisances; independent frames.
+
+    chosen : position of the law whose covariance it is; white : (laws, entries) residuals over that scatter, zero
+        where there are no data, or where a law has nothing to say of a test that was stopped.
+    """
+
+    chi_square: Floats
+    log_determinant: Floats
+    independent_frames: float
+    reference_law: int
+    whitened: Floats
+
+
+def under_common_covariance(fits: Sequence[Identification]) -> CommonCovarianceFits:
+    """All laws under the covariance of the one that explains best with its own."""
+    linearised = [_linearised(fit) for fit in fits]
+    own_scores = [_score_under_own_covariance(fit, linear) for fit, linear in zip(fits, linearised, strict=True)]
+    reference_law = int(np.argmin(own_scores))
+    noise_model, reference_residuals = fits[reference_law].noise_model, linearised[reference_law].residuals
+    results = [
+        _optimum_under(
+            linear,
+            inverse_covariances(_with_covariance_of(reference_residuals, linear.residuals), noise_model)[0],
+            len(identification.u),
+        )
+        for linear, identification in zip(linearised, fits, strict=True)
+    ]
+    independent_frames = effective_sample_size(reference_residuals, noise_model)
+    chi_squares, log_determinants, whitened = zip(*results, strict=True)
+    return CommonCovarianceFits(
+        np.array(chi_squares), np.array(log_determinants), independent_frames, reference_law, np.array(whitened)
+    )
+
+
+def _with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
+    """A law's residuals with what makes the covariance, but for which entries it speaks of, as the best law has it."""
+    transform_derivatives, rate_effect = (
+        np.where(reference.present, reference_values, own_values)
+        for reference_values, own_values in (
+            (reference.transform_derivatives, residuals.transform_derivatives),
+            (reference.log_rate_sensitivity, residuals.log_rate_sensitivity),
+        )
+    )
+    return replace(
+        residuals,
+        transform_derivatives=transform_derivatives,
+        log_rate_sensitivity=rate_effect,
+        test_weights=reference.test_weights,
+    )
+
+
+def _linearised(fit: Identification) -> LinearisedProblem:
+    assert fit.linearised is not None
+    return fit.linearised
+
+
+def _score_under_own_covariance(fit: Identification, linearised: LinearisedProblem) -> float:
+    """-2 ln L with the law's own scatter, and BIC's price of its parameters and of the sizes of that scatter.
+
+    A law that needs a drift for what another follows must not set the measure.
+    """
+    inverses, log_det = inverse_covariances(linearised.residuals, fit.noise_model)
+    independent_frames = effective_sample_size(linearised.residuals, fit.noise_model)
+    parameter_count = len(fit.u) + sum(
+        1 + 2 * (components.drift > NEGLIGIBLE_DRIFT) for components in fit.noise_model.outputs.values()
+    )
+    return (
+        log_det
+        + _optimum_under(linearised, inverses, len(fit.u))[0]
+        + parameter_count * float(np.log(independent_frames))
+    )
+
+
+def _optimum_under(
+    linearised: LinearisedProblem, inverses: Floats, parameter_count: int
+) -> tuple[float, float, Floats]:
+    """Chi-square with priors at the optimum within the bounds, ln of what nuisances cost, and white residuals.
+
+    Only unknowns of tests have priors here: the weak ones of a law's parameters must not favour the middle of bounds.
+    """
+    precision = linearised.precision.copy()
+    precision[:parameter_count] = 1e-9 * precision[:parameter_count]
+    without_parameter_priors = replace(linearised, precision=precision)
+    newton_step = np.zeros(precision.size)
+    newton_step[linearised.free] = without_parameter_priors.solve(inverses).step
+    newton_step = np.clip(newton_step, *linearised.step_bounds)
+    best = min(
+        (
+            _chi_square(without_parameter_priors, inverses, candidate_step)
+            for candidate_step in (newton_step, np.zeros_like(newton_step))
+        ),
+        key=lambda pair: pair[0],
+    )
+    return best[0], _nuisance_log_determinant(linearised, inverses, parameter_count), best[1]
+
+
+def _chi_square(linearised: LinearisedProblem, inverses: Floats, step: Floats) -> tuple[float, Floats]:
+    residuals = linearised.residuals
+    assert residuals.jacobian is not None
+    remaining = residuals.values + residuals.jacobian @ step
+    prior_deviation = linearised.prior_residual + step
+    total = np.einsum("te,tef,tf->", remaining, inverses, remaining) + (linearised.precision * prior_deviation**2).sum()
+    factor = np.linalg.cholesky(inverses)
+    whitened = (np.swapaxes(factor, 1, 2) @ remaining[..., None])[..., 0]
+    return float(total), np.where(residuals.present, whitened, 0.0).ravel()
+
+
+def _nuisance_log_determinant(linearised: LinearisedProblem, inverses: Floats, parameter_count: int) -> float:
+    """ln det(1 + S J'C^-1 J S) of the unknowns of tests, S their prior spreads: they are integrated out."""
+    assert linearised.residuals.jacobian is not None
+    jacobian = linearised.residuals.jacobian[..., parameter_count:]
+    if not jacobian.shape[-1]:
+        return 0.0
+    sd = 1.0 / np.sqrt(np.maximum(linearised.precision[parameter_count:], 1e-300))
+    sd = np.minimum(sd, np.diff(linearised.step_bounds, axis=0)[0, parameter_count:] / np.sqrt(12.0))
+    information = np.einsum("tep,tef,tfq->pq", jacobian, inverses, jacobian, optimize=True) * np.outer(sd, sd)
+    return float(np.linalg.slogdet(information + np.eye(len(sd)))[1])
+
+
+DISTINGUISHABLE_CHI_SQUARE = 2.0 * float(np.log(0.95 / 0.05))
+"""Chi-square between predictions from which on a test can be expected to decide."""
+
+
+STRESS_POINTS = 21
+"""Stresses at which local exponents are compared."""
+
+
+@dataclass(frozen=True)
+class EquivalentLaws:
+    """Two laws that the tests cannot separate.
+
+    first, second : their names, the better one first. chi_square : between their predictions on the tests.
+    reduced : "m = 0" where the richer law becomes the other one so, and the tests allow it; else empty.
+    sentence : for people.
+    """
+
+    first: str
+    second: str
+    chi_square: float
+    reduction: str
+    sentence: str
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+def equivalent_laws(ranking: WeightedLaws) -> tuple[EquivalentLaws, ...]:
+    """The pairs of a ranking's laws that its tests cannot separate, nearest predictions first."""
+    fits = [r.fit for r in ranking.laws]
+    whitened = _whitened_residuals(fits)
+    pairs = []
+    for a, b in combinations(range(len(fits)), 2):
+        chi_square = float(((whitened[a] - whitened[b]) ** 2).sum())
+        richer_law, reduction = _reduction_between(fits[a], fits[b])
+        if chi_square < DISTINGUISHABLE_CHI_SQUARE or reduction:
+            sentence = _equivalence_sentence(fits[a], fits[b], chi_square, richer_law, reduction)
+            pairs.append(EquivalentLaws(fits[a].law.name, fits[b].law.name, chi_square, reduction, sentence))
+    return tuple(sorted(pairs, key=lambda pair: pair.chi_square))
+
+
+def _whitened_residuals(fits: Sequence[Identification]) -> Floats:
+    """(laws, data) residuals of all laws at their optima over one scatter.
+
+    Identifications by likelihood keep what that takes; others are predicted again, under the covariance of the first.
+    """
+    if all(fit.linearised is not None for fit in fits):
+        return under_common_covariance(fits).whitened
+    problems = [least_squares_problem(fit) for fit in fits]
+    present = problems[0].residual_function.observations.present
+    whitened = [
+        np.linalg.solve(problems[0].covariance_factor, p.residuals.values[..., None])[..., 0][present] for p in problems
+    ]
+    return np.array(whitened)
+
+
+def _reduction_between(first: Identification, second: Identification) -> tuple[str, str]:
+    """(name of the richer law, "m = 0") where one law with a parameter off is the other, within its interval."""
+    for richer, simpler in ((first, second), (second, first)):
+        for name, value, law in _laws_with_parameter_off(richer.law):
+            if _is_same_function(law, simpler.law) and _interval_contains(richer, name, value):
+                return richer.law.name, f"{name} = {value:g}"
+    return "", ""
+
+
+def _laws_with_parameter_off(law: CreepLaw) -> Iterator[tuple[str, float, CreepLaw]]:
+    """(parameter, its off value, the law that is left) for every parameter that can be switched off."""
+    for name, param in law.table.items():
+        if param.off is None:
+            continue
+        try:
+            yield name, param.off, law.fix(**{name: param.off})
+        except LawError:  # nothing is left of the law
+            continue
+
+
+def _is_same_function(first: CreepLaw, second: CreepLaw) -> bool:
+    """Whether two laws are the same function of point and parameters, whatever these are called."""
+    return first.fingerprint.rpartition("-")[2] == second.fingerprint.rpartition("-")[2]
+
+
+def _interval_contains(fit: Identification, name: str, value: float) -> bool:
+    (estimate,) = (candidate for candidate in fit.estimates if candidate.name == name)
+    tolerance = 1e-6 * (estimate.high - estimate.low)
+    return estimate.low - tolerance <= value <= estimate.high + tolerance
+
+
+def _equivalence_sentence(
+    a: Identification, b: Identification, chi_square: float, richer_law: str, reduction: str
+) -> str:
+    """What is the same, in what sense, and where."""
+    names = f"{a.law.name} and {b.law.name}"
+    parts = [f"{names} cannot be told apart by these tests: chi-square {chi_square:.2g} between their predictions"]
+    if reduction:
+        parts.append(f"{richer_law} with {reduction} is the other law, and the tests allow it")
+    lowest, highest = a.ranges["stress"]
+    constant_loads = all(_is_constant(h.loading.program().values) for h in a.histories)
+    if highest <= 1.001 * lowest:
+        parts.append(f"every test holds one stress, {lowest:.4g} MPa")
+    elif not any(fit.law.uses(symbol) for fit in (a, b) for symbol in (strain, time)):
+        parts.append(_exponent_sentence(a, b, lowest, highest))
+    elif constant_loads and _differ_in_hardening(a.law, b.law):
+        parts.append("no test changes its load, and hardening by strain and by time differ only after a change")
+    return "; ".join(parts)
+
+
+def _exponent_sentence(a: Identification, b: Identification, lowest: float, highest: float) -> str:
+    grid = np.geomspace(lowest, highest, STRESS_POINTS)
+    first_exponents, second_exponents = (local_exponent(fit.coordinates, grid)(fit.u) for fit in (a, b))
+    ranges = [f"{float(exponents.min()):.2f} to {float(exponents.max()):.2f}" if np.ptp(exponents) > 0.005 else f"{float(exponents[0]):.2f}"
+              for exponents in (first_exponents, second_exponents)]  # fmt: skip
+    return (
+        f"over {lowest:.4g} to {highest:.4g} MPa their local exponents are {ranges[0]} and {ranges[1]}, never more than "
+        f"{float(np.abs(first_exponents - second_exponents).max()):.2g} apart"
+    )
+
+
+def _is_constant(levels: Floats) -> bool:
+    """Whether a program holds one level, but for the ramp that reaches it."""
+    return bool(np.ptp(levels[levels > 0]) <= 1e-3 * levels.max()) if (levels > 0).any() else True
+
+
+def _differ_in_hardening(first: CreepLaw, second: CreepLaw) -> bool:
+    """Whether one law hardens by its strain and the other by time."""
+    hardening = [(law.uses(strain), law.uses(time)) for law in (first, second)]
+    return hardening in ([(True, False), (False, True)], [(False, True), (True, False)])

@@ -1,0 +1,143 @@
+"""Bootstrap of term selection: how often each term is kept when the tests are resampled.
+
+Tests are drawn with replacement, as many as there are; where there is one only, its frames are, in blocks. A test (or
+frame) drawn k times has its whitened residuals counted k times: the bootstrap of weighted likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import beta
+
+from creepkit.arrays import Floats
+from creepkit.errors import FitError
+from creepkit.inverse.search.local_refinement import IterationCallback
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sparsity.penalties import ContributionPenalty, PenalisedTerms, Subsets
+from creepkit.inverse.sparsity.reduced_laws import ReducedLaws, TermProblem, terms_above
+from creepkit.inverse.sparsity.result import TermNames
+from creepkit.inverse.sparsity.term_selection import PredictorOrMapping, choose_terms, identify_full, penalised_fit
+from creepkit.language import CreepLaw
+from creepkit.records import History
+
+BLOCK_FRAMES = 6
+"""Frames of a block: an eighth of a bulge test of 48."""
+
+
+ZERO_WEIGHT = 1e-12
+"""Weight of what was not drawn."""
+
+
+@dataclass(frozen=True)
+class SelectionFrequencies:
+    """How often each term, and each set of terms, was kept.
+
+    drawn : "tests" or "blocks of frames"; repeats : number of draws; counts : {term: times kept}; sets : {terms: times
+    that they, and no others, were kept}, the most frequent first.
+    """
+
+    unit: str
+    resamples: int
+    term_counts: Mapping[str, int]
+    set_counts: Mapping[TermNames, int]
+
+    def interval(self, term: str) -> tuple[float, float]:
+        """95 % interval of the frequency of a term, of Clopper and Pearson."""
+        return binomial_interval(self.term_counts[term], self.resamples)
+
+    def __str__(self) -> str:
+        lines = [f"{self.resamples} draws of {self.unit}:"]
+        for term, count in self.term_counts.items():
+            low, high = self.interval(term)
+            lines.append(f"  {term}: kept {count} times ({low:.2f} to {high:.2f})")
+        for terms, count in self.set_counts.items():
+            lines.append(f"  {' + '.join(terms)} alone: {count} times")
+        return "\n".join(lines)
+
+
+def binomial_interval(count: int, trials: int, significance: float = 0.05) -> tuple[float, float]:
+    """Exact interval of a frequency (Clopper & Pearson (1934), Biometrika 26, 404)."""
+    low = float(beta.ppf(significance / 2, count, trials - count + 1)) if count > 0 else 0.0
+    high = float(beta.ppf(1 - significance / 2, count + 1, trials - count)) if count < trials else 1.0
+    return low, high
+
+
+def selection_frequencies(
+    reductions: ReducedLaws, penalty: ContributionPenalty | Subsets, strength: float | None, optimum: Floats, *,
+    resamples: int = 20, seed: int = 0, progress: IterationCallback | None = None,
+) -> SelectionFrequencies:  # fmt: skip
+    """Choose again for each draw, from the optima on all data; strength : that of all data, which stays.
+
+    optimum : x of the penalised fit on all data.
+    """
+    if resamples < 1:
+        raise FitError(f"repeats is {resamples}; at least one draw is needed")
+    problem, selections = reductions.problem, []
+    for k, weights in enumerate(bootstrap_weights(problem, resamples, np.random.default_rng(seed))):
+        selections.append(_terms_kept(reductions, with_weights(problem, weights), penalty, strength, optimum))
+        if progress is not None:
+            progress("draw", k + 1, resamples)
+    sets = {terms: selections.count(terms) for terms in sorted(set(selections), key=selections.count, reverse=True)}
+    counts = {label: sum(label in terms for terms in selections) for label in reductions.terms}
+    return SelectionFrequencies(
+        "tests" if len(problem.covariance_factor) > 1 else "blocks of frames", resamples, counts, sets
+    )
+
+
+def with_weights(problem: TermProblem, weights: Floats) -> TermProblem:
+    """The stage with the squares of white residuals counted `weights` (tests, entries) times."""
+    return replace(
+        problem, covariance_factor=problem.covariance_factor / np.sqrt(np.maximum(weights, ZERO_WEIGHT))[:, None, :]
+    )
+
+
+def bootstrap_weights(problem: TermProblem, resamples: int, rng: np.random.Generator) -> Iterator[Floats]:
+    """(tests, entries) how often each entry was drawn: whole tests, or blocks of frames of the only one."""
+    tests, entries = problem.objective.observations.present.shape
+    frame = problem.objective.observations.frame_index
+    for _ in range(resamples):
+        if tests > 1:
+            yield np.repeat(rng.multinomial(tests, np.full(tests, 1.0 / tests))[:, None], entries, axis=1).astype(float)
+        else:
+            yield _block_counts(int(frame.max()) + 1, rng)[frame]
+
+
+def _block_counts(frames: int, rng: np.random.Generator) -> Floats:
+    """(frames,) how often each frame was drawn, in blocks that go round the end, so that all are alike."""
+    length = min(BLOCK_FRAMES, max(frames // 2, 1))
+    counts = np.zeros(frames)
+    for start in rng.integers(frames, size=-(-frames // length)):
+        counts[(start + np.arange(length)) % frames] += 1.0
+    return counts
+
+
+def _terms_kept(
+    reductions: ReducedLaws,
+    problem: TermProblem,
+    penalty: ContributionPenalty | Subsets,
+    strength: float | None,
+    optimum: Floats,
+) -> TermNames:
+    if isinstance(penalty, Subsets):
+        return ReducedLaws(problem, reductions).lowest_bic(penalty.EXHAUSTIVE_LIMIT).kept_terms
+    penalised_terms = PenalisedTerms.from_objective(problem.objective, penalty, strength)
+    single_term_optima: Sequence[Floats] = [
+        problem.embedded(single.law, single.x) for single in reductions.single_terms()
+    ]
+    x = penalised_fit(problem, penalised_terms, [optimum, reductions.full().x, *single_term_optima]).u
+    return terms_above(problem.contributions_at(x))
+
+
+def bootstrap_terms(
+    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, penalty: ContributionPenalty | Subsets, *, resamples: int = 20,
+    seed: int = 0, settings: IdentificationSettings | None = None, progress: IterationCallback | None = None,
+) -> SelectionFrequencies:  # fmt: skip
+    """How often each term is kept when the tests (or the frames of the only one) are drawn again."""
+    _, reductions = identify_full(law, histories, using, None, settings, progress)
+    choice = choose_terms(reductions, penalty, None, progress)
+    return selection_frequencies(
+        reductions, penalty, choice.strength, choice.x, resamples=resamples, seed=seed, progress=progress
+    )

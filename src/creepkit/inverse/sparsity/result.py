@@ -1,0 +1,213 @@
+"""Results of term selection: the sparsity record of an identification, and the regularisation path of a penalty."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Any
+
+from scipy.stats import chi2
+
+from creepkit.arrays import Floats
+from creepkit.inverse.goodness_of_fit import OutputErrors
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class FitStatistics:
+    """How well a law fits, on the covariance of the whole sum.
+
+    chi_square : of all outputs, priors included; parameters : of the law that were fitted; bic : chi-square + K ln N.
+    errors : {output: Errors} over all used frames.
+    """
+
+    chi_square: float
+    parameters: int
+    bic: float
+    errors: Mapping[str, OutputErrors] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Sparsity:
+    """How a sum was reduced; the terms are those of `law`, the sum.
+
+    penalty : its class; strength : None of a choice among subsets, which has none.
+    kept, dropped : terms; off : exponents switched off, where BIC did not rise by it.
+    proposed : terms that the penalty left, before the reduced law was confirmed.
+    shares : contributions without penalty, with it, and after the refit of what was kept.
+    whole, reduced : misfits of the sum and of the reduced law on one covariance.
+    frames : measured values, N of BIC.
+    path : over the strength, where that was chosen automatically (not saved).
+    """
+
+    law: str
+    penalty: str
+    strength: float | None
+    kept_terms: TermNames
+    dropped_terms: TermNames
+    exponents_off: tuple[str, ...]
+    proposed_terms: TermNames
+    contributions_without_penalty: Mapping[str, float]
+    contributions_with_penalty: Mapping[str, float]
+    contributions_after_refit: Mapping[str, float]
+    full: FitStatistics
+    reduced: FitStatistics
+    observations: int
+    path: PenaltyPath | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def chi_square_rise(self) -> float:
+        """Of chi-square, from the whole sum to the reduced law."""
+        return self.reduced.chi_square - self.full.chi_square
+
+    @property
+    def parameters_dropped(self) -> int:
+        """Parameters that the reduced law does without."""
+        return self.full.parameters - self.reduced.parameters
+
+    @property
+    def p_value(self) -> float:
+        """Chance of such a rise, or more, if the reduced law is true; 1 where nothing was dropped."""
+        return (
+            float(chi2.sf(max(self.chi_square_rise, 0.0), self.parameters_dropped))
+            if self.parameters_dropped > 0
+            else 1.0
+        )
+
+    @property
+    def bic_difference(self) -> float:
+        """BIC of the reduced law less that of the whole sum; below zero where the reduced law is preferred."""
+        return self.reduced.bic - self.full.bic
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether what the penalty proposed stood the comparison with the whole sum."""
+        return self.proposed_terms == self.kept_terms
+
+    @property
+    def verdict(self) -> str:
+        """What was dropped, what that cost, and whether it was too much, in one or two sentences."""
+        dropped = _quoted_list([*self.dropped_terms, *(f"exponent {name}" for name in self.exponents_off)])
+        cost = (
+            f"chi-square rises by {max(self.chi_square_rise, 0.0):.1f} for {self.parameters_dropped} parameters fewer (p = {self.p_value:.2g}) "
+            f"and BIC changes by {self.bic_difference:+.1f}"
+        )
+        if not dropped:
+            sentence = f"all terms of '{self.law}' are kept"
+        else:
+            sentence = f"without {dropped} of '{self.law}' {cost}: {_quoted_list(self.kept_terms)} suffice{'s' * (len(self.kept_terms) == 1)}"
+        if self.confirmed:
+            return sentence
+        restored = _quoted_list([term for term in self.kept_terms if term not in self.proposed_terms])
+        return (
+            f"{sentence}. The penalty had dropped {restored} too, but without BIC is higher than that of the whole sum"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and names, without the path."""
+        names = (
+            "law",
+            "penalty",
+            "strength",
+            "kept_terms",
+            "dropped_terms",
+            "exponents_off",
+            "proposed_terms",
+            "observations",
+        )
+        contributions = {
+            name: dict(getattr(self, name))
+            for name in ("contributions_without_penalty", "contributions_with_penalty", "contributions_after_refit")
+        }
+        values = {name: getattr(self, name) for name in names}
+        values = {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
+        return {
+            **values,
+            **contributions,
+            "full": _statistics_to_dict(self.full),
+            "reduced": _statistics_to_dict(self.reduced),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Sparsity:
+        """The record that to_dict wrote."""
+        lists = {name: tuple(data[name]) for name in ("kept_terms", "dropped_terms", "exponents_off", "proposed_terms")}
+        statistics = {
+            name: FitStatistics(
+                **{**data[name], "errors": {k: OutputErrors(**v) for k, v in data[name]["errors"].items()}}
+            )
+            for name in ("full", "reduced")
+        }
+        return cls(**{**data, **lists, **statistics})
+
+    def __str__(self) -> str:
+        strength = "" if self.strength is None else f" of strength {self.strength:g}"
+        width = max(map(len, self.contributions_without_penalty))
+        lines = [f"{self.penalty}{strength}: {self.verdict}", f"{'':{width}}  without  with  after"]
+        for term, contribution in self.contributions_without_penalty.items():
+            refitted = self.contributions_after_refit.get(term)
+            after_text = "dropped" if refitted is None else f"{refitted:.3f}"
+            lines.append(
+                f"{term:{width}}  {contribution:.3f}  {self.contributions_with_penalty[term]:.3f}  {after_text}"
+            )
+        return "\n".join([*lines, f"(contributions; below {LEAST_CONTRIBUTION:g} a term is dropped)"])
+
+
+def _statistics_to_dict(statistics: FitStatistics) -> dict[str, Any]:
+    return {**asdict(statistics), "errors": {name: asdict(errors) for name, errors in statistics.errors.items()}}
+
+
+def _quoted_list(names: list[str] | TermNames) -> str:
+    """'a', 'b' and 'c'."""
+    quoted = [f"'{name}'" if not name.startswith("exponent ") else name for name in names]
+    return quoted[0] if len(quoted) == 1 else " and ".join([", ".join(quoted[:-1]), quoted[-1]]) if quoted else ""
+
+
+@dataclass(frozen=True, eq=False)
+class PenaltyPath:
+    """One row for each strength, the first of which is 0.
+
+    penalty : its formula in a word; labels : the terms.
+    shares : (strengths, terms) contributions; chi_square : (strengths,) of the data, penalty apart.
+    kept : the terms that are left; criterion : (strengths,) BIC of these refitted, less the least of all.
+    x : (strengths, unknowns) where the penalised fits ended; chosen : the row of choice.
+    """
+
+    penalty: str
+    terms: TermNames
+    strengths: Floats
+    contributions: Floats
+    chi_square: Floats
+    kept_terms: tuple[TermNames, ...]
+    bic_excess: Floats
+    x: Floats
+    chosen: int
+
+    def contributions_by_term(self, row: int | None = None) -> dict[str, float]:
+        """{term: contribution} of one row, by default the chosen one."""
+        return dict(zip(self.terms, map(float, self.contributions[self.chosen if row is None else row]), strict=True))
+
+    def plot(self, file: str | File | None = None) -> Figure:
+        """Shares and misfit against the strength; written to `path` when given."""
+        from creepkit.report.penalty_path_plot import penalty_path_figure
+
+        return penalty_path_figure(self, file)
+
+    def __str__(self) -> str:
+        rows = [["strength", "chi-square", "BIC - least", *self.terms, "kept"]]
+        for k, strength in enumerate(self.strengths):
+            numbers = [f"{strength:g}", f"{self.chi_square[k]:.1f}", f"{self.bic_excess[k]:.1f}"]
+            rows.append([*numbers, *(f"{c:.3f}" for c in self.contributions[k]), ", ".join(self.kept_terms[k])])
+        rows[1 + self.chosen][-1] += "   <- chosen"
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
+
+
+LEAST_CONTRIBUTION = 0.05
+"""A term that contributes less than this is dropped."""
+
+
+TermNames = tuple[str, ...]

@@ -1,0 +1,262 @@
+"""Term selection: a sum is fitted with a penalty, terms are dropped, the rest is refitted and compared with the sum.
+
+A concave penalty has a minimum at each corner, so that the penalised fit has many starts. Along the path of a penalty
+the strength is chosen by BIC: at each strength the terms that contribute 5 % or more are kept and refitted without
+penalty, and the set of lowest BIC wins, at the lowest strength that leaves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import FitError
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.identify import identify
+from creepkit.inverse.search.cost_function import GlobalSearch, SearchTrace
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
+from creepkit.inverse.search.multistart import distinct
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sparsity.penalties import ContributionPenalty, PenalisedTerms, Subsets, check_penalty
+from creepkit.inverse.sparsity.reduced_laws import ReducedLaw, ReducedLaws, TermProblem, terms_above
+from creepkit.inverse.sparsity.result import FitStatistics, PenaltyPath, Sparsity, TermNames
+from creepkit.language import CreepLaw
+from creepkit.records import History, Predictor
+
+if TYPE_CHECKING:
+    pass
+
+
+CONTINUED_STARTS, COMPLETED_STARTS = 5, 2
+"""Starts that are followed for some steps, and how many of them to the end."""
+
+
+PRELIMINARY_STEPS = 12
+"""Steps of least squares to see where a start leads."""
+
+
+def penalised_starts(reductions: ReducedLaws) -> list[Floats]:
+    """The optimum without penalty, the same with each term leading, and each term's own optimum."""
+    problem = reductions.problem
+    single_term_optima = [problem.embedded(single.law, single.x) for single in reductions.single_terms()]
+    return [problem.start, *problem.fraction_permutations(problem.start), *single_term_optima]
+
+
+def penalised_fit(problem: TermProblem, penalty: PenalisedTerms, starts: Sequence[Floats]) -> Minimum:
+    """The lowest minimum of misfit and penalty: the best starts are followed some steps, the best ends polished."""
+    costs = [problem.half_chi_square(x) + float(penalty.values(x[None])[0]) for x in starts]
+    order = sorted(range(len(starts)), key=lambda k: costs[k])[:CONTINUED_STARTS]
+    preliminary = sorted((problem.minimise(starts[k], penalty, PRELIMINARY_STEPS) for k in order), key=lambda m: m.cost)
+    completed = [m if m.converged else problem.minimise(m.u, penalty) for m in preliminary[:COMPLETED_STARTS]]
+    return min(completed, key=lambda m: m.cost)
+
+
+PATH_STRENGTHS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)
+"""Two a decade, in units of half a chi-square: from nothing to more than a dimple's whole test is worth."""
+
+
+def trace_path(
+    reductions: ReducedLaws,
+    penalty: ContributionPenalty,
+    strengths: Sequence[float] = PATH_STRENGTHS,
+    progress: IterationCallback | None = None,
+) -> PenaltyPath:
+    """The path over `strengths`, from the sum without penalty; each fit starts where the last ended, and in corners.
+
+    It ends when one term is left.
+    """
+    stage, labels = reductions.problem, reductions.terms
+    penalised, full = PenalisedTerms.from_objective(stage.objective, penalty, 0.0), reductions.full()
+    corners = penalised_starts(reductions)[-len(labels) :]
+    optima = [full.x]
+    for k, strength in enumerate(sorted(strengths)):
+        optima.append(_next_fit(reductions, penalised.with_strength(strength), optima[-1], corners).u)
+        if progress is not None:
+            progress("strength", k + 1, len(strengths))
+        if len(terms_above(stage.contributions_at(optima[-1]))) == 1:
+            break
+    contributions = np.array([list(stage.contributions_at(x).values()) for x in optima])
+    kept_terms = tuple(terms_above(dict(zip(labels, row, strict=True))) for row in contributions)
+    bic = np.array([reductions.with_terms(terms).bic for terms in kept_terms])
+    chi_square = np.array([2.0 * stage.half_chi_square(x) for x in optima])
+    path_strengths = np.array([0.0, *sorted(strengths)])[: len(optima)]
+    excess = bic - bic.min()
+    return PenaltyPath(
+        type(penalty).__name__,
+        labels,
+        path_strengths,
+        contributions,
+        chi_square,
+        kept_terms,
+        excess,
+        np.array(optima),
+        int(excess.argmin()),
+    )
+
+
+def _next_fit(
+    reductions: ReducedLaws, penalised: PenalisedTerms, previous: Floats, corners: Sequence[Floats]
+) -> Minimum:
+    """The penalised fit from the last one, and from the corners that cost less there."""
+    stage = reductions.problem
+
+    def cost(x: Floats) -> float:
+        return stage.half_chi_square(x) + float(penalised.values(x[None])[0])
+
+    previous_cost = cost(previous)
+    return penalised_fit(stage, penalised, [previous, *(x for x in corners if cost(x) < previous_cost)])
+
+
+@dataclass(frozen=True, eq=False)
+class TermChoice:
+    """What a penalty left over.
+
+    shares : contributions of all terms under the penalty; strength, path : None of a choice among subsets; trace : of
+        the global search, if there was one.
+    """
+
+    kept_terms: TermNames
+    contributions: Mapping[str, float]
+    x: Floats
+    strength: float | None = None
+    path: PenaltyPath | None = None
+    trace: SearchTrace | None = None
+
+
+def choose_terms(
+    reductions: ReducedLaws,
+    penalty: ContributionPenalty | Subsets,
+    search: GlobalSearch | None = None,
+    progress: IterationCallback | None = None,
+) -> TermChoice:
+    """The terms that a penalty keeps.
+
+    search : where the penalised landscape is searched besides the usual starts; not for subsets, nor along a path.
+    """
+    problem = reductions.problem
+    if isinstance(penalty, Subsets):
+        lowest = reductions.lowest_bic(penalty.EXHAUSTIVE_LIMIT)
+        x = problem.embedded(lowest.law, lowest.x)
+        return TermChoice(lowest.kept_terms, problem.contributions_at(x), x)
+    if penalty.strength == "auto":
+        path = trace_path(reductions, penalty, progress=progress)
+        return TermChoice(
+            path.kept_terms[path.chosen],
+            path.contributions_by_term(),
+            path.x[path.chosen],
+            float(path.strengths[path.chosen]),
+            path,
+        )
+    penalised_terms = PenalisedTerms.from_objective(problem.objective, penalty)
+    starts, trace = penalised_starts(reductions), None
+    if search is not None:
+        cost_function = problem.cost_function(penalised_terms)
+        result = search.minima(cost_function, progress)
+        starts += [problem.with_nuisances(minimum.u) for minimum in distinct(result.minima, cost_function.bounds)]
+        trace = result.trace
+    x = penalised_fit(problem, penalised_terms, starts).u
+    contributions = problem.contributions_at(x)
+    return TermChoice(terms_above(contributions), contributions, x, penalised_terms.strength, trace=trace)
+
+
+PredictorOrMapping = Predictor | Mapping[str, Predictor]
+
+
+def identify_sparse(
+    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, *, penalty: ContributionPenalty | Subsets,
+    search: GlobalSearch | None = None, through: Predictor | None = None, settings: IdentificationSettings | None = None,
+    progress: IterationCallback | None = None,
+) -> Identification:  # fmt: skip
+    """Identify the law of those terms of a sum that the histories need; what was dropped stands in `sparsity`.
+
+    The whole sum is identified without penalty first: it gives the covariance on which everything is compared. Then
+    misfit and penalty together are minimised from its optimum, from each term's own, and where `search` finds minima;
+    terms that contribute less than 5 % are dropped; what is left is identified without penalty.
+
+    through : a surrogate by which terms are chosen; values and intervals are those of `using`.
+    """
+    check_penalty(penalty)
+    full, reductions = identify_full(law, histories, using, through, settings, progress)
+    return identify_reduced(penalty, full, reductions, search, progress)
+
+
+def identify_reduced(
+    penalty: ContributionPenalty | Subsets, full: Identification, reductions: ReducedLaws, search: GlobalSearch | None = None,
+    progress: IterationCallback | None = None,
+) -> Identification:  # fmt: skip
+    """The same from the whole sum, identified and opened before."""
+    choice = choose_terms(reductions, penalty, search, progress)
+    reduced = confirmed_law(reductions, choice)
+    parameter_count = len(reduced.law.params)
+    initial_nuisances = [
+        replace(nuisance, value=float(nuisance_value))
+        for nuisance, nuisance_value in zip(full.nuisances, reduced.x[parameter_count:], strict=True)
+    ]
+    assert full.predictor is not None
+    fit = identify(
+        reduced.law, full.histories, full.predictor, settings=full.settings, start=reduced.x[:parameter_count], known_nuisances=initial_nuisances,
+        reference=full.reference, progress=progress,
+    )  # fmt: skip
+    record = _sparsity_record(full, fit, reductions, reduced, choice, penalty)
+    return replace(fit, search_trace=choice.trace or full.search_trace, sparsity=record)
+
+
+def penalty_path(
+    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, penalty: ContributionPenalty, *,
+    strengths: Sequence[float] = PATH_STRENGTHS, settings: IdentificationSettings | None = None, progress: IterationCallback | None = None,
+) -> PenaltyPath:  # fmt: skip
+    """The path of a penalty over its strength, from none to all, with the automatic choice."""
+    _, reductions = identify_full(law, histories, using, None, settings, progress)
+    return trace_path(reductions, penalty, strengths, progress)
+
+
+def identify_full(
+    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, through: Predictor | None, settings: IdentificationSettings | None,
+    progress: IterationCallback | None,
+) -> tuple[Identification, ReducedLaws]:  # fmt: skip
+    """The whole sum identified without penalty, and its terms ready to be dropped."""
+    if len(law.terms) < 2:
+        raise FitError(
+            f"law '{law.name}' has one term, '{next(iter(law.terms))}', and a penalty chooses among terms: "
+            "identify it without penalty, or a sum of laws with it"
+        )
+    full = identify(law, histories, using, settings=settings, through=through, progress=progress)
+    return full, ReducedLaws(TermProblem.from_identification(full, through))
+
+
+def confirmed_law(reductions: ReducedLaws, choice: TermChoice) -> ReducedLaw:
+    """The reduced law, to which dropped terms come back, the largest first, until its BIC is not above the sum's."""
+    kept_terms = list(choice.kept_terms)
+    while True:
+        reduced = reductions.with_terms(kept_terms)
+        if reduced.bic <= reductions.full(reduced).bic or len(kept_terms) == len(reductions.terms):
+            return reduced
+        dropped = [label for label in reductions.terms if label not in kept_terms]
+        kept_terms.append(max(dropped, key=lambda label: choice.contributions[label]))
+
+
+def _sparsity_record(
+    full_fit: Identification, fit: Identification, reductions: ReducedLaws, reduced: ReducedLaw, choice: TermChoice,
+    penalty: ContributionPenalty | Subsets,
+) -> Sparsity:  # fmt: skip
+    problem, full = reductions.problem, reductions.full(reduced)
+    return Sparsity(
+        law=problem.law.name,
+        penalty=type(penalty).__name__,
+        strength=choice.strength,
+        kept_terms=reduced.kept_terms,
+        dropped_terms=tuple(label for label in reductions.terms if label not in reduced.kept_terms),
+        exponents_off=reduced.exponents_off,
+        proposed_terms=choice.kept_terms,
+        contributions_without_penalty=problem.contributions_at(full.x),
+        contributions_with_penalty=choice.contributions,
+        contributions_after_refit=reduced.problem.contributions_at(reduced.x),
+        full=FitStatistics(full.chi_square, full.parameter_count, full.bic, full_fit.errors),
+        reduced=FitStatistics(reduced.chi_square, reduced.parameter_count, reduced.bic, fit.errors),
+        observations=problem.observation_count,
+        path=choice.path,
+    )

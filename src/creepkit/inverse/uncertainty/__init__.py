@@ -1,0 +1,1 @@
+"""Uncertainty of identified laws: intervals, profile likelihood, posterior samples, model averaging and correlation."""

@@ -1,0 +1,182 @@
+"""How estimates hang together, and what is not determined of them.
+
+A and n of a power law are each known poorly and their combination, the rate in the middle of the tests, well: the
+correlation says so. In the author's parameters (ln of a coefficient) it is often beyond .99; in the conditioned
+coordinates (see inverse.coordinates), where the ln rate at the reference point stands for a coefficient and the local
+exponent there for what only it shows, small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from creepkit.arrays import Floats, Ints
+from creepkit.errors import FitError
+from creepkit.inverse.identification import Identification
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+CoordinateSystem = Literal["author", "conditioned"]
+
+
+STRONG_CORRELATION = 0.95
+"""Correlation beyond which two parameters are told only together."""
+
+
+UNDETERMINED_WIDTH = 1.0 / 3.0
+"""Width of a 95 % interval over that of the bounds beyond which a parameter is not determined."""
+
+
+WELL_DETERMINED_SD = 0.1
+"""Standard deviation of a combination, over that which its parameters' bounds alone would leave, that is well known."""
+
+
+@dataclass(frozen=True, eq=False)
+class Correlation:
+    """The correlation of estimates, (parameters, parameters), and their standard deviations, (parameters,).
+
+    names : as the matrix is to be read, "ln A" where the logarithm is meant, "ln rate" of a conditioned coefficient.
+    """
+
+    names: tuple[str, ...]
+    matrix: Floats
+    sd: Floats
+    title: str = ""
+
+    def between(self, first: str, second: str) -> float:
+        """The correlation of two of the names."""
+        for name in (first, second):
+            if name not in self.names:
+                raise FitError(f"there is no '{name}' in this correlation; it has {', '.join(self.names)}")
+        return float(self.matrix[self.names.index(first), self.names.index(second)])
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The matrix in colours with its numbers; written to `path` when given."""
+        from creepkit.report.uncertainty_plots import correlation_figure
+
+        return correlation_figure(self, path)
+
+    def __str__(self) -> str:
+        width = max(len(name) for name in self.names) + 1
+        lines = [" " * width + "".join(f"{name:>{max(len(name), 8) + 1}}" for name in self.names)]
+        for name, row in zip(self.names, self.matrix, strict=True):
+            lines.append(
+                f"{name:{width}}"
+                + "".join(f"{v:>{max(len(n), 8) + 1}.4f}" for n, v in zip(self.names, row, strict=True))
+            )
+        return "\n".join(lines)
+
+
+def correlation(fit: Identification, coordinates: CoordinateSystem = "author") -> Correlation:
+    """The correlation of a fit's estimates, in the author's parameters or in the conditioned coordinates."""
+    if coordinates not in ("author", "conditioned"):
+        raise FitError(f"frame is '{coordinates}'; allowed are 'author' and 'conditioned'")
+    covariance = fit.covariance if coordinates == "conditioned" else _covariance_of_parameters(fit)
+    sd = np.sqrt(np.diag(covariance))
+    matrix = covariance / np.outer(sd, sd)
+    title = f"{fit.law.title or fit.law.name}, {coordinates} coordinates"
+    return Correlation(_parameter_names(fit, coordinates), np.clip(0.5 * (matrix + matrix.T), -1.0, 1.0), sd, title)
+
+
+def undetermined(fit: Identification) -> tuple[str, ...]:
+    """What the tests do not determine, a sentence for each group of parameters, and which combination they do.
+
+    A parameter counts as such where its 95 % interval fills a third of its bounds; those tied to it by a correlation of
+    .95 or more belong to its group. Empty where every parameter is determined.
+    """
+    undetermined_indices = np.flatnonzero(_relative_widths(fit) > UNDETERMINED_WIDTH)
+    groups = _groups(fit, undetermined_indices)
+    sentences = [_undetermined_sentence(fit, group) for group in groups]
+    return (*sentences, _determined_sentence(fit)) if sentences else ()
+
+
+def _covariance_of_parameters(fit: Identification) -> Floats:
+    to_theta = fit.coordinates.jacobian(fit.u)
+    return np.asarray(to_theta @ fit.covariance @ to_theta.T)
+
+
+def _parameter_names(fit: Identification, coordinate_system: CoordinateSystem) -> tuple[str, ...]:
+    """The parameters as they are correlated; in conditioned coordinates what stands in the place of some of them."""
+    names = [f"ln {n}" if p.scale == "log" else n for n, p in fit.law.table.items()]
+    if coordinate_system == "author":
+        return tuple(names)
+    coordinates = fit.coordinates
+    exponents = tuple(local.position for local in coordinates.exponents)
+    for label, positions in (("ln rate", coordinates.coefficients), ("local exponent", exponents)):
+        for k in positions:
+            names[k] = label if len(positions) == 1 else f"{label} ({fit.law.names[k]})"
+    return tuple(names)
+
+
+def _bound_widths(fit: Identification) -> Floats:
+    """(parameters,) of the bounds, on the internal scale."""
+    return np.array([np.ptp([p.to_internal(b) for b in p.bounds]) for p in fit.law.params.values()], float)
+
+
+def _relative_widths(fit: Identification) -> Floats:
+    """(parameters,) width of the interval over that of the bounds."""
+    ends = [[fit.law.table[e.name].to_internal(v) for v in (e.low, e.high)] for e in fit.estimates]
+    return np.asarray(np.ptp(np.array(ends, float), axis=1) / _bound_widths(fit))
+
+
+def _groups(fit: Identification, undetermined_indices: Ints) -> list[list[int]]:
+    """Loose parameters with all that are tied to them, joined where they share one."""
+    is_correlated = np.abs(correlation(fit).matrix) > STRONG_CORRELATION
+    groups: list[set[int]] = []
+    for k in undetermined_indices:
+        members = {int(k), *(int(j) for j in np.flatnonzero(is_correlated[k]))}
+        overlapping = [g for g in groups if g & members]
+        groups = [g for g in groups if not g & members] + [members.union(*overlapping)]
+    return [sorted(group) for group in groups]
+
+
+def _undetermined_sentence(fit: Identification, group: list[int]) -> str:
+    names = [fit.law.names[k] for k in group]
+    if len(group) == 1:
+        estimate, relative_width = fit.estimates[group[0]], float(_relative_widths(fit)[group[0]])
+        return f"{names[0]} is not determined: its interval [{estimate.low:.3g}, {estimate.high:.3g}] fills {relative_width:.0%} of its bounds"
+    sentence = f"{', '.join(names[:-1])} and {names[-1]} are not determined singly"
+    combination = _best_determined_combination(fit, group)
+    return f"{sentence}; their combination {combination} is" if combination else sentence
+
+
+def _best_determined_combination(fit: Identification, group: list[int]) -> str:
+    """The combination of a group that is known best, against what its bounds leave; empty where none is known well.
+
+    In parameters over the width of their bounds it is the eigenvector of the covariance of least eigenvalue.
+    """
+    widths = _bound_widths(fit)[group]
+    covariance = _covariance_of_parameters(fit)[np.ix_(group, group)] / np.outer(widths, widths)
+    values, vectors = np.linalg.eigh(covariance)
+    if np.sqrt(max(values[0], 0.0)) > WELL_DETERMINED_SD / np.sqrt(12.0):
+        return ""
+    weights = vectors[:, 0] / widths
+    weights /= weights[np.abs(weights * widths).argmax()]
+    theta = fit.coordinates.theta(fit.u)[group]
+    sd = float(np.sqrt(weights @ (covariance * np.outer(widths, widths)) @ weights))
+    names = [_parameter_names(fit, "author")[k] for k in group]
+    return f"{_combination_text(weights, names)} = {float(weights @ theta):.4g} +- {sd:.2g}"
+
+
+def _combination_text(weights: Floats, names: list[str]) -> str:
+    """The combination in words, that of weight one first."""
+    first, *others = sorted(range(weights.size), key=lambda k: bool(abs(weights[k] - 1.0) > 1e-12))
+    parts = [f"{'+' if weights[k] > 0 else '-'} {abs(weights[k]):.3g} {names[k]}" for k in others]
+    return " ".join([names[first], *parts])
+
+
+def _determined_sentence(fit: Identification) -> str:
+    """The rate and the local exponent in the middle of the tests, with what is known of them."""
+    reference = fit.reference
+    rate, rate_low, rate_high = (float(v) for v in fit.rate(reference.stress))
+    exponent, exponent_low, exponent_high = (float(v) for v in fit.local_exponent(reference.stress))
+    return (
+        f"what the tests see at {reference.stress:.4g} MPa: the local exponent is {exponent:.3g} [{exponent_low:.3g}, {exponent_high:.3g}], the rate "
+        f"{rate:.3g} [{rate_low:.3g}, {rate_high:.3g}] 1/s"
+    )

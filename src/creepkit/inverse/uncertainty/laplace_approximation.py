@@ -1,0 +1,241 @@
+"""Laplace's approximation: covariance and intervals of parameters, and Satterthwaite degrees of freedom of restricted likelihood."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import t as student
+
+from creepkit.arrays import Floats
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.noise_model import (
+    NEGLIGIBLE_DRIFT,
+    NoiseModel,
+    Residuals,
+    cholesky_factors,
+    covariance,
+    effective_sample_size,
+    fixed_components,
+)
+from creepkit.inverse.nuisance_parameters import NuisanceParameters
+from creepkit.inverse.search.local_refinement import Bounds
+from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, inverse_covariances, scaled_inverse
+from creepkit.language import CreepLaw
+from creepkit.records import Nuisance
+
+LOG_COMPONENT_STEP = 1e-3
+"""Of the logarithm of a size, for differences of the covariance, which is smooth in it."""
+
+
+MINIMUM_FREEDOM = 3.0
+"""Below this a quantile says nothing but that the scatter is unknown."""
+
+
+def restricted_covariance(
+    linearised: LinearisedProblem,
+    noise_model: NoiseModel,
+    nuisances: Sequence[Nuisance],
+    fixed: Collection[tuple[str, str]] = (),
+) -> tuple[Floats, float]:
+    """Posterior covariance of x = (u, e), (unknowns, unknowns), and its degrees of freedom.
+
+    stated : (output, source) of sizes that are known beside those that nuisances give.
+    Unknowns at their bounds count here as all others: their intervals reach inwards.
+    """
+    unconstrained = replace(linearised, free=np.ones_like(linearised.free))
+    inverses, _ = inverse_covariances(linearised.residuals, noise_model)
+    solution = unconstrained.solve(inverses)
+    components = [component for component in _estimated_components(noise_model, nuisances) if component not in fixed]
+    if not components:
+        return solution.covariance, 1e9
+    covariance_derivatives = [_covariance_derivative(linearised.residuals, noise_model, *one) for one in components]
+    projected = [
+        np.einsum("tep,tef,tfq->pq", solution.weighted_jacobian, s, solution.weighted_jacobian, optimize=True)
+        for s in covariance_derivatives
+    ]
+    information = _information(solution, inverses, covariance_derivatives, projected)
+    gradient = np.stack([np.diag(solution.covariance @ p @ solution.covariance) for p in projected], axis=1)
+    component_covariance = scaled_inverse(
+        information + 1e-9 * np.diag(np.diag(information)) + 1e-12 * np.eye(len(components))
+    )
+    variance_of_variance = np.einsum("pj,jk,pk->p", gradient, component_covariance, gradient)
+    freedom = 2.0 * np.diag(solution.covariance) ** 2 / np.maximum(variance_of_variance, 1e-300)
+    determined = (unconstrained.jacobian != 0).any(axis=(0, 1))
+    return solution.covariance, float(np.clip(np.median(freedom[determined]), MINIMUM_FREEDOM, 1e9))
+
+
+def _information(
+    solution: LinearSolution, inverses: Floats, covariance_derivatives: Sequence[Floats], projected: Sequence[Floats]
+) -> Floats:
+    """I_ij = tr(Q C_i Q C_j) / 2 with Q = C^-1 - B M B', B = C^-1 J: the values that tests share tie them together.
+
+    slopes : C_i of every test; pulled : B' C_i B.
+    """
+    weighted = [inverses @ slope for slope in covariance_derivatives]
+    left_products = [
+        np.einsum("tep,tef->tpf", solution.weighted_jacobian, slope, optimize=True) for slope in covariance_derivatives
+    ]
+    right_products = [a @ solution.weighted_jacobian for a in weighted]
+    shared = [solution.covariance @ own for own in projected]
+    information = np.empty((len(covariance_derivatives), len(covariance_derivatives)))
+    for i, j in np.ndindex(information.shape):
+        own_term = np.einsum("tef,tfe->", weighted[i], weighted[j])
+        cross_term = np.einsum("pq,tqe,tep->", solution.covariance, left_products[j], right_products[i], optimize=True)
+        information[i, j] = 0.5 * float(own_term - 2.0 * cross_term + np.trace(shared[i] @ shared[j]))
+    return information
+
+
+def _estimated_components(noise_model: NoiseModel, nuisances: Sequence[Nuisance]) -> list[tuple[str, str]]:
+    """(output, source) of the sizes that the data were asked for; "" for the rate."""
+    fixed = fixed_components(nuisances, list(noise_model.outputs))
+    components = []
+    for output, output_noise in noise_model.outputs.items():
+        names = ["noise"] + ["misfit"] * (output_noise.misfit > 0) + ["offset"] * (output_noise.offset > 0)
+        names += ["drift", "correlation_length"] * (output_noise.drift > NEGLIGIBLE_DRIFT)
+        components += [(output, name) for name in names if (output, name) not in fixed]
+    return components + ([("", "rate")] if noise_model.rate > 0 and ("", "rate") not in fixed else [])
+
+
+def _covariance_derivative(residuals: Residuals, noise_model: NoiseModel, output: str, name: str) -> Floats:
+    """Derivative of the covariances to the logarithm of one size, (tests, entries, entries)."""
+
+    def at(shift: float) -> Floats:
+        factor = float(np.exp(shift))
+        if not output:
+            return covariance(residuals, replace(noise_model, rate=noise_model.rate * factor))
+        return covariance(
+            residuals, noise_model.with_output(output, **{name: getattr(noise_model[output], name) * factor})
+        )
+
+    return np.asarray((at(LOG_COMPONENT_STEP) - at(-LOG_COMPONENT_STEP)) / (2.0 * LOG_COMPONENT_STEP))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter: value, 95 % interval in the author's unit, and a verdict.
+
+    verdict : "determined", "at its bound", or "not determined" (the interval fills four fifths of the bounds).
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    verdict: str
+
+
+def interval_quantile(freedom: float) -> float:
+    """Half width of a 95 % interval in standard deviations."""
+    return float(student.ppf(0.975, max(freedom, 1.0)))
+
+
+def laplace_covariance(
+    residuals: Residuals,
+    working_noise: NoiseModel,
+    noise_model: NoiseModel,
+    bounds: Bounds,
+    nuisance_parameters: NuisanceParameters,
+    *,
+    rate_known: bool = False,
+) -> tuple[Floats, float]:
+    """Posterior covariance of x = (u, e), (unknowns, unknowns), and its degrees of freedom.
+
+    rate_known : the scatter of the rate between tests was given and not estimated from them.
+    """
+    assert residuals.jacobian is not None
+    count, tests = bounds.width.size - nuisance_parameters.size, len(residuals.values)
+    covariance_factor = cholesky_factors(residuals, working_noise)
+    whitened = np.linalg.solve(covariance_factor, residuals.jacobian)
+    weighted = np.linalg.solve(np.swapaxes(covariance_factor, 1, 2), whitened)
+    prior = np.diag(np.concatenate([12.0 / bounds.width[:count] ** 2, nuisance_parameters.precision]))
+    inverse_normal_matrix = scaled_inverse(np.einsum("tfp,tfq->pq", whitened, whitened) + prior)
+
+    def meat(source: NoiseModel) -> Floats:
+        c = covariance(residuals, source)
+        return np.asarray(np.einsum("tfp,tfg,tgq->pq", weighted, c, weighted, optimize=True))
+
+    without_rate = replace(noise_model, rate=0.0)
+    within_meat = meat(without_rate)
+    within = inverse_normal_matrix @ (within_meat + prior) @ inverse_normal_matrix
+    between = inverse_normal_matrix @ (meat(noise_model) - within_meat) @ inverse_normal_matrix
+    determined = (residuals.jacobian[residuals.present][:, :count] != 0).any(axis=0)
+    parameters = max(int(determined.sum()), 1)
+    freedoms = max(tests - parameters, 1.0), max(effective_sample_size(residuals, without_rate) - parameters, 1.0)
+    if rate_known:
+        freedoms = (1e9, freedoms[1])
+    else:
+        between *= tests / freedoms[0]
+    between_share = np.diag(between)[:count] / np.maximum(np.diag(between + within)[:count], 1e-300)
+    mean_between_share = float(between_share[determined].sum() / parameters)
+    return within + between, 1.0 / (mean_between_share**2 / freedoms[0] + (1 - mean_between_share) ** 2 / freedoms[1])
+
+
+def normal_matrix(residuals: Residuals, working_noise: NoiseModel) -> Floats:
+    """J' W J of x = (u, e), (unknowns, unknowns)."""
+    assert residuals.jacobian is not None
+    whitened = np.linalg.solve(cholesky_factors(residuals, working_noise), residuals.jacobian)
+    return np.asarray(np.einsum("tfp,tfq->pq", whitened, whitened))
+
+
+def marginal_log_likelihood(
+    log_likelihood: float, normal_matrix: Floats, e: Floats, nuisance_parameters: NuisanceParameters
+) -> float:
+    """Log-likelihood with the unknowns of tests integrated out, by Laplace's approximation.
+
+    curve : J' W J of x. A prior without end counts as one of the width of the unknown's limits.
+    """
+    if not nuisance_parameters.size:
+        return log_likelihood
+    sd = np.minimum(nuisance_parameters.sd, (nuisance_parameters.high - nuisance_parameters.low) / np.sqrt(12.0))
+    scaled_normal_matrix = normal_matrix[-nuisance_parameters.size :, -nuisance_parameters.size :] * np.outer(
+        sd, sd
+    ) + np.eye(nuisance_parameters.size)
+    prior_residuals = (e - nuisance_parameters.mean) * np.sqrt(nuisance_parameters.precision)
+    return float(log_likelihood - 0.5 * (prior_residuals**2).sum() - 0.5 * np.linalg.slogdet(scaled_normal_matrix)[1])
+
+
+def parameter_estimates(
+    law: CreepLaw, coordinates: Coordinates, u: Floats, covariance: Floats, quantile: float
+) -> tuple[Estimate, ...]:
+    """Intervals of the author's parameters, `wide` standard deviations to each side."""
+    theta = coordinates.theta(u)
+    to_theta = coordinates.jacobian(u)
+    sd = np.sqrt(np.diag(to_theta @ covariance @ to_theta.T))
+    results = []
+    for (name, param), value, standard_deviation in zip(law.table.items(), theta, sd, strict=True):
+        low, high = (param.to_internal(b) for b in param.bounds)
+        value = min(max(value, low), high)
+        value = low if value - low < 1e-9 * (high - low) else high if high - value < 1e-9 * (high - low) else value
+        a, b = max(value - quantile * standard_deviation, low), min(value + quantile * standard_deviation, high)
+        middle, bottom, top = (param.from_internal(float(v)) for v in (value, a, b))
+        verdict = _verdict(float(value), float(quantile * standard_deviation), low, high)
+        results.append(Estimate(name, middle, bottom, top, param.unit, verdict))
+    return tuple(results)
+
+
+def _verdict(value: float, half: float, low: float, high: float) -> str:
+    if 2 * half >= 0.8 * (high - low):
+        return "not determined"
+    if min(value - low, high - value) <= 1e-4 * (high - low):
+        return "at its bound"
+    return "determined"
+
+
+def delta_method(
+    function: Callable[[Floats], Floats], point: Floats, covariance: Floats, step: float = 1e-4
+) -> tuple[Floats, Floats]:
+    """Value and standard deviation of functions of u, by the delta method with central differences.
+
+    function : u (parameters,) -> (...,); returns two arrays of that shape.
+    """
+    sd = np.sqrt(np.diag(covariance))
+    columns = []
+    for k in range(point.size):
+        step_vector = np.zeros(point.size)
+        step_vector[k] = step * max(sd[k], 1e-8)
+        columns.append((function(point + step_vector) - function(point - step_vector)) / (2 * step_vector[k]))
+    derivatives = np.stack(columns, axis=-1)
+    return function(point), np.sqrt(np.einsum("...i,ij,...j->...", derivatives, covariance, derivatives))

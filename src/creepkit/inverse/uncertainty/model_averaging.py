@@ -1,0 +1,308 @@
+"""Bayesian model averaging: intervals over the laws of a ranking, and bands of the creep rate.
+
+A quantity (ln of a rate, a local exponent) is normal, or Student's t, under each law; over all laws it has the distribution
+sum_i w_i F_i, whose quantiles are found by bisection (Hoeting et al. (1999), Stat. Sci. 14, 382). At an uncertain
+temperature T the rate has the distribution over laws, parameters and T together (Fig. 6d of Chen et al.),
+
+    p(ln rate) = sum_i w_i integral p_i(ln rate | T') g(T') dT',
+
+g uniform over T +- delta or normal with a standard deviation of delta / 1.96. The integral is a sum over the middles of
+slices of equal probability, so nothing is linearised in T. delta = 0 gives the band of parameters and laws alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, Protocol
+
+import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.errors import FitError
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.uncertainty.laplace_approximation import delta_method
+from creepkit.inverse.uncertainty.quantities import CoordinateFunction, local_exponent, log_rate
+from creepkit.language import temperature as TEMPERATURE
+from creepkit.records import ZERO_CELSIUS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+BISECTIONS = 80
+"""Of the interval between the lowest and the highest quantile of the parts: to the last digit."""
+
+
+NORMAL_FREEDOM = 1e9
+"""Degrees of freedom at which Student's distribution is the normal one."""
+
+
+INTERVAL_PROBABILITIES = (0.5, 0.025, 0.975)
+
+
+@dataclass(frozen=True, eq=False)
+class MixtureDistribution:
+    """The parts of a mixture: location, spread and degrees of freedom of each, with its weight.
+
+    weight, freedom : (parts,); middle, sd : (parts, ...).
+    """
+
+    weight: Floats
+    degrees_of_freedom: Floats
+    location: Floats
+    scale: Floats
+
+    def cumulative(self, x: Floats) -> Floats:
+        """(...,) the probability of less than x (...,)."""
+        probabilities = student.cdf((x - self.location) / self.scale, self._freedom)
+        return np.asarray(np.einsum("p,p...->...", self.weight, probabilities), float)
+
+    def quantile(self, probability: float) -> Floats:
+        """(...,) by halving, between the lowest and the highest quantile of the parts."""
+        quantiles = self.location + self.scale * student.ppf(probability, self._freedom)
+        lower, upper = quantiles.min(axis=0), quantiles.max(axis=0)
+        for _ in range(BISECTIONS):
+            midpoint = 0.5 * (lower + upper)
+            is_below = self.cumulative(midpoint) < probability
+            lower, upper = np.where(is_below, midpoint, lower), np.where(is_below, upper, midpoint)
+        return np.asarray(0.5 * (lower + upper), float)
+
+    def interval(self) -> tuple[Floats, Floats, Floats]:
+        """Median and 95 % interval, (...,) each."""
+        median, low, high = (self.quantile(p) for p in INTERVAL_PROBABILITIES)
+        return median, low, high
+
+    @property
+    def _freedom(self) -> Floats:
+        return self.degrees_of_freedom.reshape(-1, *(1 for _ in self.location.shape[1:]))
+
+
+class WeightedFit(Protocol):
+    """One law of a ranking: its identification and its weight."""
+
+    @property
+    def fit(self) -> Identification:
+        """The identification."""
+        ...
+
+    @property
+    def weight(self) -> float:
+        """Its share of belief."""
+        ...
+
+
+class WeightedLaws(Protocol):
+    """A ranking."""
+
+    @property
+    def laws(self) -> Sequence[WeightedFit]:
+        """Its laws."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class ModelAverage:
+    """Laws with weights that add up to one, each with its own posterior."""
+
+    fits: tuple[Identification, ...]
+    weights: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not self.fits or len(self.fits) != len(self.weights):
+            raise FitError(f"a mixture needs as many laws as weights, found {len(self.fits)} and {len(self.weights)}")
+        total = float(sum(self.weights))
+        if min(self.weights) < 0 or not (np.isfinite(total) and total > 0):
+            raise FitError(f"the weights of a mixture must not be negative, nor all zero; found {self.weights}")
+        object.__setattr__(self, "weights", tuple(float(w) / total for w in self.weights))
+
+    @classmethod
+    def from_ranking(cls, source: WeightedLaws | Identification) -> ModelAverage:
+        """The laws of a ranking; a single identification is a mixture of one."""
+        if isinstance(source, Identification):
+            return cls((source,), (1.0,))
+        weighted = [r for r in source.laws if r.weight > 0]
+        return cls(tuple(r.fit for r in weighted), tuple(r.weight for r in weighted))
+
+    def rate(
+        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        time: ArrayLike | None = None,
+    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+        """Median creep rate over the laws, 1/s, with its 95 % interval: (rate, low, high).
+
+        stress MPa, temperature K; what is not given is that of the best law's reference point.
+        """
+        distribution = self.distribution(log_rate, stress, temperature, strain, time)
+        median, low, high = (np.exp(v) for v in distribution.interval())
+        return median, low, high
+
+    def local_exponent(
+        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        time: ArrayLike | None = None,
+    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+        """Median local stress exponent over the laws, with its 95 % interval."""
+        return self.distribution(local_exponent, stress, temperature, strain, time).interval()
+
+    def distribution(
+        self, quantity: Callable[..., CoordinateFunction], stress: ArrayLike, temperature: ArrayLike | None,
+        strain: ArrayLike | None, time: ArrayLike | None,
+    ) -> MixtureDistribution:  # fmt: skip
+        """The distribution under each law of what(coordinates, stress, temperature, strain, time), at one point."""
+        reference = self.fits[0].reference
+        point = [
+            default if given is None else given
+            for given, default in (
+                (temperature, reference.temperature),
+                (strain, reference.strain),
+                (time, reference.time),
+            )
+        ]
+        normals = [_normal_under_law(fit, quantity(fit.coordinates, stress, *point)) for fit in self.fits]
+        location, scale = (np.stack([each[k] for each in normals]) for k in (0, 1))
+        return MixtureDistribution(np.array(self.weights), degrees_of_freedom(self.fits), location, scale)
+
+    def __str__(self) -> str:
+        reference = self.fits[0].reference
+        rate, low, high = (float(v) for v in self.rate(reference.stress))
+        exponent, exponent_low, exponent_high = (float(v) for v in self.local_exponent(reference.stress))
+        names = ", ".join(f"{fit.law.name} ({w:.2g})" for fit, w in zip(self.fits, self.weights, strict=True))
+        return (
+            f"over the laws {names}: rate at {reference.stress:.4g} MPa, {reference.temperature:.0f} K {rate:.3g} "
+            f"[{low:.3g}, {high:.3g}] 1/s, local stress exponent {exponent:.3g} [{exponent_low:.3g}, {exponent_high:.3g}]"
+        )
+
+
+def degrees_of_freedom(fits: Sequence[Identification]) -> Floats:
+    """(fits,) degrees of freedom of their intervals."""
+    return np.array([min(max(fit.freedom, 1.0), NORMAL_FREEDOM) for fit in fits])
+
+
+def _normal_under_law(fit: Identification, function: CoordinateFunction) -> tuple[Floats, Floats]:
+    """Value and standard deviation under one law; never quite zero, so that a mixture of certainties has quantiles."""
+    middle, sd = delta_method(function, fit.u, fit.covariance)
+    return middle, np.maximum(sd, 1e-12 * np.maximum(np.abs(middle), 1.0))
+
+
+TEMPERATURE_NODES = 81
+"""Slices of the temperature's distribution."""
+
+
+SAME_TEMPERATURE = 5.0
+"""K: tests within it of one another say nothing of how a rate depends on temperature."""
+
+
+@dataclass(frozen=True, eq=False)
+class RateBand:
+    """Creep rates over stress at an uncertain temperature.
+
+    stress : (points,) MPa; rate, low, high : (points,) 1/s, median and 95 % band, by parameters, laws and temperature.
+    inner : (low, high) of parameters and laws alone. temperature, plus_minus : K. notes : what it cannot know.
+    """
+
+    stress: Floats
+    rate: Floats
+    low: Floats
+    high: Floats
+    parameter_band: tuple[Floats, Floats]
+    temperature: float
+    temperature_uncertainty: float
+    name: str = ""
+    notes: tuple[str, ...] = ()
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Rate over stress, both logarithmic, with both bands; written to `path` when given."""
+        from creepkit.report.uncertainty_plots import rate_bands_figure
+
+        return rate_bands_figure([self], path)
+
+    def __str__(self) -> str:
+        temperature_text = f"{self.temperature - ZERO_CELSIUS:.0f} +- {self.temperature_uncertainty:g} C"
+        lines = [f"creep rate at {temperature_text}, 95 % band"]
+        for row in zip(self.stress, self.rate, self.low, self.high, strict=True):
+            lines.append("  {:8.4g} MPa  {:9.3g}  [{:.3g}, {:.3g}] 1/s".format(*row))
+        return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
+
+
+def rate_band(
+    source: Identification | WeightedLaws | ModelAverage, stresses: ArrayLike, temperature: float, *, temperature_uncertainty: float = 10.0,
+    temperature_distribution: Literal["uniform", "normal"] = "uniform", strain: float | None = None, time: float | None = None,
+) -> RateBand:  # fmt: skip
+    """Creep rates at `stresses` (MPa) and temperature +- plus_minus (K), over one law or the laws of a ranking.
+
+    A law without temperature cannot know how the temperature moves its rate: its part of the band is not widened, and
+    a note says so.
+    """
+    mixture = source if isinstance(source, ModelAverage) else ModelAverage.from_ranking(source)
+    levels = np.atleast_1d(np.asarray(stresses, float))
+    if not (
+        temperature_uncertainty >= 0
+        and np.isfinite(temperature_uncertainty)
+        and temperature - temperature_uncertainty > 0
+    ):
+        raise FitError(
+            f"a temperature of {temperature:g} +- {temperature_uncertainty:g} K was asked for; give kelvin, and a finite "
+            "uncertainty that is not negative"
+        )
+    if temperature_distribution not in ("uniform", "normal"):
+        raise FitError(f"shape is '{temperature_distribution}'; allowed are 'uniform' and 'normal'")
+    if not (levels > 0).all():
+        raise FitError("a rate band was asked for at a stress that is not above zero; give von Mises stresses, in MPa")
+    _, inner_low, inner_high = mixture.distribution(log_rate, levels, temperature, strain, time).interval()
+    temperatures = (
+        temperature + temperature_uncertainty * _standard_temperatures(temperature_distribution)
+        if temperature_uncertainty > 0
+        else np.array([temperature])
+    )
+    distribution_by_temperature = mixture.distribution(log_rate, levels, temperatures[:, None], strain, time)
+    median, low, high = _flattened(distribution_by_temperature).interval()
+    return RateBand(
+        levels, np.exp(median), np.exp(low), np.exp(high), (np.exp(inner_low), np.exp(inner_high)), float(temperature),
+        float(temperature_uncertainty), " or ".join(fit.law.title or fit.law.name for fit in mixture.fits),
+        _band_notes(mixture, temperature, temperature_uncertainty),
+    )  # fmt: skip
+
+
+def _standard_temperatures(temperature_distribution: str) -> Floats:
+    """(nodes,) temperatures of equal probability, in units of plus_minus about the middle."""
+    probabilities = (np.arange(TEMPERATURE_NODES) + 0.5) / TEMPERATURE_NODES
+    return (
+        2.0 * probabilities - 1.0
+        if temperature_distribution == "uniform"
+        else norm.ppf(probabilities) / norm.ppf(0.975)
+    )
+
+
+def _flattened(distribution: MixtureDistribution) -> MixtureDistribution:
+    """Parts (laws, nodes, points) as parts (laws x nodes, points)."""
+    nodes = distribution.location.shape[1]
+    flat = (v.reshape(-1, v.shape[-1]) for v in (distribution.location, distribution.scale))
+    return MixtureDistribution(
+        np.repeat(distribution.weight, nodes) / nodes, np.repeat(distribution.degrees_of_freedom, nodes), *flat
+    )
+
+
+def _band_notes(mixture: ModelAverage, temperature: float, temperature_uncertainty: float) -> tuple[str, ...]:
+    """What the laws, or their tests, cannot know of temperature."""
+    notes = []
+    laws_without_temperature = [fit.law.name for fit in mixture.fits if not fit.law.uses(TEMPERATURE)]
+    if laws_without_temperature and temperature_uncertainty > 0:
+        notes.append(
+            f"without a temperature in the law {' and '.join(laws_without_temperature)} the band cannot hold what {temperature_uncertainty:g} K do to "
+            "the rate; identify law.times(arrhenius())"
+        )
+    fit = mixture.fits[0]
+    low, high = fit.ranges["temperature"]
+    if len(laws_without_temperature) < len(mixture.fits) and high - low < SAME_TEMPERATURE:
+        notes.append(
+            f"all tests were made at {0.5 * (low + high) - ZERO_CELSIUS:.0f} C: how the rate depends on temperature is "
+            "not determined by them, and the band shows it"
+        )
+    extrapolation = max(low - SAME_TEMPERATURE - temperature, temperature - high - SAME_TEMPERATURE)
+    if extrapolation > 0:
+        notes.append(
+            f"{temperature - ZERO_CELSIUS:.0f} C lies {extrapolation + SAME_TEMPERATURE:.0f} K outside the tests"
+        )
+    return tuple(notes)

@@ -1,0 +1,369 @@
+"""The posterior of a law's conditioned coordinates u: its density for many candidates at once, and samples by MCMC.
+
+The prior of u is flat within the law's bounds, and chi2 is taken under the covariance that the fit found. With nu degrees
+of freedom of that covariance and K parameters
+
+    ln p(u) = -(nu + K) / 2 ln(1 + (chi2(u) - least chi2) / nu),
+
+the multivariate Student's t (Box & Tiao (1973), Bayesian Inference in Statistical Analysis, 2.7); -chi2(u) / 2 for large
+nu. Nuisance parameters of tests are integrated out to first order about their estimates: with r the whitened residuals at
+the estimates, J their derivatives to the nuisance parameters, priors below, chi2(u) = |r|^2 - |Q' r|^2, J = Q R. The
+effect of a test's own rate is taken half way between the optimum and the candidate (see uncertainty.profile_likelihood).
+
+Samples are drawn by emcee with moves of differential evolution (ter Braak (2006), Stat. Comput. 16, 239), a fifth of them
+its snooker update (ter Braak & Vrugt (2008), Stat. Comput. 18, 435).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Bools, Floats, single_threaded_blas
+from creepkit.errors import FitError
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.noise_model import MINIMUM_TESTS, cholesky_factors
+from creepkit.inverse.problem import LeastSquaresProblem, least_squares_problem
+from creepkit.inverse.residuals import ResidualFunction
+from creepkit.inverse.search.local_refinement import IterationCallback
+from creepkit.inverse.uncertainty.model_averaging import INTERVAL_PROBABILITIES
+from creepkit.inverse.uncertainty.quantities import DerivedQuantity, local_exponent, log_rate, quantity_of
+from creepkit.records import Predictor
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def interval_problem(fit: Identification) -> LeastSquaresProblem:
+    """The problem of a fit about its optimum, with the scatter of the rate as its Laplace intervals have it.
+
+    That scatter, found by maximum likelihood from T tests beside K parameters, is too small by a factor of
+    T / (T - K) in variance (see inverse.uncertainty); restricted likelihood, and a given scatter, are not.
+    """
+    problem, test_count = least_squares_problem(fit), len(fit.histories)
+    is_rate_given = test_count < MINIMUM_TESTS or any(
+        n.kind == "rate" and n.sd is not None for n in fit.settings.nuisances
+    )
+    if is_rate_given or fit.settings.weights == "likelihood" or fit.noise_model.rate == 0:
+        return problem
+    jacobian = problem.residuals.jacobian
+    assert jacobian is not None
+    determined_count = int((jacobian[..., : fit.u.size] != 0).any(axis=(0, 1)).sum())
+    rate_scatter = fit.noise_model.rate * float(np.sqrt(test_count / max(test_count - max(determined_count, 1), 1)))
+    noise_model = replace(fit.noise_model, rate=rate_scatter)
+    return replace(problem, noise_model=noise_model, covariance_factor=cholesky_factors(problem.residuals, noise_model))
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """ln p, but for a constant, of candidates u (candidates, parameters).
+
+    objective : with the unknowns of tests held at their estimates. whitening : (tests, entries, entries), inverses of
+    the Cholesky factors of the covariance without the scatter of rates. effect : (tests, entries), at the optimum,
+    what one standard deviation of a test's own rate does. floor, ceiling : (parameters,) of the internal parameters.
+    taken : (data + unknowns, unknowns) Q. prior : (unknowns,) white residuals of the priors at the estimates.
+    freedom : nu; least : the least chi-square.
+    """
+
+    problem: LeastSquaresProblem
+    objective: ResidualFunction
+    whitening: Floats
+    rate_effect: Floats
+    parameter_lower: Floats
+    parameter_upper: Floats
+    nuisance_basis: Floats
+    prior_residuals: Floats
+    degrees_of_freedom: float
+    least_chi_square: float
+
+    @classmethod
+    def from_problem(cls, problem: LeastSquaresProblem, degrees_of_freedom: float) -> Posterior:
+        """That of a reopened identification."""
+        objective, residuals, parameter_count = (
+            problem.residual_function,
+            problem.residuals,
+            len(problem.residual_function.law.params),
+        )
+        fixed, nuisances, nuisance_values = (
+            objective.with_predictor(objective.predictor, objective.law, objective.coordinates),
+            objective.nuisance_parameters,
+            problem.x[parameter_count:],
+        )
+        fixed.nuisance_parameters = replace(nuisances, mean=np.array(nuisance_values), fixed=True)
+        parameter_bounds = np.array([[p.to_internal(b) for b in p.bounds] for p in objective.law.params.values()])
+        whitening = np.asarray(
+            np.linalg.inv(cholesky_factors(residuals, replace(problem.noise_model, rate=0.0))), float
+        )
+        rate_effect = (
+            residuals.log_rate_sensitivity * problem.noise_model.rate / np.sqrt(residuals.test_weights)[:, None]
+        )
+        root_precision = np.diag(np.sqrt(nuisances.precision))
+        assert residuals.jacobian is not None
+        nuisance_jacobian = _whitened(
+            whitening, rate_effect, np.moveaxis(residuals.jacobian[..., parameter_count:], -1, 0)
+        )[:, objective.observations.present].T
+        nuisance_basis, prior_residuals = (
+            np.linalg.qr(np.concatenate([nuisance_jacobian, root_precision]))[0],
+            root_precision @ (nuisance_values - nuisances.mean[: nuisances.size]),
+        )
+        least_chi_square = problem.chi_square(problem.minimise().u)
+        return cls(
+            problem, fixed, whitening, rate_effect, parameter_bounds[:, 0], parameter_bounds[:, 1], nuisance_basis, prior_residuals, max(degrees_of_freedom, 1.0), least_chi_square
+        )  # fmt: skip
+
+    @property
+    def lower(self) -> Floats:
+        """(parameters,) the lower bounds of u."""
+        return self.problem.bounds.lower[: self.parameter_lower.size]
+
+    @property
+    def upper(self) -> Floats:
+        """(parameters,) the upper bounds of u."""
+        return self.problem.bounds.upper[: self.parameter_lower.size]
+
+    def __call__(self, u: Floats) -> Floats:
+        """(candidates,) ln p; -inf outside the bounds. All candidates are one prediction."""
+        log_density, is_inside = np.full(len(u), -np.inf), self.inside(u)
+        if is_inside.any():
+            rise = np.maximum(self.chi_square(u[is_inside]) - self.least_chi_square, -0.5 * self.degrees_of_freedom)
+            log_density[is_inside] = (
+                -0.5 * (self.degrees_of_freedom + u.shape[1]) * np.log1p(rise / self.degrees_of_freedom)
+            )
+        return np.where(np.isfinite(log_density), log_density, -np.inf)
+
+    def chi_square(self, u: Floats) -> Floats:
+        """(candidates,) least sum of squares that any values of the nuisances leave."""
+        residuals, rate_effect = self._residuals(u)
+        whitened = _whitened(self.whitening, rate_effect, residuals)[:, self.objective.observations.present]
+        rows = np.concatenate(
+            [whitened, np.broadcast_to(self.prior_residuals, (len(u), self.prior_residuals.size))], axis=1
+        )
+        return np.asarray((rows**2).sum(axis=1) - ((rows @ self.nuisance_basis) ** 2).sum(axis=1))
+
+    def _residuals(self, u: Floats) -> tuple[Floats, Floats]:
+        """Residuals (candidates, tests, entries), and what a test's own rate does half way to each candidate.
+
+        A factor on all rates moves every coefficient, each of which is a coordinate's own. Where a term has none, and
+        for tests compared over their whole life, whose derivatives are dear, it does what it does at the optimum.
+        """
+        objective, law = self.objective, self.objective.law
+        coefficients = list(objective.coordinates.coefficients)
+        is_separable = (
+            len(coefficients) == len(law.terms) + len(law.states)
+            and not objective.observations.followed_to_rupture.any()
+        )
+        if not (is_separable and self.problem.noise_model.rate > 0):
+            return objective.batch_residuals(u), self.rate_effect
+        residuals, jacobian = objective.batch_jacobian(u)
+        rate_scatter = self.problem.noise_model.rate / np.sqrt(self.problem.residuals.test_weights)[:, None]
+        return residuals, 0.5 * (self.rate_effect + jacobian[..., coefficients].sum(axis=-1) * rate_scatter)
+
+    def inside(self, u: Floats) -> Bools:
+        """(candidates,) whether the bounds of u and of the law's parameters, and its constraints, hold."""
+        is_inside = np.asarray(((u >= self.lower) & (u <= self.upper)).all(axis=1))
+        theta, tolerance = (
+            self.problem.residual_function.coordinates.theta(u),
+            1e-9 * (self.parameter_upper - self.parameter_lower),
+        )
+        is_inside &= ((theta >= self.parameter_lower - tolerance) & (theta <= self.parameter_upper + tolerance)).all(
+            axis=1
+        )
+        if self.problem.residual_function.law.constraints:
+            bound_penalties = self.problem.bound_penalties
+            is_inside &= np.array([not (bound_penalties.constraint_violations(candidate) > 0).any() for candidate in u])
+        return np.asarray(is_inside)
+
+
+def _whitened(whitening: Floats, rate_effect: Floats, values: Floats) -> Floats:
+    """Residuals (..., tests, entries) over their scatter, with a random effect (..., tests, entries) beside.
+
+    With v = W effect the covariance is W^-1 (I + v v') W^-T, and its inverse root (I - b v v') W,
+    b = (1 - 1 / sqrt(1 + v'v)) / v'v.
+    """
+    whitened = np.einsum("tij,...tj->...ti", whitening, values, optimize=True)
+    whitened_effect = np.einsum("tij,...tj->...ti", whitening, rate_effect, optimize=True)
+    squared_norm = np.maximum((whitened_effect**2).sum(axis=-1, keepdims=True), 1e-300)
+    correction = (1.0 - 1.0 / np.sqrt(1.0 + squared_norm)) / squared_norm
+    return np.asarray(
+        whitened - correction * whitened_effect * (whitened_effect * whitened).sum(axis=-1, keepdims=True)
+    )
+
+
+CONVERGED_LENGTH = 50.0
+"""Steps over autocorrelation time that emcee's authors ask for before its estimate may be trusted."""
+
+
+MAX_START_DRAWS = 50
+"""Draws of a walker's start that may fall outside the bounds."""
+
+
+@dataclass(frozen=True, eq=False)
+class PosteriorSamples:
+    """Draws of a law's values from their posterior.
+
+    chain : (steps, walkers, parameters) conditioned coordinates u, all of them; log_probability : (steps, walkers).
+    burn : steps left out at the beginning. acceptance : mean share of accepted moves.
+    autocorrelation : (parameters,) steps until a walker has forgotten where it was.
+    """
+
+    coordinates: Coordinates
+    chain: Floats
+    log_probability: Floats
+    burn_in: int
+    acceptance_fraction: float
+    autocorrelation_time: Floats
+    notes: tuple[str, ...] = ()
+
+    @property
+    def u(self) -> Floats:
+        """(draws, parameters) after the burn-in."""
+        return self.chain[self.burn_in :].reshape(-1, self.chain.shape[-1])
+
+    @property
+    def values(self) -> dict[str, Floats]:
+        """{parameter: (draws,)} in the author's units."""
+        theta = self.coordinates.theta(self.u)
+        table = self.coordinates.law.table.items()
+        return {n: np.exp(theta[:, k]) if p.scale == "log" else theta[:, k] for k, (n, p) in enumerate(table)}
+
+    @property
+    def converged(self) -> bool:
+        """Whether the chain is long against its autocorrelation time."""
+        return bool(len(self.chain) > CONVERGED_LENGTH * self.autocorrelation_time.max())
+
+    @property
+    def effective_sample_size(self) -> float:
+        """Number of independent draws that tell as much."""
+        return float(len(self.u) / self.autocorrelation_time.max())
+
+    def interval(self, quantity_or_name: str | DerivedQuantity) -> tuple[float, float, float]:
+        """Median and 95 % interval of a parameter, by name, or another quantity: (median, low, high)."""
+        quantity = quantity_of(self.coordinates, quantity_or_name)
+        quantiles = quantity.to_unit(np.quantile(quantity.function(self.coordinates)(self.u), INTERVAL_PROBABILITIES))
+        return float(quantiles[0]), float(quantiles[1]), float(quantiles[2])
+
+    def rate(
+        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        time: ArrayLike | None = None,
+    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+        """Median creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape."""
+        draws = log_rate(self.coordinates, stress, temperature, strain, time)(self.u)
+        median, low, high = np.exp(np.quantile(draws, INTERVAL_PROBABILITIES, axis=0))
+        return median, low, high
+
+    def local_exponent(
+        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        time: ArrayLike | None = None,
+    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+        """Median local stress exponent with its 95 % interval."""
+        draws = local_exponent(self.coordinates, stress, temperature, strain, time)(self.u)
+        median, low, high = np.quantile(draws, INTERVAL_PROBABILITIES, axis=0)
+        return median, low, high
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Every pair of parameters, and each alone; written to `path` when given."""
+        from creepkit.report.uncertainty_plots import pairs_figure
+
+        return pairs_figure(self, path)
+
+    def __str__(self) -> str:
+        width = max(len(name) for name in self.coordinates.names)
+        lines = [
+            f"{self.chain.shape[1]} walkers, {len(self.chain)} steps ({self.burn_in} left out): acceptance "
+            f"{self.acceptance_fraction:.2f}, autocorrelation {self.autocorrelation_time.max():.3g} steps, some "
+            f"{self.effective_sample_size:.0f} independent draws"
+        ]
+        for name, param in self.coordinates.law.table.items():
+            middle, low, high = self.interval(name)
+            unit = "" if param.unit == "1" else f" {param.unit}"
+            lines.append(f"  {name:{width}} = {middle:.5g}  [{low:.4g}, {high:.4g}]{unit}")
+        return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
+
+
+def sample_posterior(
+    fit: Identification, *, walkers: int = 32, steps: int = 1000, seed: int = 0, using: Predictor | None = None,
+    progress: IterationCallback | None = None,
+) -> PosteriorSamples:  # fmt: skip
+    """Sample the posterior of an identification's values; needs emcee.
+
+    walkers : an even number of at least twice the parameters. using : another predictor of the same tests than the
+        fit's, such as a surrogate where the fit's is a finite element model.
+    """
+    emcee, size = _import_emcee(), fit.u.size
+    if walkers % 2 or walkers < 2 * size + 2 or steps < 10:
+        raise FitError(
+            f"{walkers} walkers and {steps} steps were asked for; a law of {size} parameters needs an even number of "
+            f"at least {2 * size + 2} walkers, and at least 10 steps"
+        )
+    posterior = Posterior.from_problem(
+        interval_problem(fit if using is None else replace(fit, predictor=using)), fit.freedom
+    )
+    rng = np.random.default_rng(seed)
+    moves = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)]
+    sampler = emcee.EnsembleSampler(walkers, size, posterior, vectorize=True, moves=moves)
+    start = emcee.State(
+        _initial_walkers(fit, posterior, walkers, rng), random_state=np.random.RandomState(seed).get_state()
+    )
+    with single_threaded_blas():
+        for k, _ in enumerate(sampler.sample(start, iterations=steps)):
+            if progress is not None:
+                progress("step", k + 1, steps)
+    return _posterior_samples(fit, sampler.get_chain(), sampler.get_log_prob(), sampler.acceptance_fraction, emcee)
+
+
+def _import_emcee() -> Any:
+    try:
+        import emcee
+    except ImportError:
+        raise FitError("sampling needs emcee, which is not installed: pip install 'creepkit[mcmc]'") from None
+    return emcee
+
+
+def _initial_walkers(fit: Identification, posterior: Posterior, walkers: int, rng: np.random.Generator) -> Floats:
+    """(walkers, parameters) from Laplace's approximation, drawn again where a bound cuts it, ever closer to the fit."""
+    root = np.linalg.cholesky(fit.covariance + 1e-14 * np.diag(np.diag(fit.covariance)))
+    centre = np.clip(fit.u, posterior.lower, posterior.upper)
+    starts = np.empty((walkers, fit.u.size))
+    missing = np.ones(walkers, bool)
+    for k in range(MAX_START_DRAWS):
+        starts[missing] = centre + 0.9**k * rng.normal(size=(int(missing.sum()), fit.u.size)) @ root.T
+        starts = np.where(missing[:, None], _reflected(starts, posterior), starts)
+        missing &= ~np.isfinite(posterior(starts))
+        if not missing.any():
+            return starts
+    raise FitError(
+        f"law '{fit.law.name}': no walker can start, the values lie at the edge of the law's bounds; widen the bounds"
+    )
+
+
+def _reflected(u: Floats, posterior: Posterior) -> Floats:
+    """Points beyond a bound thrown back by as much: values at their bound leave half a normal distribution."""
+    u = np.where(u < posterior.lower, 2 * posterior.lower - u, u)
+    return np.where(u > posterior.upper, 2 * posterior.upper - u, u)
+
+
+def _posterior_samples(
+    fit: Identification, chain: Floats, log_probability: Floats, accepted: Floats, emcee: Any
+) -> PosteriorSamples:
+    steps = len(chain)
+    autocorrelation_time = np.array(
+        [float(emcee.autocorr.integrated_time(chain[:, :, k], tol=0)[0]) for k in range(fit.u.size)]
+    )
+    autocorrelation_time = np.where(np.isfinite(autocorrelation_time), np.maximum(autocorrelation_time, 1.0), steps)
+    burn_in = int(min(np.ceil(5 * autocorrelation_time.max()), steps // 2))
+    notes = []
+    if steps <= CONVERGED_LENGTH * autocorrelation_time.max():
+        notes.append(
+            f"not converged: the chain is {steps / autocorrelation_time.max():.0f} autocorrelation times long, {CONVERGED_LENGTH:.0f} are needed; "
+            f"ask for {int(np.ceil(CONVERGED_LENGTH * autocorrelation_time.max() / 100.0)) * 100 + 100} steps or more"
+        )
+    acceptance_fraction = float(np.mean(accepted))
+    if not 0.05 < acceptance_fraction < 0.8:
+        notes.append(f"a share of {acceptance_fraction:.2f} of the moves was accepted, where .2 to .5 is healthy")
+    return PosteriorSamples(
+        fit.coordinates, chain, log_probability, burn_in, acceptance_fraction, autocorrelation_time, tuple(notes)
+    )

@@ -1,0 +1,264 @@
+"""Profile likelihood: how the misfit rises as one quantity is held away from its best value, all else refitted.
+
+With chi2(x) the sum of squares that the fit minimises under the covariance it found, the profile of a quantity q is
+min {chi2(x) : q(x) = v} over v. Its 95 % interval is where the rise stays below the .95 quantile of F(1, freedom),
+which is that of chi-square with one degree of freedom where the scatter is well known (Venzon & Moolgavkar (1988),
+J. R. Stat. Soc. C 37, 87; Bates & Watts (1988), Nonlinear Regression Analysis, ch. 6). Unlike Laplace's intervals it
+may be lopsided, and open where the data never rise against a value.
+
+Each point minimises chi2(x) + ((q(x) - v) / w)^2. Where that ends is a point of the profile whatever w is: nothing
+of the same q fits better. A w far below the spread of q brings it to the v that was asked for.
+
+Where rates scatter from test to test, a test whose rate is off by a factor exp(b) leaves residuals of b d to first
+order, d the derivative to ln rate. On the scale of strains d changes along the way, and far from the optimum what is
+left of second order would count as misfit: with d half way between the optimum and where one is, it cancels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.stats import t as student
+
+from creepkit.arrays import Floats, single_threaded_blas
+from creepkit.errors import FitError
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.noise_model import cholesky_factors
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.uncertainty.posterior import interval_problem
+from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity, gradient, quantity_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+CONSTRAINT_WIDTH = 0.02
+"""w over the standard deviation of the quantity."""
+
+
+STEP_RISE = 0.35
+"""Aimed at from point to point: the rise of sqrt(chi2) over that of the interval's end."""
+
+
+MAX_POINTS = 15
+"""Points to each side; an end that lies further out than they reach is called open."""
+
+
+BLOCKED_FRACTION = 0.5
+"""Share of a step below which what was asked for cannot be had: the law's bounds are in the way."""
+
+
+ZERO_TOLERANCE = 1e-9
+"""Of the standard deviation: nearer to zero than this is zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileLikelihood:
+    """The profile of one quantity.
+
+    values, chi_square : (points,) values in the quantity's unit, rising, and the rise of chi-square at each.
+    best : the value of least chi-square. low, high : ends of the interval, None where it is open.
+    limit : the rise of chi-square at the ends; level : how sure.
+    laplace : the interval of the Laplace approximation, for comparison.
+    """
+
+    name: str
+    unit: str
+    values: Floats
+    chi_square: Floats
+    best: float
+    low: float | None
+    high: float | None
+    limit: float
+    level: float
+    laplace: tuple[float, float]
+    notes: tuple[str, ...] = field(default=())
+
+    def __str__(self) -> str:
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        low, high = (f"{end:.4g}" if end is not None else "open" for end in (self.low, self.high))
+        line = f"{self.name} = {self.best:.5g}{unit}, {100 * self.level:g} % interval [{low}, {high}] by its profile"
+        return "; ".join([line, *self.notes])
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """The rise of chi-square over the quantity, with that of Laplace's approximation; written to `path`."""
+        from creepkit.report.uncertainty_plots import profile_figure
+
+        return profile_figure(self, path)
+
+
+@dataclass(frozen=True)
+class _QuantityConstraint:
+    """The residual (q(x) - value) / width, which holds a quantity at a value."""
+
+    function: CoordinateFunction
+    size: int
+    value: float
+    width: float
+
+    def residuals(self, x: Floats) -> Floats:
+        return np.array([(float(self.function(x[: self.size])) - self.value) / self.width])
+
+    def jacobian(self, x: Floats) -> Floats:
+        u = x[: self.size]
+        quantity_gradient = gradient(self.function, u, np.maximum(np.abs(u), 1.0))
+        return np.concatenate([quantity_gradient, np.zeros(x.size - self.size)])[None] / self.width
+
+
+@dataclass(frozen=True)
+class _ProfilePoint:
+    """One point of a profile: where, the quantity on its scale, and chi-square."""
+
+    x: Floats
+    value: float
+    chi_square: float
+
+
+class _ProfileWalk:
+    """Points of a profile, one after the other outwards from the optimum."""
+
+    def __init__(
+        self, fit: Identification, problem: LeastSquaresProblem, quantity: DerivedQuantity, root: float
+    ) -> None:
+        self.problem, self.root, self.size = problem, root, fit.u.size
+        self.function, self.covariance = quantity.function(fit.coordinates), fit.covariance
+        quantity_gradient = gradient(self.function, fit.u, np.sqrt(np.diag(fit.covariance)))
+        self.sd = float(np.sqrt(quantity_gradient @ fit.covariance @ quantity_gradient))
+        if not (np.isfinite(self.sd) and self.sd > 0):
+            raise FitError(
+                f"{quantity.name} does not depend on any parameter of law '{fit.law.name}': no profile of it"
+            )
+        self.start = self._constrained_minimum(problem.x, None)
+
+    def one_side(self, sign: float) -> tuple[list[_ProfilePoint], bool]:
+        """Points to one side, and whether chi-square rose as far as wanted there."""
+        points, step = [self.start], sign * STEP_RISE * self.root * self.sd
+        for _ in range(MAX_POINTS):
+            last = points[-1]
+            point = self._constrained_minimum(self._predicted_start(last, step), last.value + step)
+            relative_step = (point.value - last.value) / step
+            points += [point] if relative_step > 0 else []
+            if self._root_rise(points[-1]) >= self.root:
+                return points, True
+            if relative_step < BLOCKED_FRACTION:
+                return points, False
+            root_rise_rate = (self._root_rise(point) - self._root_rise(last)) / (point.value - last.value) * sign
+            wanted_step = STEP_RISE * self.root / root_rise_rate if root_rise_rate > 0 else np.inf
+            step = sign * float(np.clip(wanted_step, 0.3 * abs(step), 2.0 * abs(step)))
+        return points, False
+
+    def _root_rise(self, point: _ProfilePoint) -> float:
+        return float(np.sqrt(max(point.chi_square - self.start.chi_square, 0.0)))
+
+    def _predicted_start(self, last: _ProfilePoint, step: float) -> Floats:
+        """Where Laplace's approximation expects the next point."""
+        u = last.x[: self.size]
+        quantity_gradient = gradient(self.function, u, np.sqrt(np.diag(self.covariance)))
+        direction = self.covariance @ quantity_gradient
+        directional_variance = float(quantity_gradient @ direction)
+        x = np.array(last.x)
+        x[: self.size] += direction * (step / directional_variance) if directional_variance > 0 else 0.0
+        return self.problem.bounds.clip(x)
+
+    def _constrained_minimum(self, start: Floats, value: float | None) -> _ProfilePoint:
+        constraint = (
+            None if value is None else _QuantityConstraint(self.function, self.size, value, CONSTRAINT_WIDTH * self.sd)
+        )
+        x = self.problem.minimise(start, additional=constraint).u
+        x = self._problem_at(x).minimise(x, additional=constraint).u if self.problem.noise_model.rate > 0 else x
+        value_reached = float(self.function(x[: self.size]))
+        return _ProfilePoint(
+            x, 0.0 if abs(value_reached) < ZERO_TOLERANCE * self.sd else value_reached, self._chi_square(x)
+        )
+
+    def _problem_at(self, x: Floats) -> LeastSquaresProblem:
+        """The problem with what a test's own rate does taken half way between the optimum and x."""
+        problem = self.problem
+        rate_effect = 0.5 * (
+            problem.residuals.log_rate_sensitivity + problem.residual_function.evaluate(x).log_rate_sensitivity
+        )
+        return replace(
+            problem,
+            covariance_factor=cholesky_factors(
+                replace(problem.residuals, log_rate_sensitivity=rate_effect), problem.noise_model
+            ),
+        )
+
+    def _chi_square(self, x: Floats) -> float:
+        """Of the data and the priors: the walls stand for bounds, at which a value is possible still."""
+        problem = self._problem_at(x) if self.problem.noise_model.rate > 0 else self.problem
+        whitened, nuisance_count = problem.whitened(x), x.size - self.size
+        observation_count = int(problem.residual_function.observations.present.sum())
+        return float(
+            (whitened[:observation_count] ** 2).sum() + (whitened[whitened.size - nuisance_count :] ** 2).sum()
+        )
+
+
+def profile(fit: Identification, quantity_or_name: str | DerivedQuantity, *, level: float = 0.95) -> ProfileLikelihood:
+    """Profile a parameter, by its name, or another quantity such as rate_at(120) or exponent_at(120).
+
+    The interval holds the value with probability `level`, 0.95 unless told otherwise.
+    """
+    if not 0.0 < level < 1.0:
+        raise FitError(f"level is {level:g}; a probability between 0 and 1 is needed, such as 0.95")
+    quantity = quantity_of(fit.coordinates, quantity_or_name)
+    root = float(student.ppf(0.5 + 0.5 * level, max(fit.freedom, 1.0)))
+    with single_threaded_blas():
+        walk = _ProfileWalk(fit, interval_problem(fit), quantity, root)
+        (below, low), (above, high) = walk.one_side(-1.0), walk.one_side(1.0)
+    return _profile(quantity, walk, [*below[:0:-1], *above], (low, high), level)
+
+
+def _profile(
+    quantity: DerivedQuantity,
+    walk: _ProfileWalk,
+    points: list[_ProfilePoint],
+    is_closed: tuple[bool, bool],
+    level: float,
+) -> ProfileLikelihood:
+    values, chi_square = (np.array([getattr(p, name) for p in points]) for name in ("value", "chi_square"))
+    best = int(chi_square.argmin())
+    rise = chi_square - chi_square[best]
+    ends = [
+        _interval_end(values, np.sqrt(rise), walk.root, best, sign) if c else None
+        for c, sign in zip(is_closed, (-1, 1), strict=True)
+    ]
+    low, high = (None if end is None else float(quantity.to_unit(end)) for end in ends)
+    laplace = [float(quantity.to_unit(walk.start.value + s * walk.root * walk.sd)) for s in (-1, 1)]
+    return ProfileLikelihood(
+        quantity.name, quantity.unit, quantity.to_unit(values), rise, float(quantity.to_unit(values[best])), low, high,
+        walk.root**2, level, (laplace[0], laplace[1]), _notes(quantity, points, rise, is_closed, walk),
+    )  # fmt: skip
+
+
+def _interval_end(values: Floats, roots: Floats, limit: float, best: int, sign: int) -> float:
+    """Where sqrt(rise), nearly straight, passes its limit to one side of point k."""
+    side = slice(best, None) if sign > 0 else slice(best, None, -1)
+    side_values, side_roots = values[side], roots[side]
+    is_rising = np.concatenate([[True], side_roots[1:] > np.maximum.accumulate(side_roots)[:-1]])
+    return float(PchipInterpolator(side_roots[is_rising], side_values[is_rising])(limit))
+
+
+def _notes(
+    quantity: DerivedQuantity,
+    points: list[_ProfilePoint],
+    rise: Floats,
+    is_closed: tuple[bool, bool],
+    walk: _ProfileWalk,
+) -> tuple[str, ...]:
+    notes = []
+    for is_side_closed, k, side in ((is_closed[0], 0, "below"), (is_closed[1], -1, "above")):
+        if not is_side_closed:
+            reached = float(quantity.to_unit(points[k].value))
+            notes.append(
+                f"not bounded {side} within the law's bounds: at {reached:.4g} chi-square has risen by {rise[k]:.2g} "
+                f"of {walk.root**2:.2g}"
+            )
+    better = walk.start.chi_square - min(p.chi_square for p in points)
+    if better > 0.5:
+        notes.append(f"a better minimum was met on the way, by {better:.2g} in chi-square: identify with more starts")
+    return tuple(notes)

@@ -1,0 +1,127 @@
+"""What intervals are asked of: a parameter, the creep rate at a point, the local stress exponent there.
+
+Each is a function of the conditioned coordinates u, looked at on the scale on which it is nearly normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.errors import FitError
+from creepkit.inverse.coordinates import Coordinates
+
+EXPONENT_STRESS_RATIO = 1.0005
+"""Ratio of the stresses between which a local exponent is taken, to each side."""
+
+
+CoordinateFunction = Callable[[Floats], Floats]
+"""u (..., parameters) to numbers (..., points)."""
+
+
+@dataclass(frozen=True)
+class DerivedQuantity:
+    """Something that follows from the values of a law.
+
+    scale : "log" where its logarithm is what is nearly normal.
+    of : the function of u, on that scale, of a law's coordinates; u (..., parameters) to (...,).
+    """
+
+    name: str
+    unit: str
+    scale: Literal["linear", "log"]
+    function: Callable[[Coordinates], CoordinateFunction]
+
+    def to_unit(self, value: Floats | float) -> Floats:
+        """In the quantity's unit, from its scale."""
+        return np.exp(value) if self.scale == "log" else np.asarray(value, float)
+
+
+def parameter(coordinates: Coordinates, name: str) -> DerivedQuantity:
+    """One parameter of the law of these coordinates, by name."""
+    position = coordinates.names.index(coordinates.law.symbol(name).name)
+    param = coordinates.law.table[name]
+    return DerivedQuantity(name, param.unit, param.scale, lambda c: lambda u: c.theta(u)[..., position])
+
+
+def rate_at(
+    stress: float, temperature: float | None = None, *, strain: float | None = None, time: float | None = None
+) -> DerivedQuantity:
+    """The creep rate, 1/s, at a stress (MPa) and temperature (K); what is left out is that of the reference point."""
+    point_text = _point_text(stress, temperature)
+    return DerivedQuantity(f"rate {point_text}", "1/s", "log", lambda c: log_rate(c, stress, temperature, strain, time))
+
+
+def exponent_at(
+    stress: float, temperature: float | None = None, *, strain: float | None = None, time: float | None = None
+) -> DerivedQuantity:
+    """The local stress exponent d ln rate / d ln stress there."""
+    point_text = _point_text(stress, temperature)
+    return DerivedQuantity(
+        f"local exponent {point_text}", "1", "linear", lambda c: local_exponent(c, stress, temperature, strain, time)
+    )
+
+
+def _point_text(stress: float, temperature: float | None) -> str:
+    return f"at {stress:g} MPa" + ("" if temperature is None else f", {temperature:g} K")
+
+
+def log_rate(
+    coordinates: Coordinates, stress: ArrayLike, temperature: ArrayLike | None = None, strain: ArrayLike | None = None,
+    time: ArrayLike | None = None,
+) -> CoordinateFunction:  # fmt: skip
+    """ln of the creep rate (1/s) of virgin material at points, as a function of u: (..., parameters) to (..., points).
+
+    What is not given is that of the reference point.
+    """
+    from creepkit.kernels import lower
+
+    law, reference, kernel = coordinates.law, coordinates.reference, lower(coordinates.law, "numpy")
+    if (np.asarray(stress, float) < 0).any():
+        raise FitError("a creep rate was asked for at a negative stress; give the von Mises stress, in MPa")
+    given = (
+        (stress, reference.stress),
+        (strain, reference.strain),
+        (time, reference.time),
+        (temperature, reference.temperature),
+    )
+    point = np.broadcast_arrays(*(np.asarray(default if v is None else v, float) for v, default in given))
+    initial_states = [z.initial for z in law.states.values()]
+    shape = point[0].shape
+
+    def function(u: Floats) -> Floats:
+        theta = coordinates.theta(u)
+        columns = np.moveaxis(theta.reshape(*theta.shape, *(1 for _ in shape)), theta.ndim - 1, 0)
+        out = kernel.internal_log_rate(*point, point[0], point[0] / 3, *initial_states, *columns)
+        return np.asarray(out + np.zeros((*theta.shape[:-1], *shape)), float)
+
+    return function
+
+
+def local_exponent(
+    coordinates: Coordinates, stress: ArrayLike, temperature: ArrayLike | None = None, strain: ArrayLike | None = None,
+    time: ArrayLike | None = None,
+) -> CoordinateFunction:  # fmt: skip
+    """The local stress exponent at points, likewise."""
+    level = np.asarray(stress, float)
+    above, below = (
+        log_rate(coordinates, level * f, temperature, strain, time)
+        for f in (EXPONENT_STRESS_RATIO, 1 / EXPONENT_STRESS_RATIO)
+    )
+    return lambda u: (above(u) - below(u)) / (2 * np.log(EXPONENT_STRESS_RATIO))
+
+
+def quantity_of(coordinates: Coordinates, quantity_or_name: str | DerivedQuantity) -> DerivedQuantity:
+    """The quantity meant: itself, or a parameter by its name."""
+    return parameter(coordinates, quantity_or_name) if isinstance(quantity_or_name, str) else quantity_or_name
+
+
+def gradient(function: CoordinateFunction, u: Floats, scale: Floats, step: float = 1e-4) -> Floats:
+    """(..., parameters) derivatives of a function's numbers at one u, by central differences of step times scale."""
+    h = np.diag(step * np.maximum(scale, 1e-8))
+    change = function(u + h) - function(u - h)
+    return np.moveaxis(change, 0, -1) / (2 * np.diag(h))

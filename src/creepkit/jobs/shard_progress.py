@@ -1,0 +1,231 @@
+"""Progress of sharded work: a lock for each shard, the record of finished shards, and the rate with the time left.
+
+The operating system releases a lock when its process dies. The lock file names the sample being simulated, so that a sample that kills its process is known. On a file system without locks a shard may be simulated twice, with the same result, and counts once.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import itertools
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import TypeAlias
+
+import numpy as np
+
+from creepkit.dataset.shards import Campaign, accepted_count
+from creepkit.errors import DatasetError
+
+UNSUPPORTED_LOCK_ERRORS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
+"""What file systems without locks answer."""
+
+
+MOST_DIGITS = 19
+"""Of the number of a sample; what has more is none."""
+
+
+class ShardLock:
+    """The claim on a shard; a context, `held` in it when nobody else has it.
+
+    deaths : {sample: how often its process died in it}.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file = -1
+        self._recorded_deaths = b""
+        self.held = False
+        self.deaths: Counter[int] = Counter()
+
+    def __enter__(self) -> ShardLock:
+        self._file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
+        self.held = _locked(self._file)
+        if self.held:
+            lines = os.pread(self._file, 1 << 20, 0).split()
+            self.deaths = Counter(int(line) for line in lines if line.isdigit() and len(line) < MOST_DIGITS)
+            self._recorded_deaths = b"".join(b"%d\n" % row for row in self.deaths.elements())
+        return self
+
+    def record_start(self, sample: int) -> None:
+        """Note that a sample is being simulated now."""
+        os.ftruncate(self._file, len(self._recorded_deaths))
+        os.pwrite(self._file, b"%d\n" % sample, len(self._recorded_deaths))
+
+    def remove(self) -> None:
+        """Take the file away: the shard is done."""
+        self._path.unlink(missing_ok=True)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.held:  # what ends here, be it by an error, has not died
+            os.ftruncate(self._file, len(self._recorded_deaths))
+        os.close(self._file)
+
+
+def _locked(file: int) -> bool:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError as error:
+        if error.errno not in UNSUPPORTED_LOCK_ERRORS:
+            raise
+    return True
+
+
+MOST_DRAWS_WITHOUT_ACCEPTED = 16384
+"""Draws after which a design of which none was accepted is given up."""
+
+
+@dataclass
+class ProgressRecord:
+    """The account of a campaign.
+
+    samples : accepted ones wanted; or draws : rows wanted, accepted or not. part : (k, n), only shards k-1, k-1+n ...,
+    and so many samples as make an n-th of all.
+    done : {shard: accepted samples} of this part. at_work : shards that are being simulated, here or elsewhere.
+    """
+
+    campaign: Campaign
+    samples: int | None
+    draws: int | None
+    part: tuple[int, int] | None = None
+    done: dict[int, int] = field(default_factory=dict)
+    running: set[int] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        for name, value in (("samples", self.samples), ("draws", self.draws)):
+            if value is not None and (not isinstance(value, int | np.integer) or value < 1):
+                raise DatasetError(f"{name} is {value!r}; ask for a whole number, at least one")
+        if (self.samples is None) == (self.draws is None):
+            raise DatasetError("say either how many accepted samples are wanted (samples), or how many draws (draws)")
+        if self.part is not None and not 1 <= self.part[0] <= self.part[1]:
+            raise DatasetError(f"part {self.part[0]}/{self.part[1]} is none; allowed are 1/N to N/N")
+
+    def scan_finished(self) -> None:
+        """Find the shards that are done already."""
+        for path in sorted(self.campaign.folder.glob("[0-9]*.h5")):
+            if path.stem.isdigit() and self._in_part(int(path.stem)):
+                self.mark_done(int(path.stem), accepted_count(self.campaign, int(path.stem)))
+
+    def mark_done(self, number: int, accepted: int | None) -> None:
+        """A shard is done."""
+        self.running.discard(number)
+        if accepted is not None:
+            self.done[number] = accepted
+        self._check_acceptance()
+
+    @property
+    def target(self) -> int:
+        """What `reached` has to come to: accepted samples, or rows."""
+        if self.samples is None:
+            return self.campaign.rows * len(list(self._shard_numbers()))
+        return self.samples if self.part is None else -(-self.samples // self.part[1])
+
+    @property
+    def count(self) -> int:
+        """Accepted samples, or rows, of all shards that are done."""
+        return sum(self._contribution(number) for number in self.done)
+
+    @property
+    def acceptance_rate(self) -> float:
+        """Accepted samples per draw, so far; 1 before the first are known."""
+        return self.accepted / (len(self.done) * self.campaign.rows) if self.done else 1.0
+
+    @property
+    def accepted(self) -> int:
+        """Accepted samples so far."""
+        return sum(self.done.values())
+
+    def leading_run(self) -> list[int] | None:
+        """The shortest leading run of done shards that is enough; None while there is none."""
+        total, run = 0, []
+        for number in self._shard_numbers():
+            if self.samples is not None and total >= self.target:
+                break
+            if number not in self.done:
+                return None
+            run.append(number)
+            total += self._contribution(number)
+        return run
+
+    def next_shard(self) -> int | None:
+        """The next shard to simulate; None when what is done and at work should do."""
+        expected = 0.0
+        for number in self._shard_numbers():
+            if self.samples is not None and expected >= self.target:
+                break
+            if number in self.done:
+                expected += self._contribution(number)
+            elif number in self.running:
+                expected += self.acceptance_rate * self.campaign.rows
+            else:
+                return number
+        return None
+
+    def _shard_numbers(self) -> Iterable[int]:
+        """The shards that may be needed, first ones first."""
+        first, step = (0, 1) if self.part is None else (self.part[0] - 1, self.part[1])
+        if self.draws is None:
+            return itertools.count(first, step)
+        return range(first, -(-self.draws // self.campaign.rows), step)
+
+    def _contribution(self, number: int) -> int:
+        return self.done[number] if self.draws is None else self.campaign.rows
+
+    def _in_part(self, number: int) -> bool:
+        return self.part is None or number % self.part[1] == self.part[0] - 1
+
+    def _check_acceptance(self) -> None:
+        drawn = len(self.done) * self.campaign.rows
+        if self.samples is not None and drawn >= MOST_DRAWS_WITHOUT_ACCEPTED and not self.accepted:
+            raise DatasetError(
+                f"none of the first {drawn} draws was accepted; see 'creepkit generate --dry-run', change the "
+                "design, or ask for draws instead of samples"
+            )
+
+
+ProgressCallback: TypeAlias = Callable[[str, int, int, str], None]
+"""Called with a task, how much of it is done, of how much, and a note on rate, time left and share accepted."""
+
+
+class ProgressReporter:
+    """Tells the progress of a campaign; rates count what was done since it was made."""
+
+    def __init__(self, record: ProgressRecord, progress: ProgressCallback | None) -> None:
+        self._record = record
+        self._progress = progress
+        self._start = time.monotonic()
+        self._initial_count = record.count
+        self._last_reported = -1
+
+    def report(self) -> None:
+        """Tell how far it is, when that has changed."""
+        done = self._record.count
+        if self._progress is None or done == self._last_reported:
+            return
+        self._last_reported = done
+        task = "accepted samples" if self._record.draws is None else "draws"
+        self._progress(task, min(done, self._record.target), self._record.target, self._note(done))
+
+    def _note(self, done: int) -> str:
+        rate = (done - self._initial_count) / max(time.monotonic() - self._start, 1e-3)
+        accepted = f"{100 * self._record.acceptance_rate:.0f} % accepted" if self._record.done else ""
+        if rate <= 0:
+            return accepted
+        remaining = max(self._record.target - done, 0) / rate
+        return f"{rate:.3g}/s, {duration_text(remaining)} left, {accepted}"
+
+
+def duration_text(seconds: float) -> str:
+    """A time in words, such as 12 min."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

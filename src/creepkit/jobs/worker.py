@@ -1,0 +1,111 @@
+"""The worker process, `python -m creepkit.jobs.worker`: receives a job, then task numbers, and reports a result for each.
+
+The job is pickled by the process that started the worker, as multiprocessing does.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import signal
+import struct
+import sys
+from dataclasses import asdict, dataclass
+from typing import IO, TYPE_CHECKING, Any, Protocol
+
+from creepkit.dataset.simulation import SampleFailedError
+from creepkit.errors import CreepkitError
+
+if TYPE_CHECKING:
+    pass
+
+
+if TYPE_CHECKING:
+    pass
+
+
+def main() -> None:
+    """Answer each number with what became of its shard, a line of JSON."""
+    signal.signal(signal.SIGTERM, _terminate)
+    stdin, stdout = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
+    os.dup2(2, 1)  # whatever else is printed belongs on stderr
+    sys.path[:] = _read_pickled(stdin)
+    job = _read_pickled(stdin).on_one_thread()
+    _write_result(stdout, {"ready": True})
+    for line in stdin:
+        _write_result(stdout, asdict(run_task(job, int(line))))
+
+
+def _terminate(*_: object) -> None:
+    """End as after an error: a sample that is given up on request has not killed its process."""
+    raise SystemExit(0)
+
+
+def _read_pickled(stream: IO[bytes]) -> Any:
+    (size,) = struct.unpack("!Q", stream.read(8))
+    return pickle.loads(stream.read(size))
+
+
+def _write_result(stream: IO[bytes], document: dict[str, Any]) -> None:
+    try:
+        stream.write(json.dumps(document).encode() + b"\n")
+    except BrokenPipeError:
+        raise SystemExit(0) from None  # who asked is gone; the shard is done all the same
+
+
+def run_task(job: Job, number: int) -> Any:
+    """Run a part; an error is an answer too, whatever a design or a criterion of somebody raises."""
+    from creepkit.errors import CreepkitError
+
+    try:
+        return job.run(number)
+    except CreepkitError as error:
+        return TaskResult(number, "error", text=error_text(error))
+    except Exception as error:
+        return TaskResult(number, "error", text=f"{job.task_name} {number} cannot be simulated: {error_text(error)}")
+
+
+if __name__ == "__main__":
+    main()
+
+
+# ---- one shard -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class TaskResult:
+    """What became of a shard that was asked for.
+
+    kind : "done"; "taken", by another process; "died", its own process did; "error", as text says.
+    """
+
+    number: int
+    status: str
+    accepted: int = 0
+    text: str = ""
+
+
+class Job(Protocol):
+    """What worker processes are sent, pickled, to do parts of."""
+
+    @property
+    def task_name(self) -> str:
+        """What a part is called, such as "shard"."""
+        ...
+
+    def on_one_thread(self) -> Job:
+        """The same work, to be done on one thread."""
+        ...
+
+    def run(self, number: int) -> TaskResult:
+        """Do one part and leave what came of it in a file."""
+        ...
+
+
+def error_text(error: Exception) -> str:
+    """One line on what happened; errors that are not ours are named."""
+    text = " ".join(str(error).split())
+    if isinstance(error, CreepkitError | SampleFailedError):
+        return text
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__

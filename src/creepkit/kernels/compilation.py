@@ -1,0 +1,318 @@
+"""The numba target: a law as C functions, generated, compiled once and kept on disk with checksums.
+
+Each generated module has a folder of its own, named after the hash of all that it was made from, with the source,
+numba's machine code and the SHA-256 of every file. A folder is built under a temporary name and renamed into place whole;
+one whose checksums do not match is built anew. Machine code from the cache is executed: keep the folder writable for
+yourself alone, as it is by default.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import os
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache, lru_cache, partial
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numba
+import numpy as np
+import sympy
+from numba.core import config
+from numba.core.registry import cpu_target
+
+from creepkit.arrays import Floats, frozen
+from creepkit.kernels.interface import POINT_SIZE, CompiledLaw
+from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, assignment_lines, expression_source, law_comments
+from creepkit.kernels.log_form import leading_exponents
+from creepkit.kernels.symbolic_kernel import KernelFunction, SymbolicKernel
+from creepkit.language import symbols
+from creepkit.language.law import structure_of
+
+if TYPE_CHECKING:
+    from creepkit.language.law import CreepLaw
+
+
+SOURCE_FILE, CHECKSUM_FILE = "law.py", "SHA256SUMS"
+
+
+_loaded_modules: dict[str, ModuleType] = {}
+
+
+_numba_settings: Any = config
+
+
+def load_module(key: str, source: Callable[[], str]) -> ModuleType:
+    """Return the module of `key`: from memory, from disk, or made from text() now."""
+    if key not in _loaded_modules:
+        folder = _module_folder(f"law_{key}")
+        _loaded_modules[key] = (
+            _execute_module(key, folder / SOURCE_FILE) if is_intact(folder) else _build_module(key, folder, source())
+        )
+    return _loaded_modules[key]
+
+
+def cache_folder() -> Path:
+    """Where generated kernels are kept: CREEPKIT_CACHE, else `creepkit` in the user's cache folder."""
+    chosen = os.environ.get("CREEPKIT_CACHE")
+    base = Path(chosen) if chosen else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "creepkit"
+    return base / "kernels"
+
+
+def is_intact(folder: Path) -> bool:
+    """Whether a folder holds the files its seal names, unchanged, and no others."""
+    try:
+        return (folder / CHECKSUM_FILE).read_text(encoding="utf-8") == _checksums(folder)
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+# ---- folders -------------------------------------------------------------------------------------------------------
+
+
+def _module_folder(name: str) -> Path:
+    """Where a module belongs: in the cache folder, or in a private one when that cannot be written."""
+    folder = cache_folder()
+    if _writable(folder):
+        return folder / name
+    private = _private_folder() / name
+    if is_intact(folder / name) and not private.exists():
+        shutil.copytree(folder / name, private)  # numba must be able to write beside the source
+    return private
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+@cache
+def _private_folder() -> Path:
+    """A folder of this process, removed when it ends."""
+    private = tempfile.mkdtemp(prefix="creepkit-")
+    atexit.register(shutil.rmtree, private, ignore_errors=True)
+    return Path(private)
+
+
+# ---- making and loading --------------------------------------------------------------------------------------------
+
+
+def _build_module(key: str, folder: Path, source: str) -> ModuleType:
+    """Write, compile and seal a module in a temporary folder, then put the folder into its place."""
+    temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f"new_{folder.name}_"))
+    try:
+        (temporary / SOURCE_FILE).write_text(source, encoding="utf-8", newline="\n")
+        module = _execute_module(key, temporary / SOURCE_FILE)
+        (temporary / CHECKSUM_FILE).write_text(_checksums(temporary), encoding="utf-8", newline="\n")
+        _install_folder(temporary, folder)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return module
+
+
+def _install_folder(temporary: Path, folder: Path) -> None:
+    """Rename the new folder into place; an intact one that is there already stays, a damaged one goes."""
+    if folder.exists() and not is_intact(folder):
+        _remove_folder(folder)
+    try:
+        os.rename(temporary, folder)
+    except OSError:
+        if not folder.exists():
+            raise
+
+
+def _remove_folder(folder: Path) -> None:
+    """Take a folder away whole, so that no process sees half of it."""
+    temporary = tempfile.mkdtemp(dir=folder.parent, prefix="damaged_")
+    try:
+        os.replace(folder, Path(temporary) / folder.name)
+    except FileNotFoundError:  # another process has just done it
+        return
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _execute_module(key: str, path: Path) -> ModuleType:
+    source = path.read_text(encoding="utf-8")
+    module = ModuleType(f"creepkit_kernel_{key}")
+    module.__file__, module.__dict__["SOURCE"] = str(path), source
+    sys.modules[module.__name__] = module  # numba finds the functions of cached machine code through their module
+    with _machine_code_in_module_folder():
+        exec(compile(source, str(path), "exec"), module.__dict__)
+    return module
+
+
+@contextmanager
+def _machine_code_in_module_folder() -> Iterator[None]:
+    """Overrule NUMBA_CACHE_DIR: the seal has to cover the machine code, and the folder moves as a whole."""
+    previous = _numba_settings.CACHE_DIR
+    _numba_settings.CACHE_DIR = ""
+    try:
+        yield
+    finally:
+        _numba_settings.CACHE_DIR = previous
+
+
+def _checksums(folder: Path) -> str:
+    """One line a file: its SHA-256 and its path."""
+    files = sorted(p for p in folder.rglob("*") if p.is_file() and p != folder / CHECKSUM_FILE)
+    return "".join(f"{hashlib.sha256(p.read_bytes()).hexdigest()}  {p.relative_to(folder).as_posix()}\n" for p in files)
+
+
+_MODULE_HEADER = """# Kernel of a creep law; generated, do not edit.
+{terms}
+
+from math import isfinite
+
+from numba import cfunc
+
+from creepkit.kernels.interface import SIGNATURE
+from creepkit.kernels.numba_functions import {functions}
+
+COEFFICIENTS = {coefficients}
+
+"""
+
+
+def module_source(lowered: SymbolicKernel) -> str:
+    """The generated module of a law."""
+    functions = "\n\n".join(_function_source(e, lowered) for e in (lowered.rate, lowered.update, lowered.sensitivity))
+    header = _MODULE_HEADER.format(
+        terms="\n".join(law_comments(lowered.law)),
+        functions=", ".join(_called_functions(functions)),
+        coefficients=repr(lowered.form.coefficients),
+    )
+    return f"{header}{_exponents_source(lowered)}\n\n{functions}"
+
+
+def _called_functions(text: str) -> list[str]:
+    """The kernel functions that a text calls."""
+    return sorted({*re.findall(r"\w+(?=\()", text)} & {*TARGET_FUNCTIONS})
+
+
+def _exponents_source(lowered: SymbolicKernel) -> str:
+    """A function of arrays: for each term the exponents of time and of strain at t -> 0+."""
+    pairs = [[expression_source(lowered.names.printable(e)) for e in pair] for pair in leading_exponents(lowered.form)]
+    rows = "".join(f"        ({time}, {strain}),\n" for time, strain in pairs)
+    called = _called_functions(rows)
+    lines = [f"def exponents({', '.join(s.name for s in lowered.names.inputs)}):"]
+    if called:
+        lines.append(f"    from creepkit.kernels.numpy_functions import {', '.join(called)}\n")
+    return "\n".join([*lines, f"    return (\n{rows}    )\n"])
+
+
+def _function_source(entry: KernelFunction, lowered: SymbolicKernel) -> str:
+    """One C function; what depends on theta alone is done before the loop over rows."""
+    states = len(lowered.law.states)
+    width, size = POINT_SIZE + states, len(entry.outputs)
+    point, theta = entry.inputs[:width], entry.inputs[width:]
+    lines = [
+        '@cfunc(SIGNATURE, cache=True, error_model="numpy")',
+        f"def {entry.name}(rows, x, theta, out):",
+        *(f"    {s} = theta[{k}]" for k, s in enumerate(theta) if s in entry.used_inputs),
+        *assignment_lines(entry.constants, "    "),
+        "    flags = 0",
+        "    for row in range(rows):",
+        *(f"        {s} = x[{width} * row + {k}]" for k, s in enumerate(point) if s in entry.used_inputs),
+        *assignment_lines(entry.steps, "        "),
+        *assignment_lines(_nonconstant_outputs(entry.outputs), "        "),
+        *(f"        out[{size} * row + {k}] = {_output_text(k, e)}" for k, e in enumerate(entry.outputs)),
+        *_finite_test(entry.outputs, range(1 + states), 1),
+        *_finite_test(entry.outputs, range(1 + states, size), 2),
+        "    return flags\n",
+    ]
+    return "\n".join(lines)
+
+
+def _nonconstant_outputs(outputs: tuple[sympy.Expr, ...]) -> list[tuple[sympy.Symbol, sympy.Expr]]:
+    return [(sympy.Symbol(f"y{k}"), e) for k, e in enumerate(outputs) if not e.is_number]
+
+
+def _output_text(k: int, output: sympy.Expr) -> str:
+    return expression_source(output) if output.is_number else f"y{k}"
+
+
+def _finite_test(outputs: tuple[sympy.Expr, ...], columns: range, flag: int) -> list[str]:
+    """Set a flag when an output is not finite: y - y is 0 for what is finite, NaN for what is not."""
+    numbers = [f"y{k}" for k in columns if not outputs[k].is_number]
+    if not numbers:
+        return []
+    if len(numbers) == 1:
+        test = f"not isfinite({numbers[0]})"
+    else:
+        test = f"{' + '.join(f'({y} - {y})' for y in numbers)} != 0.0"
+    return [f"        if {test}:", f"            flags |= {flag}"]
+
+
+_REFERENCE_POINT = (100.0, 0.0, 0.0, 1000.0, 100.0, 100.0 / 3.0)
+"""Where exponents that vary with stress or temperature are taken unless a point is given."""
+
+
+def compile_law(law: CreepLaw) -> CompiledLaw:
+    """Return the law's compiled entries, from memory, from the disk cache or made now."""
+    key = _cache_key(law)
+    module = load_module(key, partial(_module_source, law))
+    initial = frozen([state.initial for state in law.states.values()])
+    return CompiledLaw(
+        rate=module.rate,
+        update=module.update,
+        sensitivity=module.sensitivity,
+        names=law.names,
+        log_scale=frozen([p.scale == "log" for p in law.params.values()], dtype=bool),
+        initial=initial,
+        limits=frozen([np.inf if state.limit is None else state.limit for state in law.states.values()]),
+        leading_exponent=partial(_leading_exponent, module, (*_REFERENCE_POINT, *initial)),
+        source=module.SOURCE,
+        fingerprint=key,
+    )
+
+
+def _module_source(law: CreepLaw) -> str:
+    from creepkit.kernels.symbolic_kernel import symbolic_kernel
+
+    return module_source(symbolic_kernel(law))
+
+
+@lru_cache(maxsize=1024)
+def _cache_key(law: CreepLaw) -> str:
+    """Kept, for printing a law takes a millisecond and a fit asks a thousand times."""
+    return hashlib.sha256(f"{_code_fingerprint()}\n{structure_of(law)}".encode()).hexdigest()[:24]
+
+
+@cache
+def _code_fingerprint() -> str:
+    """Hash of the code that makes kernels and of the machine they are for, so that no stale kernel survives."""
+    digest = hashlib.sha256()
+    for path in (*sorted(Path(__file__).parent.glob("*.py")), Path(str(symbols.__file__))):
+        digest.update(path.read_bytes())
+    machine = cpu_target.target_context.codegen().magic_tuple()
+    for item in (sys.version, numba.__version__, *machine):
+        digest.update(item.encode())
+    return digest.hexdigest()
+
+
+def _leading_exponent(
+    module: ModuleType, reference_point: tuple[float, ...], theta: Floats, point: Floats | None = None
+) -> Floats:
+    """Smallest (1 + a)/(1 - b) among the terms that are not switched off; 1 when all are."""
+    theta = np.asarray(theta, float)
+    smallest = np.full(theta.shape[:-1], np.inf)
+    point_columns = reference_point if point is None else np.moveaxis(np.asarray(point, float), -1, 0)
+    pairs = module.exponents(*point_columns, *np.moveaxis(theta, -1, 0))
+    for (a, b), coefficients in zip(pairs, module.COEFFICIENTS, strict=True):
+        b = np.minimum(b, 1.0 - 1e-12)  # a term that starts with strain itself does not lead
+        beta = (1.0 + np.asarray(a)) / (1.0 - b)
+        active = np.isfinite(theta[..., list(coefficients)]).all(axis=-1)
+        smallest = np.where(active, np.minimum(smallest, beta), smallest)
+    return np.where(np.isfinite(smallest), smallest, 1.0)

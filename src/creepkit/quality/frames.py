@@ -1,0 +1,251 @@
+"""Frames of doubtful quality by the history alone: unloading, a decreasing creep output, single outliers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats, Ints
+from creepkit.records import History
+
+OUTLIER_THRESHOLD = 6.0
+"""Robust standard deviations by which a single frame must miss its neighbours: of Gaussian noise 2 in 1e9 do."""
+
+
+FEW_FRAMES_CORRECTION = 10.0
+"""The threshold is JUMP (1 + FEW / frames): few frames say little about their own noise."""
+
+
+DECREASE_FRACTION = 0.02
+"""Of the largest value: less can be drift of instruments; a loaded dimple or bar does not recover at all."""
+
+
+DECREASE_THRESHOLD = 6.0
+"""Standard deviations that a fall must have at least."""
+
+
+END_FIT_FRAMES, END_THRESHOLD, MOST_UNLOADING_FRAMES = 12, 4.0, 5
+"""Frames through which a line predicts the end, standard deviations of it that an unloading falls short, the most
+frames that it may have: 1 in 3e4 ends of Gaussian noise fall as much.
+"""
+
+
+FEWEST_FRAMES = 12
+"""Frames under one load below which nothing is said of noise."""
+
+
+LOAD_TOLERANCE, TEMPERATURE_TOLERANCE = 0.01, 2.0
+"""Relative change of the load, and K, that begin a new part of a test."""
+
+
+OPPOSITE_NEIGHBOUR_FRACTION = 0.3
+"""Of a frame's miss: how far its neighbours must miss the other way if it is to be off alone."""
+
+
+_ROUNDING_FRACTION = 0.5
+"""Of the smallest step between values: noise cannot be seen below."""
+
+
+_MOST_OUTLIERS = 0.05
+"""Of the frames that may be outliers; more are not outliers."""
+
+
+class FlaggedFrames(NamedTuple):
+    """Frames and a sentence about them."""
+
+    frames: tuple[int, ...]
+    reason: str
+
+
+class LoadSegment(NamedTuple):
+    """Frames under one load and temperature.
+
+    load : MPa. raised : whether it is at least what it was before. first : whether the part is the test's first.
+    """
+
+    frames: Ints
+    load: float
+    load_increased: bool
+    is_first: bool
+
+
+def creep_output(history: History) -> str:
+    """The output that grows with creep."""
+    return next((name for name in ("strain", "amplitude") if name in history.outputs), next(iter(history.outputs), ""))
+
+
+def unloading_frames(history: History) -> Iterator[FlaggedFrames]:
+    """Frames after the end of the test, and a sudden fall in its last used frames."""
+    usable = np.flatnonzero(history.used & _has_value(history))
+    later_frames = np.flatnonzero(~history.used)
+    later_frames = later_frames[later_frames > usable[-1]] if usable.size else later_frames[:0]
+    if later_frames.size and "frames_after_end" in history.labels:
+        yield FlaggedFrames(
+            tuple(map(int, later_frames)), f"from {history.times[later_frames[0]]:g} s on, after the end of the test"
+        )
+    segments = [part for part in load_segments(history) if part.frames.size > FEWEST_FRAMES]
+    if segments and segments[-1].frames[-1] == usable[-1]:
+        yield from _unloaded_end(history, segments[-1].frames)
+
+
+def _unloaded_end(history: History, frames: Ints) -> Iterator[FlaggedFrames]:
+    t, y = history.times[frames], history.outputs[creep_output(history)][frames]
+    sigma = noise_standard_deviation(t, y)
+    for count in range(min(MOST_UNLOADING_FRAMES, frames.size - FEWEST_FRAMES), 0, -1):
+        before = slice(max(frames.size - count - END_FIT_FRAMES, 0), frames.size - count)
+        expected, standard_error = _extrapolate(t[before], y[before], t[-count])
+        shortfall = expected - y[-count]
+        if shortfall > END_THRESHOLD * sigma * standard_error and (y[-count:] < y[-count - 1] - sigma).all():
+            description = f"{_difference_text(history, shortfall)} below what the {END_FIT_FRAMES} frames before it lead to, {shortfall / sigma:.0f} times"
+            reason = f"at {t[-count]:g} s {description} the noise: the load was taken off"
+            yield FlaggedFrames(tuple(map(int, frames[-count:])), reason)
+            return
+
+
+def _extrapolate(t: Floats, y: Floats, time: float) -> tuple[float, float]:
+    """A line through frames, at a later time, and the standard deviation of y less it over that of y."""
+    mean_time, time_variation = t.mean(), float(((t - t.mean()) ** 2).sum())
+    slope = float(((t - mean_time) * (y - y.mean())).sum()) / time_variation
+    return float(y.mean()) + slope * (time - mean_time), float(
+        np.sqrt(1 + 1 / t.size + (time - mean_time) ** 2 / time_variation)
+    )
+
+
+def decreasing_frames(history: History) -> Iterator[FlaggedFrames]:
+    """Frames of a part in which the amplitude falls though the load is held or was raised.
+
+    They begin at the highest frame; after a raise of the load with the raise, for whatever makes a dimple or a bar fall
+    under a larger load was there from then on.
+    """
+    for segment in load_segments(history):
+        if segment.frames.size < FEWEST_FRAMES or not segment.load_increased:
+            continue
+        t, y = history.times[segment.frames], history.outputs[creep_output(history)][segment.frames]
+        smoothed = _running_median(y)
+        highest = int(np.argmax(smoothed))
+        decrease = float(smoothed[highest] - smoothed[highest:].min())
+        if decrease > max(
+            DECREASE_THRESHOLD * noise_standard_deviation(t, y), DECREASE_FRACTION * float(np.abs(smoothed).max())
+        ):
+            lowest = highest + int(np.argmin(smoothed[highest:]))
+            load_text = f"{history.loading.quantity} {'is held at' if segment.is_first else 'was raised to'} {segment.load:g} MPa"
+            reason = (
+                f"falls by {_difference_text(history, decrease)} from {t[highest]:g} s to {t[lowest]:g} s, "
+                f"{decrease / noise_standard_deviation(t, y):.0f} times the noise, though the {load_text}"
+            )
+            yield FlaggedFrames(tuple(map(int, segment.frames[highest if segment.is_first else 0 :])), reason)
+
+
+def outlier_frames(history: History) -> Iterator[FlaggedFrames]:
+    """Single frames that miss the cubic through their four neighbours, largest first."""
+    for segment in load_segments(history):
+        frames, values = segment.frames, history.outputs[creep_output(history)]
+        sigma = (
+            noise_standard_deviation(history.times[frames], values[frames]) if frames.size >= FEWEST_FRAMES else np.inf
+        )
+        for _ in range(int(_MOST_OUTLIERS * segment.frames.size) + 1):
+            if frames.size < FEWEST_FRAMES:
+                break
+            residuals, residual_scale = _interpolation_residuals(history.times[frames], values[frames])
+            standardised = np.where(
+                _isolated(residuals), np.abs(residuals) / np.maximum(_local_scale(residuals), sigma), 0.0
+            )
+            worst = int(np.argmax(standardised))
+            if not standardised[worst] > OUTLIER_THRESHOLD * (1 + FEW_FRAMES_CORRECTION / frames.size):
+                break
+            deviation_text = _difference_text(history, float(residuals[worst] * residual_scale[worst]))
+            frame = int(frames[worst + 2])
+            reason = f"at {history.times[frame]:g} s off its neighbours by {deviation_text}, {standardised[worst]:.0f} times the noise"
+            yield FlaggedFrames((frame,), reason)
+            frames = np.delete(frames, worst + 2)
+
+
+def load_segments(history: History) -> list[LoadSegment]:
+    """The used and measured frames, by load and temperature."""
+    frames = np.flatnonzero(history.used & _has_value(history) & (history.times > 0))
+    if not frames.size:
+        return []
+    load = history.loading.program().at(history.times[frames])
+    temperature = history.temperature_program().at(history.times[frames])
+    is_new = (np.abs(np.diff(load)) > LOAD_TOLERANCE * load.max()) | (
+        np.abs(np.diff(temperature)) > TEMPERATURE_TOLERANCE
+    )
+    edges = np.flatnonzero(np.concatenate([[True], is_new, [True]]))
+    segments = []
+    for first, end in pairwise(edges):
+        load_increased = bool(first == 0 or load[first] >= load[first - 1])
+        segments.append(LoadSegment(frames[first:end], float(load[first]), load_increased, bool(first == 0)))
+    return segments
+
+
+def noise_standard_deviation(times: Floats, values: Floats) -> float:
+    """Standard deviation of white noise, robust, from what frames miss the cubic through their neighbours by."""
+    residuals, _ = _interpolation_residuals(times, values)
+    differences = np.abs(np.diff(values))
+    rounding = (
+        _ROUNDING_FRACTION * float(differences[differences > 0].min(initial=np.inf))
+        if (differences > 0).any()
+        else 1e-12
+    )
+    return max(float(1.4826 * np.median(np.abs(residuals))), min(rounding, float(np.ptp(values)) or rounding))
+
+
+def _interpolation_residuals(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """What each frame but the outer two misses the cubic of its neighbours by, over what unit noise makes it, and that.
+
+    The cubic is one in time or in its logarithm, whichever misses less: some tests are read evenly, some over decades.
+    """
+    results = [_cubic_residuals(x, values) for x in (times, np.log(times))]
+    return min(results, key=lambda pair: float(np.median(np.abs(pair[0]))))
+
+
+def _cubic_residuals(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    neighbour_times = np.stack([x[:-4], x[1:-3], x[3:-1], x[4:]])
+    centre_times, neighbour_values = x[2:-2], np.stack([y[:-4], y[1:-3], y[3:-1], y[4:]])
+    weights = np.ones_like(neighbour_times)
+    for a in range(4):
+        for b in range(4):
+            if a != b:
+                weights[a] *= (centre_times - neighbour_times[b]) / (neighbour_times[a] - neighbour_times[b])
+    residual_scale = np.sqrt(1.0 + (weights**2).sum(axis=0))
+    return np.asarray((y[2:-2] - (weights * neighbour_values).sum(axis=0)) / residual_scale), residual_scale
+
+
+def _local_scale(residuals: Floats) -> Floats:
+    """The size of misses about each frame, without it and its neighbours: large where a curve bends sharply."""
+    size, scales = np.abs(residuals), np.zeros(residuals.size)
+    for k in range(residuals.size):
+        neighbours = np.concatenate([size[max(k - 7, 0) : max(k - 2, 0)], size[k + 3 : k + 8]])
+        scales[k] = 1.4826 * float(np.median(neighbours)) if neighbours.size else 0.0
+    return scales
+
+
+def _isolated(residuals: Floats) -> Bools:
+    """Where a single frame is off: its neighbours then miss the other way, by 2/3 of it when evenly spaced.
+
+    Where a curve bends too sharply for cubics they miss the same way.
+    """
+    neighbours = -np.sign(residuals)[:, None] * np.stack([np.roll(residuals, 1), np.roll(residuals, -1)], axis=1)
+    neighbours[0, 0] = neighbours[-1, 1] = np.inf
+    return np.asarray((neighbours > OPPOSITE_NEIGHBOUR_FRACTION * np.abs(residuals)[:, None]).all(axis=1))
+
+
+def _running_median(values: Floats, width: int = 5) -> Floats:
+    padded = np.pad(values, width // 2, mode="reflect", reflect_type="odd")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=-1))
+
+
+def _has_value(history: History) -> Bools:
+    """(frames,) where the leading output has a number."""
+    name = creep_output(history)
+    return np.isfinite(history.outputs[name]) if name else np.zeros(history.times.size, bool)
+
+
+def _difference_text(history: History, value: float) -> str:
+    """A difference of the leading output in words."""
+    return (
+        f"{1e3 * value:.3g} um" if creep_output(history) == "amplitude" else f"{value:.2g} of {creep_output(history)}"
+    )

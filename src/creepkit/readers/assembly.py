@@ -1,0 +1,169 @@
+"""One test as text becomes one History; every file layout ends here."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats
+from creepkit.errors import HistoryError
+from creepkit.readers.conditions import (
+    END_OF_TEST_TERMS,
+    StatedConditions,
+    errors_located_at,
+    read_loading,
+    read_temperature,
+)
+from creepkit.readers.text_tables import Frames, SourceText, TextTable, column_means, read_frames
+from creepkit.readers.vocabulary import IDENTIFIABLE_SPECIMENS, SPECIMEN_OUTPUTS, HeaderVocabulary
+from creepkit.records import History
+
+if TYPE_CHECKING:
+    from creepkit.language.elastic import Elastic
+
+
+def assemble_history(
+    name: str,
+    entries: Mapping[str, SourceText],
+    table: TextTable,
+    vocabulary: HeaderVocabulary,
+    *,
+    location: str,
+    source: str,
+    skipped_columns: Collection[str] = (),
+) -> History:
+    """Return the history of one test.
+
+    entries : what is said once for the test; place : where that stands; table : its frames, without reading the
+    columns in `skip`; source : what the history says of its origin.
+    """
+    conditions = StatedConditions(entries, vocabulary, location)
+    frames = read_frames(table, vocabulary, skipped_columns)
+    columns = table.location(table.columns_line)
+    specimen, outputs = _specimen_and_outputs(conditions, frames, vocabulary, columns)
+    strain_measure = conditions.take_choice(
+        "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
+    )
+    elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required="strain" in outputs)
+    loading = read_loading(conditions, frames)
+    used = _used_frames(conditions, frames)
+    rupture_time, unruptured = _end_of_test(conditions, frames, used)
+    _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
+    return History(
+        name=conditions.take_text("name", name),
+        times=frames.times,
+        outputs=outputs,
+        loading=loading,
+        temperature=read_temperature(conditions, frames),
+        specimen=specimen,
+        elastic=_elastic(conditions),
+        strain_measure="engineering" if strain_measure == "engineering" else "logarithmic",
+        includes_elastic=elastic_included == "yes",
+        standard_deviation=_standard_deviations(conditions, frames, outputs),
+        used=used,
+        geometry=conditions.geometry,
+        operator=conditions.take_text("operator"),
+        alloy=conditions.take_text("alloy"),
+        source=source,
+        rupture_time=rupture_time,
+        unruptured=unruptured,
+        # Last, for whatever nobody has taken by now is refused.
+        labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
+    )
+
+
+def _merge_label(frames: Frames) -> dict[str, str]:
+    return {"merged_frames": str(frames.merged_count)} if frames.merged_count else {}
+
+
+def _specimen_and_outputs(
+    conditions: StatedConditions, frames: Frames, vocabulary: HeaderVocabulary, location: str
+) -> tuple[str, dict[str, Floats]]:
+    """The specimen, as named or as the outputs tell, and its outputs."""
+    stated_specimen = conditions.take_text("specimen")
+    identifiable = {
+        name: outputs
+        for name, outputs in vocabulary.outputs.items()
+        if name in IDENTIFIABLE_SPECIMENS or name not in SPECIMEN_OUTPUTS
+    }
+    candidates = (
+        {stated_specimen: vocabulary.outputs[stated_specimen]}
+        if stated_specimen in vocabulary.outputs and stated_specimen not in identifiable
+        else identifiable
+    )
+    present = [name for name, outputs in candidates.items() if outputs.keys() & frames.values.keys()]
+    if len(present) != 1 or (stated_specimen in vocabulary.outputs and stated_specimen != present[0]):
+        description = f"outputs of {' and '.join(present)}" if present else "no output"
+        wanted = f"those of {stated_specimen}" if stated_specimen in vocabulary.outputs else "those of one specimen"
+        known = "; ".join(f"{', '.join(outputs)} ({name})" for name, outputs in vocabulary.outputs.items())
+        raise HistoryError(f"{location}: missing column: the columns hold {description}, {wanted} are needed: {known}")
+    outputs = {name: frames.values[name] for name in vocabulary.outputs[present[0]] if name in frames.values}
+    return stated_specimen or present[0], outputs
+
+
+def _refuse_unread_columns(frames: Frames, read_columns: Collection[str], location: str) -> None:
+    """Refuse a column that would go unread, such as a pressure beside a stress."""
+    unread = [name for name in frames.values if name.removesuffix("_sd") not in {"time", "used", *read_columns}]
+    if unread:
+        read_text = ", ".join(sorted(read_columns))
+        raise HistoryError(f"{location}: a column of {unread[0]} has no meaning beside {read_text}; remove it")
+
+
+def _elastic(conditions: StatedConditions) -> Elastic | None:
+    modulus = conditions.take_number("modulus")
+    if modulus is None:
+        return None
+    # Here, not above: the record of elasticity brings sympy, which listing the readers must not wait for.
+    from creepkit.language.elastic import Elastic
+
+    poisson = conditions.take_number("poisson")
+    with errors_located_at(modulus.location):
+        return Elastic(modulus.value) if poisson is None else Elastic(modulus.value, poisson.value)
+
+
+def _standard_deviations(
+    conditions: StatedConditions, frames: Frames, outputs: Mapping[str, Floats]
+) -> dict[str, Floats]:
+    """Standard deviations by output, from a column or one number for all frames."""
+    standard_deviations: dict[str, Floats] = {}
+    for name in outputs:
+        number, column = conditions.take_number(f"{name}_sd"), frames.values.get(f"{name}_sd")
+        if number is not None and column is not None:
+            raise HistoryError(f"{number.location}: '{number.key}' is also a column of the frames; keep one of them")
+        if number is not None:
+            standard_deviations[name] = np.full(frames.times.shape, number.value)
+        elif column is not None:
+            standard_deviations[name] = column
+    return standard_deviations
+
+
+def _used_frames(conditions: StatedConditions, frames: Frames) -> Bools:
+    """Which frames a fit may use: those marked so, up to the end of the test; later ones saw the unloading."""
+    used = np.asarray(frames.values.get("used", np.ones(frames.times.size)) == 1.0)
+    end = conditions.take_number("end_time")
+    if end is None:
+        return used
+    after = frames.times > end.value * (1 + 1e-9)
+    if after.all():
+        raise HistoryError(f"{end.location}: every frame lies after '{end.key}', {end.value:g} s; correct the end time")
+    if after.any():
+        conditions.labels["frames_after_end"] = str(int(after.sum()))
+    return used & ~after
+
+
+def _end_of_test(conditions: StatedConditions, frames: Frames, used: Bools) -> tuple[float | None, bool]:
+    """The rupture time, s, if the test ruptured, and whether it was stopped before; neither where nothing is said.
+
+    A test that is said to have ruptured, without a time, did so when its last frame was taken.
+    """
+    time, ended = conditions.take_number("rupture"), conditions.take_choice("ended", END_OF_TEST_TERMS, required=False)
+    if time is not None and ended == "stopped":
+        raise HistoryError(
+            f"{time.location}: the test was stopped, and '{time.key}' says when it ruptured; keep one of them"
+        )
+    if time is not None or ended != "ruptured":
+        return None if time is None else time.value, ended == "stopped"
+    conditions.record_assumption("rupture at the last frame")
+    return float(frames.times[used][-1] if used.any() else frames.times[-1]), False

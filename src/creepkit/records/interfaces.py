@@ -1,0 +1,137 @@
+"""The plugin interfaces: predictors, specimens, readers and exporters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+from creepkit.arrays import ArrayLike
+from creepkit.records.history import History
+from creepkit.records.prediction import NuisanceValues, Prediction
+
+if TYPE_CHECKING:
+    from creepkit.records.law_with_values import LawWithValues
+
+
+if TYPE_CHECKING:
+    from creepkit.language.law import CreepLaw
+
+
+@runtime_checkable
+class Reader(Protocol):
+    """Turns measured files into histories."""
+
+    @property
+    def name(self) -> str:
+        """Short, lower case, unique in the registry."""
+        ...
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        ...
+
+    def accepts(self, path: Path) -> bool:
+        """Say whether this reader understands the file or folder, without reading all of it."""
+        ...
+
+    def read(self, path: Path) -> list[History]:
+        """Return the histories in the file or folder; HistoryError with file and line when it cannot."""
+        ...
+
+
+@runtime_checkable
+class Exporter(Protocol):
+    """Writes a law with its values as text: to read, or for another program."""
+
+    @property
+    def name(self) -> str:
+        """Short, lower case, unique in the registry."""
+        ...
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        ...
+
+    @property
+    def suffix(self) -> str:
+        """Ending of a file's name, with its dot."""
+        ...
+
+    def text(self, source: LawWithValues) -> str:
+        """Return the text; notes (intervals, validity) become comments.
+
+        ExportError, with the reason, when the target cannot express the law or its units.
+        """
+        ...
+
+
+@runtime_checkable
+class Predictor(Protocol):
+    """Anything that predicts histories from a law and its values: specimen, surrogate or closed form.
+
+    Optional attributes, looked for by name: `outputs`, the names of what is predicted, first the one that grows with
+    creep; `nuisances`, the kinds of explicit nuisances that predict() understands (none without it);
+    `reference_stress(history)`, the von Mises stress, MPa, that stands for the test (a number, or one for each level
+    of its loading); `screening()`, see Screened.
+    """
+
+    def predict(
+        self,
+        law: CreepLaw,
+        values: Mapping[str, ArrayLike],
+        histories: Sequence[History],
+        *,
+        jacobian: bool = False,
+        nuisances: NuisanceValues | None = None,
+    ) -> Prediction:
+        """Predict each history's outputs at its times.
+
+        values : {parameter: number or (candidates,)} in the author's units; 0 may switch a parameter off.
+        nuisances : {kind: (candidates or 1, tests)} of what differs from test to test, measured as Nuisance says. A
+            kind that the predictor does not know is a SolveError. With `jacobian` the prediction has the derivatives
+            to the kinds given in `nuisance_jacobian`.
+        """
+        ...
+
+
+@runtime_checkable
+class SupportsRupturePrediction(Predictor, Protocol):
+    """A predictor that follows a specimen to its rupture, beyond the last time of its history."""
+
+    def predict_to_rupture(
+        self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], *, jacobian: bool = False
+    ) -> Prediction:
+        """Predict as predict() does, with `life`: when measured strains are arrived at, and when it breaks."""
+        ...
+
+
+@runtime_checkable
+class SupportsReducedOrderModel(Predictor, Protocol):
+    """A predictor too expensive for a global search, with a cheap stand-in of the same outputs and nuisances."""
+
+    def reduced_order_model(self) -> Predictor:
+        """Return the stand-in; it may be some per cent off and need not know derivatives."""
+        ...
+
+
+@runtime_checkable
+class Specimen(Predictor, Protocol):
+    """A frozen record of a test piece: which outputs are observed, and how to predict them."""
+
+    @property
+    def name(self) -> str:
+        """Short, lower case, unique in the registry."""
+        ...
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        ...
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of what is observed."""
+        ...

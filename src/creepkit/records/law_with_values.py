@@ -1,0 +1,111 @@
+"""A law with the values of its parameters, units and notes: what every exporter takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from creepkit.errors import ExportError, LawError, nearest
+
+if TYPE_CHECKING:
+    from creepkit.language.elastic import Elastic
+    from creepkit.language.law import CreepLaw
+
+
+STRESS_UNITS = {"MPa": 1.0, "Pa": 1e-6, "kPa": 1e-3, "GPa": 1e3, "psi": 0.006894757293168361, "ksi": 6.894757293168361}
+"""MPa in one unit of stress; 1 psi is 1 lbf/in^2 = 4.4482216152605 N/(25.4 mm)^2."""
+
+
+TIME_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "day": 86400.0, "year": 31557600.0}
+"""Seconds in one unit of time; a year is a Julian year."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """The units of a text that leaves: of stress (and moduli) and of time; temperatures are in K.
+
+    A law itself is in MPa and s, and its numbers are ratios to 1 MPa and 1 s.
+    """
+
+    stress: str = "MPa"
+    time: str = "s"
+
+    def __post_init__(self) -> None:
+        for what, unit, known in (("stress", self.stress, STRESS_UNITS), ("time", self.time, TIME_UNITS)):
+            if unit not in known:
+                raise ExportError(f"'{unit}' is not a unit of {what}: {nearest(unit, known)}")
+
+    @property
+    def megapascals(self) -> float:
+        """MPa in one unit of stress."""
+        return STRESS_UNITS[self.stress]
+
+    @property
+    def seconds(self) -> float:
+        """Seconds in one unit of time."""
+        return TIME_UNITS[self.time]
+
+    @property
+    def is_native(self) -> bool:
+        """Whether these are the units of laws themselves."""
+        return self == Units()
+
+
+@dataclass(frozen=True)
+class LawWithValues:
+    """A law with its values, and what travels with them.
+
+    values : {parameter: number in its unit}, completed and checked.
+    notes : lines that become comments: intervals, range of validity, provenance.
+    units : of the text wanted. elastic : E in MPa, and nu, for targets that state them.
+    name : what the target is to call the law; by default the law's own name, made an identifier.
+    ranges : {"stress": (low, high) MPa, "temperature": K, "strain", "time": s} that the tests covered, where known.
+    """
+
+    law: CreepLaw
+    values: Mapping[str, float]
+    notes: Sequence[str] = ()
+    units: Units = field(default_factory=Units)
+    elastic: Elastic | None = None
+    name: str = ""
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", MappingProxyType(self.law.values(self.values)))
+        object.__setattr__(self, "notes", tuple(self.notes))
+        object.__setattr__(self, "ranges", MappingProxyType(dict(self.ranges)))
+
+    @property
+    def title(self) -> str:
+        """The law in words."""
+        return self.law.title or self.law.name
+
+    def replace(self, **changes: Any) -> LawWithValues:
+        """The same with some fields changed."""
+        return replace(self, **changes)
+
+    def at(self, temperature: float) -> LawWithValues:
+        """The same with a number, in K, in the place of the temperature."""
+        law = self.law.at(temperature)
+        elastic = None if self.elastic is None else self.elastic.at(temperature)
+        return replace(self, law=law, values={name: self.values[name] for name in law.names}, elastic=elastic)
+
+    def without_inactive_terms(self) -> LawWithValues:
+        """The same without what is switched off: terms of a zero coefficient, exponents that are 0.
+
+        ExportError when no term is left.
+        """
+        table = self.law.table
+        inactive = {name: value for name, value in self.values.items() if value == table[name].off}
+        if not inactive:
+            return self
+        try:
+            law = self.law.fix(**inactive)
+        except LawError as error:
+            raise ExportError(f"nothing to export: {error}") from None
+        description = ", ".join(f"{name} = {value:g}" for name, value in inactive.items())
+        values = {name: self.values[name] for name in law.names}
+        law = replace(law, name=self.law.name, title=self.law.title)
+        return replace(self, law=law, values=values, notes=(*self.notes, f"switched off and left out: {description}"))

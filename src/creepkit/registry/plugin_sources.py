@@ -1,0 +1,234 @@
+"""Where plugins come from (entry points and files), and the validation of what they contribute.
+
+Importing a plugin runs the code of somebody else, so whatever it raises becomes one sentence with its location.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.machinery
+import importlib.util
+import os
+import sys
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from types import CodeType, ModuleType
+from typing import Any
+
+import pluggy
+
+from creepkit import hookspecs
+from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, nearest
+
+ENTRY_POINT_GROUP = "creepkit"
+
+
+ENVIRONMENT_VARIABLE = "CREEPKIT_PLUGINS"
+
+
+@dataclass(frozen=True, order=True)
+class Provenance:
+    """Who brought a plugin: its name, and the distribution with version or the file it came from."""
+
+    origin: str
+    name: str
+
+    def __str__(self) -> str:
+        return f"plugin '{self.name}' ({self.origin})"
+
+
+def installed_entry_points() -> list[tuple[Provenance, EntryPoint]]:
+    """Return the entry points of group `creepkit`: creepkit's own first, then by distribution and name."""
+    results = [
+        (Provenance(_distribution_text(entry), entry.name), entry) for entry in entry_points(group=ENTRY_POINT_GROUP)
+    ]
+    return sorted(results, key=lambda pair: (not pair[0].origin.startswith("creepkit "), pair[0]))
+
+
+def plugin_files_in_environment() -> list[Path]:
+    """Return the files that the environment variable CREEPKIT_PLUGINS lists, separated as in PATH."""
+    return [Path(text) for text in os.environ.get(ENVIRONMENT_VARIABLE, "").split(os.pathsep) if text.strip()]
+
+
+def provenance_of_file(path: Path) -> Provenance:
+    """Return the provenance of a plugin file."""
+    return Provenance(str(path.resolve()), path.stem)
+
+
+def import_entry(provenance: Provenance, entry: EntryPoint) -> object:
+    """Import an installed plugin; PluginError when it raises."""
+    try:
+        return entry.load()
+    except (Exception, SystemExit) as error:
+        raise PluginError(f"{provenance} cannot be imported: {error_text(error)}") from error
+
+
+def import_file(provenance: Provenance, path: Path) -> ModuleType:
+    """Import a plugin file under a module name of its own; PluginError when it is missing or raises."""
+    if not path.is_file():
+        raise PluginError(f"plugin file {path} does not exist; name a Python file with hooks in it")
+    digest = hashlib.sha256(provenance.origin.encode()).hexdigest()[:8]
+    name = f"creepkit_plugin_{path.stem}_{digest}"
+    spec = importlib.util.spec_from_file_location(
+        name, provenance.origin, loader=_UncachedSourceLoader(name, provenance.origin)
+    )
+    if spec is None or spec.loader is None:
+        raise PluginError(f"plugin file {path} cannot be imported; name a Python file with hooks in it")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        del sys.modules[name]
+        raise PluginError(f"{provenance} cannot be imported: {error_text(error)}") from error
+    return module
+
+
+def error_text(error: BaseException) -> str:
+    """Return one sentence for what a plugin raised, with the plugin's file and line where they are known."""
+    if isinstance(error, SyntaxError):
+        return f"{type(error).__name__}: {error.msg} ({error.filename}, line {error.lineno})"
+    description = " ".join(str(error).split()) or "no message"
+    if not isinstance(error, CreepkitError):
+        description = f"{type(error).__name__}: {description}"
+    location = _source_location(error)
+    return f"{description} ({location})" if location else description
+
+
+class _UncachedSourceLoader(importlib.machinery.SourceFileLoader):
+    """Compiles the source each time: no bytecode beside the user's file, and never a stale one while it is edited."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        path = self.get_filename(fullname)
+        return self.source_to_code(self.get_data(path), path)
+
+
+def _distribution_text(entry: EntryPoint) -> str:
+    return f"{entry.dist.name} {entry.dist.version}" if entry.dist is not None else "unknown distribution"
+
+
+def _source_location(error: BaseException) -> str:
+    """Say where the plugin's own file appears deepest in the traceback, below the frames of registry and importlib."""
+    internal_paths = (os.path.dirname(__file__), os.path.dirname(importlib.__file__), "<frozen importlib")
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith(internal_paths)]
+    if not frames:
+        return ""
+    last = [frame for frame in frames if frame.filename == frames[0].filename][-1]
+    return f"{last.filename}, line {last.lineno}"
+
+
+HOOK_PREFIX = "creepkit_"
+
+
+COMMANDS_HOOK = "creepkit_commands"
+
+
+@dataclass(frozen=True)
+class ContributionKind:
+    """One kind of thing: its word, the hook that offers it, the error when a name is unknown, and its record.
+
+    home : module of the record that each thing must be; imported when there is a thing to check, for it is not light.
+    """
+
+    label: str
+    hook: str
+    error: type[CreepkitError]
+    record_module: str
+    record_name: str
+
+    def named_contributions(self, returned: Any) -> list[tuple[str, Any]]:
+        """Return [(name, thing)] of what a hook returned; PluginError when it is not what the hook promises."""
+        if not isinstance(returned, Sequence) or isinstance(returned, str):
+            raise PluginError(f"must return a list of {self.record_name} records, found {_type_text(returned)}")
+        required = getattr(import_module(self.record_module), self.record_name) if returned else object
+        for contribution in returned:
+            if isinstance(contribution, type) or not isinstance(contribution, required):
+                raise PluginError(
+                    f"must return a list of {self.record_name} records, found {_type_text(contribution)} in it"
+                )
+        return [(thing.name, thing) for thing in returned]
+
+
+class TemperatureFormKind(ContributionKind):
+    """Temperature forms, which are functions and so come with their names."""
+
+    def named_contributions(self, returned: Any) -> list[tuple[str, Any]]:
+        """Return [(name, function of T_ref)]."""
+        if not isinstance(returned, Mapping):
+            raise PluginError(f"must return {{name: function of T_ref}}, found {_type_text(returned)}")
+        for name, form in returned.items():
+            if not callable(form):
+                raise PluginError(f"must return {{name: function of T_ref}}, found {_type_text(form)} for '{name}'")
+        return list(returned.items())
+
+
+LAW = ContributionKind("law", "creepkit_laws", LawError, "creepkit.language", "CreepLaw")
+
+
+SPECIMEN = ContributionKind("specimen", "creepkit_specimens", SolveError, "creepkit.records", "Specimen")
+
+
+READER = ContributionKind("reader", "creepkit_readers", HistoryError, "creepkit.records", "Reader")
+
+
+EXPORTER = ContributionKind("exporter", "creepkit_exporters", ExportError, "creepkit.records", "Exporter")
+
+
+TEMPERATURE_FORM = TemperatureFormKind("temperature form", "creepkit_temperature_forms", LawError, "", "function")
+
+
+CONTRIBUTION_KINDS = (LAW, SPECIMEN, READER, EXPORTER, TEMPERATURE_FORM)
+
+
+def hook_implementations(
+    manager: pluggy.PluginManager, plugin: object, provenance: Provenance
+) -> dict[str, pluggy.HookImpl]:
+    """Return {hook: implementation} of one registered plugin; PluginError when a hook of it could never be called.
+
+    This is pluggy's check_pending for one plugin; it names the nearest hook and sees forgotten decorators as well.
+    """
+    known = [name for name in vars(hookspecs) if name.startswith(HOOK_PREFIX)]
+    callers = manager.get_hookcallers(plugin) or []
+    for caller in callers:
+        if not caller.has_spec():
+            raise PluginError(f"{provenance} has an unknown hook '{caller.name}': {nearest(caller.name, known)}")
+    results = {c.name: impl for c in callers for impl in c.get_hookimpls() if impl.plugin is plugin}
+    marked = {impl.function.__name__ for impl in results.values()}
+    for name in vars(plugin):
+        if name.startswith(HOOK_PREFIX) and callable(getattr(plugin, name)) and name not in marked:
+            raise PluginError(f"{provenance} has a function '{name}' without @hookimpl; add the decorator")
+    if not results:
+        raise PluginError(f"{provenance} offers nothing; mark one of its functions @hookimpl ({', '.join(known)})")
+    return results
+
+
+def contributions_of(kind: ContributionKind, implementation: pluggy.HookImpl) -> dict[str, Any]:
+    """Return {name: thing} that one plugin's hook offers."""
+    returned = call_hook(implementation)
+    try:
+        contributions = kind.named_contributions(returned)
+    except PluginError as error:
+        raise PluginError(f"{implementation.plugin_name}: {kind.hook} {error}") from None
+    for name, _ in contributions:
+        if [other for other, _ in contributions].count(name) > 1:
+            raise PluginError(f"{implementation.plugin_name} offers the {kind.label} '{name}' twice; rename one")
+    return dict(contributions)
+
+
+def call_hook(implementation: pluggy.HookImpl, **keywords: Any) -> Any:
+    """Call one plugin's hook; PluginError when it raises."""
+    arguments = [keywords[name] for name in implementation.argnames]
+    try:
+        return implementation.function(*arguments)
+    except Exception as error:
+        name = implementation.function.__name__
+        raise PluginError(f"{implementation.plugin_name}: {name} raised {error_text(error)}") from error
+
+
+def _type_text(thing: Any) -> str:
+    """Name something unexpected: a class by its own name, else by its type."""
+    return f"the class {thing.__name__}" if isinstance(thing, type) else f"{type(thing).__name__} {thing!r}"[:80]

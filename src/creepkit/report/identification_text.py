@@ -1,0 +1,211 @@
+"""An identification as text for a terminal, and as comments for exported laws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from statistics import median
+from typing import TYPE_CHECKING
+
+from creepkit.inverse.goodness_of_fit import RuptureComparison
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
+from creepkit.language.printing import expression_text
+
+if TYPE_CHECKING:
+    from creepkit.inverse.goodness_of_fit import RuptureComparison
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.nuisance_parameters import NuisanceEstimate
+
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+
+
+LISTED_RUPTURES = 15
+"""With more tests than this their rupture times are summed up alone."""
+
+
+UNITS = {"amplitude": "mm", "width": "mm", "thickness": "mm", "window": "mm", "temperature": "K"}
+
+
+def identification_text(fit: Identification) -> str:
+    """The law, its values with 95 % intervals, the scatter between tests, and what is not determined."""
+    lines = [
+        f"{fit.law.title or fit.law.name}",
+        *(f"  {label}: {expression_text(term)}" for label, term in fit.law.terms.items()),
+        "",
+        *_values(fit),
+        *_reference(fit),
+        "",
+        *_strains(fit),
+        *_ruptures(fit),
+        *_linear_outputs(fit),
+        *_table(fit),
+    ]
+    lines += [f"  {fit.sparsity.verdict}"] if fit.sparsity is not None else []
+    lines += [f"  note: {note}" for note in fit.notes]
+    return "\n".join(lines)
+
+
+def _values(fit: Identification) -> list[str]:
+    width, lines = max(len(e.name) for e in fit.estimates) if fit.estimates else 4, []
+    for e in fit.estimates:
+        unit = "" if e.unit == "1" else f" {e.unit}"
+        note = "" if e.verdict == "determined" else f"   <- {e.verdict} by these data"
+        note = "   <- at its bound" if e.verdict == "at its bound" else note
+        lines.append(f"  {e.name:{width}} = {e.value:.5g}  [{e.low:.4g}, {e.high:.4g}]{unit}{note}")
+    return lines
+
+
+def _reference(fit: Identification) -> list[str]:
+    r = fit.reference
+    rate, low, high = (float(v) for v in fit.rate(r.stress))
+    n, exponent_low, exponent_high = (float(v) for v in fit.local_exponent(r.stress))
+    qualifier = " of virgin material" if fit.law.states else ""
+    return [
+        f"  rate{qualifier} at {r.stress:.4g} MPa, {r.temperature:.0f} K, strain {r.strain:.2g}, {r.time:.3g} s: "
+        f"{rate:.3g} [{low:.3g}, {high:.3g}] 1/s",
+        f"  local stress exponent there: {n:.3g} [{exponent_low:.3g}, {exponent_high:.3g}]",
+    ]
+
+
+def _tests(count: int) -> str:
+    return "1 test" if count == 1 else f"{count} tests"
+
+
+def _strains(fit: Identification) -> list[str]:
+    if "strain" not in fit.noise_model.outputs:
+        return []
+    strain_noise, strain_tests = (
+        fit.noise_model["strain"],
+        [m for m in fit.tests if m.outputs and m.outputs[0].output == "strain"],
+    )
+    return [
+        f"  {_tests(len(strain_tests))}, {sum(m.frames for m in strain_tests)} frames: {_rms_label(fit)} {fit.rms:.3g}",
+        f"  scatter (one sd): rate between tests {100 * fit.noise_model.rate:.0f} %, loading strain {strain_noise.offset:.2g}, "
+        f"frame noise {strain_noise.noise:.2g}, what the law cannot follow {100 * strain_noise.drift:.1f} % of strain",
+    ]
+
+
+def _rms_label(fit: Identification) -> str:
+    whole = any(m.rupture is not None for m in fit.tests)
+    return "rms distance in ln strain and ln time" if whole else "rms of ln strain"
+
+
+def _ruptures(fit: Identification) -> list[str]:
+    """Rupture times, predicted over measured, and each test's where they are few."""
+    ruptures = rupture_rows(fit)
+    if not ruptures:
+        return []
+    ratios, censored = [r.ratio for _, _, r in ruptures if not r.censored], [r for _, _, r in ruptures if r.censored]
+    line = f"  rupture: {len(ratios)} of {_tests(len(fit.tests))} broke"
+    if ratios:
+        within_interval = sum(r.low <= r.measured <= r.high for _, _, r in ruptures if not r.censored)
+        line += (
+            f"; time predicted over measured {min(ratios):.2g} to {max(ratios):.2g}, median {median(ratios):.3g}; "
+            f"{within_interval} within the 95 % interval of a single test"
+        )
+    if censored:
+        unexpected = sum(r.predicted < r.measured for r in censored)
+        line += f"; {len(censored)} stopped before, of which {unexpected or 'none'} should have broken"
+    return [line, *(_rupture_table(ruptures) if len(ruptures) <= LISTED_RUPTURES else [])]
+
+
+def _rupture_table(ruptures: Sequence[tuple[str, str, RuptureComparison]]) -> list[str]:
+    width, condition_width = (
+        max(len(name) for name, _, _ in ruptures),
+        max(len(condition) for _, condition, _ in ruptures),
+    )
+    lines = [f"  {'test':{width}}  {'condition':{condition_width}} {'lasted, h':>11} {'predicted':>10}  [95 %]"]
+    for name, condition, r in ruptures:
+        duration = f"{'> ' if r.censored else ''}{r.measured / 3600:.4g}"
+        low, time, high = (v / 3600 for v in (r.low, r.predicted, r.high))
+        lines.append(
+            f"  {name:{width}}  {condition:{condition_width}} {duration:>11} {time:>10.4g}  [{low:.4g}, {high:.4g}]"
+        )
+    return lines
+
+
+def _linear_outputs(fit: Identification) -> list[str]:
+    """Errors of outputs that are compared as they are, over all used frames of all tests."""
+    lines = []
+    for name, e in fit.errors.items():
+        if name in ("strain", RUPTURE_OUTPUT):
+            continue
+        unit, s = f" {UNITS[name]}" if name in UNITS else "", fit.noise_model[name]
+        lines.append(
+            f"  {name}: relative squared error {e.relative_squared_error:.3g}, rms {e.mean_squared_error**0.5:.3g}{unit} ({100 * e.relative_rms_error:.2g} %), "
+            f"noise {s.noise:.2g}{unit}, offsets {s.offset:.2g}{unit}, reduced chi-square {e.chi_square:.3g}"
+        )
+    if lines and "strain" not in fit.errors:
+        count = _tests(len(fit.tests))
+        lines.append(f"  {count}; scatter of the rate between tests (one sd) {100 * fit.noise_model.rate:.0f} %")
+    return lines
+
+
+def _table(fit: Identification) -> list[str]:
+    """One line a test: its error, its offset and weight, and what was found of its nuisances."""
+    linear_output_tests = [m for m in fit.tests if m.outputs and m.outputs[0].output != "strain"]
+    estimates_by_owner = {(n.kind, n.owner): n for n in fit.nuisances if n.scope == "test"}
+    kinds = list(dict.fromkeys(n.kind for n in fit.nuisances if n.scope == "test"))
+    if not (linear_output_tests or kinds):
+        return _shared_nuisances(fit)
+    width = max(len(m.name) for m in fit.tests)
+    head = f"  {'test':{width}}  {'condition':22} {'error':>9} {'chi2':>8} {'offset':>9} {'rate':>6} {'weight':>6}"
+    lines = ["", head + "".join(f" {kind + _unit(kind):>18}" for kind in kinds)]
+    for m in fit.tests:
+        first_output = m.outputs[0]
+        test_estimates = [estimates_by_owner.get((kind, m.name)) for kind in kinds]
+        lines.append(
+            f"  {m.name:{width}}  {m.condition:22} {first_output.errors.relative_squared_error:9.2g} {first_output.errors.chi_square:8.3g} "
+            f"{first_output.offset:9.2g} {m.rate_factor:6.2f} {m.weight:6.2f}"
+            + "".join(f" {'-' if n is None else _plus_minus(n):>18}" for n in test_estimates)
+        )
+    return [*lines, *_shared_nuisances(fit)]
+
+
+def _shared_nuisances(fit: Identification) -> list[str]:
+    """Nuisances that tests share, and spreads that were estimated."""
+    lines = [
+        f"  {n.kind} of {n.owner or 'one alloy'}{_unit(n.kind)}: {_plus_minus(n)}"
+        for n in fit.nuisances
+        if n.scope != "test"
+    ]
+    for nuisance in fit.settings.nuisances:
+        prior_sds = [n.prior_sd for n in fit.nuisances if n.kind == nuisance.kind]
+        if nuisance.sd is None and prior_sds:
+            lines.append(f"  {nuisance.kind}: spread estimated as {prior_sds[0]:.3g}{_unit(nuisance.kind)}")
+    return lines
+
+
+def _plus_minus(n: NuisanceEstimate) -> str:
+    return f"{n.value:.4g} +- {n.sd:.2g}"
+
+
+def _unit(kind: str) -> str:
+    return f", {UNITS[kind]}" if kind in UNITS else ""
+
+
+def identification_comments(fit: Identification) -> list[str]:
+    """Intervals, validity and provenance as lines, to travel as comments with an exported law."""
+    lines = [f"identified with creepkit {fit.provenance.get('creepkit', '')} from {_tests(len(fit.tests))}"]
+    for e in fit.estimates:
+        unit = "" if e.unit == "1" else f" {e.unit}"
+        lines.append(f"{e.name} = {e.value:.8g}{unit}, 95 % interval {e.low:.4g} to {e.high:.4g}, {e.verdict}")
+    units = {"stress": "MPa", "temperature": "K", "strain": "", "time": "s"}
+    covered = (
+        f"{name} {low:.4g} to {high:.4g} {units.get(name, '')}".strip() for name, (low, high) in fit.ranges.items()
+    )
+    lines.append(f"valid within the tests: {', '.join(covered)}")
+    rate_scatter = f"rates of single tests scatter by {100 * fit.noise_model.rate:.0f} % (one sd)"
+    errors_text = [f"rms of ln strain {fit.rms:.3g}"] if "strain" in fit.errors else []
+    errors_text += [
+        f"relative squared error of {name} {e.relative_squared_error:.3g}"
+        for name, e in fit.errors.items()
+        if name != "strain"
+    ]
+    return [*lines, "; ".join([*errors_text, rate_scatter]), *fit.notes]
+
+
+def rupture_rows(fit: Identification) -> list[tuple[str, str, RuptureComparison]]:
+    """(test, condition, rupture) of the tests whose end is known."""
+    return [(m.name, m.condition, m.rupture) for m in fit.tests if m.rupture is not None]

@@ -1,0 +1,311 @@
+"""A screened plate as text for a terminal and as plots after Fig. 7 of Chen et al."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import FitError
+from creepkit.inverse.observation_vector import usable_frames
+from creepkit.report.figures import empty_figure
+from creepkit.screening.files import COMPARISON_STRESS, confirmation_text
+from creepkit.screening.results import AlloyResult, PredictedOutputs, mean_chi_square, mean_relative_squared_error
+
+if TYPE_CHECKING:
+    from creepkit.screening.results import Plate
+
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from creepkit.screening.results import Plate
+
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from creepkit.records import History
+    from creepkit.screening.results import Plate
+
+
+TABLE_COLUMNS = ("alloy", "class", "law", "weight", "rate at 100 MPa, 1/s", "local exponent", "chi-square", "confirmed")
+
+
+def table_rows(plate: Plate) -> list[tuple[str, ...]]:
+    """One row an alloy for people: COLUMNS."""
+    return [_table_row(plate, result) for result in plate.results]
+
+
+def screening_text(plate: Plate) -> str:
+    """The table, the share of each law in each class, and what failed."""
+    rows = [TABLE_COLUMNS, *table_rows(plate)]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(TABLE_COLUMNS))]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return "\n".join([*lines, "", *summary_lines(plate)])
+
+
+def summary_lines(plate: Plate) -> list[str]:
+    """What the alloys say together, and what is odd, a line each."""
+    decisive = sum(result.decisive for result in plate.identified)
+    lines = [f"{len(plate.identified)} of {len(plate.results)} alloys identified, {decisive} of them decisively"]
+    if plate.compositions is not None:
+        for name, law_fractions in plate.law_fractions().items():
+            fractions = ", ".join(
+                f"{law} {100 * fraction:.0f} %" for law, fraction in sorted(law_fractions.items(), key=lambda p: -p[1])
+            )
+            lines.append(f"{name} ({len(plate.by_class()[name])}): {fractions}")
+    lines += [f"failed: {_failure_text(alloy, reason)}" for alloy, reason in plate.failures.items()]
+    for answer in plate.identified:
+        if answer.confirmation is not None and not answer.confirmation.confirmed:
+            lines.append(f"{answer.alloy}: {answer.confirmation.verdict}")
+    return [*lines, *(f"note: {note}" for note in plate.notes)]
+
+
+def _table_row(plate: Plate, result: AlloyResult) -> tuple[str, ...]:
+    first_cells = (result.alloy, plate.class_of(result.alloy))
+    if not result.identified:
+        return (*first_cells, "none", *[""] * (len(TABLE_COLUMNS) - 3))
+    fit = result.best
+    names = fit.law.name + (f" or {', '.join(result.credible_laws[1:])}" if len(result.credible_laws) > 1 else "")
+    return (
+        *first_cells, names, f"{result.laws[0].weight:.2f}", _interval_text(fit.rate(COMPARISON_STRESS), 3), _interval_text(fit.local_exponent(COMPARISON_STRESS), 3),
+        f"{mean_chi_square(fit):.3g}", confirmation_text(result),
+    )  # fmt: skip
+
+
+def _interval_text(interval: Sequence[Any], digits: int) -> str:
+    value, low, high = (float(v) for v in interval)
+    return f"{value:.{digits}g} [{low:.{digits}g}, {high:.{digits}g}]"
+
+
+def _failure_text(alloy: str, failure: str) -> str:
+    """The reason, after the alloy's name where it does not say it itself."""
+    return failure if f"'{alloy}'" in failure else f"alloy '{alloy}': {failure}"
+
+
+PLOT_RADII = (0.0, 2.0, 4.0)
+"""mm, those of Fig. 7a."""
+
+
+PROFILE_OUTPUTS = ("amplitude", "width", "shape")
+
+
+def profile_displacement(outputs: Mapping[str, Floats], radius: float) -> Floats:
+    """D exp(-(r / S)^p), (frames,) mm; NaN where width or shape is not above zero or was not observed."""
+    amplitude = np.asarray(outputs["amplitude"], float)
+    if radius == 0.0:
+        return amplitude
+    not_observed = np.full(amplitude.shape, np.nan)
+    width, shape = (np.asarray(outputs.get(name, not_observed), float) for name in ("width", "shape"))
+    valid = (width > 0) & (shape > 0)
+    ratio = np.where(valid, radius / np.where(valid, width, 1.0), np.nan)
+    return np.asarray(amplitude * np.exp(-(ratio ** np.where(valid, shape, 1.0))))
+
+
+MISFIT_MEASURES = (
+    ("loss of Eq. (4), mean over outputs", mean_relative_squared_error),
+    ("chi-square, mean over outputs", mean_chi_square),
+)
+
+
+LOG_TICKS, MIN_LOG_RATIO = (1.0, 2.0, 5.0), 5.0
+"""Of logarithmic axes: where ticks are, and the ratio of their ends below which they are linear instead."""
+
+
+class LegendLabels:
+    """Labels for a legend, each given out once."""
+
+    def __init__(self) -> None:
+        self._used: set[str] = set()
+
+    def first_use(self, name: str) -> str | None:
+        """The name the first time, None from then on."""
+        if name in self._used:
+            return None
+        self._used.add(name)
+        return name
+
+
+def class_colours(plate: Plate) -> Mapping[str, str]:
+    """{class: colour}."""
+    return {name: f"C{k % 10}" for k, name in enumerate(plate.by_class())}
+
+
+def plot_misfits(plate: Plate, results: list[AlloyResult]) -> Figure:
+    """Misfit of the reduced law against that of the dense one (Fig. 7b): Eq. (4), and in units of noise."""
+    figure = empty_figure(8.6, 4.6)
+    colours, labels = class_colours(plate), LegendLabels()
+    for axes, (title, measure) in zip(figure.subplots(1, 2), MISFIT_MEASURES, strict=True):
+        points = [(measure(a.dense_fit), measure(a.reduced_fit)) for a in results if a.dense_fit is not None]
+        for (x, y), result in zip(points, results, strict=True):
+            name = plate.class_of(result.alloy)
+            axes.plot(x, y, "o", ms=5, color=colours[name], alpha=0.75, label=labels.first_use(name))
+        values = np.array(points)[np.isfinite(points).all(axis=1)]
+        _finish_misfit(axes, (values.min() / 1.2, values.max() * 1.2) if values.size else (0.1, 10.0))
+        axes.set_title(title, fontsize=10)
+    figure.legend(loc="outside lower center", ncols=6, fontsize=8)
+    return figure
+
+
+def _finish_misfit(axes: Axes, limits: tuple[float, float]) -> None:
+    """Equal axes, logarithmic where they span much."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axes.plot(limits, limits, "k-", lw=0.7, alpha=0.6)
+    axes.set(xlim=limits, ylim=limits, xlabel="law without sparsity", ylabel="reduced law")
+    axes.grid(alpha=0.25)
+    if limits[1] < MIN_LOG_RATIO * limits[0]:
+        return
+    axes.set(xscale="log", yscale="log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=LOG_TICKS))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
+
+
+def plot_law_fractions(plate: Plate) -> Figure:
+    """Share of each law by class (Fig. 7c): full colour where decisive, hatched what is shared out between laws."""
+    figure = empty_figure(7.2, 4.4)
+    axes: Axes = figure.subplots()
+    classes = plate.by_class()
+    bottom, positions = np.zeros(len(classes)), range(len(classes))
+    for k, law in enumerate(sorted({w.fit.law.name for a in plate.identified for w in a.laws})):
+        decisive_fractions, undecided_fractions = (
+            np.array([_law_fraction(m, law, d) for m in classes.values()]) for d in (True, False)
+        )
+        axes.bar(positions, decisive_fractions, bottom=bottom, color=f"C{k}", label=law, width=0.6)
+        axes.bar(positions, undecided_fractions, bottom=bottom + decisive_fractions, color=f"C{k}", alpha=0.45, hatch="///", width=0.6,
+                 edgecolor="white", linewidth=0)  # fmt: skip
+        bottom += decisive_fractions + undecided_fractions
+    axes.set_xticks(positions, [f"{name}\n{len(m)} alloy{'s' if len(m) > 1 else ''}" for name, m in classes.items()])
+    axes.set(ylim=(0, 1), xlim=(-0.6, max(len(classes), 3) - 0.4), ylabel="share of alloys")
+    axes.set_title("identified laws by class; hatched: shared out by weight where not decisive", fontsize=10)
+    figure.legend(loc="outside lower center", ncols=4, fontsize=8)
+    return figure
+
+
+def _law_fraction(members: tuple[AlloyResult, ...], law: str, decisive: bool) -> float:
+    """Mean weight of a law over the members that are decisive, or over those that are not, as a share of all."""
+    weights = [w.weight for m in members if m.decisive is decisive for w in m.laws if w.fit.law.name == law]
+    return sum(weights) / len(members)
+
+
+MAX_CLASSES = 4
+"""Classes that are shown."""
+
+
+SECONDS_PER_HOUR = 3600.0
+
+
+def plot_histories(plate: Plate, results: list[AlloyResult]) -> Figure:
+    """A panel a class: the first test of its first alloy, at three radii."""
+    shown_results: dict[str, AlloyResult] = {}
+    for name in plate.by_class():
+        members = [a for a in results if plate.class_of(a.alloy) == name]
+        if members and len(shown_results) < MAX_CLASSES:
+            shown_results[name] = next((a for a in members if a.decisive), members[0])
+    figure = empty_figure(3.6 * max(len(shown_results), 2), 3.9)
+    panels = figure.subplots(1, len(shown_results), squeeze=False)[0]
+    for axes, (name, result) in zip(panels, shown_results.items(), strict=True):
+        test = plate.histories[result.alloy][0]
+        _plot_displacements(axes, test, result.predicted[test.name])
+        axes.set_title(f"{result.alloy}, {name}: {result.best.law.name}", fontsize=9)
+    panels[0].set_ylabel("displacement, mm")
+    panels[0].legend(fontsize=8, title="measured (dots), identified", title_fontsize=8)
+    return figure
+
+
+def _plot_displacements(axes: Axes, test: History, predicted: PredictedOutputs) -> None:
+    profile_outputs = {name: row for name, row in predicted.items() if name in PROFILE_OUTPUTS}
+    for k, radius in enumerate(PLOT_RADII):
+        if radius > 0 and len(profile_outputs) < len(PROFILE_OUTPUTS):
+            continue
+        hours = test.times / SECONDS_PER_HOUR
+        axes.plot(
+            hours[test.used], profile_displacement(test.outputs, radius)[test.used], ".", ms=2, color=f"C{k}", alpha=0.4
+        )
+        axes.plot(
+            hours, profile_displacement(profile_outputs, radius), "-", lw=1.2, color=f"C{k}", label=f"r = {radius:g} mm"
+        )
+    axes.set(xlabel="time, h", ylim=(0, None))
+    axes.grid(alpha=0.25)
+
+
+def plot_screening(plate: Plate, folder: Path) -> list[Path]:
+    """Write histories.png and parity.png (bulge tests), misfit.png (with a dense law) and laws.png; their paths."""
+    if not plate.identified:
+        raise FitError("no alloy of this plate has a law, so there is nothing to draw; see Plate.failed")
+    bulge_results = [a for a in plate.identified if any("amplitude" in rows for rows in a.predicted.values())]
+    dense_results = [a for a in plate.identified if a.dense_fit is not None]
+    figures = {"laws.png": plot_law_fractions(plate)}
+    if bulge_results:
+        figures["parity.png"] = _plot_parity(plate, bulge_results)
+        figures["histories.png"] = plot_histories(plate, bulge_results)
+    if dense_results:
+        figures["misfit.png"] = plot_misfits(plate, dense_results)
+    return [_save_figure(figure, folder / name) for name, figure in sorted(figures.items())]
+
+
+def _plot_parity(plate: Plate, results: list[AlloyResult]) -> Figure:
+    """Identified against measured displacement at three radii, and their difference (Fig. 7a, of all alloys)."""
+    figure = empty_figure(3.7 * len(PLOT_RADII), 5.6)
+    panels = figure.subplots(2, len(PLOT_RADII), height_ratios=(2.2, 1.0), sharex="col")
+    colours, labels = class_colours(plate), LegendLabels()
+    for (upper, lower), radius in zip(panels.T, PLOT_RADII, strict=True):
+        errors, axis_limit = [np.zeros(0)], 0.0
+        for result in results:
+            name = plate.class_of(result.alloy)
+            for measured, predicted in _displacement_pairs(plate, result, radius):
+                upper.plot(measured, predicted, ".", ms=2, color=colours[name], alpha=0.6, label=labels.first_use(name))
+                lower.plot(measured, 1e3 * (predicted - measured), ".", ms=1.5, color=colours[name], alpha=0.5)
+                errors.append(predicted - measured)
+                axis_limit = max(axis_limit, float(measured.max()), float(predicted.max()))
+        _finish_parity(upper, lower, radius, np.concatenate(errors), 1.05 * axis_limit or 1.0)
+    figure.legend(loc="outside lower center", ncols=6, fontsize=8, markerscale=4)
+    return figure
+
+
+def _displacement_pairs(plate: Plate, result: AlloyResult, radius: float) -> list[tuple[Any, Any]]:
+    """Measured and identified displacement of each test that has what the radius needs, (frames,) mm."""
+    pairs = []
+    for test in plate.histories[result.alloy]:
+        predicted_outputs = result.predicted.get(test.name, {})
+        if "amplitude" not in predicted_outputs or (radius > 0 and not set(PROFILE_OUTPUTS) <= set(predicted_outputs)):
+            continue
+        used = usable_frames(test, "amplitude")
+        measured, predicted = (
+            profile_displacement(test.outputs, radius)[used],
+            profile_displacement(predicted_outputs, radius)[used],
+        )
+        finite = np.isfinite(measured) & np.isfinite(predicted)
+        pairs.append((measured[finite], predicted[finite]))
+    return [pair for pair in pairs if pair[0].size]
+
+
+def _finish_parity(upper: Axes, lower: Axes, radius: float, errors: Any, axis_limit: float) -> None:
+    upper.plot([0, axis_limit], [0, axis_limit], "k-", lw=0.7, alpha=0.6)
+    lower.axhline(0, color="black", lw=0.7, alpha=0.6)
+    rms = f", rms {1e3 * float(np.sqrt(np.mean(errors**2))):.2g} um" if errors.size else ": not observed"
+    upper.set(xlim=(0, axis_limit), ylim=(0, axis_limit))
+    upper.set_title(f"r = {radius:g} mm{rms}", fontsize=10)
+    lower.set(xlabel="measured displacement, mm")
+    for axes in (upper, lower):
+        axes.grid(alpha=0.25)
+    if radius == PLOT_RADII[0]:
+        upper.set_ylabel("identified displacement, mm")
+        lower.set_ylabel("difference, um")
+
+
+def _save_figure(figure: Figure, path: Path) -> Path:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, dpi=130)
+    except OSError as error:
+        raise FitError(f"{path}: cannot be written ({error.strerror}); name a folder that can be") from None
+    return path

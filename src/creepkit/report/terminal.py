@@ -1,0 +1,81 @@
+"""Output of commands: tables for people, JSON for programs, and the progress of long computations."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from types import TracebackType
+from typing import Any
+
+import typer
+
+
+def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table as wide as the terminal, or 120 columns elsewhere; cells are plain text, the first never breaks."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=title, title_justify="left")
+    for k, column in enumerate(columns):
+        table.add_column(column, overflow="fold", no_wrap=k == 0)
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    console = Console()
+    (console if console.is_terminal else Console(width=120)).print(table)
+
+
+def print_json(value: Any) -> None:
+    """Print an answer as JSON."""
+    typer.echo(json.dumps(value, indent=2, ensure_ascii=False))
+
+
+class ProgressBar:
+    """Use as a context; call `tick(task, done, total)`, maybe with a note, from the work. Writes to stderr."""
+
+    LINE_INTERVAL, ELAPSED_FRACTION = 2.0, 0.01
+    """s between plain lines, and the share of the time so far: nobody reads five thousand lines of three hours."""
+
+    def __init__(self) -> None:
+        self._bar: Any = None
+        self._tasks: dict[str, Any] = {}
+        self._start = self._last_line = time.monotonic()
+
+    def __enter__(self) -> ProgressBar:
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+            from rich.progress import Progress as Bar
+
+            columns = (
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TimeRemainingColumn(),
+                TextColumn("{task.fields[note]}"),
+            )
+            self._bar = Bar(*columns, console=Console(stderr=True))
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def tick(self, task: str, done: int, total: int, note: str = "") -> None:
+        """Report that `done` of `total` parts of a task are finished; note : what else there is to say."""
+        if self._bar is not None:
+            if task not in self._tasks:
+                self._tasks[task] = self._bar.add_task(task, total=total, note=note)
+            self._bar.update(self._tasks[task], completed=done, total=total, note=note)
+        elif done == total or self._is_due():
+            self._last_line = time.monotonic()
+            print(f"{task}: {done} of {total}{note and f' ({note})'}", file=sys.stderr, flush=True)
+
+    def _is_due(self) -> bool:
+        now = time.monotonic()
+        return now - self._last_line > max(self.LINE_INTERVAL, self.ELAPSED_FRACTION * (now - self._start))

@@ -1,0 +1,266 @@
+"""Acceptance criteria of samples: before simulation (rates, bounds, constraints of the law) and after it.
+
+Criteria 1 to 5 are those of the paper (Materials and Methods, "Data generation and preparation"). Criterion 4 of the paper asks for an apex displacement above 0.01 mm, meant to remove samples without creep. The elastic deflection alone is 0.01 to 0.2 mm, so criterion 4 is applied here to the growth of the amplitude by creep within each of the two holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal, TypeAlias
+
+import numpy as np
+import sympy
+
+from creepkit.arrays import Bools, Floats
+from creepkit.language import CreepLaw
+from creepkit.language.symbols import POINT_VARIABLES
+from creepkit.records import Status
+from creepkit.sampling.conditions import BULGE, ROOM_TEMPERATURE, VISIBLE_CREEP
+from creepkit.sampling.draws import Draws
+from creepkit.sampling.rates import RateArguments, log10_rate
+
+TIME_FRACTIONS = np.concatenate([np.zeros(1), np.geomspace(1e-3, 1.0, 60)])
+"""Times, as shares of a test's end, at which relations are looked at."""
+
+
+CONSTRAINT_STRESS, CONSTRAINT_STRAIN = 100.0, 0.01
+"""MPa and strain at which they are, where they depend on these."""
+
+
+def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:
+    """Which draws meet every relation at every time of their tests, (rows,); what is not a number does not."""
+    parameters = [column[:, None] for column in draws.parameters.T]
+    stress, strain = np.full((len(draws), TIME_FRACTIONS.size), CONSTRAINT_STRESS), CONSTRAINT_STRAIN
+    temperature = draws.condition("temperature", ROOM_TEMPERATURE)[:, None]
+    arguments = (stress, strain, TIME_FRACTIONS * end_times[:, None], temperature, stress, stress / 3.0)
+    states = [state.initial for state in law.states.values()]
+    holds = np.ones(len(draws), bool)
+    for relation in law.constraints:
+        function = sympy.lambdify((*POINT_VARIABLES, *law.states, *law.params), relation, "numpy", dummify=True)
+        with np.errstate(all="ignore"):
+            satisfied = np.broadcast_to(function(*arguments, *states, *parameters), stress.shape)
+        holds &= satisfied.all(axis=1)
+    return holds
+
+
+FIRST_HOLD, BEFORE_JUMP, AFTER_JUMP, END = range(4)
+"""Rows of an outcome's marks: a hold is from the first to the second, and from the third to the fourth."""
+
+
+BURST_TIME_FACTOR = 2.0
+"""How many times too early a stand-in must burst before it is believed; the dimple's is within 1.6 as a rule."""
+
+
+@dataclass(frozen=True, eq=False)
+class SimulationOutcome:
+    """One simulated sample, or what a stand-in predicts of it.
+
+    times : (frames,) s. outputs : (frames, outputs), first the one that grows with creep; NaN after the end.
+    marks : (4, outputs) at the end of the first ramp, just before the jump, at the end of the second ramp, at the end
+        of the test; NaN where the simulation did not get. end_time : s, up to which it got.
+    """
+
+    times: Floats
+    outputs: Floats
+    hold_outputs: Floats
+    status: Status
+    end_time: float
+    conditions: Mapping[str, float]
+
+    @property
+    def last_output(self) -> float:
+        """The first output in the last frame that has one; NaN without any."""
+        finite_outputs = self.outputs[np.isfinite(self.outputs[:, 0]), 0]
+        return float(finite_outputs[-1]) if finite_outputs.size else float("nan")
+
+    @property
+    def creep_in_holds(self) -> tuple[float, float]:
+        """Growth of the first output in each hold, elastic jumps left out.
+
+        Of a hold that a burst cut short up to the last frame; NaN of one that never began.
+        """
+        start, before, after, end = self.hold_outputs[:, 0]
+        first_hold = (self.last_output if np.isnan(before) else before) - start
+        return float(first_hold), float((self.last_output if np.isnan(end) else end) - after)
+
+
+@dataclass(frozen=True)
+class RateLimit:
+    """The law's rate at one point lies within limits, both None where there is none: criteria 1 and 2.
+
+    stress : MPa. least, most : log10 of the rate, 1/s: as logarithms rates do not underflow.
+    """
+
+    name: str
+    text: str
+    stress: float
+    lower: float | None = None
+    upper: float | None = None
+    strain: float = 0.01
+    time: float = 1e4
+    stage: ClassVar[Literal["before"]] = "before"
+
+    def passes(self, law: CreepLaw, draws: Draws) -> Bools:
+        """Which draws meet it, (rows,)."""
+        arguments = RateArguments(self.stress, self.strain, self.time, draws.condition("temperature", ROOM_TEMPERATURE))
+        log10_rates = log10_rate(law, draws.parameters, arguments)
+        low, high = (limit if limit is not None else log10_rates for limit in (self.lower, self.upper))
+        return np.asarray((log10_rates >= low) & (log10_rates <= high))
+
+
+@dataclass(frozen=True)
+class WithinBounds:
+    """Every parameter lies within the law's bounds, or is off."""
+
+    name: str
+    text: str
+    stage: ClassVar[Literal["before"]] = "before"
+
+    def passes(self, law: CreepLaw, draws: Draws) -> Bools:
+        """Which draws meet it, (rows,)."""
+        low, high = np.array([param.bounds for param in law.params.values()]).reshape(-1, 2).T
+        off_values = np.array([np.nan if param.off is None else param.off for param in law.params.values()])
+        values, slack = draws.parameters, 1e-9 * np.abs([low, high])
+        return np.asarray(
+            (((values >= low - slack[0]) & (values <= high + slack[1])) | (values == off_values)).all(axis=1)
+        )
+
+
+@dataclass(frozen=True)
+class ConstraintsHold:
+    """The relations that the law declares hold throughout the test; end : s, of tests whose end is not drawn."""
+
+    name: str
+    text: str
+    end: float
+    stage: ClassVar[Literal["before"]] = "before"
+
+    def passes(self, law: CreepLaw, draws: Draws) -> Bools:
+        """Which draws meet it, (rows,)."""
+        return constraints_hold(law, draws, draws.condition("end_time", self.end))
+
+
+@dataclass(frozen=True)
+class SurvivesTime:
+    """The simulation converged and went on for `seconds`, or to the end of a shorter test: criterion 3.
+
+    None stands for the whole test. A burst is no failure of the simulation: with a number of seconds, one after them
+    is admitted.
+    """
+
+    name: str
+    text: str
+    seconds: float | None = None
+    stage: ClassVar[Literal["after"]] = "after"
+
+    def passes(self, outcome: SimulationOutcome) -> bool:
+        """Whether the outcome meets it."""
+        if outcome.status == Status.COMPLETE:
+            return True
+        return self.seconds is not None and outcome.status == Status.RUPTURED and outcome.end_time >= self.seconds
+
+    def rejects_early(self, screening_outcome: SimulationOutcome) -> bool:
+        """Whether a stand-in's prediction leaves no hope: it bursts far too early."""
+        burst = screening_outcome.status == Status.RUPTURED
+        return burst and self.seconds is not None and BURST_TIME_FACTOR * screening_outcome.end_time < self.seconds
+
+
+@dataclass(frozen=True)
+class CreepInEachHold:
+    """Creep above `least` in either hold, elastic jumps left out: criterion 4.
+
+    A hold that a burst cut short counts up to its last frame; a second hold that was never reached is no growth.
+    """
+
+    name: str
+    text: str
+    threshold: float
+    stage: ClassVar[Literal["after"]] = "after"
+
+    def passes(self, outcome: SimulationOutcome) -> bool:
+        """Whether the outcome meets it."""
+        return all(growth > self.threshold for growth in outcome.creep_in_holds)
+
+    def rejects_early(self, screening_outcome: SimulationOutcome) -> bool:
+        """Whether a stand-in's prediction leaves no hope: it bursts long before the second hold begins.
+
+        Little growth is no reason. Under a nearly plastic law a dimple creeps at its clamped edge, where the stress is
+        high: the stand-in, which knows one stress, has called a growth of .02 mm one of 1e-5.
+        """
+        return (
+            screening_outcome.status == Status.RUPTURED
+            and BURST_TIME_FACTOR * screening_outcome.end_time < screening_outcome.times[-2]
+        )
+
+
+@dataclass(frozen=True)
+class TotalCreepAbove:
+    """Creep of `least` or more in both holds together, elastic jumps left out."""
+
+    name: str
+    text: str
+    threshold: float
+    stage: ClassVar[Literal["after"]] = "after"
+
+    def passes(self, outcome: SimulationOutcome) -> bool:
+        """Whether the outcome meets it."""
+        return float(np.nansum(outcome.creep_in_holds)) >= self.threshold
+
+
+@dataclass(frozen=True)
+class FinalOutputAbove:
+    """The first output is above `least` at the end: criterion 5. After a burst, in the last frame before it."""
+
+    name: str
+    text: str
+    threshold: float
+    stage: ClassVar[Literal["after"]] = "after"
+
+    def passes(self, outcome: SimulationOutcome) -> bool:
+        """Whether the outcome meets it."""
+        return outcome.last_output > self.threshold
+
+
+DrawCriterion: TypeAlias = RateLimit | WithinBounds | ConstraintsHold
+
+
+OutcomeCriterion: TypeAlias = SurvivesTime | CreepInEachHold | TotalCreepAbove | FinalOutputAbove
+
+
+Criterion: TypeAlias = DrawCriterion | OutcomeCriterion
+
+
+PAPER_LEAST_CREEP = {"bulge": 0.01, "uniaxial": 1e-4}
+"""mm of amplitude, of criteria 4 and 5: twice the resolution of the paper's cameras; and the like of a strain."""
+
+
+def paper_criteria(kind: str) -> tuple[Criterion, ...]:
+    """Criteria 1 to 5 of the paper; of a bar 4 and 5 speak of its strain."""
+    least = _with_unit(kind, PAPER_LEAST_CREEP[kind])
+    output = "amplitude" if kind == BULGE else "strain"
+    return (
+        RateLimit("1", "rate of 1e-20 1/s or more at 600 MPa, strain .01, 10,000 s", 600.0, lower=-20.0),
+        RateLimit("2", "rate of 1 1/s or less at 50 MPa, strain .01, 10,000 s", 50.0, upper=0.0),
+        SurvivesTime("3", "simulation converged and lasted 1 h", 3600.0),
+        CreepInEachHold("4", f"creep of more than {least} in each hold", PAPER_LEAST_CREEP[kind]),
+        FinalOutputAbove("5", f"{output} of more than {least} at the end", PAPER_LEAST_CREEP[kind]),
+    )
+
+
+def conditioned_criteria(law: CreepLaw, kind: str, end: float) -> tuple[Criterion, ...]:
+    """What the conditioned box asks: a law as its author means it, a full history, and visible creep."""
+    label = ("constraints", "what the law declares of its parameters holds throughout the test")
+    constraint_criteria = (ConstraintsHold(*label, end),) if law.constraints else ()
+    return (
+        WithinBounds("bounds", "every parameter lies within the law's bounds"),
+        *constraint_criteria,
+        SurvivesTime("full history", "simulation went on to the end of the test"),
+        TotalCreepAbove(
+            "visible creep", f"creep of {_with_unit(kind, VISIBLE_CREEP[kind])} or more", VISIBLE_CREEP[kind]
+        ),
+    )
+
+
+def _with_unit(kind: str, value: float) -> str:
+    return f"{value:g} mm" if kind == BULGE else f"{value:g}"

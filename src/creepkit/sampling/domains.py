@@ -1,0 +1,398 @@
+"""Sampling domains: what is drawn of the parameters of a law and of its tests, and the share of draws that is accepted.
+
+The paper domain is uniform in the bounds of the law (Materials and Methods and Table 1 of the paper). The conditioned domain is uniform in the logarithm of the mean rate at the reference stress, so that most samples creep visibly and survive the test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats
+from creepkit.errors import DatasetError, nearest
+from creepkit.language import CreepLaw, temperature
+from creepkit.language.law_codec import law_to_json
+from creepkit.records import Specimen
+from creepkit.sampling.coefficients import (
+    draw_stress_scales,
+    solve_coefficients,
+    solve_damage_coefficients,
+    stress_scale_positions,
+    term_groups,
+)
+from creepkit.sampling.conditions import (
+    PAPER_END,
+    PAPER_INTERVAL,
+    PAPER_RANGES,
+    ConditionRanges,
+    TimeGrid,
+    condition_range,
+    condition_ranges,
+    test_kind,
+)
+from creepkit.sampling.criteria import Criterion, conditioned_criteria, paper_criteria
+from creepkit.sampling.draws import (
+    SELECTION_DIMENSIONS,
+    TERM_COUNT_PROBABILITIES,
+    Draws,
+    active_terms,
+    additive_recurrence_step,
+    ln_term_fractions,
+    sobol_rows,
+)
+from creepkit.sampling.rates import (
+    RateEvaluationPoints,
+    ReferenceStress,
+    author_parameters,
+    internal_parameters,
+    mean_ln_rate,
+    reference_stress_of,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+if TYPE_CHECKING:
+    from creepkit.sampling.criteria import Criterion
+
+
+@dataclass(frozen=True)
+class SamplingDomain:
+    """A design that draws a law's parameters and the conditions of its tests from ranges.
+
+    reference : what stands for a test where the rate of its material is wanted, and which rates are useful.
+    """
+
+    law: CreepLaw
+    conditions: ConditionRanges
+    grid: TimeGrid
+    criteria: tuple[Criterion, ...]
+    reference_stress: ReferenceStress
+
+    name: ClassVar[str]
+    """The word for it; part of its document."""
+
+    @property
+    def condition_names(self) -> tuple[str, ...]:
+        """What is drawn of a test."""
+        return self.conditions.names
+
+    @property
+    def specimen(self) -> str:
+        """The kind of test."""
+        return self.conditions.kind
+
+    def draw(self, first: int, count: int, seed: int) -> Draws:
+        """Return rows first to first + count of the sequence of a seed."""
+        raise NotImplementedError
+
+    def document(self) -> dict[str, Any]:
+        """Everything that decides the draws, as JSON-able data; boxes add what is theirs."""
+        return {
+            "domain": self.name,
+            "version": 1,
+            "law": law_to_json(self.law),
+            "conditions": self.conditions.document(),
+            "grid": self.grid.document(),
+            "criteria": [{"criterion": type(c).__name__, **vars(c)} for c in self.criteria],
+        }
+
+
+def uniform_in_bounds(law: CreepLaw, unit_coordinates: Floats) -> Floats:
+    """Internal parameters at coordinates (rows, parameters) from 0 to 1, each uniform on its own scale."""
+    low, high = np.array([[p.to_internal(b) for b in p.bounds] for p in law.params.values()]).reshape(-1, 2).T
+    return np.asarray(low + unit_coordinates * (high - low))
+
+
+def default_grid(interval: float, ranges: Mapping[str, Any]) -> TimeGrid:
+    """Frames up to the end of the longest test."""
+    return TimeGrid.every(interval, condition_range("end_time", ranges.get("end_time", PAPER_END)).high)
+
+
+@dataclass(frozen=True)
+class PaperDomain(SamplingDomain):
+    """Uniform in the bounds of a law and the ranges of conditions.
+
+    screened : leave out simulations that are hopeless by the specimen's stand-in; see dataset.sketching.
+    """
+
+    screened: bool = True
+
+    name: ClassVar[str] = "paper"
+
+    def draw(self, first: int, count: int, seed: int) -> Draws:
+        """Return rows of the sequence: parameters first, then conditions."""
+        parameter_count = len(self.law.params)
+        unit_coordinates = sobol_rows(parameter_count + len(self.condition_names), first, count, seed)
+        parameters = author_parameters(self.law, uniform_in_bounds(self.law, unit_coordinates[:, :parameter_count]))
+        return Draws(parameters, self.conditions.draw(unit_coordinates[:, parameter_count:]), self.condition_names)
+
+    def document(self) -> dict[str, Any]:
+        """Everything that decides the draws, as JSON-able data."""
+        return {**super().document(), "screened": self.screened}
+
+
+def paper_domain(
+    law: CreepLaw, specimen: Specimen, *, every: float = PAPER_INTERVAL, grid: TimeGrid | None = None,
+    screened: bool = True, **ranges: Any,
+) -> PaperDomain:  # fmt: skip
+    """Return the paper's box of any law: its bounds, E 50 to 300 GPa, Tj 2 to 10 h of 12 h, P1 <= P2 from 3 to 25 MPa.
+
+    every : s between frames. grid : in its place, other times. screened : see PaperBox. given : other ranges of
+    conditions, see design_of.
+    """
+    kind = test_kind(specimen)
+    grid = grid or default_grid(every, ranges)
+    condition_space = condition_ranges(kind, grid, ranges, PAPER_RANGES[kind], needs_temperature=law.uses(temperature))
+    return PaperDomain(law, condition_space, grid, paper_criteria(kind), reference_stress_of(specimen), screened)
+
+
+MOST_TRIALS = 32
+"""Places at which the parameters of a row are looked for."""
+
+
+@dataclass(frozen=True)
+class ConditionedDomain(SamplingDomain):
+    """Uniform in the log of the mean rate at the reference stress; how_many : shares of rows with 1, 2, 3 parts."""
+
+    term_count_probabilities: tuple[float, ...] = TERM_COUNT_PROBABILITIES
+
+    name: ClassVar[str] = "conditioned"
+
+    def draw(self, first: int, count: int, seed: int) -> Draws:
+        """Return rows of the sequence: total rate, choice of parts, their shares, parameters, then conditions."""
+        group_count = len(term_groups(self.law))
+        sizes = (1, SELECTION_DIMENSIONS, group_count, len(self.law.params), len(self.condition_names))
+        unit_coordinates = np.split(sobol_rows(sum(sizes), first, count, seed), np.cumsum(sizes)[:-1], axis=1)
+        tests = Draws(np.zeros((count, 0)), self.conditions.draw(unit_coordinates[4]), self.condition_names)
+        low, high = self.reference_stress.useful_rates(tests, self.conditions.end)
+        active = active_terms(unit_coordinates[1], group_count, self.term_count_probabilities)
+        ln_rates = np.log(10.0) * (low + unit_coordinates[0][:, 0] * (high - low))[:, None] + ln_term_fractions(
+            unit_coordinates[2], active
+        )
+        points = self.reference_stress.evaluation_points(tests, self.conditions.end)
+        return Draws(
+            self._parameters(unit_coordinates[3], active, ln_rates, points, tests),
+            tests.conditions,
+            self.condition_names,
+        )
+
+    def _parameters(
+        self, unit_coordinates: Floats, active: Bools, ln_rates: Floats, points: RateEvaluationPoints, tests: Draws
+    ) -> Floats:
+        """The author's parameters for wanted rates.
+
+        A row whose parameters leave the bounds or break the law's constraints moves on, by a fixed step in all
+        coordinates at once, to the first place where they do not.
+        """
+        parameters = self._solved_parameters(unit_coordinates, active, ln_rates, points)
+        rejected_rows, step = np.arange(len(unit_coordinates)), additive_recurrence_step(unit_coordinates.shape[1])
+        for trial in range(1, MOST_TRIALS):
+            rejected_rows = rejected_rows[
+                ~self._meets_draw_criteria(
+                    Draws(parameters[rejected_rows], tests.conditions[rejected_rows], self.condition_names)
+                )
+            ]
+            if not rejected_rows.size:
+                break
+            shifted = (unit_coordinates[rejected_rows] + trial * step) % 1.0
+            parameters[rejected_rows] = self._solved_parameters(
+                shifted, active[rejected_rows], ln_rates[rejected_rows], points.rows(rejected_rows)
+            )
+        return parameters
+
+    def _solved_parameters(
+        self, unit_coordinates: Floats, active: Bools, ln_rates: Floats, points: RateEvaluationPoints
+    ) -> Floats:
+        groups = term_groups(self.law)
+        theta = self.shape_parameters(unit_coordinates, active, points)
+        theta = draw_stress_scales(
+            self.law, groups, theta, unit_coordinates[:, list(stress_scale_positions(self.law))], ln_rates, points
+        )
+        theta = solve_coefficients(groups, theta, ln_rates, points)
+        return author_parameters(self.law, solve_damage_coefficients(self.law, theta, unit_coordinates, points))
+
+    def _meets_draw_criteria(self, draws: Draws) -> Bools:
+        met = [c.passes(self.law, draws) for c in self.criteria if c.stage == "before"]
+        return np.asarray(np.all(met, axis=0))
+
+    def shape_parameters(self, unit_coordinates: Floats, active: Bools, points: RateEvaluationPoints) -> Floats:
+        """Internal parameters within their bounds, before coefficients and stress scales; there : which parts are."""
+        return uniform_in_bounds(self.law, unit_coordinates)
+
+    def document(self) -> dict[str, Any]:
+        """Everything that decides the draws, as JSON-able data."""
+        return {
+            **super().document(),
+            "reference": vars(self.reference_stress),
+            "how_many": self.term_count_probabilities,
+        }
+
+
+def conditioned_domain(
+    law: CreepLaw, specimen: Specimen, *, every: float = PAPER_INTERVAL, grid: TimeGrid | None = None, **ranges: Any
+) -> ConditionedDomain:
+    """Return the conditioned box for any law whose terms have rate coefficients (else DatasetError).
+
+    every : s between frames. grid : in its place, other times. given : other ranges of conditions, see design_of.
+    """
+    kind = test_kind(specimen)
+    term_groups(law)
+    grid = grid or default_grid(every, ranges)
+    condition_space = condition_ranges(kind, grid, ranges, PAPER_RANGES[kind], needs_temperature=law.uses(temperature))
+    reference = reference_stress_of(specimen)
+    return ConditionedDomain(
+        law, condition_space, grid, conditioned_criteria(law, kind, condition_space.end), reference
+    )
+
+
+DEFAULT_DRAWS = 4096
+"""Rows drawn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Acceptance:
+    """What is known of a design without simulating it.
+
+    draws : rows of the design. met : {criterion before simulation: (rows,) whether it is met on its own}.
+    strains : (rows,) log10 of the mean rate at the reference stress times the duration of the test.
+    window : (rows, 2) log10 of the strains between which creep is visible and the test lasts, as a rule.
+    """
+
+    design: SamplingDomain
+    seed: int
+    draws: Draws
+    criteria_met: Mapping[str, Bools]
+    log10_strains: Floats
+    useful_strains: Floats
+
+    @property
+    def kept(self) -> Bools:
+        """Which rows meet every criterion that needs no simulation, (rows,)."""
+        return np.asarray(np.all([np.ones(len(self.draws), bool), *self.criteria_met.values()], axis=0))
+
+    @property
+    def useful(self) -> Bools:
+        """Which of them have a useful rate, (rows,); of the others some may be useful, too.
+
+        Of Eq. (2) in the paper's box 8 % have, and 16 % of 600 simulated draws crept visibly and lasted: a dimple
+        relieves itself of stress as it deflects, and so outlasts rates above the window.
+        """
+        in_range = (self.log10_strains >= self.useful_strains[:, 0]) & (self.log10_strains <= self.useful_strains[:, 1])
+        return np.asarray(self.kept & in_range)
+
+    def figure(self, path: str | Path | None = None) -> Figure:
+        """Draw the sampled rates, with the useful ones and criteria 1 and 2 marked; write them to `path` if given."""
+        from creepkit.report.dataset import acceptance_figure
+
+        return acceptance_figure(self, path)
+
+    def __str__(self) -> str:
+        return "\n".join([self._title(), *self._table(), self._last()])
+
+    def _title(self) -> str:
+        domain = self.design
+        count = f"{len(self.draws)} draws, seed {self.seed}"
+        return f"law '{domain.law.name}', {domain.name} box, {domain.specimen} test of {domain.grid.frames} frames: {count}"
+
+    def _table(self) -> list[str]:
+        lines, remaining = [f"{'criterion':<14} {'meet it':>8} {'rejected':>9}  asks"], np.ones(len(self.draws), bool)
+        for criterion in self.design.criteria:
+            if criterion.stage == "after":
+                numbers = f"{'after simulation':>18}"
+            else:
+                is_met = self.criteria_met[criterion.name]
+                numbers = f"{_percent(is_met):>8} {_percent(remaining & ~is_met):>9}"
+                remaining = remaining & is_met
+            lines.append(f"{criterion.name:<14} {numbers}  {criterion.text}")
+        return lines
+
+    def _last(self) -> str:
+        simulated, useful = _percent(self.kept), _percent(self.useful)
+        exception = (
+            " but for those that burst far too early by a cheap stand-in" if getattr(self.design, "screened", 0) else ""
+        )
+        description = "a rate at which creep is visible and the test lasts (others may, too)"
+        return f"{simulated} of the draws would be simulated{exception}; {useful} of all have {description}"
+
+
+def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0) -> Acceptance:
+    """Return what a design's criteria reject before simulation, and how its rates lie; nothing is simulated.
+
+    draws : how many rows; a rejection counts for the first criterion that is not met.
+    """
+    rows = design.draw(0, draws, seed)
+    criteria_met = {c.name: c.passes(design.law, rows) for c in design.criteria if c.stage == "before"}
+    end, reference = design.conditions.end, design.reference_stress
+    points = reference.evaluation_points(rows, end)
+    log10_rates = mean_ln_rate(design.law, internal_parameters(design.law, rows.parameters), points) / np.log(10.0)
+    log10_end_times = np.log10(rows.condition("end_time", end))
+    useful_rates = np.stack(np.broadcast_arrays(*reference.useful_rates(rows, end)), axis=1)
+    return Acceptance(
+        design, seed, rows, criteria_met, log10_rates + log10_end_times, useful_rates + log10_end_times[:, None]
+    )
+
+
+def _percent(mask: Bools) -> str:
+    return f"{100 * float(mask.mean()):.1f} %"
+
+
+@runtime_checkable
+class SamplingDesign(Protocol):
+    """Which samples are drawn; a frozen record that worker processes can be sent."""
+
+    @property
+    def law(self) -> CreepLaw:
+        """The law whose parameters are drawn."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """paper, conditioned or rate-family."""
+        ...
+
+    @property
+    def specimen(self) -> str:
+        """The kind of test: bulge or uniaxial."""
+        ...
+
+    @property
+    def condition_names(self) -> tuple[str, ...]:
+        """What is drawn of a test, in the order of the columns."""
+        ...
+
+    @property
+    def grid(self) -> TimeGrid:
+        """The times of its samples."""
+        ...
+
+    @property
+    def criteria(self) -> tuple[Criterion, ...]:
+        """What a sample must meet to be kept, those before simulation first."""
+        ...
+
+    def draw(self, first: int, count: int, seed: int) -> Draws:
+        """Return rows `first` to `first + count` of one scrambled Sobol sequence, whatever the block."""
+        ...
+
+    def document(self) -> dict[str, Any]:
+        """Everything that decides the draws, as JSON-able data."""
+        ...
+
+
+def sampling_design(law: CreepLaw, specimen: Specimen, domain: str = "conditioned", **changes: Any) -> SamplingDesign:
+    """Return a design for a law and a specimen; see paper_box.paper_box and conditioned_box.conditioned_box.
+
+    box : "conditioned", whose samples creep visibly, or "paper", uniform in the law's bounds.
+    changes : ranges of conditions, (low, high) or a number: P1=(5, 20), apex_thickness=(.44, .6), end_time=3600;
+        `every`, s between frames, or `grid`, a TimeGrid.
+    """
+    domains: dict[str, Callable[..., SamplingDesign]] = {"conditioned": conditioned_domain, "paper": paper_domain}
+    if domain not in domains:
+        raise DatasetError(f"there is no box '{domain}': {nearest(domain, domains)}")
+    return domains[domain](law, specimen, **changes)

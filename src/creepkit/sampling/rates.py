@@ -1,0 +1,204 @@
+"""Creep rates of many parameter rows at once, and the mean rate of a test at its reference stress.
+
+Bulge test: reference stress k P with k = 14.69 (h/0.5 mm)^-1.17 for a cavity radius of 7.5 mm and apex thickness h, P the geometric mean of both pressures. The amplitude grows by 42.3 (h/0.5 mm)^-0.486 mm per unit of reference strain. Both were fitted to simulations with the Norton law, n from 1 to 8, h from 0.44 to 0.60 mm. A tensile bar has the stresses of its two holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.special import logsumexp
+
+from creepkit.arrays import ArrayLike, Floats, Ints
+from creepkit.kernels import lower
+from creepkit.language import CreepLaw, time
+from creepkit.records import Specimen
+from creepkit.sampling.conditions import BULGE, LOAD_LEVELS, ROOM_TEMPERATURE, VISIBLE_CREEP, test_kind
+from creepkit.sampling.draws import Draws
+from creepkit.specimens.bulge.specimen import Bulge
+
+
+@dataclass(frozen=True, eq=False)
+class RateArguments:
+    """Where rates are stated: stress MPa, strain, time s, temperature K; numbers, or arrays that fit the rows."""
+
+    stress: ArrayLike
+    strain: ArrayLike
+    time: ArrayLike
+    temperature: ArrayLike
+
+
+def log10_rate(law: CreepLaw, parameters: Floats, arguments: RateArguments) -> Floats:
+    """Return log10 of the rate, 1/s, of rows of the author's parameters, (rows,)."""
+    return np.asarray(ln_rate(law, internal_parameters(law, parameters), arguments) / np.log(10.0))
+
+
+def ln_rate(
+    law: CreepLaw, theta: Floats, arguments: RateArguments, states: Sequence[ArrayLike] | None = None
+) -> Floats:
+    """Return ln of the rate of rows of internal parameters, (rows,): simple tension; states : by default virgin."""
+    stress = np.asarray(arguments.stress, float)
+    states = [state.initial for state in law.states.values()] if states is None else states
+    variables: list[Any] = [
+        stress,
+        arguments.strain,
+        arguments.time,
+        arguments.temperature,
+        stress,
+        stress / 3.0,
+        *states,
+    ]
+    shape = np.broadcast_shapes(theta.shape[:-1], *(np.shape(v) for v in variables))
+    columns = [np.broadcast_to(np.asarray(v, float), shape) for v in (*variables, *np.moveaxis(theta, -1, 0))]
+    return np.asarray(lower(law, "numpy").internal_log_rate(*columns), float)
+
+
+def internal_parameters(law: CreepLaw, parameters: Floats) -> Floats:
+    """The kernels' form of the author's parameters (rows, parameters): ln where the scale is log, -inf of 0."""
+    on_log_scale, theta = is_log_scale(law), np.array(parameters, float)
+    with np.errstate(divide="ignore"):
+        theta[:, on_log_scale] = np.log(theta[:, on_log_scale])
+    return theta
+
+
+def author_parameters(law: CreepLaw, theta: Floats) -> Floats:
+    """The author's parameters of internal ones (rows, parameters)."""
+    on_log_scale, values = is_log_scale(law), np.array(theta, float)
+    with np.errstate(over="ignore"):
+        values[:, on_log_scale] = np.exp(values[:, on_log_scale])
+    return values
+
+
+def is_log_scale(law: CreepLaw) -> Any:
+    """Which parameters have a log scale, (parameters,)."""
+    return np.array([param.scale == "log" for param in law.params.values()], bool)
+
+
+POINT_COUNT = 12
+
+
+POINT_FRACTIONS = (np.arange(POINT_COUNT) + 0.5) / POINT_COUNT
+"""Of the end of the test."""
+
+
+REFERENCE_STRAIN = 0.01
+"""At which rates are stated, as in the paper's criteria 1 and 2."""
+
+
+@dataclass(frozen=True, eq=False)
+class RateEvaluationPoints:
+    """stress : (rows, looks) MPa, or (rows, 1) where it stays. times : (rows, looks) s. temperature : (rows,) K."""
+
+    stress: Floats
+    times: Floats
+    temperature: Floats
+
+    def arguments(self, axes: int = 0, *, one_time: bool = False, factor: float = 1.0) -> RateArguments:
+        """The point with `axes` more axes between rows and looks; timeless : one look will do where stress stays."""
+        times = self.times[:, :1] if one_time else self.times
+        columns = (factor * self.stress, times, self.temperature[:, None])
+        stress, seconds, temperature = (v.reshape(v.shape[0], *[1] * axes, v.shape[1]) for v in columns)
+        return RateArguments(stress, REFERENCE_STRAIN, seconds, temperature)
+
+    def rows(self, rows: Ints) -> RateEvaluationPoints:
+        """Some of the rows."""
+        return RateEvaluationPoints(self.stress[rows], self.times[rows], self.temperature[rows])
+
+    @property
+    def end_times(self) -> Floats:
+        """When the tests end, (rows,) s."""
+        return np.asarray(self.times[:, -1] / POINT_FRACTIONS[-1])
+
+    def midpoint_arguments(self, axes: int = 0) -> RateArguments:
+        """The point at the middle stress, half way in time, with `axes` axes after the rows."""
+        shape = (len(self.times), *[1] * axes)
+        stress, seconds, temperature = (
+            v.reshape(shape) for v in (self.mean_stress, 0.5 * self.end_times, self.temperature)
+        )
+        return RateArguments(stress, REFERENCE_STRAIN, seconds, temperature)
+
+    @property
+    def mean_stress(self) -> Floats:
+        """The geometric mean of the stresses, (rows,) MPa."""
+        return np.asarray(np.exp(np.log(self.stress).mean(axis=1)))
+
+
+def mean_ln_rate(law: CreepLaw, theta: Floats, points: RateEvaluationPoints, stress_factor: float = 1.0) -> Floats:
+    """ln of the mean rate over a test, 1/s, (rows, ...).
+
+    theta : (rows, ..., parameters) internal. factor : on the stresses.
+    """
+    arguments = points.arguments(theta.ndim - 2, one_time=not law.uses(time), factor=stress_factor)
+    ln_rates = ln_rate(law, theta[..., None, :], arguments)
+    return np.asarray(logsumexp(ln_rates, axis=-1) - np.log(ln_rates.shape[-1]))
+
+
+LARGEST_REFERENCE_STRAIN = 0.2
+"""Of the reference strain when the test ends; the paper's dimple is then some 2 mm deep."""
+
+
+@dataclass(frozen=True)
+class ReferenceStress:
+    """How loads become rates.
+
+    kind : of specimen. visible : creep, mm or strain, that every sample should show. per_load : reference stress over
+        load at the specimen's own thickness (mm; 0: it has none). growth : creep per unit of reference strain there.
+        powers : of thickness in both.
+    """
+
+    kind: str
+    visible_creep: float
+    stress_per_load: float = 1.0
+    creep_per_strain: float = 1.0
+    thickness: float = 0.0
+    thickness_exponents: tuple[float, float] = (0.0, 0.0)
+
+    def evaluation_points(self, draws: Draws, end: float) -> RateEvaluationPoints:
+        """Stresses and times of each row; end : s, where it is not drawn."""
+        first, second = (draws.condition(name)[:, None] for name in LOAD_LEVELS[self.kind])
+        times = POINT_FRACTIONS * draws.condition("end_time", end)[:, None]
+        if self.kind == BULGE:
+            stress = (
+                self.stress_per_load
+                * np.sqrt(first * second)
+                * self._relative_thickness(draws)[:, None] ** self.thickness_exponents[0]
+            )
+        else:
+            stress = np.where(times < draws.condition("Tj")[:, None], first, second)
+        return RateEvaluationPoints(stress, times, draws.condition("temperature", ROOM_TEMPERATURE))
+
+    def useful_rates(self, draws: Draws, end: float) -> tuple[Floats, Floats]:
+        """log10 of the lowest and highest useful mean rate, 1/s: half the visible creep, and the largest strain.
+
+        Half, because the higher of both pressures gives more creep than their geometric mean.
+        """
+        least_strain = (
+            0.5
+            * self.visible_creep
+            / (self.creep_per_strain * self._relative_thickness(draws) ** self.thickness_exponents[1])
+        )
+        end_times = draws.condition("end_time", end)
+        return np.log10(least_strain / end_times), np.log10(LARGEST_REFERENCE_STRAIN / end_times)
+
+    def _relative_thickness(self, draws: Draws) -> Floats:
+        """Thickness of each row over the specimen's own."""
+        if not self.thickness:
+            return np.ones(len(draws))
+        return draws.condition("apex_thickness", self.thickness) / self.thickness
+
+
+def reference_stress_of(specimen: Specimen) -> ReferenceStress:
+    """The reference of a specimen."""
+    kind = test_kind(specimen)
+    if kind != BULGE:
+        return ReferenceStress(kind, VISIBLE_CREEP[kind])
+    bulge = getattr(specimen, "specimen", specimen)
+    assert isinstance(bulge, Bulge)
+    radius, thickness = bulge.geometry.cavity_radius / 7.5, bulge.geometry.apex_thickness / 0.5
+    stress_per_load, creep_per_strain = 14.69 * (radius / thickness) ** 1.17, 42.3 * radius**1.486 * thickness**-0.486
+    return ReferenceStress(
+        kind, VISIBLE_CREEP[kind], stress_per_load, creep_per_strain, bulge.geometry.apex_thickness, (-1.17, -0.486)
+    )

@@ -1,0 +1,297 @@
+"""Files of a screening: one JSON file an alloy, a CSV table and one HDF5 file of the whole plate.
+
+JSON is validated strictly on reading and nothing in it is evaluated. The HDF5 file is read by any HDF5 reader without
+creepkit. Its attributes: `format` "creepkit-plate", `layout` 1, `units` "MPa, mm, s, K". A group `alloys` has a group
+for each alloy, numbered from 0000 in the order of the plate:
+
+    alloys/0000                  attributes: alloy, class, law (empty without one), verdict, reason, decisive, notes
+      laws/0                     an identified law, best first; attributes: law, weight, excess (of BIC), converged
+        values, low, high  (P,)  parameters in the author's units and their 95 % intervals; attribute `names` (P,)
+        u            (P,)        conditioned coordinates; covariance (P, P) of them
+      rate, local_exponent (3,)  at 100 MPa: value, low, high, of the best law
+      tests/0                    attributes: name, condition, temperature
+        times (frames,) s, used (frames,); measured/OUTPUT (frames,), predicted/OUTPUT (frames,) of the best law
+        loading (breakpoints, 2) s and MPa
+      confirmation               attributes: holds, verdict, using; chi_square (tests, outputs), difference likewise
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import h5py
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from creepkit.errors import FitError
+from creepkit.files.writing import replace_on_success, write_text_atomically
+from creepkit.inverse.confirmation import Confirmation
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.identification_document import MAXIMUM_BYTES, identification_from_json, identification_to_json
+from creepkit.records import History
+from creepkit.screening.results import AlloyResult, PredictedOutputs, WeightedLaw, mean_relative_squared_error
+
+if TYPE_CHECKING:
+    from creepkit.screening.results import Plate
+
+
+class WeightedLawDocument(BaseModel):
+    """One identified law."""
+
+    model_config = ConfigDict(extra="forbid")
+    fit: dict[str, Any]
+    bic_difference: float
+    weight: float
+
+
+class AlloyResultDocument(BaseModel):
+    """What must stand in the file, and nothing else may. NaN and infinity stand there as words."""
+
+    model_config = ConfigDict(extra="forbid", ser_json_inf_nan="strings")
+    kind: Literal["creepkit alloy"] = "creepkit alloy"
+    version: Literal[1] = 1
+    alloy: str
+    fingerprint: str
+    laws: list[WeightedLawDocument]
+    failed_laws: dict[str, str]
+    verdict: str
+    equivalents: list[str]
+    failure: str
+    dense_fit: dict[str, Any] | None
+    sparse_fit: dict[str, Any] | None
+    confirmation: Confirmation | None
+    predicted: dict[str, dict[str, list[float]]]
+    notes: list[str]
+    cpu_seconds: float
+
+
+def write_result(result: AlloyResult, path: Path) -> Path:
+    """Write the answer; the file is whole or absent."""
+    return write_text_atomically(_result_document(result).model_dump_json(indent=1) + "\n", path)
+
+
+def read_result(path: Path) -> AlloyResult:
+    """Read an answer; FitError, in one sentence, for a file that is none."""
+    try:
+        if path.stat().st_size > MAXIMUM_BYTES:
+            raise FitError(f"{path}: larger than {MAXIMUM_BYTES // 1_000_000} MB, which no answer for an alloy is")
+        document = AlloyResultDocument.model_validate_json(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FitError(f"{path}: cannot be read ({error.strerror})") from None
+    except (ValidationError, UnicodeDecodeError) as error:
+        problem = "text" if isinstance(error, UnicodeDecodeError) else error.errors()[0]["msg"].lower()
+        raise FitError(
+            f"{path}: not the answer for an alloy ({problem}); remove it, and it is worked out again"
+        ) from None
+    source = str(path)
+    return AlloyResult(
+        alloy=document.alloy,
+        fingerprint=document.fingerprint,
+        laws=tuple(
+            WeightedLaw(identification_from_json(w.fit, source), w.bic_difference, w.weight) for w in document.laws
+        ),
+        failed_laws=document.failed_laws,
+        verdict=document.verdict,
+        equivalents=tuple(document.equivalents),
+        failure=document.failure,
+        dense_fit=_optional_identification(document.dense_fit, source),
+        sparse_fit=_optional_identification(document.sparse_fit, source),
+        confirmation=document.confirmation,
+        predicted={t: {name: np.array(row) for name, row in rows.items()} for t, rows in document.predicted.items()},
+        notes=tuple(document.notes),
+        cpu_seconds=document.cpu_seconds,
+    )
+
+
+def _result_document(result: AlloyResult) -> AlloyResultDocument:
+    return AlloyResultDocument(
+        alloy=result.alloy,
+        fingerprint=result.fingerprint,
+        laws=[
+            WeightedLawDocument(fit=identification_to_json(w.fit), bic_difference=w.bic_difference, weight=w.weight)
+            for w in result.laws
+        ],
+        failed_laws=dict(result.failed_laws),
+        verdict=result.verdict,
+        equivalents=list(result.equivalents),
+        failure=result.failure,
+        dense_fit=None if result.dense_fit is None else identification_to_json(result.dense_fit),
+        sparse_fit=None if result.sparse_fit is None else identification_to_json(result.sparse_fit),
+        confirmation=result.confirmation,
+        predicted={t: {name: row.tolist() for name, row in rows.items()} for t, rows in result.predicted.items()},
+        notes=list(result.notes),
+        cpu_seconds=result.cpu_seconds,
+    )
+
+
+def _optional_identification(data: dict[str, Any] | None, source: str) -> Identification | None:
+    return None if data is None else identification_from_json(data, source)
+
+
+HDF5_FORMAT, HDF5_LAYOUT, HDF5_UNITS = "creepkit-plate", 1, "MPa, mm, s, K"
+
+
+def write_hdf5(plate: Plate, path: Path) -> Path:
+    """Write the file; it is whole or absent."""
+    with replace_on_success(path) as temporary, h5py.File(temporary, "w") as file:
+        file.attrs.update({"format": HDF5_FORMAT, "layout": HDF5_LAYOUT, "units": HDF5_UNITS})
+        for k, result in enumerate(plate.results):
+            group = file.create_group(f"alloys/{k:04d}")
+            group.attrs.update({"alloy": result.alloy, "class": plate.class_of(result.alloy)})
+            _write_result(group, result)
+            for n, test in enumerate(plate.histories[result.alloy]):
+                _write_test(group.create_group(f"tests/{n}"), test, result.predicted.get(test.name, {}))
+    return path
+
+
+def _write_result(group: Any, result: AlloyResult) -> None:
+    group.attrs.update(
+        {
+            "law": result.best.law.name if result.identified else "",
+            "verdict": result.verdict,
+            "reason": result.failure,
+            "decisive": result.decisive,
+            "notes": "\n".join(result.notes),
+        }
+    )
+    for k, weighted_law in enumerate(result.laws):
+        _write_law(group.create_group(f"laws/{k}"), weighted_law)
+    if result.identified:
+        group["rate"] = np.array([float(v) for v in result.best.rate(COMPARISON_STRESS)])
+        group["local_exponent"] = np.array([float(v) for v in result.best.local_exponent(COMPARISON_STRESS)])
+    if result.confirmation is not None:
+        confirmation = result.confirmation
+        confirmation_group = group.create_group("confirmation")
+        confirmation_group.attrs.update(
+            {"holds": confirmation.confirmed, "verdict": confirmation.verdict, "using": confirmation.predictor_name}
+        )
+        names = list(dict.fromkeys(o.output for t in confirmation.tests for o in t.outputs))
+        confirmation_group.attrs["outputs"] = names
+        confirmation_group["chi_square"] = _comparison_matrix(result, names, "chi_square")
+        confirmation_group["difference"] = _comparison_matrix(result, names, "difference")
+
+
+def _comparison_matrix(result: AlloyResult, names: list[str], quantity: str) -> Any:
+    """(tests, outputs) of a confirmation; NaN for an output that a test has not."""
+    assert result.confirmation is not None
+    matrix = np.full((len(result.confirmation.tests), len(names)), np.nan)
+    for row, test in zip(matrix, result.confirmation.tests, strict=True):
+        for comparison in test.outputs:
+            value = comparison.simulation_errors.chi_square if quantity == "chi_square" else comparison.rms_difference
+            row[names.index(comparison.output)] = value
+    return matrix
+
+
+def _write_law(group: Any, weighted_law: WeightedLaw) -> None:
+    fit = weighted_law.fit
+    group.attrs.update(
+        {
+            "law": fit.law.name,
+            "weight": weighted_law.weight,
+            "excess": weighted_law.bic_difference,
+            "converged": fit.converged,
+        }
+    )
+    group.attrs["names"] = [e.name for e in fit.estimates]
+    for name in ("value", "low", "high"):
+        group["values" if name == "value" else name] = np.array([getattr(e, name) for e in fit.estimates])
+    group["u"], group["covariance"] = fit.u, fit.covariance
+
+
+def _write_test(group: Any, test: History, predicted: PredictedOutputs) -> None:
+    temperature = float(np.mean(test.temperature_program().values))
+    group.attrs.update({"name": test.name, "condition": test.condition, "temperature": temperature})
+    program = test.loading.program()
+    group["times"], group["used"] = test.times, test.used
+    group["loading"] = np.stack([program.times, program.values], axis=1)
+    for source, rows in (("measured", test.outputs), ("predicted", predicted)):
+        for name, values in rows.items():
+            group[f"{source}/{name}"] = values
+
+
+COMPARISON_STRESS = 100.0
+"""MPa, at which rates and local exponents of alloys are compared."""
+
+
+def result_columns(plate: Plate, result: AlloyResult) -> dict[str, Any]:
+    """Everything that the CSV says of one alloy."""
+    first_columns: dict[str, Any] = {"alloy": result.alloy, "class": plate.class_of(result.alloy)}
+    if not result.identified:
+        return {**first_columns, "tests": len(plate.histories[result.alloy]), "notes": result.failure}
+    fit = result.best
+    columns = {
+        **first_columns,
+        "tests": len(plate.histories[result.alloy]),
+        "law": fit.law.name,
+        "weight": _number_text(result.laws[0].weight),
+        "decisive": "yes" if result.decisive else "no",
+        "not_ruled_out": "; ".join(result.credible_laws[1:]),
+        "equivalents": "; ".join(result.equivalents),
+        **_interval_columns("rate_100MPa", fit.rate(COMPARISON_STRESS)),
+        **_interval_columns("local_exponent_100MPa", fit.local_exponent(COMPARISON_STRESS)),
+        "rate_strain": _number_text(fit.reference.strain),
+        "rate_time_s": _number_text(fit.reference.time),
+        "rate_temperature_K": _number_text(fit.reference.temperature),
+        **{f"rse_{name}": _number_text(e.relative_squared_error) for name, e in fit.errors.items()},
+        **{f"chi_square_{name}": _number_text(e.chi_square) for name, e in fit.errors.items()},
+        "confirmed": confirmation_text(result),
+        **_confirmation_columns(result),
+        "loss_reduced": _number_text(mean_relative_squared_error(result.reduced_fit)),
+        "loss_dense": "" if result.dense_fit is None else _number_text(mean_relative_squared_error(result.dense_fit)),
+        **({} if result.sparse_fit is None else {"law_by_penalty": result.sparse_fit.law.name}),
+    }
+    for e in fit.estimates:
+        columns |= {
+            e.name: _number_text(e.value),
+            f"{e.name}_low": _number_text(e.low),
+            f"{e.name}_high": _number_text(e.high),
+        }
+    return {
+        **columns,
+        "notes": "; ".join([*result.notes, *(f"{law}: {why}" for law, why in result.failed_laws.items())]),
+    }
+
+
+def write_csv(plate: Plate, path: Path) -> Path:
+    """Write the whole table; columns of parameters are those of all laws found, empty where a law has none."""
+    rows = [result_columns(plate, result) for result in plate.results]
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    columns.sort(key=lambda name: name == "notes")
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return write_text_atomically(text.getvalue(), path)
+
+
+def _interval_columns(name: str, interval: Sequence[Any]) -> dict[str, str]:
+    return {
+        f"{name}{suffix}": _number_text(float(v)) for suffix, v in zip(("", "_low", "_high"), interval, strict=True)
+    }
+
+
+def confirmation_text(result: AlloyResult) -> str:
+    """Whether the full simulation confirmed the result: yes, no, or nothing where it was not asked."""
+    if result.confirmation is None:
+        return ""
+    return "yes" if result.confirmation.confirmed else "no"
+
+
+def _confirmation_columns(result: AlloyResult) -> dict[str, str]:
+    """{confirmed_chi_square_...}: of the simulation, the mean over tests."""
+    chi_squares: dict[str, list[float]] = {}
+    for test in result.confirmation.tests if result.confirmation is not None else ():
+        for comparison in test.outputs:
+            chi_squares.setdefault(f"confirmed_chi_square_{comparison.output}", []).append(
+                comparison.simulation_errors.chi_square
+            )
+    return {name: _number_text(sum(values) / len(values)) for name, values in chi_squares.items()}
+
+
+def _number_text(number: float) -> str:
+    return "" if math.isnan(number) else f"{number:.7g}"

@@ -1,0 +1,250 @@
+"""ScreeningJob: what is asked of each alloy, as it is sent to worker processes, and how one alloy is screened.
+
+Laws are ranked, compared with the law without sparsity, and the best one is simulated by the specimen where that is
+asked for or in doubt.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import pickle
+import re
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from creepkit.errors import CreepkitError, DatasetError
+from creepkit.inverse.composite_predictor import CompositePredictor
+from creepkit.inverse.confirmation import Confirmation, confirm, outside_domain
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.identify import identify
+from creepkit.inverse.reference_conditions import with_arrhenius
+from creepkit.inverse.selection.discrimination import equivalent_laws
+from creepkit.inverse.selection.select import select
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
+from creepkit.inverse.sparsity.term_selection import identify_full, identify_reduced
+from creepkit.jobs.worker import TaskResult
+from creepkit.language import CreepLaw
+from creepkit.records import History, Predictor, Program
+from creepkit.screening import files
+from creepkit.screening.alloys import Alloy, check_tests, limitations
+from creepkit.screening.results import AlloyResult, PredictedOutputs, WeightedLaw
+from creepkit.specimens.documents import specimen_to_json
+
+
+def single_threaded(predictor: Predictor) -> Predictor:
+    """The same predictor, which starts no threads."""
+    untyped: Any = predictor
+    if isinstance(untyped, CompositePredictor):
+        return CompositePredictor({name: single_threaded(p) for name, p in untyped.predictors.items()})
+    if _is_surrogate(untyped):
+        metadata = replace(untyped.told, specimen=single_threaded(untyped.told.specimen))
+        return untyped.recipe.surrogate(untyped.module, metadata)  # type: ignore[no-any-return]
+    if getattr(untyped, "threads", 1) == 1:
+        return predictor
+    return untyped.replace(threads=1)  # type: ignore[no-any-return]
+
+
+def underlying_specimen(predictor: Predictor) -> Predictor:
+    """What a surrogate or a stand-in says that it stands for; anything else is taken for the specimen itself."""
+    untyped: Any = predictor
+    if isinstance(untyped, CompositePredictor):
+        return CompositePredictor({name: underlying_specimen(p) for name, p in untyped.predictors.items()})
+    return getattr(untyped, "specimen", predictor)
+
+
+def predictor_fingerprint(predictor: Predictor) -> str:
+    """The same for predictors that predict the same, as far as their records tell, on however many threads."""
+    return hashlib.sha256(_serialised_predictor(single_threaded(predictor))).hexdigest()[:16]
+
+
+def _serialised_predictor(predictor: Predictor) -> bytes:
+    untyped: Any = predictor
+    if isinstance(untyped, CompositePredictor):
+        return b"".join(name.encode() + _serialised_predictor(p) for name, p in sorted(untyped.predictors.items()))
+    if _is_surrogate(untyped):
+        weights = b"".join(tensor.detach().numpy().tobytes() for tensor in untyped.module.state_dict().values())
+        return json.dumps(untyped.header, sort_keys=True).encode() + weights
+    try:
+        return json.dumps(specimen_to_json(untyped), sort_keys=True).encode()
+    except (DatasetError, AttributeError):  # a mesh of its own, or no record at all
+        return pickle.dumps(predictor)
+
+
+def _is_surrogate(predictor: Any) -> bool:
+    """Whether it is a surrogate.Surrogate; asking by class would load torch for everybody."""
+    return all(hasattr(predictor, name) for name in ("recipe", "module", "metadata"))
+
+
+def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
+    """The answer for one alloy; what is wrong with it is an answer too."""
+    start = time.process_time()
+    try:
+        check_tests(alloy, job.predictor)
+        result = _identify_alloy(job, alloy)
+    except CreepkitError as error:
+        result = AlloyResult(alloy.name, failure=str(error))
+    return replace(result, cpu_seconds=time.process_time() - start)
+
+
+def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
+    laws = [with_arrhenius(law, alloy.tests) for law in job.laws]
+    ranking = select(laws, alloy.tests, job.predictor, settings=job.settings, through=_surrogate_for(job, laws))
+    best, notes = ranking.best, list(limitations(alloy, job.predictor))
+    dense = sparse = None
+    if job.dense_law is not None:
+        dense, sparse = _fit_dense_law(job, job.dense_law, alloy, notes)
+    confirmation = _confirm_best(job, best, alloy, notes)
+    predictor = job.predictor if confirmation is None else underlying_specimen(job.predictor)
+    return AlloyResult(
+        alloy.name,
+        laws=tuple(WeightedLaw(r.fit, r.excess, r.weight) for r in ranking.laws),
+        failed_laws=dict(ranking.failed),
+        verdict=ranking.verdict,
+        equivalents=tuple(str(pair) for pair in equivalent_laws(ranking)),
+        dense_fit=dense,
+        sparse_fit=sparse,
+        confirmation=confirmation,
+        predicted=_predict_tests(best, alloy.tests, predictor),
+        notes=(*notes, *best.notes),
+    )
+
+
+def _surrogate_for(job: ScreeningJob, laws: Sequence[CreepLaw]) -> Predictor | None:
+    """The surrogate, where a law has several terms: those of one cost no more without it."""
+    return job.surrogate if any(len(law.terms) > 1 for law in laws) else None
+
+
+def _fit_dense_law(
+    job: ScreeningJob, dense: CreepLaw, alloy: Alloy, notes: list[str]
+) -> tuple[Identification | None, Identification | None]:
+    """The dense law, and what a penalty makes of it; a failure of these is a note, for the ranking stands."""
+    law, settings = with_arrhenius(dense, alloy.tests), job.settings
+    try:
+        if job.penalty is None:
+            return identify(law, alloy.tests, job.predictor, settings=settings, through=job.surrogate), None
+        dense_fit, reductions = identify_full(law, alloy.tests, job.predictor, job.surrogate, settings, None)
+        return dense_fit, identify_reduced(job.penalty, dense_fit, reductions)
+    except CreepkitError as error:
+        notes.append(f"misfit without sparsity is not known: {error}")
+        return None, None
+
+
+def _confirm_best(job: ScreeningJob, best: Identification, alloy: Alloy, notes: list[str]) -> Confirmation | None:
+    """The finite element run of the best law, where it is asked for or in doubt; that it failed is a note."""
+    if job.confirm is False or (job.confirm is not True and not outside_domain(best)):
+        return None
+    try:
+        return confirm(best, alloy.tests, underlying_specimen(job.predictor))
+    except CreepkitError as error:
+        notes.append(f"not confirmed: {error}")
+        return None
+
+
+def _predict_tests(best: Identification, tests: Sequence[History], predictor: Predictor) -> dict[str, PredictedOutputs]:
+    prediction = best.predict(tests, predictor)
+    return {
+        test.name: {
+            name: prediction.of(k)[:, prediction.outputs.index(name)]
+            for name in prediction.outputs
+            if name in test.outputs
+        }
+        for k, test in enumerate(tests)
+    }
+
+
+FITS_FOLDER = "fits"
+"""The folder of the best identifications, inside that of the answers."""
+
+
+METADATA_FIELDS = ("source", "labels")
+"""Fields of a history that no identification looks at."""
+
+
+@dataclass(frozen=True)
+class ScreeningJob:
+    """What is asked of each alloy, and the folder that answers are kept in.
+
+    using, through : predictors, as identify() takes them. dense : the law that is set against the reduced one, or None;
+    penalty : what reduces it, else the best of `laws` is taken. confirm : True, False or "when in doubt".
+    """
+
+    alloys: tuple[Alloy, ...]
+    laws: tuple[CreepLaw, ...]
+    predictor: Predictor
+    surrogate: Predictor | None
+    settings: IdentificationSettings
+    dense_law: CreepLaw | None
+    penalty: ContributionPenalty | Subsets | None
+    confirm: bool | str
+    folder: Path
+    task_name: ClassVar[str] = "alloy"
+
+    def path(self, number: int) -> Path:
+        """The file of an alloy's answer: its name where that can be one, and its fingerprint's beginning elsewhere."""
+        name = self.alloys[number].name
+        file_name = re.sub(r"[^A-Za-z0-9.=+-]+", "-", name).strip("-.")
+        is_valid_name = file_name == name and [a.name.lower() for a in self.alloys].count(name.lower()) == 1
+        return self.folder / (
+            f"{file_name}.json" if is_valid_name else f"{file_name or 'alloy'}_{_short_hash(name.encode())[:6]}.json"
+        )
+
+    def fingerprint(self, number: int) -> str:
+        """Of the tests of an alloy and of all that is asked."""
+        return _short_hash("\n".join([self._settings_text, *map(_history_text, self.alloys[number].tests)]).encode())
+
+    def on_one_thread(self) -> ScreeningJob:
+        """The same with predictors that start no threads."""
+        surrogate = None if self.surrogate is None else single_threaded(self.surrogate)
+        return replace(self, predictor=single_threaded(self.predictor), surrogate=surrogate)
+
+    def run(self, number: int) -> TaskResult:
+        """Screen an alloy and write its answer, and its best identification beside it, which other commands take."""
+        result = replace(screen_alloy(self, self.alloys[number]), fingerprint=self.fingerprint(number))
+        if result.identified:
+            result.best.save(self.path(number).parent / FITS_FOLDER / self.path(number).name)
+        files.write_result(result, self.path(number))
+        return TaskResult(number, "done", accepted=int(result.identified))
+
+    @cached_property
+    def _settings_text(self) -> str:
+        return "\n".join(self._settings_lines())
+
+    def _settings_lines(self) -> Iterator[str]:
+        yield f"creepkit {version('creepkit')}"
+        for law in (*self.laws, *([self.dense_law] if self.dense_law is not None else [])):
+            yield f"{law.name} {law.fingerprint} {[(name, p.bounds, p.off) for name, p in law.table.items()]}"
+        for predictor in (self.predictor, self.surrogate):
+            yield "none" if predictor is None else predictor_fingerprint(predictor)
+        yield repr((self.settings, self.dense_law is None, self.penalty, self.confirm))
+
+
+def _history_text(history: History) -> str:
+    """All that a history says of its test, for hashing."""
+    values = {f.name: getattr(history, f.name) for f in fields(history) if f.name not in METADATA_FIELDS}
+    program = history.loading.program()
+    loading = (type(history.loading).__name__, _plain_value(program), getattr(history.loading, "control", ""))
+    return repr([(name, _plain_value(value)) for name, value in {**values, "loading": loading}.items()])
+
+
+def _plain_value(value: Any) -> Any:
+    """A value whose repr tells all of it."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, Program):
+        return value.times.tolist(), value.values.tolist()
+    if hasattr(value, "items"):
+        return sorted((name, _plain_value(item)) for name, item in value.items())
+    return value
+
+
+def _short_hash(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:24]

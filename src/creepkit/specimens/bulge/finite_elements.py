@@ -1,0 +1,377 @@
+"""The finite element model of a bulge test: set-up from a history, prediction, and sensitivities of its outputs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import product
+from numbers import Real
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit import kernels
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.errors import SolveError, nearest
+from creepkit.fem.banded_system import FiniteElementModel, finite_element_model
+from creepkit.fem.mesh import GeometryDerivative, geometry_derivative
+from creepkit.fem.simulation import LoadHistory, Simulation, SurfaceSensitivities, sensitivities, simulate
+from creepkit.fem.step_record import SolverSettings
+from creepkit.records import History, NuisanceValues, Prediction, Program, Status
+from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.specimens.bulge.observation import OBSERVED, Observation
+
+if TYPE_CHECKING:
+    from creepkit.language import Elastic
+    from creepkit.specimens.bulge.specimen import Bulge
+
+
+if TYPE_CHECKING:
+    from creepkit.kernels.interface import CompiledLaw
+    from creepkit.records import History
+
+
+if TYPE_CHECKING:
+    from creepkit.kernels.interface import CompiledLaw
+    from creepkit.language import CreepLaw
+    from creepkit.specimens.bulge.specimen import Bulge
+
+
+MODULUS_TEMPERATURE_STEP = 1.0
+"""K, of the central difference of the modulus to the temperature."""
+
+
+@dataclass(frozen=True, eq=False)
+class TestSetup:
+    """One test made ready: its body and course, its geometry, its observation operator.
+
+    refinement : of the structured mesh, None for a mesh from files.
+    """
+
+    model: FiniteElementModel
+    load_history: LoadHistory
+    geometry: DimpleGeometry
+    observation: Observation
+    refinement: float | None
+
+    @property
+    def radii(self) -> Floats:
+        """(top,) mm, radii of the observed nodes at rest."""
+        return np.asarray(self.model.nodes[self.model.top, 0])
+
+
+def set_up_test(specimen: Bulge, history: History, nuisances: Mapping[str, float]) -> TestSetup:
+    """Prepare one test; nuisances : {kind: value} of its explicit nuisances."""
+    where = history.source or f"history '{history.name}'"
+    if history.loading.quantity != "pressure":
+        raise SolveError(
+            f"{where}: a bulge specimen is loaded by pressure, found {history.loading.quantity}; use PressureJump"
+        )
+    if history.times[-1] <= 0.0:
+        raise SolveError(f"{where}: the last time is 0 s, where the load only begins; ask for a time after it")
+    if history.elastic is None:
+        raise SolveError(f"{where}: a bulge test needs elastic data; set elastic=Elastic(E=...), E in MPa")
+    pressure = history.loading.program()
+    if pressure.values.min() < 0.0:
+        raise SolveError(f"{where}: the pressure falls to {pressure.values.min():g} MPa; it must not be negative")
+    geometry = _geometry(specimen, history, nuisances)
+    operator = Observation.from_text(history.operator) if history.operator else specimen.observation
+    if "window" in nuisances:
+        operator = operator.replace(window=float(nuisances["window"]))
+    temperature = history.temperature_program()
+    temperature = Program(temperature.times, temperature.values + nuisances.get("temperature", 0.0))
+    modulus = modulus_program(history.elastic, temperature, 1.0 + nuisances.get("modulus", 0.0), where)
+    model = model_of_geometry(geometry, specimen.refinement) if specimen.mesh is None else _model_of_mesh(specimen)
+    poisson = float(history.elastic.at(float(temperature.values[0])).nu)
+    load_history = LoadHistory(pressure, temperature, modulus, float(history.times[-1]), poisson)
+    return TestSetup(model, load_history, geometry, operator, specimen.refinement if specimen.mesh is None else None)
+
+
+def modulus_program(elastic: Elastic, temperature: Program, factor: float, where: str) -> Program:
+    """Young's modulus over time, MPa, a straight line where the temperature is one."""
+    moduli = {float(T): float(elastic.at(float(T)).E) for T in np.unique(temperature.values)}
+    values = np.array([factor * moduli[float(T)] for T in temperature.values])
+    if not (values > 0).all():
+        raise SolveError(f"{where}: the modulus is {values.min():g} MPa; it must be above zero")
+    return Program(temperature.times, values)
+
+
+@lru_cache(maxsize=256)
+def model_of_geometry(geometry: DimpleGeometry, refinement: float) -> FiniteElementModel:
+    """The body of a dimple; kept, for a fit asks for it a thousand times."""
+    return finite_element_model(geometry.mesh(refinement))
+
+
+@lru_cache(maxsize=16)
+def _model_of_mesh(specimen: Bulge) -> FiniteElementModel:
+    assert specimen.mesh is not None
+    if not specimen.mesh.top.size:
+        raise SolveError("the mesh of a bulge specimen names no observed surface; give it the nodes of its top")
+    return finite_element_model(specimen.mesh)
+
+
+def _geometry(specimen: Bulge, history: History, nuisances: Mapping[str, float]) -> DimpleGeometry:
+    """The specimen's geometry, with what was measured of this test and then what is assumed of it."""
+    changes = {name: value for name, value in history.geometry.items() if name in DimpleGeometry.lengths}
+    if "thickness" in nuisances:
+        changes["apex_thickness"] = float(nuisances["thickness"])
+    if not changes:
+        return specimen.geometry
+    if specimen.mesh is not None:
+        raise SolveError(
+            f"history '{history.name}' has a geometry of its own ({', '.join(changes)}), which a specimen with a mesh "
+            "from files cannot follow; use one without mesh="
+        )
+    return specimen.geometry.replace(**changes)
+
+
+_TIME_SHIFT = 1e-3
+"""s, by which steps are moved to difference an interpolation between steps that move."""
+
+
+@dataclass(frozen=True, eq=False)
+class BulgeSensitivities:
+    """Derivatives of the outputs, (times, 3, parameters) to the law's and {name: (times, 3)} to everything else."""
+
+    law: Floats
+    nuisances: Mapping[str, Floats]
+
+
+def output_sensitivities(
+    setup: TestSetup, kernel: CompiledLaw, theta: Floats, history: History, simulation: Simulation, profiles: Floats,
+    names: Sequence[str],
+) -> tuple[Floats, BulgeSensitivities]:  # fmt: skip
+    """Outputs (times, 3) and their derivatives.
+
+    names : "modulus" (relative), "temperature" (K), "thickness" (mm) and any length of the dimple, "window" (mm), and
+        the numbers of the loading, such as P1, P2 and Tj.
+    """
+    loads = [n for n in names if n != "window" and not _is_dimension(n)]
+    lengths = [n for n in names if _is_dimension(n)]
+    directions = np.array([_direction(setup, history, name) for name in loads]).reshape(
+        -1, *setup.load_history.segments.shape
+    )
+    velocities = [_velocity(setup.geometry, _dimension_name(name), setup) for name in lengths]
+    change = sensitivities(
+        kernel, theta, setup.model, setup.load_history, simulation, directions=directions, velocities=velocities
+    )
+    outputs, output_derivatives = setup.observation.observe_with_derivatives(setup.radii, profiles)
+    output_columns = output_derivatives @ change.surface
+    output_columns[0, 1:] = output_columns[1, 1:] if len(output_columns) > 1 else 0.0
+    for k, (_, velocity) in enumerate(velocities):
+        radial_velocity = velocity[setup.model.top, 0]
+        output_columns[:, :, theta.size + len(loads) + k] += setup.observation.node_derivatives(
+            setup.radii, profiles, radial_velocity
+        )
+    along = simulation.at(output_columns, history.times)
+    nuisances = {}
+    for k, name in enumerate(loads):
+        nuisances[name] = along[..., theta.size + k] + _step_time_derivative(
+            simulation, change, directions, k, outputs, history.times
+        )
+    for k, name in enumerate(lengths):
+        nuisances[name] = along[..., theta.size + len(loads) + k]
+    if "window" in names:
+        nuisances["window"] = simulation.at(setup.observation.window_derivatives(setup.radii, profiles), history.times)
+    return simulation.at(outputs, history.times), BulgeSensitivities(along[..., : theta.size], nuisances)
+
+
+def _step_time_derivative(
+    simulation: Simulation, change: SurfaceSensitivities, directions: Floats, k: int, outputs: Floats, times: Floats
+) -> Floats | float:
+    """What the motion of the steps in time does to the interpolation between them."""
+    if not change.times[:, k].any() and not directions[k, :, 0].any():
+        return 0.0
+    starts = directions[k, : simulation.timeline.starts.size, 0]
+    ends = (
+        simulation.timeline.moved(s * _TIME_SHIFT * change.times[:, k], s * _TIME_SHIFT * starts) for s in (1.0, -1.0)
+    )
+    up, down = (line.interpolate(outputs, times) for line in ends)
+    return np.asarray((up - down) / (2.0 * _TIME_SHIFT))
+
+
+def _is_dimension(name: str) -> bool:
+    return name == "thickness" or name in DimpleGeometry.lengths
+
+
+def _dimension_name(name: str) -> str:
+    return "apex_thickness" if name == "thickness" else name
+
+
+def _direction(setup: TestSetup, history: History, name: str) -> Floats:
+    """Derivative of the course's segments, (segments, 10), by a central difference, exact for what enters linearly."""
+    load_history = setup.load_history
+    if name == "modulus":
+        # measured against the modulus that the history states
+        given_value = history.elastic.at(float(load_history.temperature.values[0])).E if history.elastic else 1.0
+        share = Program(
+            load_history.modulus.times,
+            load_history.modulus.values * (float(given_value) / load_history.modulus.values[0]),
+        )
+        return np.asarray(replace(load_history, modulus=share).segments * _COLUMNS["modulus"])
+    if name == "temperature":
+        return _by_temperature(setup, history)
+    loading = history.loading
+    if not isinstance(getattr(loading, name, None), Real):
+        known = ("modulus", "temperature", "thickness", "window", *getattr(loading, "__dataclass_fields__", ()))
+        raise SolveError(f"history '{history.name}': no derivative to '{name}' is known; {nearest(name, known)}")
+    value = float(getattr(loading, name))
+    step = 1e-4 * max(abs(value), 1e-3)
+    up, down = (
+        replace(load_history, pressure=replace(loading, **{name: value + s}).program()).segments  # type: ignore[type-var]
+        for s in (step, -step)
+    )
+    return np.asarray((up - down) / (2.0 * step))
+
+
+_COLUMNS = {
+    "modulus": np.array([0, 0, 0, 0, 0, 0, 1, 1, 0, 0.0]),
+    "temperature": np.array([0, 0, 0, 0, 1, 1, 0, 0, 0, 0.0]),
+}
+
+
+def _by_temperature(setup: TestSetup, history: History) -> Floats:
+    """One kelvin more in every temperature, and the modulus that goes with it."""
+    load_history = setup.load_history
+    direction: Floats = np.zeros_like(load_history.segments) + _COLUMNS["temperature"]
+    if history.elastic is None:
+        return np.asarray(direction)
+    temperature = load_history.temperature.values
+    given_modulus = [float(history.elastic.at(float(T)).E) for T in temperature]
+    factor = load_history.modulus.values / np.array(given_modulus)
+    up, down = (
+        np.array([float(history.elastic.at(float(T) + s).E) for T in temperature])
+        for s in (MODULUS_TEMPERATURE_STEP, -MODULUS_TEMPERATURE_STEP)
+    )
+    slope = Program(load_history.modulus.times, factor * (up - down) / (2.0 * MODULUS_TEMPERATURE_STEP))
+    modulus_changes: Floats = replace(load_history, modulus=slope).segments * _COLUMNS["modulus"]
+    return np.asarray(direction + modulus_changes)
+
+
+@lru_cache(maxsize=256)
+def _velocity_of(geometry: DimpleGeometry, refinement: float, name: str) -> tuple[GeometryDerivative, Floats]:
+    velocity = geometry.mesh_velocity(name, refinement)
+    return geometry_derivative(geometry.mesh(refinement), velocity), velocity
+
+
+def _velocity(geometry: DimpleGeometry, name: str, setup: TestSetup) -> tuple[GeometryDerivative, Floats]:
+    if setup.refinement is None:
+        raise SolveError(f"a mesh from files does not say how it follows {name}; use the structured mesh instead")
+    return _velocity_of(geometry, setup.refinement, name)
+
+
+@dataclass(frozen=True, eq=False)
+class BulgeResponse:
+    """One candidate in one test: outputs (times, 3), how it ended, and derivatives if asked for."""
+
+    values: Floats
+    status: Status
+    end_time: float
+    sensitivities: BulgeSensitivities | None
+
+
+def predict_bulge(
+    specimen: Bulge,
+    law: CreepLaw,
+    values: Mapping[str, ArrayLike],
+    histories: Sequence[History],
+    jacobian: bool,
+    nuisances: NuisanceValues,
+) -> Prediction:
+    """Predict every candidate in every test; see records.Predictor."""
+    for kind in nuisances:
+        if kind not in specimen.nuisances:
+            raise SolveError(
+                f"a bulge specimen does not know the nuisance '{kind}'; it knows {', '.join(specimen.nuisances)}"
+            )
+    kernel = kernels.lower(law, "numba")
+    theta = kernel.to_internal(values)
+    candidates = max([len(theta), *(len(v) for v in nuisances.values())])
+    theta = np.broadcast_to(theta, (candidates, theta.shape[1]))
+    broadcast_nuisances = {kind: np.broadcast_to(v, (candidates, len(histories))) for kind, v in nuisances.items()}
+    tasks = list(product(range(candidates), range(len(histories))))
+
+    def run(task: tuple[int, int]) -> BulgeResponse:
+        c, k = task
+        nuisance_values = {kind: float(value[c, k]) for kind, value in broadcast_nuisances.items()}
+        return simulate_and_observe(specimen, kernel, theta[c], histories[k], nuisance_values, jacobian)
+
+    workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
+    if workers > 1:
+        with ThreadPoolExecutor(workers) as pool:
+            rows = list(pool.map(run, tasks))
+    else:
+        rows = [run(task) for task in tasks]
+    return _to_prediction(rows, histories, candidates, theta.shape[1], tuple(nuisances) if jacobian else (), jacobian)
+
+
+def simulate_and_observe(
+    specimen: Bulge,
+    kernel: CompiledLaw,
+    theta: Floats,
+    history: History,
+    nuisances: Mapping[str, float],
+    jacobian: bool,
+) -> BulgeResponse:
+    """Simulate one test and observe it at the times of its history."""
+    test_setup = set_up_test(specimen, history, nuisances)
+    settings = solver_settings(specimen, exact=jacobian)
+    simulation = simulate(
+        kernel, theta, test_setup.model, test_setup.load_history, settings=settings, keep_stages=jacobian
+    )
+    profiles = simulation.displacements[:, test_setup.model.top, 1]
+    sensitivities = None
+    if jacobian:
+        outputs, sensitivities = output_sensitivities(
+            test_setup, kernel, theta, history, simulation, profiles, tuple(nuisances)
+        )
+    else:
+        outputs = simulation.at(test_setup.observation.observe(test_setup.radii, profiles), history.times)
+    return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
+
+
+def solver_settings(specimen: Bulge, *, exact: bool = False) -> SolverSettings:
+    """The solver's settings; exact : equilibrium so tight that derivatives are those of the scheme."""
+    return SolverSettings(
+        tolerance=specimen.tolerance,
+        newton=1e-7 if exact else 1e-2 * specimen.tolerance,
+        deflection_limit=specimen.deflection_limit,
+        strain_limit=specimen.strain_limit,
+        max_steps=int(specimen.max_steps),
+    )
+
+
+def _to_prediction(
+    rows: Sequence[BulgeResponse],
+    histories: Sequence[History],
+    candidates: int,
+    parameters: int,
+    kinds: tuple[str, ...],
+    jacobian: bool,
+) -> Prediction:
+    longest = max((h.times.size for h in histories), default=0)
+    shape = (candidates, len(histories), longest, len(OBSERVED))
+    values = np.full(shape, np.nan)
+    law_jacobian = np.full((*shape, parameters), np.nan) if jacobian else None
+    nuisance_jacobian = {kind: np.full(shape, np.nan) for kind in kinds}
+    for n, response in enumerate(rows):
+        c, k = divmod(n, len(histories))
+        frames = histories[k].times.size
+        values[c, k, :frames] = response.values
+        if law_jacobian is not None and response.sensitivities is not None:
+            law_jacobian[c, k, :frames] = response.sensitivities.law
+            for kind in kinds:
+                nuisance_jacobian[kind][c, k, :frames] = response.sensitivities.nuisances[kind]
+    return Prediction(
+        values=values,
+        outputs=OBSERVED,
+        lengths=np.array([h.times.size for h in histories], dtype=np.int64),
+        status=np.array([int(r.status) for r in rows], dtype=np.int64).reshape(shape[:2]),
+        end_times=np.array([r.end_time for r in rows]).reshape(shape[:2]),
+        jacobian=law_jacobian,
+        times=tuple(h.times for h in histories),
+        nuisance_jacobian=nuisance_jacobian,
+    )

@@ -1,0 +1,361 @@
+"""The observation operator: amplitude D_amp, width S_d and shape S_p of a generalised Gaussian.
+
+Fitted by least squares to the displacement of the top within a window of the undeformed radius: as "profile", D exp(-(r/S)^p), the paper's Eq. (3), or as "field", Eq. (7). `fit_field` fits Eq. (7) to measured points whose centre is unknown.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from numbers import Real
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats, Ints, frozen
+from creepkit.errors import FitError, SolveError, nearest
+from creepkit.fem.mesh import SurfaceInterpolation, checked_surface_radii, surface_interpolation_with_slopes
+
+if TYPE_CHECKING:
+    from creepkit.specimens.bulge.gaussian_fit import PolarGrid
+
+
+OBSERVED = ("amplitude", "width", "shape")
+"""Columns of what is observed: D_amp in mm, S_d in mm, S_p."""
+
+
+Form = Literal["profile", "field"]
+
+
+DEFAULT_RADII: dict[str, int] = {"profile": 76, "field": 40}
+"""Radii looked at by default: for the profile 0, 0.1 ... 7.5 mm in the default window."""
+
+
+_ANGLES = 6
+"""Gauss points over an eighth of a turn; S_p from 40 radii by 6 angles lies within 5e-5 of that from 1000 by 40."""
+
+
+_FEWEST, _MOST = 8, 2000
+
+
+_TEXT = re.compile(r"\s*(\w+)\s+0\s*(?:-|to)\s*(\S+)\s*mm\s*(?:,\s*(\d+)\s+radii\s*)?")
+
+
+class ProfileSampling(NamedTuple):
+    """What a form, a window and a set of nodes come to: the radii as shares of the window, the way there, the grid."""
+
+    shares: Floats
+    nodes: SurfaceInterpolation
+    grid: PolarGrid
+
+
+@dataclass(frozen=True)
+class Observation:
+    """How a top profile becomes D_amp, S_d, S_p: form, window and grid of the generalised Gaussian fit.
+
+    form : "profile" or "field". window : mm, the largest radius looked at, in the undeformed plate.
+    points : radii looked at; None for 76 of a profile and 40 of a field (Gauss points, at 6 angles each).
+
+    The radii are fixed shares of the window, so that what is observed changes smoothly with it.
+    """
+
+    form: Form = "profile"
+    window: float = 7.5
+    points: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.form not in get_args(Form):
+            raise SolveError(f"observation: no form is called '{self.form}'; {nearest(str(self.form), get_args(Form))}")
+        if not _lies_within(self.window, 1e-3, 1e4):
+            raise SolveError(f"observation: window is {self.window!r}; allowed is a length of 0.001 to 10000 mm")
+        points = DEFAULT_RADII[self.form] if self.points is None else self.points
+        if not _lies_within(points, _FEWEST, _MOST) or points != int(points):
+            raise SolveError(f"observation: points is {points!r}; allowed are whole numbers, {_FEWEST} to {_MOST}")
+        object.__setattr__(self, "window", float(self.window))
+        object.__setattr__(self, "points", int(points))
+
+    @classmethod
+    def from_text(cls, text: str) -> Observation:
+        """The operator that `str` wrote, as in 'profile 0-7.5 mm' or 'field 0-5 mm, 30 radii'."""
+        result = _TEXT.fullmatch(text)
+        try:
+            if result is None:
+                raise ValueError(text)
+            window, points = float(result[2]), None if result[3] is None else int(result[3])
+        except ValueError as error:
+            raise SolveError(
+                f"observation: '{text}' is not understood; write a form and a window, as in 'profile 0-7.5 mm' or "
+                "'field 0-5 mm'"
+            ) from error
+        return cls(result[1], window, points)  # type: ignore[arg-type]
+
+    def __str__(self) -> str:
+        window = repr(self.window).removesuffix(".0")
+        radii = "" if self.points == DEFAULT_RADII[self.form] else f", {self.points} radii"
+        return f"{self.form} 0-{window} mm{radii}"
+
+    def replace(self, **changes: Any) -> Observation:
+        """The same operator with some fields changed; a new form has its own points unless they are given too."""
+        if "form" in changes:
+            changes = {"points": None, **changes}
+        return replace(self, **changes)
+
+    def observe(self, radii: ArrayLike, profiles: ArrayLike) -> Floats:
+        """D_amp in mm, S_d in mm and S_p, (frames, 3).
+
+        radii : (nodes,) mm, of the undeformed top's corner and middle nodes in turn, from the axis outwards.
+        profiles : (frames, nodes) u_z in mm.
+
+        A frame at rest (below 1e-9 mm everywhere) has D = 0 and the S and p of the next frame that was fitted, else of
+        the last one: at t = 0 they stand for the limit of what follows. A frame without a fit worth the name is NaN.
+        """
+        sampling = self._sampling(radii)
+        return self._fit(sampling, _frames(profiles, sampling), slopes=False)[0]
+
+    def observe_with_derivatives(self, radii: ArrayLike, profiles: ArrayLike) -> tuple[Floats, Floats]:
+        """As `observe`, and the exact derivatives (frames, 3, nodes) to `profiles`.
+
+        At rest D has the derivatives of the frame that lent its shape (those of D do not change with the size of a
+        profile), S and p have none and are given zeros.
+        """
+        sampling = self._sampling(radii)
+        outputs, derivatives = self._fit(sampling, _frames(profiles, sampling), slopes=True)
+        return outputs, derivatives @ sampling.nodes.values
+
+    def window_derivatives(self, radii: ArrayLike, profiles: ArrayLike) -> Floats:
+        """Derivatives (frames, 3) of what is observed to the window, 1/mm of each."""
+        sampling = self._sampling(radii)
+        frames = _frames(profiles, sampling)
+        outputs, derivatives = self._fit(sampling, frames, slopes=True)
+        slopes = self._chain(derivatives, frames @ sampling.nodes.slopes.T * sampling.shares)
+        slopes[:, 1] += outputs[:, 1] / self.window
+        return slopes
+
+    def node_derivatives(self, radii: ArrayLike, profiles: ArrayLike, shift: ArrayLike) -> Floats:
+        """Derivatives (frames, 3) of what is observed when the top nodes move along the radius, keeping their u_z.
+
+        shift : (nodes,) mm for each unit of what moves them, such as the apex thickness of a mesh that follows it.
+        """
+        sampling = self._sampling(radii)
+        frames = _frames(profiles, sampling)
+        _, derivatives = self._fit(sampling, frames, slopes=True)
+        moved = sampling.nodes.values @ np.asarray(shift, dtype=float)
+        return self._chain(derivatives, -(frames @ sampling.nodes.slopes.T) * moved)
+
+    def _sampling(self, radii: ArrayLike) -> ProfileSampling:
+        return _sampling_of(self, np.asarray(radii, dtype=float).tobytes())
+
+    def _fit(self, sampling: ProfileSampling, frames: Floats, slopes: bool) -> tuple[Floats, Floats]:
+        """What is observed (frames, 3), and its derivatives (frames, 3, radii) to the profile at the radii."""
+        from creepkit.specimens.bulge import gaussian_fit
+
+        with np.errstate(invalid="ignore"):  # a profile that is not finite becomes NaN, which is the answer to it
+            samples = frames @ sampling.nodes.values.T
+        fits, states = np.empty((len(samples), 3)), np.empty(len(samples), dtype=np.int64)
+        derivatives = np.full((len(samples) if slopes else 0, 3, samples.shape[1]), np.nan)
+        gaussian_fit.fit_frames(sampling.grid, samples, fits, states, derivatives)
+        fits[:, 1] *= self.window
+        derivatives[:, 1] *= self.window
+        _fill_rest_shapes(
+            fits, derivatives, np.flatnonzero(states == gaussian_fit.AT_REST), states == gaussian_fit.FITTED
+        )
+        return fits, derivatives
+
+    @staticmethod
+    def _chain(derivatives: Floats, change: Floats) -> Floats:
+        """Change (frames, 3) of what is observed with a change (frames, radii) of the profile."""
+        return np.asarray(np.einsum("fvi,fi->fv", derivatives, change))
+
+
+def _lies_within(value: object, least: float, most: float) -> bool:
+    return isinstance(value, Real) and least <= float(value) <= most
+
+
+def _frames(profiles: ArrayLike, sampling: ProfileSampling) -> Floats:
+    frames = np.asarray(profiles, dtype=float)
+    nodes = sampling.nodes.values.shape[1]
+    if frames.ndim != 2 or frames.shape[1] != nodes:
+        raise SolveError(
+            f"profiles have the shape {frames.shape}; expected (frames, {nodes}), a column for each radius"
+        )
+    return frames
+
+
+def _fill_rest_shapes(fits: Floats, derivatives: Floats, resting: Ints, fitted: np.ndarray) -> None:
+    """Give frames at rest no amplitude and the shape of the next frame that was fitted, else of the last one."""
+    fits[resting, 0] = 0.0
+    source_frames = np.flatnonzero(fitted)
+    if not (resting.size and source_frames.size):
+        return
+    source = source_frames[np.minimum(np.searchsorted(source_frames, resting), source_frames.size - 1)]
+    fits[resting, 1:] = fits[source, 1:]
+    if len(derivatives):
+        derivatives[resting, 0] = derivatives[source, 0]
+        derivatives[resting, 1:] = 0.0
+
+
+@lru_cache(maxsize=64)
+def _sampling_of(operator: Observation, nodes: bytes) -> ProfileSampling:
+    """Where `operator` looks on a surface with these radii."""
+    from creepkit.specimens.bulge.gaussian_fit import LOG_OF_ZERO, PolarGrid
+
+    radii = checked_surface_radii(np.frombuffer(nodes))
+    if radii[0] > 1e-9 or radii[-1] < operator.window * (1 - 1e-9):
+        raise SolveError(
+            f"observation: the window reaches from 0 to {operator.window:g} mm, but the observed surface from "
+            f"{radii[0]:g} to {radii[-1]:g} mm; choose a window within it"
+        )
+    shares, radial, angles, angular = _disc(operator) if operator.form == "field" else _line(operator)
+    with np.errstate(divide="ignore"):
+        logarithms = [np.maximum(np.log(values), LOG_OF_ZERO) for values in (shares, np.cos(angles), np.sin(angles))]
+    grid = PolarGrid(
+        frozen(logarithms[0]), frozen(radial), frozen(logarithms[1]), frozen(logarithms[2]), frozen(angular)
+    )
+    return ProfileSampling(frozen(shares), surface_interpolation_with_slopes(radii, operator.window * shares), grid)
+
+
+def _line(operator: Observation) -> tuple[Floats, Floats, Floats, Floats]:
+    """Shares of the window and their weights, angles and their weights: equidistant radii at the angle 0."""
+    assert operator.points is not None
+    return np.linspace(0.0, 1.0, operator.points), np.ones(operator.points), np.zeros(1), np.ones(1)
+
+
+def _disc(operator: Observation) -> tuple[Floats, Floats, Floats, Floats]:
+    """As `_line`, for the disc: Gauss points from the middle to the edge, and over one of eight equal sectors."""
+    assert operator.points is not None
+    place, weight = np.polynomial.legendre.leggauss(operator.points)
+    turn, share = np.polynomial.legendre.leggauss(_ANGLES)
+    shares = 0.5 * (place + 1.0)
+    return shares, weight * shares, np.pi / 8.0 * (turn + 1.0), share
+
+
+_FEWEST_POINTS = 12
+
+
+_SHAPES = (0.25, 40.0)
+"""Least and greatest p of an answer, as in the fit of profiles."""
+
+
+_LEAST_SIGNAL_TO_ERROR = 5.0
+"""Least ratio of D to its standard error in an answer; the best fit to noise alone reached 3 in forty trials."""
+
+
+_START_QUANTILES = (1.0, 0.98)
+"""Searches start from the greatest height, right for a small bulge, and from one that a few wild points leave alone."""
+
+
+@dataclass(frozen=True)
+class FieldFit:
+    """A bulge D exp(-|(x - x_c)/S|^p - |(y - y_c)/S|^p) fitted to points.
+
+    amplitude, width : D and S, mm. shape : p. x_center, y_center : mm.
+    standard_errors : of these five, in this order, if the points err independently. Pixels with overlapping subsets do
+        not: true errors are greater by the root of the number of pixels that share one error.
+    scatter : mm, root mean square of what the fit leaves. points : how many were fitted.
+    """
+
+    amplitude: float
+    width: float
+    shape: float
+    x_center: float
+    y_center: float
+    standard_errors: tuple[float, ...]
+    residual_sd: float
+    points: int
+
+
+def fit_field(x: ArrayLike, y: ArrayLike, heights: ArrayLike) -> FieldFit:
+    """Fit Eq. (7) by unweighted least squares to points x, y, heights, each (points,) in mm, in any order or shape.
+
+    Points that are not finite (a camera lost them) are left out. The fit has no offset: take off first what the surface
+    showed without pressure.
+    """
+    X, Y, H = _points(x, y, heights)
+    scale = float(np.abs(H).max())
+    v, jacobian, left = _search(X, Y, H / scale)
+    values = np.array([scale * v[0], np.exp(v[1]), np.exp(v[2]), v[3], v[4]])
+    errors = _standard_errors(jacobian, left) * np.array([scale, values[1], values[2], 1.0, 1.0])
+    if not (abs(values[0]) > _LEAST_SIGNAL_TO_ERROR * errors[0] and _SHAPES[0] < values[2] < _SHAPES[1]):
+        raise FitError(
+            f"the field of {H.size} points shows no bulge of Eq. (7): the best fit has D = {values[0]:.3g} +- "
+            f"{errors[0]:.2g} mm, S = {values[1]:.3g} mm, p = {values[2]:.3g}; take off what the surface showed "
+            "without pressure and give the points of one bulge"
+        )
+    D, S, p, a, b = values.tolist()
+    return FieldFit(D, S, p, a, b, tuple(errors.tolist()), scale * float(np.sqrt(left / H.size)), int(H.size))
+
+
+def _search(X: Floats, Y: Floats, heights: Floats) -> tuple[Floats, Floats, float]:
+    """v of the least squares, the Jacobian there and the sum of squares that is left."""
+    from scipy.optimize import least_squares  # heavy, and a list of specimens needs none of it
+
+    fits = [
+        least_squares(
+            lambda v: _model(v, X, Y)[0] - heights,
+            start,
+            jac=lambda v: _model(v, X, Y)[1],
+            x_scale="jac",
+            xtol=1e-12,
+            ftol=1e-15,
+            gtol=1e-15,
+            max_nfev=200,
+        )
+        for start in (_start(X, Y, heights, share) for share in _START_QUANTILES)
+    ]
+    best = min(fits, key=lambda fit: float(fit.cost))
+    return best.x, best.jac, 2.0 * float(best.cost)
+
+
+def _points(x: ArrayLike, y: ArrayLike, heights: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """The points that were seen, as three arrays (points,)."""
+    arrays = [np.asarray(values, dtype=float) for values in (x, y, heights)]
+    if len({array.shape for array in arrays}) > 1:
+        shapes = ", ".join(str(array.shape) for array in arrays)
+        raise FitError(f"a field needs as many x as y as heights; found the shapes {shapes}")
+    outputs = np.isfinite(arrays).all(axis=0)
+    X, Y, H = (array[outputs] for array in arrays)
+    if H.size < _FEWEST_POINTS or not np.abs(H).max() > 0.0 or not min(np.ptp(X), np.ptp(Y)) > 0.0:
+        raise FitError(
+            f"a field of {H.size} finite points cannot be fitted; it needs at least {_FEWEST_POINTS}, spread over x and y, "
+            "and heights that are not all zero"
+        )
+    return X, Y, H
+
+
+def _start(X: Floats, Y: Floats, H: Floats, share: float) -> Floats:
+    """v from the moments of the points above half of what a `share` of the points stay below: noise moves them little.
+
+    A Gaussian stands above its half within r = S sqrt(ln 2), where the mean of x^2 about its centre is S^2 ln(2) / 4.
+    """
+    size = np.abs(H)
+    top = float(np.quantile(size, share))
+    turned = H * np.sign(H[np.argmin(np.abs(size - top))])
+    high = turned >= 0.5 * top
+    spread = 0.5 * (X[high].var() + Y[high].var())
+    width = np.sqrt(4.0 * spread / np.log(2.0)) if spread > 0.0 else 0.25 * min(np.ptp(X), np.ptp(Y))
+    amplitude = top * np.sign(np.sum(H[high]))
+    return np.array([amplitude, np.log(width), np.log(2.0), X[high].mean(), Y[high].mean()])
+
+
+def _model(v: Floats, X: Floats, Y: Floats) -> tuple[Floats, Floats]:
+    """Heights (points,) of Eq. (7) and their derivatives (points, 5) to v = (D, ln S, ln p, x_c, y_c)."""
+    D, width, p = v[0], np.exp(v[1]), np.exp(v[2])
+    parts = []
+    for far in ((X - v[3]) / width, (Y - v[4]) / width):
+        logarithm = np.log(np.maximum(np.abs(far), 1e-100))
+        power = np.exp(np.minimum(p * logarithm, 6.0))  # exp(-exp(6)) = 1e-175: nothing, and no overflow
+        parts.append((power, logarithm, p * power / np.where(far == 0.0, np.inf, far) / width))
+    (qx, lx, sx), (qy, ly, sy) = parts
+    bell = np.exp(-qx - qy)
+    high = D * bell
+    return high, np.stack([bell, high * p * (qx + qy), -high * p * (qx * lx + qy * ly), high * sx, high * sy], axis=1)
+
+
+def _standard_errors(jacobian: Floats, left: float) -> Floats:
+    """Roots of the diagonal of s^2 (J^T J)^-1, s^2 being what each degree of freedom leaves; infinite if singular."""
+    points, unknowns = jacobian.shape
+    if np.linalg.matrix_rank(jacobian) < unknowns:
+        return np.full(unknowns, np.inf)
+    variance = left / (points - unknowns)
+    return np.asarray(np.sqrt(variance * np.diag(np.linalg.inv(jacobian.T @ jacobian))))

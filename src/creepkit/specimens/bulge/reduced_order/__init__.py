@@ -1,0 +1,1 @@
+"""The reduced-order model of the bulge test: one degree of freedom with tables of the very dimple."""

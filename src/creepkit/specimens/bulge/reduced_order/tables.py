@@ -1,0 +1,414 @@
+"""Tables of the reduced-order model of a dimple, computed from finite element simulations, and their files.
+
+In steady Norton creep of a dimple of apex thickness h the amplitude D grows as if one point crept: dD/dt = kappa(D, h) A (k(D, h) P)^n.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property, lru_cache
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
+from scipy.interpolate import CubicSpline
+
+from creepkit import kernels
+from creepkit.arrays import Bools, Floats
+from creepkit.errors import SolveError
+from creepkit.fem.banded_system import FiniteElementModel, finite_element_model
+from creepkit.fem.simulation import LoadHistory, simulate
+from creepkit.fem.step_record import SolverSettings
+from creepkit.language import CreepLaw, Param, parameters, stress
+from creepkit.records import Program
+from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.specimens.bulge.observation import Observation
+from creepkit.specimens.bulge.reduced_order.deflection_curves import (
+    AMPLITUDE,
+    CURVES,
+    ELASTIC_WIDTH,
+    EXPONENTS,
+    LOG_GROWTH,
+    LOG_STRESS,
+    RESIDUAL,
+    SHAPE,
+    WIDTH,
+    DimpleCurves,
+)
+from creepkit.specimens.bulge.reduced_order.step_equations import REDISTRIBUTION, redistribution_sizes
+
+if TYPE_CHECKING:
+    from creepkit.specimens.bulge.specimen import Bulge
+
+
+THICKNESS_RATIOS = (0.85, 1.0, 1.2)
+"""Apex thicknesses of the runs over the nominal one: those of a plate scatter by 15 %."""
+
+
+LOAD_RANGE = (1e-7, 3e-3)
+"""P/E of the elastic runs."""
+
+
+_STIFFNESS = 1e6
+"""E/P of the Norton runs: elastic strains so small that stresses are steady at the least deflection."""
+
+
+_RATE = 1e-6
+"""1/s, about the first rate of a Norton run; with the longest time any dimple reaches its limit."""
+
+
+_LONGEST = 1e10
+
+
+_A, _n = parameters("A n")
+
+
+_NORTON = CreepLaw(
+    name="norton",
+    title="Norton power law",
+    terms={"power law": _A * stress**_n},
+    params={
+        _A: Param("rate coefficient", unit="1/s", bounds=(1e-300, 1.0), scale="log", off=0.0),
+        _n: Param("stress exponent", bounds=(0.5, 13)),
+    },
+    references=("Norton (1929), The Creep of Steel at High Temperatures",),
+)
+
+
+class OfflineSimulation(NamedTuple):
+    """One run: times s (or P/E of the elastic one), displacement of the top (records, top) mm, the top's radii mm, and
+    ln(A P^n).
+    """
+
+    times: Floats
+    profiles: Floats
+    radii: Floats
+    level: float
+
+
+@lru_cache(maxsize=16)
+def offline_simulations(specimen: Bulge, geometry: DimpleGeometry) -> tuple[tuple[OfflineSimulation, ...], ...]:
+    """For each thickness the Norton runs and the elastic one."""
+    result = []
+    for thickness in offline_thicknesses(specimen, geometry):
+        body = offline_model(specimen, geometry, thickness)
+        guess = 12.5 * (geometry.cavity_radius / 15.0 / thickness) ** 1.15  # as Bulge.reference_stress
+        creeping = [_norton(specimen, body, n, guess) for n in EXPONENTS]
+        result.append((*creeping, _elastic(specimen, body)))
+    return tuple(result)
+
+
+def offline_model(specimen: Bulge, geometry: DimpleGeometry, thickness: float) -> FiniteElementModel:
+    """The body of a trial; the only one of a mesh from files."""
+    if specimen.mesh is not None:
+        return finite_element_model(specimen.mesh)
+    return finite_element_model(replace(geometry, apex_thickness=thickness).mesh(specimen.refinement))
+
+
+def offline_thicknesses(specimen: Bulge, geometry: DimpleGeometry) -> list[float]:
+    """Apex thicknesses of the trials, mm: as the plate allows; the only one of a mesh from files."""
+    nominal, most = geometry.apex_thickness, geometry.plate_thickness - geometry.roof_axial
+    if specimen.mesh is not None:
+        return [nominal]
+    return sorted({min(ratio * nominal, most) for ratio in THICKNESS_RATIOS})
+
+
+def _norton(specimen: Bulge, body: FiniteElementModel, exponent: float, guess: float) -> OfflineSimulation:
+    """A Norton run at 1 MPa until the dimple bursts."""
+    level = np.log(_RATE) - exponent * np.log(guess)
+    pressure = Program(np.array([0.0, 5.0]), np.array([0.0, 1.0]))
+    load_history = LoadHistory(pressure, Program.constant(1.0), Program.constant(_STIFFNESS), _LONGEST)
+    return simulate_profiles(specimen, body, load_history, np.array([level, exponent]), level)
+
+
+def _elastic(specimen: Bulge, body: FiniteElementModel) -> OfflineSimulation:
+    """An elastic run in which P/E rises to the end of its range, or till the dimple is as deep as can be."""
+    end = 1e4
+    pressure = Program(np.array([0.0, end]), np.array([0.0, 1.0]))
+    load_history = LoadHistory(pressure, Program.constant(1.0), Program.constant(1.0 / LOAD_RANGE[1]), end)
+    result = simulate_profiles(specimen, body, load_history, np.array([-np.inf, 1.0]), 0.0)
+    return result._replace(times=result.times * LOAD_RANGE[1] / end)
+
+
+def simulate_profiles(
+    specimen: Bulge,
+    body: FiniteElementModel,
+    load_history: LoadHistory,
+    theta: Floats,
+    level: float,
+    tolerance: float = 5e-3,
+) -> OfflineSimulation:
+    """March, keeping what an operator looks at."""
+    settings = SolverSettings(
+        tolerance=tolerance, newton=4e-3 * tolerance, deflection_limit=specimen.deflection_limit,
+        strain_limit=specimen.strain_limit,
+    )  # fmt: skip
+    result = simulate(kernels.lower(_NORTON, "numba"), theta, body, load_history, settings=settings)
+    return OfflineSimulation(
+        result.times, result.displacements[:, body.top, 1], np.asarray(body.nodes[body.top, 0]), level
+    )
+
+
+_SMALLEST = 0.05
+"""Least deflection seen in the runs, over the apex thickness: below it k and kappa are constant to 2 %."""
+
+
+_STEADY = slice(1, 5)
+"""Of the exponents, those that k and kappa are fitted to: 1 to 8."""
+
+
+_DEFLECTIONS, _LOADS = 64, 48
+"""Points of the grids."""
+
+
+class TableGrid(NamedTuple):
+    """x = offset (exp(step i) - 1), i = 0 .. length - 1: even near zero, then in proportion."""
+
+    offset: float
+    step: float
+    length: int
+
+    @classmethod
+    def spanning(cls, most: float, offset: float, length: int) -> TableGrid:
+        """From zero to the most."""
+        return cls(offset, float(np.log1p(most / offset)) / (length - 1), length)
+
+    @property
+    def points(self) -> Floats:
+        """(length,) x."""
+        return np.asarray(self.offset * np.expm1(self.step * np.arange(self.length)))
+
+
+LOADS = TableGrid.spanning(LOAD_RANGE[1], 1e-6, _LOADS)
+"""P/E of the elastic tables."""
+
+
+_FORMAT = "creepkit-one-degree-of-freedom-1"
+
+
+_ARRAYS = ("thicknesses", "curves", "elastic", "redistribution")
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedOrderTables:
+    """Tables of one observed dimple at some thicknesses.
+
+    thicknesses : (rows,) mm. curves : (rows, CURVES, deflections), named in `reduced_step`, on `grid`.
+    elastic : (rows, loads) ln of the elastic deflection, mm, over P/E, on LOADS.
+    redistribution : the numbers named in `reduced_step`.
+    geometry, window : mm, of the dimple (its apex thickness is the nominal one) and of what was observed.
+    """
+
+    thicknesses: Floats
+    curves: Floats
+    elastic: Floats
+    redistribution: Floats
+    grid: TableGrid
+    geometry: DimpleGeometry
+    window: float
+
+    def to_tensors(self) -> tuple[dict[str, Floats], dict[str, Any]]:
+        """Arrays and a JSON-able document from which `from_tensors` makes the same tables without any simulation."""
+        arrays = {name: np.ascontiguousarray(getattr(self, name)) for name in _ARRAYS}
+        return arrays, {
+            "format": _FORMAT, "deflections": list(self.grid), "loads": list(LOADS), "exponents": list(EXPONENTS),
+            "window": self.window, "geometry": asdict(self.geometry),
+        }  # fmt: skip
+
+    @classmethod
+    def from_tensors(cls, arrays: Mapping[str, Any], document: Mapping[str, Any]) -> ReducedOrderTables:
+        """The tables that `to_tensors` wrote; SolveError for any others."""
+        ours = {"format": _FORMAT, "loads": list(LOADS), "exponents": list(EXPONENTS)}
+        for name, value in ours.items():
+            if document.get(name) != value:
+                raise SolveError(
+                    f"tables of a one-degree-of-freedom model: {name} is {document.get(name)}, this creepkit reads "
+                    f"{value}; make them again with 'creepkit reduced-model'"
+                )
+        length = {"clamped": tuple(document["geometry"]["clamped"])}
+        geometry = DimpleGeometry(**{**document["geometry"], **length})
+        offset, step, points = document["deflections"]
+        values = {name: np.asarray(arrays[name], float) for name in _ARRAYS}
+        return cls(
+            **values, grid=TableGrid(offset, step, int(points)), geometry=geometry, window=float(document["window"])
+        )
+
+    def dimple(self, thickness: float) -> DimpleCurves:
+        """The curves of one thickness and their derivatives to it, with a point more at each end."""
+        weights, slopes = self._weights(thickness)
+        curves, changes = (_extended(np.tensordot(w, self.curves, 1)) for w in (weights, slopes))
+        return DimpleCurves(curves, changes, self.redistribution, self.grid.offset, self.grid.step)
+
+    def elastic_deflection(self, load: Floats, thickness: float | Floats) -> tuple[Floats, Floats, Floats]:
+        """Elastic deflection, mm, at P/E (..., loads), with its derivatives to the thickness (...) and to ln(P/E)."""
+        position = np.minimum(np.log1p(load / LOADS.offset) / LOADS.step, LOADS.length - 1.0)
+        weights, changes = (np.expand_dims(np.moveaxis(w, 0, -1), -2) for w in self._weights(thickness))
+        rows = self._elastic_rows(position)
+        deflection = load * np.exp((rows * weights).sum(axis=-1))
+        steeper = (self._elastic_rows(position, 1) * weights).sum(axis=-1)
+        bend = steeper * load / (LOADS.step * (LOADS.offset + load))
+        return deflection, deflection * (rows * changes).sum(axis=-1), deflection * (1.0 + bend)
+
+    @cached_property
+    def _elastic_rows(self) -> CubicSpline:
+        """Splines of the elastic rows over places in LOADS, (..., rows)."""
+        return CubicSpline(np.arange(LOADS.length), self.elastic.T)
+
+    def _weights(self, thickness: float | Floats) -> tuple[Floats, Floats]:
+        """Weights (rows, ...) of the polynomial in ln h through all rows, and their derivatives to h, 1/mm."""
+        known, x = np.log(self.thicknesses), np.log(thickness)
+        values, slopes = np.ones((known.size, *np.shape(x))), np.zeros((known.size, *np.shape(x)))
+        for i, j in product(range(known.size), repeat=2):  # the product rule, factor by factor
+            if i != j:
+                apart = known[i] - known[j]
+                slopes[i] = (slopes[i] * (x - known[j]) + values[i]) / apart
+                values[i] *= (x - known[j]) / apart
+        return values, slopes / thickness
+
+
+def _extended(curves: Floats) -> Floats:
+    """(points + 2, CURVES)."""
+    first, last = 2 * curves[:, :1] - curves[:, 1:2], 2 * curves[:, -1:] - curves[:, -2:-1]
+    return np.ascontiguousarray(np.concatenate([first, curves, last], axis=1).T)
+
+
+def deflection_grid(specimen: Bulge) -> TableGrid:
+    """Deflections of the tables, mm, up to where the dimple has burst."""
+    least = _SMALLEST * specimen.geometry.apex_thickness
+    return TableGrid.spanning(max(specimen.deflection_limit, 2 * least), least, _DEFLECTIONS)
+
+
+@lru_cache(maxsize=64)
+def build_tables(specimen: Bulge, geometry: DimpleGeometry, operator: Observation) -> ReducedOrderTables:
+    """The tables of a dimple as an operator sees it; some seconds of CPU, then kept while the program runs."""
+    grid = deflection_grid(specimen)
+    rows = [_row(runs, grid.points, operator) for runs in offline_simulations(specimen, geometry)]
+    curves, elastic = (np.array(values) for values in zip(*rows, strict=True))
+    heights = np.array(offline_thicknesses(specimen, geometry))
+    curves[:, AMPLITUDE] = redistribution_sizes(grid.points / heights[:, None])
+    return ReducedOrderTables(heights, curves, elastic, REDISTRIBUTION, grid, geometry, operator.window)
+
+
+def _row(runs: tuple[OfflineSimulation, ...], points: Floats, operator: Observation) -> tuple[Floats, Floats]:
+    """Curves and elastic deflections of one thickness from its Norton runs and, last, its elastic one."""
+    outputs = [operator.observe(run.radii, run.profiles) for run in runs]
+    logs = np.array([_log_rate(run, out[:, 0], points) for run, out in zip(runs[:-1], outputs[:-1], strict=True)])
+    stress, growth = _fitted(np.array(EXPONENTS)[_STEADY], logs[_STEADY], points)
+    curves = np.zeros((CURVES, points.size))
+    curves[LOG_STRESS], curves[LOG_GROWTH] = stress, growth
+    for k, n in enumerate(EXPONENTS):
+        curves[RESIDUAL + k] = _filled(logs[k] - growth - n * stress)
+        curves[[WIDTH + k, SHAPE + k]] = _outputs_along(points, outputs[k])
+    curves[ELASTIC_WIDTH : ELASTIC_WIDTH + 2] = _outputs_along(points, outputs[-1])
+    load, deflection = runs[-1].times[1:], outputs[-1][1:, 0]
+    known = CubicSpline(np.log(load), np.log(deflection / load))
+    inside = np.clip(np.log(np.maximum(LOADS.points, load[0])), np.log(load[0]), np.log(load[-1]))
+    return curves, np.asarray(known(inside))
+
+
+def _filled(values: Floats) -> Floats:
+    """Values with what is missing taken from the nearest."""
+    there = np.isfinite(values)
+    if not there.any():
+        return np.zeros_like(values)
+    index = np.arange(values.size)
+    return np.interp(index, index[there], values[there])
+
+
+def _fitted(exponents: Floats, logs: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """ln k and ln kappa, (deflections,), from ln(dD/dt / (A P^n)), (exponents, deflections), NaN where not reached.
+
+    Least squares in n at each deflection; beyond where fewer than two exponents led, the last values go on.
+    """
+    there = np.isfinite(logs)
+    count, n = there.sum(axis=0), np.where(there, exponents[:, None], 0.0)
+    y = np.where(there, logs, 0.0)
+    usable = count >= 2
+    if not usable.any():
+        raise SolveError(
+            f"the dimple did not bulge by {points[1]:g} mm in any trial of its one-degree-of-freedom model; check its "
+            "geometry, or predict with the specimen itself"
+        )
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean_n, mean_y = n.sum(axis=0) / count, y.sum(axis=0) / count
+        spread = np.where(there, n - mean_n, 0.0)
+        slope = (spread * (y - mean_y)).sum(axis=0) / (spread**2).sum(axis=0)
+        level = mean_y - slope * mean_n
+    return _filled(np.where(usable, slope, np.nan)), _filled(np.where(usable, level, np.nan))
+
+
+def _log_rate(run: OfflineSimulation, amplitude: Floats, points: Floats) -> Floats:
+    """ln(dD/dt / (A P^n)) at each deflection, NaN where the run did not get, (deflections,)."""
+    rising = _monotonic(amplitude)
+    rising[np.flatnonzero(rising)[-2:]] = False  # the steps in which a run ends are its worst
+    time = CubicSpline(np.log(amplitude[rising]), np.log(run.times[rising]))
+    reached = (points <= amplitude[rising][-1]) & (
+        points >= max(amplitude[rising][0], points[1], _LEAST_DEFLECTION * points[-1])
+    )
+    x = np.log(np.where(reached, points, amplitude[rising][-1]))
+    slope = time(x, 1)
+    reached &= slope > 0
+    return np.where(reached, x - time(x) - np.log(np.where(reached, slope, 1.0)) - run.level, np.nan)
+
+
+_LEAST_DEFLECTION = 0.008
+"""Least deflection that is used, over the largest: before it stresses have not settled."""
+
+
+def _outputs_along(points: Floats, outputs: Floats) -> Floats:
+    """Width and shape, (2, deflections), at deflections on the way of a run; its end values beyond."""
+    rising = _monotonic(outputs[:, 0])
+    x = np.log(outputs[rising, 0])
+    where = np.log(np.maximum(points, outputs[rising, 0][0]))
+    return np.stack([np.interp(where, x, outputs[rising, k]) for k in (1, 2)])
+
+
+def _monotonic(amplitude: Floats) -> Bools:
+    """(records,) those that lie above all before."""
+    highest = np.maximum.accumulate(np.concatenate([[0.0], amplitude[:-1]]))
+    return np.asarray(amplitude > 1.0005 * highest)
+
+
+_HEADER_KEY = "creepkit"
+
+
+def write_tables(tables: ReducedOrderTables, path: str | Path) -> Path:
+    """Write to a temporary name, then rename: a file is whole or absent."""
+    path = Path(path)
+    arrays, document = tables.to_tensors()
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        temporary.write_bytes(save(arrays, metadata={_HEADER_KEY: json.dumps(document)}))
+        os.replace(temporary, path)
+    except OSError as error:
+        why = f"cannot be written ({error.strerror})"
+        raise SolveError(f"{path}: {why}; choose a file in a folder that exists and has room") from None
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path
+
+
+def read_tables(path: str | Path) -> ReducedOrderTables:
+    """The tables of a file; SolveError says what is wrong with any other."""
+    path = Path(path)
+    if not path.is_file():
+        raise SolveError(f"{path}: there is no such file; give one that creepkit reduced-model wrote")
+    try:
+        with safe_open(path, framework="numpy") as file:
+            message = (file.metadata() or {}).get(_HEADER_KEY, "{}")
+            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (a handle, not a mapping)
+        document = json.loads(message)
+    except (SafetensorError, json.JSONDecodeError):
+        raise SolveError(
+            f"{path}: damaged, or not a file of tables; make it again with 'creepkit reduced-model'"
+        ) from None
+    try:
+        return ReducedOrderTables.from_tensors(arrays, document)
+    except SolveError as error:
+        raise SolveError(f"{path}: {error}") from None

@@ -1,0 +1,342 @@
+"""A material point under prescribed stresses and total strains of its six components.
+
+Outputs are "strain", the equivalent creep strain, "strain_11" to "strain_13", the components of creep strain (of the tensor; elastic strain is added where the history says so), and "stress_11" to "stress_13", MPa. Small strain, isotropic elasticity, creep along the deviator of stress. Derivatives are exact under proportional loading, else central differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+import numpy as np
+
+from creepkit import integration, kernels
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.errors import SolveError
+from creepkit.hookspecs import hookimpl
+from creepkit.records import COMPONENTS, History, NuisanceValues, PointLoading, Prediction, Specimen
+from creepkit.specimens.bar import NUISANCES, STEPS_PER_BREAKPOINT, isothermal_elasticity, predict_with_nuisances
+from creepkit.specimens.run import Run, run_from_outputs
+
+if TYPE_CHECKING:
+    from creepkit.integration.tensor_integration import PointTrajectory
+    from creepkit.integration.tensor_point import ProportionalLoading
+    from creepkit.kernels.interface import CompiledLaw
+    from creepkit.language import CreepLaw
+
+
+if TYPE_CHECKING:
+    from creepkit.language import CreepLaw
+
+
+OUTPUTS = ("strain", *(f"strain_{c}" for c in COMPONENTS), *(f"stress_{c}" for c in COMPONENTS))
+
+
+DIFFERENCE_STEP = 1e-3
+"""Of the central differences in internal parameters, relative where a parameter of linear scale is above one."""
+
+
+DEFAULT_ELASTICITY = (150e3, 0.3)
+"""E, MPa, and nu where stresses alone are prescribed and no elastic data are given: creep does not depend on them."""
+
+
+class PointPrediction(NamedTuple):
+    """One history: values (candidates, frames, outputs), status and end times (candidates,), and derivatives."""
+
+    values: Floats
+    status: Floats
+    ends: Floats
+    jacobian: Floats | None
+
+
+@dataclass(frozen=True)
+class MaterialPoint:
+    """A material point.
+
+    tolerance : relative local error of a step of the integration. strain_limit : equivalent creep strain at which the
+    point has burst. max_steps : cap on the steps of one history, beside those for its frames and each row of its
+    programs.
+    """
+
+    tolerance: float = 1e-5
+    strain_limit: float = 1.0
+    max_steps: int = 2000
+
+    name: ClassVar[str] = "point"
+    title: ClassVar[str] = "Material point under prescribed stresses and strains of any components"
+    outputs: ClassVar[tuple[str, ...]] = OUTPUTS
+    nuisances: ClassVar[tuple[str, ...]] = NUISANCES
+    """Kinds of explicit nuisances that predict() understands."""
+
+    def __post_init__(self) -> None:
+        if not (1e-10 <= self.tolerance <= 1e-2 and 0 < self.strain_limit <= 10 and self.max_steps >= 10):
+            raise SolveError(
+                f"point specimen: tolerance {self.tolerance:g}, strain_limit {self.strain_limit:g}, max_steps "
+                f"{self.max_steps}; allowed are 1e-10 to 1e-2, above 0 up to 10, and 10 or more"
+            )
+
+    def replace(self, **changes: float) -> MaterialPoint:
+        """The same specimen with some fields changed."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+    def predict(
+        self,
+        law: CreepLaw,
+        values: Mapping[str, ArrayLike],
+        histories: Sequence[History],
+        *,
+        jacobian: bool = False,
+        nuisances: NuisanceValues | None = None,
+    ) -> Prediction:
+        """Predict all components of each history at its times, for numbers or (candidates,) values of the parameters.
+
+        nuisances : "temperature" (K above what the history says) and "modulus" (relative change).
+        """
+        predict_plain = partial(self._predict, law)
+        return predict_with_nuisances(predict_plain, values, histories, nuisances, jacobian, specimen=self.name)
+
+    def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> PointRun:
+        """Run one test, keeping all tensors and the states of the law; see PointRun."""
+        return run_material_point(self, law, values, plan)
+
+    def reference_stress(self, history: History) -> Floats:
+        """The von Mises stresses that are prescribed, or would be if nothing crept, MPa."""
+        return elastic_von_mises(_loading(history), None if history.elastic is None else _elastic(history))
+
+    def reference_strain(self, history: History) -> float:
+        """The largest equivalent creep strain that a test reached, about as far as its outputs tell."""
+        for kind in ("strain", "strain_", "stress_"):
+            result = [v[history.used] for name, v in history.outputs.items() if name.startswith(kind)]
+            if result and kind == "stress_":
+                return max(float(np.ptp(v)) for v in result) / _elastic(history)[0]
+            if result:
+                return max(float(np.max(np.abs(v), initial=0.0)) for v in result)
+        return 0.0
+
+    # ---- one history at a time -------------------------------------------------------------------------------------
+
+    def _predict(
+        self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], jacobian: bool
+    ) -> Prediction:
+        kernel = kernels.lower(law, "numba")
+        theta = np.array(kernel.to_internal(values), dtype=float, ndmin=2)
+        steps = DIFFERENCE_STEP * np.array([1.0 if p.scale == "log" else np.inf for p in law.params.values()])
+        steps = np.where(np.isinf(steps), DIFFERENCE_STEP * np.maximum(1.0, np.abs(theta)), steps)
+        parts = [self._rows(kernel, theta, history, steps if jacobian else None) for history in histories]
+        lengths = [h.times.size for h in histories]
+        shape = (len(theta), len(histories), max(lengths, default=0), len(OUTPUTS))
+        shown, changes = np.full(shape, np.nan), np.full((*shape, theta.shape[1]), np.nan) if jacobian else None
+        for k, part in enumerate(parts):
+            shown[:, k, : lengths[k]] = part.values
+            if changes is not None and part.jacobian is not None:
+                changes[:, k, : lengths[k]] = part.jacobian
+        empty = np.zeros((len(theta), 0))
+        return Prediction(
+            values=shown,
+            outputs=OUTPUTS,
+            lengths=np.array(lengths, dtype=np.int64),
+            status=np.stack([p.status for p in parts], axis=1).astype(np.int64) if parts else empty.astype(np.int64),
+            end_times=np.stack([p.ends for p in parts], axis=1) if parts else empty,
+            jacobian=changes,
+            times=tuple(h.times for h in histories),
+        )
+
+    def _rows(self, kernel: CompiledLaw, theta: Floats, history: History, steps: Floats | None) -> PointPrediction:
+        """One history; steps : (candidates, P) of the differences, or None to do without derivatives."""
+        path = _path(history)
+        if path is not None:
+            return self._predict_proportional(path, kernel, theta, history, steps is not None)
+        runs = [self.simulate(kernel, candidate, history) for candidate in theta]
+        return PointPrediction(
+            np.array([point_outputs(run, history) for run in runs]),
+            np.array([float(run.status) for run in runs]),
+            np.array([run.end_time for run in runs]),
+            None
+            if steps is None
+            else np.array([self._differences(kernel, *one, history) for one in zip(theta, steps, strict=True)]),
+        )
+
+    def _predict_proportional(
+        self, path: ProportionalLoading, kernel: CompiledLaw, theta: Floats, history: History, jacobian: bool
+    ) -> PointPrediction:
+        """One history whose stress keeps its direction: what is shown is a straight line in the creep strain."""
+        test = integration.PointTest(path.driving, history.temperature_program(), history.times, path.stiffness)
+        result = integration.integrate(
+            kernel, theta, [test], settings=self._settings(history), jacobian=jacobian, axes=path.axes
+        )
+        stress, stress_derivative = (
+            _imposed(history) + np.outer(path.driving.at(history.times), path.along),
+            -path.stiffness * path.along,
+        )
+        elastic = compliance(_elastic(history)) if history.includes_elastic else np.zeros((6, 6))
+        start = np.concatenate([np.zeros((len(stress), 1)), stress @ elastic.T, stress], axis=1)
+        slope = np.concatenate([[1.0], path.flow + elastic @ stress_derivative, stress_derivative])
+        changes = None if result.jacobian is None else result.jacobian[:, :, None, :] * slope[:, None]
+        values = start + result.strain[..., None] * slope
+        return PointPrediction(values, result.status[:, 0].astype(float), result.end_times[:, 0], changes)
+
+    def simulate(self, kernel: CompiledLaw, theta: Floats, history: History) -> PointTrajectory:
+        """March one candidate, theta (P,) in internal form, through one history in six components."""
+        from creepkit.integration.tensor_integration import integrate_tensor_point, prescribed_strain, prescribed_stress
+        from creepkit.integration.time_discretisation import SDIRK4
+
+        loading = _loading(history)
+        controls = {name: prescribed_stress(p) for name, p in loading.stress.items()}
+        controls |= {name: prescribed_strain(p) for name, p in loading.strain.items()}
+        stress_only = not loading.strain and not history.includes_elastic
+        elastic = DEFAULT_ELASTICITY if stress_only and history.elastic is None else _elastic(history)
+        temperature = history.temperature_program()
+        settings = self._settings(history)
+        return integrate_tensor_point(
+            kernel, theta, elastic, controls, temperature, history.times, settings=settings, tableau=SDIRK4
+        )
+
+    def _differences(self, kernel: CompiledLaw, theta: Floats, steps: Floats, history: History) -> Floats:
+        """Central differences to the internal parameters, (frames, outputs, P); zero where one is switched off."""
+        slopes = np.zeros((history.times.size, len(OUTPUTS), theta.size))
+        for p in np.flatnonzero(np.isfinite(theta)):
+            shift = np.where(np.arange(theta.size) == p, steps, 0.0)
+            up, down = (
+                point_outputs(self.simulate(kernel, end, history), history) for end in (theta + shift, theta - shift)
+            )
+            slopes[:, :, p] = (up - down) / (2 * steps[p])
+        return slopes
+
+    def _settings(self, history: History) -> integration.IntegrationSettings:
+        loading = _loading(history)
+        programs = [*loading.stress.values(), *loading.strain.values(), history.temperature_program()]
+        breaks = sum(program.times.size - 1 for program in programs)
+        most = int(self.max_steps) + history.times.size + STEPS_PER_BREAKPOINT * breaks
+        return integration.IntegrationSettings(rtol=self.tolerance, strain_limit=self.strain_limit, max_steps=most)
+
+
+def _loading(history: History) -> PointLoading:
+    if isinstance(history.loading, PointLoading):
+        return history.loading
+    where = history.source or f"history '{history.name}'"
+    raise SolveError(
+        f"{where}: a material point is loaded by components, found {history.loading.quantity}; "
+        'use PointLoading(stress={"11": 100})'
+    )
+
+
+@lru_cache(maxsize=4096)
+def _path(history: History) -> ProportionalLoading | None:
+    from creepkit.integration.tensor_point import proportional_loading
+
+    loading = _loading(history)
+    return proportional_loading(loading, float(history.times[-1]), _elastic(history) if loading.strain else None)
+
+
+def _elastic(history: History) -> tuple[float, float]:
+    return isothermal_elasticity(history, "point")
+
+
+def _imposed(history: History) -> Floats:
+    """(frames, 6) prescribed stresses, MPa; zero where none is."""
+    stress = _loading(history).stress
+    zero = np.zeros(history.times.size)
+    return np.stack([stress[c].at(history.times) if c in stress else zero for c in COMPONENTS], axis=-1)
+
+
+def point_outputs(run: PointTrajectory, history: History) -> Floats:
+    """The outputs of a driven point, (frames, outputs), NaN after its end."""
+    strains = run.strain if history.includes_elastic else run.creep_strain
+    rows = np.concatenate([run.equivalent[:, None], strains, run.stress], axis=1)
+    shown = np.full((history.times.size, len(OUTPUTS)), np.nan)
+    shown[: len(rows)] = rows
+    return shown
+
+
+@hookimpl
+def creepkit_specimens() -> list[Specimen]:
+    """The material point with its default settings."""
+    return [MaterialPoint()]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PointRun(Run):
+    """A simulated material point, at the times of the run.
+
+    stress, total_strain, creep_strain : (times, 6) MPa and tensor strains, in the order 11, 22, 33, 12, 23, 13; the
+        total strain is NaN without elastic data. equivalent : (times,) equivalent creep strain.
+    states : {name: (times,)} internal variables of the law.
+
+    Its outputs leave out the components that stay zero.
+    """
+
+    stress: Floats = field(repr=False)
+    total_strain: Floats = field(repr=False)
+    creep_strain: Floats = field(repr=False)
+    equivalent: Floats = field(repr=False)
+    states: Mapping[str, Floats] = field(repr=False)
+
+    @property
+    def mises(self) -> Floats:
+        """The von Mises stress, (times,) MPa."""
+        deviator = self.stress - self.stress[:, :3].mean(axis=1)[:, None] * np.array([1, 1, 1, 0, 0, 0])
+        return np.asarray(np.sqrt(1.5 * (deviator**2 @ np.array([1, 1, 1, 2, 2, 2]))))
+
+
+def run_material_point(specimen: MaterialPoint, law: CreepLaw, values: Mapping[str, float], plan: History) -> PointRun:
+    """Simulate one test and keep all of it."""
+    kernel = kernels.lower(law, "numba")
+    result = specimen.simulate(kernel, kernel.to_internal(law.values(values))[0], plan)
+    rows = point_outputs(result, plan)
+    shown_columns = [k for k, column in enumerate(rows.T) if k == 0 or np.nanmax(np.abs(column), initial=0.0) > 0.0]
+    names = [OUTPUTS[k] for k in shown_columns]
+    output_rows = np.searchsorted(result.times, plan.times[plan.times <= result.end_time])
+    total = result.strain if plan.elastic is not None else np.full_like(result.strain, np.nan)
+    states = {symbol.name: result.states[output_rows, k] for k, symbol in enumerate(law.states)}
+    return run_from_outputs(
+        PointRun,
+        plan,
+        names,
+        rows[:, shown_columns],
+        result.status,
+        result.end_time,
+        result.reason,
+        stress=result.stress[output_rows],
+        total_strain=total[output_rows],
+        creep_strain=result.creep_strain[output_rows],
+        equivalent=result.equivalent[output_rows],
+        states=states,
+    )
+
+
+_SHEAR_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+
+
+def compliance(elastic: tuple[float, float]) -> Floats:
+    """(6, 6) tensor strains from stresses, 1/MPa; elastic : E, MPa, and nu."""
+    E, nu = elastic
+    matrix = (1.0 + nu) / E * np.eye(6)
+    matrix[:3, :3] -= nu / E
+    return matrix
+
+
+def elastic_von_mises(loading: PointLoading, elastic: tuple[float, float] | None) -> Floats:
+    """The von Mises stresses above zero at the breakpoints of a loading, if nothing crept, (levels,) MPa."""
+    marks = np.unique(np.concatenate([p.times for p in (*loading.stress.values(), *loading.strain.values())]))
+    stress = np.zeros((marks.size, 6))
+    for name, program in loading.stress.items():
+        stress[:, COMPONENTS.index(name)] = program.at(marks)
+    if loading.strain:
+        if elastic is None:
+            raise SolveError(
+                "a material point under prescribed strain needs elastic data; set elastic=Elastic(E=150e3)"
+            )
+        strain_controlled = [COMPONENTS.index(name) for name in loading.strain]
+        flexibility = compliance(elastic)
+        wanted = (
+            np.stack([p.at(marks) for p in loading.strain.values()], axis=-1)
+            - stress @ flexibility[strain_controlled].T
+        )
+        stress[:, strain_controlled] = np.linalg.solve(
+            flexibility[np.ix_(strain_controlled, strain_controlled)], wanted.T
+        ).T
+    deviator = stress - stress[:, :3].mean(axis=1)[:, None] * np.array([1, 1, 1, 0, 0, 0])
+    levels = np.unique(np.sqrt(1.5 * (deviator**2 @ _SHEAR_WEIGHTS)))
+    return np.asarray(levels[levels > 0])

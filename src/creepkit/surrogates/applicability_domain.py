@@ -1,0 +1,129 @@
+"""The applicability domain of a surrogate: how far inputs lie from the training rows.
+
+A row of inputs is inside when each stands within the range of the training rows (with a margin) and the
+row lies no farther from their middle than the farthest training row as the others see it: Mahalanobis distance, whose
+leave-one-out value has a closed form. The range catches one input that leaves its range, the distance a combination that
+never occurred (a coefficient and an exponent that between them make no creep). What never varied in training may not
+vary at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Bools, Floats
+from creepkit.errors import SurrogateError
+
+DEFAULT_MARGIN = 0.01
+"""Share of an input's range by which it may leave it, unless more is forgiven."""
+
+
+LEAST_VARIANCE = 1e-9
+"""Variance of a standardised direction below which it never varied."""
+
+
+INPUTS_NAMED = 3
+"""Inputs named when a row is outside."""
+
+
+ARRAY_FIELDS = ("low", "high", "margin", "mean", "scale", "whitening")
+
+
+@dataclass(frozen=True, eq=False)
+class ApplicabilityDomain:
+    """Where training rows lie.
+
+    names : of the inputs. low, high : their ranges; forgiven : share of it by which each may leave it; mean, scale :
+    their middle and deviation, (inputs,) each. whitening : (inputs, directions), standardised inputs to independent
+    ones; limit : largest distance inside.
+    """
+
+    names: tuple[str, ...]
+    low: Floats
+    high: Floats
+    margin: Floats
+    mean: Floats
+    scale: Floats
+    whitening: Floats
+    limit: float
+
+    @classmethod
+    def from_rows(cls, names: Sequence[str], rows: Floats, margin: ArrayLike = DEFAULT_MARGIN) -> ApplicabilityDomain:
+        """The domain of training rows, (n, inputs); NaN, an input that is not there, counts nowhere."""
+        rows = np.array(rows, float)
+        finite = np.isfinite(rows)
+        rows[:, ~finite.any(axis=0)] = 0.0
+        mean, low, high = (f(rows, axis=0) for f in (np.nanmean, np.nanmin, np.nanmax))
+        rows = np.where(np.isnan(rows), mean, rows)
+        deviation = rows.std(axis=0)
+        scale = np.where(deviation > 1e-6 * np.maximum(np.abs(mean), 1e-300), deviation, np.maximum(np.abs(mean), 1.0))
+        standard = (rows - mean) / scale
+        variance, axes = np.linalg.eigh(np.cov(standard, rowvar=False, ddof=1).reshape(len(names), len(names)))
+        whitening = axes / np.sqrt(np.maximum(variance, LEAST_VARIANCE))
+        square = ((standard @ whitening) ** 2).sum(axis=1)
+        limit = float(np.sqrt(_leave_one_out_distance(square, len(rows)).max()))
+        margins = np.broadcast_to(np.asarray(margin, float), low.shape).copy()
+        return cls(tuple(names), low, high, margins, mean, scale, whitening, limit)
+
+    def distance(self, rows: Floats) -> Floats:
+        """How far rows (..., inputs) lie out, (...): up to 1 is inside; NaN, an input that is not there, is not far."""
+        rows = np.where(np.isnan(rows), self.mean, rows)
+        mahalanobis = np.sqrt((((rows - self.mean) / self.scale @ self.whitening) ** 2).sum(axis=-1)) / self.limit
+        return np.asarray(np.maximum(mahalanobis, 1.0 + self._beyond_margin(rows).max(axis=-1, initial=-1.0)))
+
+    def outside(self, rows: Floats) -> Bools:
+        """Which rows (..., inputs) lie outside, (...)."""
+        return np.asarray(self.distance(rows) > 1.0)
+
+    def excess(self, rows: Floats) -> Floats:
+        """By what share of its training range each input leaves it, (..., inputs); negative inside."""
+        width = np.where(self.high > self.low, self.high - self.low, 1e-6 * self.scale)
+        return np.asarray(np.maximum(self.low - rows, rows - self.high) / width)
+
+    def _beyond_margin(self, rows: Floats) -> Floats:
+        return self.excess(rows) - self.margin
+
+    def reason(self, row: Floats) -> str:
+        """Why one row is outside, in words; "" inside."""
+        row = np.asarray(row, float)
+        if not self.outside(row):
+            return ""
+        excess = self._beyond_margin(row)
+        farthest = [k for k in np.argsort(-excess) if excess[k] > 0][:INPUTS_NAMED]
+        descriptions = [
+            f"{self.names[k]} = {row[k]:.4g} (trained on {self.low[k]:.4g} to {self.high[k]:.4g})" for k in farthest
+        ]
+        return ", ".join(descriptions) or "a combination of inputs far from those of the training"
+
+    def document(self) -> dict[str, Any]:
+        """The domain as JSON-able data."""
+        arrays = {name: getattr(self, name).tolist() for name in ARRAY_FIELDS}
+        return {"names": list(self.names), "limit": self.limit if np.isfinite(self.limit) else None, **arrays}
+
+    @classmethod
+    def from_document(cls, data: Mapping[str, Any]) -> ApplicabilityDomain:
+        """The domain that `document` wrote."""
+        try:
+            names, limit = tuple(str(n) for n in data["names"]), data["limit"]
+            arrays = {name: np.array(data[name], float) for name in ARRAY_FIELDS}
+            domain = cls(names, **arrays, limit=np.inf if limit is None else float(limit))
+        except (KeyError, TypeError, ValueError):
+            raise SurrogateError("the domain in the header of this surrogate is damaged; train it again") from None
+        if any(a.shape[0] != len(names) for a in arrays.values()):
+            raise SurrogateError("the domain in the header of this surrogate is damaged; train it again")
+        return domain
+
+
+def _leave_one_out_distance(square: Floats, n: int) -> Floats:
+    """Squared distance of each row from the others, given that from all n with their covariance.
+
+    Removing row i moves the mean by (x_i - m)/(n - 1) and the scatter by n/(n - 1) (x_i - m)(x_i - m)'; Sherman and
+    Morrison give the rest.
+    """
+    denominator = (n - 1) - n / (n - 1) * square
+    distance_squared = (n / (n - 1)) ** 2 * (n - 2) * square / np.maximum(denominator, 1e-300)
+    return np.asarray(np.where(denominator > 1e-9 * n, distance_squared, np.inf))

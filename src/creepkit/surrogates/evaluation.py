@@ -1,0 +1,223 @@
+"""Evaluation of surrogates against data: Eq. (4) of the paper, MSE, MAE, R2, and the largest errors of whole histories.
+
+Eq. (4): O^i is the vector of outputs at the i-th time, each divided by its standard deviation over the training rows; its mean is taken over samples at the i-th time; squares are summed over samples, times and outputs, numerator and denominator separately. Frames after the end of a history are excluded. For a single output at a single time it is 1 - R2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from creepkit.arrays import Bools, Floats, Ints
+from creepkit.dataset.dataset import first_difference
+from creepkit.errors import DatasetError
+from creepkit.specimens.documents import specimen_to_json
+from creepkit.surrogates.recipe import SampleTensors, SurrogateMetadata, SurrogateModule
+from creepkit.surrogates.surrogate import Surrogate
+from creepkit.surrogates.training_loop import dataset_fingerprint, output_deviation, trainable_samples, training_split
+
+if TYPE_CHECKING:
+    from creepkit.sampling.conditions import TimeGrid
+
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+
+
+PAPER_EVALUATION_TIMES = (7_500.0, 22_500.0, 37_500.0)
+"""s, at which Fig. 4 looks; other lengths of tests are looked at after the same shares of twelve hours."""
+
+
+PAPER_TEST_DURATION = 43_200.0
+
+
+WORST_COUNT = 10
+
+
+@dataclass(frozen=True, eq=False)
+class PredictionComparison:
+    """What a network predicts of samples, and what is true.
+
+    times : (n, frames) s. true, predicted : (n, frames, outputs). mask : (n, frames) which frames are data.
+    scale : (outputs,) standard deviation of each over the training rows. index : (n,) the samples' numbers in their
+    design.
+    """
+
+    times: Floats
+    true: Floats
+    predicted: Floats
+    mask: Bools
+    outputs: tuple[str, ...]
+    scale: Floats
+    index: Ints
+
+    def at_time(self, time: float) -> tuple[Floats, Floats]:
+        """True and predicted outputs at a time, (samples that last so long, outputs), linear between frames."""
+        last = np.where(self.mask, self.times, -np.inf).max(axis=1)
+        rows = [k for k in np.flatnonzero(last >= time) if self.times[k, self.mask[k]][0] <= time]
+        values = [np.stack([_interpolated(time, self.times[k], v[k], self.mask[k]) for k in rows]) if rows else
+                  np.zeros((0, len(self.outputs))) for v in (self.true, self.predicted)]  # fmt: skip
+        return values[0], values[1]
+
+    def largest_errors(self) -> Floats:
+        """(n, outputs) largest absolute error of each history."""
+        return np.asarray(np.where(self.mask[..., None], np.abs(self.predicted - self.true), 0.0).max(axis=1))
+
+
+def _interpolated(time: float, times: Floats, values: Floats, mask: Bools) -> Floats:
+    return np.array([np.interp(time, times[mask], column[mask]) for column in values.T])
+
+
+def relative_squared_error(true: Floats, predicted: Floats, mask: Bools, scale: Floats | None = None) -> float:
+    """Eq. (4) over the outputs together: (n, frames, outputs) each, mask (n, frames), scale (outputs,)."""
+    scale = np.ones(true.shape[-1]) if scale is None else scale
+    error_squares, deviation_squares = (
+        _sum_of_squares(v / scale, mask) for v in (predicted - true, deviations_from_mean(true, mask))
+    )
+    return float(error_squares.sum() / deviation_squares.sum()) if deviation_squares.sum() > 0 else float("nan")
+
+
+def deviations_from_mean(true: Floats, mask: Bools) -> Floats:
+    """True outputs less their mean over samples at each time, (n, frames, outputs)."""
+    count = np.maximum(mask.sum(axis=0), 1)[:, None]
+    mean = np.where(mask[..., None], true, 0.0).sum(axis=0) / count
+    return np.asarray(true - mean)
+
+
+def _sum_of_squares(values: Floats, mask: Bools) -> Floats:
+    return np.asarray((np.where(mask[..., None], values, 0.0) ** 2).sum(axis=(0, 1)))
+
+
+def error_metrics(true: Floats, predicted: Floats, mask: Bools) -> dict[str, float]:
+    """RSE, MSE, MAE and R2 of one output: (n, frames) each."""
+    residuals, true_values = (predicted - true)[mask], true[mask]
+    total_squares = float(((true_values - true_values.mean()) ** 2).sum()) if true_values.size else 0.0
+    return {
+        "rse": relative_squared_error(true[..., None], predicted[..., None], mask),
+        "mse": float((residuals**2).mean()) if true_values.size else float("nan"),
+        "mae": float(np.abs(residuals).mean()) if true_values.size else float("nan"),
+        "r2": 1.0 - float((residuals**2).sum()) / total_squares if total_squares > 0 else float("nan"),
+    }
+
+
+def comparison_metrics(comparison: PredictionComparison, times: Sequence[float]) -> dict[str, Any]:
+    """Everything that is told of a network: {"loss", "outputs", "times", "worst", "samples"}; NaN becomes None."""
+    largest = comparison.largest_errors()
+    outputs = {}
+    for k, name in enumerate(comparison.outputs):
+        output_metrics = error_metrics(comparison.true[..., k], comparison.predicted[..., k], comparison.mask)
+        quantiles = np.quantile(largest[:, k], (0.5, 0.95))
+        outputs[name] = {**output_metrics, "largest_median": float(quantiles[0]), "largest_p95": float(quantiles[1])}
+    metrics = {
+        "loss": relative_squared_error(comparison.true, comparison.predicted, comparison.mask, comparison.scale),
+        "samples": len(comparison.true),
+        "outputs": outputs,
+        "times": {f"{time:g}": _metrics_at_time(comparison, time) for time in times},
+        "worst": worst_histories(comparison, largest),
+    }
+    result: dict[str, Any] = _without_nan(metrics)
+    return result
+
+
+def _metrics_at_time(comparison: PredictionComparison, time: float) -> dict[str, dict[str, float]]:
+    true, predicted = comparison.at_time(time)
+    mask = np.ones((len(true), 1), bool)
+    return {
+        name: error_metrics(true[:, k : k + 1], predicted[:, k : k + 1], mask)
+        for k, name in enumerate(comparison.outputs)
+    }
+
+
+def worst_histories(comparison: PredictionComparison, largest: Floats) -> list[dict[str, float]]:
+    """The samples with the largest errors of the first output: number in the design, row, error and when."""
+    rows = np.argsort(-largest[:, 0])[:WORST_COUNT]
+    absolute_errors = np.where(comparison.mask, np.abs(comparison.predicted - comparison.true)[..., 0], -1.0)
+    return [
+        {
+            "index": int(comparison.index[k]),
+            "row": int(k),
+            "error": float(largest[k, 0]),
+            "time": float(comparison.times[k, int(absolute_errors[k].argmax())]),
+        }
+        for k in rows
+    ]
+
+
+def evaluation_times(grid: TimeGrid, end: float) -> tuple[float, ...]:
+    """The paper's three times where the tests are as long as the paper's, else the same shares of their length."""
+    last = end if grid.relative else float(grid.values[-1])
+    if np.isclose(last, PAPER_TEST_DURATION):
+        return PAPER_EVALUATION_TIMES
+    return tuple(float(f"{time / PAPER_TEST_DURATION * last:.4g}") for time in PAPER_EVALUATION_TIMES)
+
+
+def _without_nan(value: Any) -> Any:
+    """JSON has no NaN."""
+    if isinstance(value, Mapping):
+        return {k: _without_nan(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(v) for v in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+EVALUATION_BATCH = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """What a surrogate predicts of samples beside what is true, the metrics of it, and the times these look at."""
+
+    comparison: PredictionComparison
+    metrics: dict[str, Any]
+    times: tuple[float, ...]
+
+
+def evaluate(surrogate: Surrogate, data: Dataset) -> Evaluation:
+    """Compare a surrogate with a data set: with the validation rows where it is the one of its training, else all."""
+    data = trainable_samples(data)
+    check_same_kind(surrogate.metadata, data)
+    provenance = surrogate.metadata.provenance
+    samples = surrogate.recipe.sample_tensors(data)
+    all_rows = torch.arange(len(data))
+    rows, scale = all_rows, output_deviation(samples, all_rows)
+    if provenance.get("data") == dataset_fingerprint(data):
+        train, rows = training_split(len(data), surrogate.recipe.training, int(provenance["seed"]))
+        scale = output_deviation(samples, train)
+    comparison = compare_predictions(surrogate.module, samples, data, rows, scale)
+    times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
+    return Evaluation(comparison, comparison_metrics(comparison, times), times)
+
+
+def check_same_kind(metadata: SurrogateMetadata, data: Dataset) -> None:
+    """DatasetError where a data set is not of the kind that a surrogate was trained on."""
+    if not np.array_equal(metadata.grid.values, data.grid.values) or metadata.grid.relative != data.grid.relative:
+        raise DatasetError("the data set has another time grid than the one the surrogate was trained on")
+    specimens = specimen_to_json(metadata.specimen), specimen_to_json(data.specimen)
+    if difference := first_difference(*specimens, "specimen"):
+        raise DatasetError(f"the data set is of another specimen than the surrogate: {difference}")
+    if metadata.outputs != data.outputs:
+        raise DatasetError(f"the data set has the outputs {', '.join(data.outputs)}, not {', '.join(metadata.outputs)}")
+
+
+@torch.no_grad()
+def compare_predictions(
+    module: SurrogateModule, samples: SampleTensors, data: Dataset, rows: Tensor, scale: Tensor
+) -> PredictionComparison:
+    """What a network says of rows of a data set, beside what is true."""
+    module.eval()
+    parts = [module({name: v[part] for name, v in samples.items()}) for part in torch.split(rows, EVALUATION_BATCH)]
+    row_numbers = rows.numpy()
+    return PredictionComparison(
+        times=np.stack([data.times(int(k)) for k in row_numbers]),
+        true=samples["targets"][rows].double().numpy(),
+        predicted=torch.cat(parts).double().numpy(),
+        mask=samples["mask"][rows].numpy(),
+        outputs=data.outputs,
+        scale=scale.numpy(),
+        index=data.index[row_numbers],
+    )

@@ -1,0 +1,420 @@
+"""ParameterGru: the surrogate of one law as in the paper, with optional improvements at the same size, and its predictor."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from creepkit.arrays import ArrayLike, Floats, Ints
+from creepkit.errors import DatasetError, SurrogateError, nearest
+from creepkit.records import History, NuisanceValues, Prediction, Status
+from creepkit.surrogates.applicability_domain import ApplicabilityDomain
+from creepkit.surrogates.parameter_inputs import (
+    CONSTANT_INPUTS,
+    SERIES_INPUTS,
+    LawInputs,
+    LoadHistoryInputs,
+    complete_parameters,
+    hold_last_value,
+    screening_model_of,
+)
+from creepkit.surrogates.parameter_network import ParameterModule, RecurrentCell, recurrent_with_derivatives
+from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, SurrogateModule, Training
+from creepkit.surrogates.surrogate import (
+    Surrogate,
+    check_applicable,
+    interpolation_weights,
+    observation_derivative,
+    observed_outputs,
+    prediction_frames,
+)
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+    from creepkit.surrogates.surrogate import Surrogate
+
+
+if TYPE_CHECKING:
+    from creepkit.language import CreepLaw
+
+
+@dataclass(frozen=True)
+class ParameterGru:
+    """A recurrent network that sees a law's parameters and the load: the paper's, at its defaults.
+
+    hidden, layers, cell : of the network; cell "gru" or "lstm".
+    inputs : what is seen at each frame, of "load" (at the frame, all that the paper's sees), "mean_load" (since the
+        frame before: it tells when between two frames the load jumped), "time" and "step". () is "load" alone, and for
+        grids that stretch with the test "load", "mean_load", "time" and "step".
+    target : "value" of the first output, or its "log".
+    base : "none"; or "one-dof": the specimen's cheap stand-in predicts the first output, and the network corrects the
+        logarithm of it. Derivatives are then left to differences.
+    """
+
+    hidden: int = 128
+    layers: int = 3
+    cell: RecurrentCell = "gru"
+    inputs: tuple[str, ...] = ()
+    target: Literal["value", "log"] = "value"
+    base: Literal["none", "one-dof"] = "none"
+    training: Training = field(default_factory=Training)
+
+    kind: ClassVar[str] = "parameter-gru"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inputs", tuple(self.inputs))
+        for name, largest in (("hidden", 4096), ("layers", 32)):
+            value = getattr(self, name)
+            if value != int(value) or not 1 <= value <= largest:
+                raise SurrogateError(f"ParameterGru: {name} is {value}; allowed are whole numbers from 1 to {largest}")
+        choices = {"cell": ("gru", "lstm"), "target": ("value", "log"), "base": ("none", "one-dof")}
+        for name, allowed in choices.items():
+            if getattr(self, name) not in allowed:
+                raise SurrogateError(
+                    f"ParameterGru: {name} is '{getattr(self, name)}'; allowed are {', '.join(allowed)}"
+                )
+        for name in self.inputs:
+            if name not in SERIES_INPUTS:
+                raise SurrogateError(f"ParameterGru: there is no input '{name}': {nearest(name, SERIES_INPUTS)}")
+
+    # ---- what the trainer asks -------------------------------------------------------------------------------------
+
+    def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:
+        """Tensors of a data set: constants, series, targets, mask, base, and "domain" for the guard."""
+        law, history_inputs = LawInputs(data.law), self._history_inputs(data)
+        mask = np.asarray(np.isfinite(data.values).all(axis=-1))
+        constants, series, domain_rows = _test_inputs(data, history_inputs, progress)
+        rows = law.input_rows(law.internal_rows(data.parameters))
+        arrays = {
+            "constants": np.concatenate([rows, constants], axis=1),
+            "series": series,
+            "targets": np.where(mask[..., None], data.values, 0.0),
+        }
+        if self.base != "none":
+            arrays["base"] = base_outputs(data, progress)
+        tensors = {name: torch.from_numpy(np.asarray(v, np.float32)) for name, v in arrays.items()}
+        domain = np.concatenate([rows, domain_rows], axis=1)
+        return {**tensors, "mask": torch.from_numpy(mask), "domain": torch.from_numpy(domain)}
+
+    def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
+        """A fresh network with the scales of the training rows."""
+        sizes = samples["constants"].shape[-1], samples["series"].shape[-1], len(data.outputs)
+        return self._network(sizes).with_scales(samples, train)
+
+    def metadata(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateMetadata:
+        """Scales by name, the domain, and what was constant."""
+        history_inputs, law = self._history_inputs(data), LawInputs(data.law)
+        names = (*law.names, *history_inputs.constants)
+        module = self.module(data, samples, train)
+        assert isinstance(module, ParameterModule)
+        series = (*history_inputs.series, *(["ln base"] if self.base != "none" else []))
+        scaling = {
+            "inputs": _scale_pairs(names, module.constants),
+            "series": _scale_pairs(series, module.series),
+            "outputs": _scale_pairs(data.outputs, module.targets),
+        }
+        domain_names = (*law.names, *history_inputs.domain_names(data.planned_test(0)))
+        constant_names = [n for n, c in zip(names, samples["constants"][train].T, strict=True) if _is_constant(c)]
+        constant_names = [n for n in constant_names if not n.endswith(" is off")]
+        notes = (
+            (f"constant in training, so that nothing is known beyond: {', '.join(constant_names)}",)
+            if constant_names
+            else ()
+        )
+        domain = ApplicabilityDomain.from_rows(domain_names, samples["domain"][train].numpy())
+        return SurrogateMetadata.from_dataset(data, scaling=scaling, domain=domain, notes=notes)
+
+    def empty_module(self, metadata: SurrogateMetadata) -> SurrogateModule:
+        """A network for the weights of a file."""
+        series = len(metadata.scaling["series"]) - (self.base != "none")
+        return self._network((len(metadata.scaling["inputs"]), series, len(metadata.outputs)))
+
+    def surrogate(self, module: SurrogateModule, metadata: SurrogateMetadata) -> Surrogate:
+        """The network as a predictor."""
+        return ParameterSurrogate(self, module, metadata)
+
+    # ---- parts -----------------------------------------------------------------------------------------------------
+
+    def series_inputs(self, relative: bool) -> tuple[str, ...]:
+        """What is seen at each frame."""
+        return self.inputs or (SERIES_INPUTS if relative else SERIES_INPUTS[:1])
+
+    def _history_inputs(self, data: Dataset) -> LoadHistoryInputs:
+        return load_history_inputs(self, data.specimen, data.condition_names, data.grid.relative)
+
+    def _network(self, sizes: tuple[int, int, int]) -> ParameterModule:
+        log, based = self.target == "log", self.base != "none"
+        return ParameterModule(sizes, self.hidden, self.layers, self.cell, logarithm=log, corrects_base=based)
+
+
+def load_history_inputs(
+    recipe: ParameterGru, specimen: Any, conditions: tuple[str, ...], relative: bool
+) -> LoadHistoryInputs:
+    """The inputs that tests give: what of CONSTANTS was varied, and the recipe's series."""
+    return LoadHistoryInputs(
+        specimen, tuple(n for n in CONSTANT_INPUTS if n in conditions), recipe.series_inputs(relative), relative
+    )
+
+
+def base_outputs(data: Dataset, progress: ProgressCallback | None = None) -> Floats:
+    """(n, frames) what the specimen's stand-in predicts of the first output; its last value after its end."""
+    reduced_model = screening_model_of(data.specimen)
+    base = np.empty(data.values.shape[:2])
+    for k in range(len(data)):
+        plan = data.planned_test(k).replace(times=data.times(k))
+        prediction = reduced_model.predict(data.law, data.values_of(k), [plan])
+        base[k] = hold_last_value(prediction.values[0, 0, :, prediction.outputs.index(data.outputs[0])])
+        if progress is not None:
+            progress("base", k + 1, len(data), "")
+    return base
+
+
+def _test_inputs(
+    data: Dataset, history_inputs: LoadHistoryInputs, progress: ProgressCallback | None
+) -> tuple[Floats, ...]:
+    """Constants (n, C), series (n, frames, S) and what the guard sees (n, ...) of all tests."""
+    parts = []
+    for k in range(len(data)):
+        plan, times = data.planned_test(k), data.times(k)
+        parts.append(
+            (
+                history_inputs.constant_values(plan),
+                history_inputs.series_values(plan, times),
+                history_inputs.domain_inputs(plan, times),
+            )
+        )
+        if progress is not None and (k + 1) % 1000 == 0:
+            progress("inputs", k + 1, len(data), "")
+    constants, series, domain_rows = (np.stack(part) for part in zip(*parts, strict=True))
+    if not np.isfinite(series).all():
+        raise DatasetError("the load of some sample of this data set is not a number; the file is damaged")
+    return constants, series, domain_rows
+
+
+def _scale_pairs(names: tuple[str, ...], scale: Any) -> dict[str, list[float]]:
+    means, deviations = scale.mean.tolist(), scale.deviation.tolist()
+    return {name: [m, d] for name, m, d in zip(names, means, deviations, strict=True)}
+
+
+def _is_constant(column: Tensor) -> bool:
+    finite = column[~column.isnan()]
+    return not len(finite) or bool((finite - finite[0]).abs().max() <= 1e-6 * finite.abs().max())
+
+
+NUISANCE_OF_INPUT = {"modulus": "modulus", "apex_thickness": "thickness", "temperature": "temperature"}
+"""{input: the nuisance that moves it}."""
+
+
+BATCH_NUMBERS = 2**24
+"""Numbers in the inputs of a batch."""
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkQuery:
+    """What is asked of the network: candidates x tests.
+
+    theta : (candidates, parameters) internal. rows : (candidates, columns) of the law, as the network sees them.
+    numbers : (candidates, tests, constants). series : (tests, frames, series). base : (candidates, tests, frames).
+    slopes : {effect: (candidates, tests, constants)} derivatives of the numbers.
+    """
+
+    theta: Floats
+    law_rows: Floats
+    constants: Floats
+    series: Floats
+    base: Floats | None
+    derivatives: Mapping[str, Floats]
+
+    def batch(self, candidates: slice) -> SampleTensors:
+        """Some candidates, each with every test: what the module eats, a row for each pair."""
+        constants = self.constants[candidates]
+        count, tests = constants.shape[:2]
+        rows = np.repeat(self.law_rows[candidates], tests, axis=0)
+        arrays = {
+            "constants": np.concatenate([rows, constants.reshape(count * tests, -1)], axis=1),
+            "series": np.tile(self.series, (count, 1, 1)),
+        }
+        if self.base is not None:
+            arrays["base"] = self.base[candidates].reshape(count * tests, -1)
+        return {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
+
+
+class ParameterSurrogate(Surrogate):
+    """The network on the frames it was trained at, and between them linear in time."""
+
+    recipe: ParameterGru
+
+    @property
+    def nuisances(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The nuisances whose inputs were varied."""
+        return tuple(NUISANCE_OF_INPUT[name] for name in self._history_inputs.constants)
+
+    def predict(
+        self,
+        law: CreepLaw,
+        values: Mapping[str, ArrayLike],
+        histories: Sequence[History],
+        *,
+        jacobian: bool = False,
+        nuisances: NuisanceValues | None = None,
+    ) -> Prediction:
+        """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
+        nuisances = nuisances or {}
+        check_applicable(self.metadata, histories, nuisances, self.nuisances)
+        parameters = complete_parameters(self.metadata.law, law, values, self._default_values)
+        frames = prediction_frames(self.metadata.grid, histories)
+        query = self._query(parameters, histories, frames, nuisances)
+        positions = [self.metadata.law.names.index(name) for name in law.names]
+        outputs = self._values(query)
+        derivatives = self._derivatives(query, positions) if jacobian and self.recipe.base == "none" else None
+        return self._prediction(query, histories, frames, outputs, derivatives, tuple(nuisances))
+
+    # ---- what the network is asked ---------------------------------------------------------------------------------
+
+    @cached_property
+    def _history_inputs(self) -> LoadHistoryInputs:
+        return load_history_inputs(self.recipe, self.specimen, self.metadata.conditions, self.metadata.grid.relative)
+
+    @cached_property
+    def _law_inputs(self) -> LawInputs:
+        return LawInputs(self.metadata.law)
+
+    @cached_property
+    def _default_values(self) -> dict[str, float]:
+        """Values of parameters whose term is switched off: any will do, the middle of the bounds is inside."""
+        return {name: param.center for name, param in self.metadata.law.table.items()}
+
+    @cached_property
+    def _double_precision(self) -> ParameterModule:
+        """The network in float64: derivatives by differences need the digits."""
+        module = copy.deepcopy(self.module).double()
+        assert isinstance(module, ParameterModule)
+        return module
+
+    def _query(
+        self,
+        values: Mapping[str, Any],
+        histories: Sequence[History],
+        frames: Sequence[Floats],
+        nuisances: NuisanceValues,
+    ) -> NetworkQuery:
+        theta = self._law_inputs.internal(values)
+        count = max([len(theta), *(len(v) for v in nuisances.values())])
+        theta = np.broadcast_to(theta, (count, theta.shape[1]))
+        nuisances = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in nuisances.items()}
+        perturbed = [
+            self._history_inputs.with_nuisances(h, {kind: v[:, k] for kind, v in nuisances.items()}, count)
+            for k, h in enumerate(histories)
+        ]
+        return NetworkQuery(
+            theta=theta,
+            law_rows=self._law_inputs.input_rows(theta),
+            constants=np.stack([numbers for numbers, _ in perturbed], axis=1),
+            series=np.stack([self._history_inputs.series_values(h, t) for h, t in zip(histories, frames, strict=True)]),
+            base=self._base(values, histories, frames, nuisances, count) if self.recipe.base != "none" else None,
+            derivatives={kind: np.stack([slopes[kind] for _, slopes in perturbed], axis=1) for kind in nuisances},
+        )
+
+    def _base(
+        self, values: Mapping[str, Any], histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues,
+        count: int,
+    ) -> Floats:  # fmt: skip
+        """(candidates, tests, frames) what the specimen's stand-in predicts of the first output."""
+        tests = [h.replace(times=t, outputs={}) for h, t in zip(histories, frames, strict=True)]
+        prediction = screening_model_of(self.specimen).predict(self.metadata.law, values, tests, nuisances=nuisances)
+        first = hold_last_value(prediction.values[..., prediction.outputs.index(self.outputs[0])])
+        return np.broadcast_to(first, (count, *first.shape[1:]))
+
+    # ---- what it answers -------------------------------------------------------------------------------------------
+
+    @torch.no_grad()
+    def _values(self, query: NetworkQuery) -> Floats:
+        """(candidates, tests, frames, outputs)."""
+        width = 4 * self._double_precision.network.hidden_size
+        parts = [self._double_precision(query.batch(part)).numpy() for part in _batches(query, width)]
+        return np.concatenate(parts).reshape(*query.constants.shape[:2], *parts[0].shape[1:])
+
+    @torch.no_grad()
+    def _derivatives(self, query: NetworkQuery, positions: Sequence[int]) -> Floats:
+        """(candidates, tests, frames, outputs, directions): to the parameters `own`, then to the nuisances."""
+        width = (len(positions) + len(query.derivatives)) * self._double_precision.network.hidden_size * 4
+        parts = [self._batch_derivatives(query, part, positions) for part in _batches(query, width)]
+        return np.concatenate(parts).reshape(*query.constants.shape[:2], *parts[0].shape[1:])
+
+    def _batch_derivatives(self, query: NetworkQuery, candidates: slice, positions: Sequence[int]) -> Floats:
+        network = self._double_precision
+        inputs = network.standardised_inputs(query.batch(candidates))
+        columns, tests = query.law_rows.shape[1], query.constants.shape[1]
+        directions_in = np.zeros((len(inputs), len(positions) + len(query.derivatives), inputs.shape[2]))
+        law_derivatives = np.repeat(
+            self._law_inputs.derivatives(query.theta[candidates])[:, :, list(positions)], tests, axis=0
+        )
+        directions_in[:, : len(positions), :columns] = np.swapaxes(law_derivatives, 1, 2)
+        constant_columns = slice(columns, columns + query.constants.shape[2])
+        for k, constant_derivatives in enumerate(query.derivatives.values()):
+            directions_in[:, len(positions) + k, constant_columns] = constant_derivatives[candidates].reshape(
+                len(inputs), -1
+            )
+        directions_in[:, :, : constant_columns.stop] /= network.constants.deviation.numpy()
+        directions = torch.from_numpy(directions_in)[:, :, None].expand(-1, -1, inputs.shape[1], -1)
+        state, state_derivatives = recurrent_with_derivatives(network.network, inputs, directions)
+        derivatives = network.decoded_derivatives(network.head(state))[:, None] * (
+            state_derivatives @ network.head.weight.T
+        )
+        return derivatives.movedim(1, -1).numpy()
+
+    def _prediction(
+        self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats], outputs: Floats,
+        derivatives: Floats | None, nuisance_names: tuple[str, ...],
+    ) -> Prediction:  # fmt: skip
+        """At the times of the histories, as their instruments show it."""
+        lengths = np.array([h.times.size for h in histories], dtype=np.int64)
+        shape = (*outputs.shape[:2], int(lengths.max(initial=0)), outputs.shape[3])
+        values = np.full(shape, np.nan)
+        derivative_array = None if derivatives is None else np.full((*shape, derivatives.shape[-1]), np.nan)
+        for k, (history, frame_times) in enumerate(zip(histories, frames, strict=True)):
+            weights = interpolation_weights(frame_times, history.times)
+            interpolated = np.einsum("tf,cfo->cto", weights, outputs[:, k])
+            values[:, k, : lengths[k]] = observed_outputs(self.specimen, history, interpolated)
+            if derivative_array is not None and derivatives is not None:
+                derivative = np.einsum("tf,cfod->ctod", weights, derivatives[:, k])
+                derivative_array[:, k, : lengths[k]] = (
+                    derivative * observation_derivative(self.specimen, history, interpolated)[..., None]
+                )
+        count = 0 if derivative_array is None else derivative_array.shape[-1] - len(nuisance_names)
+        ends = np.broadcast_to([h.times[-1] for h in histories], outputs.shape[:2]).astype(float)
+        return Prediction(
+            values=values, outputs=self.outputs, lengths=lengths, status=self._status(query, histories, frames),
+            end_times=ends, jacobian=None if derivative_array is None else derivative_array[..., :count],
+            times=tuple(h.times for h in histories),
+            nuisance_jacobian={} if derivative_array is None else {kind: derivative_array[..., count + k] for k, kind in enumerate(nuisance_names)},
+        )  # fmt: skip
+
+    def _status(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Ints:
+        """(candidates, tests): complete, or outside the domain."""
+        outside = np.zeros(query.constants.shape[:2], bool)
+        if self.metadata.domain is not None:
+            outside = self.metadata.domain.outside(self._domain_inputs(query, histories, frames))
+        return np.where(outside, int(Status.OUTSIDE_DOMAIN), int(Status.COMPLETE)).astype(np.int64)
+
+    def _domain_inputs(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Floats:
+        """(candidates, tests, inputs) what the guard sees."""
+        count, tests, constants = query.constants.shape
+        test_rows = np.stack([self._history_inputs.domain_inputs(h, t) for h, t in zip(histories, frames, strict=True)])
+        test_summary = np.broadcast_to(test_rows[None, :, constants:], (count, tests, test_rows.shape[1] - constants))
+        rows = np.broadcast_to(query.law_rows[:, None], (count, tests, query.law_rows.shape[1]))
+        return np.concatenate([rows, query.constants, test_summary], axis=2)
+
+
+def _batches(query: NetworkQuery, width: int) -> list[slice]:
+    """Candidates in groups whose largest tensors are not too large."""
+    count, tests = query.constants.shape[:2]
+    step = max(1, BATCH_NUMBERS // (tests * query.series.shape[1] * width))
+    return [slice(first, first + step) for first in range(0, count, step)]

@@ -1,0 +1,293 @@
+"""Inputs of ParameterGru: law parameters, load history, test conditions, and the values of a reduced law.
+
+Parameters on a log scale enter as log10. A coefficient that is switched off (0) has a NaN column, standardised to zero, and an indicator column equal to one. A law that lacks terms of the trained law is predicted with the coefficients of these terms at zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import SurrogateError
+from creepkit.kernels.log_form import log_form
+from creepkit.language import CreepLaw
+from creepkit.records import History, Program, Specimen, SupportsReducedOrderModel
+
+if TYPE_CHECKING:
+    pass
+
+
+CONSTANT_INPUTS = ("modulus", "apex_thickness", "temperature")
+"""Conditions that do not change during a test: MPa, mm, K."""
+
+
+SERIES_INPUTS = ("load", "mean_load", "time", "step")
+"""Inputs at each frame: the load there, its mean since the frame before (MPa), log10 of 1 s + the time, and of 1 s +
+the time since the frame before."""
+
+
+TEMPERATURE_STEP = 0.1
+"""K, by which a modulus is differenced."""
+
+
+JUMP_TOLERANCE = 0.02
+"""Mean deviation of a load from a jump, over its largest value, that is none."""
+
+
+LARGEST_TEMPERATURE_CHANGE = 1.0
+"""K by which the temperature of a test may drift."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadHistoryInputs:
+    """Inputs that tests of one specimen give.
+
+    constants : of CONSTANTS, those that the data set varied. series : of SERIES, those of the recipe. relative :
+    whether frames are at shares of a test's end.
+    """
+
+    specimen: Specimen
+    constants: tuple[str, ...]
+    series: tuple[str, ...]
+    relative: bool = False
+
+    def constant_values(self, history: History) -> Floats:
+        """(constants,) of one test."""
+        return np.array([_constant_input(name, history, self.specimen) for name in self.constants])
+
+    def with_nuisances(
+        self, history: History, nuisances: Mapping[str, Floats], count: int
+    ) -> tuple[Floats, dict[str, Floats]]:
+        """(count, constants) of one test with nuisances, {kind: (count,)}, and {kind: derivatives}; see Nuisance."""
+        values = np.tile(self.constant_values(history), (count, 1))
+        derivatives = {kind: np.zeros_like(values) for kind in nuisances}
+        position = {name: k for k, name in enumerate(self.constants)}
+        if "thickness" in nuisances:
+            values[:, position["apex_thickness"]] = nuisances["thickness"]
+            derivatives["thickness"][:, position["apex_thickness"]] = 1.0
+        if "temperature" in nuisances:
+            temperature_change = nuisances["temperature"]
+            values[:, position["temperature"]] += temperature_change
+            derivatives["temperature"][:, position["temperature"]] = 1.0
+            if "modulus" in position:
+                moduli = [
+                    _modulus_at(history, temperature_change + step)
+                    for step in (0.0, -TEMPERATURE_STEP, TEMPERATURE_STEP)
+                ]
+                values[:, position["modulus"]] = moduli[0]
+                derivatives["temperature"][:, position["modulus"]] = (moduli[2] - moduli[1]) / (2 * TEMPERATURE_STEP)
+        if "modulus" in nuisances:
+            factor, k = 1.0 + nuisances["modulus"], position["modulus"]
+            derivatives["modulus"][:, k] = values[:, k]
+            values[:, k] *= factor
+            if "temperature" in nuisances:
+                derivatives["temperature"][:, k] *= factor
+        return values, derivatives
+
+    def series_values(self, history: History, times: Floats) -> Floats:
+        """(frames, series) at the times of frames, s."""
+        program = history.loading.program()
+        return np.stack([_SERIES_FUNCTIONS[name](program, times) for name in self.series], axis=1)
+
+    def domain_inputs(self, history: History, times: Floats) -> Floats:
+        """What the domain guard sees of a test, named by `domain_names`.
+
+        The constants, and a thickness also where it did not vary; of the load over the frames the value at the first
+        that is loaded, the last, the mean, and how unlike one jump from the first to the last it is; and where grids
+        stretch with the test log10 of its end.
+        """
+        load = _load_after_start(history, times)
+        load_summary = [load[0], load[-1], load.mean(), _deviation_from_jump(load)]
+        fixed_thickness = [apex_thickness_of(history, self.specimen)] if self._has_fixed_thickness else []
+        end = [np.log10(times[-1])] if self.relative else []
+        return np.array([*self.constant_values(history), *fixed_thickness, *load_summary, *end])
+
+    def domain_names(self, history: History) -> tuple[str, ...]:
+        """Of what `domain` gives."""
+        load = history.loading.quantity
+        load_names = (f"first {load}", f"last {load}", f"mean {load}", f"{load} unlike one jump")
+        fixed_names = ("apex_thickness",) if self._has_fixed_thickness else ()
+        return (*self.constants, *fixed_names, *load_names, *(("log10 end_time",) if self.relative else ()))
+
+    @property
+    def _has_fixed_thickness(self) -> bool:
+        geometry = getattr(self.specimen, "geometry", None)
+        return "apex_thickness" not in self.constants and hasattr(geometry, "apex_thickness")
+
+
+def _constant_input(name: str, history: History, specimen: Specimen) -> float:
+    where = history.source or f"history '{history.name}'"
+    temperature = history.temperature_program().values
+    if name in ("modulus", "temperature") and np.ptp(temperature) > LARGEST_TEMPERATURE_CHANGE:
+        raise SurrogateError(
+            f"{where}: its temperature goes from {temperature.min():g} to {temperature.max():g} K; the surrogate was trained at "
+            "temperatures that do not change, use the specimen itself"
+        )
+    if name == "temperature":
+        return float(temperature.mean())
+    if name == "modulus":
+        if history.elastic is None:
+            raise SurrogateError(f"{where}: the surrogate needs the modulus; set elastic=Elastic(E=150e3), in MPa")
+        return float(history.elastic.at(float(temperature.mean())).E)
+    return apex_thickness_of(history, specimen)
+
+
+def _modulus_at(history: History, temperature_changes: Floats) -> Floats:
+    """The modulus, MPa, at the temperature of a test and so many K more."""
+    assert history.elastic is not None  # _constant has complained
+    T = float(history.temperature_program().values.mean())
+    return np.array([float(history.elastic.at(T + float(step)).E) for step in temperature_changes])
+
+
+def apex_thickness_of(history: History, specimen: Specimen) -> float:
+    """The apex thickness of a test, mm: its own, or the specimen's."""
+    geometry: Any = getattr(specimen, "geometry", None)
+    return float(history.geometry.get("apex_thickness", getattr(geometry, "apex_thickness", np.nan)))
+
+
+def _load_after_start(history: History, times: Floats) -> Floats:
+    """The load from the first frame on that is loaded, MPa."""
+    load = history.loading.program().at(times)
+    loaded = np.flatnonzero(load > 0)
+    return load[loaded[0] :] if loaded.size else load
+
+
+def _deviation_from_jump(load: Floats) -> float:
+    """Mean distance of a load from the nearest one that jumps from its first to its last value, over its largest.
+
+    Zero below UNNOTICED: a recorded load is noisy, and a frame may lie on a ramp.
+    """
+    before, after = (np.abs(load - level) for level in (load[0], load[-1]))
+    cost_before = np.concatenate([[0.0], np.cumsum(before)])
+    cost_after = np.concatenate([np.cumsum(after[::-1])[::-1], [0.0]])
+    deviation = float((cost_before + cost_after).min() / load.size / max(float(load.max()), 1e-300))
+    return deviation if deviation > JUMP_TOLERANCE else 0.0
+
+
+def _interval_means(program: Program, times: Floats) -> Floats:
+    """Mean of a program since the time before, (times,); the first since zero, or the value at zero."""
+    knots = np.union1d(program.times, times)
+    after, before = program.at(np.nextafter(knots[:-1], np.inf)), program.at(np.nextafter(knots[1:], -np.inf))
+    integral = np.concatenate([[0.0], np.cumsum(0.5 * (after + before) * np.diff(knots))])
+    steps, increments = (np.diff(v, prepend=0.0) for v in (times, integral[np.searchsorted(knots, times)]))
+    return np.where(steps > 0, increments / np.where(steps > 0, steps, 1.0), program.at(times))
+
+
+_SERIES_FUNCTIONS: dict[str, Callable[[Program, Floats], Floats]] = {
+    "load": lambda program, times: program.at(times),
+    "mean_load": _interval_means,
+    "time": lambda program, times: np.log10(1.0 + times),
+    "step": lambda program, times: np.log10(1.0 + np.diff(times, prepend=0.0)),
+}
+
+
+LN10 = float(np.log(10.0))
+
+
+@dataclass(frozen=True)
+class LawInputs:
+    """The columns that stand for the parameters of one law."""
+
+    law: CreepLaw
+
+    @cached_property
+    def switchable(self) -> tuple[int, ...]:
+        """Positions of the parameters that can be switched off and then have no logarithm."""
+        return tuple(k for k, p in enumerate(self.law.params.values()) if p.scale == "log" and p.off == 0)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Of the columns."""
+        columns = [f"log10 {name}" if p.scale == "log" else name for name, p in self.law.table.items()]
+        return (*columns, *(f"{self.law.names[k]} is off" for k in self.switchable))
+
+    @cached_property
+    def _column_scales(self) -> Floats:
+        """(parameters,) what a column grows by with its internal parameter."""
+        return np.array([1.0 / LN10 if p.scale == "log" else 1.0 for p in self.law.params.values()])
+
+    def internal(self, values: Mapping[str, Any]) -> Floats:
+        """(candidates, parameters) internal, from the author's values; 0 of a coefficient is -inf."""
+        columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[n], float)) for n in self.law.names))
+        return self.internal_rows(np.stack(columns, axis=-1))
+
+    def internal_rows(self, parameters: Floats) -> Floats:
+        """(rows, parameters) internal, from the author's."""
+        theta, on_log_scale = np.array(parameters, float), [p.scale == "log" for p in self.law.params.values()]
+        with np.errstate(divide="ignore"):
+            theta[:, on_log_scale] = np.log(theta[:, on_log_scale])
+        return theta
+
+    def input_rows(self, theta: Floats) -> Floats:
+        """(rows, columns) of internal parameters (rows, parameters)."""
+        off = np.isneginf(theta)
+        return np.concatenate(
+            [np.where(off, np.nan, theta * self._column_scales), off[:, list(self.switchable)]], axis=1
+        )
+
+    def derivatives(self, theta: Floats) -> Floats:
+        """(rows, columns, parameters) derivatives of `rows`; zero where a coefficient is off."""
+        count = theta.shape[1]
+        derivatives = np.zeros((len(theta), len(self.names), count))
+        derivatives[:, range(count), range(count)] = np.where(np.isneginf(theta), 0.0, self._column_scales)
+        return derivatives
+
+
+def complete_parameters(
+    trained: CreepLaw, law: CreepLaw, values: Mapping[str, Any], defaults: Mapping[str, float]
+) -> dict[str, Any]:
+    """Values of the trained law that make it `law` with `values`; SurrogateError where it cannot be that law.
+
+    Terms that `law` lacks are switched off by their coefficients; what else they have stands at `middle`, where it
+    changes nothing.
+    """
+    zero_names = _zero_coefficients(trained, law)
+    missing = {name: 0.0 if name in zero_names else defaults[name] for name in trained.names if name not in law.names}
+    return {**{name: np.asarray(values[name], float) for name in law.names}, **missing}
+
+
+@lru_cache(maxsize=256)
+def _zero_coefficients(trained: CreepLaw, law: CreepLaw) -> frozenset[str]:
+    """Names of the coefficients of the trained law that are zero in `law`."""
+    if law.fingerprint == trained.fingerprint:
+        return frozenset()
+    terms = list(law.terms.values())
+    missing_labels = [label for label, term in trained.terms.items() if term not in terms]
+    is_reduction = all(term in trained.terms.values() for term in terms) and set(law.names) <= set(trained.names)
+    coefficients = [_term_coefficient(trained, label) for label in missing_labels]
+    if not is_reduction or None in coefficients or dict(law.states) != dict(trained.states):
+        raise SurrogateError(
+            f"a surrogate of law '{trained.name}' cannot predict law '{law.name}': it answers for its own law, and for "
+            f"that less some of its terms ({', '.join(trained.terms)}) by {trained.name}.without(...)"
+        )
+    return frozenset(name for name in coefficients if name is not None)
+
+
+def _term_coefficient(law: CreepLaw, label: str) -> str | None:
+    """The parameter that switches a term, and no other, off."""
+    single = law.only(label)
+    for k in log_form(single).coefficients[0]:
+        name = single.names[k]
+        uses = sum(law.symbol(name) in term.free_symbols for term in law.terms.values())
+        if uses == 1 and law.table[name].off == 0:
+            return name
+    return None
+
+
+def screening_model_of(specimen: Any) -> Any:
+    """The specimen's cheap stand-in; SurrogateError where it has none."""
+    if not isinstance(specimen, SupportsReducedOrderModel):
+        raise SurrogateError(f"specimen '{specimen.name}' has no stand-in of one degree of freedom; use base='none'")
+    return specimen.reduced_order_model()
+
+
+def hold_last_value(values: Floats) -> Floats:
+    """Values (..., frames) with their last finite one in the place of NaN after it, and none below zero."""
+    frames = np.where(np.isfinite(values), np.arange(values.shape[-1]), 0)
+    last_finite = np.maximum.accumulate(frames, axis=-1)
+    return np.nan_to_num(np.maximum(np.take_along_axis(values, last_finite, axis=-1), 0.0), nan=0.0)

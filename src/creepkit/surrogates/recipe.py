@@ -1,0 +1,158 @@
+"""Training settings, the network interface, the metadata of a surrogate, and the standardisation of its inputs."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import torch
+from torch import Tensor, nn
+
+from creepkit.errors import SurrogateError
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+    from creepkit.language import CreepLaw
+    from creepkit.records import Specimen
+    from creepkit.sampling.conditions import TimeGrid
+    from creepkit.surrogates.applicability_domain import ApplicabilityDomain
+
+
+SampleTensors: TypeAlias = dict[str, Tensor]
+"""Tensors whose leading axis is the sample. Always there: "targets" (n, frames, outputs), physical, float32, zero where
+there is none; "mask" (n, frames), which frames are data. The rest is the recipe's own: what its module eats."""
+
+
+ProgressCallback: TypeAlias = Callable[[str, int, int, str], None]
+"""Called with (task, parts done, parts in all, what else there is to say)."""
+
+
+@dataclass(frozen=True)
+class Training:
+    """How a network is trained: with Adam, on batches of whole histories.
+
+    epochs : passes over the training rows. batch : histories in a step. rate : Adam's, at the beginning.
+    schedule : of the rate: "constant"; "cosine", down to zero at the last epoch; "plateau", a tenth of it whenever the
+        validation loss has not fallen by a ten-thousandth for `patience` epochs, as the paper has it.
+    early_stop : stop when the validation loss has not fallen for so many epochs; None goes to the end.
+    clip : largest norm of the gradient; None leaves it alone.
+    validation : share of the rows that are set aside, drawn by the seed. samples : rows of the others that are learnt
+    from, the first so many; None takes them all. The rows set aside are the same for every number of samples.
+    """
+
+    epochs: int = 500
+    batch: int = 64
+    rate: float = 1e-3
+    schedule: Literal["plateau", "cosine", "constant"] = "plateau"
+    patience: int = 15
+    early_stop: int | None = None
+    clip: float | None = None
+    validation: float = 0.2
+    samples: int | None = None
+
+    def __post_init__(self) -> None:
+        names = ("epochs", "batch", "patience", "early_stop", "samples")
+        whole = {name: getattr(self, name) for name in names}
+        for name, value in whole.items():
+            if value is not None and (value != int(value) or value < 1):
+                raise SurrogateError(f"training: {name} is {value}; allowed are whole numbers above zero")
+        if self.schedule not in ("plateau", "cosine", "constant"):
+            raise SurrogateError(f"training: schedule is '{self.schedule}'; allowed are plateau, cosine and constant")
+        if not 0 < self.rate <= 1 or not (self.clip is None or self.clip > 0):
+            raise SurrogateError(f"training: rate {self.rate} and clip {self.clip} must be above zero, rate at most 1")
+        if not 0 < self.validation < 1:
+            raise SurrogateError(f"training: validation is {self.validation}; allowed are shares between 0 and 1")
+
+
+class SurrogateModule(nn.Module, ABC):
+    """A network with its scales: from samples to outputs in physical units. Its buffers are saved with its weights."""
+
+    @abstractmethod
+    def forward(self, batch: SampleTensors) -> Tensor:
+        """(rows, frames, outputs) in physical units at the times of the data."""
+
+    @abstractmethod
+    def loss(self, batch: SampleTensors) -> Tensor:
+        """What training makes small: a number, the mean over the rows of the batch."""
+
+    def loss_and_outputs(self, batch: SampleTensors) -> tuple[Tensor, Tensor]:
+        """The loss and the outputs at once; a module may spare itself the second pass."""
+        return self.loss(batch), self(batch)
+
+
+@dataclass(frozen=True, eq=False)
+class SurrogateMetadata:
+    """What a surrogate knows beside its weights; all of it stands in the header of its file.
+
+    law, specimen, outputs, grid : of the data set; a surrogate of one law answers for that law.
+    parameters, conditions : names of the data set's columns.
+    scaling : {input: (mean, standard deviation)}, and of outputs, for people to read; the module holds its own.
+    domain : where the training rows lie, in the inputs that the recipe names.
+    metrics : of the validation rows (see surrogate.metrics). curves : {name: one number an epoch}.
+    provenance : versions, seed, fingerprints, counts, when.
+    notes : what to be wary of, a sentence each.
+    """
+
+    law: CreepLaw
+    specimen: Specimen
+    outputs: tuple[str, ...]
+    grid: TimeGrid
+    parameters: tuple[str, ...]
+    conditions: tuple[str, ...]
+    scaling: Mapping[str, Any] = field(default_factory=dict)
+    domain: ApplicabilityDomain | None = None
+    metrics: Mapping[str, Any] = field(default_factory=dict)
+    curves: Mapping[str, list[float]] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def from_dataset(cls, data: Dataset, **fields: Any) -> SurrogateMetadata:
+        """What a data set says; more : the other fields."""
+        return cls(
+            law=data.law, specimen=data.specimen, outputs=data.outputs, grid=data.grid,
+            parameters=data.parameter_names, conditions=data.condition_names, **fields,
+        )  # fmt: skip
+
+
+CONSTANT_TOLERANCE = 1e-6
+"""A standard deviation below this share of the largest value is rounding: the column is constant."""
+
+
+class Standardisation(nn.Module):
+    """Standardises the last axis; its mean and deviation are buffers, float64, saved with the weights.
+
+    A column that is constant in training is only shifted: the network sees zero, and the domain guard sees others.
+    """
+
+    mean: Tensor
+    deviation: Tensor
+
+    def __init__(self, mean: Tensor, deviation: Tensor) -> None:
+        super().__init__()
+        self.register_buffer("mean", mean.double())
+        self.register_buffer("deviation", deviation.double())
+
+    @classmethod
+    def from_rows(cls, values: Tensor, mask: Tensor | None = None) -> Standardisation:
+        """The scale of columns; values : (..., columns), mask : (...) which rows count. NaN counts nowhere."""
+        rows = (values[mask] if mask is not None else values.reshape(-1, values.shape[-1])).double()
+        mean = torch.nan_to_num(rows.nanmean(dim=0), nan=0.0)
+        deviation = torch.nan_to_num((rows - mean).square().nanmean(dim=0).sqrt(), nan=0.0)
+        constant = deviation <= CONSTANT_TOLERANCE * torch.nan_to_num(rows, nan=0.0).abs().amax(dim=0)
+        return cls(mean, torch.where(constant, 1.0, deviation))
+
+    @classmethod
+    def identity(cls, columns: int) -> Standardisation:
+        """A scale that changes nothing."""
+        return cls(torch.zeros(columns), torch.ones(columns))
+
+    def forward(self, values: Tensor) -> Tensor:
+        """Standardised values."""
+        return (values - self.mean.to(values.dtype)) / self.deviation.to(values.dtype)
+
+    def inverse(self, values: Tensor) -> Tensor:
+        """Physical values of standardised ones."""
+        return values * self.deviation.to(values.dtype) + self.mean.to(values.dtype)

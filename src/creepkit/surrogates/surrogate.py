@@ -1,0 +1,269 @@
+"""Surrogates: trained networks as predictors, and the check that a history is one they apply to."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+import numpy as np
+from torch import Tensor
+
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.errors import SurrogateError
+from creepkit.files import safetensors_files
+from creepkit.language.law_codec import law_to_json
+from creepkit.records import History, NuisanceValues, Prediction, Predictor, Specimen
+from creepkit.report.surrogate import surrogate_text
+from creepkit.sampling.conditions import TimeGrid, test_kind
+from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.specimens.documents import specimen_to_json
+from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, SurrogateModule, Training
+
+if TYPE_CHECKING:
+    from creepkit.language import CreepLaw
+    from creepkit.records import Specimen
+
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+    from creepkit.language import CreepLaw
+    from creepkit.records import Specimen
+    from creepkit.sampling.conditions import TimeGrid
+
+
+CONTROLLED_QUANTITY = {"bulge": "pressure", "uniaxial": "stress"}
+"""What drives the tests of each kind of specimen."""
+
+
+RELATIVE_TOLERANCE = 1e-6
+
+
+def check_applicable(
+    metadata: SurrogateMetadata, histories: Sequence[History], nuisances: Iterable[str], known_nuisances: Sequence[str]
+) -> None:
+    """SurrogateError where a history, or an explicit nuisance, is none that the surrogate knows."""
+    for history in histories:
+        check_history(metadata, history)
+    for kind in nuisances:
+        if kind not in known_nuisances:
+            names = ", ".join(known_nuisances) or "none"
+            raise SurrogateError(f"this surrogate does not know the nuisance '{kind}'; it knows {names}")
+
+
+def check_history(metadata: SurrogateMetadata, history: History) -> None:
+    """SurrogateError where a history is of another kind of test than those of the training."""
+    where, specimen = history.source or f"history '{history.name}'", metadata.specimen
+    quantity = CONTROLLED_QUANTITY[test_kind(specimen)]
+    if history.loading.quantity != quantity:
+        raise SurrogateError(f"{where}: its {history.loading.quantity} is prescribed; the surrogate knows {quantity}")
+    control = getattr(history.loading, "control", None)
+    if control not in (None, "load") and quantity == "stress" and metadata.provenance.get("control", "load") != control:
+        raise SurrogateError(f"{where}: true stress is held, and the surrogate was trained under held loads")
+    last = float(history.times[-1])
+    if not metadata.grid.relative and last > metadata.grid.end * (1 + RELATIVE_TOLERANCE):
+        raise SurrogateError(
+            f"{where}: it lasts {last:g} s, and the surrogate was trained up to {metadata.grid.end:g} s; leave later "
+            "frames out or train on longer tests"
+        )
+    observation = getattr(specimen, "observation", None)
+    if observation is not None and history.operator and history.operator != str(observation):
+        raise SurrogateError(f"{where}: observed by '{history.operator}'; the surrogate was trained on '{observation}'")
+    _check_lengths(where, history, getattr(specimen, "geometry", None))
+
+
+def _check_lengths(where: str, history: History, geometry: Any) -> None:
+    """Lengths but the apex thickness, which the domain guard watches, must be those of the specimen."""
+    for name, value in history.geometry.items():
+        trained = getattr(geometry, name, None)
+        if (
+            name != "apex_thickness"
+            and trained is not None
+            and abs(float(trained) - value) > RELATIVE_TOLERANCE * abs(float(trained))
+        ):
+            raise SurrogateError(f"{where}: {name} is {value:g} mm; the surrogate was trained on {float(trained):g} mm")
+
+
+def prediction_frames(grid: TimeGrid, histories: Sequence[History]) -> list[Floats]:
+    """The frames, s, at which the network is asked for each history: as many for all, as far as the longest needs."""
+    if grid.relative:
+        return [grid.times(float(h.times[-1])) for h in histories]
+    last = max(float(h.times[-1]) for h in histories)
+    count = min(int(np.searchsorted(grid.values, last * (1 - RELATIVE_TOLERANCE))) + 1, grid.values.size)
+    return [grid.values[:count]] * len(histories)
+
+
+def interpolation_weights(frames: Floats, times: Floats) -> Floats:
+    """(times, frames): linear in time between frames, constant before the first and beyond the last."""
+    position = np.interp(times, frames, np.arange(frames.size, dtype=float))
+    below = np.minimum(position.astype(int), frames.size - 1)
+    fraction, rows = position - below, np.arange(times.size)
+    weights = np.zeros((times.size, frames.size))
+    weights[rows, below] = 1.0 - fraction
+    weights[rows, np.minimum(below + 1, frames.size - 1)] += fraction
+    return weights
+
+
+def observed_outputs(specimen: Specimen, history: History, values: Floats) -> Floats:
+    """What a history's instrument shows, (candidates, times, outputs): of a bar's creep strain, its own measure."""
+    observe: Any = getattr(specimen, "shown", None)
+    return values if observe is None else np.asarray(observe(history, values[..., 0]))[..., None]
+
+
+def observation_derivative(specimen: Specimen, history: History, values: Floats) -> Floats:
+    """Derivative of what is shown to what the network gives, (candidates, times, outputs)."""
+    derivative: Any = getattr(specimen, "slope", None)
+    return np.ones_like(values) if derivative is None else np.asarray(derivative(history, values[..., 0]))[..., None]
+
+
+class Surrogate(ABC):
+    """A trained network in the place of a specimen; a records.Predictor.
+
+    recipe, module, told : what it was trained as, its network (on the CPU), and what it knows of its training.
+    """
+
+    nuisances: tuple[str, ...] = ()
+    """Kinds of explicit nuisances that predict() understands."""
+
+    def __init__(self, recipe: Recipe, module: SurrogateModule, metadata: SurrogateMetadata) -> None:
+        self.recipe, self.module, self.metadata = recipe, module.eval(), metadata
+
+    @property
+    def name(self) -> str:
+        """Which kind of surrogate it is, and of what."""
+        return f"{self.recipe.kind} of {self.specimen.name}"
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+        return f"{self.specimen.title}, by a network ({self.recipe.kind}) trained on law '{self.metadata.law.name}'"
+
+    @property
+    def specimen(self) -> Specimen:
+        """What it stands for."""
+        return self.metadata.specimen
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of what is predicted."""
+        return self.metadata.outputs
+
+    @abstractmethod
+    def predict(
+        self,
+        law: CreepLaw,
+        values: Mapping[str, ArrayLike],
+        histories: Sequence[History],
+        *,
+        jacobian: bool = False,
+        nuisances: NuisanceValues | None = None,
+    ) -> Prediction:
+        """Predict each history's outputs at its times; see records.Predictor.
+
+        A row outside the domain of the training has its values all the same, and Status.OUTSIDE_DOMAIN.
+        """
+
+    @property
+    def error(self) -> dict[str, float]:
+        """{output: standard deviation of its error}, in the output's unit, as validation saw it.
+
+        1.25 times the mean absolute error, that of a Gaussian: rare large errors would make every answer unsure.
+        """
+        outputs = self.metadata.metrics.get("outputs", {})
+        return {name: 1.2533 * float(errors["mae"]) for name, errors in outputs.items() if "mae" in errors}
+
+    def screening(self) -> Predictor:
+        """A stand-in for searches: that of the specimen, if it has one, else the network itself."""
+        screening_model = getattr(self.specimen, "reduced_order_model", None)
+        return self if screening_model is None else screening_model()
+
+    def applies_to(self, specimen: object, histories: Sequence[History]) -> bool:
+        """Whether it was trained on this specimen, but for its apex thickness and threads, and knows such histories."""
+        if _without_free_fields(specimen) != _without_free_fields(self.specimen):
+            return False
+        try:
+            check_applicable(self.metadata, histories, (), self.nuisances)
+        except SurrogateError:
+            return False
+        return True
+
+    def reference_stress(self, history: History) -> Floats:
+        """The von Mises stresses, MPa, that stand for the test: the specimen's, or those that are prescribed."""
+        specimen_stress = getattr(self.specimen, "reference_stress", None)
+        if specimen_stress is not None:
+            return np.asarray(specimen_stress(history))
+        levels = np.unique(history.loading.program().values)
+        return np.asarray(levels[levels > 0])
+
+    @property
+    def file_header(self) -> dict[str, Any]:
+        """Everything that a file says beside the weights."""
+        metadata = self.metadata
+        return {
+            "kind": self.recipe.kind,
+            "config": asdict(self.recipe),  # type: ignore[call-overload]
+            "law": law_to_json(metadata.law),
+            "specimen": specimen_to_json(metadata.specimen),
+            "grid": metadata.grid.document(),
+            "outputs": list(metadata.outputs),
+            "parameters": list(metadata.parameters),
+            "conditions": list(metadata.conditions),
+            "scaling": dict(metadata.scaling),
+            "domain": None if metadata.domain is None else metadata.domain.document(),
+            "metrics": dict(metadata.metrics),
+            "curves": dict(metadata.curves),
+            "provenance": dict(metadata.provenance),
+            "notes": list(metadata.notes),
+        }
+
+    def save(self, path: str | Path) -> Path:
+        """Write the weights with their header."""
+        return safetensors_files.write_safetensors(path, self.module.state_dict(), self.file_header)
+
+    def __str__(self) -> str:
+        return surrogate_text(self.title, self.metadata)
+
+    def __repr__(self) -> str:
+        return f"<Surrogate: {self.title}>"
+
+
+def _without_free_fields(specimen: object) -> object:
+    """A specimen without what a surrogate is free of."""
+    if isinstance(specimen, Bulge):
+        return specimen.replace(threads=None, apex_thickness=DimpleGeometry().apex_thickness)
+    return specimen
+
+
+class Recipe(Protocol):
+    """A frozen record of what is trained: its fields are plain numbers and words, and make the recipe again."""
+
+    kind: ClassVar[str]
+    """The word for it in files; surrogate.surrogate.KINDS says where the class is."""
+
+    @property
+    def training(self) -> Training:
+        """How it is trained, unless train() is told otherwise; a field."""
+        ...
+
+    def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:
+        """The tensors of a data set; DatasetError where it cannot be learnt from."""
+        ...
+
+    def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
+        """A fresh network for these data; scales are those of the training rows, positions (rows,), alone."""
+        ...
+
+    def metadata(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateMetadata:
+        """What the data say of a surrogate before its training: scaling, domain and notes among it."""
+        ...
+
+    def empty_module(self, metadata: SurrogateMetadata) -> SurrogateModule:
+        """A network of the right shapes, into which the weights and scales of a file are put."""
+        ...
+
+    def surrogate(self, module: SurrogateModule, metadata: SurrogateMetadata) -> Surrogate:
+        """The trained network as a predictor."""
+        ...

@@ -1,0 +1,265 @@
+"""Training of surrogates: train, resume from a checkpoint, and size studies (Fig. S7 of the paper)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from importlib.metadata import version
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from creepkit.errors import SurrogateError
+from creepkit.files import safetensors_files
+from creepkit.surrogates.evaluation import compare_predictions, comparison_metrics, evaluation_times
+from creepkit.surrogates.loading import load_surrogate
+from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.parameter_network import RecurrentCell
+from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, Training
+from creepkit.surrogates.surrogate import Recipe, Surrogate
+from creepkit.surrogates.training_loop import (
+    NetworkTraining,
+    dataset_fingerprint,
+    output_deviation,
+    trainable_samples,
+    training_split,
+)
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+
+
+if TYPE_CHECKING:
+    from creepkit.dataset.dataset import Dataset
+
+
+CHECKPOINT_KIND = "checkpoint"
+
+
+def training_request(data: Dataset, recipe: Recipe, seed: int) -> dict[str, Any]:
+    """What was asked for, as JSON-able data: the same call goes on where it was interrupted."""
+    config: Any = asdict(recipe)  # type: ignore[call-overload]
+    request: dict[str, Any] = json.loads(
+        json.dumps({"data": dataset_fingerprint(data), "kind": recipe.kind, "recipe": config, "seed": seed})
+    )
+    return request
+
+
+class Checkpoint:
+    """Where a training leaves what it needs to go on; without a path it leaves nothing."""
+
+    def __init__(self, result_path: Path | None, request: Mapping[str, Any]) -> None:
+        self.path = None if result_path is None else result_path.with_name(f"{result_path.name}.checkpoint")
+        self.request = dict(request)
+
+    def save(self, state_of_training: NetworkTraining) -> None:
+        """Leave a fit as it is, in the place of what was left before."""
+        if self.path is not None:
+            safetensors_files.write_safetensors(
+                self.path,
+                state_of_training.state(),
+                {"kind": CHECKPOINT_KIND, "call": self.request, "curves": state_of_training.curves},
+            )
+
+    def restore(self, state_of_training: NetworkTraining) -> None:
+        """Bring a fresh fit to where the same call was interrupted, if it was."""
+        if self.path is None or not self.path.exists():
+            return
+        tensors, header = safetensors_files.read_safetensors(self.path)
+        if header["kind"] != CHECKPOINT_KIND:
+            raise SurrogateError(f"{self.path}: not a checkpoint of a training; remove it, or choose another name")
+        if header.get("call") != self.request:
+            differences = ", ".join(_differences(self.request, header.get("call") or {}))
+            raise SurrogateError(
+                f"{self.path}: left by another training (it differs in {differences}); finish that one, remove the file, or "
+                "choose another name"
+            )
+        try:
+            state_of_training.restore(tensors, header["curves"])
+        except (KeyError, RuntimeError, ValueError, AttributeError):
+            raise SurrogateError(f"{self.path}: this checkpoint is damaged; remove it to begin again") from None
+
+    def remove(self) -> None:
+        """The training is done and its file written."""
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
+
+
+def _differences(first: Any, second: Any, path: str = "") -> list[str]:
+    """The names of what two calls do not share."""
+    if isinstance(first, Mapping) and isinstance(second, Mapping):
+        names = dict.fromkeys([*first, *second])
+        return [difference for name in names for difference in _differences(first.get(name), second.get(name), name)]
+    return [] if first == second else [path]
+
+
+def train(
+    data: Dataset,
+    recipe: Recipe,
+    *,
+    to: str | Path | None = None,
+    seed: int = 0,
+    training: Training | None = None,
+    device: str = "auto",
+    progress: ProgressCallback | None = None,
+) -> Surrogate:
+    """Train a network on the accepted samples of a data set and return it as a predictor.
+
+    to : file to write. A checkpoint lies beside it while the training goes on: the same call continues from there, and
+        to the last bit as if nothing had happened on a CPU; where the file is there already, it is returned.
+    seed : of the split into training and validation rows, the first weights and the order of rows.
+    training : in the place of the recipe's own. device : "auto" (a GPU where there is one), "cpu", "cuda".
+    progress : called with (task, epochs done, epochs in all, note); the note says Eq. (4) of the validation rows.
+    """
+    recipe = recipe if training is None else replace(recipe, training=training)  # type: ignore[type-var]
+    torch_device, path, data = _device(device), None if to is None else Path(to), trainable_samples(data)
+    request = training_request(data, recipe, seed)
+    if path is not None and path.exists():
+        return _load_finished(path, request)
+    samples = recipe.sample_tensors(data, progress)
+    rows = training_split(len(data), recipe.training, seed)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        module, metadata = recipe.module(data, samples, rows[0]), recipe.metadata(data, samples, rows[0])
+    fit, checkpoint = (
+        NetworkTraining(module, samples, rows, recipe.training, seed, torch_device),
+        Checkpoint(path, request),
+    )
+    checkpoint.restore(fit)
+    fit.run(checkpoint.save, progress)
+    module = module.cpu().eval()
+    module.load_state_dict(fit.best)
+    result = recipe.surrogate(module, _training_metadata(metadata, data, samples, rows, fit, request))
+    if path is not None:
+        result.save(path)
+        checkpoint.remove()
+    return result
+
+
+def _training_metadata(
+    metadata: SurrogateMetadata,
+    data: Dataset,
+    samples: SampleTensors,
+    rows: tuple[Tensor, Tensor],
+    fit: NetworkTraining,
+    request: dict[str, Any],
+) -> SurrogateMetadata:
+    """What the surrogate is told, with how its training went."""
+    comparison = compare_predictions(fit.module, samples, data, rows[1], output_deviation(samples, rows[0]))
+    times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
+    provenance = {
+        **request,
+        "creepkit": version("creepkit"),
+        "torch": torch.__version__,
+        "device": fit.device.type,
+        "training_rows": len(rows[0]),
+        "validation_rows": len(rows[1]),
+        "epochs": fit.epochs,
+        "best_epoch": int(np.argmin(fit.curves["validation"])) + 1,
+        "data_set": dict(data.provenance),
+        "when": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+    return replace(metadata, metrics=comparison_metrics(comparison, times), curves=fit.curves, provenance=provenance)
+
+
+def _load_finished(path: Path, request: dict[str, Any]) -> Surrogate:
+    """The surrogate that the same call has written; SurrogateError where something else lies there."""
+    _, header = safetensors_files.read_safetensors(path)
+    provenance = header.get("provenance", {})
+    if any(provenance.get(name) != value for name, value in request.items()):
+        raise SurrogateError(f"{path}: another surrogate is there already; remove it or choose another name")
+    return load_surrogate(path)
+
+
+def _device(name: str) -> torch.device:
+    if name == "auto":
+        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    if name not in ("cpu", "cuda") or (name == "cuda" and not torch.cuda.is_available()):
+        available = "auto, cpu and cuda" if torch.cuda.is_available() else "auto and cpu (torch sees no GPU)"
+        raise SurrogateError(f"device '{name}' is not there; allowed are {available}")
+    return torch.device(name)
+
+
+@dataclass(frozen=True)
+class SizeStudyResult:
+    """One training of a sweep.
+
+    cell, hidden, layers, samples : what was varied; samples are those learnt from.
+    weights : numbers that were fitted. loss : Eq. (4) of the validation rows at the best epoch; training : the loss of
+        the training rows in that epoch. outputs : {output: its RSE}. losses : Eq. (4) of each epoch.
+    """
+
+    cell: RecurrentCell
+    hidden: int
+    layers: int
+    samples: int
+    weight_count: int
+    loss: float
+    training: float
+    epochs: int
+    best_epoch: int
+    outputs: dict[str, float]
+    losses: tuple[float, ...]
+    file: str
+
+    @property
+    def label(self) -> str:
+        """In words."""
+        return f"{self.cell} {self.hidden} x {self.layers}, {self.samples} samples"
+
+
+def size_study(
+    data: Dataset, recipe: ParameterGru, *, to: str | Path, layers: Sequence[int] = (), hidden: Sequence[int] = (),
+    cells: Sequence[RecurrentCell] = (), samples: Sequence[int] = (), seed: int = 0, device: str = "auto",
+    progress: ProgressCallback | None = None,
+) -> list[SizeStudyResult]:  # fmt: skip
+    """Train every combination, each to a file of its own in the folder `to`; those that are there already are read.
+
+    What is not given stays as the recipe has it; samples are numbers to learn from. Every training is judged by the
+    same rows, a share of the whole data set that none of them learns from.
+    """
+    data, folder = trainable_samples(data), Path(to)
+    training_count = len(training_split(len(data), recipe.training, seed)[0])
+    counts = [*samples] or [training_count]
+    training_split(
+        len(data), replace(recipe.training, samples=max(counts)), seed
+    )  # complains now, not after hours of training
+    folder.mkdir(parents=True, exist_ok=True)
+    combinations = list(product(cells or [recipe.cell], layers or [recipe.layers], hidden or [recipe.hidden], counts))
+    results = []
+    for k, (cell, depth, width, count) in enumerate(combinations):
+        settings = replace(recipe.training, samples=count)
+        variant = replace(recipe, cell=cell, layers=depth, hidden=width, training=settings)
+        path = folder / f"{cell}-{width}x{depth}-{count}.safetensors"
+        named_progress = _with_task_name(progress, f"{k + 1} of {len(combinations)}, {path.stem}")
+        model = train(data, variant, to=path, seed=seed, device=device, progress=named_progress)
+        results.append(_study_result(model, variant, count, path))
+    return results
+
+
+def _with_task_name(progress: ProgressCallback | None, name: str) -> ProgressCallback | None:
+    if progress is None:
+        return None
+    return lambda task, done, total, note: progress(f"{name}, {task}", done, total, note)
+
+
+def _study_result(model: Surrogate, recipe: ParameterGru, count: int, path: Path) -> SizeStudyResult:
+    metadata, provenance = model.metadata, model.metadata.provenance
+    best = int(provenance["best_epoch"])
+    return SizeStudyResult(
+        recipe.cell, recipe.hidden, recipe.layers, count,
+        weight_count=sum(weight.numel() for weight in model.module.parameters()),
+        loss=float(metadata.metrics["loss"]),
+        training=float(metadata.curves["loss"][best - 1]),
+        epochs=int(provenance["epochs"]),
+        best_epoch=best,
+        outputs={name: float(errors_of_output["rse"]) for name, errors_of_output in metadata.metrics["outputs"].items()},
+        losses=tuple(metadata.curves["rse"]),
+        file=path.name,
+    )  # fmt: skip

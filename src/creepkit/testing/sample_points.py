@@ -1,0 +1,96 @@
+"""Sample points of a law: Sobol points of the full bounds and of the ranges that creep tests cover."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import sympy
+from scipy.stats import qmc
+
+from creepkit.arrays import Bools, Floats
+from creepkit.kernels.interface import POINT_SIZE
+from creepkit.language.law import CreepLaw
+from creepkit.language.symbols import POINT_VARIABLES, State
+
+STRESS_RANGE, STRAIN_RANGE, TIME_RANGE, TEMPERATURE_RANGE = (1e-3, 2000.0), (1e-12, 1.0), (1e-3, 1e6), (600.0, 1600.0)
+"""Ranges in MPa, 1, s and K."""
+
+
+_MOST_BATCHES = 64
+"""How many times as many points are drawn, at most, to find enough where the law's constraints hold."""
+
+
+@dataclass(frozen=True)
+class LawSamples:
+    """points : (samples, 6 + states); theta : (samples, parameters), internal; the constraints hold at all of them."""
+
+    points: Floats
+    theta: Floats
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def arguments(self) -> list[Floats]:
+        """The columns of points and theta, as the internal methods of kernels take them."""
+        return [*self.points.T, *self.theta.T]
+
+    def at(self, **columns: float) -> LawSamples:
+        """The same with variables of the point set to numbers: at(strain=0.0)."""
+        points = self.points.copy()
+        for name, value in columns.items():
+            points[:, [s.name for s in POINT_VARIABLES].index(name)] = value
+        return LawSamples(points, self.theta)
+
+
+def draw_samples(law: CreepLaw, samples: int, seed: int = 0) -> LawSamples:
+    """Return Sobol points at which the law's constraints hold: `samples`, a power of two, or fewer if such are rare."""
+    size = POINT_SIZE + len(law.states) + len(law.params)
+    sequence = qmc.Sobol(size, seed=seed)
+    points, theta = np.empty((0, POINT_SIZE + len(law.states))), np.empty((0, len(law.params)))
+    for _ in range(_MOST_BATCHES):
+        unit = sequence.random(samples)
+        new_points, new_theta = _to_points(law, unit[:, : points.shape[1]]), _to_theta(law, unit[:, points.shape[1] :])
+        satisfied = constraints_hold(law, new_points, new_theta)
+        points, theta = np.vstack([points, new_points[satisfied]]), np.vstack([theta, new_theta[satisfied]])
+        if len(points) >= samples:
+            break
+    return LawSamples(points[:samples], theta[:samples])
+
+
+def constraints_hold(law: CreepLaw, points: Floats, theta: Floats) -> Bools:
+    """Where every constraint of the law holds, (samples,)."""
+    values = [np.exp(t) if p.scale == "log" else t for p, t in zip(law.params.values(), theta.T, strict=True)]
+    holds = np.ones(len(points), bool)
+    for relation in law.constraints:
+        test = sympy.lambdify((*POINT_VARIABLES, *law.states, *law.params), relation, "numpy", dummify=True)
+        holds &= np.asarray(test(*points.T, *values), bool)
+    return holds
+
+
+def _to_points(law: CreepLaw, unit: Floats) -> Floats:
+    """Stress, strain, time spread over decades; the principal stress 0.4 to 1 of the stress, the mean -1/3 to 2/3."""
+    stress, strain, time = (
+        _log_between(u, r) for u, r in zip(unit.T, (STRESS_RANGE, STRAIN_RANGE, TIME_RANGE), strict=False)
+    )
+    temperature = TEMPERATURE_RANGE[0] + unit[:, 3] * (TEMPERATURE_RANGE[1] - TEMPERATURE_RANGE[0])
+    point = [stress, strain, time, temperature, stress * (0.4 + 0.6 * unit[:, 4]), stress * (unit[:, 5] - 1 / 3)]
+    state_values = [_state_between(u, state) for u, state in zip(unit.T[POINT_SIZE:], law.states.values(), strict=True)]
+    return np.stack([*point, *state_values], axis=1)
+
+
+def _to_theta(law: CreepLaw, unit: Floats) -> Floats:
+    bounds = [[p.to_internal(b) for b in p.bounds] for p in law.params.values()]
+    low, high = np.array(bounds).reshape(-1, 2).T
+    return np.asarray(low + unit * (high - low))
+
+
+def _state_between(u: Floats, state: State) -> Floats:
+    """From just after the start of an internal variable to just before its limit (or 1 from its start)."""
+    distance = 1.0 if state.limit is None else state.limit - state.initial
+    return state.initial + (0.01 + 0.94 * u) * distance
+
+
+def _log_between(u: Floats, bounds: tuple[float, float]) -> Floats:
+    low, high = np.log(bounds)
+    return np.asarray(np.exp(low + u * (high - low)))
