@@ -22,7 +22,7 @@ from creepkit.arrays import Floats
 from creepkit.fem.simulation import Simulation, simulate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Loading, PressureJump, Program, RecordedLoading
-from creepkit.specimens.bulge.finite_elements import TestSetup, set_up_test, solver_settings
+from creepkit.specimens.bulge.finite_elements import BulgeSetup, set_up_test, solver_settings
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.specimen import Bulge
 
@@ -61,7 +61,7 @@ class Case:
             specimen="bulge", elastic=ck.Elastic(self.E),
         )  # fmt: skip
 
-    def simulation(self, end: float, **changes: float) -> tuple[Simulation, TestSetup]:
+    def simulation(self, end: float, **changes: float) -> tuple[Simulation, BulgeSetup]:
         """A run until `end`, s, by the specimen with some settings changed."""
         specimen = self.specimen.replace(**changes)
         made = set_up_test(specimen, self.history(np.array([end])), {})

@@ -69,7 +69,7 @@ def summary(one, design, ranking, cost):
             same |= {r.fit.law.fingerprint for r in ranking.laws if r.fit.law.name in mates}
     row = {
         "truth": one.law.name, "answer": ranking.best.law.name, "strict": laws[0] == truth, "merged": laws[0] in same,
-        "set": [r.fit.law.name for r in ranking.remaining], "in set": bool(truth in laws[: len(ranking.remaining)]),
+        "set": [r.fit.law.name for r in ranking.credible], "in set": bool(truth in laws[: len(ranking.credible)]),
         "decisive": ranking.decisive, "cost": cost, "cover": [], "cover mixture": [], "width": [],
         "gap": float(ranking.laws[position].excess) if position >= 0 else np.nan,
     }  # fmt: skip

@@ -96,10 +96,10 @@ def spread_of_repeats(histories):
 
 def row(name, fit, histories, cpu, largest):
     """One line of the table, without BIC."""
-    fitted = times_to_strain(fit.law, fit.values, histories, fit.using, LEVEL, loading_strains(histories))
+    fitted = times_to_strain(fit.law, fit.values, histories, fit.predictor, LEVEL, loading_strains(histories))
     held = "-" if len(fit.law.params) > largest else f"{leave_one_condition_out(fit, histories, LEVEL)[0].z_factor:.2f}"
     ends = [e.name for e in fit.estimates if e.verdict != "determined"]
-    scatter = f"{100 * fit.scatter.rate:.0f} %"
+    scatter = f"{100 * fit.noise_model.rate:.0f} %"
     first = [name, str(len(fit.law.params)), f"{fit.rms:.3f}", f"{fitted.z_factor:.2f}", held, scatter]
     return [*first, "", f"{cpu:.1f}", ", ".join(ends) or "all"]
 
@@ -138,7 +138,7 @@ def main():
             if given.plots:
                 given.plots.mkdir(parents=True, exist_ok=True)
                 fit.plot(given.plots / f"{title}_{name.replace(' ', '_')}.png")
-        print(f"\n{len(tests)} tests, {sum(m.frames for m in fits[0].misfits)} frames\n")
+        print(f"\n{len(tests)} tests, {sum(m.frames for m in fits[0].tests)} frames\n")
         print(HEAD)
         print("|-|-|-|-|-|-|-|-|-|")
         for entry in rank(fits).laws:

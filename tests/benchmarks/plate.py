@@ -82,12 +82,12 @@ def recovered(plate, truth):
     print("\n| quantity | share | 95 % interval | of |\n|-|-|-|-|")
     rows = {
         "identified": [a.identified for a in plate.answers], "law right": best, "right, sinh and power merged": merged,
-        "truth in the set": [t.law in a.remaining for t, a in told.values()],
+        "truth in the set": [t.law in a.credible for t, a in told.values()],
         "decisive": [a.decisive for _, a in told.values()], "right where decisive": sure, "covered": inside,
     }  # fmt: skip
     for name, hits in rows.items():
         print(f"| {name} | {share(hits)} | {len(hits)} |")
-    print(f"mean size of the set {np.mean([len(a.remaining) for _, a in told.values()]):.2f}")
+    print(f"mean size of the set {np.mean([len(a.credible) for _, a in told.values()]):.2f}")
     confusion = Counter((t.law, a.best.law.name) for t, a in told.values())
     for (planted, found), count in sorted(confusion.items()):
         print(f"  {planted} found as {found}: {count}")

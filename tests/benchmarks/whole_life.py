@@ -75,15 +75,15 @@ def spread_of_repeats(histories):
 
 def row(name, fit, histories, cpu, quick):
     """One line of the table, without BIC."""
-    fitted = times_to_rupture(fit.law, fit.values, histories, fit.using)
+    fitted = times_to_rupture(fit.law, fit.values, histories, fit.predictor)
     held = "-" if quick else f"{leave_one_condition_out(fit, histories, None)[0].z_factor:.2f}"
     low, middle, high = np.percentile(fitted.predicted / fitted.measured, [2.5, 50, 97.5])
-    ends = [m.rupture for m in fit.misfits if m.rupture is not None and m.rupture.stopped]
+    ends = [m.rupture for m in fit.tests if m.rupture is not None and m.rupture.stopped]
     early = sum(r.predicted < r.measured for r in ends)
     flaws = [e.name for e in fit.estimates if e.verdict != "determined"]
     return [
         name, str(len(fit.law.params)), f"{fit.rms:.3f}", f"{fitted.z_factor:.2f}", held,
-        f"{middle:.2f} ({low:.2f} to {high:.2f})", f"{early} of {len(ends)}", f"{100 * fit.scatter.rate:.0f} %",
+        f"{middle:.2f} ({low:.2f} to {high:.2f})", f"{early} of {len(ends)}", f"{100 * fit.noise_model.rate:.0f} %",
         "", f"{cpu:.1f}", ", ".join(flaws) or "none",
     ]  # fmt: skip
 

@@ -23,7 +23,7 @@ class Known:
     """A landscape whose cost is a function of u, (candidates, parameters) to (candidates,); calls counts candidates."""
 
     of: Callable[[np.ndarray], np.ndarray]
-    box: Bounds
+    bounds: Bounds
     settings: IdentificationSettings = field(default_factory=IdentificationSettings)
     law: object = NORTON
     rates: tuple[int, ...] = (0,)
@@ -49,15 +49,15 @@ class Known:
             moved[free] = part
             return float(self.of(moved[None])[0])
 
-        bounds = list(zip(self.box.lower[free], self.box.upper[free], strict=True))
+        bounds = list(zip(self.bounds.lower[free], self.bounds.upper[free], strict=True))
         found = minimize(cost, whole[free], bounds=bounds, method="L-BFGS-B")
         whole[free] = found.x
         return Minimum(whole, float(found.fun), bool(found.success), int(found.nfev))
 
 
-def cube(size: int, reach: float = 5.0) -> Bounds:
-    """All coordinates from -reach to reach."""
-    return Bounds(np.full(size, -reach), np.full(size, reach))
+def cube(size: int, half_width: float = 5.0) -> Bounds:
+    """All coordinates from -half_width to half_width."""
+    return Bounds(np.full(size, -half_width), np.full(size, half_width))
 
 
 def quadratic(u):

@@ -85,7 +85,7 @@ def known_scatter(
     """
     settings = IdentificationSettings(starts=2, sobol_points=8, nuisances=nuisances)
     fit = identify(law, tests, using or LogRates(), settings=settings)
-    return replace(fit, scatter=NoiseModel({"amplitude": OutputNoise(noise=sd)}), freedom=1e9)
+    return replace(fit, noise_model=NoiseModel({"amplitude": OutputNoise(noise=sd)}), freedom=1e9)
 
 
 def least_squares(tests: Sequence[History], sd: float) -> tuple[np.ndarray, np.ndarray]:

@@ -25,7 +25,7 @@ from creepkit.laws.combined import COMBINED
 from creepkit.records import History, PressureJump, Status
 from creepkit.specimens.bulge.finite_elements import (
     BulgeSensitivities,
-    TestSetup,
+    BulgeSetup,
     output_sensitivities,
     set_up_test,
     solver_settings,
@@ -62,7 +62,7 @@ class Base(NamedTuple):
     kernel: CompiledLaw
     theta: Floats
     history: History
-    made: TestSetup
+    made: BulgeSetup
     found: Simulation
     slopes: BulgeSensitivities
 
@@ -140,7 +140,9 @@ def test_displacements_on_a_mesh_that_moves(base) -> None:
     mesh = base.made.geometry.mesh(SPECIMEN.refinement)
     velocity = base.made.geometry.mesh_velocity("apex_thickness", SPECIMEN.refinement)
     velocities = [(geometry_derivative(mesh, velocity), velocity)]
-    change = sensitivities(base.kernel, base.theta, base.made.body, base.made.course, base.found, velocities=velocities)
+    change = sensitivities(
+        base.kernel, base.theta, base.made.model, base.made.load_history, base.found, velocities=velocities
+    )
     step = 1e-5
     difference = (moved_profiles(base, step) - moved_profiles(base, -step)) / (2 * step)
     np.testing.assert_allclose(change.surface[:, :, -1], difference, atol=1e-6 * np.abs(difference).max())
@@ -149,7 +151,7 @@ def test_displacements_on_a_mesh_that_moves(base) -> None:
 def test_thickness_on_a_mesh_that_moves(base) -> None:
     """Amplitude, width and shape to the apex thickness, the observed nodes moving along the radius too."""
     step = 1e-5
-    drift = base.made.geometry.mesh_velocity("apex_thickness", SPECIMEN.refinement)[base.made.body.top, 0]
+    drift = base.made.geometry.mesh_velocity("apex_thickness", SPECIMEN.refinement)[base.made.model.top, 0]
     assert np.abs(drift).max() > 0.01
     operator, radii = base.made.observation, base.made.radii
     frames = [operator.observe(radii + s * drift, moved_profiles(base, s)) for s in (step, -step)]

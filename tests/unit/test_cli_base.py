@@ -8,7 +8,7 @@ from creepkit.specimens.bulge.reduced_order.tables import read_tables
 
 def test_tables_of_a_dimple_are_printed_drawn_and_written(tmp_path):
     file, picture = tmp_path / "small.safetensors", tmp_path / "small.png"
-    words = ["base", "--to", str(file), "--picture", str(picture), "--geometry", "apex_thickness=0.52"]
+    words = ["reduced-model", "--to", str(file), "--picture", str(picture), "--geometry", "apex_thickness=0.52"]
     said = CliRunner().invoke(app, words)
     assert said.exit_code == 0, said.output
     assert "k = sigma*/P" in said.output
@@ -18,6 +18,6 @@ def test_tables_of_a_dimple_are_printed_drawn_and_written(tmp_path):
 
 
 def test_only_a_dimple_has_a_base(tmp_path):
-    said = CliRunner().invoke(app, ["base", "--to", str(tmp_path / "none"), "--specimen", "uniaxial"])
+    said = CliRunner().invoke(app, ["reduced-model", "--to", str(tmp_path / "none"), "--specimen", "uniaxial"])
     assert said.exit_code == 1
     assert "only a bulge has a one-degree-of-freedom model" in said.output

@@ -43,7 +43,7 @@ def fit():
 def test_a_fit_by_the_specimen_itself_is_confirmed_with_its_own_misfit(fit):
     told = confirm(fit, TESTS, BAR)
     assert told.noise_ratio == 0.0
-    for test in fit.misfits:
+    for test in fit.tests:
         assert told[test.name, "strain"].simulation_errors == told[test.name, "strain"].fit_errors
         assert told[test.name, "strain"].simulation_errors.mean_squared_error == pytest.approx(
             test["strain"].errors.mse, rel=1e-9
@@ -53,13 +53,13 @@ def test_a_fit_by_the_specimen_itself_is_confirmed_with_its_own_misfit(fit):
 @pytest.mark.parametrize("share", [0.5, 2.0])
 def test_the_difference_is_told_in_units_of_the_noise(fit, share):
     """A surrogate that is off by `share` times the noise everywhere."""
-    told = confirm(replace(fit, using=Stranger(share * SD)), TESTS, BAR)
+    told = confirm(replace(fit, predictor=Stranger(share * SD)), TESTS, BAR)
     assert told.noise_ratio == pytest.approx(share, rel=1e-9)
     assert told.confirmed is (share < 1)
 
 
 def test_a_surrogate_that_is_far_off_is_not_believed(fit):
-    told = confirm(replace(fit, using=Stranger(3 * SD)), TESTS, BAR)
+    told = confirm(replace(fit, predictor=Stranger(3 * SD)), TESTS, BAR)
     assert told.verdict.startswith("not confirmed: uniaxial differs from the fit by 3 times the noise (strain of 'X-")
     assert told.verdict.endswith("identify again with using= this specimen")
 
@@ -81,8 +81,8 @@ def test_a_simulation_that_ends_early_confirms_nothing(fit, status, words):
 
 def test_only_the_guard_of_a_surrogate_doubts(fit):
     assert not outside_domain(fit)
-    assert outside_domain(replace(fit, using=Stranger(status=Status.OUTSIDE_DOMAIN)))
-    assert not outside_domain(replace(fit, using=None))
+    assert outside_domain(replace(fit, predictor=Stranger(status=Status.OUTSIDE_DOMAIN)))
+    assert not outside_domain(replace(fit, predictor=None))
 
 
 def test_a_fit_from_a_file_is_held_against_the_misfit_it_tells(fit, tmp_path):
@@ -96,7 +96,7 @@ def test_a_fit_from_a_file_is_held_against_the_misfit_it_tells(fit, tmp_path):
 
 def test_other_tests_are_predicted_without_a_misfit_of_the_fit(fit):
     others = [h.replace(name=f"new {h.name}") for h in TESTS]
-    told = confirm(replace(fit, using=None), others, {"uniaxial": BAR})
+    told = confirm(replace(fit, predictor=None), others, {"uniaxial": BAR})
     assert told.tests[0].outputs[0].fit_errors is None
     assert np.isnan(told.noise_ratio)
 

@@ -65,7 +65,7 @@ def test_estimates_alone_hold_the_planted_form_and_energy(alone):
 
 
 def test_the_curves_themselves_decide(trend):
-    assert trend.judged_by == "histories"
+    assert trend.criterion_data == "histories"
     assert trend.forms == {"A": "arrhenius", "n": "linear"}
     assert trend.candidates[0].weight > 0.9
     assert all(inside(trend).values())
@@ -197,7 +197,7 @@ def test_identifications_that_do_not_belong_together(alone, tests):
     with pytest.raises(FitError, match="takes a list of identifications"):
         discover(alone[0])
     with pytest.raises(FitError, match="give using="):
-        discover([replace(fit, using=None) for fit in alone], forms=FEW, histories=tests)
+        discover([replace(fit, predictor=None) for fit in alone], forms=FEW, histories=tests)
 
 
 def test_a_form_that_cannot_be_refitted_is_told(trend, tests, monkeypatch):

@@ -104,7 +104,7 @@ def test_index_with_pieces_cut_out_and_put_in(tmp_path, reader, data):
     frames["a_creep.csv"] = "time_h,creep_extension_pct,T_top_C,T_mid_C,T_bot_C\n0,0,1,1,1\n1,1,1,1,1\n"
     for name, text in frames.items():
         (tmp_path / name).write_text(text)
-    index = f"{reader.key},temperature_C,stress_MPa,state\na,850,60,x\n"
+    index = f"{reader.key_column},temperature_C,stress_MPa,state\na,850,60,x\n"
     start = data.draw(st.integers(0, len(index)))
     end = data.draw(st.integers(start, len(index)))
     index = index[:start] + data.draw(st.sampled_from(PIECES) | st.text(max_size=5)) + index[end:]

@@ -24,7 +24,7 @@ def heavy_after(code: str) -> list[str]:
     [
         "import creepkit",
         "import creepkit; creepkit.__version__; dir(creepkit); creepkit.errors",
-        "import creepkit.registry; creepkit.registry.default()",
+        "import creepkit.registry; creepkit.registry.default_registry()",
         "import sys; sys.argv = ['creepkit', '--help']; from creepkit.cli import main; main()",
         "import sys; sys.argv = ['creepkit', '--version']; from creepkit.cli import main; main()",
         "import sys; sys.argv = ['creepkit', 'laws', '--help']; from creepkit.cli import main; main()",

@@ -69,13 +69,13 @@ def test_each_thickness_and_offset_is_found(fit):
     errors = [(n.value - p.thickness) / n.sd for n, p in zip(fit.nuisances, PLANS, strict=True)]
     assert np.sqrt(np.mean(np.square(errors))) < 1.9
     assert all(n.sd < 0.5 * SPREAD for n in fit.nuisances)
-    found = [m["amplitude"].offset for m in fit.misfits]
+    found = [m["amplitude"].offset for m in fit.tests]
     np.testing.assert_allclose(found, [p.offset for p in PLANS], atol=0.004)
 
 
 def test_what_is_left_is_the_noise(fit):
     """The planted noise is 1.5 um; chi-square counts it in units of what third differences say, here within a third."""
-    for m in fit.misfits:
+    for m in fit.tests:
         assert m["amplitude"].errors.mse ** 0.5 < 2 * 1.5e-3
         assert m["width"].errors.mse ** 0.5 == pytest.approx(0.02, rel=0.5)
     assert fit.errors["amplitude"].rse < 1e-3

@@ -21,9 +21,9 @@ from creepkit.records import Nuisance
 BOTH = (Nuisance("offset"), Nuisance("rate"))
 
 
-def sizes(noise, misfit=0.0, offset=0.0, rate=0.0, drift=0.0, reach=1.0):
+def sizes(noise, misfit=0.0, offset=0.0, rate=0.0, drift=0.0, correlation_length=1.0):
     """Scatter of strains alone."""
-    return NoiseModel({"strain": OutputNoise(noise, misfit, offset, drift, reach)}, rate)
+    return NoiseModel({"strain": OutputNoise(noise, misfit, offset, drift, correlation_length)}, rate)
 
 
 def residuals_of(values, slopes, present, times, effect, output=None):
@@ -46,7 +46,7 @@ def made(tests, frames, seed, scatter):
 
 
 def test_likelihood_is_that_of_a_multivariate_normal():
-    scatter = sizes(noise=1e-5, offset=2e-5, rate=0.3, drift=0.05, reach=1.5)
+    scatter = sizes(noise=1e-5, offset=2e-5, rate=0.3, drift=0.05, correlation_length=1.5)
     residuals = made(3, 12, 0, scatter)
     c = covariance(residuals, scatter)
     truth = sum(multivariate_normal(np.zeros(12), c[k]).logpdf(residuals.values[k]) for k in range(3))
@@ -54,13 +54,13 @@ def test_likelihood_is_that_of_a_multivariate_normal():
 
 
 def test_absent_frames_do_not_count():
-    scatter = sizes(noise=1e-5, offset=2e-5, rate=0.3, drift=0.05, reach=1.5)
+    scatter = sizes(noise=1e-5, offset=2e-5, rate=0.3, drift=0.05, correlation_length=1.5)
     whole = made(2, 12, 1, scatter)
     present = whole.present.copy()
     present[1, 7:] = False
     part = replace(whole, present=present, values=np.where(present, whole.values, 0),
-                   slopes=np.where(present, whole.transform_derivatives, 0),
-                   rate_effect=np.where(present, whole.log_rate_sensitivity, 0))  # fmt: skip
+                   transform_derivatives=np.where(present, whole.transform_derivatives, 0),
+                   log_rate_sensitivity=np.where(present, whole.log_rate_sensitivity, 0))  # fmt: skip
     c = covariance(whole, scatter)
     truth = multivariate_normal(np.zeros(12), c[0]).logpdf(whole.values[0])
     truth += multivariate_normal(np.zeros(7), c[1][:7, :7]).logpdf(whole.values[1, :7])
@@ -69,7 +69,7 @@ def test_absent_frames_do_not_count():
 
 def test_planted_scatter_is_found():
     """150 tests: the standard error of a standard deviation from 150 draws is 6 %, so 25 % is four of them."""
-    truth = sizes(noise=2e-5, offset=1e-4, rate=0.4, drift=0.1, reach=1.5)
+    truth = sizes(noise=2e-5, offset=1e-4, rate=0.4, drift=0.1, correlation_length=1.5)
     residuals = made(150, 30, 2, truth)
     found = estimate_variance_components(residuals, sizes(2e-5, 0, 3e-5, 0.5, 0.2, 2.0), BOTH)
     assert found["strain"].offset == pytest.approx(truth["strain"].offset, rel=0.25)
@@ -126,10 +126,13 @@ def by_hand(residuals, scatter, test):
     for i in range(10):
         for j in range(10):
             a, b = (list(scatter.outputs.values())[r.output[test, k]] for k in (i, j))
-            c[i, j] = scatter.rate**2 * r.rate_effect[test, i] * r.rate_effect[test, j]
+            c[i, j] = scatter.rate**2 * r.log_rate_sensitivity[test, i] * r.log_rate_sensitivity[test, j]
             if a is b:
                 lag = abs(r.clock[test, i] - r.clock[test, j])
-                c[i, j] += a.drift**2 * np.exp(-lag / a.reach) + a.offset**2 * r.slopes[test, i] * r.slopes[test, j]
+                c[i, j] += (
+                    a.drift**2 * np.exp(-lag / a.correlation_length)
+                    + a.offset**2 * r.slopes[test, i] * r.slopes[test, j]
+                )
             if i == j:
                 c[i, j] += (a.noise * r.slopes[test, i]) ** 2 + a.misfit**2
     return c
@@ -155,7 +158,9 @@ def test_slopes_of_the_likelihood_are_its_differences():
     from creepkit.inverse.variance_components import _Likelihood
 
     residuals, scatter = two_outputs()
-    free = [(o, n) for o in scatter.outputs for n in ("misfit", "offset", "drift", "reach")] + [("", "rate")]
+    free = [(o, n) for o in scatter.outputs for n in ("misfit", "offset", "drift", "correlation_length")] + [
+        ("", "rate")
+    ]
     likelihood = _Likelihood(residuals.with_test_weights(np.array([1.0, 0.3])), scatter, free)
     x = np.log([*(getattr(scatter[o], n) for o, n in free[:-1]), scatter.rate])
     slope = likelihood.cost(x)[1]

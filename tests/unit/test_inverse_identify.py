@@ -253,9 +253,9 @@ def test_histories_of_one_name_are_refused(tests):
 
 
 def test_attaching_histories_goes_by_name(fit, tests):
-    assert [h.name for h in fit.on(tests[::-1], Steady()).histories] == [h.name for h in tests]
+    assert [h.name for h in fit.with_histories(tests[::-1], Steady()).histories] == [h.name for h in tests]
     with pytest.raises(FitError, match="not among the histories"):
-        fit.on(tests[:1], Steady())
+        fit.with_histories(tests[:1], Steady())
 
 
 def test_settings_and_nuisances_that_mean_nothing_are_refused():

@@ -70,7 +70,7 @@ def test_what_a_predictor_states_of_its_error_is_not_asked_of_the_data():
     entries = SimpleNamespace(outputs=("amplitude",), scales=(LinearTransform(2.0, 1.0),))
     weighting = WorkingNoise(IdentificationSettings(weights="likelihood"), entries, {"amplitude": 0.004})
     scatter = white(0.3, ("amplitude",), drift=0.002)
-    assert weighting.fixed_components(scatter) == {("amplitude", "drift"), ("amplitude", "reach")}
+    assert weighting.fixed_components(scatter) == {("amplitude", "drift"), ("amplitude", "correlation_length")}
     assert weighting.fixed_components(white(0.3, ("amplitude",), drift=0.1)) == set()
     assert restricted_covariance(linear, scatter, ())[1] < 10.0
     assert restricted_covariance(linear, scatter, (), weighting.fixed_components(scatter))[1] == pytest.approx(
@@ -88,7 +88,7 @@ def test_tests_that_share_their_values_share_one_freedom():
 def test_the_mean_of_a_few_tests_has_their_number_less_one():
     """Rates that scatter, seen without noise: Student's interval of the mean of T numbers has T - 1."""
     linear = linear_model(np.zeros((5, 3)), np.ones((5, 3, 1)))
-    linear = replace(linear, residuals=replace(linear.residuals, rate_effect=np.ones((5, 3))))
+    linear = replace(linear, residuals=replace(linear.residuals, log_rate_sensitivity=np.ones((5, 3))))
     scatter = NoiseModel({"strain": OutputNoise(1e-4)}, rate=0.3)
     assert restricted_covariance(linear, scatter, ())[1] == pytest.approx(4.0, rel=1e-3)
 
@@ -103,7 +103,7 @@ def test_a_spread_that_explains_no_more_is_not_more_likely():
 
 def test_a_prior_counts_where_its_unknown_stands_at_its_bound():
     linear = linear_model(np.zeros((1, 10)), polynomial(10, 0))
-    held = replace(linear, precision=np.array([4.0]), distance=np.array([1.5]), free=np.zeros(1, bool))
+    held = replace(linear, precision=np.array([4.0]), prior_residual=np.array([1.5]), free=np.zeros(1, bool))
     assert held.solve(inverse_covariances(held.residuals, white(0.5))[0]).chi_square == pytest.approx(9.0, rel=1e-12)
 
 
@@ -121,7 +121,9 @@ def test_the_likelihood_is_that_of_contrasts_that_know_nothing_of_the_values():
     rng, design = np.random.default_rng(2), polynomial(12, 2)
     values = rng.normal(size=(1, 12))
     contrasts = np.linalg.qr(design[0], mode="complete")[0][:, 3:]
-    scatters = [white(s, drift=d, reach=r) for s, d, r in ((0.5, 0.3, 1.0), (1.0, 0.8, 0.4), (0.2, 0.1, 2.0))]
+    scatters = [
+        white(s, drift=d, correlation_length=r) for s, d, r in ((0.5, 0.3, 1.0), (1.0, 0.8, 0.4), (0.2, 0.1, 2.0))
+    ]
     mine, textbook = [], []
     for scatter in scatters:
         linear = linear_model(values, design)
@@ -133,7 +135,7 @@ def test_the_likelihood_is_that_of_contrasts_that_know_nothing_of_the_values():
 
 def test_the_optimum_is_generalised_least_squares():
     rng, design = np.random.default_rng(3), polynomial(20, 1, tests=2)
-    values, scatter = rng.normal(size=(2, 20)), white(0.1, drift=1.0, reach=0.7)
+    values, scatter = rng.normal(size=(2, 20)), white(0.1, drift=1.0, correlation_length=0.7)
     linear = linear_model(values, design)
     inverses, _ = inverse_covariances(linear.residuals, scatter)
     A = sum(x.T @ c @ x for x, c in zip(design, inverses, strict=True))
@@ -144,7 +146,7 @@ def test_the_optimum_is_generalised_least_squares():
 def test_outputs_inverted_one_by_one_are_the_whole_matrix_inverted():
     rng = np.random.default_rng(4)
     linear = linear_model(rng.normal(size=(2, 20)), polynomial(20, 1, tests=2), outputs=2)
-    scatter = white(0.3, ("amplitude", "width"), drift=0.5, reach=0.3)
+    scatter = white(0.3, ("amplitude", "width"), drift=0.5, correlation_length=0.3)
     blocks, log_det = inverse_covariances(linear.residuals, scatter)
     shared = replace(linear.residuals, known=np.zeros((2, 20, 1)))
     whole, same = inverse_covariances(shared, scatter)
@@ -165,7 +167,7 @@ def test_autocorrelated_noise_is_not_taken_for_less_than_it_is():
     for _ in range(60):
         values = (factor @ rng.normal(size=48))[None]
         linear = linear_model(values, design, clock)
-        start = white(0.1, drift=0.7, reach=1.0)
+        start = white(0.1, drift=0.7, correlation_length=1.0)
         restricted.append(estimate_variance_components(linear.residuals, start, (), linearised=linear)["strain"].drift)
         left = values - (design[0] @ np.linalg.lstsq(design[0], values[0], rcond=None)[0])[None]
         plain.append(estimate_variance_components(replace(linear.residuals, values=left), start, ())["strain"].drift)

@@ -38,7 +38,7 @@ def campaign(law, values, stresses, seed, stopped=()):
     rng, tests = np.random.default_rng(seed), []
     for k, stress in enumerate(stresses):
         plan = History(f"t{k}", np.array([1e8]), {}, constant_stress(stress), 1000.0, strain_measure="engineering")
-        life = float(BAR.predict_life(law, values, [plan]).times_to_strain.rupture_times[0, 0])
+        life = float(BAR.predict_to_rupture(law, values, [plan]).times_to_strain.rupture_times[0, 0])
         own, rate = (np.exp(SCATTER[name] * rng.standard_normal()) for name in ("life", "rate"))
         times = life * (SHARES[SHARES < 0.5] if k in stopped else SHARES[life * SHARES < life * own])
         strain = BAR.predict(law, values, [plan.replace(times=times)]).of(0)[:, 0]
@@ -59,7 +59,7 @@ def test_planted_values_lie_within_their_intervals(planted):
     _, values, _, fit = planted
     for e in fit.estimates:
         assert e.low <= values[e.name] <= e.high, (e, values[e.name])
-    assert fit.scatter.rate == pytest.approx(0.15, abs=0.1)  # eight tests: give or take a quarter, and life's own
+    assert fit.noise_model.rate == pytest.approx(0.15, abs=0.1)  # eight tests: give or take a quarter, and life's own
 
 
 def test_by_likelihood_ruptures_have_a_scatter_of_their_own_and_laws_are_ranked():
@@ -81,7 +81,7 @@ def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
     law, values, _, fit = planted
     stresses = np.array([50.0, 80.0, 130.0])
     plans = [History(f"{s}", np.array([1e8]), {}, constant_stress(s), 1000.0) for s in stresses]
-    truth = BAR.predict_life(law, values, plans).times_to_strain.rupture_times[0]
+    truth = BAR.predict_to_rupture(law, values, plans).times_to_strain.rupture_times[0]
     time, less, more = fit.rupture_time(stresses, 1000.0)
     assert ((less < truth) & (truth < more)).all()
     np.testing.assert_allclose(time, truth, rtol=0.35)
@@ -93,7 +93,7 @@ def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
 
 def test_the_answer_says_how_tests_ended(planted, tmp_path):
     _, _, tests, fit = planted
-    ends = [m.rupture for m in fit.misfits]
+    ends = [m.rupture for m in fit.tests]
     assert [r.stopped for r in ends] == [k in (0, 6) for k in range(8)]
     assert [r.measured for r in ends] == [h.rupture_time or h.times[-1] for h in tests]
     assert "rupture: 6 of 8 tests broke; time predicted over measured" in str(fit)
@@ -188,7 +188,7 @@ def test_histories_that_say_nothing_of_their_end_are_compared_as_ever():
     law, values = PLANTED["Kachanov-Rabotnov"]
     tests = campaign(law, values, [60, 80], 1)
     cut = [h.up_to("strain", 0.01) for h in tests]
-    assert not any(h.ended for h in cut)
+    assert not any(h.end_known for h in cut)
     assert RUPTURE_OUTPUT not in objective(law, cut).observations.outputs
     assert RUPTURE_OUTPUT in objective(law, tests).observations.outputs
 
@@ -216,7 +216,7 @@ def test_bars_are_followed_to_rupture_beside_tests_that_are_not():
     both = CompositePredictor({"uniaxial": BAR, "relaxation": Relaxation()})
     given = {name: np.array([value]) for name, value in values.items()}
     found = predict_to_rupture(both, law, given, [bars[0], held, bars[1]], jacobian=True).times_to_strain
-    alone = BAR.predict_life(law, given, bars, jacobian=True).times_to_strain
+    alone = BAR.predict_to_rupture(law, given, bars, jacobian=True).times_to_strain
     np.testing.assert_array_equal(found.rupture_times[0, [0, 2]], alone.rupture_times[0])
     for name in ("arrivals", "slopes", "arrival_jacobian"):
         joined, own = (getattr(life, name)[0] for life in (found, alone))
@@ -231,7 +231,7 @@ def test_how_a_test_ended_survives_pickling():
     for end in ({"rupture_time": 12.5}, {"unruptured": True}, {}):
         bar = History("bar", np.array([1.0, 10.0]), {"strain": [0.0, 0.1]}, constant_stress(80.0), 1000.0, **end)
         back = pickle.loads(pickle.dumps(bar))
-        assert (back.rupture_time, back.unruptured, back.ended) == (bar.rupture_time, bar.unruptured, bool(end))
+        assert (back.rupture_time, back.unruptured, back.end_known) == (bar.rupture_time, bar.unruptured, bool(end))
 
 
 def test_percent_taken_for_strain_shows_in_tests_followed_to_their_end_as_well():

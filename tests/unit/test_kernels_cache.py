@@ -16,11 +16,11 @@ PROGRAM = """
 import sys
 import numpy
 from creepkit.kernels import lower
-from creepkit.kernels.calling import call
+from creepkit.kernels.interface import call_entry
 from creepkit.laws.norton import NORTON
 
 compiled = lower(NORTON, "numba")
-out, flags = call(compiled, "rate", numpy.array([[100.0] + 5 * [0.0]]), compiled.internal({"A": 1e-16, "n": 4.0})[0])
+out, flags = call_entry(compiled, "rate", numpy.array([[100.0] + 5 * [0.0]]), compiled.internal({"A": 1e-16, "n": 4.0})[0])
 print(out[0, 0], flags, compiled.rate.cache_hits)
 """
 
@@ -47,7 +47,7 @@ NEW, KNOWN = (pytest.approx(1e-8, rel=1e-12), 0, 0), (pytest.approx(1e-8, rel=1e
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache folder; nothing is remembered in memory."""
     monkeypatch.setenv("CREEPKIT_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(compilation, "_loaded", {})
+    monkeypatch.setattr(compilation, "_loaded_modules", {})
     return tmp_path / "cache"
 
 

@@ -75,7 +75,7 @@ def test_a_missing_law_names_the_package_that_has_it(monkeypatch: pytest.MonkeyP
     from creepkit.registry import plugin_sources
 
     own = [pair for pair in plugin_sources.installed_entry_points() if pair[0].origin.startswith("creepkit ")]
-    monkeypatch.setattr(plugin_sources, "installed", lambda: own)
+    monkeypatch.setattr(plugin_sources, "installed_entry_points", lambda: own)
     with pytest.raises(LawError) as raised:
         Registry().law("kachanov-rabotnov")
     package = "package creepkit-damage has it: pip install creepkit-damage"

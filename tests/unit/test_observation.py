@@ -134,7 +134,7 @@ def test_noise_is_averaged_and_no_frame_leans_on_the_one_before(operator):
     together = operator.observe(NODES, frames)
     alone = np.vstack([operator.observe(NODES, frame[None]) for frame in frames])
     np.testing.assert_allclose(together, alone, rtol=1e-10)
-    clean, slopes = operator.observe_with_slopes(NODES, [bell(NODES, 0.1, 3.8, 2.2)])
+    clean, slopes = operator.observe_with_derivatives(NODES, [bell(NODES, 0.1, 3.8, 2.2)])
     expected = 0.003 * np.sqrt((slopes[0] ** 2).sum(axis=1))  # what the slopes say of the scatter
     np.testing.assert_allclose(together.std(axis=0), expected, rtol=0.2)
     np.testing.assert_allclose(together.mean(axis=0), clean[0], atol=0.4 * expected.max())
@@ -153,7 +153,7 @@ def test_scale_does_not_matter():
 @pytest.mark.parametrize("operator", FORMS, ids=str)
 def test_slopes_against_differences(operator):
     profiles, directions = plates(NODES), np.random.default_rng(2).normal(size=(5, 41))
-    seen, slopes = operator.observe_with_slopes(NODES, profiles)
+    seen, slopes = operator.observe_with_derivatives(NODES, profiles)
     np.testing.assert_allclose(seen, operator.observe(NODES, profiles), rtol=1e-13)
     for direction in directions:
         change = 0.1 * profiles[:, :1] * direction
@@ -184,7 +184,7 @@ def test_slopes_of_a_planted_bell_are_those_of_linear_least_squares():
 @pytest.mark.parametrize("operator", FORMS, ids=str)
 def test_what_is_observed_is_smooth_in_the_window(operator):
     profiles = plates(NODES)
-    slopes = operator.window_slopes(NODES, profiles)
+    slopes = operator.window_derivatives(NODES, profiles)
     expected = richardson(lambda h: operator.replace(window=operator.window + h).observe(NODES, profiles), 1e-5)
     np.testing.assert_allclose(slopes, expected, rtol=1e-6, atol=1e-7)  # radii on nodes: the kinks there cost a digit
     steps = np.linspace(operator.window - 0.2, operator.window, 81)
@@ -195,7 +195,7 @@ def test_what_is_observed_is_smooth_in_the_window(operator):
 @pytest.mark.parametrize("operator", FORMS, ids=str)
 def test_slopes_to_a_motion_of_the_nodes(operator):
     profiles, shift = plates(NODES), NODES * (10 - NODES) / 25
-    slopes = operator.node_slopes(NODES, profiles, shift)
+    slopes = operator.node_derivatives(NODES, profiles, shift)
     expected = richardson(lambda h: operator.observe(NODES + h * shift, profiles), 1e-6)
     np.testing.assert_allclose(slopes, expected, rtol=1e-6, atol=1e-7)
 

@@ -47,7 +47,7 @@ def test_how_the_tests_of_alloy_617_ended(alloy617):
     assert Counter((h.rupture_time is not None, h.unruptured) for h in alloy617.values()) == {
         (True, False): 71, (False, True): 1, (False, False): 22,
     }  # fmt: skip
-    assert {h.name.split("/")[0] for h in alloy617.values() if not h.ended} == {"inl_1"}
+    assert {h.name.split("/")[0] for h in alloy617.values() if not h.end_known} == {"inl_1"}
     broken = alloy617["kaeri_1/AirBase_900_25_a"]
     assert broken.rupture_time == broken.times[-1]
     assert alloy617["inl_2/AirBase_950_19_a"].unruptured

@@ -73,11 +73,11 @@ def test_inertia_falls_from_its_first_value_to_its_last():
     np.testing.assert_allclose(found, [0.9, 0.65, 0.4])
 
 
-@pytest.mark.parametrize("walls", ["absorb", "reflect"])
+@pytest.mark.parametrize("boundary", ["absorb", "reflect"])
 @pytest.mark.parametrize("velocity", [0.05, 0.15])
-def test_no_step_is_longer_than_the_limit_and_none_leaves_the_box(walls, velocity):
+def test_no_step_is_longer_than_the_limit_and_none_leaves_the_box(boundary, velocity):
     landscape = Known(rastrigin, Bounds(np.array([0.5, -5.0]), np.array([5.0, 0.1])))
-    ParticleSwarm(particles=50, iterations=40, boundary=walls, max_velocity=velocity).minima(landscape)
+    ParticleSwarm(particles=50, iterations=40, boundary=boundary, max_velocity=velocity).minima(landscape)
     x = paths(landscape)[:40]
     assert x.min() >= 0
     assert x.max() <= 1
@@ -249,7 +249,7 @@ def test_a_parameter_shared_with_another_term_does_not_rest():
         (dict(iterations=2.5), "iterations is 2.5"),
         (dict(patience=0), "patience is 0"),
         (dict(form="best"), "form is 'best'; allowed are constriction and inertia"),
-        (dict(walls="none"), "walls is 'none'; allowed are absorb and reflect"),
+        (dict(boundary="none"), "boundary is 'none'; allowed are absorb and reflect"),
         (dict(inertia=(1.2, 0.4)), r"inertia is \(1.2, 0.4\); both are from 0 to 1"),
         (dict(velocity=0), "velocity is 0 of the box"),
         (dict(own=2.0, common=2.0), "must be more than 4 together"),

@@ -23,12 +23,14 @@ def law(seed, size=1.0, **changes):
     r = Residuals(values, ones, ones > 0, clock, ones[..., None], ones, np.zeros(shape, int), ones, np.ones(TESTS))
     free, room = np.ones(1, bool), np.array([[-9.0], [9.0]])
     linear = LinearisedProblem(replace(r, **changes), np.full(1, 1e-9), np.zeros(1), free, room)
-    return SimpleNamespace(linear=linear, scatter=NoiseModel({"strain": OutputNoise(1.0)}, rate=0.5), u=np.zeros(1))
+    return SimpleNamespace(
+        linearised=linear, noise_model=NoiseModel({"strain": OutputNoise(1.0)}, rate=0.5), u=np.zeros(1)
+    )
 
 
 def test_little_trust_in_a_test_does_not_make_a_law_better():
     best, poor = law(0), law(1, size=3.0)
-    doubting = law(1, size=3.0, trust=np.array([1.0, 0.1, 0.1]))
+    doubting = law(1, size=3.0, test_weights=np.array([1.0, 0.1, 0.1]))
     found = under_common_covariance([best, poor, doubting])
     assert found.reference_law == 0
     assert found.chi_square[2] == pytest.approx(found.chi_square[1], rel=1e-12)
@@ -36,7 +38,7 @@ def test_little_trust_in_a_test_does_not_make_a_law_better():
 
 def test_rates_that_matter_more_to_a_law_do_not_excuse_it():
     best, poor = law(0), law(1, size=3.0)
-    excusing = law(1, size=3.0, rate_effect=np.full((TESTS, ENTRIES), 20.0))
+    excusing = law(1, size=3.0, log_rate_sensitivity=np.full((TESTS, ENTRIES), 20.0))
     found = under_common_covariance([best, poor, excusing])
     assert found.chi_square[2] == pytest.approx(found.chi_square[1], rel=1e-12)
 
@@ -46,8 +48,8 @@ def test_chi_square_between_laws_is_that_of_their_difference_under_the_covarianc
     one, other = law(0), law(0)
     step = np.zeros((TESTS, ENTRIES))
     step[0, :6], step[0, 6:] = 1.0, -1.0
-    residuals = replace(other.linear.residuals, values=other.linear.residuals.values + step)
-    other.linear = replace(other.linear, residuals=residuals)
+    residuals = replace(other.linearised.residuals, values=other.linearised.residuals.values + step)
+    other.linearised = replace(other.linearised, residuals=residuals)
     white = under_common_covariance([one, other]).whitened
     assert ((white[0] - white[1]) ** 2).sum() == pytest.approx(12.0, rel=1e-9)
 
@@ -56,10 +58,13 @@ def test_a_law_that_has_nothing_to_say_of_an_entry_is_compared_by_the_others():
     present = np.ones((TESTS, ENTRIES), bool)
     present[2, -1] = False
     silent = law(1)
-    r = silent.linear.residuals
-    blank = {name: np.where(present, getattr(r, name), 0.0) for name in ("values", "slopes", "rate_effect")}
+    r = silent.linearised.residuals
+    blank = {
+        name: np.where(present, getattr(r, name), 0.0)
+        for name in ("values", "transform_derivatives", "log_rate_sensitivity")
+    }
     residuals = replace(r, present=present, jacobian=present[..., None].astype(float), **blank)
-    silent.linear = replace(silent.linear, residuals=residuals)
+    silent.linearised = replace(silent.linearised, residuals=residuals)
     found = under_common_covariance([law(0), silent])
     assert found.whitened.shape == (2, TESTS * ENTRIES)
     assert found.whitened[1, -1] == 0.0

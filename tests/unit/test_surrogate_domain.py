@@ -62,12 +62,12 @@ def test_each_input_is_forgiven_what_it_is_told() -> None:
     assert "exponent" not in domain.reason(np.array([1.06, 14.5]))
 
 
-def test_documents_that_say_nothing_of_it_forgive_one_percent() -> None:
+def test_a_document_without_margins_is_damaged() -> None:
     rows = np.stack([np.linspace(0.0, 1.0, 50), np.random.default_rng(8).normal(size=50)], axis=1)
     document = {**ApplicabilityDomain.from_rows("ab", rows, 0.5).document(), "limit": None}
-    del document["forgiven"]
-    edges = np.array([[1.009, 0.5], [1.02, 0.5]])
-    assert ApplicabilityDomain.from_document(document).outside(edges).tolist() == [False, True]
+    del document["margin"]
+    with pytest.raises(SurrogateError, match="damaged"):
+        ApplicabilityDomain.from_document(document)
 
 
 def test_inputs_that_are_not_there_are_not_far() -> None:

@@ -122,7 +122,7 @@ def test_a_broken_law_is_caught_and_told_why(name: str) -> None:
 @pytest.fixture
 def fresh(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Kernels are lowered anew, so that what is patched counts."""
-    monkeypatch.setattr(lowering, "_kernel", lowering._array_kernel.__wrapped__)
+    monkeypatch.setattr(lowering, "_array_kernel", lowering._array_kernel.__wrapped__)
     return monkeypatch
 
 
@@ -163,7 +163,7 @@ def test_a_missing_floor_is_caught(fresh: pytest.MonkeyPatch) -> None:
 
 
 def test_a_mistake_in_the_kit_is_not_taken_for_one_of_the_law(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("creepkit.testing.law_checks.worst", None)
+    monkeypatch.setattr("creepkit.testing.law_checks.largest_differences", None)
 
     with pytest.raises(TypeError):
         check_law(NORTON, samples=16)

@@ -78,7 +78,7 @@ from creepkit.testing import check_law
 
 def test_it_keeps_what_every_law_promises() -> None:
     report = check_law(creepkit.law("$name"))
-    assert report.ok, str(report)
+    assert report.passed, str(report)
 """)
 
 

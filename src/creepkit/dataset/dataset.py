@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import DatasetError
 from creepkit.records import Status
-from creepkit.report.dataset import dataset_text
 from creepkit.sampling.conditions import CONDITION_UNITS, planned_test
 from creepkit.specimens.documents import specimen_to_json
 
@@ -107,6 +106,8 @@ class Dataset:
         return len(self.index)
 
     def __str__(self) -> str:
+        from creepkit.report.dataset import dataset_text
+
         return dataset_text(self)
 
     def __repr__(self) -> str:

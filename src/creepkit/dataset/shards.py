@@ -119,6 +119,10 @@ class Campaign:
         """The file of a shard."""
         return self.folder / f"{number:05d}.h5"
 
+    def accepted_count(self, number: int) -> int | None:
+        """How many samples of a shard were accepted; None when it has to be simulated, or again, which is logged."""
+        return accepted_count(self, number)
+
     def open_folder(self) -> None:
         """Make the folder, or check that the one that is there belongs to this campaign."""
         path = self.folder / "campaign.json"

@@ -78,7 +78,7 @@ REJECTED_DIGITS = 12
 """Of the histories of rejected samples: 1 part in 4000, for a look at what was rejected, not for learning."""
 
 
-class SampleFailedError(Exception):
+class SampleFailedError(DatasetError):
     """A simulation that left nothing; its text is kept."""
 
 

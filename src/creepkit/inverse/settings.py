@@ -56,7 +56,7 @@ class IdentificationSettings:
     test_loss: str = "gaussian"
 
     def __post_init__(self) -> None:
-        for name, minimum in (("starts", 1), ("draws", 1), ("frames", 2), ("seed", 0)):
+        for name, minimum in (("starts", 1), ("sobol_points", 1), ("frames", 2), ("seed", 0)):
             value = getattr(self, name)
             if int(value) != value or value < minimum:
                 raise FitError(f"{name} is {value!r}; it must be a whole number of at least {minimum}")

@@ -19,8 +19,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from creepkit.dataset.shards import Campaign, accepted_count
 from creepkit.errors import DatasetError
+from creepkit.jobs.worker import ShardedJob
 
 UNSUPPORTED_LOCK_ERRORS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
 """What file systems without locks answer."""
@@ -93,7 +93,7 @@ class ProgressRecord:
     done : {shard: accepted samples} of this part. at_work : shards that are being simulated, here or elsewhere.
     """
 
-    campaign: Campaign
+    campaign: ShardedJob
     samples: int | None
     draws: int | None
     part: tuple[int, int] | None = None
@@ -113,7 +113,7 @@ class ProgressRecord:
         """Find the shards that are done already."""
         for path in sorted(self.campaign.folder.glob("[0-9]*.h5")):
             if path.stem.isdigit() and self._in_part(int(path.stem)):
-                self.mark_done(int(path.stem), accepted_count(self.campaign, int(path.stem)))
+                self.mark_done(int(path.stem), self.campaign.accepted_count(int(path.stem)))
 
     def mark_done(self, number: int, accepted: int | None) -> None:
         """A shard is done."""

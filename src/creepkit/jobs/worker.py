@@ -12,9 +12,9 @@ import signal
 import struct
 import sys
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Protocol
 
-from creepkit.dataset.simulation import SampleFailedError
 from creepkit.errors import CreepkitError
 
 if TYPE_CHECKING:
@@ -103,9 +103,31 @@ class Job(Protocol):
         ...
 
 
+class ShardedJob(Job, Protocol):
+    """A job whose parts are shards of `rows` samples, each a file in `folder`."""
+
+    @property
+    def folder(self) -> Path:
+        """Where the files of the shards lie."""
+        ...
+
+    @property
+    def rows(self) -> int:
+        """Samples of a shard."""
+        ...
+
+    def path(self, number: int) -> Path:
+        """The file of a shard."""
+        ...
+
+    def accepted_count(self, number: int) -> int | None:
+        """How many samples of a shard were accepted; None when it has to be simulated."""
+        ...
+
+
 def error_text(error: Exception) -> str:
     """One line on what happened; errors that are not ours are named."""
     text = " ".join(str(error).split())
-    if isinstance(error, CreepkitError | SampleFailedError):
+    if isinstance(error, CreepkitError):
         return text
     return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -20,9 +20,8 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import IO, Any, Protocol
 
-from creepkit.dataset.shards import Campaign
 from creepkit.errors import DatasetError
-from creepkit.jobs.worker import Job, TaskResult, run_task
+from creepkit.jobs.worker import Job, ShardedJob, TaskResult, run_task
 
 ADDRESS = re.compile(r"inproc://.+|[a-z]+://.+:[0-9]+/?")
 
@@ -42,7 +41,7 @@ DEAD_WORKER_ERRORS = ("KilledWorker", "FutureCancelledError", "CancelledError")
 class ClusterWorkers:
     """The workers of a dask scheduler, at most `size` of their threads at once (None: all); a context."""
 
-    def __init__(self, job: Campaign, address: str, thread_limit: int | None = None) -> None:
+    def __init__(self, job: ShardedJob, address: str, thread_limit: int | None = None) -> None:
         self._job = job.on_one_thread()
         self._address = address
         self._size = thread_limit

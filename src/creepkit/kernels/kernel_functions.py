@@ -125,7 +125,7 @@ class ExpDifference(StableFunction):
 
 def in_sympy_functions(expression: sympy.Expr) -> sympy.Expr:
     """The expression in ordinary sympy, for limits."""
-    return expression.replace(lambda e: isinstance(e, StableFunction), lambda e: e.plain(*e.args))
+    return expression.replace(lambda e: isinstance(e, StableFunction), lambda e: e.sympy_form(*e.args))
 
 
 TARGET_FUNCTION_NAMES = {

@@ -48,7 +48,7 @@ class Uniaxial(Bar):
         """Derivative of the observed strain to the creep strain."""
         return np.exp(creep) if history.strain_measure == "engineering" else np.ones_like(creep)
 
-    def predict_life(
+    def predict_to_rupture(
         self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], *, jacobian: bool = False
     ) -> Prediction:
         """Predict as predict() does, and follow each bar to its rupture: by a state's limit, or by the strain limit."""

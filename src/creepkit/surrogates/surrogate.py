@@ -16,7 +16,6 @@ from creepkit.errors import SurrogateError
 from creepkit.files import safetensors_files
 from creepkit.language.law_codec import law_to_json
 from creepkit.records import History, NuisanceValues, Prediction, Predictor, Specimen
-from creepkit.report.surrogate import surrogate_text
 from creepkit.sampling.conditions import TimeGrid, test_kind
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.specimen import Bulge
@@ -224,6 +223,8 @@ class Surrogate(ABC):
         return safetensors_files.write_safetensors(path, self.module.state_dict(), self.file_header)
 
     def __str__(self) -> str:
+        from creepkit.report.surrogate import surrogate_text
+
         return surrogate_text(self.title, self.metadata)
 
     def __repr__(self) -> str:

@@ -148,9 +148,9 @@ class ParticleSwarm:
         at rest from a Sobol set are the settings of the authors' published code (NIMSI-NU/DABI-Property-Extraction).
         That one is for finite elements in the loop: 70 particles, each told of a new best at once; here an iteration is
         one prediction, so that all hear of it together. The table of the paper's 300 x 100 (S1) is not at hand, nor is
-        it said what happens at the walls.
+        it said what happens at the bounds.
     inertia : w of the first and of the last iteration, for form="inertia" (Shi & Eberhart 1999).
-    walls : "absorb" stops a particle there, which suits optima on bounds; "reflect" sends it back.
+    boundary : "absorb" stops a particle there, which suits optima on bounds; "reflect" sends it back.
     off : names of terms of a sum, or "any", that a particle may switch off: a coefficient in {0} U [bounds]. A particle
         has a mask beside its position, inherited from its own best and the common best by the toss of a coin, with a
         flip now and then, and follows the best of its subset. This makes zero possible, not preferred: more terms never
@@ -177,7 +177,7 @@ class ParticleSwarm:
             {} if self.patience is None else {"patience": 1}
         )
         check_whole_numbers("particle swarm", {name: getattr(self, name) for name in minimum_values}, minimum_values)
-        for name, allowed in (("form", ("constriction", "inertia")), ("walls", ("absorb", "reflect"))):
+        for name, allowed in (("form", ("constriction", "inertia")), ("boundary", ("absorb", "reflect"))):
             value = getattr(self, name)
             if value not in allowed:
                 raise FitError(f"particle swarm: {name} is {value!r}; allowed are {' and '.join(allowed)}")

@@ -45,7 +45,7 @@ MODULUS_TEMPERATURE_STEP = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class TestSetup:
+class BulgeSetup:
     """One test made ready: its body and course, its geometry, its observation operator.
 
     refinement : of the structured mesh, None for a mesh from files.
@@ -63,7 +63,7 @@ class TestSetup:
         return np.asarray(self.model.nodes[self.model.top, 0])
 
 
-def set_up_test(specimen: Bulge, history: History, nuisances: Mapping[str, float]) -> TestSetup:
+def set_up_test(specimen: Bulge, history: History, nuisances: Mapping[str, float]) -> BulgeSetup:
     """Prepare one test; nuisances : {kind: value} of its explicit nuisances."""
     where = history.source or f"history '{history.name}'"
     if history.loading.quantity != "pressure":
@@ -87,7 +87,7 @@ def set_up_test(specimen: Bulge, history: History, nuisances: Mapping[str, float
     model = model_of_geometry(geometry, specimen.refinement) if specimen.mesh is None else _model_of_mesh(specimen)
     poisson = float(history.elastic.at(float(temperature.values[0])).nu)
     load_history = LoadHistory(pressure, temperature, modulus, float(history.times[-1]), poisson)
-    return TestSetup(model, load_history, geometry, operator, specimen.refinement if specimen.mesh is None else None)
+    return BulgeSetup(model, load_history, geometry, operator, specimen.refinement if specimen.mesh is None else None)
 
 
 def modulus_program(elastic: Elastic, temperature: Program, factor: float, where: str) -> Program:
@@ -141,7 +141,7 @@ class BulgeSensitivities:
 
 
 def output_sensitivities(
-    setup: TestSetup, kernel: CompiledLaw, theta: Floats, history: History, simulation: Simulation, profiles: Floats,
+    setup: BulgeSetup, kernel: CompiledLaw, theta: Floats, history: History, simulation: Simulation, profiles: Floats,
     names: Sequence[str],
 ) -> tuple[Floats, BulgeSensitivities]:  # fmt: skip
     """Outputs (times, 3) and their derivatives.
@@ -201,7 +201,7 @@ def _dimension_name(name: str) -> str:
     return "apex_thickness" if name == "thickness" else name
 
 
-def _direction(setup: TestSetup, history: History, name: str) -> Floats:
+def _direction(setup: BulgeSetup, history: History, name: str) -> Floats:
     """Derivative of the course's segments, (segments, 10), by a central difference, exact for what enters linearly."""
     load_history = setup.load_history
     if name == "modulus":
@@ -233,7 +233,7 @@ _COLUMNS = {
 }
 
 
-def _by_temperature(setup: TestSetup, history: History) -> Floats:
+def _by_temperature(setup: BulgeSetup, history: History) -> Floats:
     """One kelvin more in every temperature, and the modulus that goes with it."""
     load_history = setup.load_history
     direction: Floats = np.zeros_like(load_history.segments) + _COLUMNS["temperature"]
@@ -257,7 +257,7 @@ def _velocity_of(geometry: DimpleGeometry, refinement: float, name: str) -> tupl
     return geometry_derivative(geometry.mesh(refinement), velocity), velocity
 
 
-def _velocity(geometry: DimpleGeometry, name: str, setup: TestSetup) -> tuple[GeometryDerivative, Floats]:
+def _velocity(geometry: DimpleGeometry, name: str, setup: BulgeSetup) -> tuple[GeometryDerivative, Floats]:
     if setup.refinement is None:
         raise SolveError(f"a mesh from files does not say how it follows {name}; use the structured mesh instead")
     return _velocity_of(geometry, setup.refinement, name)

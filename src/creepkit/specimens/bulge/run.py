@@ -26,7 +26,7 @@ from creepkit.kernels.interface import (
     call_entry,
 )
 from creepkit.records import History, Status
-from creepkit.specimens.bulge.finite_elements import TestSetup, set_up_test, solver_settings
+from creepkit.specimens.bulge.finite_elements import BulgeSetup, set_up_test, solver_settings
 from creepkit.specimens.bulge.observation import OBSERVED
 from creepkit.specimens.run import Run, run_from_outputs
 
@@ -107,7 +107,7 @@ class BulgeRun(Run):
     states : names of the law's internal variables.
     """
 
-    setup: TestSetup = field(repr=False)
+    setup: BulgeSetup = field(repr=False)
     simulation: Simulation = field(repr=False)
     states: tuple[str, ...] = ()
 
@@ -218,19 +218,19 @@ def run_bulge(specimen: Bulge, law: CreepLaw, values: Mapping[str, float], plan:
         status,
         end_time,
         reason,
-        made=test_setup,
+        setup=test_setup,
         simulation=simulation,
         states=states,
     )
 
 
-def _lengths(specimen: Bulge, setup: TestSetup) -> dict[str, float]:
+def _lengths(specimen: Bulge, setup: BulgeSetup) -> dict[str, float]:
     """The lengths of the dimple, so that a written history says what was simulated; a mesh from files has none."""
     return {} if specimen.mesh is not None else {name: getattr(setup.geometry, name) for name in setup.geometry.lengths}
 
 
 def _rate_failure(
-    specimen: Bulge, kernel: CompiledLaw, theta: Floats, plan: History, setup: TestSetup, simulation: Simulation
+    specimen: Bulge, kernel: CompiledLaw, theta: Floats, plan: History, setup: BulgeSetup, simulation: Simulation
 ) -> tuple[float, str] | None:
     """Until when the law had a creep rate, and where it has none: at any step, and beyond an early end.
 

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.records import History
-from creepkit.specimens.bulge.finite_elements import MODULUS_TEMPERATURE_STEP, TestSetup, set_up_test
+from creepkit.specimens.bulge.finite_elements import MODULUS_TEMPERATURE_STEP, BulgeSetup, set_up_test
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
 from creepkit.specimens.bulge.reduced_order.tables import ReducedOrderTables, build_tables
 from creepkit.specimens.bulge.reduced_order.time_integration import (
@@ -52,7 +52,7 @@ class TimeNodes:
     frames : (frames, nodes) the values at the history's times as sums of those at nodes.
     """
 
-    setup: TestSetup
+    setup: BulgeSetup
     times: Floats
     pressure: Floats
     temperature: Floats
