@@ -10,16 +10,16 @@ import sys
 import tempfile
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import torch
-from card_cases import CASES, HAS, STEEL
 from neml2 import SR2, Model, Scalar
 from neml2.factory import load_model
 
 from creepkit.exporters.moose_neml2 import Neml2Model
 from creepkit.kernels import lower
 from creepkit.records import LawWithValues
+from helpers.creep_form_cases import CASES, HAS, STEEL
 
 STEP = 10.0
 """s, of the backward Euler step whose residual is asked for."""

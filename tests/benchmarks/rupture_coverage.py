@@ -15,7 +15,7 @@ import numpy as np
 import creepkit as ck
 from creepkit.records import History, constant_stress
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 from test_inverse_rupture import BAR, OMEGA, SCATTER, campaign
 
 VALUES = {"A": 1e-16, "n": 4.0, "m": 20.0}

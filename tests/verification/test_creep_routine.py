@@ -5,9 +5,7 @@ alone, of lower order at the start of a sum of hardening terms); in relaxation t
 its end, makes it first order.
 """
 
-import sys
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,9 +14,7 @@ import creepkit as ck
 from creepkit.exporters.creep_subroutine import AbaqusCreepSubroutine, CalculixCreepSubroutine
 from creepkit.language import CreepLaw, Param, State, mean_stress, parameters, states, strain, stress
 from creepkit.records import LawWithValues, Program, Units
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
-from fortran_library import Routine
+from helpers.compiled_fortran import Routine
 
 BAR = ck.specimen("uniaxial").replace(tolerance=1e-11)
 STEPS = ((0.0, 60.0), (3e4, 90.0), (5e4, 40.0))

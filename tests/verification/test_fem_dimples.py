@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from fem_cases import BENCHMARKS, course, run
 
 from creepkit.fem.mesh import surface_interpolation
 from creepkit.fem.simulation import LoadHistory, Simulation
@@ -20,6 +19,7 @@ from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import PressureJump, Program, Status
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import Observation
+from helpers.fem_cases import BENCHMARKS, course, run
 
 if not BENCHMARKS.is_dir():
     pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)

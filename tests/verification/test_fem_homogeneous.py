@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fem_cases import block, course, equal_steps, mesh_of, orders, right_of, run
 
 from creepkit.fem.mesh import Mesh
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import Program, Status
+from helpers.fem_cases import block, course, equal_steps, mesh_of, orders, right_of, run
 
 E, NU = 1e5, 0.3
 STRETCH = np.array([0.3, -0.2])

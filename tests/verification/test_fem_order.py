@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fem_cases import STILL, course, equal_steps, mesh_of, orders, run, shell, steady_velocity
 
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.specimens.bulge.geometry import DimpleGeometry
+from helpers.fem_cases import STILL, course, equal_steps, mesh_of, orders, run, shell, steady_velocity
 
 MESHES = (2, 4, 8, 16)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fem_cases import BENCHMARKS, course, run
 
 from creepkit.fem.mesh import discretize, surface_interpolation
 from creepkit.fem.mesh_files import read_input_deck, read_mesh
@@ -14,6 +13,7 @@ from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import PressureJump, Program, Status
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import Observation
+from helpers.fem_cases import BENCHMARKS, course, run
 
 if not BENCHMARKS.is_dir():
     pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)

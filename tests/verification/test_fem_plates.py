@@ -6,10 +6,10 @@ import json
 
 import numpy as np
 import pytest
-from fem_cases import BENCHMARKS, block, course, mesh_of, run, steady_velocity
 
 from creepkit.fem.mesh import Mesh, StripMesh
 from creepkit.records import Program
+from helpers.fem_cases import BENCHMARKS, block, course, mesh_of, run, steady_velocity
 
 if not BENCHMARKS.is_dir():
     pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)

@@ -9,7 +9,11 @@ import json
 
 import numpy as np
 import pytest
-from fem_cases import (
+
+from creepkit.fem.mesh import Mesh
+from creepkit.laws.norton import NORTON
+from creepkit.records import Program
+from helpers.fem_cases import (
     BENCHMARKS,
     block,
     coaxial_stresses,
@@ -21,10 +25,6 @@ from fem_cases import (
     shell,
     steady_velocity,
 )
-
-from creepkit.fem.mesh import Mesh
-from creepkit.laws.norton import NORTON
-from creepkit.records import Program
 
 if not BENCHMARKS.is_dir():
     pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)

@@ -1,18 +1,13 @@
 """Stated 95 % intervals cover planted values about 95 times in 100, under scatter that real tests have."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
-from steady import Steady, planted
 
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identify import identify
 from creepkit.kernels import lower
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
+from helpers.steady_rate_predictor import Steady, planted
 
 REPEATS = 100
 

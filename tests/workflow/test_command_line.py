@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 import creepkit as ck
 from creepkit.cli.app import app
 from creepkit.cli.demo import PLANTED, PLANTED_BULGE
+from helpers.paths import EXAMPLES
 
 CURVES = sorted(str(p) for p in PLANTED.glob("*.csv"))
 
@@ -173,7 +174,7 @@ def test_demo_finds_the_law_of_a_virtual_bulge_test(tmp_path):
 
 def test_the_virtual_bulge_test_is_what_its_script_makes(tmp_path):
     """To a third of its noise: the solver may change within its tolerance."""
-    script = Path(__file__).parents[2] / "examples" / "00_make_a_virtual_bulge_test.py"
+    script = EXAMPLES / "00_make_a_virtual_bulge_test.py"
     runpy.run_path(str(script))["main"](tmp_path)
     (made,), (shipped,) = (ck.read_histories(folder / "virtual_bulge_test.csv") for folder in (tmp_path, PLANTED_BULGE))
     for name, noise in (("amplitude", 1.5e-3), ("width", 0.02), ("shape", 0.02)):

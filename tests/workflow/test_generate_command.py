@@ -4,7 +4,6 @@ import json
 import os
 import re
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,9 @@ import creepkit as ck
 from creepkit.cli.app import app
 from creepkit.cli.generate import design_changes, select_design
 from creepkit.errors import DatasetError
+from helpers.paths import EXAMPLES
 
-EXAMPLES = Path(__file__).parents[2] / "examples" / "cluster"
+EXAMPLES = EXAMPLES / "cluster"
 BARS = ("norton", "--specimen", "uniaxial", "--interval", "3600", "--seed", "1")
 
 

@@ -1,7 +1,6 @@
 """The way a laboratory would go, on real curves: CMSX-6 at 980 C (BAM, doi 10.5281/zenodo.13937986, CC BY 4.0)."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,9 @@ import creepkit as ck
 from creepkit.cli.app import app
 from creepkit.inverse.cross_validation import leave_one_condition_out, loading_strains, times_to_strain
 from creepkit.language import CreepLaw, Param, parameters, strain, stress
+from helpers.paths import SHARED
 
-CURVES = Path(__file__).parents[3] / "shared" / "data" / "uniaxial" / "cmsx6"
+CURVES = SHARED / "uniaxial" / "cmsx6"
 pytestmark = pytest.mark.skipif(not CURVES.is_dir(), reason="the measured curves lie beside the project, not in it")
 
 

@@ -2,8 +2,6 @@
 
 import csv
 import json
-import sys
-from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -11,10 +9,7 @@ from typer.testing import CliRunner
 from creepkit.cli.app import app
 from creepkit.readers.history_csv import write_history
 from creepkit.screening.planted import planted_plate
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
-
-from planted_alloys import bulge
+from helpers.planted_alloys import bulge
 
 LAWS = ("--law", "norton", "--law", "strain-hardening")
 HOW = (*LAWS, "--surrogate", "dimple", "--dense", "none", "--confirm", "always", "--workers", "1")

@@ -106,6 +106,10 @@ class Job(Protocol):
 class ShardedJob(Job, Protocol):
     """A job whose parts are shards of `rows` samples, each a file in `folder`."""
 
+    def on_one_thread(self) -> ShardedJob:
+        """The same work, to be done on one thread."""
+        ...
+
     @property
     def folder(self) -> Path:
         """Where the files of the shards lie."""

@@ -1,0 +1,360 @@
+"""The commands that need no data: laws, plugins, check, simulate, the global options and the exit codes."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+import creepkit as ck
+from creepkit.cli.app import COMMANDS
+from helpers.command_line import creepkit, one_line
+
+FALLING = """
+from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress
+
+A, n = parameters("A n")
+LAW = CreepLaw(
+    name="falling",
+    title="A rate that falls with stress",
+    terms={"falling": A * stress**n},
+    params={
+        A: Param("rate coefficient", unit="1/s", bounds=(1e-20, 1e-5), scale="log"),
+        n: Param("stress exponent", bounds=(-3, -1)),
+    },
+    references=("nobody",),
+)
+
+
+@hookimpl
+def creepkit_laws():
+    return [LAW]
+"""
+
+BRITTLE = """
+from creepkit.language import CreepLaw, Param, State, hookimpl, parameters, states, stress
+
+(A,), (w,) = parameters("A"), states("w")
+RATE = A * stress / (1 - w)
+COEFFICIENT = Param("rate coefficient", unit="1/s", bounds=(1e-20, 1e-5), scale="log")
+
+
+@hookimpl
+def creepkit_laws():
+    return [CreepLaw("brittle", {"creep": RATE}, {A: COEFFICIENT}, states={w: State(0, RATE, "damage", limit=0.9)})]
+"""
+
+COMMAND = """
+import typer
+
+from creepkit.language import hookimpl
+
+
+@hookimpl
+def creepkit_commands(app: typer.Typer) -> None:
+    @app.command("{name}")
+    def command() -> None:
+        typer.echo("from a plugin")
+"""
+
+
+pytestmark = pytest.mark.usefixtures("own_registry")
+
+
+# ---- global --------------------------------------------------------------------------------------------------------
+
+
+def test_help_tells_every_command_in_a_line() -> None:
+    result = creepkit("--help")
+
+    assert result.exit_code == 0
+    assert all(f"\n  {name} " in result.stdout for name in COMMANDS)
+    assert "..." not in result.stdout.split("Commands:")[1]
+
+
+@pytest.mark.parametrize("words", [(), ("no-such-command",), ("laws", "--no-such"), ("check",), ("new-law", "Bad!")])
+def test_wrong_usage_exits_2(words: tuple[str, ...]) -> None:
+    assert creepkit(*words).exit_code == 2
+
+
+def test_a_misspelt_command_is_suggested() -> None:
+    assert "Did you mean 'plugins'?" in creepkit("plugin").stderr
+
+
+def test_version() -> None:
+    assert creepkit("--version").stdout.startswith("creepkit 0.")
+
+
+def test_debug_lets_the_traceback_through() -> None:
+    quiet, loud = creepkit("laws", "nortn"), creepkit("--debug", "laws", "nortn")
+
+    assert "did you mean 'norton'?" in one_line(quiet)
+    assert loud.exit_code == 1
+    assert type(loud.exception).__name__ == "LawError"
+
+
+# ---- laws ----------------------------------------------------------------------------------------------------------
+
+
+def test_laws_are_listed_with_their_parameters() -> None:
+    result = creepkit("laws")
+
+    assert result.exit_code == 0
+    assert "norton" in result.stdout
+    assert "A n_0 n_inf C tau_d tau_r" in result.stdout
+
+
+def test_laws_as_json_hold_what_table_1_says() -> None:
+    laws = {law["name"]: law for law in json.loads(creepkit("laws", "--json").stdout)}
+
+    m = laws["strain-hardening"]["parameters"]["m"]
+    assert (m["bounds"], m["off"]) == ([-1, 0], 0)
+    assert laws["combined"]["parameters"]["A_1"]["bounds"] == [1e-40, 1e-5]
+    assert laws["norton"]["provenance"].startswith("plugin 'norton' (creepkit ")
+
+
+def test_one_law_in_full() -> None:
+    shown = creepkit("laws", "norton").stdout
+
+    assert "A*stress**n" in shown
+    assert r"A \sigma_e^{n}" in shown
+    assert "Norton (1929)" in shown
+    assert json.loads(creepkit("laws", "norton", "--json").stdout)["terms"] == {"power law": "A*stress**n"}
+
+
+# ---- plugins -------------------------------------------------------------------------------------------------------
+
+
+def test_a_plugin_file_joins_the_laws() -> None:
+    Path("mine.py").write_text(FALLING)
+
+    result = creepkit("--plugin", "mine.py", "laws", "falling")
+
+    assert result.exit_code == 0
+    assert f"from plugin 'mine' ({Path('mine.py').resolve()})" in result.stdout
+
+
+def test_a_state_as_json_says_where_the_material_ends() -> None:
+    Path("brittle.py").write_text(BRITTLE)
+
+    law = json.loads(creepkit("--plugin", "brittle.py", "laws", "brittle", "--json").stdout)
+
+    rate = "A*stress/(1 - w)"
+    assert law["states"] == {"w": {"meaning": "damage", "unit": "1", "rate": rate, "initial": 0.0, "limit": 0.9}}
+
+
+def test_a_plugin_file_that_is_asked_for_must_work() -> None:
+    Path("mine.py").write_text("A = (\n")
+
+    assert f"({Path('mine.py').resolve()}, line 1)" in one_line(creepkit("--plugin", "mine.py", "laws"))
+    assert "plugin file none.py does not exist" in one_line(creepkit("--plugin", "none.py", "laws"))
+
+
+def test_plugins_are_listed_broken_ones_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("good.py").write_text(FALLING)
+    Path("twin.py").write_text(FALLING)
+    Path("bad.py").write_text("1 / 0\n")
+    monkeypatch.setenv("CREEPKIT_PLUGINS", os.pathsep.join(["good.py", "twin.py", "bad.py"]))
+
+    text, answer = creepkit("plugins"), json.loads(creepkit("plugins", "--json").stdout)
+
+    by_name = {plugin["name"]: plugin for plugin in answer["plugins"]}
+    assert by_name["norton"]["offers"] == {"law": ["norton"]}
+    assert by_name["good"]["status"] == "ok"
+    assert by_name["bad"]["status"] == "broken"
+    assert "ZeroDivisionError: division by zero" in by_name["bad"]["problem"]
+    assert by_name["bad"]["problem"] in text.stdout
+    assert len(answer["clashes"]) == 1
+    assert answer["clashes"][0] in text.stdout
+
+
+def test_a_plugin_adds_a_command() -> None:
+    Path("mine.py").write_text(COMMAND.format(name="greet"))
+
+    assert creepkit("--plugin", "mine.py", "greet").stdout == "from a plugin\n"
+
+
+def test_a_plugin_cannot_take_the_place_of_a_command() -> None:
+    Path("mine.py").write_text(COMMAND.format(name="laws"))
+
+    assert "a plugin adds the command 'laws'" in one_line(creepkit("--plugin", "mine.py", "greet"))
+
+
+# ---- check ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_law_that_breaks_a_promise_fails_the_check() -> None:
+    Path("falling.py").write_text(FALLING)
+
+    result = creepkit("check", "falling.py")
+
+    assert result.exit_code == 1
+    assert "stress" in result.stdout
+    assert result.stderr == "creepkit: 1 of 1 laws failed the check\n"
+
+
+def test_a_file_without_laws_cannot_be_checked() -> None:
+    Path("commands.py").write_text(COMMAND.format(name="greet"))
+
+    assert "offers no law" in one_line(creepkit("check", "commands.py"))
+
+
+# ---- simulate ------------------------------------------------------------------------------------------------------
+
+NORTON = ("simulate", "norton", "--set", "A=5e-13", "--set", "n=3", "--end-h", "2")
+DIMPLE = (*NORTON, "--specimen", "bulge", "--modulus-gpa", "150")
+
+
+def test_a_dimple_is_simulated_with_all_it_needs_in_the_head() -> None:
+    jump = ("--pressure", "8", "--pressure", "3600:10")
+    rest = ("--geometry", "apex_thickness=0.48", "--every", "600", "--to", "run.csv", "--picture", "section.png")
+    result = creepkit(*DIMPLE, *jump, *rest)
+
+    assert result.exit_code == 0, result.output
+    assert result.stdout == "wrote run.csv: 13 frames to 2 h\n"
+    (run,) = ck.read_histories("run.csv")
+    dimple = ck.specimen("bulge").replace(apex_thickness=0.48)
+    loading = ck.PressureJump(8, 10, 3600)
+    same = ck.simulate("norton", dimple, {"A": 5e-13, "n": 3}, loading=loading, times=run.times, elastic=run.elastic)
+    assert (run.loading, run.elastic, run.operator) == (loading, ck.Elastic(E=150e3), "profile 0-7.5 mm")
+    assert run.geometry == same.geometry
+    assert run.outputs["amplitude"].tolist() == same.outputs["amplitude"].tolist()
+    assert Path("section.png").stat().st_size > 20_000
+
+
+def test_the_cameras_of_a_dimple_take_a_frame_every_150_s() -> None:
+    lines = creepkit(*DIMPLE, "--pressure", "8").stdout.splitlines()
+
+    assert "# pressure_1_MPa: 8.0" in lines
+    assert [line.split(",")[0] for line in lines[-2:]] == ["7050.0", "7200.0"]
+
+
+def test_more_pressures_are_a_program_of_ramps() -> None:
+    steps = [word for step in ("8", "3600:10", "5000:0") for word in ("--pressure", step)]
+    lines = creepkit(*DIMPLE, *steps).stdout.splitlines()
+
+    assert (
+        "# pressure_program: 0.0 s 0.0 MPa; 5.0 s 8.0 MPa; 3600.0 s 8.0 MPa; 3605.0 s 10.0 MPa; 5000.0 s 10.0 MPa; "
+        "5005.0 s 0.0 MPa"
+    ) in lines
+
+
+def test_a_burst_is_told_and_the_history_ends_there() -> None:
+    fast = [word.replace("5e-13", "1e-9") for word in DIMPLE]
+    result = creepkit(*fast, "--pressure", "8", "--to", "run.csv")
+
+    assert result.exit_code == 0
+    assert " h: the surface reached the deflection limit; the history ends there\n" in result.stderr
+    (run,) = ck.read_histories("run.csv")
+    assert run.times[-1] < run.rupture_time < 7200
+    assert run.labels["ended"] == "the surface reached the deflection limit"
+
+
+def test_a_bar_with_a_modulus_has_its_elastic_strain() -> None:
+    creepkit(
+        *NORTON, "--stress", "100", "--control", "stress", "--modulus-gpa", "100", "--points", "3", "--to", "bar.csv"
+    )
+
+    (run,) = ck.read_histories("bar.csv")
+    assert run.outputs["strain"].tolist() == pytest.approx([1e-3, 1e-3 + 5e-7 * 3600, 1e-3 + 5e-7 * 7200], rel=1e-6)
+    assert run.includes_elastic
+
+
+def test_specimens_are_listed_with_their_outputs() -> None:
+    listed = {one["name"]: one for one in json.loads(creepkit("specimens", "--json").stdout)}
+
+    assert {"uniaxial", "relaxation", "point", "bulge"} <= listed.keys()
+    assert listed["relaxation"]["outputs"] == ["stress"]
+    assert listed["relaxation"]["nuisances"] == ["temperature", "modulus"]
+    assert "strain strain_11" in creepkit("specimens").stdout
+
+
+def test_a_bar_relaxes() -> None:
+    """Norton, n = 3: s^-2 grows by 2 E A t; at first s = 150 MPa."""
+    held = ("--specimen", "relaxation", "--strain", "0.001", "--modulus-gpa", "150", "--points", "3")
+    result = creepkit(*NORTON, *held, "--to", "held.csv")
+
+    assert result.exit_code == 0, result.output
+    (run,) = ck.read_histories("held.csv")
+    assert (run.name, run.specimen, run.loading) == ("held", "relaxation", ck.constant_strain(0.001))
+    expected = [(150.0**-2 + 2 * 150e3 * 5e-13 * t) ** -0.5 for t in (0, 3600, 7200)]
+    assert run.outputs["stress"].tolist() == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_point_is_loaded_by_components() -> None:
+    """Tension, and torsion after an hour: q^2 = s^2 + 3 tau^2."""
+    loads = ("--specimen", "point", "--stress", "11=60", "--stress", "12=3600:40", "--points", "3")
+    result = creepkit(*NORTON, *loads, "--to", "tube.csv")
+
+    assert result.exit_code == 0, result.output
+    (run,) = ck.read_histories("tube.csv")
+    assert run.loading == ck.PointLoading(stress={"11": 60, "12": [(0, 0), (3600, 40)]})
+    later = (60.0**2 + 3 * 40.0**2) ** 1.5
+    assert run.outputs["strain"].tolist() == pytest.approx([0, 5e-13 * 60**3 * 3600, 5e-13 * (60**3 + later) * 3600])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((*DIMPLE, "--stress", "8"), "--stress belongs to --specimen uniaxial or point, found --specimen bulge"),
+        (
+            (*DIMPLE, "--pressure", "8", "--control", "load"),
+            "--control belongs to --specimen uniaxial, found --specimen bulge",
+        ),
+        ((*NORTON, "--pressure", "8"), "--pressure belongs to --specimen bulge, found --specimen uniaxial"),
+        (
+            (*NORTON, "--stress", "8", "--picture", "x.png"),
+            "--picture belongs to --specimen bulge, found --specimen uniaxial",
+        ),
+        ((*NORTON, "--specimen", "cube"), "there is no specimen 'cube': known: bulge, point, relaxation, uniaxial"),
+        (NORTON, "a bar needs a stress: give --stress, such as 100, or --specimen bulge with --pressure"),
+        ((*NORTON, "--specimen", "relaxation"), "a bar in relaxation needs a strain: give --strain, such as 0.002"),
+        ((*NORTON, "--specimen", "relaxation", "--strain", "0.001"), "a prescribed strain needs a modulus"),
+        (
+            (*NORTON, "--stress", "80", "--ramp", "5"),
+            "--ramp belongs to --specimen relaxation, found --specimen uniaxial",
+        ),
+        ((*NORTON, "--specimen", "point"), "a material point needs a component: give --stress 11=100"),
+        ((*NORTON, "--specimen", "point", "--stress", "80"), "--stress 80: name the component of a material point"),
+        ((*NORTON, "--stress", "11=80"), "11=80 names a component, which --specimen uniaxial has not; give --specimen"),
+        (
+            (*NORTON, "--stress", "80", "--temperature-c", "1800:500"),
+            "--temperature-c 1800:500: nothing is said of the time before; give the first one from 0 s on",
+        ),
+        (
+            (*NORTON, "--specimen", "point", "--stress", "21=80"),
+            "no component '21' to load; allowed are 11, 22, 33, 12, 23, 13",
+        ),
+        (DIMPLE, "a dimple needs a pressure: give --pressure, such as 8, or 7200:10 for a later step"),
+        (
+            (*NORTON, "--specimen", "bulge", "--pressure", "8"),
+            "a dimple needs a modulus: give --modulus-gpa, such as 150",
+        ),
+        ((*DIMPLE, "--pressure", "8", "--set", "n=4"), "--set n=4: n is given twice; keep one of them"),
+        ((*DIMPLE, "--pressure", "-8"), "--pressure -8: the first pressure starts at 0 s, none is negative, and each"),
+        ((*DIMPLE, "--pressure", "8", "--pressure", "2:9"), "comes 5 s or more after the one before"),
+        ((*DIMPLE, "--pressure", "high"), "--pressure high: write a number, or SECONDS:NUMBER for a later step"),
+        (
+            (*DIMPLE, "--pressure", "8", "--geometry", "thickness=1"),
+            "--geometry: no length is called 'thickness'; did you mean 'apex_thickness'?",
+        ),
+        (
+            (*DIMPLE, "--pressure", "8", "--geometry", "apex_thickness"),
+            "--geometry apex_thickness: write NAME=NUMBER, such as apex_thickness=0.48",
+        ),
+        (
+            (*DIMPLE, "--pressure", "8", "--every", "60", "--points", "9"),
+            "--points and --every both say when frames are taken; give one of them",
+        ),
+        (
+            (*DIMPLE, "--pressure", "8", "--every", "9999"),
+            "--every 9999 s is not a step of a test of 7200 s (allowed are 1 to 1000000 frames)",
+        ),
+        (
+            (*DIMPLE, "--pressure", "8", "--picture", "none/section.png"),
+            "none/section.png: the picture cannot be written",
+        ),
+    ],
+)
+def test_a_simulation_that_makes_no_sense_is_one_line(words: tuple[str, ...], said: str) -> None:
+    assert said in one_line(creepkit(*words))

@@ -1,0 +1,143 @@
+"""`new-law`: a package or a file to start from; a missing law names its package; hard limits of parameters."""
+
+import json
+import math
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import creepkit as ck
+from creepkit.errors import LawError
+from creepkit.language import CreepLaw, Param, parameters, stress
+from creepkit.language.law_codec import law_from_json, law_to_json
+from creepkit.registry import Registry, default_registry
+from creepkit.registry.plugin_registry import LAWS_BY_PACKAGE, package_with_law
+from helpers.command_line import creepkit, one_line
+from helpers.paths import ROOT
+
+A, n = parameters("A n")
+
+
+pytestmark = pytest.mark.usefixtures("own_registry")
+
+
+# ---- what it writes ------------------------------------------------------------------------------------------------
+
+
+def test_a_new_law_is_a_package_that_says_what_to_do_next() -> None:
+    told = creepkit("new-law", "my-law").stdout
+    project = tomllib.loads(Path("my-law", "pyproject.toml").read_text())
+
+    assert project["project"]["entry-points"]["creepkit"] == {"my-law": "creepkit_my_law"}
+    assert project["project"]["dependencies"] == ["creepkit"]
+    files = {str(p.relative_to("my-law")) for p in Path("my-law").rglob("*") if p.is_file()}
+    assert files == {"creepkit_my_law.py", "pyproject.toml", "README.md", "tests/test_my_law.py"}
+    assert sum(len(Path("my-law", file).read_text().splitlines()) for file in files) < 70
+    assert "creepkit check my-law/creepkit_my_law.py" in told
+    assert "pip install -e ./my-law" in told
+
+
+def test_its_law_and_its_test_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    creepkit("new-law", "my-law")
+    checked = creepkit("check", "my-law/creepkit_my_law.py")
+    assert checked.exit_code == 0, checked.stdout
+    assert "my-law: conforms" in checked.stdout
+    space: dict = {}
+    exec(compile(Path("my-law/tests/test_my_law.py").read_text(), "test_my_law.py", "exec"), space)
+    space["test_it_keeps_what_every_law_promises"]()
+
+
+def test_one_file_is_enough_for_a_start() -> None:
+    written = creepkit("new-law", "my-law", "--file")
+    assert written.exit_code == 0
+    assert "creepkit check my_law.py" in written.stdout
+    assert len(Path("my_law.py").read_text().splitlines()) <= 25
+    assert creepkit("--plugin", "my_law.py", "laws", "my-law").exit_code == 0
+
+
+@pytest.mark.parametrize(("words", "place"), [((), "my-law"), (("--file",), "my_law.py")])
+def test_a_new_law_never_overwrites(words: tuple[str, ...], place: str) -> None:
+    Path(place).write_text("precious")
+    assert f"{place} exists already" in one_line(creepkit("new-law", "my-law", *words))
+    assert Path(place).read_text() == "precious"
+
+
+def test_a_new_law_needs_a_new_name() -> None:
+    assert "there is a law 'norton' already" in one_line(creepkit("new-law", "norton"))
+    assert not Path("norton").exists()
+
+
+# ---- laws that are not installed -----------------------------------------------------------------------------------
+
+
+def test_a_missing_law_names_the_package_that_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    from creepkit.registry import plugin_sources
+
+    own = [pair for pair in plugin_sources.installed_entry_points() if pair[0].origin.startswith("creepkit ")]
+    monkeypatch.setattr(plugin_sources, "installed_entry_points", lambda: own)
+    with pytest.raises(LawError) as raised:
+        Registry().law("kachanov-rabotnov")
+    package = "package creepkit-damage has it: pip install creepkit-damage"
+    assert str(raised.value) == f"there is no law 'kachanov-rabotnov'; {package}"
+    default_registry.cache_clear()
+    assert "pip install creepkit-classic" in one_line(creepkit("laws", "theta-projection"))
+    assert "did you mean 'norton'?" in one_line(creepkit("laws", "nortn"))
+
+
+def test_the_table_is_what_the_packages_of_this_project_offer() -> None:
+    for project in (tomllib.loads(p.read_text()) for p in sorted(ROOT.glob("plugins/*/pyproject.toml"))):
+        package = project["project"]["name"]
+        assert set(LAWS_BY_PACKAGE[package]) == set(project["project"]["entry-points"]["creepkit"])
+    assert package_with_law("norton") == ""
+
+
+def test_a_law_tells_which_package_it_came_from() -> None:
+    known = default_registry()
+    sum_of_two = (ck.law("logarithmic") + ck.law("norton")).times(ck.arrhenius())
+    version = ck.__version__
+    assert known.distributions_of(ck.law("logarithmic").fix(n=4)) == "creepkit-logarithmic 0.1.0"
+    assert known.distributions_of(sum_of_two) == f"creepkit {version}, creepkit-logarithmic 0.1.0"
+    assert known.distributions_of(limited(None)) == ""
+
+
+# ---- limits --------------------------------------------------------------------------------------------------------
+
+
+def limited(limits, off=None) -> CreepLaw:
+    rate = Param("rate coefficient", unit="1/s", bounds=(1e-40, 1e-5), scale="log")
+    return CreepLaw("limited", {"creep": A * stress**n}, {A: rate, n: Param("n", (1, 8), off=off, limits=limits)})
+
+
+def test_values_outside_the_physical_limits_are_refused() -> None:
+    law = limited((0.5, 12), off=0.0)
+    assert law.values({"A": 1e-16, "n": 10.0})["n"] == 10.0, "bounds are where a fit looks, not what is possible"
+    assert law.values({"A": 1e-16, "n": 0.0})["n"] == 0.0, "off is allowed"
+    with pytest.raises(LawError, match=r"'limited', parameter 'n': 13 is not physical, which is from 0.5 to 12 \(or 0"):
+        law.values({"A": 1e-16, "n": 13.0})
+    with pytest.raises(LawError, match="not physical"):
+        ck.simulate(law, "uniaxial", {"A": 1e-16, "n": 0.1}, loading=ck.constant_stress(50), times=[1.0])
+
+
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [((2, 12), r"bounds \(1, 8\) must lie within the limits \(2, 12\)"), (3, "write two numbers"), (("a", 9), "two")],
+)
+def test_limits_hold_the_bounds(limits, said: str) -> None:
+    with pytest.raises(LawError, match=said):
+        limited(limits)
+
+
+@pytest.mark.parametrize("limits", [None, (0.5, 12), (0.5, math.inf), (-math.inf, math.inf)])
+def test_limits_travel_in_json_and_are_no_mathematics(limits) -> None:
+    law = limited(limits)
+    data = json.loads(json.dumps(law_to_json(law), allow_nan=False))
+    assert law_from_json(data) == law
+    assert law.fingerprint == limited(None).fingerprint
+    assert ("limits" in data["params"][1]) == (limits is not None), "laws without are written as they always were"
+
+
+def test_sums_and_temperature_keep_limits() -> None:
+    law = (limited((0.5, 12)) + ck.law("norton")).times(ck.arrhenius()).with_temperature(n_1=ck.linear())
+    assert law.table["n_1"].limits == (0.5, 12.0)
+    assert "physical from 0.5 to 12" in str(law)

@@ -1,0 +1,115 @@
+"""`creepkit train` and `creepkit sweep`: files, tables, pictures, and one line for what cannot be."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import creepkit as ck
+from creepkit.dataset.storage import write_dataset
+from creepkit.surrogates import training as sweeping
+from creepkit.surrogates.evaluation import evaluate
+from creepkit.surrogates.training_loop import training_split
+from helpers.command_line import creepkit, one_line
+from helpers.planted_datasets import bars
+
+PNG = b"\x89PNG"
+
+
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_dataset(bars(60), tmp_path_factory.mktemp("set") / "bars.h5")
+
+
+def test_train_writes_a_surrogate_and_its_pictures(file: Path, tmp_path: Path) -> None:
+    words = ("train", str(file), "--to", str(tmp_path / "m.safetensors"), "--hidden", "6", "--layers", "1")
+    shown = creepkit(*words, "--epochs", "3", "--target", "log")
+    assert shown.exit_code == 0, shown.output
+    assert "validation loss (Eq. 4, outputs together)" in shown.stdout
+    assert "48 samples for training, 12 for validation" in shown.stdout
+    pictures = sorted(p.name for p in tmp_path.glob("*.png"))
+    assert pictures == ["m-curves.png", "m-parity.png", "m-worst.png"]
+    assert all((tmp_path / name).read_bytes().startswith(PNG) for name in pictures)
+    model = ck.surrogate(tmp_path / "m.safetensors")
+    assert model.recipe == ck.ParameterGru(6, 1, target="log", training=ck.Training(epochs=3))
+
+
+def test_train_tells_its_errors_as_json(file: Path, tmp_path: Path) -> None:
+    words = ("train", str(file), "--to", str(tmp_path / "m.safetensors"), "--hidden", "4", "--layers", "1")
+    shown = creepkit(*words, "--epochs", "1", "--json")
+    told = json.loads(shown.stdout)
+    assert set(told["metrics"]["outputs"]["strain"]) >= {"rse", "mse", "mae", "r2"}
+    assert len(told["pictures"]) == 3
+
+
+def test_a_sweep_is_a_table_and_a_picture_and_is_not_redone(file: Path, tmp_path: Path) -> None:
+    words = ("sweep", str(file), "--to", str(tmp_path), "--layers", "1", "--hidden", "4,6", "--cell", "gru,lstm")
+    first = creepkit(*words, "--samples", "20,48", "--epochs", "2", "--json")
+    assert first.exit_code == 0, first.output
+    found = json.loads(first.stdout)["trainings"]
+    sizes = {(e["cell"], e["hidden"], e["layers"], e["samples"]) for e in found}
+    assert sizes == {(c, h, 1, n) for c in ("gru", "lstm") for h in (4, 6) for n in (20, 48)}
+    gru = next(e for e in found if (e["cell"], e["hidden"]) == ("gru", 4))
+    # 3 gates of (4 + 4 + 2) x 4 numbers for log10 A, n, off and the load, and a head of 4 + 1
+    assert gru["weights"] == 3 * 4 * (4 + 4 + 2) + 5
+    assert (tmp_path / "sweep.png").read_bytes().startswith(PNG)
+    stamps = {p: p.stat().st_mtime_ns for p in tmp_path.glob("*.safetensors")}
+    assert len(stamps) == 8
+    (tmp_path / "gru-4x1-20.safetensors").unlink()
+    again = creepkit(*words, "--samples", "20,48", "--epochs", "2", "--json")
+    assert json.loads(again.stdout)["trainings"] == found
+    assert sum(p.stat().st_mtime_ns == stamp for p, stamp in stamps.items()) == 7
+
+
+def test_a_sweep_judges_every_number_of_samples_by_the_same_rows(tmp_path: Path) -> None:
+    data, recipe = bars(60), ck.ParameterGru(4, 1, training=ck.Training(epochs=2))
+    entries = sweeping.size_study(data, recipe, to=tmp_path, samples=(10, 20, 48))
+    judged = [evaluate(ck.surrogate(tmp_path / e.file), data) for e in entries]
+    for entry, one in zip(entries, judged, strict=True):
+        assert one.comparison.index.tolist() == judged[0].comparison.index.tolist()
+        assert entry.loss == one.metrics["loss"]
+        learnt = training_split(len(data), ck.Training(samples=entry.samples), 0)[0].tolist()
+        assert (len(learnt), set(learnt) & set(one.comparison.index)) == (entry.samples, set())
+    assert len({e.loss for e in entries}) == 3
+
+
+def test_the_best_of_a_sweep_stands_on_top(file: Path, tmp_path: Path) -> None:
+    recipe = ck.ParameterGru(4, 1, training=ck.Training(epochs=2))
+    entries = sweeping.size_study(bars(60), recipe, to=tmp_path, hidden=(2, 8))
+    _, rows = sweeping.size_study_rows(entries)
+    losses = [float(row[5]) for row in rows]
+    assert losses == sorted(losses)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("train", "{set}", "--to", "{to}", "--recipe", "gru"), "--recipe gru is not known"),
+        (("train", "{set}", "--to", "{to}", "--cell", "rnn"), "cell is 'rnn'; allowed are gru, lstm"),
+        (
+            ("train", "{set}", "--to", "{to}", "--recipe", "rate-net", "--cell", "gru"),
+            "--cell means nothing to rate-net",
+        ),
+        (("train", "{to}", "--to", "{to}"), "no such"),
+        (("sweep", "{set}", "--to", "{to}", "--hidden", "64;128"), "--hidden 64;128 is not understood"),
+        (
+            ("sweep", "{set}", "--to", "{to}", "--samples", "900"),
+            "there are not 900 samples to learn from: the data set has 60 accepted ones, of which 12",
+        ),
+    ],
+)
+def test_what_cannot_be_is_one_line(file: Path, tmp_path: Path, words: tuple[str, ...], told: str) -> None:
+    places = {"set": file, "to": tmp_path / "m.safetensors"}
+    shown = creepkit(*(word.format(**places) for word in words))
+    assert shown.exit_code == 1
+    assert told in one_line(shown)
+
+
+def test_verbs_say_what_they_take() -> None:
+    with pytest.raises(ck.errors.SurrogateError, match=r"found ParameterGru"):
+        ck.train(bars(10), ck.ParameterGru)
+    with pytest.raises(ck.errors.DatasetError, match="takes a data set or its file, found list"):
+        ck.train([1, 2], ck.ParameterGru())

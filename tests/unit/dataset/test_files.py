@@ -1,0 +1,365 @@
+"""Data sets in files: what is written is read, with h5py alone too; what is something else is said in a sentence."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.dataset import storage
+from creepkit.dataset.dataset import COLUMNS
+from creepkit.dataset.shards import Campaign
+from creepkit.dataset.simulation import rounded_outputs, simulate_rows
+from creepkit.errors import DatasetError
+from helpers.planted_sampling import BAR, GRID, Planted, Raising, strain, stress_of
+
+
+def simulated(tmp_path, design=None, first=0, rows=32, seed=0, specimen=BAR):
+    campaign = Campaign(design or Planted(), specimen, seed, tmp_path / "parts", rows)
+    return simulate_rows(campaign.design, campaign.header, seed, first, rows, lambda row: None)
+
+
+@pytest.fixture
+def data(tmp_path):
+    raising = Raising(stress_of(next(r for r in range(32) if stress_of(r) <= 120.0)))
+    return simulated(tmp_path, Planted((*Planted().criteria, raising)))
+
+
+def assert_same(one, other):
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+    assert dict(one.failures) == dict(other.failures)
+
+
+def test_histories_are_those_of_nortons_law_under_constant_load(data):
+    for row in np.flatnonzero(data.reasons == 0):
+        expected = strain(data.values_of(row), data.conditions_of(row), GRID.values)
+        np.testing.assert_allclose(data.values[row, :, 0], expected, rtol=1e-4, atol=1e-12)
+        marks = strain(data.values_of(row), data.conditions_of(row), np.array([0.0, 2000.0, 2000.0, 3600.0]))
+        np.testing.assert_allclose(data.marks[row, :, 0], marks, rtol=1e-4, atol=1e-12)
+
+
+def test_samples_fall_out_for_the_first_criterion_that_they_do_not_meet(data):
+    strong = data.conditions[:, 0] <= 120.0
+    np.testing.assert_array_equal(data.reasons == 1, ~strong)
+    assert np.isnan(data.values[~strong]).all()
+    assert (data.status[~strong] == -1).all()
+    visible = np.array([strain(data.values_of(r), data.conditions_of(r), GRID.values)[-1] > 1e-5 for r in range(32)])
+    np.testing.assert_array_equal(data.reasons == 2, strong & ~visible)
+    assert np.isfinite(data.values[data.reasons == 2]).all()
+
+
+def test_a_failed_sample_is_data_with_its_text(data):
+    (row,) = np.flatnonzero(data.reasons == -1)
+    assert data.failures == {row: "ZeroDivisionError: stress of no use"}
+    assert np.isfinite(data.values[row]).all()
+
+
+def test_a_sample_that_does_not_converge_at_all_has_failed(tmp_path):
+    @dataclass(frozen=True)
+    class Stuck(type(BAR)):
+        def predict(self, law, values, histories):
+            found = super().predict(law, values, histories)
+            nothing = np.full_like(found.values, np.nan)
+            return replace(found, values=nothing, status=found.status + 2, end_times=found.end_times * 0)
+
+    stuck = simulated(tmp_path, specimen=Stuck(), rows=7)
+    assert set(stuck.failures.values()) == {"not converged from 0 s on, with nothing to show before"}
+    assert len(stuck.failures) == (stuck.reasons == -1).sum() == (stuck.conditions[:, 0] <= 120.0).sum()
+
+
+def test_when_all_samples_fail_that_is_an_error(tmp_path):
+    with pytest.raises(DatasetError, match="the first 8 simulations all failed: ZeroDivisionError: stress of no use"):
+        simulated(tmp_path, Planted((Raising(),)))
+
+
+def test_histories_of_rejected_samples_keep_one_part_in_4000(tmp_path):
+    values = np.array([0.0, np.nan, 1e-30, -3.14159, 5000.5], dtype=np.float32)
+    np.testing.assert_allclose(rounded_outputs(values), values, rtol=1.3e-4)
+    assert not (rounded_outputs(values).view(np.uint32) & 0xFFF)[[0, 2, 3, 4]].any()
+
+
+def test_what_is_written_is_read(data, tmp_path):
+    again = storage.read_dataset(storage.write_dataset(data, tmp_path / "a.h5"))
+    assert_same(again, data)
+    assert again.law == data.law
+    assert again.specimen == BAR
+    assert again.grid == GRID
+    assert again.outputs == ("strain",)
+    assert again.reason_names == ("accepted", "strong", "visible", "raising")
+    assert again.design_document == data.design_document
+    assert again.provenance == data.provenance
+    assert os.listdir(tmp_path) == ["a.h5"]
+
+
+def test_only_accepted_samples_may_be_read(data, tmp_path):
+    path = storage.write_dataset(data, tmp_path / "a.h5")
+    assert_same(storage.read_dataset(path, accepted_only=True), data.accepted)
+    assert len(data.accepted) == (data.reasons == 0).sum() > 0
+
+
+def test_h5py_alone_reads_a_data_set(data, tmp_path):
+    path = storage.write_dataset(data, tmp_path / "a.h5")
+    program = f"""
+import json, sys, h5py
+with h5py.File({str(path)!r}) as f:
+    good = f["reasons"][:] == 0
+    strain = f["values"][good][:, :, list(f.attrs["outputs"]).index("strain")]
+    A = f["parameters"][good][:, list(f.attrs["parameter_names"]).index("A")]
+    times, relative = f["time_grid"][:], f["time_grid"].attrs["relative"]
+    failed = dict(zip(f["failures/rows"][:].tolist(), f["failures/texts"].asstr()[:].tolist()))
+    told = f.attrs["format"], int(f.attrs["layout"]), f.attrs["units"], json.loads(f.attrs["law"])["name"]
+    print(json.dumps([strain.tolist(), A.tolist(), times.tolist(), bool(relative), failed, told]))
+assert "creepkit" not in sys.modules
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    strains, A, times, relative, failed, told = json.loads(done.stdout)
+    good = data.accepted
+    np.testing.assert_array_equal(np.float32(strains), good.values[..., 0])
+    np.testing.assert_array_equal(A, good.parameters[:, 0])
+    np.testing.assert_array_equal(times, GRID.values)
+    assert (relative, told) == (False, ["creepkit-dataset", 1, "MPa, mm, s, K", "norton"])
+    assert {int(row): text for row, text in failed.items()} == data.failures
+
+
+def test_a_bulge_is_rebuilt_with_its_geometry_but_for_its_threads(tmp_path):
+    dimple = ck.specimen("bulge").replace(apex_thickness=0.48, threads=2, tolerance=0.02)
+    data = replace(simulated(tmp_path), specimen=dimple)
+    again = storage.read_dataset(storage.write_dataset(data, tmp_path / "a.h5"))
+    assert again.specimen == dimple.replace(threads=None)
+
+
+def test_rows_keep_what_belongs_to_them(data):
+    (row,) = data.failures
+    part = data.rows([31, row])
+    assert_same(part.rows([1]), data.rows([row]))
+    assert part.failures == {1: data.failures[row]}
+    assert part.values_of(0) == data.values_of(31)
+    assert part.index.tolist() == [31, row]
+    assert part.plan(0).loading.program() == data.plan(31).loading.program()
+    np.testing.assert_array_equal(part.times(0), GRID.values)
+
+
+# ---- joining -------------------------------------------------------------------------------------------------------
+
+
+def test_joined_sets_hold_the_samples_of_both(tmp_path, data):
+    other = replace(simulated(tmp_path, seed=1), design_document=data.design_document, reason_names=data.reason_names)
+    both = data.joined(other)
+    assert_same(both.rows(slice(0, 32)), data)
+    assert_same(both.rows(slice(32, 64)), other)
+    assert [source["seed"] for source in both.provenance["joined"]] == [0, 1]
+    assert len(both.joined(replace(other, provenance={"seed": 2})).provenance["joined"]) == 3
+
+
+def test_the_same_samples_do_not_count_twice(data):
+    with pytest.raises(DatasetError, match="both data sets hold 32 samples of the same design and seed .* twice"):
+        data.joined(data)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"law": ck.law("strain-hardening")}, "laws 'norton' and 'strain-hardening' cannot be joined"),
+        ({"specimen": BAR.replace(tolerance=1e-4)}, "specimen.fields.tolerance is 1e-05 and 0.0001"),
+        ({"outputs": ("elongation",)}, "different outputs cannot be joined: strain and elongation"),
+        ({"reason_names": ("accepted",)}, "different reason names"),
+        ({"grid": type(GRID)(2 * GRID.values)}, "different time grids"),
+    ],
+)
+def test_strangers_are_not_joined(data, change, message):
+    with pytest.raises(DatasetError, match=message):
+        data.joined(replace(data, **change))
+
+
+# ---- files that are something else ---------------------------------------------------------------------------------
+
+
+def sentence(path):
+    with pytest.raises(DatasetError) as caught:
+        storage.read_dataset(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_no_file_a_folder_and_text(tmp_path):
+    assert "there is no such file" in sentence(tmp_path / "none.h5")
+    assert "is a folder" in sentence(tmp_path)
+    (tmp_path / "text.h5").write_text("A,n\n1,2\n")
+    assert "not an HDF5 file; give a data set" in sentence(tmp_path / "text.h5")
+    (tmp_path / "empty.h5").touch()
+    assert "not an HDF5 file" in sentence(tmp_path / "empty.h5")
+
+
+def test_a_foreign_hdf5_file(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("x", data=np.arange(3), dtype=np.int64)
+    assert "an HDF5 file, but no data set of creepkit" in sentence(tmp_path / "a.h5")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("layout", 2, "its layout is 2, this creepkit reads layout 1; upgrade creepkit"),
+        ("layout", 0, "its layout is 0, this creepkit reads layout 1; generate it again"),
+        ("units", "Pa, m, s, K", "its units are 'Pa, m, s, K'; allowed are 'MPa, mm, s, K'"),
+        ("law", "{", "cannot be read, it seems damaged: Expecting property name"),
+        ("law", "{}", "this is not a law that creepkit wrote"),
+        ("specimen", '{"name": "bar of soap", "fields": {}}', "'bar of soap' cannot be rebuilt here"),
+        ("specimen", '{"name": "uniaxial", "fields": {"colour": 1}}', "'uniaxial' cannot be rebuilt here"),
+        ("specimen", "[]", "does not say its specimen"),
+        ("outputs", None, "the attribute 'outputs' is missing"),
+        ("outputs", ["a", "b"], "the array 'values' is .*, which does not fit"),
+    ],
+)
+def test_attributes_that_say_something_else(data, tmp_path, name, value, message):
+    path = storage.write_dataset(data, tmp_path / "a.h5")
+    with h5py.File(path, "r+") as file:
+        if value is None:
+            del file.attrs[name]
+        else:
+            file.attrs[name] = value
+    with pytest.raises(DatasetError, match=message):
+        storage.read_dataset(path)
+    sentence(path)
+
+
+def test_arrays_that_are_missing_or_of_another_length(data, tmp_path):
+    path = storage.write_dataset(data, tmp_path / "a.h5")
+    with h5py.File(path, "r+") as file:
+        file["reasons"].resize(3, axis=0)
+    assert "the array 'reasons' is int8 (3,), which does not fit the others" in sentence(path)
+    with h5py.File(path, "r+") as file:
+        del file["marks"]
+    assert "the array 'marks' is missing" in sentence(path)
+
+
+def test_columns_that_are_not_numbers(data, tmp_path):
+    path = storage.write_dataset(
+        replace(data, parameters=np.where(data.parameters > 0, np.nan, 0.0)), tmp_path / "a.h5"
+    )
+    assert "parameters of sample 0 (A) are not finite" in sentence(path)
+    path = storage.write_dataset(replace(data, reasons=np.full(32, 6)), tmp_path / "b.h5")
+    assert "reason of sample 0 is 6; allowed are -1 to 3" in sentence(path)
+
+
+def test_every_truncation_of_a_file_is_noticed(data, tmp_path):
+    whole = storage.write_dataset(data, tmp_path / "a.h5").read_bytes()
+    for length in range(0, len(whole), max(len(whole) // 23, 1)):
+        (tmp_path / "cut.h5").write_bytes(whole[:length])
+        sentence(tmp_path / "cut.h5")
+
+
+def test_a_target_that_cannot_be_written(data, tmp_path):
+    (tmp_path / "file").touch()
+    for target in (tmp_path / "no folder" / "a.h5", tmp_path / "file" / "a.h5"):
+        with pytest.raises(DatasetError, match=r"a\.h5: cannot be written: "):
+            storage.write_dataset(data, target)
+
+
+def half_written(path):
+    with storage.replace_on_success(path) as temporary:
+        temporary.write_bytes(b"half")
+        raise OSError(28, "nothing left")
+
+
+def test_a_writing_that_fails_leaves_what_was_there(data, tmp_path):
+    path = storage.write_dataset(data, tmp_path / "a.h5")
+    before = path.read_bytes()
+    with pytest.raises(DatasetError, match="No space left on device; make room and start again"):
+        half_written(path)
+    assert path.read_bytes() == before
+    assert os.listdir(tmp_path) == ["a.h5"]
+
+
+def test_long_attributes_are_no_trouble(data, tmp_path):
+    long = replace(data, design_document={"name": "long", "numbers": list(range(30_000))})
+    assert storage.read_dataset(storage.write_dataset(long, tmp_path / "a.h5")).design_document == long.design_document
+
+
+def test_a_specimen_that_a_file_cannot_hold_is_refused(data, tmp_path):
+    odd = ck.specimen("bulge")
+    mesh = odd.geometry.mesh(0.5)
+    with pytest.raises(DatasetError, match="bulge.mesh is a Mesh, which a data set cannot hold"):
+        storage.write_dataset(replace(data, specimen=odd.replace(mesh=mesh)), tmp_path / "a.h5")
+
+
+# ---- files that mean harm ------------------------------------------------------------------------------------------
+
+
+def changed(data, path, change):
+    """A file of the data set that `change` has had in its hands."""
+    storage.write_dataset(data, path)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    return path
+
+
+def replaced(name, values, **how):
+    """A change of one array."""
+
+    def change(file):
+        kept = dict(file[name].attrs)
+        del file[name]
+        file.create_dataset(name, data=values, **how).attrs.update(kept)
+
+    return change
+
+
+def enormous(file):
+    """Every array promises a million million samples; of none is anything there."""
+    for name in COLUMNS:
+        file[name].resize(10**12, axis=0)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (enormous, "says to be .*, and is not all there"),
+        (replaced("reasons", np.zeros(32)), r"the array 'reasons' is float64 \(32,\), which does not fit"),
+        (replaced("parameters", np.zeros((32, 2), complex)), "'parameters' is complex128"),
+        (replaced("parameters", np.full((32, 2), b"1e-12")), "'parameters' is |S5"),
+        (replaced("time_grid", np.array([0.0, np.nan, 1000.0, 3600.0])), "a time grid needs two or more finite times"),
+        (replaced("time_grid", np.array([0.0, 100.0, 100.0, 3600.0])), "must start at or after 0 and increase"),
+        (replaced("time_grid", np.zeros((4, 4))), "a time grid needs"),
+        (replaced("time_grid", np.array([b"0", b"1", b"2", b"3"])), "its time grid is |S1"),
+        (lambda file: file["time_grid"].attrs.__delitem__("relative"), "cannot be read, it seems damaged"),
+        (lambda file: file.__delitem__("time_grid"), "cannot be read, it seems damaged"),
+        (lambda file: file.__delitem__("failures"), "cannot be read, it seems damaged"),
+        (replaced("failures/rows", np.array([1, 2, 3])), "cannot be read, it seems damaged"),
+        (lambda file: file.attrs.__setitem__("provenance", "[]"), "the attribute 'provenance' is no record"),
+        (lambda file: file.attrs.__setitem__("design", "3"), "the attribute 'design' is no record"),
+        (lambda file: file.attrs.__setitem__("law", "[" * 100_000), "cannot be read, it seems damaged"),
+        (lambda file: file.attrs.__setitem__("outputs", 3.0), "cannot be read, it seems damaged"),
+        (lambda file: file.attrs.__setitem__("parameter_names", ["n", "A"]), "its parameters are n, A, those of its"),
+        (lambda file: file.attrs.__setitem__("reason_texts", ["met"]), "not a text for each reason"),
+    ],
+)
+def test_what_a_file_promises_is_checked(data, tmp_path, change, message):
+    with pytest.raises(DatasetError, match=message):
+        storage.read_dataset(changed(data, tmp_path / "a.h5", change))
+    sentence(tmp_path / "a.h5")
+
+
+def test_an_accepted_sample_needs_a_history(data, tmp_path):
+    row = np.flatnonzero(data.reasons == 0)[0]
+    values = np.array(data.values)
+    values[row] = np.nan
+    path = storage.write_dataset(replace(data, values=values), tmp_path / "a.h5")
+    assert f"sample {row} was accepted and has no history" in sentence(path)
+
+
+def test_nothing_from_a_file_is_unpickled():
+    """Pickles travel between a campaign and its workers, through pipes; none is read from a file."""
+    folder = Path(storage.__file__).parent
+    assert {path.name for path in folder.glob("*.py") if "import pickle" in path.read_text()} == {
+        "worker.py", "workers.py"
+    }  # fmt: skip
+    assert "allow_pickle" not in "".join(path.read_text() for path in folder.glob("*.py"))

@@ -1,0 +1,240 @@
+"""discover() and refit() from creep curves to an ordinary law, on a closed-form predictor and on one dimple."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import creepkit as ck
+from creepkit.cli.app import app
+from creepkit.discovery.discover import discover, group_by_temperature, temperature_study
+from creepkit.discovery.refitting import refit
+from creepkit.errors import FitError
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.identify import identify
+from creepkit.inverse.reference_conditions import ReferencePoint
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.kernels import lower
+from creepkit.language import Elastic, arrhenius, linear, temperature
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.records import PressureJump
+from helpers.steady_rate_predictor import Steady, planted
+
+T_REF = 1023.15
+TRUE = NORTON.with_temperature(n=linear(T_REF)).times(arrhenius(T_REF))
+TRUTH = {"A": 1.5e-16, "n": 4.6, "n_T": -8e-3, "Q": 4.2e5}
+FIVE = (973.0, 1000.5, 1028.0, 1055.5, 1083.0)
+QUICK = IdentificationSettings(starts=1, sobol_points=8, frames=12)
+FEW = {"A": ("arrhenius", "logarithmic"), "n": ("constant", "linear", "inverse")}
+
+
+@pytest.fixture(scope="module")
+def tests():
+    conditions = [(stress, T) for T in FIVE for stress in (60.0, 90.0, 120.0)]
+    return planted(TRUE, TRUTH, conditions, seed=4, rate=0.01, noise=1e-5, frames=16)
+
+
+@pytest.fixture(scope="module")
+def alone(tests):
+    return [identify(NORTON, group, Steady(), settings=QUICK) for group in group_by_temperature(tests)]
+
+
+@pytest.fixture(scope="module")
+def trend(alone, tests):
+    return discover(alone, forms=FEW, histories=tests, settings=QUICK)
+
+
+def inside(trend):
+    return {e.name: e.low <= TRUTH[e.name] <= e.high for e in trend.estimates}
+
+
+# ---- from curves to a law ------------------------------------------------------------------------------------------
+
+
+def test_estimates_alone_hold_the_planted_form_and_energy(alone):
+    found = discover(alone, forms=FEW)
+    assert found.criterion_data == "points"
+    assert found.fit is None
+    assert {"arrhenius"} <= {form.name for form in found.plausible_forms["A"]}
+    assert {"linear"} <= {form.name for form in found.plausible_forms["n"]}
+    assert inside(found)["Q"]
+    assert sum(one.weight for one in found.candidates) == pytest.approx(1.0)
+
+
+def test_the_curves_themselves_decide(trend):
+    assert trend.criterion_data == "histories"
+    assert trend.forms == {"A": "arrhenius", "n": "linear"}
+    assert trend.candidates[0].weight > 0.9
+    assert all(inside(trend).values())
+    assert trend.fit.law == trend.law
+    plain = next(one for one in trend.candidates if one.forms["n"] == "constant")
+    assert plain.excess > 50
+
+
+def test_the_law_is_an_ordinary_one(trend, tmp_path):
+    assert trend.law.names == ("A", "Q", "n", "n_T")
+    assert trend.law.uses(temperature)
+    text = ck.export(trend, "python", to=tmp_path / "law.py")
+    space = {}
+    exec(compile(text, "law.py", "exec"), space)
+    for T in (980.0, 1050.0):
+        expected = float(lower(trend.law, "numpy").rate(trend.values, stress=80.0, temperature=T))
+        assert space["rate"](80.0, temperature=T) == pytest.approx(expected, rel=1e-12)
+        now = {name: float(v[0]) for name, v in trend.at(T).items()}
+        assert float(lower(NORTON, "numpy").rate(now, stress=80.0)) == pytest.approx(expected, rel=1e-9)
+    assert "valid between 973 and 1083 K" in ck.export(trend.valued, "latex")
+
+
+def test_text_file_and_plot(trend, tmp_path):
+    text = str(trend)
+    assert "A  arrhenius" in text
+    assert "prior odds" in text
+    assert "5 temperatures, 973 to 1083 K, and valid between them" in text
+    data = json.loads(trend.save(tmp_path / "trend.json").read_text())
+    assert data["kind"] == "creepkit temperature law"
+    assert data["sets"]["n"][0]["name"] == "linear"
+    assert data["fit"]["kind"] == "creepkit identification"
+    figure = trend.plot(tmp_path / "trend.png")
+    assert [axes.get_xlabel() for axes in figure.axes] == ["temperature, K"] * 2
+    assert (tmp_path / "trend.png").stat().st_size > 10_000
+    with pytest.raises(FitError, match="choose a file in a folder that exists"):
+        trend.save(tmp_path / "none" / "trend.json")
+
+
+def test_parameters_that_may_not_depend_on_temperature(alone):
+    found = discover(alone, forms=FEW, parameters=("A",))
+    assert found.forms["n"] == "constant"
+    assert list(found.prior_odds["n"]) == ["constant"]
+
+
+def test_beyond_its_range_a_law_is_not_asked(trend):
+    with pytest.raises(FitError, match="holds between 973 and 1083 K; it was asked beyond"):
+        trend.at(1100.0)
+    with pytest.raises(FitError, match="has no parameter 'n_t': did you mean 'n_T'"):
+        trend.estimate("n_t")
+
+
+def test_a_study_groups_tests_and_finds_the_same(tests, trend):
+    found = temperature_study(NORTON, tests, Steady(), settings=QUICK, forms=FEW)
+    assert found.moduli_fit is None
+    assert len(found.isothermal_fits) == 5
+    assert found.joint_fit.law.names == ("A", "n", "Q")
+    assert found.temperature_law.forms == trend.forms
+    assert "Norton power law (PL), arrhenius in temperature" in str(found)
+
+
+def test_a_form_is_where_it_should_be_at_its_reference_temperature():
+    coordinates = Coordinates(TRUE, ReferencePoint(100.0, 0.01, 7e3, T_REF))
+    theta = np.array([np.log(1.5e-16), 4.6, -8e-3, 4.2e5])
+    assert np.allclose(coordinates.theta(coordinates.u(theta)), theta, rtol=1e-12)
+    assert np.isfinite(coordinates.jacobian(coordinates.u(theta))).all()
+
+
+# ---- the command ---------------------------------------------------------------------------------------------------
+
+
+def test_the_command_on_saved_identifications(alone, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for k, fit in enumerate(alone):
+        fit.save(tmp_path / f"{k}.json")
+    files = [f"{k}.json" for k in range(len(alone))]
+    forms = ["--form", "A=arrhenius", "--form", "n=constant,linear", "--prior", "n:linear=2"]
+    told = CliRunner().invoke(app, ["discover", *files, *forms, "--json", "--to", "out"])
+    assert told.exit_code == 0, told.output
+    answer = json.loads(told.stdout)
+    assert answer["forms"] == {"A": "arrhenius", "n": "linear"}
+    assert answer["judged_by"] == "points"
+    names = {"temperature.json", "temperature.png", "law.tex", "law.py"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == names
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["--form", "n"], "--form n is not known; write n=constant,linear"),
+        (["--form", "q=linear"], "has no parameter 'q'"),
+        (["--prior", "A:arrhenius=much"], "write A:arrhenius=10"),
+    ],
+)
+def test_the_command_says_what_is_wrong(alone, tmp_path, monkeypatch, given, said):
+    monkeypatch.chdir(tmp_path)
+    for k, fit in enumerate(alone):
+        fit.save(tmp_path / f"{k}.json")
+    told = CliRunner().invoke(app, ["discover", *(f"{k}.json" for k in range(len(alone))), *given])
+    assert told.exit_code == 1
+    assert said in told.stderr
+
+
+# ---- what cannot be known ------------------------------------------------------------------------------------------
+
+
+def test_one_temperature_says_what_it_cannot(tests, alone):
+    with pytest.raises(FitError, match="from one temperature neither an activation energy nor how any other parameter"):
+        discover(alone[:1])
+    found = temperature_study(NORTON, tests[:3], Steady(), settings=QUICK)
+    assert found.temperature_law is None
+    assert "all tests are at 973 K" in found.notes[0]
+
+
+def test_two_temperatures_have_no_form(alone):
+    with pytest.raises(FitError, match="at 973 and 1000 K alone: two temperatures give an activation energy but no"):
+        discover(alone[:2])
+
+
+def test_identifications_that_do_not_belong_together(alone, tests):
+    other = identify(STRAIN_HARDENING, tests[:3], Steady(), settings=QUICK)
+    with pytest.raises(FitError, match="are of 'norton' and of 'strain-hardening'; give those of one law"):
+        discover([*alone, other])
+    warm = identify(NORTON.times(arrhenius()), tests[:6], Steady(), settings=QUICK)
+    with pytest.raises(FitError, match="depends on temperature already"):
+        discover([warm, *alone])
+    joint = identify(NORTON, tests[:6], Steady(), settings=QUICK)
+    with pytest.raises(FitError, match="spans 973 to 1000 K; identify each temperature alone"):
+        discover([joint, *alone])
+    with pytest.raises(FitError, match="takes a list of identifications"):
+        discover(alone[0])
+    with pytest.raises(FitError, match="give using="):
+        discover([replace(fit, predictor=None) for fit in alone], forms=FEW, histories=tests)
+
+
+def test_a_form_that_cannot_be_refitted_is_told(trend, tests, monkeypatch):
+    from creepkit.discovery import refitting
+
+    def failing(law, *given, **how):
+        if "n_I" in law.names:
+            raise FitError("this one never converges")
+        return identify(law, *given, **how)
+
+    monkeypatch.setattr(refitting, "identify", failing)
+    found = refit(trend, tests, Steady(), settings=QUICK, search_again=False)
+    assert found.forms == trend.forms
+    assert all("this one never converges" in note for note in found.notes)
+
+
+# ---- a dimple ------------------------------------------------------------------------------------------------------
+
+
+def test_a_dimple_at_three_temperatures_through_the_surrogate():
+    model, rng = ck.surrogate("dimple"), np.random.default_rng(8)
+    law = NORTON.times(arrhenius(1033.15))
+    truth = {"A": 1.5e-6 / 100.0**4.5, "n": 4.5, "Q": 4.2e5}
+    sd = {"amplitude": 1.5e-3, "width": 0.02, "shape": 0.02}
+    tests = []
+    for T in (973.15, 1033.15, 1083.15):
+        run = ck.simulate(
+            law, model, truth, loading=PressureJump(8.0, 10.0, 7200.0), times=np.arange(1200.0, 14401.0, 1200.0),
+            temperature=T, elastic=Elastic(E=100e3), name=f"{T:.0f} K",
+        )  # fmt: skip
+        noisy = {name: value + sd[name] * rng.normal(size=value.size) for name, value in run.outputs.items()}
+        known = {name: np.full(run.times.size, s) for name, s in sd.items()}
+        tests.append(run.replace(outputs=noisy, standard_deviation=known))
+    settings = IdentificationSettings(starts=1, sobol_points=8, frames=12, nuisances=())
+    fits = [identify(NORTON, [test], model, settings=settings) for test in tests]
+    trend = discover(fits, forms={"A": ("arrhenius",), "n": ("constant", "linear")}, histories=tests, settings=settings)
+    assert trend.forms == {"A": "arrhenius", "n": "constant"}
+    Q = trend.estimate("Q")
+    assert Q.low <= truth["Q"] <= Q.high
+    assert Q.high - Q.low < 1e5

@@ -1,0 +1,209 @@
+"""The exported C compiles without a warning and agrees with 50 digits: rates, derivatives, internal variables."""
+
+import ctypes
+import math
+import subprocess
+
+import numpy as np
+import pytest
+import sympy
+
+from creepkit.errors import ExportError
+from creepkit.exporters.c import STABLE_FUNCTIONS, CExporter
+from creepkit.language import CreepLaw, Param, parameters, stress
+from creepkit.language.symbols import POINT_VARIABLES
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.norton import NORTON
+from creepkit.laws.time_hardening import TIME_HARDENING
+from creepkit.records import LawWithValues, Units
+from helpers.export_cases import LAWS, TOLERANCE, case
+
+STRICT = ("gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
+COEFFICIENT = Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", 0.0)
+
+
+def compiled(folder, sources):
+    """The exported sources as one library, all in one call of the compiler without a warning."""
+    for k, source in enumerate(sources):
+        (folder / f"law{k}.c").write_text(CExporter().text(source), encoding="utf-8")
+    files = [str(path) for path in sorted(folder.glob("law*.c"))]
+    command = [*STRICT, "-O1", "-shared", "-fPIC", "-o", str(folder / "laws.so"), *files, "-lm"]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr[:2000]
+    return ctypes.CDLL(str(folder / "laws.so"))
+
+
+class Compiled:
+    """One law in a library."""
+
+    def __init__(self, library, name, law):
+        self.used = [k for k, s in enumerate(POINT_VARIABLES) if s == stress or law.uses(s)]
+        self.used += [len(POINT_VARIABLES) + k for k in range(len(law.states))]
+        self.states, self.size = len(law.states), len(POINT_VARIABLES) + len(law.states)
+        self.entries = {end: getattr(library, f"{name}_{end}", None) for end in ("rate", "log_rate", "state_rates")}
+        self.entries["rate"].restype = self.entries["log_rate"].restype = ctypes.c_double
+
+    def arguments(self, point):
+        return [ctypes.c_double(point[k]) for k in self.used]
+
+    def rate(self, point):
+        return self.entries["rate"](*self.arguments(point))
+
+    def log_rate(self, point):
+        """ln rate, and its derivatives to the variables used."""
+        slopes = (ctypes.c_double * len(self.used))()
+        return self.entries["log_rate"](*self.arguments(point), slopes), list(slopes)
+
+    def state_rates(self, point):
+        """Rates, and rows of derivatives."""
+        rates, slopes = (ctypes.c_double * self.states)(), (ctypes.c_double * (self.states * len(self.used)))()
+        self.entries["state_rates"](*self.arguments(point), rates, slopes)
+        return list(rates), np.array(slopes).reshape(self.states, -1)
+
+    def rows(self, point):
+        """Value and derivatives of the rate and of each state's rate, and ln rate."""
+        rows = np.zeros((1 + self.states, 1 + self.size))
+        log, slopes = self.log_rate(point)
+        rows[0, 0] = self.rate(point)
+        with np.errstate(over="ignore", invalid="ignore"):  # a rate that no double holds is judged by its logarithm
+            rows[0, [1 + k for k in self.used]] = rows[0, 0] * np.array(slopes)
+        if self.states:
+            rates, slopes = self.state_rates(point)
+            rows[1:, 0] = rates
+            rows[1:, [1 + k for k in self.used]] = slopes
+        return rows, log
+
+
+def test_every_law_agrees_with_50_digits(tmp_path):
+    sources, places = [], {}
+    for name in LAWS:
+        for values in case(name).sets:
+            key = (name, *values.values())
+            if key not in places:
+                places[key] = f"law_{len(sources)}"
+                sources.append(LawWithValues(LAWS[name], values, name=places[key]))
+    library = compiled(tmp_path, sources)
+
+    bad = []
+    for name in LAWS:
+        judged = case(name)
+        pairs = zip(judged.drawn.points, judged.sets, strict=True)
+        found = [Compiled(library, places[(name, *v.values())], judged.law).rows(point) for point, v in pairs]
+        told, size = judged.worst(np.array([rows for rows, _ in found]), np.array([log for _, log in found]))
+        bad += [told] if size > TOLERANCE else []
+    assert not bad, "\n".join(bad)
+
+
+def test_these_laws_call_every_stable_function():
+    texts = [CExporter().text(LawWithValues(case(name).law, case(name).sets[0])) for name in LAWS]
+    called = {name for text in texts for name in STABLE_FUNCTIONS if f"static double {name}(" in text}
+    assert called == {*STABLE_FUNCTIONS}
+
+
+# ---- what the text holds -------------------------------------------------------------------------------------------
+
+
+def test_a_file_has_the_authors_numbers_and_says_how_to_call_it():
+    text = CExporter().text(LawWithValues(NORTON, {"A": 1.2e-16, "n": 5.2}, ["n = 5.2 +- 0.1 (95 %)"]))
+    for line in (
+        " * Stress in MPa, time in s, rates in 1/s. stress is a ratio to 1 MPa, time to 1 s, rates are per s.",
+        " * Note: n = 5.2 +- 0.1 (95 %)",
+        " *   double norton_rate(double stress);",
+        " *   double norton_log_rate(double stress, double slopes[1]);",
+        "static const double A = 1.2e-16; /* 1/s, rate coefficient */",
+        "static const double n = 5.2; /* stress exponent */",
+        "double norton_rate(double stress)",
+    ):
+        assert line in text.splitlines()
+
+
+def test_only_math_h_is_included():
+    text = CExporter().text(LawWithValues(COMBINED, COMBINED.center()))
+    assert [line for line in text.splitlines() if line.startswith("#")] == ["#include <math.h>"]
+
+
+def test_what_is_off_is_left_out_and_told():
+    text = CExporter().text(LawWithValues(COMBINED, {**COMBINED.center(), "A_1": 0.0, "m_1": 0.0}))
+    assert " * Note: switched off and left out: A_1 = 0, m_1 = 0" in text.splitlines()
+    assert "sinh" not in text.replace("sinh(x)", "")
+    assert "combined_rate(double stress, double time)" in text
+
+
+def test_every_term_off_is_refused():
+    with pytest.raises(ExportError):
+        CExporter().text(LawWithValues(NORTON, {"A": 0.0, "n": 5.0}))
+
+
+def test_a_function_without_a_form_in_c_is_refused():
+    (A,) = parameters("A")
+    law = CreepLaw("gamma", {"x": A * sympy.gamma(stress)}, {A: COEFFICIENT})
+    with pytest.raises(ExportError, match="law 'gamma', term 'x': the function gamma"):
+        CExporter().text(LawWithValues(law, {"A": 1e-9}))
+
+
+# ---- what the compiled file does -----------------------------------------------------------------------------------
+
+
+def test_units_are_converted_on_entry_and_on_exit(tmp_path):
+    """With stress in Pa and time in h, rates are per hour and slopes per Pa and per hour."""
+    law = LAWS["foreign Kachanov-Rabotnov"] + TIME_HARDENING
+    values = law.center()
+    units = Units("Pa", "h")
+    sources = [LawWithValues(law, values, name="native"), LawWithValues(law, values, name="converted", units=units)]
+    library = compiled(tmp_path, sources)
+    plain, other = (Compiled(library, name, law) for name in ("native", "converted"))
+    point = np.array([120.0, 0.01, 7.2e4, 1000.0, 90.0, 40.0, 0.3])
+    scales = np.array([1e6, 1.0, 1 / 3600, 1.0, 1e6, 1e6, 1.0])
+    rows, log = plain.rows(point)
+    found, found_log = other.rows(point * scales)
+    np.testing.assert_allclose(found[:, 0], 3600 * rows[:, 0], rtol=1e-13)
+    np.testing.assert_allclose(found[:, 1:], 3600 * rows[:, 1:] / scales, rtol=1e-13)
+    assert found_log == pytest.approx(log + math.log(3600), rel=1e-14)
+
+
+def test_internal_variables_start_and_end_as_the_law_says(tmp_path):
+    law = LAWS["foreign Kachanov-Rabotnov"]
+    library = compiled(tmp_path, [LawWithValues(law, law.center(), name="damage")])
+    assert ctypes.c_double.in_dll(library, "damage_initial").value == 0.0
+    assert ctypes.c_double.in_dll(library, "damage_limit").value == 0.99
+
+
+def test_names_that_c_keeps_for_itself_are_renamed_openly(tmp_path):
+    words = parameters("double log y0 printf x least slopes odd_rate new")
+    law = CreepLaw(
+        "odd",
+        {"x": words[0] * sympy.exp(-stress / sum(words[1:]))},
+        {words[0]: COEFFICIENT, **dict.fromkeys(words[1:], Param("number", (1, 8)))},
+    )
+    values = {s.name: 2.0 for s in words} | {"double": 1e-9}
+    source = LawWithValues(law, values)
+    text = CExporter().text(source)
+    for name in ("double", "log", "y0", "printf", "slopes", "odd_rate", "new"):
+        assert f" * '{name}' is called {name}_2 here" in text
+    assert Compiled(compiled(tmp_path, [source]), "odd", law).rate([8.0]) == pytest.approx(1e-9 * math.exp(-0.5))
+
+
+def test_nothing_in_a_note_becomes_code(tmp_path):
+    notes = ["*/ broken", "/* nested", "*/*/ twice", "trigraph ??/", "back\\", "line\n*/ two", "\x00\u2028*/"]
+    library = compiled(tmp_path, [LawWithValues(NORTON, {"A": 1e-16, "n": 5.0}, notes)])
+    assert Compiled(library, "norton", NORTON).rate([100.0]) == pytest.approx(1e-6, rel=1e-12)
+
+
+def test_virgin_and_unloaded_material_has_finite_numbers(tmp_path):
+    library = compiled(tmp_path, [LawWithValues(COMBINED, COMBINED.center())])
+    law = Compiled(library, "combined", COMBINED)
+    for point in ([100.0, 0.0, 0.0], [0.0, 0.01, 1.0], [0.0, 0.0, 0.0]):
+        rows, log = law.rows(point + [0.0] * 3)
+        assert np.isfinite(rows).all()
+        assert math.isfinite(log)
+
+
+def test_beyond_doubles_the_rate_is_infinite_and_its_logarithm_is_not(tmp_path):
+    """ln A sinh(x)^n = ln A + n (x - ln 2) for large x."""
+    law = LAWS["registered hyperbolic-sine"]
+    library = compiled(tmp_path, [LawWithValues(law, {"A": 1e-5, "n": 8.0, "B": 1.0})])
+    found = Compiled(library, "hyperbolic_sine", law)
+    assert found.rate([2000.0]) == math.inf
+    log, slopes = found.log_rate([2000.0])
+    assert log == pytest.approx(math.log(1e-5) + 8 * (2000 - math.log(2)), rel=1e-14)
+    assert slopes == [pytest.approx(8.0)]

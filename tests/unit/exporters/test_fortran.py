@@ -1,0 +1,243 @@
+"""Exported Fortran: every law's own subroutine against 50 digits, and what the files hold."""
+
+import ctypes
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from creepkit.errors import ExportError
+from creepkit.exporters.creep_subroutine import AbaqusCreepSubroutine, CalculixCreepSubroutine
+from creepkit.exporters.fortran_code import (
+    FORTRAN_RESERVED,
+    fortran_expression,
+    fortran_number,
+    fortran_statement,
+    law_subroutine,
+)
+from creepkit.exporters.law_code import Identifiers, LawCode
+from creepkit.language import CreepLaw, Param, mean_stress, parameters, principal_stress, stress
+from creepkit.language.symbols import POINT_VARIABLES
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.norton import NORTON
+from creepkit.laws.time_hardening import TIME_HARDENING
+from creepkit.records import LawWithValues, Units
+from helpers.compiled_fortran import PARAMETERS, compiled, pointer
+from helpers.export_cases import LAWS, TOLERANCE, case
+
+A, n, a = parameters("A n a")
+RATE = Param("rate coefficient", bounds=(1e-40, 1e-5), unit="1/s", scale="log", off=0.0)
+POWER = Param("exponent", bounds=(1, 8))
+NORTON_VALUES = {"A": 1e-16, "n": 5.0}
+
+
+def law(term, params, name="foreign", **more):
+    return CreepLaw(name=name, title="A foreign law", terms={"term": term}, params=params, references=("x",), **more)
+
+
+def routine_of(values, name):
+    return law_subroutine(LawCode(values, Identifiers(FORTRAN_RESERVED, ignore_case=True)), name)
+
+
+# ---- the law -------------------------------------------------------------------------------------------------------
+
+
+def test_every_law_agrees_with_50_digits(tmp_path):
+    places, lines = {}, []
+    for name in LAWS:
+        for values in case(name).sets:
+            key = (name, *values.values())
+            if key not in places:
+                places[key] = f"law{len(places)}"
+                lines += routine_of(LawWithValues(LAWS[name], values), places[key])
+    library = compiled("\n".join(lines) + "\n", tmp_path, "laws")[0]
+
+    bad = []
+    for name in LAWS:
+        judged = case(name)
+        places_of = [places[(name, *values.values())] for values in judged.sets]
+        found = [rows_of(library, k, p, judged.law) for k, p in zip(places_of, judged.drawn.points, strict=True)]
+        told, size = judged.worst(np.array([rows for rows, _ in found]), np.array([log for _, log in found]))
+        bad += [told] if size > TOLERANCE else []
+    assert not bad, "\n".join(bad)
+
+
+def rows_of(library, name, point, judged):
+    """Value and derivatives of the rate and of each state's rate, and ln rate, at one point."""
+    rows, width = 1 + len(judged.states), len(POINT_VARIABLES) + len(judged.states)
+    given, out = np.array(point), np.empty(rows * (1 + width))
+    getattr(library, f"{name}_")(pointer(given), pointer(out))
+    values, slopes = out[:rows].copy(), out[rows:].reshape(rows, width).copy()
+    with np.errstate(over="ignore", invalid="ignore"):  # a rate that no double holds is judged by its logarithm
+        values[0] = np.exp(values[0])
+        slopes[0] *= values[0]
+    return np.column_stack([values, slopes]), out[0]
+
+
+def test_functions_that_fortran_lacks_keep_their_digits_near_zero(tmp_path):
+    import mpmath
+
+    lines = [
+        "subroutine probe(a, out)",
+        "implicit none",
+        "double precision, intent(in) :: a",
+        "double precision, intent(out) :: out(6)",
+        *(f"out({k}) = {name}(a)" for k, name in enumerate(PROBED, 1)),
+    ]
+    from creepkit.exporters.fortran_code import fortran_statements, stable_function_definitions
+
+    text = fortran_statements([*lines, "contains", *stable_function_definitions(PROBED), "end subroutine probe"])
+    library = compiled("\n".join(text) + "\n", tmp_path, "probe")[0]
+    for a in (1e-12, 3e-5, 0.02, 0.4, 0.6, 0.9, 1.1, 5.0, 40.0, 600.0):
+        out = np.empty(6)
+        library.probe_(ctypes.byref(ctypes.c_double(a)), pointer(out))
+        with mpmath.workdps(40):
+            exact = [f(mpmath.mpf(a)) for f in PROBED.values()]
+        assert out == pytest.approx([float(e) for e in exact], rel=1e-14)
+
+
+def _probed():
+    import mpmath as mp
+
+    return {
+        "log1p": lambda x: mp.log(1 + x),
+        "expm1": lambda x: mp.exp(x) - 1,
+        "log_sinh": lambda x: mp.log(mp.sinh(x)),
+        "log_cosh": lambda x: mp.log(mp.cosh(x)),
+        "log_rise": lambda x: mp.log(1 - mp.exp(-x)),
+        "coth": lambda x: mp.coth(x),
+    }
+
+
+PROBED = _probed()
+
+
+# ---- the text ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_every_file_is_fixed_form(name):
+    given = LawWithValues(LAWS[name], LAWS[name].center(), notes=["a note " * 30])
+    if LAWS[name].uses(principal_stress):
+        with pytest.raises(ExportError, match="largest principal stress"):
+            AbaqusCreepSubroutine().text(given)
+        return
+    text = AbaqusCreepSubroutine().text(given)
+    assert text.isascii() or not given.law.title.isascii()
+    for line in text.splitlines():
+        assert len(line) <= 72
+        assert line.startswith(("!", "      ", "     &"))
+
+
+@pytest.mark.skipif(shutil.which("gfortran") is None, reason="gfortran is not installed; CI installs it")
+def test_files_compile_without_a_warning(tmp_path):
+    sources = []
+    for k, name in enumerate(["combined with temperature", "registered drifting-exponent", "foreign names of Python"]):
+        for exporter in (AbaqusCreepSubroutine(), CalculixCreepSubroutine()):
+            sources.append(tmp_path / f"{exporter.name}{k}.f")
+            sources[-1].write_text(exporter.text(LawWithValues(LAWS[name], LAWS[name].center())))
+    (tmp_path / "ABA_PARAM.INC").write_text("      implicit real*8(a-h,o-z)\n")
+    flags = ["-fsyntax-only", "-Wall", "-Wno-zerotrip", "-Wno-unused-dummy-argument"]
+    run = subprocess.run(["gfortran", *flags, *sources], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stderr) == (0, "")
+
+
+def test_the_head_says_law_units_values_notes_and_what_the_input_file_needs():
+    text = AbaqusCreepSubroutine().text(
+        LawWithValues(TIME_HARDENING, {"A": 1.5e-12, "n": 4.0, "m": -0.3}, ["n = 4, 95 % interval 3.8 to 4.2"])
+    )
+    words = " ".join(re.sub(r"^! *", "", line) for line in text.splitlines() if line.startswith("!"))
+    for said in (
+        "rate = A*stress**n*time**m",
+        "Stress in MPa, time in s, rates in 1/s.",
+        "A = 1.5e-12 1/s, rate coefficient",
+        "Note: n = 4, 95 % interval 3.8 to 4.2",
+        "*CREEP, LAW=USER",
+        "Time is the total time, TIME(2), less t_first",
+    ):
+        assert said in words
+
+
+def test_names_that_clash_without_case_are_renamed_openly():
+    text = AbaqusCreepSubroutine().text(
+        LawWithValues(law(A * stress**n * a, {A: RATE, n: POWER, a: POWER}), NORTON_VALUES | {"a": 2})
+    )
+    assert "! 'a' is called a_2 here" in text
+    assert "parameter :: a_2 = 2.0d0" in text
+
+
+def test_a_name_is_made_an_identifier_and_short_enough():
+    text = AbaqusCreepSubroutine().text(
+        LawWithValues(NORTON, NORTON_VALUES, name="2nd law of Würzburg, " + 9 * "long ")
+    )
+    assert re.search(r"subroutine x_2nd_law_of_wurzbur\w*_law\(x, out\)", text)
+    assert max(len(name) for name in re.findall(r"subroutine (\w+)", text)) <= 31
+
+
+@pytest.mark.parametrize("exporter", [AbaqusCreepSubroutine(), CalculixCreepSubroutine()])
+def test_names_that_are_long_or_those_of_routines_compile(exporter, tmp_path):
+    clash, long, longer = parameters(f"foreign_law a_{80 * 'y'} a_{80 * 'y'}z")
+    source = law(clash * stress**long * longer, {clash: RATE, long: POWER, longer: POWER})
+    text = exporter.text(LawWithValues(source, {clash.name: 1e-16, long.name: 5, longer.name: 2}))
+    assert "! 'foreign_law' is called foreign_law_2 here" in text
+    assert max(len(line) for line in text.splitlines() if line[:1] != "!") <= 72
+    assert not compiled(text, tmp_path, "clash")[1]
+
+
+def test_a_saturating_rate_raises_no_floating_point_exception_at_long_times(tmp_path):
+    text = AbaqusCreepSubroutine().text(LawWithValues(LAWS["foreign saturating"], {"A": 1e-20, "r": 1e-3, "n": 4.0}))
+    driver = """
+      program trapped
+        double precision x(6), out(7)
+        x = (/ 60d0, 0d0, 1d7, 1d3, 60d0, 20d0 /)
+        call foreign_law(x, out)
+        if (abs(out(1) - log(1d-20) - 4*log(60d0)) > 1d-9) stop 2
+      end program"""
+    (tmp_path / "ABA_PARAM.INC").write_text(PARAMETERS)
+    (tmp_path / "law.f").write_text(text + driver + "\n")
+    trap = ["gfortran", "-w", "-ffpe-trap=invalid,zero,overflow", "-finit-real=snan", "-o", "law", "law.f"]
+    subprocess.run(trap, cwd=tmp_path, check=True)
+    assert subprocess.run([tmp_path / "law"], check=False).returncode == 0
+
+
+def test_what_creep_is_not_told_is_refused():
+    first = law(A * principal_stress**n, {A: RATE, n: POWER})
+    with pytest.raises(ExportError, match="largest principal stress, which Abaqus does not pass to CREEP"):
+        AbaqusCreepSubroutine().text(LawWithValues(first, NORTON_VALUES))
+    mean = law(A * (stress + mean_stress) ** n, {A: RATE, n: POWER})
+    assert "-p*mpa" in AbaqusCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
+    with pytest.raises(ExportError, match="mean stress, which CalculiX does not pass"):
+        CalculixCreepSubroutine().text(LawWithValues(mean, NORTON_VALUES))
+
+
+def test_every_term_off_is_refused():
+    with pytest.raises(ExportError, match="nothing to export"):
+        AbaqusCreepSubroutine().text(LawWithValues(NORTON, {"A": 0.0, "n": 5.0}))
+
+
+def test_what_is_off_is_left_out():
+    text = AbaqusCreepSubroutine().text(LawWithValues(COMBINED, COMBINED.center() | {"A_1": 0.0, "m_1": 0.0}))
+    assert "log_sinh" not in text
+    assert "switched off and left out: A_1 = 0, m_1 = 0" in text
+
+
+def test_units_are_constants_of_the_file():
+    text = AbaqusCreepSubroutine().text(LawWithValues(NORTON, NORTON_VALUES, units=Units("Pa", "h")))
+    assert "parameter :: mpa = 1.0d-6" in text
+    assert "parameter :: seconds = 3600.0d0" in text
+    assert "! Stress in Pa, time in h, rates in 1/h." in text
+
+
+def test_statements_break_between_tokens():
+    long = "total = " + " + ".join(f"share_of_term_{k}*1.25d-{k:02d}" for k in range(20))
+    lines = fortran_statement(long)
+    assert all(len(line) <= 72 for line in lines)
+    assert all(line.startswith("     &") for line in lines[1:])
+    assert "".join(line[6:] for line in lines).replace(" ", "") == long.replace(" ", "")
+
+
+def test_numbers_are_double_precision():
+    assert [fortran_number(v) for v in (5, 1e-120, -2.5, 0.1)] == ["5.0d0", "1.0d-120", "-2.5d0", "0.1d0"]
+    assert fortran_expression(stress**n / 3) == "(0.3333333333333333d0)*power(stress, n)"

@@ -1,0 +1,336 @@
+"""Cards for other codes: read back by their grammars, the formulas of the codes' manuals give the law's own rate."""
+
+from dataclasses import replace
+from functools import cache
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.stats import qmc
+
+import creepkit as ck
+from creepkit.errors import ExportError
+from creepkit.exporters.abaqus_cards import AbaqusCards
+from creepkit.exporters.ansys import AnsysCards
+from creepkit.exporters.code_aster import CodeAsterMaterial
+from creepkit.exporters.moose_neml2 import MooseBlock, Neml2Model
+from creepkit.kernels import lower
+from creepkit.kernels.multiprecision import MultiprecisionLaw
+from creepkit.language import GAS_CONSTANT, Elastic, arrhenius, linear, wachtman
+from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.laws.time_hardening import TIME_HARDENING
+from creepkit.records import LawWithValues, Units
+from creepkit.registry import default_registry
+from helpers.creep_form_cases import CASES, COMBINED, EXPONENTIAL, HAS, STEEL, valued
+from helpers.input_file_parsers import READERS, abaqus, abaqus_cards, ansys_commands, aster_keywords, code_aster, hit
+from helpers.paths import GOLDEN
+
+EXPORTERS = {e.name: e for e in (AbaqusCards(), AnsysCards(), MooseBlock(), CodeAsterMaterial(), Neml2Model())}
+EXACT = cache(MultiprecisionLaw)
+UNITS = [Units(), Units("Pa", "h"), Units("psi", "min")]
+TABLES = {"strain hardening warm", "time hardening warm", "time hardening warm, small", "stranger"}
+"""Cases that Abaqus takes as a table against temperature."""
+
+
+def exported(name: str, case: str, units: Units | None = None) -> str:
+    source = CASES[case].replace(units=units or Units())
+    return EXPORTERS[name].text(source if name != "neml2" else source.replace(elastic=STEEL))
+
+
+def points(count: int) -> list[list[float]]:
+    """Stress 20 to 200 MPa, strain 1e-5 to 0.2, time 1 to 1e7 s, temperature 900 to 1250 K."""
+    low, high = np.log([20.0, 1e-5, 1.0, 900.0]), np.log([200.0, 0.2, 1e7, 1250.0])
+    return np.exp(qmc.scale(qmc.Sobol(4, seed=7).random(count), low, high)).tolist()
+
+
+def true_rate(source: LawWithValues, s: float, e: float, t: float, T: float) -> float:
+    """The rate, 1/s, in 50 digits."""
+    return mpmath.fsum(EXACT(source.law).term_and_state_rates([s, e, t, T, s, s / 3], source.values.values()))
+
+
+# ---- the round trip ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("units", UNITS, ids=lambda u: f"{u.stress},{u.time}")
+@pytest.mark.parametrize(("name", "case"), [(name, case) for name in HAS for case in sorted(HAS[name])])
+def test_the_manuals_formula_gives_the_laws_rate(name, case, units):
+    rate, source = READERS[name](exported(name, case, units)), CASES[case]
+    for s, e, t, T in points(16):
+        if name == "abaqus-cards" and case in TABLES:
+            T = 873.15 + round(T - 873.15)  # a row of the table
+        found = rate(s / units.megapascals, e, t / units.seconds, T) / units.seconds
+        assert found == pytest.approx(float(true_rate(source, s, e, t, T)), rel=1e-10)
+
+
+@pytest.mark.parametrize("case", sorted(TABLES))
+def test_between_the_rows_of_a_table_abaqus_is_within_a_thousandth(case):
+    """Linear interpolation of a convex function lies above it."""
+    rate, source = abaqus(exported("abaqus-cards", case)), CASES[case]
+    warmth = np.arange(873.2, 1273.0, 0.3)
+    truth = lower(source.law, "numpy").rate(source.values, stress=100.0, strain=0.01, time=1e4, temperature=warmth)
+    errors = [rate(100.0, 0.01, 1e4, T) / true - 1 for T, true in zip(warmth, truth, strict=True)]
+    assert -1e-11 < min(errors) < 1e-4 < max(errors) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "case"), [(n, c) for n in HAS for c in ("strain hardening", "time hardening") if c in HAS[n]]
+)
+def test_the_same_strain_after_the_same_time_in_pascal_and_hours(name, case):
+    """100 MPa from 1 to 100 h, from a strain of 1e-4: the card in Pa and h against the law in MPa and s."""
+    source = CASES[case]
+    hourly = READERS[name](exported(name, case, Units("Pa", "h")))
+    kernel = lower(source.law, "numpy")
+
+    def own(t, e):
+        return kernel.rate(source.values, stress=100.0, strain=e[0], time=t)
+
+    in_hours = solve_ivp(lambda t, e: [hourly(1e8, e[0], t, 1000.0)], (1, 100), [1e-4], rtol=1e-10, atol=1e-13)
+    in_seconds = solve_ivp(own, (3600, 360_000), [1e-4], rtol=1e-10, atol=1e-13)
+    assert in_hours.y[0, -1] > 2e-4
+    assert in_hours.y[0, -1] == pytest.approx(in_seconds.y[0, -1], rel=1e-8)
+
+
+@pytest.mark.parametrize(("name", "case"), [(n, c) for n in HAS for c in sorted({*CASES} - HAS[n])])
+def test_what_a_code_does_not_have_is_refused_with_a_way_out(name, case):
+    with pytest.raises(
+        ExportError, match=rf"^law '{CASES[case].law.name.replace('+', '.').replace('*', '.')}'.*; export it as '"
+    ):
+        exported(name, case)
+
+
+# ---- published figures ---------------------------------------------------------------------------------------------
+
+
+def test_moose_power_law_creep_cube():
+    """MOOSE's test power_law_creep.i: 10 MPa at 1000 K, its own R; creep strains of its file of results."""
+    R, Q = 8.3143, 3e5
+    law = NORTON.times(arrhenius(1000.0))
+    values = {"A": 1e-15 * 1e24 * np.exp(-Q / (R * 1000.0)), "n": 4.0, "Q": Q * GAS_CONSTANT / R}
+    creep = hit(MooseBlock().text(LawWithValues(law, values, units=Units("Pa"))))["Materials"]["power_law"]
+    assert float(creep["coefficient"]) == pytest.approx(1e-15, rel=1e-12)
+    assert float(creep["n_exponent"]) == 4
+    assert float(creep["m_exponent"]) == 0
+    assert float(creep["activation_energy"]) / float(creep["gas_constant"]) == pytest.approx(Q / R, rel=1e-12)
+    run = ck.simulate(
+        law, "uniaxial", values, loading=ck.constant_stress(10.0, "stress"), times=[0.1, 0.5, 1.0], temperature=1000.0
+    )
+    np.testing.assert_allclose(
+        run.outputs["strain"], [0.00021359459285203, 0.0010680153108105, 0.0021360306230979], rtol=1e-4
+    )
+
+
+def test_code_aster_ssnp107():
+    """ssnp107a: LEMAITRE with N = 11, UN_SUR_K = 8e-4, UN_SUR_M = 1/5.6, held 3600 s after a plastic ramp.
+
+    210 MPa of tension with 121.24 MPa of shear make 297 MPa; the ramp leaves p = (297 - 120)/H, H = E E_t/(E - E_t).
+    code_aster asks for its reference to 1e-3.
+    """
+    source = LawWithValues(STRAIN_HARDENING, {"A": 8e-4**11, "n": 11.0, "m": -11 * 0.178571429})
+    text = CodeAsterMaterial().text(source)
+    lemaitre = aster_keywords(text)["LEMAITRE"]
+    assert lemaitre == pytest.approx({"N": 11.0, "UN_SUR_K": 8e-4, "UN_SUR_M": 0.178571429}, rel=1e-12)
+    tension, shear, E, tangent = 210.0, 4 * 30.31088913, 178600.0, 1930.0
+    equivalent = np.hypot(tension, np.sqrt(3) * shear)
+    before = (equivalent - 120.0) * (E - tangent) / (E * tangent)
+    rate = code_aster(text)
+    after = solve_ivp(lambda t, p: [rate(equivalent, p[0], t, 293.0)], (0, 3600), [before], rtol=1e-10).y[0, -1]
+    assert after * tension / equivalent == pytest.approx(0.0906364, rel=1e-4)
+    assert after * 1.5 * shear / equivalent == pytest.approx(0.0784935, rel=1e-4)
+
+
+def test_code_aster_ssna104():
+    """ssna104a is Newtonian: N = 1, K = 1, UN_SUR_M = 0."""
+    text = CodeAsterMaterial().text(LawWithValues(NORTON, {"A": 1.0, "n": 1.0}, elastic=Elastic(1.0, 0.3)))
+    assert aster_keywords(text) == {
+        "ELAS": {"E": 1.0, "NU": 0.3},
+        "LEMAITRE": {"N": 1.0, "UN_SUR_K": 1.0, "UN_SUR_M": 0.0},
+    }
+
+
+def test_abaqus_time_and_strain_hardening_have_one_set_of_constants():
+    """Abaqus' manual: at constant stress both are equivalent with the same A, n, m.
+
+    From e = A s^n t^(m+1)/(m+1), A s^n t^m is A^(1/(m+1)) s^(n/(m+1)) [(m+1) e]^(m/(m+1)).
+    """
+    A, n, m = 3e-13, 4.5, -0.6
+    own = A ** (1 / (m + 1)) * (m + 1) ** (m / (m + 1))
+    by_time = AbaqusCards().text(LawWithValues(TIME_HARDENING, {"A": A, "n": n, "m": m}))
+    by_strain = AbaqusCards().text(LawWithValues(STRAIN_HARDENING, {"A": own, "n": n / (m + 1), "m": m / (m + 1)}))
+    (time_law, (constants,)), (strain_law, (same,)) = (abaqus_cards(t)["CREEP"] for t in (by_time, by_strain))
+    assert (time_law["LAW"], strain_law["LAW"]) == ("TIME", "STRAIN")
+    assert constants == pytest.approx([A, n, m], rel=1e-12)
+    assert same == pytest.approx(constants, rel=1e-12)
+
+
+# ---- what else a card says -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", EXPORTERS)
+def test_the_header_tells_units_reference_intervals_and_new_names(name):
+    head = exported(name, "norton warm", Units("Pa", "h"))
+    for told in (
+        "Numbers below are in Pa and h, temperatures in K: stress is a ratio to 1 Pa, time to 1 h",
+        "n = 5.2 [5.1, 5.3]",
+        "valid from 973 to 1123 K",
+        "A = 1.2e-16 1/s, rate coefficient",
+        "Norton (1929)",
+    ):
+        assert told in head
+
+
+def test_a_material_may_be_named_and_renaming_is_told():
+    source = replace(CASES["norton"], name="IN 625 / tube")
+    for name, label in (("abaqus-cards", "IN_625_tube"), ("code_aster", "IN_625")):
+        text = EXPORTERS[name].text(source)
+        assert f"'IN 625 / tube' is called {label} here" in text
+    assert "*MATERIAL, NAME=IN_625_tube" in EXPORTERS["abaqus-cards"].text(source)
+
+
+def test_elastic_moduli_follow_the_unit_of_stress():
+    source = CASES["norton"].replace(units=Units("GPa"))
+    assert abaqus_cards(EXPORTERS["abaqus-cards"].text(source))["ELASTIC"] == ({}, [[150.0, 0.3]])
+    assert [c for c in ansys_commands(EXPORTERS["ansys"].text(source)) if c[0] == "MP"] == [
+        ["MP", "EX", "1", "150"],
+        ["MP", "PRXY", "1", "0.3"],
+    ]
+    elasticity = hit(EXPORTERS["moose"].text(source))["Materials"]["elasticity"]
+    assert (elasticity["youngs_modulus"], elasticity["poissons_ratio"]) == ("150", "0.3")
+    assert aster_keywords(EXPORTERS["code_aster"].text(source))["ELAS"] == {"E": 150, "NU": 0.3}
+    assert hit(EXPORTERS["neml2"].text(source))["Models"]["elasticity"]["coefficients"] == "150 0.3"
+
+
+WARM_STEEL = Elastic(wachtman(210e3, 60.0, 300.0), 0.3)
+
+
+def test_moduli_that_depend_on_temperature_are_tabulated_or_written_as_a_formula():
+    source = CASES["norton warm"].replace(elastic=WARM_STEEL, units=Units("Pa"))
+    _, rows = abaqus_cards(EXPORTERS["abaqus-cards"].text(source))["ELASTIC"]
+    assert (rows[0][2], rows[-1][2]) == (873.15, 1273.15)
+    for E, nu, T in rows:
+        assert (E, nu) == (pytest.approx(1e6 * (210e3 - 60.0 * T * np.exp(-300.0 / T)), rel=1e-12), 0.3)
+    commands = ansys_commands(EXPORTERS["ansys"].text(source))
+    T, E = (
+        [float(v) for c in commands if c[0] == head for v in c[skip:]] for head, skip in (("MPTEMP", 2), ("MPDATA", 4))
+    )
+    assert len(E) == 2 * len(T)
+    np.testing.assert_allclose(E[: len(T)], [1e6 * (210e3 - 60.0 * t * np.exp(-300.0 / t)) for t in T], rtol=1e-12)
+    elastic = aster_keywords(EXPORTERS["code_aster"].text(source))["ELAS_FO"]
+    assert elastic["E"](1000.0) == pytest.approx(1e6 * (210e3 - 60e3 * np.exp(-0.3)), rel=1e-12)
+    assert elastic["NU"](1000.0) == 0.3
+
+
+@pytest.mark.parametrize("name", ["moose", "neml2"])
+def test_moduli_that_depend_on_temperature_are_refused_where_numbers_are_needed(name):
+    with pytest.raises(ExportError, match=r"the elastic moduli depend on temperature.*give elastic.at\(1073\)"):
+        EXPORTERS[name].text(CASES["norton"].replace(elastic=WARM_STEEL))
+
+
+AT = dict(A=1e-9, n=4)
+REFUSED = [
+    (
+        "abaqus-cards",
+        valued(STRAIN_HARDENING, A=1e-9, n=0, m=-0.5),
+        r"asks for n > 0 .* \(n = 0, m = -0.333333\); export",
+    ),
+    ("abaqus-cards", valued(EXPONENTIAL, A=1e-9, B=20), "its exponential of stress does not stand alone there"),
+    (
+        "abaqus-cards",
+        valued(COMBINED, **COMBINED.center()),
+        r"a sum of 3 \(hyperbolic sine \+ strain hardening \+ time",
+    ),
+    ("ansys", valued(COMBINED, **COMBINED.center()), "none of Ansys' implicit creep laws.*USERCREEP"),
+    (
+        "ansys",
+        valued(NORTON.with_temperature(n=linear()), n_T=-1e-3, **AT),
+        "not a number .constants at one temperature may",
+    ),
+    ("ansys", valued(NORTON.times(arrhenius(300.0)), Q=2.7e6, **AT), "C1 would be 1e461, .* give the temperature"),
+    ("moose", valued(STRAIN_HARDENING, m=-0.5, **AT), r"power -0.5 of creep strain \(its m_exponent is one of time\)"),
+    ("moose", valued(HYPERBOLIC_SINE, B=40, **AT), "no creep model for its sinh of stress"),
+    (
+        "code_aster",
+        valued(TIME_HARDENING, m=-0.5, **AT),
+        "is not code_aster's LEMAITRE: time hardening depends on time",
+    ),
+    ("code_aster", valued(HYPERBOLIC_SINE, B=40, **AT), "is a sinh of stress; export it as 'mfront'"),
+    ("neml2", valued(TIME_HARDENING, m=-0.5, **AT), "steady power laws of stress only.*time exponent -0.5"),
+    ("neml2", valued(NORTON, **AT), "needs the moduli; give elastic=Elastic"),
+]
+
+
+@pytest.mark.parametrize(("name", "source", "message"), REFUSED)
+def test_refusals_give_the_reason(name, source, message):
+    with pytest.raises(ExportError, match=message) as error:
+        EXPORTERS[name].text(source)
+    assert "\n" not in str(error.value)
+
+
+def test_a_temperature_makes_a_card_possible():
+    """What lies beyond double range at infinite temperature is an ordinary number at the analysis' own."""
+    source = valued(NORTON.times(arrhenius(300.0)), A=1e-9, n=4, Q=2.7e6)
+    rate = READERS["ansys"](AnsysCards().text(source.at(310.0)))
+    assert rate(50.0, 0.0, 0.0, 1.0) == pytest.approx(float(true_rate(source, 50.0, 0.0, 0.0, 310.0)), rel=1e-10)
+
+
+@pytest.mark.parametrize("law", sorted(default_registry().laws()))
+@pytest.mark.parametrize("name", sorted(default_registry().exporters()))
+def test_every_registered_law_is_exported_or_refused_with_a_reason(name, law):
+    exporter, source = default_registry().exporters()[name].value, default_registry().law(law)
+    try:
+        text = exporter.text(LawWithValues(source, source.center(), elastic=STEEL, units=Units("Pa", "h")))
+    except ExportError as error:
+        told = str(error)
+        sensible = f"'{law}'" in told and len(told) > 60
+    else:
+        sensible = len(text.splitlines()) > 4
+    assert sensible
+
+
+# ---- golden files --------------------------------------------------------------------------------------------------
+
+
+def golden_cases() -> dict[str, str]:
+    """{file: text}. After a wanted change, write them by hand: golden_cases() items into tests/golden."""
+    files = {
+        f"{name}_{case.replace(' ', '_').replace(',', '')}{EXPORTERS[name].suffix}": exported(name, case, units)
+        for name, case, units in (
+            ("abaqus-cards", "norton", None),
+            ("abaqus-cards", "strain hardening", Units("Pa", "h")),
+            ("abaqus-cards", "time hardening, small", None),
+            ("abaqus-cards", "sine warm", Units("Pa", "h")),
+            ("abaqus-cards", "two power laws warm", None),
+            ("ansys", "strain hardening warm", Units("Pa", "s")),
+            ("ansys", "primary and steady warm", Units("Pa", "h")),
+            ("ansys", "garofalo", None),
+            ("moose", "norton warm", Units("Pa", "s")),
+            ("moose", "primary and steady", None),
+            ("code_aster", "strain hardening", None),
+            ("code_aster", "norton warm", Units("Pa", "h")),
+            ("neml2", "norton", None),
+            ("neml2", "two power laws warm", None),
+        )
+    }
+    short = AbaqusCards(lowest_temperature=1000.0, highest_temperature=1010.0).text(CASES["stranger"])
+    return files | {"abaqus-cards_stranger_1000_to_1010_K.inp": short}
+
+
+@pytest.mark.parametrize("file", sorted(golden_cases()))
+def test_cards_are_as_they_were_checked_line_by_line(file):
+    assert golden_cases()[file].splitlines() == (GOLDEN / file).read_text(encoding="utf-8").splitlines()
+
+
+def test_there_are_no_stray_golden_files():
+    assert {
+        p.name for p in GOLDEN.iterdir() if p.name.split("_")[0] in EXPORTERS or p.name.startswith("code_aster")
+    } == {*golden_cases()}
+
+
+def test_a_table_covers_what_the_tests_did():
+    law = STRAIN_HARDENING.times(arrhenius(T_ref=1073.15))
+    values = {"A": 1e-16, "n": 4.0, "m": -0.3, "Q": 3e5}
+    text = AbaqusCards().text(LawWithValues(law, values, ranges={"temperature": (1023.15, 1073.15)}))
+    kelvin = [float(line.split(",")[-1]) for line in text.splitlines() if line[:1].isdigit()]
+    assert (kelvin[0], kelvin[-1]) == (998.15, 1098.15)

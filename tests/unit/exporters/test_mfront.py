@@ -1,0 +1,237 @@
+"""The exported MFront file keeps the grammar, and its @Integrator, compiled on its own, gives our numbers.
+
+MFront itself is not run here. The law's statements are compiled as they stand in the file and compared with 50 digits;
+the whole block runs on the tensors of tfel_stub.hxx, where its Jacobian is that of its residuals.
+"""
+
+import ctypes
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+import sympy
+
+from creepkit.errors import ExportError
+from creepkit.language import CreepLaw, Elastic, Param, State, parameters, states, stress, temperature
+from creepkit.language.symbols import POINT_VARIABLES
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.records import Units
+from helpers.export_cases import LAWS, TOLERANCE, case, renamed
+from helpers.mfront_integrator import ELASTIC, Block, compiled, declared, exported, scalar_function
+
+# ---- the law's statements against 50 digits ------------------------------------------------------------------------
+
+
+def test_every_law_agrees_with_50_digits(tmp_path):
+    """The derivatives to time and temperature, which are known at t + theta dt, are not in the file."""
+    functions, places = [], {}
+    for name, law in LAWS.items():
+        for values in case(name).sets:
+            key = (name, *values.values())
+            if key not in places:
+                places[key] = f"law_{len(functions)}"
+                functions.append(scalar_function(places[key], law, exported(law, values)))
+    start = "#include <cmath>\nusing namespace std;\nusing real = double;"
+    library = compiled(tmp_path, "\n".join([start, *functions]))
+
+    bad = []
+    for name, law in LAWS.items():
+        judged = case(name)
+        shape = (1 + len(law.states), 1 + len(POINT_VARIABLES) + len(law.states))
+        rows = np.zeros((len(judged.sets), *shape))
+        for k, (point, values) in enumerate(zip(judged.drawn.points, judged.sets, strict=True)):
+            x, out = (ctypes.c_double * point.size)(*point), (ctypes.c_double * (shape[0] * shape[1]))()
+            getattr(library, places[(name, *values.values())])(x, out)
+            rows[k] = np.reshape(out, shape)
+            for row, true in zip(rows[k], judged.truth.rows[k], strict=True):
+                row[[3, 4]] = [float(true[3]), float(true[4])]
+        told, size = judged.worst(rows, judged.logs(rows[:, 0, 0]))
+        bad += [told] if size > TOLERANCE else []
+    assert not bad, "\n".join(bad)
+
+
+# ---- the whole block on tensors ------------------------------------------------------------------------------------
+
+
+SKEW = np.array([8e-4, -3e-4, 1e-4, 2e-4, -1e-4, 3e-4])
+"""An elastic strain with six components and three distinct principal stresses."""
+
+
+@pytest.mark.parametrize(
+    "name", ["registered combined", "multiaxial", "foreign Liu-Murakami", "foreign Kachanov-Rabotnov"]
+)
+@pytest.mark.parametrize("units", [Units(), Units("Pa", "h")], ids=["MPa s", "Pa h"])
+def test_the_jacobian_is_that_of_the_residuals(name, units, tmp_path):
+    """Against central differences of the residuals, whose error is some 1e-9 of the largest entry of a row."""
+    law = LAWS[name]
+    values = {n: 1e-14 if p.unit == "1/s" else p.center for n, p in law.table.items()}
+    values |= {"A": 1e-8} if name == "multiaxial" else {}
+    block = Block(tmp_path, law, values, units)
+    state = np.array([0.01, *[0.3] * len(block.states)])
+    unknown = np.array([1e-5, -2e-5, 1e-5, 3e-5, -1e-5, 2e-5, 1e-4, *[1e-3] * len(block.states)])
+    place = {"eel": SKEW, "state": state, "dt": 200.0 / units.seconds, "elapsed": 1e4 / units.seconds}
+    _, jacobian = block(unknown, **place)
+    columns = []
+    for k, width in enumerate([1e-9] * 6 + [1e-7] + [1e-6] * len(block.states)):
+        shift = width * np.eye(block.size)[k]
+        up, down = (block(unknown + sign * shift, **place)[0] for sign in (1, -1))
+        columns.append((up - down) / (2 * width))
+    difference = np.abs(np.array(columns).T - jacobian)
+    assert (difference <= 2e-6 * np.abs(jacobian).max(axis=1, keepdims=True)).all()
+    assert np.abs(jacobian[6, :6]).max() > 1e-6
+
+
+def test_relaxation_follows_the_closed_form_to_second_order(tmp_path):
+    """Norton at constant strain: s^(1-n) = s_0^(1-n) + 3 G A (n - 1) t for the von Mises stress s, G = E/(2 (1+nu))."""
+    A, n, seconds = 1e-20, 5.0, 2e6
+    block = Block(tmp_path, NORTON, {"A": A, "n": n})
+    shear = ELASTIC.E / 2 / 1.3
+    start = 2 * shear * 1e-3 * np.sqrt(3)  # pure shear: eel_12 = 1e-3, in the basis of 2^(1/2) eel_12
+    exact = (start ** (1 - n) + 3 * shear * A * (n - 1) * seconds) ** (1 / (1 - n))
+    assert exact < 0.5 * start
+    errors = []
+    for steps in (50, 100):
+        eel, state = np.array([0, 0, 0, 1e-3 * np.sqrt(2), 0, 0]), np.zeros(1)
+        for _ in range(steps):
+            eel, state, _ = block.step(eel, state, seconds / steps)
+        errors.append(2 * shear * eel[3] / np.sqrt(2) * np.sqrt(3) / exact - 1)
+    assert abs(errors[1]) < 1e-3
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.parametrize("m", [-0.3, -0.6, -0.9])
+def test_the_first_increment_from_zero_strain_converges(m, tmp_path):
+    """dp = dt A s^n (dp/2)^m at a stress that hardly relaxes: dp = (dt A s^n 2^-m)^(1/(1-m))."""
+    block = Block(tmp_path, STRAIN_HARDENING, {"A": 1e-22, "n": 5.0, "m": m})
+    eel = np.array([0, 0, 0, 1e-3 * np.sqrt(2), 0, 0])
+    stress_ = ELASTIC.E / 1.3 * 1e-3 * np.sqrt(3)
+    _, state, iterations = block.step(eel, np.zeros(1), 60.0, guess=1e-6)
+    assert state[0] == pytest.approx((60 * 1e-22 * stress_**5 * 2**-m) ** (1 / (1 - m)), rel=0.05)
+    assert iterations < 40
+
+
+def test_no_stress_leaves_the_material_as_it_is(tmp_path):
+    block = Block(tmp_path, COMBINED)
+    residual, jacobian = block(np.zeros(7), np.zeros(6), np.zeros(1), 10.0)
+    assert np.isfinite(jacobian).all()
+    np.testing.assert_allclose(residual, 0.0, atol=1e-30)
+
+
+# ---- the grammar ---------------------------------------------------------------------------------------------------
+
+DECLARATIONS = {
+    "@DSL", "@Behaviour", "@Brick", "@Algorithm", "@Theta", "@Epsilon", "@IterMax", "@ModellingHypotheses",
+    "@Parameter", "@ElasticMaterialProperties", "@MaterialProperty", "@StateVariable", "@AuxiliaryStateVariable",
+    "@PhysicalBounds",
+}  # fmt: skip
+BLOCKS = {"@Description", "@Predictor", "@Integrator", "@UpdateAuxiliaryStateVariables"}
+STATEMENT = re.compile(
+    r"@DSL Implicit;|@Behaviour [A-Za-z_]\w*;|@Brick StandardElasticity;|@Algorithm NewtonRaphson;"
+    r"|@(Theta|Epsilon|IterMax) [\d.e-]+;|@ModellingHypotheses \{\"\.\+\"\};"
+    r"|@ElasticMaterialProperties \{([\d.e+-]+|\"[^\"]+\"), ([\d.e+-]+|\"[^\"]+\")\};"
+    r"|@Parameter \w+ = -?[\d.]+(e[+-]?\d+)?;|@(MaterialProperty|StateVariable|AuxiliaryStateVariable) \w+ \w+;"
+    r"|@PhysicalBounds \w+ in \]\*:[\d.e+-]+\];|\w+\.set(Glossary|Entry)Name\(\"\w+\"\);"
+)
+
+
+def bare(text):
+    """The text without comments."""
+    return re.sub(r"//.*", "", text)
+
+
+def outside(text):
+    """What stands outside of code blocks, and the blocks by keyword."""
+    blocks = dict(re.findall(r"^(@\w+) ?\{\n?(.*?)\}(?=\n\n|\n$)", bare(text), re.MULTILINE | re.DOTALL))
+    rest = re.sub(r"^@(Predictor|Integrator|Update\w+) \{\n.*?^\}", "", bare(text), flags=re.MULTILINE | re.DOTALL)
+    return re.sub(r"^@Description\{ \"[^\"\\]*\" \}$", "", rest, flags=re.MULTILINE), blocks
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_file_keeps_the_grammar(name):
+    text = exported(LAWS[name], units=Units("Pa", "h"))
+    assert {*re.findall(r"^@\w+", bare(text), re.MULTILINE)} <= DECLARATIONS | BLOCKS
+    rest, _ = outside(text)
+    for line in filter(None, map(str.strip, rest.splitlines())):
+        assert STATEMENT.fullmatch(line), line
+    for opening, closing in ("()", "{}", "[]"):
+        code = re.sub(r"@PhysicalBounds.*", "", bare(text))
+        assert code.count(opening) == code.count(closing)
+    code = re.search(r"^@Integrator \{\n(.*?)^\}", bare(text), re.MULTILINE | re.DOTALL)[1]
+    assert all(line.endswith(";") for line in filter(None, map(str.strip, code.splitlines())))
+    used = {*re.findall(r"\w+", code)}
+    assert {*declared(text, "Parameter"), *declared(text, "AuxiliaryStateVariable")} <= used
+    assert {f"{sign}{variable}" for variable in declared(text, "StateVariable") for sign in "df"} <= used
+
+
+def test_the_file_reads_as_the_gallery_does():
+    text = exported(NORTON, {"A": 1.2e-16, "n": 5.2}, elastic=ELASTIC, notes=["n = 5.2 +- 0.1 (95 %)"])
+    for line in (
+        "// Note: n = 5.2 +- 0.1 (95 %)",
+        "@DSL Implicit;",
+        "@Behaviour norton;",
+        "@Brick StandardElasticity;",
+        "@ElasticMaterialProperties {150000.0, 0.3};",
+        'p.setGlossaryName("EquivalentViscoplasticStrain");',
+        "@Parameter A = 1.2e-16; // 1/s, rate coefficient",
+        "  feel += dp * flow;",
+        "  fp -= dt * rate;",
+        "  dfeel_ddp = flow;",
+        "  dfp_ddeel = -theta * dt * (rate_by_stress * 2 * shear * flow);",
+    ):
+        assert line in text.splitlines()
+
+
+def test_moduli_are_properties_unless_they_are_known():
+    assert "@MaterialProperty stress young;" in exported(NORTON)
+    text = exported(NORTON, elastic=Elastic(150e3 - 60.5 * temperature, 0.3), units=Units("Pa"))
+    assert '@ElasticMaterialProperties {"150000000000.0 - 60500000.0*T", 0.3};' in text
+    with pytest.raises(ExportError, match="no formula of MFront"):
+        exported(NORTON, elastic=Elastic(150e3 * sympy.tanh(temperature), 0.3))
+
+
+def test_time_is_counted_where_a_law_reads_it():
+    assert "elapsed" not in exported(NORTON)
+    text = exported(COMBINED)
+    assert "@AuxiliaryStateVariable real elapsed;" in text
+    assert text.endswith("@UpdateAuxiliaryStateVariables {\n  elapsed += dt;\n}\n")
+
+
+def test_an_internal_variable_that_does_not_start_at_zero_is_held_less_its_start():
+    A, C = parameters("A C")
+    (left,) = states("left")
+    coefficient = Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", 0.0)
+    rates = {left: State(1.0, -C * stress * left, meaning="ductility that is left", limit=0.05)}
+    text = exported(CreepLaw("ductile", {"x": A * stress / left}, dict.fromkeys((A, C), coefficient), states=rates))
+    assert "// left holds the internal variable less its start, 1.0, and starts at 0." in text.splitlines()
+    assert "  const real left_now = 1.0 + left + theta * dleft;" in text.splitlines()
+    assert "// the material has failed where left reaches -0.95" in text.splitlines()
+
+
+def test_names_that_mfront_keeps_are_renamed_openly():
+    words = parameters("T theta stress_now seq mu domega")
+    (omega,) = states("omega")
+    law = CreepLaw(
+        "odd",
+        {"x": words[0] * sympy.exp(-stress / sum(words[1:])) * (1 + omega)},
+        {words[0]: Param("rate coefficient", (1e-40, 1e-5), "1/s", "log")}
+        | dict.fromkeys(words[1:], Param("number", (1, 8))),
+        states={omega: State(0.0, words[0] * stress)},
+    )
+    text = exported(law)
+    other = renamed(text)
+    assert {*other} == {word.name for word in words}
+    assert {*declared(text, "Parameter")} == {*other.values()}
+    assert not {*other.values()} & {"T", "theta", "stress_now", "seq", "mu", "domega"}
+
+
+def test_nothing_in_a_note_or_a_title_becomes_code():
+    params = {symbol: dataclasses.replace(param, meaning="back\\") for symbol, param in NORTON.params.items()}
+    law = dataclasses.replace(NORTON.rename("norton", 'odd " title \\ } */'), params=params)
+    text = exported(law, notes=["first\n@Theta 1;", "back\\ ", "}"])
+    assert not [line for line in text.splitlines() if line.rstrip().endswith("\\")], "the next line would be a comment"
+    assert text.count("\n@Theta") == 1
+    rest, _ = outside(text)
+    assert all(STATEMENT.fullmatch(line) for line in filter(None, map(str.strip, rest.splitlines())))

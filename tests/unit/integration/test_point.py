@@ -1,0 +1,200 @@
+"""Adaptive integration of a point: endings, jumps, dense output, states, and work that stays bounded."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from creepkit.errors import SolveError
+from creepkit.integration import IntegrationSettings, PointTest, integrate
+from creepkit.integration.event_location import DIVERGED, REACHED_END, STATE_LIMIT, STRAIN_LIMIT, TOO_MANY_STEPS
+from creepkit.integration.time_discretisation import SDIRK2
+from creepkit.kernels import lower
+from creepkit.language import CreepLaw, Param, State, parameters, stress
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.records import Program, Status
+from helpers.kachanov_law import A, C, damage, kachanov, n, v
+
+KACHANOV = kachanov(stress, 0.9)
+(phi,) = parameters("phi")
+RABOTNOV = CreepLaw(
+    name="rabotnov in damage itself",
+    terms={"creep": A * stress**n},
+    params={
+        **{key: KACHANOV.params[key] for key in (A, n, C, v)},
+        phi: Param("exponent of damage", bounds=(0, 30)),
+    },
+    states={damage: State(0.0, C * stress**v / ((1 + phi) * (1 - damage) ** phi), limit=0.99)},
+    references=("Rabotnov (1969)",),
+)
+ROOM = Program.constant(1000.0)
+SINH, HARDENING = {"A_1": 1e-9, "n_1": 2.0, "B": 80.0}, {"A_2": 1e-17, "n_2": 4.0, "m_1": -0.5}
+VALUES = {**SINH, **HARDENING, "A_3": 1e-12, "n_3": 3.0, "m_2": -0.4}
+
+
+def run(law, values, driving, times, stiffness=0.0, constant_load=False, **kwargs):
+    kernel = lower(law, "numba")
+    test = PointTest(driving, ROOM, np.asarray(times, float), stiffness, constant_load)
+    return integrate(kernel, kernel.to_internal(values), [test], **kwargs)
+
+
+def test_constant_load_bursts_when_the_closed_form_says() -> None:
+    """Norton under constant load: p = -ln(1 - n A s^n t)/n, so p = 1 at t = (1 - exp(-n))/(n A s^n)."""
+    values, rate = {"A": 1e-13, "n": 4.0}, 1e-13 * 100.0**4
+    times = np.linspace(0, 1 / rate, 50)
+    result = run(
+        NORTON, values, Program.constant(100.0), times, constant_load=True, settings=IntegrationSettings(rtol=1e-8)
+    )
+    burst = (1 - np.exp(-4.0)) / (4 * rate)
+    assert result.terminations[0, 0] == STRAIN_LIMIT
+    assert result.status[0, 0] == Status.RUPTURED
+    assert result.end_times[0, 0] == pytest.approx(burst, rel=1e-6)
+    alive = times < burst
+    np.testing.assert_allclose(result.strain[0, alive], -np.log1p(-4 * rate * times[alive]) / 4, rtol=1e-6)
+    assert np.isnan(result.strain[0, ~alive]).all()
+
+
+def test_a_rate_that_diverges_is_a_burst_not_an_error() -> None:
+    """With the strain limit out of reach the point still ends where 1/(n A s^n) says."""
+    values, rate = {"A": 1e-13, "n": 4.0}, 1e-13 * 100.0**4
+    result = run(
+        NORTON,
+        values,
+        Program.constant(100.0),
+        [1 / rate],
+        constant_load=True,
+        settings=IntegrationSettings(strain_limit=50.0),
+    )
+    assert result.terminations[0, 0] == DIVERGED
+    assert result.end_times[0, 0] == pytest.approx(1 / (4 * rate), rel=1e-4)
+
+
+def test_an_instant_burst_ends_within_the_cap() -> None:
+    values = {"A": 1e-5, "n": 8.0}
+    for load in (False, True):
+        result = run(NORTON, values, Program.constant(1000.0), [1e6], constant_load=load)
+        assert result.status[0, 0] == Status.RUPTURED
+        assert result.end_times[0, 0] < 1e-10
+        assert result.steps.sum() < 100
+
+
+def test_damage_ends_at_its_limit_when_the_closed_form_says() -> None:
+    """d = 1 - (1 - t/t_r)^(1/(v+1)), t_r = 1/((v+1) C s^v); p follows by quadrature (Kachanov, Rabotnov)."""
+    values, s = {"A": 2e-16, "n": 4.0, "C": 1e-14, "v": 3.5}, 120.0
+    rupture = 1 / (4.5 * 1e-14 * s**3.5)
+    times = np.linspace(0, rupture, 40)
+    result = run(KACHANOV, values, Program.constant(s), times, settings=IntegrationSettings(rtol=1e-9), jacobian=True)
+    power = 1 - 4.0 / 4.5
+    exact = 2e-16 * s**4 * rupture / power * (1 - (1 - times / rupture) ** power)
+    end = rupture * (1 - 0.1**4.5)
+    assert result.terminations[0, 0] == STATE_LIMIT
+    assert result.end_times[0, 0] == pytest.approx(end, rel=1e-6)
+    alive = times < end
+    np.testing.assert_allclose(result.strain[0, alive], exact[alive], rtol=1e-6)
+    assert result.jacobian is not None
+    np.testing.assert_allclose(result.jacobian[0, alive, 0], exact[alive], rtol=1e-6)
+    nudge, fine = 1e-4, IntegrationSettings(rtol=1e-11)
+    up, down = (
+        run(KACHANOV, {**values, "v": 3.5 + d}, Program.constant(s), times[:30], settings=fine).strain[0]
+        for d in (nudge, -nudge)
+    )
+    np.testing.assert_allclose(result.jacobian[0, :30, 3], (up - down) / (2 * nudge), rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.parametrize(("steepness", "rtol"), [(6.0, 1e-12), (14.0, 1e-9), (30.0, 1e-9)])
+def test_a_limit_that_is_met_faster_than_any_step_is_a_rupture(steepness: float, rtol: float) -> None:
+    """w = 1 - (1 - t/t_r)^(1/(1+phi)), t_r = 1/(C s^v): past w = 0.9 less is left than doubles tell from t_r."""
+    values = {"A": 1e-15, "n": 3.0, "C": 1e-14, "v": 4.0, "phi": steepness}
+    fine = IntegrationSettings(rtol=rtol, max_steps=100_000)
+    result = run(RABOTNOV, values, Program.constant(100.0), [1.0, 2e6], settings=fine, jacobian=True)
+    assert result.terminations[0, 0] == STATE_LIMIT
+    assert result.end_times[0, 0] == pytest.approx(1e6, rel=1e-8)
+    assert result.end_jacobian is not None
+    np.testing.assert_allclose(result.end_jacobian[0, 0], [0, 0, -1, -np.log(100.0), 0], rtol=1e-5, atol=1e-5)
+
+
+def test_strain_hardening_continues_from_its_strain_after_steps_and_holds() -> None:
+    """p^(1-m) grows by (1 - m) A s^n t in each step of stress, and rests at zero stress."""
+    a, power, m = 1e-15, 4.0, -0.7
+    steps = [(0.0, 80.0), (1e4, 130.0), (3e4, 0.0), (4e4, 95.0)]
+    times = np.array([0.0, 5e3, 1e4, 1.0001e4, 2e4, 3e4, 3.5e4, 4e4, 4.2e4, 1e5])
+    grown = np.interp(times, [0, 1e4, 3e4, 4e4, 1e5], np.cumsum([0, 80**4 * 1e4, 130**4 * 2e4, 0, 95**4 * 6e4]))
+    result = run(STRAIN_HARDENING, {"A": a, "n": power, "m": m}, Program.steps(steps), times)
+    np.testing.assert_allclose(result.strain[0], ((1 - m) * a * grown) ** (1 / (1 - m)), rtol=1e-9)
+    assert result.steps.sum() < 40, "the clock makes hardening a straight line"
+
+
+def test_many_tests_and_candidates_in_one_call_equal_one_by_one() -> None:
+    kernel = lower(COMBINED, "numba")
+    theta = kernel.to_internal({**VALUES, "n_1": np.array([1.5, 2.0, 2.5])})
+    tests = [PointTest(Program.constant(s), ROOM, np.linspace(0, 1e5, count)) for s, count in ((60.0, 11), (100.0, 7))]
+    together = integrate(kernel, theta, tests, jacobian=True)
+    assert together.strain.shape == (3, 18)
+    assert together.jacobian is not None
+    for c in range(3):
+        for k, test in enumerate(tests):
+            alone = integrate(kernel, theta[c : c + 1], [test], jacobian=True)
+            assert alone.jacobian is not None
+            np.testing.assert_array_equal(together.of(k)[c], alone.strain[0])
+            frames = slice(together.starts[k], together.starts[k + 1])
+            np.testing.assert_array_equal(together.jacobian[c, frames], alone.jacobian[0])
+
+
+def test_answers_do_not_depend_on_when_they_are_asked_for() -> None:
+    times = np.geomspace(1.0, 1e5, 60)
+    dense = run(COMBINED, VALUES, Program.constant(100.0), times).strain[0]
+    for k in range(0, 60, 7):
+        alone = run(COMBINED, VALUES, Program.constant(100.0), times[k : k + 1]).strain[0, 0]
+        assert dense[k] == pytest.approx(alone, rel=1e-4)
+
+
+def test_the_two_tableaux_agree() -> None:
+    times = np.linspace(1e3, 1e5, 20)
+    fine = run(COMBINED, VALUES, Program.constant(100.0), times, settings=IntegrationSettings(rtol=1e-9)).strain
+    coarse = run(
+        COMBINED, VALUES, Program.constant(100.0), times, settings=IntegrationSettings(rtol=1e-5), tableau=SDIRK2
+    ).strain
+    np.testing.assert_allclose(coarse, fine, rtol=2e-4)
+
+
+def test_the_cap_on_steps_keeps_the_history_so_far() -> None:
+    times = np.linspace(0, 1e5, 100)
+    result = run(
+        COMBINED, VALUES, Program.constant(100.0), times, settings=IntegrationSettings(rtol=1e-10, max_steps=60)
+    )
+    assert result.terminations[0, 0] == TOO_MANY_STEPS
+    assert result.status[0, 0] == Status.NOT_CONVERGED
+    alive = np.isfinite(result.strain[0])
+    assert 0 < alive.sum() < 100
+    assert times[alive].max() <= result.end_times[0, 0] < 1e5
+
+
+def test_a_candidate_that_is_not_a_number_ends_as_not_converged() -> None:
+    kernel = lower(NORTON, "numba")
+    theta = np.array([[np.nan, 4.0], [np.log(1e-15), np.nan], [np.log(1e-15), 4.0]])
+    result = integrate(kernel, theta, [PointTest(Program.constant(100.0), ROOM, np.array([10.0]))])
+    assert result.status[:2, 0].tolist() == [Status.NOT_CONVERGED] * 2
+    assert result.terminations[2, 0] == REACHED_END
+
+
+def test_no_times_and_time_zero() -> None:
+    kernel = lower(NORTON, "numba")
+    theta = kernel.to_internal({"A": 1e-15, "n": 4.0})
+    empty = PointTest(Program.constant(100.0), ROOM, np.zeros(0))
+    start = PointTest(Program.constant(100.0), ROOM, np.zeros(1))
+    result = integrate(kernel, theta, [empty, start], jacobian=True)
+    assert result.strain.tolist() == [[0.0]]
+    assert result.status.tolist() == [[Status.COMPLETE] * 2]
+
+
+@pytest.mark.parametrize("times", [[2.0, 1.0], [-1.0], [np.nan]])
+def test_times_that_make_no_sense_are_refused(times: list[float]) -> None:
+    with pytest.raises(SolveError, match="output times must be finite"):
+        PointTest(Program.constant(100.0), ROOM, np.array(times))
+
+
+def test_stiffness_goes_with_prescribed_strain_only() -> None:
+    with pytest.raises(SolveError, match="stiffness must not be negative"):
+        PointTest(Program.constant(100.0), ROOM, np.array([1.0]), stiffness=1e5, constant_load=True)

@@ -1,0 +1,285 @@
+"""ParticleSwarm: known minima, the rules of its sources, walls, seeds, and terms that may be off."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from creepkit.errors import FitError
+from creepkit.inverse.search.derivative_free import ParticleSwarm
+from creepkit.inverse.search.local_refinement import Bounds
+from creepkit.inverse.search.term_mask import TermMask
+from creepkit.inverse.settings import IdentificationSettings
+from helpers.cost_functions import SUM, TRIPLE, Known, cube, quadratic, rastrigin, rosenbrock
+
+BARE = ParticleSwarm(refined_candidates=0)
+SMALL = ParticleSwarm(particles=40, iterations=30)
+
+
+def paths(landscape):
+    """(iterations, particles, parameters) where the particles were, in widths of the box."""
+    return (np.array(landscape.seen) - landscape.box.low) / landscape.box.width
+
+
+# ---- known minima --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "swarm",
+    [
+        BARE,
+        ParticleSwarm(refined_candidates=0, form="inertia"),
+        ParticleSwarm(refined_candidates=0, boundary="reflect"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("cost", "box", "at"),
+    [(quadratic, cube(3), [1, 2, 3]), (rosenbrock, cube(2), [1, 1]), (rastrigin, cube(3, 5.12), [0, 0, 0])],
+)
+def test_the_papers_swarm_finds_known_minima_by_itself(swarm, cost, box, at):
+    found = swarm.minima(Known(cost, box)).minima[0]
+    np.testing.assert_allclose(found.u, at, atol=0.02)
+    assert found.cost == cost(found.u[None])[0]
+
+
+def test_least_squares_finishes_what_the_swarm_leaves():
+    rough, fine = (s.minima(Known(rosenbrock, cube(5))) for s in (BARE, ParticleSwarm()))
+    assert rough.minima[0].cost > 0.01  # a curved valley in five dimensions is too long for 100 iterations
+    np.testing.assert_allclose(fine.minima[0].u, 1.0, atol=1e-3)
+    assert fine.trace.best_cost[-1] == rough.minima[0].cost
+    assert fine.trace.refined_cost == fine.minima[0].cost
+
+
+def test_refined_minima_differ_and_come_best_first():
+    found = ParticleSwarm(refined_candidates=4).minima(Known(rastrigin, cube(3, 5.12))).minima
+    assert [m.cost for m in found] == sorted(m.cost for m in found)
+    starts = np.array([m.u for m in found])
+    assert len(found) == 4
+    assert len(np.unique(starts.round(2), axis=0)) > 1
+
+
+# ---- rules ---------------------------------------------------------------------------------------------------------
+
+
+def test_constriction_is_the_published_one():
+    """K = 0.7298437881283576 for c1 = c2 = 2.05 (Clerc & Kennedy 2002, and the authors' code)."""
+    assert BARE.next_velocity(np.array([0.1]), np.zeros(1), 0) / 0.1 == pytest.approx(0.7298437881283576, rel=1e-15)
+    assert BARE.next_velocity(np.zeros(1), np.array([0.1]), 0) / 0.1 == pytest.approx(0.7298437881283576, rel=1e-15)
+
+
+def test_inertia_falls_from_its_first_value_to_its_last():
+    swarm = ParticleSwarm(form="inertia", inertia=(0.9, 0.4), iterations=11)
+    found = [swarm.next_velocity(np.array([0.1]), np.zeros(1), k)[0] / 0.1 for k in (0, 5, 10)]
+    np.testing.assert_allclose(found, [0.9, 0.65, 0.4])
+
+
+@pytest.mark.parametrize("boundary", ["absorb", "reflect"])
+@pytest.mark.parametrize("velocity", [0.05, 0.15])
+def test_no_step_is_longer_than_the_limit_and_none_leaves_the_box(boundary, velocity):
+    landscape = Known(rastrigin, Bounds(np.array([0.5, -5.0]), np.array([5.0, 0.1])))
+    ParticleSwarm(particles=50, iterations=40, boundary=boundary, max_velocity=velocity).minima(landscape)
+    x = paths(landscape)[:40]
+    assert x.min() >= 0
+    assert x.max() <= 1
+    steps = np.abs(np.diff(x, axis=0))
+    assert steps.max() <= velocity * (1 + 1e-12)
+    assert steps.max() > 0.9 * velocity
+
+
+def test_an_optimum_beyond_a_wall_is_found_on_it():
+    box = Bounds(np.array([2.0, -5.0]), np.array([5.0, 5.0]))
+    found = BARE.minima(Known(quadratic, box)).minima[0]
+    assert found.u[0] == 2.0
+    assert found.u[1] == pytest.approx(2.0, abs=1e-3)
+
+
+def test_walls_absorb_or_reflect():
+    """Pushed through a wall by .1 of the box, a particle stops there, or comes back by what it went too far."""
+    from creepkit.inverse.search.derivative_free import _Swarm
+
+    for walls, place, speed in (("absorb", 1.0, 0.0), ("reflect", 0.93, -0.1)):
+        flight = _Swarm(ParticleSwarm(particles=2, boundary=walls), Known(quadratic, cube(2)))
+        flight.velocity = np.full((2, 2), 0.1)
+        flight._apply_boundary(np.array([[1.07, 0.5], [0.2, 0.3]]))
+        np.testing.assert_allclose(flight.x, [[place, 0.5], [0.2, 0.3]])
+        np.testing.assert_allclose(flight.velocity, [[speed, 0.1], [0.1, 0.1]])
+
+
+def test_it_starts_from_a_sobol_set_at_rest():
+    """One point in each of 64 equal boxes of a plane: balance of a scrambled Sobol set."""
+    landscape = Known(quadratic, cube(2))
+    ParticleSwarm(particles=64, iterations=1, refined_candidates=0).minima(landscape)
+    counts, *_ = np.histogram2d(*paths(landscape)[0].T, bins=8, range=[[0, 1], [0, 1]])
+    assert (counts == 1).all()
+
+
+# ---- one prediction an iteration, seeds, progress ------------------------------------------------------------------
+
+
+def test_each_iteration_is_one_call():
+    landscape = Known(quadratic, cube(2))
+    found = ParticleSwarm(particles=30, iterations=12).minima(landscape)
+    assert landscape.calls == [30] * 12
+    np.testing.assert_array_equal(found.trace.evaluations, 30 * np.arange(1, 13))
+
+
+def test_a_seed_gives_the_same_answer_twice_and_another_seed_another():
+    runs = [SMALL.minima(Known(rastrigin, cube(4), IdentificationSettings(seed=seed))) for seed in (7, 7, 8)]
+    np.testing.assert_array_equal(runs[0].minima[0].u, runs[1].minima[0].u)
+    np.testing.assert_array_equal(runs[0].trace.quartiles, runs[1].trace.quartiles)
+    assert (runs[0].trace.quartiles != runs[2].trace.quartiles).any()
+
+
+def test_progress_is_told_of_each_iteration_and_refinement():
+    told = []
+    ParticleSwarm(particles=8, iterations=5, refined_candidates=1).minima(
+        Known(quadratic, cube(2)), lambda *a: told.append(a)
+    )
+    assert told == [("swarm", k, 5) for k in range(1, 6)] + [("refinement", 1, 1)]
+
+
+def test_patience_ends_a_swarm_that_gains_nothing():
+    landscape = Known(quadratic, cube(1))
+    found = ParticleSwarm(particles=50, patience=5).minima(landscape)
+    assert len(found.trace) < 60
+    assert found.minima[0].u == pytest.approx(1.0, abs=1e-4)
+
+
+# ---- terms that may be off -----------------------------------------------------------------------------------------
+
+WAVE = 0.02
+BOX = Bounds(np.array([-12.0, 1.0, -12.0, 1.0, -1.0]), np.array([6.0, 8.0, 6.0, 8.0, 0.0]))
+POWER, HARDENING = SUM.terms
+
+
+def curve(u):
+    """A sum of two terms at 20 times: exp(u0) (1 + n1 t) + exp(u2) t^(1 + m)."""
+    t = np.linspace(0.05, 1.0, 20)
+    first = np.exp(u[:, :1]) * (1 + u[:, 1:2] * t)
+    return first + np.exp(u[:, 2:3]) * t ** (1 + u[:, 4:5])
+
+
+def planted(*terms, price=5.0):
+    """The landscape of a curve that has only these terms, with waves of .02; rates lie at 0 and 2.
+
+    price : added to half of chi-square for each term whose rate is above a thousandth, more or less.
+    """
+    truth = np.array([[0.5 if POWER in terms else -60.0, 3.0, 0.3 if HARDENING in terms else -60.0, 4.0, -0.6]])
+    data = curve(truth)[0] + WAVE * np.cos(np.arange(20.0))
+
+    def cost(u):
+        size = np.exp(u[:, [0, 2]])
+        return 0.5 * (((curve(u) - data) / WAVE) ** 2).sum(axis=1) + price * (size / (size + 1e-3)).sum(axis=1)
+
+    return Known(cost, BOX, law=SUM, rates=(0, 2))
+
+
+CAREFUL = ParticleSwarm(particles=100, iterations=60, maskable_terms="any")
+
+
+@pytest.mark.parametrize("terms", [(POWER,), (HARDENING,), (POWER, HARDENING)])
+@pytest.mark.parametrize("off", ["any", (POWER, HARDENING)])
+def test_an_absent_term_is_switched_off_and_a_present_one_is_not(terms, off):
+    found = replace(CAREFUL, off=off).minima(planted(*terms)).minima[0]
+    assert {POWER, HARDENING} - set(found.terms_off) == set(terms)
+    assert found.cost < 5 * len(terms) + 10  # half of the chi-square of the planted waves is 5
+
+
+def test_minima_are_the_best_of_each_subset_and_more_terms_fit_no_worse():
+    """Without a price, zero is possible and not preferred."""
+    found = CAREFUL.minima(planted(POWER, HARDENING, price=0.0)).minima
+    costs = {m.terms_off: m.cost for m in found}
+    assert len(costs) == len(found)
+    assert set(costs) == {(), (POWER,), (HARDENING,)}
+    assert costs[()] < min(costs[(HARDENING,)], costs[(POWER,)])
+
+
+def test_of_subsets_that_fit_alike_the_simplest_comes_first():
+    """Data without waves of a single term: the sum of both is not better by more than its bottom allows."""
+    flat = Known(
+        lambda u: 0.5 * np.exp(u[:, 2]) + (u[:, 0] - 1) ** 2 + 0.01 * (u[:, 1] - 3) ** 2, BOX, law=SUM, rates=(0, 2)
+    )
+    found = CAREFUL.minima(flat).minima
+    assert found[0].terms_off == (HARDENING,)
+    assert found[0].cost == pytest.approx(0.0, abs=1e-4)
+
+
+def test_what_is_off_rests_at_the_bottom_of_its_rate():
+    found = CAREFUL.minima(planted(POWER)).minima[0]
+    assert found.terms_off == (HARDENING,)
+    assert found.u[2] == -12.0
+
+
+def test_only_what_may_be_off_is():
+    landscape = planted(POWER)
+    found = ParticleSwarm(particles=40, iterations=20, maskable_terms=POWER).minima(landscape)
+    assert all(HARDENING not in m.terms_off for m in found.minima)
+    assert ParticleSwarm(particles=40, iterations=20).minima(landscape).minima[0].terms_off == ()
+
+
+def test_masks_of_three_terms_are_never_empty_and_reach_every_subset():
+    landscape = Known(quadratic, cube(len(TRIPLE.names)), law=TRIPLE, rates=(0, 2, 5))
+    switches, rng = TermMask.from_cost_function(landscape, "any"), np.random.default_rng(0)
+    masks = switches.initial_masks(2000, rng)
+    assert masks.any(axis=1).all()
+    assert len(np.unique(masks, axis=0)) == 7
+    later = switches.recombined(np.zeros((2000, 3), bool), np.zeros(3, bool), rng)
+    assert later.any(axis=1).all()
+    assert len(np.unique(later, axis=0)) == 7
+
+
+def test_a_parameter_shared_with_another_term_does_not_rest():
+    from creepkit.language import arrhenius
+
+    law = SUM.times(arrhenius(T_ref=1000.0))
+    landscape = Known(quadratic, cube(len(law.names)), law=law, rates=(0, 2))
+    switches = TermMask.from_cost_function(landscape, "any")
+    live = dict(zip(law.names, switches.active_parameters(np.array([True, False])), strict=True))
+    assert live.pop("Q")
+    assert [name for name, is_live in live.items() if not is_live] == ["A_2", "n_2", "m"]
+
+
+# ---- what cannot be ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (dict(particles=1), "particles is 1; it must be a whole number of at least 2"),
+        (dict(iterations=2.5), "iterations is 2.5"),
+        (dict(patience=0), "patience is 0"),
+        (dict(form="best"), "form is 'best'; allowed are constriction and inertia"),
+        (dict(boundary="none"), "boundary is 'none'; allowed are absorb and reflect"),
+        (dict(inertia=(1.2, 0.4)), r"inertia is \(1.2, 0.4\); both are from 0 to 1"),
+        (dict(velocity=0), "velocity is 0 of the box"),
+        (dict(own=2.0, common=2.0), "must be more than 4 together"),
+    ],
+)
+def test_settings_that_cannot_be(options, words):
+    with pytest.raises(FitError, match=words):
+        ParticleSwarm(**options)
+
+
+@pytest.mark.parametrize(
+    ("off", "words"),
+    [
+        ("strain hardning", "no term 'strain hardning' to switch off; did you mean 'strain hardening'"),
+        (("x",), "known:"),
+    ],
+)
+def test_terms_that_are_not_there(off, words):
+    with pytest.raises(FitError, match=words):
+        ParticleSwarm(maskable_terms=off).minima(planted(POWER))
+
+
+def test_a_single_term_cannot_be_off():
+    (term,) = ("power law",)
+    with pytest.raises(FitError, match="has one term, 'power law', which cannot be switched off"):
+        ParticleSwarm(maskable_terms=term).minima(Known(quadratic, cube(2)))
+    assert (
+        ParticleSwarm(particles=8, iterations=3, maskable_terms="any")
+        .minima(Known(quadratic, cube(2)))
+        .minima[0]
+        .terms_off
+        == ()
+    )

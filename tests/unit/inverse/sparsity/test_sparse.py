@@ -1,0 +1,205 @@
+"""A sum reduced to the terms that planted bulge tests need: single laws, two-term laws, paths and draws."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from creepkit.errors import FitError
+from creepkit.inverse.search.derivative_free import ParticleSwarm
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.sparsity.bootstrap import (
+    binomial_interval,
+    bootstrap_weights,
+    selection_frequencies,
+    with_weights,
+)
+from creepkit.inverse.sparsity.penalties import L2, PenalisedTerms, Sqrt, Subsets
+from creepkit.inverse.sparsity.reduced_laws import terms_above
+from creepkit.inverse.sparsity.result import Sparsity
+from creepkit.inverse.sparsity.term_selection import (
+    TermChoice,
+    choose_terms,
+    confirmed_law,
+    identify_full,
+    identify_reduced,
+    identify_sparse,
+    trace_path,
+)
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.laws.time_hardening import TIME_HARDENING
+from helpers.reduced_bulge_predictor import OneDegree, Plan, planted
+
+EXACT = OneDegree(exact=True)
+QUICK = IdentificationSettings(starts=1, sobol_points=4, frames=24, nuisances=())
+SINE, STRAIN, TIME = COMBINED.terms
+TRUTH = {"A": 3e-14, "n": 3.5, "m": -0.4}
+
+
+@pytest.fixture(scope="module")
+def hardening():
+    """Eq. (2) opened on one test of a dimple that hardens with strain."""
+    tests = planted(STRAIN_HARDENING, TRUTH, [Plan(760, 8, 10)], seed=5, frames=24)
+    return identify_full(COMBINED, tests, EXACT, None, QUICK, None)
+
+
+@pytest.fixture(scope="module")
+def reduced(hardening):
+    return identify_reduced(Sqrt(), *hardening)
+
+
+def test_a_planted_single_law_is_found(reduced):
+    assert reduced.sparsity.kept == (STRAIN,)
+    assert set(reduced.law.terms) == {STRAIN}
+    for name, truth in (("n_2", 3.5), ("m_1", -0.4)):
+        estimate = next(e for e in reduced.estimates if e.name == name)
+        assert estimate.value == pytest.approx(truth, abs=4 * (estimate.high - estimate.low) / 3.92)
+    assert reduced.sparsity.excess < 0
+    assert reduced.sparsity.p_value > 0.01
+
+
+def test_subsets_find_it_too(hardening):
+    choice = choose_terms(hardening[1], Subsets())
+    assert choice.kept_terms == (STRAIN,)
+    assert choice.contributions[STRAIN] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_swarm_searches_the_penalised_landscape(hardening):
+    """Its cost at the optimum is what least squares has there, penalty included."""
+    _, reductions = hardening
+    stage = reductions.stage
+    penalised = PenalisedTerms.from_objective(stage.objective, Sqrt())
+    landscape, u = stage.landscape(penalised), stage.start[: stage.size]
+    wanted = stage.misfit(stage.start) + penalised.values(u[None])[0]
+    assert landscape.cost(u[None])[0] == pytest.approx(wanted, rel=1e-9)
+    choice = choose_terms(reductions, Sqrt(), ParticleSwarm(particles=8, iterations=2, refined_candidates=1))
+    assert choice.kept_terms == (STRAIN,)
+    assert len(choice.trace) == 2
+
+
+def test_squared_l2_shares_the_rate_out(hardening):
+    """What one term gives alone is given by several: the penalty is smallest at equal shares."""
+    stage = hardening[1].stage
+    x = stage.minimise(stage.start, PenalisedTerms.from_objective(stage.objective, L2(240.0))).u
+    shares = stage.shares(x)
+    assert max(shares.values()) < max(stage.shares(stage.start).values())
+    assert len(terms_above(shares)) > 1
+
+
+def test_memory_that_is_not_there_is_switched_off():
+    """Planted Norton creep ends as strain hardening, or time hardening, of exponent zero, if not as a sinh."""
+    tests = planted(NORTON, {"A": 2e-13, "n": 3.5}, [Plan(760, 8, 10)], seed=6, frames=24)
+    fit = identify_sparse(STRAIN_HARDENING + TIME_HARDENING, tests, EXACT, penalty=Sqrt(), settings=QUICK)
+    assert len(fit.law.terms) == 1
+    assert len(fit.law.params) == 2
+    assert fit.sparsity.exponents_off in (("m_1",), ("m_2",))
+    assert next(v for k, v in fit.values.items() if k.startswith("n")) == pytest.approx(3.5, abs=0.2)
+
+
+def test_two_terms_are_kept_where_three_pressures_need_them():
+    law = NORTON + TIME_HARDENING
+    values = {"A_1": 1.5e-20, "n_1": 6.5, "A_2": 3.3e-9, "n_2": 2.0, "m": -0.6}
+    plans = [Plan(760, P, 1.15 * P) for P in (6, 8, 10.5)]
+    tests = planted(law, values, plans, seed=7, frames=12)
+    fit = identify_sparse(law, tests, EXACT, penalty=Sqrt(), settings=QUICK)
+    assert fit.sparsity.kept_terms == ("power law", "time hardening")
+    assert fit.values["n_1"] == pytest.approx(6.5, abs=0.3)
+
+
+# ---- the path, and draws -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def path(hardening):
+    return trace_path(hardening[1], Sqrt("auto"), strengths=(30.0,))
+
+
+def test_along_the_path_terms_go_and_misfit_grows(path):
+    assert path.strengths[0] == 0
+    assert path.kept[-1] == (STRAIN,)
+    assert (np.diff(path.chi_square) > -0.1).all()
+    assert path.kept[path.chosen] == (STRAIN,)
+    assert path.criterion[path.chosen] == 0
+    assert "<- chosen" in str(path)
+
+
+def test_the_path_is_drawn(path, tmp_path):
+    assert path.plot(tmp_path / "path.png").axes[0].get_xlabel() == "strength of the penalty"
+    assert (tmp_path / "path.png").stat().st_size > 10_000
+    with pytest.raises(FitError, match="cannot be written"):
+        path.plot(tmp_path / "path.unknown")
+
+
+def test_draws_of_frames_keep_what_the_whole_test_keeps(hardening):
+    _, reductions = hardening
+    optimum = reductions.stage.placed(reductions.of([STRAIN]).law, reductions.of([STRAIN]).x)
+    found = selection_frequencies(reductions, Sqrt(), 24.0, optimum, resamples=2, seed=1)
+    assert found.unit == "blocks of frames"
+    assert found.term_counts == {SINE: 0, STRAIN: 2, TIME: 0}
+    assert found.set_counts == {(STRAIN,): 2}
+    assert "kept 2 times" in str(found)
+
+
+def test_draws_weigh_all_frames_alike(hardening):
+    """Blocks that go round the end: each frame is drawn once on average."""
+    stage = hardening[1].stage
+    weights = np.mean(list(bootstrap_weights(stage, 2000, np.random.default_rng(0))), axis=0)
+    present = stage.objective.entries.present
+    np.testing.assert_allclose(weights[present], 1.0, atol=0.1)
+
+
+def test_of_several_tests_whole_ones_are_drawn():
+    """As many as there are, each as likely as another; all entries of a test together."""
+    entries = SimpleNamespace(present=np.ones((5, 7), bool), frame=np.tile(np.arange(7), (5, 1)))
+    stage = SimpleNamespace(objective=SimpleNamespace(entries=entries))
+    drawn = np.array(list(bootstrap_weights(stage, 2000, np.random.default_rng(0))))
+    assert (drawn == drawn[:, :, :1]).all()
+    np.testing.assert_array_equal(drawn[:, :, 0].sum(axis=1), 5)
+    np.testing.assert_allclose(drawn.mean(axis=0), 1.0, atol=0.1)
+
+
+def test_frames_drawn_twice_count_twice(hardening):
+    stage = hardening[1].stage
+    twice = with_weights(stage, np.full(stage.objective.entries.present.shape, 2.0))
+    assert twice.half_chi_square(stage.start) == pytest.approx(2 * stage.misfit(stage.start))
+
+
+def test_intervals_of_frequencies_are_exact():
+    """Clopper and Pearson: none of n gives 1 - (.025)^(1/n)."""
+    assert binomial_interval(0, 20) == pytest.approx((0.0, 1 - 0.025 ** (1 / 20)))
+    assert binomial_interval(20, 20) == pytest.approx((0.025 ** (1 / 20), 1.0))
+    low, high = binomial_interval(10, 20)
+    assert low == pytest.approx(1 - high)
+
+
+# ---- confirmation and the record -----------------------------------------------------------------------------------
+
+
+def test_a_term_that_is_needed_comes_back(hardening):
+    _, reductions = hardening
+    wrong = TermChoice((SINE,), {SINE: 0.6, STRAIN: 0.3, TIME: 0.1}, reductions.stage.start)
+    assert STRAIN in confirmed_law(reductions, wrong).kept_terms
+
+
+def test_the_record_says_what_was_dropped_and_survives_a_file(reduced):
+    told = reduced.sparsity
+    assert "without 'hyperbolic sine' and 'time hardening' of 'combined' chi-square rises by" in told.verdict
+    assert "'strain hardening' suffices" in told.verdict
+    assert Sparsity.from_dict(json.loads(json.dumps(told.to_dict()))) == told
+    back = replace(told, proposed=())
+    assert "The penalty had dropped 'strain hardening' too" in back.verdict
+
+
+def test_one_term_is_nothing_to_choose_from():
+    tests = planted(NORTON, {"A": 2e-13, "n": 3.5}, [Plan(760)], frames=8)
+    with pytest.raises(FitError, match="law 'norton' has one term, 'power law', and a penalty chooses among terms"):
+        identify_sparse(NORTON, tests, EXACT, penalty=Sqrt())
+
+
+def test_the_largest_term_stays_whatever_the_least_share():
+    assert terms_above({"a": 0.6, "b": 0.04}) == ("a",)
+    assert terms_above({"a": 0.03, "b": 0.04}) == ("b",)

@@ -1,0 +1,119 @@
+"""The simulation of an identified law beside its tests: differences of known size, and the sentence for each case."""
+
+import json
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import FitError
+from creepkit.inverse.confirmation import confirm, outside_domain
+from creepkit.inverse.identification_document import load_identification
+from creepkit.readers.history_csv import write_history
+from creepkit.records import Status
+from helpers.command_line import creepkit, one_line
+from helpers.planted_alloys import bars
+
+BAR = ck.specimen("uniaxial")
+SD = 1e-4
+TESTS = [h.replace(standard_deviation={"strain": SD}) for h in bars("X")]
+
+
+@dataclass(frozen=True)
+class Stranger:
+    """Predicts what a bar does, and something more in strain; says that it ended as `status` tells."""
+
+    more: float = 0.0
+    status: Status = Status.COMPLETE
+    name: str = "stranger"
+    outputs: tuple[str, ...] = ("strain",)
+
+    def predict(self, law, values, histories, *, jacobian=False, nuisances=None):
+        found = BAR.predict(law, values, histories, jacobian=jacobian, nuisances=nuisances)
+        status, ends = np.full_like(found.status, int(self.status)), np.full(found.end_times.shape, 3600.0)
+        return replace(found, values=found.values + self.more, status=status, end_times=ends)
+
+
+@pytest.fixture(scope="module")
+def fit():
+    return ck.identify("norton", TESTS, starts=2)
+
+
+def test_a_fit_by_the_specimen_itself_is_confirmed_with_its_own_misfit(fit):
+    told = confirm(fit, TESTS, BAR)
+    assert told.noise_ratio == 0.0
+    for test in fit.tests:
+        assert told[test.name, "strain"].simulation_errors == told[test.name, "strain"].fit_errors
+        assert told[test.name, "strain"].simulation_errors.mean_squared_error == pytest.approx(
+            test["strain"].errors.mse, rel=1e-9
+        )
+
+
+@pytest.mark.parametrize("share", [0.5, 2.0])
+def test_the_difference_is_told_in_units_of_the_noise(fit, share):
+    """A surrogate that is off by `share` times the noise everywhere."""
+    told = confirm(replace(fit, predictor=Stranger(share * SD)), TESTS, BAR)
+    assert told.noise_ratio == pytest.approx(share, rel=1e-9)
+    assert told.confirmed is (share < 1)
+
+
+def test_a_surrogate_that_is_far_off_is_not_believed(fit):
+    told = confirm(replace(fit, predictor=Stranger(3 * SD)), TESTS, BAR)
+    assert told.verdict.startswith("not confirmed: uniaxial differs from the fit by 3 times the noise (strain of 'X-")
+    assert told.verdict.endswith("identify again with using= this specimen")
+
+
+def test_a_law_that_follows_no_test_is_said_whoever_predicts_it(fit):
+    tight = [h.replace(standard_deviation={"strain": SD / 1e4}) for h in TESTS]
+    assert "confirmed, but the law does not follow the tests: chi-square" in confirm(fit, tight, BAR).verdict
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [(Status.RUPTURED, "the specimen bursts at 3600 s"), (Status.NOT_CONVERGED, "the simulation stops at 3600 s")],
+)
+def test_a_simulation_that_ends_early_confirms_nothing(fit, status, words):
+    told = confirm(fit, TESTS, Stranger(status=status))
+    assert not told.confirmed
+    assert told.verdict.startswith(f"not confirmed: by stranger, {words} of test 'X-60'")
+
+
+def test_only_the_guard_of_a_surrogate_doubts(fit):
+    assert not outside_domain(fit)
+    assert outside_domain(replace(fit, predictor=Stranger(status=Status.OUTSIDE_DOMAIN)))
+    assert not outside_domain(replace(fit, predictor=None))
+
+
+def test_a_fit_from_a_file_is_held_against_the_misfit_it_tells(fit, tmp_path):
+    found = load_identification(fit.save(tmp_path / "fit.json"))
+    told = confirm(found, TESTS, BAR)
+    assert np.isnan(told["X-60", "strain"].rms_difference)
+    assert told.noise_ratio == pytest.approx(0.0, abs=1e-3)
+    far = confirm(found, TESTS, Stranger(100 * SD))
+    assert far.noise_ratio == pytest.approx(100.0, rel=0.05)
+
+
+def test_other_tests_are_predicted_without_a_misfit_of_the_fit(fit):
+    others = [h.replace(name=f"new {h.name}") for h in TESTS]
+    told = confirm(replace(fit, predictor=None), others, {"uniaxial": BAR})
+    assert told.tests[0].outputs[0].fit_errors is None
+    assert np.isnan(told.noise_ratio)
+
+
+def test_it_takes_tests(fit):
+    with pytest.raises(FitError, match="law 'norton': there are no tests to confirm it with"):
+        confirm(fit, [], BAR)
+
+
+def test_confirm_command(fit, tmp_path):
+    path = fit.save(tmp_path / "fit.json")
+    for history in TESTS:
+        write_history(history, tmp_path / f"{history.name}.csv")
+    told = creepkit("confirm", str(path), str(tmp_path / "*.csv"))
+    assert told.exit_code == 0
+    assert "norton by uniaxial" in told.stdout
+    answer = json.loads(creepkit("confirm", str(path), str(tmp_path / "*.csv"), "--json").stdout)
+    assert answer["tests"][0]["outputs"][0]["difference"] is None
+    assert {t["name"] for t in answer["tests"]} == {h.name for h in TESTS}
+    assert "cannot be read" in one_line(creepkit("confirm", str(tmp_path / "none.json"), str(tmp_path / "*.csv")))

@@ -1,0 +1,269 @@
+"""Kernels for NumPy arrays and torch tensors: values, shapes, zeros, gradients."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from creepkit.errors import LawError
+from creepkit.kernels import lower
+from creepkit.language import CreepLaw, arrhenius
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
+from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.laws.time_hardening import TIME_HARDENING
+from creepkit.testing import draw_samples
+from helpers.literature_laws import EQUATIONS
+
+SHIPPED = [NORTON, STRAIN_HARDENING, TIME_HARDENING, HYPERBOLIC_SINE, DRIFTING_EXPONENT, COMBINED]
+LAWS = [*SHIPPED, EQUATIONS["combined with temperature"], EQUATIONS["Liu-Murakami"], EQUATIONS["threshold"]]
+ARRAYS: list[Any] = [("numpy", np.asarray), ("torch", torch.as_tensor)]
+
+each_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+torch_warns = pytest.mark.filterwarnings("ignore:.torch.jit.script. is deprecated")  # torch's own forward mode does
+each_target = pytest.mark.parametrize(("target", "array"), ARRAYS, ids=["numpy", "torch"])
+
+
+def moderate(law: CreepLaw, size: int, dtype: torch.dtype = torch.float64) -> list[torch.Tensor]:
+    """Positional arguments near the middle of the bounds, whose rates are representable in single precision."""
+    generator = np.random.default_rng(3)
+    low, high = [120.0, 0.01, 1e3, 1000.0, 90.0, 39.0], [140.0, 0.02, 2e3, 1100.0, 110.0, 49.0]
+    point = generator.uniform(low, high, (size, 6)).T
+    inner = generator.uniform(0.1, 0.3, (len(law.states), size))
+    bounds = np.array([[p.to_internal(b) for b in p.bounds] for p in law.params.values()])
+    middle, reach = bounds.mean(axis=1), np.ptp(bounds, axis=1)
+    theta = (middle + 0.05 * generator.uniform(-1, 1, (size, len(middle))) * reach).T
+    return [torch.tensor(column, dtype=dtype) for column in (*point, *inner, *theta)]
+
+
+# ---- values and shapes ---------------------------------------------------------------------------------------------
+
+
+@each_target
+def test_norton_by_hand(target: Any, array: Callable[[Any], Any]) -> None:
+    kernel = lower(NORTON, target)
+    stress = array([10.0, 100.0])
+
+    found = kernel.derivatives({"A": 1e-16, "n": 4.0}, stress=stress)
+
+    np.testing.assert_allclose(kernel.rate({"A": 1e-16, "n": 4.0}, stress=stress), [1e-12, 1e-8], rtol=1e-13)
+    np.testing.assert_allclose(found.rate, [1e-12, 1e-8], rtol=1e-13)
+    np.testing.assert_allclose(found["stress"], [4e-13, 4e-10], rtol=1e-13)
+    np.testing.assert_allclose(found["A"], [1e-12, 1e-8], rtol=1e-13)  # to ln A
+    np.testing.assert_allclose(found["n"], np.log([10, 100]) * [1e-12, 1e-8], rtol=1e-13)
+    np.testing.assert_allclose(found["time"], [0.0, 0.0], atol=0)
+
+
+@each_target
+def test_candidates_and_points_broadcast(target: Any, array: Callable[[Any], Any]) -> None:
+    kernel = lower(TIME_HARDENING, target)
+    values = {"A": 1e-12, "n": array([[2.0], [3.0]]), "m": -0.5}
+    point = {"stress": array([10.0, 20.0, 30.0]), "time": 4.0}
+
+    found = kernel.derivatives(values, **point)
+
+    expected = 1e-12 * np.array([10.0, 20.0, 30.0]) ** np.array([[2.0], [3.0]]) / 2
+    np.testing.assert_allclose(kernel.rate(values, **point), expected, rtol=1e-13)
+    assert {tuple(d.shape) for d in (*found.point.values(), *found.params.values())} == {(2, 3)}
+
+
+@each_target
+def test_numbers_alone_give_a_number(target: Any, array: Callable[[Any], Any]) -> None:
+    rate = lower(NORTON, target).rate({"A": 1e-10, "n": 2.0}, stress=3.0)
+
+    assert rate.shape == ()
+    assert float(rate) == pytest.approx(9e-10, rel=1e-14)
+
+
+def test_damage_grows_at_its_own_rate() -> None:
+    law = EQUATIONS["Kachanov-Rabotnov"]
+    values = {"A": 1e-12, "n": 3.0, "B": 1e-8, "k": 2.0, "r": 4.0}
+
+    rates = lower(law, "numpy").state_rates(values, stress=50.0, principal_stress=40.0, omega=0.5)
+
+    assert float(rates["omega"]) == pytest.approx(1e-8 * 40.0**2 / 0.5**4, rel=1e-13)
+
+
+@each_target
+def test_log_rate_reaches_where_the_rate_does_not(target: Any, array: Callable[[Any], Any]) -> None:
+    kernel = lower(HYPERBOLIC_SINE, target)
+    values = {"A": 1e-5, "n": 8.0, "B": 1.0}
+
+    assert float(kernel.rate(values, stress=2000.0)) == np.inf
+    assert float(kernel.log_rate(values, stress=2000.0)) == pytest.approx(
+        np.log(1e-5) + 8 * (2000 - np.log(2)), rel=1e-14
+    )
+
+
+# ---- off, and zero -------------------------------------------------------------------------------------------------
+
+
+@each_target
+@each_law
+def test_a_law_that_is_off_creeps_at_rate_zero(law: CreepLaw, target: Any, array: Callable[[Any], Any]) -> None:
+    kernel = lower(law, target)
+    off = {name: p.off for name, p in law.table.items() if p.off == 0 and p.scale == "log"}
+    point = {"stress": array([50.0]), "temperature": 1000.0, "time": 0.0, "strain": 0.0}
+
+    found = kernel.derivatives({**law.center(), **off}, **point)
+
+    assert float(found.rate[0]) == 0.0
+    assert all(np.isfinite(float(d[0])) for d in (*found.point.values(), *found.params.values()))
+    assert -np.inf < float(kernel.log_rate({**law.center(), **off}, **point)[0]) < -1e20
+
+
+def test_the_gradient_to_a_coefficient_that_is_off_is_not_nan() -> None:
+    A = torch.tensor(0.0, dtype=torch.float64, requires_grad=True)
+
+    rate = lower(NORTON, "torch").rate({"A": A, "n": 3.0}, stress=torch.tensor([10.0], dtype=torch.float64))
+    rate.sum().backward()
+
+    assert torch.isfinite(A.grad)
+
+
+@pytest.mark.parametrize("zeros", [(0, 4, 5), (1,), (2,), (0, 1, 2, 4, 5)], ids=["stress", "strain", "time", "all"])
+@pytest.mark.parametrize(
+    ("law", "dtype"),
+    [*((law, torch.float64) for law in LAWS), *((law, torch.float32) for law in SHIPPED)],
+    ids=lambda x: x.name if isinstance(x, CreepLaw) else str(x),
+)
+def test_nothing_is_nan_or_infinite_at_zero(law: CreepLaw, dtype: torch.dtype, zeros: tuple[int, ...]) -> None:
+    arguments = moderate(law, 4, dtype)
+    for column in zeros:
+        arguments[column] = torch.zeros_like(arguments[column])
+    kernel = lower(law, "torch")
+    inputs = [a.requires_grad_() for a in arguments]
+
+    log_rate = kernel.internal_log_rate(*inputs)
+    gradients = torch.autograd.grad(log_rate.sum(), inputs, allow_unused=True)
+
+    assert log_rate.dtype == dtype
+    assert torch.isfinite(log_rate).all()
+    assert all(torch.isfinite(g).all() for g in gradients if g is not None)
+    plain = [a.detach().numpy() for a in arguments]
+    with np.errstate(all="raise", under="ignore", over="ignore", divide="ignore"):
+        assert np.isfinite(lower(law, "numpy").internal_log_rate(*plain)).all()
+        found = lower(law, "numpy").internal_derivatives(*plain)
+    if dtype == torch.float64:
+        assert np.isfinite([found.rate, *found.point.values(), *found.params.values()]).all()
+
+
+# ---- gradients -----------------------------------------------------------------------------------------------------
+
+
+@each_law
+def test_autograd_gives_the_derivatives_by_symbols(law: CreepLaw) -> None:
+    drawn = draw_samples(law, 64, seed=5)
+    found = lower(law, "numpy").internal_derivatives(*drawn.arguments())
+    kept = np.isfinite(found.rate) & (found.rate > 1e-250) & (found.rate < 1e250)
+    inputs = [torch.tensor(column[kept], requires_grad=True) for column in drawn.arguments()]
+
+    grown = torch.autograd.grad(lower(law, "torch").internal_rate(*inputs).sum(), inputs, allow_unused=True)
+
+    assert kept.sum() > 10
+    for g, expected in zip(grown, [*found.point.values(), *found.params.values()], strict=True):
+        np.testing.assert_allclose(0.0 if g is None else g.numpy(), expected[kept], rtol=1e-10)
+
+
+@torch_warns
+@each_law
+@pytest.mark.parametrize("transform", ["jacfwd", "jacrev", "grad"])
+def test_batches_of_candidates_are_differentiated_by_torch_func(law: CreepLaw, transform: str) -> None:
+    arguments, kernel = moderate(law, 5), lower(law, "torch")
+    split = 6 + len(law.states)
+    point, theta = [a[0] for a in arguments[:split]], torch.stack(arguments[split:], dim=1)
+
+    def log_rate(candidate: torch.Tensor) -> torch.Tensor:
+        return kernel.internal_log_rate(*point, *candidate.unbind())
+
+    found = torch.func.vmap(getattr(torch.func, transform)(log_rate))(theta)
+
+    slopes = kernel.internal_derivatives(*point, *theta.T)
+    expected = torch.stack([d / slopes.rate for d in slopes.params.values()], dim=1)
+    torch.testing.assert_close(found, expected, rtol=1e-10, atol=1e-300)
+
+
+def test_gradients_of_damage_rates_are_theirs() -> None:
+    """d/dr of B s^k (1 - omega)^-r is that times -ln(1 - omega)."""
+    kernel, r = (
+        lower(EQUATIONS["Kachanov-Rabotnov"], "torch"),
+        torch.tensor(4.0, dtype=torch.float64, requires_grad=True),
+    )
+    values = {"A": 1e-12, "n": 3.0, "B": 1e-8, "k": 2.0, "r": r}
+
+    rate = kernel.state_rates(values, stress=50.0, principal_stress=40.0, omega=0.5)["omega"]
+    (slope,) = torch.autograd.grad(rate, r)
+
+    assert float(slope) == pytest.approx(1e-8 * 40.0**2 * 0.5**-4 * np.log(2), rel=1e-13)
+
+
+@torch_warns
+def test_second_derivatives_are_those_of_norton() -> None:
+    """ln f = ln A + n ln s, so d2/ds2 = -n/s^2 and d2/(ds dn) = 1/s."""
+    kernel = lower(NORTON, "torch")
+
+    def log_rate(stress: torch.Tensor, n: torch.Tensor) -> torch.Tensor:
+        return kernel.internal_log_rate(stress, 0.0, 0.0, 1000.0, stress, stress / 3, -40.0, n)
+
+    at = torch.tensor(20.0, dtype=torch.float64), torch.tensor(4.0, dtype=torch.float64)
+    (ss, sn), (ns, nn) = torch.func.hessian(log_rate, argnums=(0, 1))(*at)
+
+    torch.testing.assert_close(torch.stack([ss, sn, ns, nn]), torch.tensor([-0.01, 0.05, 0.05, 0.0], dtype=at[0].dtype))
+
+
+def test_gradients_flow_to_inputs_of_any_shape() -> None:
+    kernel = lower(STRAIN_HARDENING, "torch")
+    stress = torch.rand(3, 1, dtype=torch.float64, requires_grad=True)
+    n = torch.full((4,), 3.0, dtype=torch.float64, requires_grad=True)
+
+    kernel.log_rate({"A": 1e-10, "n": n, "m": -0.5}, stress=stress, strain=0.01).sum().backward()
+
+    torch.testing.assert_close(stress.grad, 12.0 / stress.detach())
+    torch.testing.assert_close(n.grad, torch.log(stress.detach()).sum().expand(4))
+
+
+def test_single_precision_stays_single() -> None:
+    law, arguments = COMBINED, moderate(COMBINED, 8, torch.float32)
+
+    found = lower(law, "torch").internal_derivatives(*arguments)
+    exact = lower(law, "torch").internal_derivatives(*(a.double() for a in arguments))
+
+    doubled = [*exact.point.values(), *exact.params.values()]
+    for got, expected in zip((*found.point.values(), *found.params.values()), doubled, strict=True):
+        assert got.dtype == torch.float32
+        torch.testing.assert_close(got.double(), expected, rtol=1e-3, atol=1e-30)
+
+
+# ---- what is refused -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("values", "point", "message"),
+    [
+        ({"A": 1e-10, "n": 3.0}, {"stress": 1.0, "stres": 2.0}, "has no variable 'stres': did you mean 'stress'"),
+        ({"A": 1e-10, "n": 3.0}, {"strain": 1.0}, "needs a stress, in MPa"),
+        ({"A": 1e-10}, {"stress": 1.0}, "needs a value for n"),
+        ({"A": 1e-10, "n": 3.0, "m": 1.0}, {"stress": 1.0}, "has no parameter 'm'"),
+    ],
+)
+def test_a_call_that_cannot_be_meant_is_refused(
+    values: dict[str, float], point: dict[str, float], message: str
+) -> None:
+    with pytest.raises(LawError, match=message):
+        lower(NORTON, "numpy").rate(values, **point)
+
+
+def test_a_law_that_depends_on_temperature_asks_for_it() -> None:
+    law = NORTON.times(arrhenius())
+
+    with pytest.raises(LawError, match="depends on temperature: give temperature in K"):
+        lower(law, "numpy").rate(law.center(), stress=10.0)
+
+
+def test_an_unknown_target_is_refused() -> None:
+    with pytest.raises(LawError, match="no kernel target 'jax'"):
+        lower(NORTON, "jax")  # type: ignore[call-overload]

@@ -1,0 +1,165 @@
+"""Kernels on disk: found again, safe from each other, from damage and from folders that cannot be written."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from creepkit.kernels import compilation, lower
+from creepkit.kernels.compilation import CHECKSUM_FILE, SOURCE_FILE, is_intact
+from creepkit.language import CreepLaw, stress
+from helpers.literature_laws import POWER, RATE, A, law, n
+
+PROGRAM = """
+import sys
+import numpy
+from creepkit.kernels import lower
+from creepkit.kernels.interface import call_entry
+from creepkit.laws.norton import NORTON
+
+compiled = lower(NORTON, "numba")
+out, flags = call_entry(compiled, "rate", numpy.array([[100.0] + 5 * [0.0]]), compiled.internal({"A": 1e-16, "n": 4.0})[0])
+print(out[0, 0], flags, compiled.rate.cache_hits)
+"""
+
+
+class Other(subprocess.Popen[str]):
+    """Another interpreter that asks for Norton's kernel."""
+
+    def __init__(self, cache: Path, **environment: str) -> None:
+        variables = {**os.environ, "CREEPKIT_CACHE": str(cache), **environment}
+        super().__init__([sys.executable, "-c", PROGRAM], stdout=-1, stderr=-1, text=True, env=variables)
+
+    def answer(self) -> tuple[float, int, int]:
+        """Rate at 100 MPa, flags, and whether machine code came from disk."""
+        out, err = self.communicate(timeout=120)
+        assert self.returncode == 0, err
+        rate, flags, hits = out.split()
+        return float(rate), int(flags), int(hits)
+
+
+NEW, KNOWN = (pytest.approx(1e-8, rel=1e-12), 0, 0), (pytest.approx(1e-8, rel=1e-12), 0, 1)
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache folder; nothing is remembered in memory."""
+    monkeypatch.setenv("CREEPKIT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(compilation, "_loaded_modules", {})
+    return tmp_path / "cache"
+
+
+def some_law(factor: int = 1) -> CreepLaw:
+    """A law that nothing else has compiled."""
+    return law(factor * A * stress**n, {A: RATE, n: POWER})
+
+
+def folder_of(cache: Path) -> Path:
+    (folder,) = (cache / "kernels").glob("law_*")
+    return folder
+
+
+def test_a_law_is_compiled_once_for_all_processes(cache: Path) -> None:
+    assert Other(cache).answer() == NEW
+    assert Other(cache).answer() == KNOWN
+    assert sorted(p.name for p in (cache / "kernels").iterdir()) == [folder_of(cache).name]
+
+
+def test_processes_may_build_the_same_law_at_once(cache: Path) -> None:
+    others = [Other(cache), Other(cache)]
+
+    answers = [other.answer() for other in others]
+
+    assert all(answer[:2] == NEW[:2] for answer in answers)
+    assert sorted(p.name for p in (cache / "kernels").iterdir()) == [folder_of(cache).name]
+    assert is_intact(folder_of(cache))
+    assert Other(cache).answer() == KNOWN
+
+
+@pytest.mark.parametrize(
+    ("suffix", "damage", "factor"),
+    [
+        (SOURCE_FILE, "truncated", 2),
+        (SOURCE_FILE, "changed", 3),
+        (".nbi", "emptied", 5),
+        (".nbc", "truncated", 7),
+        (".nbc", "changed", 11),
+        (".nbc", "removed", 13),
+        (CHECKSUM_FILE, "removed", 17),
+    ],
+)
+def test_what_is_damaged_is_made_anew(cache: Path, suffix: str, damage: str, factor: int) -> None:
+    lower(some_law(factor), "numba")
+    victim = sorted(p for p in folder_of(cache).rglob("*") if p.name.endswith(suffix))[0]
+    content = victim.read_bytes()
+    if damage == "removed":
+        victim.unlink()
+    else:
+        changed = content[: len(content) // 2] + b"#" + content[len(content) // 2 + 1 :]
+        victim.write_bytes({"truncated": content[:-20], "emptied": b"", "changed": changed}[damage])
+    assert not is_intact(folder_of(cache))
+
+    compilation._loaded_modules.clear()
+    again = lower(some_law(factor), "numba")
+
+    assert is_intact(folder_of(cache))
+    assert again.rate.cache_hits == 0
+    compilation._loaded_modules.clear()
+    assert lower(some_law(factor), "numba").rate.cache_hits == 1
+    assert [p.name for p in (cache / "kernels").iterdir()] == [folder_of(cache).name]
+
+
+def test_a_file_that_does_not_belong_makes_the_folder_suspect(cache: Path) -> None:
+    lower(some_law(23), "numba")
+    (folder_of(cache) / "extra.py").write_text("raise SystemExit('was run')")
+
+    assert not is_intact(folder_of(cache))
+    compilation._loaded_modules.clear()
+    lower(some_law(23), "numba")
+    assert is_intact(folder_of(cache))
+
+
+def test_without_a_folder_to_write_to_each_process_compiles_for_itself(tmp_path: Path) -> None:
+    """A file lies where the cache folder should be, which stops root too."""
+    (tmp_path / "cache").write_text("not a folder")
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+
+    assert Other(tmp_path / "cache", TMPDIR=str(temporary)).answer() == NEW
+    assert (tmp_path / "cache").read_text() == "not a folder"
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_folder_that_is_read_only_still_serves_what_it_holds(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lower(some_law(29), "numba")
+    before = folder_of(cache)
+    monkeypatch.setattr(compilation, "_writable", lambda folder: False)
+    compilation._loaded_modules.clear()
+
+    known, new = lower(some_law(29), "numba"), lower(some_law(31), "numba")
+
+    assert (known.rate.cache_hits, new.rate.cache_hits) == (1, 0)
+    assert folder_of(cache) == before
+
+
+def test_a_failure_leaves_nothing_half_made(cache: Path) -> None:
+    with pytest.raises(SyntaxError):
+        compilation.load_module("broken", lambda: "def rate(:")
+
+    assert list((cache / "kernels").iterdir()) == []
+
+
+def test_the_folder_is_for_its_owner_alone(cache: Path) -> None:
+    lower(some_law(37), "numba")
+
+    for folder in (cache / "kernels", folder_of(cache)):
+        assert folder.stat().st_mode & 0o022 == 0
+
+
+def test_the_cache_has_a_home_without_the_variable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("CREEPKIT_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+    assert compilation.cache_folder() == tmp_path / "creepkit" / "kernels"

@@ -1,0 +1,204 @@
+"""The compiled interface: layout, rows, flags, and what is off."""
+
+import numpy as np
+import pytest
+from numba import float64, int64, njit
+
+from creepkit.arrays import Floats
+from creepkit.kernels import CompiledLaw, lower
+from creepkit.kernels.interface import DERIVATIVE_NOT_FINITE, ENTRY_TYPE, RATE_NOT_FINITE, call_entry, data_pointer
+from creepkit.language import CreepLaw, strain, stress
+from creepkit.laws.combined import COMBINED
+from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
+from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.laws.time_hardening import TIME_HARDENING
+from creepkit.testing import draw_samples
+from helpers.literature_laws import EQUATIONS, POWER, RATE, A, B, damage, law, n, omega, scale
+
+SHIPPED = [NORTON, STRAIN_HARDENING, TIME_HARDENING, HYPERBOLIC_SINE, DRIFTING_EXPONENT, COMBINED]
+LAWS = [*SHIPPED, EQUATIONS["Liu-Murakami"], EQUATIONS["threshold"], EQUATIONS["combined with temperature"]]
+each_law = pytest.mark.parametrize("law_", LAWS, ids=lambda law_: law_.name)
+
+
+def point(**given: float) -> Floats:
+    """One row: 100 MPa uniaxial, strain 0.01, 1000 s, 1000 K."""
+    names = ("stress", "strain", "time", "temperature", "principal_stress", "mean_stress")
+    usual = dict(zip(names, (100.0, 0.01, 1000.0, 1000.0, 100.0, 100.0 / 3), strict=True))
+    return np.array([[{**usual, **given}[name] for name in names]])
+
+
+# ---- layout --------------------------------------------------------------------------------------------------------
+
+
+def test_norton_by_hand() -> None:
+    compiled = lower(NORTON, "numba")
+    theta = compiled.to_internal({"A": 1e-16, "n": 4.0})[0]
+
+    rate, flags = call_entry(compiled, "rate", point(), theta)
+    update, _ = call_entry(compiled, "update", point(), theta)
+    sensitivity, _ = call_entry(compiled, "sensitivity", point(), theta)
+
+    assert flags == 0
+    np.testing.assert_allclose(rate, [[1e-8]], rtol=1e-13)
+    np.testing.assert_allclose(update, [[np.log(1e-8), 0.04, 0, 0, 0, 0, 0]], rtol=1e-13)
+    np.testing.assert_allclose(sensitivity, [[1e-8, 4e-10, 0, 0, 0, 0, 0, 1e-8, 1e-8 * np.log(100)]], rtol=1e-13)
+
+
+def test_damage_comes_after_the_rate_row_by_row() -> None:
+    """Rate A s^n (1 + omega) and damage rate B s omega: values, then slopes to x of both, then to theta."""
+    compiled = lower(damage(A * stress**n * (1 + omega), B * stress * omega, {A: RATE, n: POWER, B: RATE}), "numba")
+    theta = compiled.to_internal({"A": 1e-16, "n": 4.0, "B": 1e-9})[0]
+    x = np.column_stack([point(), [[0.25]]])
+
+    rate, _ = call_entry(compiled, "rate", x, theta)
+    update, _ = call_entry(compiled, "update", x, theta)
+    sensitivity, _ = call_entry(compiled, "sensitivity", x, theta)
+
+    f, g = 1.25e-8, 2.5e-8
+    np.testing.assert_allclose(rate, [[f, g]], rtol=1e-13)
+    to_x = [0.04, 0, 0, 0, 0, 0, 1 / 1.25], [g / 100, 0, 0, 0, 0, 0, 1e-7]
+    np.testing.assert_allclose(update, [[np.log(f), g, *to_x[0], *to_x[1]]], rtol=1e-13)
+    to_theta = [f, f * np.log(100), 0], [0, 0, g]
+    expected = [f, g, *np.multiply(f, to_x[0]), *to_x[1], *to_theta[0], *to_theta[1]]
+    np.testing.assert_allclose(sensitivity, [expected], rtol=1e-13)
+    assert (compiled.states, compiled.initial.tolist(), compiled.limits.tolist()) == (1, [0.0], [0.99])
+
+
+@each_law
+@pytest.mark.parametrize("entry", ["rate", "update", "sensitivity"])
+def test_rows_together_are_rows_one_by_one(law_: CreepLaw, entry: str) -> None:
+    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 16, seed=2)
+    theta = drawn.theta[0]
+
+    together, _ = call_entry(compiled, entry, drawn.points, theta)  # type: ignore[arg-type]
+    alone = np.vstack([call_entry(compiled, entry, row[None], theta)[0] for row in drawn.points])  # type: ignore[arg-type]
+
+    np.testing.assert_array_equal(together, alone)
+
+
+@each_law
+def test_update_is_the_logarithm_of_the_rate(law_: CreepLaw) -> None:
+    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 16, seed=4)
+    for x, theta in zip(drawn.points, drawn.theta, strict=True):
+        sensitivity, update = (call_entry(compiled, e, x[None], theta)[0][0] for e in ("sensitivity", "update"))
+        inner = 1 + compiled.states
+        if 1e-250 < sensitivity[0] < 1e250:
+            assert np.exp(update[0]) == pytest.approx(sensitivity[0], rel=1e-12)
+            slopes = sensitivity[inner : inner + x.size] / sensitivity[0]
+            np.testing.assert_allclose(update[inner : inner + x.size], slopes, rtol=1e-10)
+
+
+def test_code_compiled_once_takes_any_law() -> None:
+    @njit(int64(ENTRY_TYPE, float64[::1], float64[::1], float64[::1]))
+    def called(entry, x, theta, out):  # type: ignore[no-untyped-def]
+        return entry(1, data_pointer(x), data_pointer(theta), data_pointer(out))
+
+    for law_, expected in ((NORTON, 1e-8), (STRAIN_HARDENING, 1e-7)):
+        compiled, out = lower(law_, "numba"), np.empty(1)
+        theta = compiled.to_internal({"A": 1e-16, "n": 4.0, **({"m": -0.5} if "m" in law_.names else {})})[0]
+        assert called(compiled.rate, point()[0], theta, out) == 0
+        assert out[0] == pytest.approx(expected, rel=1e-13)
+
+
+# ---- flags and off -------------------------------------------------------------------------------------------------
+
+
+def flags(compiled: CompiledLaw, entry: str, x: Floats, theta: Floats) -> int:
+    return call_entry(compiled, entry, x, theta)[1]  # type: ignore[arg-type]
+
+
+def test_a_rate_beyond_float64_is_flagged_but_not_its_logarithm() -> None:
+    compiled = lower(HYPERBOLIC_SINE, "numba")
+    theta = compiled.to_internal({"A": 1e-5, "n": 8.0, "B": 1.0})[0]
+
+    assert flags(compiled, "rate", point(stress=2000.0), theta) == RATE_NOT_FINITE
+    assert flags(compiled, "sensitivity", point(stress=2000.0), theta) == RATE_NOT_FINITE | DERIVATIVE_NOT_FINITE
+    assert flags(compiled, "update", point(stress=2000.0), theta) == 0
+
+
+def test_one_bad_row_among_good_ones_is_flagged() -> None:
+    compiled = lower(HYPERBOLIC_SINE, "numba")
+    theta = compiled.to_internal({"A": 1e-5, "n": 8.0, "B": 1.0})[0]
+    rows = np.vstack([point(stress=1.0), point(stress=2000.0), point(stress=2.0)])
+
+    out, found = call_entry(compiled, "rate", rows, theta)
+
+    assert found == RATE_NOT_FINITE
+    assert np.isfinite(out[[0, 2]]).all()
+
+
+def test_a_derivative_alone_can_be_flagged() -> None:
+    """The rate at strain 0 is 1e-10 (1e-30)^-10 = 1e290, its slope a factor 1e31 larger."""
+    compiled = lower(law(A * stress / strain**10, {A: scale(1e-12, 1e-5)}), "numba")
+    theta = compiled.to_internal({"A": 1e-10})[0]
+
+    assert flags(compiled, "sensitivity", point(strain=0.0, stress=1.0), theta) == DERIVATIVE_NOT_FINITE
+
+
+def test_large_numbers_that_are_finite_are_not_flagged() -> None:
+    """The sum of the derivatives would overflow; each of them does not."""
+    compiled = lower(law(A * stress, {A: RATE}), "numba")
+
+    assert flags(compiled, "sensitivity", point(stress=2.0), np.array([709.0])) == 0
+
+
+@each_law
+def test_a_nan_is_flagged(law_: CreepLaw) -> None:
+    compiled = lower(law_, "numba")
+    theta, x = compiled.to_internal(law_.center())[0], point(stress=np.nan)
+    x = np.column_stack([x, np.full((1, compiled.states), 0.1)])
+
+    assert flags(compiled, "rate", x, theta) & RATE_NOT_FINITE
+    assert flags(compiled, "update", x, theta) & RATE_NOT_FINITE
+
+
+@each_law
+@pytest.mark.parametrize("zeros", [(), (0, 1, 2, 4, 5)], ids=["somewhere", "at zero"])
+def test_with_every_term_off_the_rate_is_zero_and_the_update_finite(law_: CreepLaw, zeros: tuple[int, ...]) -> None:
+    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 8)
+    x, theta = drawn.points.copy(), drawn.theta[0].copy()
+    x[:, zeros] = 0.0
+    theta[[k for k, p in enumerate(law_.params.values()) if p.off == 0 and p.scale == "log"]] = -np.inf
+
+    rate, rate_flags = call_entry(compiled, "rate", x, theta)
+    update, update_flags = call_entry(compiled, "update", x, theta)
+    sensitivity, sensitivity_flags = call_entry(compiled, "sensitivity", x, theta)
+
+    assert (rate[:, 0] == 0).all()
+    assert (update[:, 0] < -1e20).all()
+    assert np.isfinite(update).all()
+    assert np.isfinite(sensitivity).all()
+    assert (rate_flags, update_flags, sensitivity_flags) == (0, 0, 0)
+
+
+def test_a_term_that_is_off_leaves_the_others() -> None:
+    compiled = lower(COMBINED, "numba")
+    values = {**COMBINED.center(), "A_1": 0.0, "A_3": 0.0, "A_2": 1e-16, "n_2": 4.0, "m_1": -0.5}
+
+    update, _ = call_entry(compiled, "update", point(), compiled.to_internal(values)[0])
+
+    np.testing.assert_allclose(update, [[np.log(1e-7), 0.04, -50.0, 0, 0, 0, 0]], rtol=1e-12)
+
+
+# ---- records -------------------------------------------------------------------------------------------------------
+
+
+def test_internal_parameters_are_logarithms_where_the_scale_is_log() -> None:
+    compiled = lower(HYPERBOLIC_SINE, "numba")
+
+    theta = compiled.to_internal({"A": np.array([1e-10, 0.0]), "n": 2.0, "B": 10.0})
+
+    assert compiled.log_scale.tolist() == [True, False, True]
+    np.testing.assert_array_equal(theta, [[np.log(1e-10), 2.0, np.log(10.0)], [-np.inf, 2.0, np.log(10.0)]])
+
+
+def test_one_structure_is_compiled_once() -> None:
+    """Bounds and titles do not enter; the scale does, since theta is the logarithm then."""
+    other = law({"power law": A * stress**n}, {A: scale(1e-9, 1e-1), n: POWER}, name="other")
+    linear = law({"power law": A * stress**n}, {A: POWER, n: POWER}, name="linear")
+
+    assert lower(other, "numba").fingerprint == lower(NORTON, "numba").fingerprint
+    assert lower(other, "numba").rate is lower(NORTON, "numba").rate
+    assert lower(linear, "numba").fingerprint != lower(NORTON, "numba").fingerprint

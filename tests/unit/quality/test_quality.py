@@ -1,0 +1,282 @@
+"""What is suspect in histories: verdicts on the measured bulges, planted faults, and silence on clean noise."""
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import HistoryError
+from creepkit.language import Elastic
+from creepkit.quality import check_data_quality, exclude_suspect_frames
+from creepkit.readers.reading import creepkit_readers, read_histories
+from creepkit.records import History, Prediction, PressureJump, StressSteps
+from helpers.paths import SHARED
+
+DATA = SHARED
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the measured curves do not lie beside this checkout")
+NOISE = 1.5e-3
+HOUR = 3600.0
+TIMES = np.arange(1, 97) * 150.0
+
+
+class ElasticDimple:
+    """Shows 749 mm x (1 + 830 x)^-.723 of amplitude, x = P/E: a published fit for the dimple of .5 mm thickness."""
+
+    def predict(self, law, values, histories, *, jacobian=False, nuisances=None):
+        (history,) = histories
+        x = history.loading.program().at(history.times) / history.elastic.E
+        value = 749 * x * (1 + 830 * x) ** -0.723
+        return Prediction(
+            value[None, None, :, None],
+            ("amplitude",),
+            np.array([x.size]),
+            np.zeros((1, 1), int),
+            np.full((1, 1), np.inf),
+        )
+
+
+def bulge(rng, *, celsius=770.0, P2=8.0, amplitude=None, noise=NOISE, name="planted", offset=0.0, rate=1.0):
+    """A bulge that begins elastically and grows as t^.8, faster after a raise to P2 MPa at 2 h."""
+    T = celsius + 273.15
+    growth = rate * 0.25 * np.exp(-30000.0 * (1 / T - 1 / 1043.15)) * (TIMES / (4 * HOUR)) ** 0.8
+    later = np.maximum(TIMES - 2 * HOUR, 0.0)
+    growth = growth * (1 + (P2 / 8 - 1) * 3 * later / (4 * HOUR))
+    clean = 0.055 * np.where(TIMES > 2 * HOUR, P2 / 8, 1.0) + offset + growth if amplitude is None else amplitude
+    return History(
+        name, TIMES, {"amplitude": clean + noise * rng.normal(size=TIMES.size)}, PressureJump(8.0, P2, 2 * HOUR), T,
+        specimen="bulge", elastic=Elastic(180e3 - 100 * celsius),
+    )  # fmt: skip
+
+
+def bar(rng, *, times=None, noise=2e-5, amount=0.02, steps=((0.0, 100.0),)):
+    """A bar with primary and tertiary creep, read over decades of time."""
+    t = np.geomspace(60.0, 1e6, 80) if times is None else times
+    strain = amount * (0.3 * (t / 1e6) ** 0.3 + 0.7 * t / 1e6 / (1.05 - t / 1e6))
+    return History("bar", t, {"strain": strain + noise * rng.normal(size=t.size)}, StressSteps(steps), 1123.15)
+
+
+def kinds(found):
+    return {(s.history, s.kind) for s in found}
+
+
+# ---- measured ------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return read_histories(DATA / "dabi/in625", creepkit_readers())
+
+
+@needs_data
+def test_verdict_on_the_nine_bulges(measured):
+    """Test 11 after its jump, test 12 beside its twin test 08; cold tests begin high; every last frame is unloading."""
+    found = check_data_quality(measured, ElasticDimple())
+    unloaded = {(h.name, "unloading") for h in measured}
+    high = {(f"test_{k:02d}", "first frame") for k in (1, 2, 6, 9)}
+    assert kinds(found) == unloaded | high | {("test_11", "falling"), ("test_12", "twin"), ("test_12", "first frame")}
+    told = {(s.history, s.kind): str(s) for s in found}
+    assert "above the elastic one" in told["test_01", "first frame"]
+    assert "below the elastic one" in told["test_12", "first frame"]
+    assert "grows 0.55 times as much as its twin test_08" in told["test_12", "twin"]
+    assert "though the pressure was raised to 10 MPa" in told["test_11", "falling"]
+
+
+@needs_data
+def test_the_second_part_of_test_11_can_be_left_out(measured):
+    """The jump is at 4.05 h; 28950 and 29100 s are after the end of that test."""
+    (jumped,) = (h for h in exclude_suspect_frames(measured) if h.name == "test_11")
+    assert jumped.times[jumped.used].max() == 14550.0
+    assert jumped.labels["suspect"] == "unloading, frames 192-193; falling, frames 97-191"
+    others = [h for h in exclude_suspect_frames(measured, kinds=["falling"]) if h.name != "test_11"]
+    assert all("suspect" not in h.labels for h in others)
+
+
+@needs_data
+def test_unloading_is_seen_without_being_told(measured):
+    """Without the end times of the headers: the last frame of tests 01 to 09."""
+    naive = [h.replace(used=np.ones(h.times.size, bool), labels={}) for h in measured]
+    found = {s.history: s.frames for s in check_data_quality(naive) if s.kind == "unloading"}
+    assert found == {f"test_{k:02d}": (96,) for k in (1, 2, 3, 4, 6, 8, 9)}
+
+
+@needs_data
+def test_uniaxial_curves_are_mostly_believed():
+    """Some tens of frames of 94 tests with 14 thousand frames; no falling strain, no outliers in the smooth CMSX-6."""
+    steel = read_histories(DATA / "uniaxial/alloy617", creepkit_readers())
+    found = [s for s in check_data_quality(steel) if s.frames]
+    assert sum(h.times.size for h in steel) > 10_000
+    assert len(found) < 60
+    smooth = read_histories(DATA / "uniaxial/cmsx6", creepkit_readers())
+    assert not [s for s in check_data_quality(smooth) if s.frames]
+
+
+# ---- planted -------------------------------------------------------------------------------------------------------
+
+
+def test_no_false_alarms_on_clean_bulges():
+    """A hundred noisy tests of one campaign, temperatures from 720 to 810 C, every fourth with a raised pressure."""
+    rng = np.random.default_rng(0)
+    tests = [
+        bulge(rng, name=f"t{k}", celsius=720 + 90 * rng.random(), P2=10.0 if k % 4 == 0 else 8.0) for k in range(100)
+    ]
+    assert check_data_quality(tests, ElasticDimple()) == ()
+    marked = exclude_suspect_frames(tests)
+    assert all(a is b for a, b in zip(marked, tests, strict=True))
+
+
+def test_no_false_alarms_on_clean_bars():
+    rng = np.random.default_rng(1)
+    for k in range(100):
+        times = np.linspace(1e3, 1e6, 60) if k % 2 else None
+        assert check_data_quality([bar(rng, times=times, noise=10 ** rng.uniform(-6, -4))]) == ()
+
+
+def test_no_false_alarm_without_creep_or_noise():
+    rng = np.random.default_rng(2)
+    flat = bulge(rng, amplitude=np.full(TIMES.size, 0.055))
+    constant = bulge(rng, amplitude=np.full(TIMES.size, 0.055), noise=0.0)
+    exact = bulge(rng, noise=0.0)
+    rounded = exact.replace(outputs={"amplitude": exact.outputs["amplitude"].round(3)})
+    assert [check_data_quality([test]) for test in (flat, constant, exact, rounded)] == [()] * 4
+
+
+@pytest.mark.parametrize("frames", [1, 3, 5])
+def test_unloading_at_the_end(frames):
+    test = bulge(np.random.default_rng(3))
+    D = test.outputs["amplitude"].copy()
+    D[-frames:] -= 0.03
+    (found,) = check_data_quality([test.replace(outputs={"amplitude": D})])
+    assert found.kind == "unloading"
+    assert found.frames == tuple(range(96 - frames, 96))
+    assert "the load was taken off" in found.reason
+
+
+def test_frames_after_the_end_are_told():
+    test = bulge(np.random.default_rng(4))
+    used = np.arange(96) < 94
+    (found,) = check_data_quality([test.replace(used=used, labels={"frames_after_end": "2"})])
+    assert str(found) == "planted: unloading: frames 94-95: from 14250 s on, after the end of the test"
+
+
+def test_an_amplitude_that_falls_under_a_held_pressure():
+    rng = np.random.default_rng(5)
+    shape = np.where(TIMES < 9000, TIMES / 9000, 2 - TIMES / 9000)
+    (found,) = check_data_quality([bulge(rng, amplitude=0.055 + 0.2 * shape)])
+    assert found.kind == "falling"
+    assert abs(found.frames[0] - 59) <= 4  # 9000 s is frame 59
+    assert found.frames[-1] == 95
+    assert "is held at 8 MPa" in found.reason
+
+
+def test_a_fall_after_the_pressure_was_lowered_is_no_fault():
+    rng = np.random.default_rng(6)
+    amplitude = np.where(TIMES > 2 * HOUR, 0.2 - 0.05 * (TIMES - 2 * HOUR) / 2 / HOUR, 0.06 + 0.15 * TIMES / 2 / HOUR)
+    assert check_data_quality([bulge(rng, amplitude=amplitude, P2=4.0)]) == ()
+
+
+@pytest.mark.parametrize("frame", [2, 40, 93])
+def test_single_frames_that_jump(frame):
+    """20 um of 1.5 um noise; the outermost two frames at each end have no neighbours on both sides."""
+    test = bulge(np.random.default_rng(7))
+    D = test.outputs["amplitude"].copy()
+    D[frame] += 0.02
+    (found,) = check_data_quality([test.replace(outputs={"amplitude": D})])
+    assert (found.kind, found.frames) == ("outlier", (frame,))
+    (marked,) = exclude_suspect_frames([test.replace(outputs={"amplitude": D})])
+    assert np.flatnonzero(~marked.used).tolist() == [frame]
+    assert marked.labels["suspect"] == f"outlier, frame {frame}"
+
+
+def test_two_jumps_in_a_bar():
+    test = bar(np.random.default_rng(8))
+    strain = test.outputs["strain"].copy()
+    strain[[20, 50]] -= 1e-3
+    found = check_data_quality([test.replace(outputs={"strain": strain})])
+    assert {s.frames for s in found} == {(20,), (50,)}
+    assert all("neighbours by -0.001 of strain" in s.reason for s in found)
+
+
+def test_a_step_of_the_load_is_no_jump():
+    rng = np.random.default_rng(9)
+    times = np.linspace(1e3, 1e6, 60)
+    test = bar(rng, times=times, steps=((0.0, 100.0), (5e5, 120.0)))
+    strain = test.outputs["strain"] + np.where(times > 5e5, 2e-3, 0.0)
+    assert check_data_quality([test.replace(outputs={"strain": strain})]) == ()
+
+
+def campaign(rng, **faults):
+    """Eight tests from 720 to 800 C, and a twin of the last one at 801 C."""
+    plans = [(f"t{k}", 720 + 80 * k / 7) for k in range(8)] + [("twin", 801.0)]
+    return [bulge(rng, name=name, celsius=c, **faults.get(name, {})) for name, c in plans]
+
+
+def test_a_twin_far_from_the_other():
+    rng = np.random.default_rng(10)
+    assert check_data_quality(campaign(rng)) == ()
+    found = check_data_quality(campaign(rng, twin={"rate": 0.5}))
+    assert ("twin", "twin") in kinds(found)
+    assert {s.history for s in found} == {"twin"}
+    pair = campaign(rng, twin={"rate": 0.5})[-2:]
+    assert kinds(check_data_quality(pair)) == {("t7", "twin"), ("twin", "twin")}  # two alone cannot tell
+
+
+def test_twins_have_one_alloy_and_one_load():
+    rng = np.random.default_rng(11)
+    one, two = campaign(rng, twin={"rate": 0.5})[-2:]
+    assert check_data_quality([one, two.replace(alloy="another")]) == ()
+    assert check_data_quality([one, two.replace(loading=PressureJump(6.0, 6.0, HOUR))]) == ()
+
+
+def test_a_temperature_out_of_line():
+    """One test that was 30 K colder than it says; neither its twins nor its frames know."""
+    rng = np.random.default_rng(12)
+    tests = campaign(rng)[:8]
+    tests[3] = bulge(rng, name="t3", celsius=tests[3].temperature - 273.15 - 30.0).replace(
+        temperature=tests[3].temperature, elastic=tests[3].elastic
+    )
+    (found,) = check_data_quality(tests)
+    assert (found.history, found.kind, found.frames) == ("t3", "temperature", ())
+    assert "K colder than" in found.reason
+    assert 20 <= float(found.reason.split("been ")[1].split()[0]) <= 40
+
+
+def test_a_modulus_out_of_line():
+    tests = campaign(np.random.default_rng(13))
+    tests[2] = tests[2].replace(elastic=Elastic(tests[2].elastic.E * 0.9))
+    (found,) = check_data_quality(tests)
+    assert (found.history, found.kind) == ("t2", "modulus")
+    assert "where the others lead to" in found.reason
+
+
+@pytest.mark.parametrize(("offset", "word"), [(0.014, "above"), (-0.014, "below")])
+def test_a_first_frame_off_the_elastic_one(offset, word):
+    test = bulge(np.random.default_rng(14), celsius=730.0, offset=offset)
+    assert check_data_quality([test]) == ()
+    (found,) = check_data_quality([test], ElasticDimple())
+    assert (found.kind, found.frames) == ("first frame", (0,))
+    assert word in found.reason
+
+
+# ---- use -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_door():
+    test = bulge(np.random.default_rng(15))
+    assert ck.check_data_quality([test]) == ()
+    (same,) = ck.exclude_suspect_frames([test])
+    assert same is test
+
+
+def test_kinds_that_cannot_be_marked():
+    with pytest.raises(
+        HistoryError, match="'twin'; that kind questions a whole test; the kinds of frames are unloading"
+    ):
+        exclude_suspect_frames([], kinds=["twin"])
+    with pytest.raises(HistoryError, match="frames cannot be marked for 'colour'; the kinds of frames are"):
+        exclude_suspect_frames([], kinds=["colour"])
+
+
+def test_histories_with_next_to_nothing():
+    empty = History("few", np.array([1.0, 2.0]), {"strain": np.array([np.nan, 0.1])}, StressSteps(((0, 50.0),)), 900.0)
+    silent = empty.replace(outputs={})
+    assert check_data_quality([empty, silent]) == ()
+    assert check_data_quality([]) == ()

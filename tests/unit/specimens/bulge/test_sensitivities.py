@@ -1,0 +1,165 @@
+"""Derivatives of what a bulge test shows against central differences at the very same steps.
+
+With equilibrium as tight as rounding allows, both are derivatives of one scheme: they agree within 1e-5 of the largest
+of each output, most within 1e-7. Differences of 1e-4 of a parameter leave 1e-8 of truncation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from sympy import exp
+
+from creepkit import kernels
+from creepkit.arrays import Floats
+from creepkit.fem.banded_system import finite_element_model
+from creepkit.fem.mesh import geometry_derivative
+from creepkit.fem.simulation import Simulation, sensitivities, simulate
+from creepkit.kernels.interface import CompiledLaw
+from creepkit.language import CreepLaw, Elastic, mean_stress, parameters, principal_stress, stress, temperature
+from creepkit.laws.combined import COMBINED
+from creepkit.records import History, PressureJump, Status
+from creepkit.specimens.bulge.finite_elements import (
+    BulgeSensitivities,
+    BulgeSetup,
+    output_sensitivities,
+    set_up_test,
+    solver_settings,
+)
+from creepkit.specimens.bulge.specimen import Bulge
+from helpers.literature_laws import RATE, damage, law, number, omega
+
+SPECIMEN = Bulge(refinement=0.5, threads=1)
+SETTINGS = solver_settings(SPECIMEN, exact=True)._replace(newton=1e-12)
+NAMES = ("modulus", "temperature", "thickness", "window", "P1", "P2", "Tj")
+A, B, n, k, c = parameters("A B n k c")
+TRIAXIAL = law(A * stress**n * (1 + c * mean_stress / temperature), {A: RATE, n: number(1, 8), c: number(0, 10)})
+"""Faster under tension and when it is cold: depends on the mean stress and on temperature."""
+
+DAMAGING = damage(
+    A * (stress / (1 - omega)) ** n,
+    B * stress**k * exp(c * principal_stress / 100) / (1 - omega) ** k,
+    {A: RATE, n: number(1, 8), B: RATE, k: number(1, 8), c: number(0, 10)},
+)
+"""With an internal variable that grows faster under tension."""
+
+CASES: dict[str, tuple[CreepLaw, dict[str, float]]] = {
+    "combined": (
+        COMBINED,
+        {"A_1": 1e-9, "n_1": 3, "B": 60, "A_2": 1e-14, "n_2": 4, "m_1": -0.3, "A_3": 3e-12, "n_3": 3, "m_2": -0.4},
+    ),
+    "damage by principal stress": (DAMAGING, {"A": 1e-13, "n": 3.5, "B": 3e-11, "k": 2.5, "c": 0.5}),
+    "mean stress": (TRIAXIAL, {"A": 2e-13, "n": 3.5, "c": 3.0}),
+}
+
+
+class Base(NamedTuple):
+    """A run, and what `slopes_of` says of it."""
+
+    kernel: CompiledLaw
+    theta: Floats
+    history: History
+    made: BulgeSetup
+    found: Simulation
+    slopes: BulgeSensitivities
+
+
+@pytest.fixture(scope="module", params=CASES)
+def base(request) -> Base:
+    """A test of two pressures with outputs before, at and after the jump; the modulus depends on temperature."""
+    creep, values = CASES[request.param]
+    history = History(
+        name="planted", times=np.array([150.0, 1800.0, 7000.0, 7202.0, 7300.0, 14400.0]), outputs={},
+        loading=PressureJump(8.0, 9.0, 7200.0), temperature=1000.0, specimen="bulge",
+        elastic=Elastic(E=210e3 - 60 * temperature),
+    )  # fmt: skip
+    kernel = kernels.lower(creep, "numba")
+    theta = kernel.to_internal(values)[0]
+    made = set_up_test(SPECIMEN, history, {})
+    found = simulate(kernel, theta, made.model, made.load_history, settings=SETTINGS, keep_stages=True)
+    assert found.status == Status.COMPLETE
+    slopes = output_sensitivities(
+        made, kernel, theta, history, found, found.displacements[:, made.model.top, 1], NAMES
+    )[1]
+    return Base(kernel, theta, history, made, found, slopes)
+
+
+def seen(base: Base, theta: Floats | None = None, history: History | None = None, **nuisances: float) -> Floats:
+    """Outputs (times, 3) of the same steps with something changed."""
+    history = history or base.history
+    made = set_up_test(SPECIMEN, history, nuisances)
+    theta = base.theta if theta is None else theta
+    found = simulate(base.kernel, theta, made.model, made.load_history, settings=SETTINGS, same_steps_as=base.found)
+    profiles = found.displacements[:, made.model.top, 1]
+    return found.at(made.observation.observe(made.radii, profiles), history.times)
+
+
+def agree(exact: Floats, up: Floats, down: Floats, step: float) -> None:
+    """Within 1e-5 of the largest, for each output."""
+    difference = (up - down) / (2 * step)
+    largest = np.abs(difference).max(axis=0)
+    assert (largest > 0).all()
+    np.testing.assert_array_less(np.abs(exact - difference).max(axis=0), 1e-5 * largest)
+
+
+def test_every_parameter_of_the_law(base) -> None:
+    for p, step in enumerate(1e-4 * np.maximum(1.0, np.abs(base.theta) / 10)):
+        move = step * np.eye(base.theta.size)[p]
+        agree(base.slopes.law[:, :, p], seen(base, base.theta + move), seen(base, base.theta - move), step)
+
+
+@pytest.mark.parametrize(("name", "step"), [("modulus", 1e-4), ("temperature", 0.1), ("window", 1e-4)])
+def test_modulus_temperature_and_window(base, name: str, step: float) -> None:
+    start = base.made.observation.window if name == "window" else 0.0
+    up, down = (seen(base, **{name: start + s}) for s in (step, -step))
+    agree(base.slopes.nuisances[name], up, down, step)
+
+
+@pytest.mark.parametrize(("name", "step"), [("P1", 1e-4), ("P2", 1e-4), ("Tj", 1e-2)])
+def test_loading(base, name: str, step: float) -> None:
+    loading = base.history.loading
+    moved = [replace(loading, **{name: getattr(loading, name) + s}) for s in (step, -step)]
+    up, down = (seen(base, history=replace(base.history, loading=each)) for each in moved)
+    agree(base.slopes.nuisances[name], up, down, step)
+
+
+def moved_profiles(base: Base, step: float) -> Floats:
+    """Top profiles (steps, top) of the same steps on nodes moved as the thickness moves them."""
+    mesh = base.made.geometry.mesh(SPECIMEN.refinement)
+    velocity = base.made.geometry.mesh_velocity("apex_thickness", SPECIMEN.refinement)
+    body = finite_element_model(mesh.moved(mesh.nodes + step * velocity))
+    found = simulate(base.kernel, base.theta, body, base.made.load_history, settings=SETTINGS, same_steps_as=base.found)
+    return found.displacements[:, body.top, 1]
+
+
+def test_displacements_on_a_mesh_that_moves(base) -> None:
+    """u_z of the top to the apex thickness, on the nodes of one mesh, at every step: within 1e-6 of the largest."""
+    mesh = base.made.geometry.mesh(SPECIMEN.refinement)
+    velocity = base.made.geometry.mesh_velocity("apex_thickness", SPECIMEN.refinement)
+    velocities = [(geometry_derivative(mesh, velocity), velocity)]
+    change = sensitivities(
+        base.kernel, base.theta, base.made.model, base.made.load_history, base.found, velocities=velocities
+    )
+    step = 1e-5
+    difference = (moved_profiles(base, step) - moved_profiles(base, -step)) / (2 * step)
+    np.testing.assert_allclose(change.surface[:, :, -1], difference, atol=1e-6 * np.abs(difference).max())
+
+
+def test_thickness_on_a_mesh_that_moves(base) -> None:
+    """Amplitude, width and shape to the apex thickness, the observed nodes moving along the radius too."""
+    step = 1e-5
+    drift = base.made.geometry.mesh_velocity("apex_thickness", SPECIMEN.refinement)[base.made.model.top, 0]
+    assert np.abs(drift).max() > 0.01
+    operator, radii = base.made.observation, base.made.radii
+    frames = [operator.observe(radii + s * drift, moved_profiles(base, s)) for s in (step, -step)]
+    up, down = (base.found.at(each, base.history.times) for each in frames)
+    agree(base.slopes.nuisances["thickness"], up, down, step)
+
+
+def test_thickness_as_the_specimen_meshes_it(base) -> None:
+    """A dimple of another thickness spreads its columns otherwise too."""
+    step = 1e-5
+    agree(base.slopes.nuisances["thickness"], seen(base, thickness=0.5 + step), seen(base, thickness=0.5 - step), step)

@@ -1,0 +1,218 @@
+"""Training: bit-identical when resumed, returned when done, and one sentence for each data set that teaches nothing."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from creepkit.dataset.dataset import Dataset
+from creepkit.errors import DatasetError, SurrogateError
+from creepkit.surrogates.evaluation import evaluate
+from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.parameter_network import ParameterModule
+from creepkit.surrogates.recipe import Training
+from creepkit.surrogates.training import train
+from creepkit.surrogates.training_loop import dataset_fingerprint, epochs_since_best, learning_rate, training_split
+from helpers.planted_datasets import bars
+
+SMALL = ParameterGru(hidden=8, layers=1, training=Training(epochs=6, batch=16, rate=1e-2))
+
+
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
+
+
+@pytest.fixture(scope="module")
+def data() -> Dataset:
+    return bars()
+
+
+class Interrupted(Exception):
+    pass
+
+
+def stop_at(epoch: int):
+    def progress(task: str, done: int, total: int, note: str) -> None:
+        if (task, done) == ("epochs", epoch):
+            raise Interrupted
+
+    return progress
+
+
+def test_resumed_is_bit_for_bit_uninterrupted(data: Dataset, tmp_path: Path) -> None:
+    whole = train(data, SMALL, seed=3)
+    path = tmp_path / "m.safetensors"
+    for epoch in (2, 3, 5):
+        with pytest.raises(Interrupted):
+            train(data, SMALL, to=path, seed=3, progress=stop_at(epoch))
+        assert not path.exists()
+    resumed = train(data, SMALL, to=path, seed=3)
+    assert resumed.metadata.curves == whole.metadata.curves
+    pairs = zip(resumed.module.state_dict().values(), whole.module.state_dict().values(), strict=True)
+    assert all(torch.equal(a, b) for a, b in pairs)
+    assert [p.name for p in tmp_path.iterdir()] == ["m.safetensors"]
+
+
+def test_a_training_leaves_the_generator_of_others_alone(data: Dataset) -> None:
+    torch.manual_seed(11)
+    expected = torch.rand(3)
+    torch.manual_seed(11)
+    train(data, SMALL, training=Training(epochs=1))
+    assert torch.equal(torch.rand(3), expected)
+
+
+def test_another_seed_is_another_training(data: Dataset) -> None:
+    one, other = (train(data, SMALL, seed=seed, training=Training(epochs=1)) for seed in (0, 1))
+    assert one.metadata.curves["loss"] != other.metadata.curves["loss"]
+
+
+def test_what_is_done_is_returned_and_what_is_another_is_kept(data: Dataset, tmp_path: Path) -> None:
+    path = tmp_path / "m.safetensors"
+    once = train(data, SMALL, to=path, seed=3)
+    stamp = path.stat().st_mtime_ns
+    again = train(data, SMALL, to=path, seed=3)
+    assert path.stat().st_mtime_ns == stamp
+    assert again.metadata.curves == once.metadata.curves
+    with pytest.raises(SurrogateError, match="another surrogate is there already; remove it or choose another name"):
+        train(data, SMALL, to=path, seed=4)
+
+
+def test_the_checkpoint_of_another_training_is_kept(data: Dataset, tmp_path: Path) -> None:
+    path = tmp_path / "m.safetensors"
+    with pytest.raises(Interrupted):
+        train(data, SMALL, to=path, progress=stop_at(1))
+    left = (tmp_path / "m.safetensors.checkpoint").read_bytes()
+    with pytest.raises(SurrogateError, match=r"left by another training \(it differs in hidden, seed\)"):
+        train(data, replace(SMALL, hidden=9), to=path, seed=1)
+    with pytest.raises(SurrogateError, match=r"left by another training \(it differs in data\)"):
+        train(data.rows(slice(50)), SMALL, to=path)
+    assert (tmp_path / "m.safetensors.checkpoint").read_bytes() == left
+
+
+def test_a_damaged_checkpoint_says_so(data: Dataset, tmp_path: Path) -> None:
+    path = tmp_path / "m.safetensors.checkpoint"
+    path.write_bytes(b"torn")
+    with pytest.raises(SurrogateError, match="checkpoint: damaged"):
+        train(data, SMALL, to=tmp_path / "m.safetensors")
+
+
+def test_early_stop_and_the_best_epoch(data: Dataset) -> None:
+    model = train(data, SMALL, training=Training(epochs=50, rate=0.5, schedule="constant", early_stop=3))
+    losses, known = model.metadata.curves["validation"], model.metadata.provenance
+    assert known["epochs"] == len(losses) < 50
+    assert epochs_since_best(losses) == 3
+    assert known["best_epoch"] == int(np.argmin(losses)) + 1
+    assert model.metadata.metrics["loss"] == pytest.approx(
+        model.metadata.curves["rse"][known["best_epoch"] - 1], rel=1e-5
+    )
+
+
+def test_training_learns_and_the_file_holds_the_same_network(data: Dataset, tmp_path: Path) -> None:
+    model = train(data, SMALL, to=tmp_path / "m.safetensors", training=Training(epochs=40, rate=2e-2, batch=16))
+    assert model.metadata.metrics["loss"] < 0.25
+    judged = evaluate(model, data)
+    assert judged.metrics == model.metadata.metrics
+    assert len(judged.comparison.true) == round(0.2 * len(data))
+    assert sorted(model.metadata.metrics["times"]) == ["18750"[:5], "31250", "6250"]
+
+
+def test_the_plateau_is_torchs() -> None:
+    training = Training(rate=1e-3, patience=3)
+    losses = np.exp(-np.minimum(np.arange(40), 9) / 5.0) + np.where(np.arange(40) == 25, -0.1, 0.0)
+    adam = torch.optim.Adam([torch.zeros(1, requires_grad=True)], lr=1e-3)
+    plateau = torch.optim.lr_scheduler.ReduceLROnPlateau(adam, patience=3)
+    for k, loss in enumerate(losses):
+        assert learning_rate(training, list(losses[:k])) == pytest.approx(adam.param_groups[0]["lr"], rel=1e-12)
+        plateau.step(loss)
+
+
+def test_the_cosine_ends_at_zero() -> None:
+    training = Training(rate=1e-2, schedule="cosine", epochs=4)
+    assert learning_rate(training, []) == 1e-2
+    assert learning_rate(training, [1.0], epoch_fraction=1.0) == pytest.approx(5e-3)
+    assert learning_rate(training, [1.0] * 3, epoch_fraction=1.0) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_rows_set_aside_are_a_fifth_and_none_is_lost() -> None:
+    aside, kept = training_split(101, Training(), seed=0)[::-1]
+    assert len(aside) == 20
+    assert sorted([*aside.tolist(), *kept.tolist()]) == list(range(101))
+    assert training_split(101, Training(), seed=1)[1].tolist() != aside.tolist()
+
+
+def test_frames_that_are_not_numbers_teach_nothing(data: Dataset) -> None:
+    values = data.values.copy()
+    values[::2, 7:] = np.nan
+    short = replace(data, values=values)
+    model = train(short, SMALL)
+    assert math.isfinite(model.metadata.metrics["loss"])
+    values[1, :] = np.nan
+    with pytest.raises(DatasetError, match=r"sample 1 of the data set is accepted, but no frame .* \(so it is with 1"):
+        train(replace(data, values=values), SMALL)
+
+
+def test_samples_that_were_rejected_teach_nothing(data: Dataset) -> None:
+    reasons = np.zeros(len(data), np.int64)
+    reasons[20:] = 2
+    model = train(replace(data, reasons=reasons), SMALL)
+    assert model.metadata.provenance["training_rows"] + model.metadata.provenance["validation_rows"] == 20
+    reasons[9:] = -1
+    with pytest.raises(
+        DatasetError, match="a data set with 9 accepted samples of 96 teaches nothing; 10 are the least"
+    ):
+        train(replace(data, reasons=reasons), SMALL)
+
+
+def test_a_constant_column_is_told_and_harmless(data: Dataset) -> None:
+    parameters = data.parameters.copy()
+    parameters[:, 1] = 4.5
+    model = train(replace(data, parameters=parameters), SMALL)
+    assert model.metadata.notes == ("constant in training, so that nothing is known beyond: n",)
+    assert math.isfinite(model.metadata.metrics["loss"])
+
+
+def test_conditions_in_another_unit_are_noticed(data: Dataset) -> None:
+    pascals = replace(data, conditions=data.conditions * [1e6, 1e6, 1.0])
+    with pytest.raises(DatasetError, match=r"condition 'stress_1' .* which is not in MPa"):
+        train(pascals, SMALL)
+
+
+def test_a_data_set_of_another_kind_cannot_judge(data: Dataset) -> None:
+    model = train(data, SMALL)
+    with pytest.raises(DatasetError, match="another specimen than the surrogate: specimen.fields.tolerance"):
+        evaluate(model, replace(data, specimen=data.specimen.replace(tolerance=1e-4)))
+
+
+def test_a_training_that_diverges_says_so(data: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ParameterModule, "loss", lambda self, batch: self(batch).sum() * math.nan)
+    with pytest.raises(SurrogateError, match=r"diverged in epoch 1: .* lower the rate \(0.01\) or limit the gradient"):
+        train(data, SMALL)
+
+
+def test_fingerprints_see_what_can_be_learnt(data: Dataset) -> None:
+    values = data.values.copy()
+    values[3, 4] += 1e-4
+    assert dataset_fingerprint(replace(data, values=values)) != dataset_fingerprint(data)
+    assert dataset_fingerprint(replace(data, provenance={})) == dataset_fingerprint(data)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"epochs": 0}, "epochs is 0"),
+        ({"batch": 2.5}, "batch is 2.5"),
+        ({"schedule": "step"}, "schedule is 'step'; allowed are plateau, cosine and constant"),
+        ({"rate": 0.0}, "must be above zero"),
+        ({"validation": 1.0}, "validation is 1.0"),
+    ],
+)
+def test_settings_that_make_no_sense(changes: dict, told: str) -> None:
+    with pytest.raises(SurrogateError, match=told):
+        Training(**changes)
+
+
+def test_a_device_that_is_not_there(data: Dataset) -> None:
+    with pytest.raises(SurrogateError, match="device 'tpu' is not there; allowed are auto"):
+        train(data, SMALL, device="tpu")

@@ -1,0 +1,221 @@
+"""The conformance kit: laws of the literature pass it, and each kind of broken law or kernel is caught and named."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy
+import torch
+from sympy import Piecewise, exp, gamma, sinh, sqrt
+
+from creepkit.kernels import lowering, numpy_functions, torch_functions
+from creepkit.kernels.multiprecision import MultiprecisionLaw
+from creepkit.language import CreepLaw, strain, stress, time
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.testing import check_law, draw_samples
+from creepkit.testing.parity import (
+    DERIVATIVE_TOLERANCE,
+    KernelTable,
+    MultiprecisionReference,
+    evaluate_numpy,
+    largest_differences,
+)
+from helpers.literature_laws import EQUATIONS, POWER, RATE, A, B, law, m, n, number, s_0, scale
+
+# ---- what passes ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+def test_laws_that_others_would_write_are_fit_for_every_verb(name: str) -> None:
+    report = check_law(EQUATIONS[name], samples=16)
+
+    assert report.passed, str(report)
+
+
+def test_a_report_prints_one_line_a_check() -> None:
+    report = check_law(NORTON, samples=16)
+
+    lines = str(report).splitlines()
+    assert lines[0] == "norton: conforms"
+    assert len(lines) == 1 + len(report.checks)
+    assert "  ok   off equals fix: A 0.0e+00, n 0.0e+00" in lines
+
+
+# ---- laws that are broken ------------------------------------------------------------------------------------------
+
+PLAIN = {A: RATE, n: POWER}
+BROKEN: dict[str, tuple[CreepLaw, str, str]] = {
+    "no title": (
+        CreepLaw(name="x", terms={"t": A * stress**n}, params=PLAIN, references=("somebody",)),
+        "title, references, units",
+        "missing title",
+    ),
+    "no reference": (
+        CreepLaw(name="x", title="A law", terms={"t": A * stress**n}, params=PLAIN),
+        "title, references, units",
+        "missing references",
+    ),
+    "negative by a sign": (
+        law({"creep": A * stress**n, "recovery": -B * stress**m}, {**PLAIN, B: RATE, m: POWER}),
+        "lowering",
+        "term 'recovery': -B*stress**m is negative, and a rate is not; write recovery as a factor or an internal",
+    ),
+    "negative somewhere": (
+        law(A * stress**n * (1 - m * strain), {**PLAIN, m: number(0, 1e6)}),
+        "no term is negative",
+        "say in constraints where the law holds",
+    ),
+    "falls with stress": (
+        law(A * stress**n, {A: RATE, n: number(-3, -1)}),
+        "rate never falls with stress",
+        "not at 16 of 16 points, such as stress ",
+    ),
+    "function without a kernel": (
+        law(A * stress**n * gamma(B), {**PLAIN, B: number(1, 4)}),
+        "lowering",
+        "term 'term': the function gamma in gamma(B) has no kernel; allowed are Abs, ",
+    ),
+    "gap between branches": (
+        law(A * Piecewise((stress**n, stress < 100)), PLAIN),
+        "lowering",
+        "must hold in all remaining cases: write (..., True)",
+    ),
+    "overflow": (
+        law(A * stress**n * exp(sinh(stress)), PLAIN),
+        "ln rate is finite",
+        "such as stress ",
+    ),
+    "digits lost as written": (
+        law(A * stress * (sqrt(1 + strain) - 1), {A: RATE}),
+        "numpy value against 50 digits",
+        ", rate at stress ",
+    ),
+    "off that is no switch": (
+        law(A * sinh(stress / B), {A: RATE, B: scale(1, 100, off=0.0)}),
+        "switches",
+        "LawError: ",
+    ),
+    "constraint that never holds": (
+        law(A * stress**n, PLAIN, constraints=(n >= 9,)),
+        "constraints",
+        "the constraints hold at 0 of the samples",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_law_is_caught_and_told_why(name: str) -> None:
+    broken, check, sentence = BROKEN[name]
+
+    report = check_law(broken, samples=16)
+
+    assert not report.passed
+    (found,) = [c for c in report.failures if c.name == check]
+    assert sentence in found.detail
+    assert "does NOT conform" in str(report)
+
+
+# ---- kernels that are broken ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def fresh(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """Kernels are lowered anew, so that what is patched counts."""
+    monkeypatch.setattr(lowering, "_array_kernel", lowering._array_kernel.__wrapped__)
+    return monkeypatch
+
+
+def failures(of: CreepLaw) -> set[str]:
+    return {check.name for check in check_law(of, samples=16).failures}
+
+
+def test_a_wrong_eleventh_digit_of_one_target_is_caught(fresh: pytest.MonkeyPatch) -> None:
+    fresh.setitem(numpy_functions.FUNCTIONS, "exp", lambda x: np.exp(x) * (1 + 3e-11))
+
+    assert "numpy value against 50 digits" in failures(STRAIN_HARDENING)
+    assert "torch value against 50 digits" not in failures(STRAIN_HARDENING)
+
+
+def test_a_wrong_derivative_is_caught(fresh: pytest.MonkeyPatch) -> None:
+    """The floor in 1/max(strain, floor) is only called by derivatives."""
+    fresh.setitem(torch_functions.FUNCTIONS, "floored", lambda x, floor: torch.clamp(x, min=floor) * (1 + 1e-9))
+
+    assert failures(STRAIN_HARDENING) == {"torch derivatives against 50 digits", "torch gradients"} | {
+        "torch gradients at zero strain and time"
+    }
+
+
+def test_a_gradient_that_is_nan_at_zero_is_caught(fresh: pytest.MonkeyPatch) -> None:
+    fresh.setitem(torch_functions.FUNCTIONS, "floored", lambda x, floor: x)
+
+    assert "torch gradients at zero strain and time" in failures(STRAIN_HARDENING)
+
+
+def test_a_missing_floor_is_caught(fresh: pytest.MonkeyPatch) -> None:
+    def without_floor(x: Any, floor: float) -> Any:
+        with np.errstate(divide="ignore"):
+            return np.log(x)
+
+    fresh.setitem(numpy_functions.FUNCTIONS, "log_floor", without_floor)
+
+    assert "ln rate and its derivatives are finite at zero strain" in failures(STRAIN_HARDENING)
+
+
+def test_a_mistake_in_the_kit_is_not_taken_for_one_of_the_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("creepkit.testing.law_checks.largest_differences", None)
+
+    with pytest.raises(TypeError):
+        check_law(NORTON, samples=16)
+
+
+# ---- the measure ---------------------------------------------------------------------------------------------------
+
+
+def test_samples_cover_bounds_and_constraints() -> None:
+    halved = law(A * stress**n, PLAIN, constraints=(n >= 4,))
+
+    drawn = draw_samples(halved, 32, seed=1)
+
+    assert len(drawn) == 32
+    assert (drawn.theta[:, 1] >= 4).all()
+    assert (np.log(1e-40) <= drawn.theta[:, 0]).all()
+    assert (drawn.theta[:, 0] <= np.log(1e-5)).all()
+    assert drawn.points[:, 0].min() < 1
+    assert drawn.points[:, 0].max() > 1000
+    np.testing.assert_array_equal(draw_samples(halved, 32, seed=1).points, drawn.points)
+
+
+def test_exact_derivatives_are_those_of_differences() -> None:
+    """By symbols at 50 digits and by central differences at 200."""
+    exact, drawn = MultiprecisionLaw(EQUATIONS["Kachanov-Rabotnov"]), draw_samples(EQUATIONS["Kachanov-Rabotnov"], 4)
+    for point, theta in zip(drawn.points, drawn.theta, strict=True):
+        rows, differences = exact.values_and_derivatives(point, theta), exact.values_and_differences(point, theta)
+        for row, line in zip(rows, differences, strict=True):
+            for a, b in zip(row, line, strict=True):
+                assert abs(a - b) <= 1e-40 * abs(b)
+
+
+def test_a_result_that_cancels_is_told_from_one_that_is_wrong() -> None:
+    """The slope n - 2 k ln s of A s^n exp(-k (ln s)^2) vanishes at ln s = n/2k."""
+    curved = law(A * stress**n * exp(-s_0 * sympy.log(stress) ** 2), {**PLAIN, s_0: number(0.1, 0.3)})
+    drawn = draw_samples(curved, 4)
+    drawn.points[:, 0] = np.exp(drawn.theta[:, 1] / (2 * drawn.theta[:, 2]))
+    truth, table = MultiprecisionReference(MultiprecisionLaw(curved), drawn), evaluate_numpy(curved, drawn)
+
+    assert largest_differences(truth, table)[1].size > DERIVATIVE_TOLERANCE
+    assert largest_differences(truth, table, allow_cancellation=True)[1].size <= DERIVATIVE_TOLERANCE
+    wrong = KernelTable(table.rows * (1 + 1e-9), table.log_rates)
+    assert largest_differences(truth, wrong, allow_cancellation=True)[1].size > DERIVATIVE_TOLERANCE
+
+
+def test_zero_to_fifty_digits_is_looked_at_again() -> None:
+    """1 - exp(-500) is 1 to 50 digits, and its logarithm is not 0."""
+    late = EQUATIONS["saturating to a power"]
+    drawn = draw_samples(late, 4)
+    drawn.points[:, 2] = 500.0 / np.exp(drawn.theta[:, 1])
+    truth = MultiprecisionReference(MultiprecisionLaw(late), drawn)
+
+    assert truth.rows[0][0][-1] == 0
+    assert max(d.size for d in largest_differences(truth, evaluate_numpy(late, drawn))) < 1e-12
+    assert time in late.rate.free_symbols

@@ -1,0 +1,199 @@
+"""Campaigns that are killed, meet one another or a cluster: nothing is lost or counts twice."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from creepkit.dataset import storage
+from helpers.dataset_runs import ROWS, assert_same, left_behind, run, run_here, shards_of, whole_of
+from helpers.planted_sampling import Deadly, Planted, Strong, Visible, strain, stress_of
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The data set as it is when nothing goes wrong."""
+    return whole_of(tmp_path_factory)
+
+
+# ---- a campaign as it should be ------------------------------------------------------------------------------------
+
+
+def test_the_leading_shards_that_hold_enough_are_taken_whoever_made_them(whole, tmp_path):
+    """With the progress of it, for the sake of the time that workers take to start."""
+    told = []
+    assert_same(run(tmp_path / "a.h5", progress=lambda *words: told.append(words)), whole)
+    np.testing.assert_array_equal(whole.index, np.arange(len(whole)))
+    counts = (whole.reasons.reshape(-1, ROWS) == 0).sum(axis=1)
+    assert counts.sum() >= 40 > counts[:-1].sum()
+    assert {word[0] for word in told} == {"accepted samples", "shards merged"}
+    last = [word for word in told if word[0] == "accepted samples"][-1]
+    assert last[1:3] == (40, 40)
+    assert re.fullmatch(r"[\d.]+/s, \d+ s left, \d+ % accepted", last[3])
+
+
+def test_samples_are_those_of_the_design_and_its_law(whole):
+    draws = Planted().draw(0, len(whole), 0)
+    np.testing.assert_array_equal(whole.parameters, draws.parameters)
+    np.testing.assert_array_equal(whole.conditions, draws.conditions)
+    for row in np.flatnonzero(whole.reasons == 0):
+        expected = strain(whole.values_of(row), whole.conditions_of(row), whole.times(row))
+        np.testing.assert_allclose(whole.values[row, :, 0], expected, rtol=1e-4, atol=1e-12)
+
+
+def test_draws_are_counted_whatever_becomes_of_them(whole, tmp_path):
+    part = run_here(tmp_path / "a.h5", samples=None, draws=20)
+    assert_same(part, whole.rows(slice(0, 20)))
+
+
+def test_a_finished_campaign_is_not_made_again_and_a_larger_one_goes_on(tmp_path):
+    log, to = tmp_path / "log", tmp_path / "a.h5"
+    design = Planted((Strong(), Visible(log=str(log))))
+    first = run_here(to, design)
+    looked = log.stat().st_size
+    assert_same(run_here(to, design), first)
+    assert log.stat().st_size == looked
+    more = run_here(to, design, samples=60)
+    assert len(more) > len(first)
+    assert log.stat().st_size == (more.status >= 0).sum()
+    assert_same(more.rows(slice(0, len(first))), first)
+
+
+def test_parts_of_a_job_array_become_one_file(whole, tmp_path):
+    to = tmp_path / "a.h5"
+    one, two = (run_here(to, part=(k, 2)) for k in (1, 2))
+    assert set(one.index // ROWS % 2) == {0}
+    assert set(two.index // ROWS % 2) == {1}
+    assert not to.exists()
+    made = {path: path.stat().st_mtime_ns for path in shards_of(to)}
+    assert_same(run_here(to), whole)
+    assert made.items() <= {path: path.stat().st_mtime_ns for path in shards_of(to)}.items()
+
+
+def test_nothing_is_left_behind(tmp_path):
+    run_here(tmp_path / "a.h5")
+    assert left_behind(tmp_path) == ["merging.claim"]
+
+
+# ---- deaths --------------------------------------------------------------------------------------------------------
+
+
+def strong_enough(rows):
+    return next(row for row in rows if stress_of(row) <= 120.0)
+
+
+def test_a_worker_that_is_killed_is_replaced(whole, tmp_path, caplog):
+    once = tmp_path / "killed"
+    deadly = Deadly(stress_of(strong_enough(range(20, 32))), str(once))
+    data = run(tmp_path / "a.h5", Planted((*Planted().criteria, deadly)), workers=1)
+    assert once.exists()
+    assert_same(data, whole)
+    assert "a worker process died (signal SIGKILL); its shard 1 is simulated again" in caplog.text
+
+
+def test_a_sample_that_kills_its_worker_each_time_fails(whole, tmp_path):
+    row = strong_enough(range(20, 32))
+    deadly = Deadly(stress_of(row))
+    data = run(tmp_path / "a.h5", Planted((Strong(), deadly, Visible())), samples=None, draws=48, workers=1)
+    assert data.failures == {row: "its process died 2 times while it was simulated"}
+    others = np.delete(np.arange(48), row)
+    np.testing.assert_array_equal(data.values[others][:, :, 0] > 0, whole.values[others][:, :, 0] > 0)
+    assert data.reasons[row] == -1
+
+
+SCRIPT = """
+import sys
+from helpers.planted_sampling import *
+from creepkit.dataset.campaign import generate
+data = generate(Planted((Strong(), Visible(log={log!r}, seconds={seconds}))), BAR, samples={samples}, seed=0,
+                to={to!r}, workers={workers}, rows=16)
+"""
+
+
+def started(to, log="", seconds=0.0, samples=40, workers=2, **how):
+    """A campaign in a process of its own; a script without a main guard."""
+    program = SCRIPT.format(to=str(to), log=str(log), seconds=seconds, samples=samples, workers=workers)
+    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    # a test run in the background of a shell inherits that SIGINT is ignored
+    program = f"import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n{program}"
+    return subprocess.Popen([sys.executable, "-c", program], env=env, stderr=subprocess.PIPE, text=True, **how)
+
+
+def children(pid):
+    return [int(line) for path in Path(f"/proc/{pid}/task").glob("*/children") for line in path.read_text().split()]
+
+
+def wait_for(what, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("workers_too", [True, False])
+def test_a_campaign_that_is_killed_goes_on_where_it_was(whole, tmp_path, workers_too):
+    to, log = tmp_path / "a.h5", tmp_path / "log"
+    first = started(to, log, seconds=0.03, workers=1)
+    wait_for(lambda: len(shards_of(to)) >= 1)
+    workers = children(first.pid)
+    assert len(workers) == 1
+    for pid in [first.pid, *(workers if workers_too else [])]:
+        os.kill(pid, signal.SIGKILL)
+    first.wait()
+    first.stderr.close()
+    wait_for(lambda: not any(Path(f"/proc/{pid}/stat").exists() for pid in workers))
+    assert not to.exists()
+    made = {path: path.stat().st_mtime_ns for path in shards_of(to)}
+    assert_same(run_here(to), whole)
+    assert made.items() <= {path: path.stat().st_mtime_ns for path in shards_of(to)}.items()
+    assert left_behind(tmp_path) == ["merging.claim"]
+
+
+def test_ctrl_c_ends_the_workers_and_counts_no_death(tmp_path):
+    to = tmp_path / "a.h5"
+    first = started(to, seconds=0.1, workers=1)
+    wait_for(lambda: len(children(first.pid)) == 1 and list(to.with_name("a.h5.parts").glob("*.claim")))
+    workers = children(first.pid)
+    time.sleep(0.5)
+    first.send_signal(signal.SIGINT)
+    assert "KeyboardInterrupt" in first.communicate()[1]
+    assert not any(Path(f"/proc/{pid}").exists() for pid in workers)
+    assert [path.read_bytes() for path in to.with_name("a.h5.parts").glob("*.claim")] == [b""]
+
+
+def test_a_claim_of_the_dead_does_not_block(whole, tmp_path):
+    to = tmp_path / "a.h5"
+    parts = tmp_path / "a.h5.parts"
+    parts.mkdir()
+    (parts / "00000.claim").write_text("3\n")
+    (parts / "00001.claim").write_bytes(b"\xff\x00garbage")
+    assert_same(run_here(to), whole)
+
+
+def test_two_campaigns_in_one_folder_share_the_work(whole, tmp_path):
+    to, log = tmp_path / "a.h5", tmp_path / "log"
+    both = [started(to, log, seconds=0.02, workers=1) for _ in range(2)]
+    assert [process.communicate()[1] for process in both] == ["", ""]
+    data = storage.read_dataset(to)
+    assert_same(data, whole)
+    made = [storage.read_dataset(path) for path in shards_of(to)]
+    assert log.stat().st_size == sum((part.status >= 0).sum() for part in made)
+    assert len(made) <= len(data) // ROWS + 2
+
+
+# ---- a cluster -----------------------------------------------------------------------------------------------------
+
+
+def test_a_dask_cluster_makes_the_same_data_set(whole, tmp_path):
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, protocol="tcp") as cluster:
+        data = run(tmp_path / "a.h5", cluster=cluster.scheduler_address, workers=None)
+    assert_same(data, whole)
+    assert len(shards_of(tmp_path / "a.h5")) >= len(whole) // ROWS
