@@ -112,7 +112,7 @@ def measured(history: ck.History) -> tuple[np.ndarray, np.ndarray]:
 
 def amplitudes(which: ck.CreepLaw, values: dict, histories: Sequence[ck.History]) -> list[np.ndarray]:
     """Predicted amplitude at the used frames of each test; a dimple that burst keeps its last value."""
-    prediction = dimple.predict(which, which.values(values), histories)
+    prediction = dimple.predict(which, which.to_internal(which.values(values)), histories)
     rows = [prediction.of(k)[:, 0] for k in range(len(histories))]
     return [np.where(np.isfinite(r), r, np.nanmax(r))[h.used] for r, h in zip(rows, histories, strict=True)]
 

@@ -78,7 +78,7 @@ def cpu(work: Callable[[], object], repeats: int = REPEATS) -> float:
 def seconds_of(case: Case) -> float:
     """CPU seconds of one simulation of 12 h with output every 150 s and the fit."""
     plan = [case.history(TIMES)]
-    return cpu(lambda: case.specimen.predict(case.model, case.values, plan))
+    return cpu(lambda: case.specimen.predict(case.model, case.model.to_internal(case.values), plan))
 
 
 def converged(case: Case) -> Reference:

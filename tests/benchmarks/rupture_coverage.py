@@ -39,7 +39,7 @@ def main():
     parser.add_argument("--campaigns", type=int, default=40)
     given = parser.parse_args()
     plan = History("50 MPa", np.array([1e8]), {}, constant_stress(50.0), 1000.0)
-    truth = float(BAR.predict_to_rupture(OMEGA, VALUES, [plan]).life.ruptures[0, 0])
+    truth = float(BAR.predict_to_rupture(OMEGA, OMEGA.to_internal(VALUES), [plan]).life.ruptures[0, 0])
     shares = np.mean([one(100 + k, truth) for k in range(given.campaigns)], axis=0)
     names = [*OMEGA.names, "rupture time of the law", "rupture of a single test"]
     print("; ".join(f"{name} {100 * share:.0f} %" for name, share in zip(names, shares, strict=True)))

@@ -62,10 +62,12 @@ def main() -> None:
             elastic=ck.Elastic(E=150e3),
         )  # fmt: skip
         numbers, modulus = law.values(values), {"modulus": np.zeros((1, 1))}
-        forward = least(lambda law=law, plan=plan, numbers=numbers: dimple.predict(law, numbers, [plan]))
+        forward = least(
+            lambda law=law, plan=plan, numbers=numbers: dimple.predict(law, law.to_internal(numbers), [plan])
+        )
         both = least(
             lambda law=law, plan=plan, numbers=numbers, modulus=modulus: dimple.predict(
-                law, numbers, [plan], jacobian=True, nuisances=modulus
+                law, law.to_internal(numbers), [plan], sensitivities=True, nuisances=modulus
             )
         )
         columns = len(law.names) + 1

@@ -86,7 +86,7 @@ def predicted(model, data):
     """(n, frames, 3), NaN where the model stopped, and which rows are outside its domain."""
     values, outside = np.full(data.values.shape, np.nan), np.zeros(len(data), bool)
     for k in range(len(data)):
-        found = model.predict(data.law, data.values_of(k), [data.plan(k)])
+        found = model.predict(data.law, data.theta_of(k), [data.plan(k)])
         own = found.of(0)
         values[k, : len(own)] = own
         outside[k] = found.status[0, 0] == Status.OUTSIDE_DOMAIN

@@ -48,7 +48,7 @@ def main():
 
 def line(name, model, held, scale):
     """One model on the held-out samples."""
-    model.predict(held.law, held.values_of(0), [held.plan(0)])
+    model.predict(held.law, held.theta_of(0), [held.plan(0)])
     shown, outside = predicted(model, held)
     true = held.values[:, 1:].astype(float)
     mask = np.isfinite(true[..., 0]) & np.isfinite(shown[:, 1:, 0])
@@ -72,13 +72,13 @@ def costs(model, held, few=10):
     """CPU ms of a candidate, asked for one by one, and 100 at once in one test."""
     began = time.process_time()
     for k in range(few):
-        model.predict(held.law, held.values_of(k), [held.plan(k)])
+        model.predict(held.law, held.theta_of(k), [held.plan(k)])
     each = (time.process_time() - began) / few
     if few < 10:
         return 1e3 * each, 0.0
     values = {name: held.parameters[:100, k] for k, name in enumerate(held.parameter_names)}
     began = time.process_time()
-    model.predict(held.law, values, [held.plan(0)])
+    model.predict(held.law, held.law.to_internal(values), [held.plan(0)])
     return 1e3 * each, 1e3 * (time.process_time() - began) / len(held.parameters[:100])
 
 

@@ -83,12 +83,15 @@ def row(name: str, count: int, simulated: int, file: str | None) -> str:
     spent = in_turns(
         (lambda: simulate_trajectories(exact, compiled, theta, [TEST], factors=WITHOUT_FEATURES), count),
         (lambda: simulate_trajectories(exact, compiled, theta, [TEST], factors=factors), count),
-        (lambda: surrogate.predict(law, many, [TEST]), count),
-        (lambda: surrogate.predict(law, some, [TEST], jacobian=True, nuisances=thickness), max(1, count // 10)),
+        (lambda: surrogate.predict(law, law.to_internal(many), [TEST]), count),
+        (
+            lambda: surrogate.predict(law, law.to_internal(some), [TEST], sensitivities=True, nuisances=thickness),
+            max(1, count // 10),
+        ),
     )
     slow = in_turns(
-        (lambda: exact.predict(law, few, [TEST]), simulated),
-        (lambda: exact.predict(law, few, [TEST], jacobian=True, nuisances=thickness), simulated),
+        (lambda: exact.predict(law, law.to_internal(few), [TEST]), simulated),
+        (lambda: exact.predict(law, law.to_internal(few), [TEST], sensitivities=True, nuisances=thickness), simulated),
         repeats=1,
     )
     ratios = f"{slow[0] / spent[2]:.0f}, {slow[1] / spent[3]:.0f}"
@@ -102,7 +105,7 @@ def walls(name: str, count: int, file: str | None) -> str:
     compiled, many = kernels.lower(law, "numba"), scattered(name, count)
     theta, factors = compiled.to_internal(many), surrogate.recipe.factors
     spent = in_turns(
-        (lambda: surrogate.predict(law, many, [TEST]), 1),
+        (lambda: surrogate.predict(law, law.to_internal(many), [TEST]), 1),
         (lambda: simulate_trajectories(Bulge(), compiled, theta, [TEST], factors=factors, threads=cores), 1),
         (gru(count, 49, cores), 1),
         (gru(count, TEST.times.size, cores), 1),

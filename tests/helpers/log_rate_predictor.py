@@ -36,21 +36,19 @@ class LogRates:
         return float(np.exp(-15.0) * END)
 
     def predict(
-        self, law: CreepLaw, values: Mapping[str, Any], histories: Sequence[History], *, jacobian: bool = False,
-        nuisances: Mapping[str, Any] | None = None,
+        self, law: CreepLaw, theta: np.ndarray, histories: Sequence[History], *,
+        nuisances: Mapping[str, Any] | None = None, sensitivities: bool = False,
     ) -> Prediction:  # fmt: skip
-        columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[n], float)) for n in law.names))
-        theta = [np.log(c) if p.scale == "log" else c for c, p in zip(columns, law.table.values(), strict=True)]
-        count, longest = columns[0].size, max(h.times.size for h in histories)
+        count, longest = len(theta), max(h.times.size for h in histories)
         kernel, found = lower(law, "numpy"), np.full((count, len(histories), longest, 1), np.nan)
         for k, h in enumerate(histories):
             s = h.loading.program().values[0]
-            log = np.broadcast_to(kernel.internal_log_rate(s, 1.0, 1.0, h.temperature, s, s / 3, *theta), (count,))
+            log = np.broadcast_to(kernel.internal_log_rate(s, 1.0, 1.0, h.temperature, s, s / 3, *theta.T), (count,))
             found[:, k, : h.times.size, 0] = log[:, None] + h.times / END
         shift = 0.0 if not nuisances else self.by * (np.asarray(nuisances["thickness"]) - self.nominal)
         found += np.broadcast_to(shift, found.shape[:2])[..., None, None]
         ends, status = np.full(found.shape[:2], np.inf), np.zeros(found.shape[:2], np.int64)
-        slopes = {"thickness": np.full(found.shape, self.by)} if jacobian and nuisances else {}
+        slopes = {"thickness": np.full(found.shape, self.by)} if sensitivities and nuisances else {}
         lengths = np.array([h.times.size for h in histories])
         return Prediction(found, self.outputs, lengths, status, ends, nuisance_jacobian=slopes)
 
@@ -65,7 +63,7 @@ def measured(
         History(f"{k}: {s:g} MPa", times, {"amplitude": 0 * times}, constant_stress(s, "stress"), 1000.0)
         for k, s in enumerate(stresses)
     ]
-    found = (using or LogRates()).predict(law, values, blank)
+    found = (using or LogRates()).predict(law, law.to_internal(values), blank)
     return [
         h.replace(
             outputs={"amplitude": found.values[0, k, :, 0] + rng.normal(size=frames) * sd},

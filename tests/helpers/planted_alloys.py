@@ -32,7 +32,7 @@ class Deadly:
     name: str = "deadly"
     outputs: tuple[str, ...] = ("strain",)
 
-    def predict(self, law, values, histories, *, jacobian=False, nuisances=None):
+    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
         os._exit(3)
 
 
@@ -48,8 +48,8 @@ class Doubting:
     def specimen(self):
         return ck.specimen("uniaxial")
 
-    def predict(self, law, values, histories, *, jacobian=False, nuisances=None):
-        found = self.specimen.predict(law, values, histories, jacobian=jacobian, nuisances=nuisances)
+    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+        found = self.specimen.predict(law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)
         outside = np.full_like(found.status, int(Status.OUTSIDE_DOMAIN))
         return replace(found, values=(1.0 + self.excess) * found.values, status=outside)
 

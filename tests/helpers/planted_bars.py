@@ -23,7 +23,7 @@ def bars(
     """One test for each loading."""
     rng, times = np.random.default_rng(seed), np.geomspace(1e-3, 1.0, frames) * END
     blank = [History(f"bar {k}", times, {"strain": 0 * times}, one, 1000.0) for k, one in enumerate(loadings)]
-    found = BAR.predict(law, values, blank)
+    found = BAR.predict(law, law.to_internal(values), blank)
     sd = {"strain": np.full(frames, noise)}
     return [
         h.replace(outputs={"strain": found.of(k)[:, 0] + rng.normal(size=frames) * noise}, standard_deviation=sd)

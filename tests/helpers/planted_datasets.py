@@ -58,7 +58,7 @@ def dimples(count: int = 24) -> Dataset:
         "apex_thickness": 0.46 + 0.08 * unit[:, 7],
     }
     empty = data_set("bulge", ck.law("norton"), grid, parameters, columns, np.zeros((count, grid.frames, 3)))
-    found = [empty.specimen.predict(empty.law, empty.values_of(k), [empty.planned_test(k)]).of(0) for k in range(count)]
+    found = [empty.specimen.predict(empty.law, empty.theta_of(k), [empty.planned_test(k)]).of(0) for k in range(count)]
     return data_set("bulge", empty.law, grid, parameters, columns, np.array(found))
 
 

@@ -7,7 +7,6 @@ and so on, read as numbers of a test problem, not as truth). Width and shape are
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -59,11 +58,9 @@ class OneDegree:
             self.reduced_order_model = lambda: OneDegree(coarseness=1.1, calls=self.calls)
 
     def predict(
-        self, law: CreepLaw, values: Mapping[str, Any], histories: Sequence[History], *, jacobian: bool = False,
-        nuisances: Mapping[str, np.ndarray] | None = None,
+        self, law: CreepLaw, theta: np.ndarray, histories: Sequence[History], *,
+        nuisances: Mapping[str, np.ndarray] | None = None, sensitivities: bool = False,
     ) -> Prediction:  # fmt: skip
-        theta = [np.atleast_1d(np.log(values[n]) if p.scale == "log" else values[n]) for n, p in law.table.items()]
-        theta = np.stack(np.broadcast_arrays(*theta), axis=-1)
         for kind in nuisances or {}:
             if kind not in self.nuisances:
                 raise SolveError(f"{self.name} does not know the nuisance '{kind}'")
@@ -72,7 +69,7 @@ class OneDegree:
         theta = np.broadcast_to(theta, (count, theta.shape[-1]))
         self.calls.append(count)
         found, ends = self._run(law, theta, histories, own)
-        slopes, changes = self._slopes(law, theta, histories, own) if jacobian and self.exact else (None, {})
+        slopes, changes = self._slopes(law, theta, histories, own) if sensitivities and self.exact else (None, {})
         lengths = np.array([h.times.size for h in histories])
         status = np.where(np.isfinite(ends), 1, 0)
         return Prediction(found, self.outputs, lengths, status, ends, slopes, nuisance_jacobian=changes)
@@ -164,7 +161,7 @@ def planted(law, values, plans, *, seed=0, noise=(1.5e-3, 0.02, 0.02), frames=48
         )  # fmt: skip
         own = {**values, coefficient: values[coefficient] * plan.rate}
         nuisances = {"thickness": np.array([[plan.thickness]]), "temperature": np.array([[plan.temperature]])}
-        clean = OneDegree().predict(law, own, [bare], nuisances=nuisances).of(0)
+        clean = OneDegree().predict(law, law.to_internal(own), [bare], nuisances=nuisances).of(0)
         noisy = clean + rng.normal(size=clean.shape) * noise
         noisy[:, 0] += plan.offset
         tests.append(bare.replace(outputs=dict(zip(OneDegree.outputs, noisy.T, strict=True))))

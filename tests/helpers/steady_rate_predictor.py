@@ -1,7 +1,6 @@
 """A closed-form predictor for laws without memory at constant stress: strain = rate x time, and planted tests."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -17,15 +16,14 @@ class Steady:
     outputs = ("strain",)
 
     def predict(
-        self, law: CreepLaw, values: Mapping[str, Any], histories: Sequence[History], *, jacobian: bool = False
+        self, law: CreepLaw, theta: np.ndarray, histories: Sequence[History], *, sensitivities: bool = False
     ) -> Prediction:
-        columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[n], float)) for n in law.names))
-        kernel, count = lower(law, "numpy"), columns[0].size
+        kernel, count, values = lower(law, "numpy"), len(theta), law.from_internal(theta)
         shape = (count, len(histories), max(h.times.size for h in histories), 1)
         strain, slope = np.full(shape, np.nan), np.full((*shape, len(law.names)), np.nan)
         for k, h in enumerate(histories):
             stress, T = h.loading.program().values[0], h.temperature
-            found = kernel.derivatives(dict(zip(law.names, columns, strict=True)), stress=stress, temperature=T)
+            found = kernel.derivatives(values, stress=stress, temperature=T)
             size = h.times.size
             strain[:, k, :size, 0] = np.broadcast_to(found.rate, (count,))[:, None] * h.times
             for p, name in enumerate(law.names):
@@ -33,7 +31,7 @@ class Steady:
         lengths = np.array([h.times.size for h in histories])
         ends = np.full((count, len(histories)), np.inf)
         status = np.zeros((count, len(histories)), np.int64)
-        return Prediction(strain, ("strain",), lengths, status, ends, slope if jacobian else None)
+        return Prediction(strain, ("strain",), lengths, status, ends, slope if sensitivities else None)
 
 
 def planted(

@@ -90,7 +90,7 @@ def test_a_dimple_screens_candidates_that_rupture_at_once():
     for (name, param), share in zip(law.table.items(), draws, strict=True):
         low, high = (param.to_internal(end) for end in param.bounds)
         values[name] = np.array([param.from_internal(low + s * (high - low)) for s in share])
-    found = dimple.reduced_order_model().predict(law, values, [plan])
+    found = dimple.reduced_order_model().predict(law, law.to_internal(values), [plan])
     counts = np.bincount(found.status[:, 0], minlength=3)
     assert counts.sum() == 256
     assert (counts[:2] > 20).all()

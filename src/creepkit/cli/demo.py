@@ -62,12 +62,12 @@ def compile_kernels() -> None:
         times=test.times[:3], outputs={name: values[:3] for name, values in test.outputs.items()}
     )
     law = ck.law(BULGE_LAWS[0])
-    values = {name: param.center for name, param in law.table.items()}
+    theta = law.to_internal(law.center())
     bulge = ck.specimen("bulge")
-    bulge.predict(law, values, [shortened_test], jacobian=True)
+    bulge.predict(law, theta, [shortened_test], sensitivities=True)
     reduced_model = reduced_order_model_of(bulge)
     assert reduced_model is not None
-    reduced_model.predict(law, values, [shortened_test])  # a fit to a bulge test asks it where to begin
+    reduced_model.predict(law, theta, [shortened_test])  # a fit to a bulge test asks it where to begin
 
 
 def _rank_uniaxial_laws(histories: list[History]) -> Ranking:

@@ -131,6 +131,10 @@ class Dataset:
         """The law's parameters of one sample."""
         return dict(zip(self.parameter_names, self.parameters[row].tolist(), strict=True))
 
+    def theta_of(self, row: int) -> Floats:
+        """The law's parameters of one sample as internal values, (1, parameters)."""
+        return self.law.to_internal(self.parameters[row : row + 1])
+
     def conditions_of(self, row: int) -> dict[str, float]:
         """The conditions of one sample."""
         return dict(zip(self.condition_names, self.conditions[row].tolist(), strict=True))

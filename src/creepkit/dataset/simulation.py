@@ -55,7 +55,7 @@ def _screening_outcome(
     test = planned_test(samples.specimen, conditions, design.grid)
     hold_instants = hold_times(test)
     times = np.unique(hold_instants)
-    prediction = reduced_model.predict(samples.law, samples.values_of(row), [test.replace(times=times)])
+    prediction = reduced_model.predict(samples.law, samples.theta_of(row), [test.replace(times=times)])
     outputs = prediction.of(0)
     status, end_time = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
     return SimulationOutcome(
@@ -177,7 +177,7 @@ def _simulate_sample(design: SamplingDesign, samples: Dataset, row: int) -> int:
     test = planned_test(samples.specimen, conditions, design.grid)
     hold_instants = hold_times(test)
     times = np.union1d(test.times, hold_instants)
-    prediction = samples.specimen.predict(samples.law, samples.values_of(row), [test.replace(times=times)])
+    prediction = samples.specimen.predict(samples.law, samples.theta_of(row), [test.replace(times=times)])
     observed = prediction.of(0)
     outputs = np.full(samples.values.shape[1:], np.nan)
     outputs[: test.times.size] = observed[np.searchsorted(times, test.times)]

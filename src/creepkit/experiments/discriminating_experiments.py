@@ -192,7 +192,8 @@ def _with_predictions(
         nuisance_values["thickness"] = nuisance_values["thickness"].copy()
         for k, thickness in _stated_thicknesses(histories, measured_count):
             nuisance_values["thickness"][0, k] = thickness
-    prediction = predict(predictor, fit.law, fit.values, histories, nuisances=nuisance_values)
+    theta = fit.law.to_internal(fit.values)
+    prediction = predict(predictor, fit.law, theta, histories, nuisances=nuisance_values)
     predicted = []
     for k, history in enumerate(histories):
         outputs, sd = {}, {}

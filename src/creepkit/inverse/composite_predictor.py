@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Floats
+from creepkit.arrays import Floats
 from creepkit.errors import FitError, SolveError
 from creepkit.language import CreepLaw
 from creepkit.records import (
@@ -46,18 +46,20 @@ class CompositePredictor:
     def predict(
         self,
         law: CreepLaw,
-        values: Mapping[str, ArrayLike],
+        theta: Floats,
         histories: Sequence[History],
         *,
-        jacobian: bool = False,
         nuisances: NuisanceValues | None = None,
+        sensitivities: bool = False,
     ) -> Prediction:
         """Predict each group of histories with its predictor; outputs that a test does not have are NaN."""
         predictions = []
         for predictor, tests in self.groups(histories):
             group_nuisances = {k: v[:, tests] for k, v in (nuisances or {}).items() if supports_nuisance(predictor, k)}
             group_histories = [histories[k] for k in tests]
-            prediction = predict(predictor, law, values, group_histories, jacobian=jacobian, nuisances=group_nuisances)
+            prediction = predict(
+                predictor, law, theta, group_histories, nuisances=group_nuisances, sensitivities=sensitivities
+            )
             predictions.append((tests, prediction))
         for kind in nuisances or {}:
             if not any(supports_nuisance(self.predictor_for(h), kind) for h in histories):
@@ -140,13 +142,18 @@ def _concatenated_life(groups: Sequence[tuple[list[int], Prediction]], shape: tu
 
 
 def predict(
-    predictor: Predictor, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], *,
-    jacobian: bool = False, nuisances: NuisanceValues | None = None,
-) -> Prediction:  # fmt: skip
+    predictor: Predictor,
+    law: CreepLaw,
+    theta: Floats,
+    histories: Sequence[History],
+    *,
+    nuisances: NuisanceValues | None = None,
+    sensitivities: bool = False,
+) -> Prediction:
     """Predict, mentioning nuisances only where there are any: a closed form need not know of them."""
     if nuisances:
-        return predictor.predict(law, values, histories, jacobian=jacobian, nuisances=nuisances)
-    return predictor.predict(law, values, histories, jacobian=jacobian)
+        return predictor.predict(law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)
+    return predictor.predict(law, theta, histories, sensitivities=sensitivities)
 
 
 def prediction_errors_of(predictor: Predictor) -> dict[str, float]:
@@ -203,7 +210,7 @@ def predict_with_sensitivities(
 
     theta : (parameters,) internal. What the predictor does not differentiate itself comes from differences.
     """
-    prediction = predict(predictor, law, author_values(law, theta[None]), histories, jacobian=True, nuisances=nuisances)
+    prediction = predict(predictor, law, theta[None], histories, nuisances=nuisances, sensitivities=True)
     numeric = prediction.jacobian is None
     kinds = [kind for kind in nuisances if kind not in prediction.nuisance_jacobian]
     if not (numeric or kinds):
@@ -211,7 +218,7 @@ def predict_with_sensitivities(
     steps = RELATIVE_STEP * np.maximum(np.abs(theta), 1.0) if numeric else np.zeros(0)
     nuisance_steps = [NUISANCE_STEPS[kind] for kind in kinds]
     points, shifted_nuisances = _difference_points(theta, steps, nuisances, kinds, nuisance_steps)
-    batch = predict(predictor, law, author_values(law, points), histories, nuisances=shifted_nuisances)
+    batch = predict(predictor, law, points, histories, nuisances=shifted_nuisances)
     count = len(points) // 2
     differences = batch.values[:count] - batch.values[count:]
     jacobian = np.moveaxis(differences[: steps.size], 0, -1) / (2 * steps) if numeric else None
@@ -240,19 +247,10 @@ def _difference_points(
     return points, shifted_nuisances
 
 
-def author_values(law: CreepLaw, theta: Floats) -> dict[str, Floats]:
-    """{parameter: (candidates,)} in the author's units, from internal parameters (candidates, parameters)."""
-    return {
-        name: np.exp(theta[:, k]) if param.scale == "log" else theta[:, k]
-        for k, (name, param) in enumerate(law.table.items())
-    }
-
-
 def predict_to_rupture(
-    using: Predictor, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], *,
-    jacobian: bool = False,
-) -> Prediction:  # fmt: skip
-    """Predict with `life`; tests whose predictor follows none to rupture arrive nowhere and never break."""
+    using: Predictor, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
+) -> Prediction:
+    """Predict with `times_to_strain`; tests whose predictor follows none to rupture arrive nowhere and never break."""
     groups = (
         using.groups(histories) if isinstance(using, CompositePredictor) else [(using, list(range(len(histories))))]
     )
@@ -261,10 +259,10 @@ def predict_to_rupture(
         group_histories = [histories[k] for k in tests]
         if isinstance(predictor, SupportsRupturePrediction):
             group_predictions.append(
-                (tests, predictor.predict_to_rupture(law, values, group_histories, jacobian=jacobian))
+                (tests, predictor.predict_to_rupture(law, theta, group_histories, sensitivities=sensitivities))
             )
         else:
-            prediction = predict(predictor, law, values, group_histories, jacobian=jacobian)
+            prediction = predict(predictor, law, theta, group_histories, sensitivities=sensitivities)
             group_predictions.append(
                 (tests, replace(prediction, times_to_strain=_without_rupture(prediction, len(law.names))))
             )

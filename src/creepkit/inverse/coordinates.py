@@ -168,10 +168,7 @@ class Coordinates:
 
     def values(self, u: Floats) -> dict[str, float]:
         """{parameter: value} in the author's units, of one u."""
-        theta = self.theta(u)
-        return {
-            name: float(param.from_internal(t)) for (name, param), t in zip(self.law.table.items(), theta, strict=True)
-        }
+        return {name: float(value) for name, value in self.law.from_internal(self.theta(u)).items()}
 
     def u(self, theta: Floats) -> Floats:
         """Conditioned coordinates of internal parameters."""

@@ -149,7 +149,7 @@ def times_to_strain(
         h.replace(times=grid, outputs={"strain": np.zeros(grid.size)}, standard_deviation={}, includes_elastic=False)
         for (h, _), grid in zip(reached, time_grids, strict=True)
     ]
-    prediction = predictor.predict(law, values, extended)
+    prediction = predictor.predict(law, law.to_internal(values), extended)
     predicted = [
         _crossing_time(prediction.of(k)[:, 0], grid, strain, prediction, k) for k, grid in enumerate(time_grids)
     ]
@@ -166,7 +166,7 @@ def times_to_rupture(
     measured = np.array([h.rupture_time for h in ruptured], float)
     if not ruptured:
         return TimeComparison(float("nan"), (), measured, measured)
-    life_prediction = predict_to_rupture(predictor, law, values, ruptured).times_to_strain
+    life_prediction = predict_to_rupture(predictor, law, law.to_internal(values), ruptured).times_to_strain
     assert life_prediction is not None
     predicted = np.where(np.isfinite(life_prediction.rupture_times[0]), life_prediction.rupture_times[0], np.inf)
     return TimeComparison(float("nan"), tuple(h.name for h in ruptured), measured, predicted)

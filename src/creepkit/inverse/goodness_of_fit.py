@@ -281,7 +281,8 @@ def predict_rupture_times(
                 f"history '{history.name}': {name} follows no test to rupture; give using=, such as uniaxial"
             )
     extended = [_extended_to_rupture(history) for history in histories]
-    prediction = predict_to_rupture(predictor, coordinates.law, coordinates.values(u), extended, jacobian=True)
+    theta = coordinates.theta(u)[None]
+    prediction = predict_to_rupture(predictor, coordinates.law, theta, extended, sensitivities=True)
     assert prediction.times_to_strain is not None
     assert prediction.times_to_strain.rupture_jacobian is not None
     median_times = prediction.times_to_strain.rupture_times[0]

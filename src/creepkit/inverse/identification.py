@@ -165,7 +165,7 @@ class Identification:
         prediction = predict(
             predictor,
             self.law,
-            self.values,
+            self.law.to_internal(self.values),
             tests,
             nuisances=self.nuisance_values(tests, own_nuisances=own_nuisances, using=predictor),
         )

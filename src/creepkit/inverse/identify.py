@@ -331,7 +331,7 @@ def _result(problem: IdentificationProblem, best: EstimationResult, search_outco
     prediction = predict(
         residual_function.predictor,
         law,
-        coordinates.values(u),
+        coordinates.theta(u)[None],
         list(histories),
         nuisances=best.nuisance_parameters.predictor_values(x[parameters:]),
     )

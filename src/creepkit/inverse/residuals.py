@@ -9,7 +9,6 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.inverse.composite_predictor import (
-    author_values,
     predict,
     predict_to_rupture,
     predict_with_sensitivities,
@@ -185,14 +184,14 @@ class ResidualFunction:
 
     def batch_residuals(self, u: Floats, e: Floats | None = None) -> Floats:
         """Residuals without derivatives: (candidates, parameters) to entries; unknowns of tests at e or their means."""
-        values = author_values(self.law, self.coordinates.theta(u))
+        theta = self.coordinates.theta(u)
         if self.observations.followed_to_rupture.any():
-            prediction = predict_to_rupture(self.predictor, self.law, values, self.histories)
+            prediction = predict_to_rupture(self.predictor, self.law, theta, self.histories)
         else:
             nuisances = replace(self.nuisance_parameters, fixed=e is None).predictor_values(
                 np.zeros(0) if e is None else e
             )
-            prediction = predict(self.predictor, self.law, values, self.histories, nuisances=nuisances)
+            prediction = predict(self.predictor, self.law, theta, self.histories, nuisances=nuisances)
         self.evaluations += len(u)
         return np.where(
             self.observations.present,
@@ -249,9 +248,7 @@ class ResidualFunction:
             self.coordinates.theta(u),
             replace(self.nuisance_parameters, fixed=True).predictor_values(np.zeros(0)),
         )
-        prediction = predict(
-            self.predictor, self.law, author_values(self.law, theta), self.histories, jacobian=True, nuisances=nuisances
-        )
+        prediction = predict(self.predictor, self.law, theta, self.histories, nuisances=nuisances, sensitivities=True)
         if prediction.jacobian is None or self.observations.followed_to_rupture.any():
             single = self.with_predictor(self.predictor, self.law, self.coordinates)
             evaluated = [single.evaluate(one) for one in u]
@@ -280,8 +277,7 @@ class ResidualFunction:
         u, e = x[:parameters], x[parameters:]
         theta = self.coordinates.theta(u)
         if observations.followed_to_rupture.any():
-            values = author_values(self.law, theta[None])
-            prediction = predict_to_rupture(self.predictor, self.law, values, self.histories, jacobian=True)
+            prediction = predict_to_rupture(self.predictor, self.law, theta[None], self.histories, sensitivities=True)
         else:
             prediction = predict_with_sensitivities(
                 self.predictor, self.law, theta, self.histories, self.nuisance_parameters.predictor_values(e)

@@ -15,9 +15,11 @@ from types import MappingProxyType
 from typing import Any
 
 import mpmath
+import numpy as np
 import sympy
 from sympy.logic.boolalg import Boolean, BooleanAtom
 
+from creepkit.arrays import ArrayLike, Bools, Floats
 from creepkit.errors import LawError, nearest
 from creepkit.language.expression_trees import evaluate_multiprecision
 from creepkit.language.symbols import POINT_VARIABLES, Param, State
@@ -256,6 +258,37 @@ class CreepLaw:
             if self.table[name].scale == "log" and value == 0 and self.table[name].off != 0:
                 raise LawError(f"law '{self.name}', parameter '{name}': 0 is not allowed, it must be positive")
         return values
+
+    @property
+    def log_scale(self) -> Bools:
+        """Which internal values are logarithms, (parameters,)."""
+        return np.array([param.scale == "log" for param in self.params.values()], bool)
+
+    def to_internal(self, values: Mapping[str, ArrayLike] | Floats) -> Floats:
+        """Return theta, the internal values: the natural logarithm where the scale is log, -inf of a coefficient of 0.
+
+        values : {name: number or (candidates,)}, or (candidates, parameters) in the law's order, in the author's units.
+        Returns (candidates, parameters), in the law's order.
+        """
+        if isinstance(values, Mapping):
+            missing = [name for name in self.names if name not in values]
+            if missing:
+                raise LawError(f"law '{self.name}' needs a value for {', '.join(missing)}")
+            columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[name], float)) for name in self.names))
+            theta = np.stack(columns, axis=-1) if columns else np.zeros((1, 0))
+        else:
+            theta = np.array(values, dtype=float, ndmin=2)
+        with np.errstate(divide="ignore"):
+            theta[:, self.log_scale] = np.log(theta[:, self.log_scale])
+        return np.ascontiguousarray(theta)
+
+    def from_internal(self, theta: Floats) -> dict[str, Floats]:
+        """Return {name: (...)} in the author's units from internal values; theta : (..., parameters)."""
+        with np.errstate(over="ignore"):
+            return {
+                name: np.exp(theta[..., k]) if param.scale == "log" else np.array(theta[..., k], float)
+                for k, (name, param) in enumerate(self.table.items())
+            }
 
     def number(self, value: Any, what: str) -> float:
         """Return `value` as a float, or raise LawError saying that `what` is not a number."""

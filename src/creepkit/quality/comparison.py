@@ -208,7 +208,7 @@ def first_frame_deviations(histories: Sequence[History], specimen: Predictor) ->
 def _elastic_value(history: History, frame: int, specimen: Predictor, output: str) -> float:
     """What the specimen shows without creep at a frame."""
     elastic_history = history.replace(times=history.times[frame : frame + 1], outputs={}, standard_deviation={})
-    result = specimen.predict(_NO_CREEP_LAW, {"A": 0.0, "n": 1.0}, [elastic_history])
+    result = specimen.predict(_NO_CREEP_LAW, _NO_CREEP_LAW.to_internal({"A": 0.0, "n": 1.0}), [elastic_history])
     return float(result.of(0)[0, result.outputs.index(output)])
 
 

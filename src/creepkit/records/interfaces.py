@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from creepkit.arrays import ArrayLike
+from creepkit.arrays import Floats
 from creepkit.records.history import History
 from creepkit.records.prediction import NuisanceValues, Prediction
 
 if TYPE_CHECKING:
-    from creepkit.records.law_with_values import LawWithValues
-
-
-if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
+    from creepkit.records.law_with_values import LawWithValues
 
 
 @runtime_checkable
@@ -70,29 +67,32 @@ class Exporter(Protocol):
 
 @runtime_checkable
 class Predictor(Protocol):
-    """Anything that predicts histories from a law and its values: specimen, surrogate or closed form.
+    """Anything that predicts histories from a law and its internal values: specimen, surrogate or closed form.
 
     Optional attributes, looked for by name: `outputs`, the names of what is predicted, first the one that grows with
     creep; `nuisances`, the kinds of explicit nuisances that predict() understands (none without it);
     `reference_stress(history)`, the von Mises stress, MPa, that stands for the test (a number, or one for each level
-    of its loading); `screening()`, see Screened.
+    of its loading); `reduced_order_model()`, see
+    SupportsReducedOrderModel.
     """
 
     def predict(
         self,
         law: CreepLaw,
-        values: Mapping[str, ArrayLike],
+        theta: Floats,
         histories: Sequence[History],
         *,
-        jacobian: bool = False,
         nuisances: NuisanceValues | None = None,
+        sensitivities: bool = False,
     ) -> Prediction:
         """Predict each history's outputs at its times.
 
-        values : {parameter: number or (candidates,)} in the author's units; 0 may switch a parameter off.
+        theta : (candidates, parameters) internal values in the order of law.names, see CreepLaw.to_internal: the
+            natural logarithm where the scale is log, -inf for a coefficient that is off.
         nuisances : {kind: (candidates or 1, tests)} of what differs from test to test, measured as Nuisance says. A
-            kind that the predictor does not know is a SolveError. With `jacobian` the prediction has the derivatives
-            to the kinds given in `nuisance_jacobian`.
+            kind that the predictor does not know is a SolveError.
+        sensitivities : whether the prediction has its derivatives with respect to theta, in `jacobian`, and to the
+            kinds of nuisances given, in `nuisance_jacobian`.
         """
         ...
 
@@ -102,18 +102,18 @@ class SupportsRupturePrediction(Predictor, Protocol):
     """A predictor that follows a specimen to its rupture, beyond the last time of its history."""
 
     def predict_to_rupture(
-        self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], *, jacobian: bool = False
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
     ) -> Prediction:
-        """Predict as predict() does, with `life`: when measured strains are arrived at, and when it breaks."""
+        """Predict as predict() does, with `times_to_strain`: when measured strains are reached, and when it breaks."""
         ...
 
 
 @runtime_checkable
 class SupportsReducedOrderModel(Predictor, Protocol):
-    """A predictor too expensive for a global search, with a cheap stand-in of the same outputs and nuisances."""
+    """A predictor too expensive for a global search, with a cheap model of the same outputs and nuisances."""
 
     def reduced_order_model(self) -> Predictor:
-        """Return the stand-in; it may be some per cent off and need not know derivatives."""
+        """Return the reduced-order model; it may be some per cent off and need not know derivatives."""
         ...
 
 

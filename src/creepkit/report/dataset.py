@@ -14,7 +14,7 @@ from creepkit.errors import DatasetError
 from creepkit.report.figures import empty_figure, save_figure
 from creepkit.sampling.conditions import ROOM_TEMPERATURE
 from creepkit.sampling.criteria import RateLimit
-from creepkit.sampling.rates import RateArguments, internal_parameters, ln_rate
+from creepkit.sampling.rates import RateArguments, ln_rate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -210,7 +210,7 @@ def _draw_rates(axes: Axes, acceptance: Acceptance) -> None:
 def _rate_curves(acceptance: Acceptance, stress: Floats) -> Floats:
     """log10 of rates over stress of the first rows, (rows, stresses)."""
     law, draws = acceptance.design.law, acceptance.draws
-    theta = internal_parameters(law, draws.parameters[:CURVES_SHOWN])
+    theta = law.to_internal(draws.parameters[:CURVES_SHOWN])
     temperature = draws.condition("temperature", ROOM_TEMPERATURE)[: len(theta), None]
     return np.asarray(
         ln_rate(law, theta[:, None, :], RateArguments(stress, SHOWN_STRAIN, SHOWN_TIME, temperature)) / np.log(10.0)

@@ -48,7 +48,6 @@ from creepkit.sampling.rates import (
     RateEvaluationPoints,
     ReferenceStress,
     author_parameters,
-    internal_parameters,
     mean_ln_rate,
     reference_stress_of,
 )
@@ -330,7 +329,7 @@ def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0
     criteria_met = {c.name: c.passes(design.law, rows) for c in design.criteria if c.stage == "before"}
     end, reference = design.conditions.end, design.reference_stress
     points = reference.evaluation_points(rows, end)
-    log10_rates = mean_ln_rate(design.law, internal_parameters(design.law, rows.parameters), points) / np.log(10.0)
+    log10_rates = mean_ln_rate(design.law, design.law.to_internal(rows.parameters), points) / np.log(10.0)
     log10_end_times = np.log10(rows.condition("end_time", end))
     useful_rates = np.stack(np.broadcast_arrays(*reference.useful_rates(rows, end)), axis=1)
     return Acceptance(

@@ -33,7 +33,7 @@ class RateArguments:
 
 def log10_rate(law: CreepLaw, parameters: Floats, arguments: RateArguments) -> Floats:
     """Return log10 of the rate, 1/s, of rows of the author's parameters, (rows,)."""
-    return np.asarray(ln_rate(law, internal_parameters(law, parameters), arguments) / np.log(10.0))
+    return np.asarray(ln_rate(law, law.to_internal(parameters), arguments) / np.log(10.0))
 
 
 def ln_rate(
@@ -56,25 +56,9 @@ def ln_rate(
     return np.asarray(lower(law, "numpy").internal_log_rate(*columns), float)
 
 
-def internal_parameters(law: CreepLaw, parameters: Floats) -> Floats:
-    """The kernels' form of the author's parameters (rows, parameters): ln where the scale is log, -inf of 0."""
-    on_log_scale, theta = is_log_scale(law), np.array(parameters, float)
-    with np.errstate(divide="ignore"):
-        theta[:, on_log_scale] = np.log(theta[:, on_log_scale])
-    return theta
-
-
 def author_parameters(law: CreepLaw, theta: Floats) -> Floats:
-    """The author's parameters of internal ones (rows, parameters)."""
-    on_log_scale, values = is_log_scale(law), np.array(theta, float)
-    with np.errstate(over="ignore"):
-        values[:, on_log_scale] = np.exp(values[:, on_log_scale])
-    return values
-
-
-def is_log_scale(law: CreepLaw) -> Any:
-    """Which parameters have a log scale, (parameters,)."""
-    return np.array([param.scale == "log" for param in law.params.values()], bool)
+    """The author's values, (rows, parameters) in the law's order, of internal ones."""
+    return np.stack(list(law.from_internal(theta).values()), axis=-1)
 
 
 POINT_COUNT = 12

@@ -156,7 +156,8 @@ def _simulate_test(
         planned_test = History(name, TIMES, {}, LOADING, TEMPERATURE, "bulge", ELASTIC, alloy=name,
                        geometry={"apex_thickness": thickness})  # fmt: skip
         specimen = coarse_specimen.replace(refinement=2.0, tolerance=1e-3)
-        prediction = specimen.predict(registry.default_registry().law(law), values, [planned_test])
+        creep_law = registry.default_registry().law(law)
+        prediction = specimen.predict(creep_law, creep_law.to_internal(values), [planned_test])
         if prediction.status[0, 0] == Status.COMPLETE:
             return AlloyTruth(law, values, thickness, base_fractions), _with_noise(
                 planned_test, prediction.outputs, prediction.of(0), rng

@@ -10,18 +10,14 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 
 from creepkit import integration, kernels
-from creepkit.arrays import ArrayLike, Floats
+from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.records import History, NuisanceValues, Prediction, Program, Status
 from creepkit.specimens.run import Run, run_from_outputs
 
 if TYPE_CHECKING:
     from creepkit.integration import Integration, PointTest
-    from creepkit.language import CreepLaw
-
-
-if TYPE_CHECKING:
-    from creepkit.language import Elastic
+    from creepkit.language import CreepLaw, Elastic
 
 
 STEPS_PER_BREAKPOINT = 20
@@ -93,39 +89,39 @@ class Bar:
     def predict(
         self,
         law: CreepLaw,
-        values: Mapping[str, ArrayLike],
+        theta: Floats,
         histories: Sequence[History],
         *,
-        jacobian: bool = False,
         nuisances: NuisanceValues | None = None,
+        sensitivities: bool = False,
     ) -> Prediction:
-        """Predict the output of each history at its times, for numbers or (candidates,) values of the parameters.
+        """Predict the output of each history at its times; see records.Predictor.
 
+        theta : (candidates, parameters) internal values.
         nuisances : "temperature" (K above what the history says) and "modulus" (relative change).
         """
         predict_plain = partial(self._predict, law)
         return predict_with_nuisances(
             predict_plain,
-            values,
+            theta,
             histories,
             nuisances,
-            jacobian,
+            sensitivities,
             modulus_derivative=self.modulus_derivative,
             specimen=self.name,
         )
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> Run:
         """Run one test: what its history would show at its times, and how it ended."""
-        result = self._integrate(law, law.values(values), self._tests([plan]), jacobian=False)
+        result = self._integrate(law, law.to_internal(law.values(values)), self._tests([plan]), False)
         rows = self.observed_output(plan, result.of(0))[0]
         end, reason = float(result.end_times[0, 0]), integration.REASONS[int(result.terminations[0, 0])]
         reason = self.end_reason(plan, reason, rows, end)
         return run_from_outputs(Run, plan, self.outputs, rows[:, None], Status(int(result.status[0, 0])), end, reason)
 
-    def _predict(
-        self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], jacobian: bool
-    ) -> Prediction:
-        return self._observed_prediction(law, histories, self._integrate(law, values, self._tests(histories), jacobian))
+    def _predict(self, law: CreepLaw, theta: Floats, histories: Sequence[History], sensitivities: bool) -> Prediction:
+        result = self._integrate(law, theta, self._tests(histories), sensitivities)
+        return self._observed_prediction(law, histories, result)
 
     def _tests(self, histories: Sequence[History]) -> list[PointTest]:
         return [self.point_test(history) for history in histories]
@@ -153,9 +149,7 @@ class Bar:
             times=tuple(h.times for h in histories),
         )
 
-    def _integrate(
-        self, law: CreepLaw, values: Mapping[str, ArrayLike], tests: Sequence[PointTest], jacobian: bool
-    ) -> Integration:
+    def _integrate(self, law: CreepLaw, theta: Floats, tests: Sequence[PointTest], sensitivities: bool) -> Integration:
         kernel = kernels.lower(law, "numba")
         breaks = max((test.driving.times.size + test.temperature.times.size - 2 for test in tests), default=0)
         settings = integration.IntegrationSettings(
@@ -163,15 +157,15 @@ class Bar:
             strain_limit=self.strain_limit,
             max_steps=int(self.max_steps) + STEPS_PER_BREAKPOINT * breaks,
         )
-        return integration.integrate(kernel, kernel.to_internal(values), tests, settings=settings, jacobian=jacobian)
+        return integration.integrate(kernel, theta, tests, settings=settings, jacobian=sensitivities)
 
 
 DIFFERENCE_STEPS = {"temperature": 0.1, "modulus": 1e-3}
 """Of central differences: K, and relative."""
 
 
-PlainPredict = Callable[[Mapping[str, ArrayLike], Sequence[History], bool], Prediction]
-"""Predict values and histories, with derivatives or without."""
+PlainPredict = Callable[[Floats, Sequence[History], bool], Prediction]
+"""Predict histories for theta (candidates, parameters), with sensitivities or without."""
 
 
 ModulusDerivative = Callable[[Prediction, Sequence[History], Floats], Floats | None]
@@ -180,10 +174,10 @@ ModulusDerivative = Callable[[Prediction, Sequence[History], Floats], Floats | N
 
 def predict_with_nuisances(
     predict_plain: PlainPredict,
-    values: Mapping[str, ArrayLike],
+    theta: Floats,
     histories: Sequence[History],
     nuisances: NuisanceValues | None,
-    jacobian: bool,
+    sensitivities: bool,
     *,
     modulus_derivative: ModulusDerivative | None = None,
     specimen: str = "uniaxial",
@@ -191,10 +185,10 @@ def predict_with_nuisances(
     """Predict with nuisances, if there are any, a candidate at a time where they differ from candidate to candidate.
 
     Derivatives are central differences, of 0.1 K and of a thousandth of the modulus to each side, but for that to the
-    modulus where `softening` gives it.
+    modulus where `modulus_derivative` gives it.
     """
     if not nuisances:
-        return predict_plain(values, histories, jacobian)
+        return predict_plain(theta, histories, sensitivities)
     for kind in nuisances:
         if kind not in NUISANCES:
             known = " and ".join(NUISANCES)
@@ -203,28 +197,34 @@ def predict_with_nuisances(
     if rows == 1:
         return _predict_one(
             predict_plain,
-            values,
+            theta,
             histories,
             {kind: v[0] for kind, v in nuisances.items()},
-            jacobian,
+            sensitivities,
             modulus_derivative,
         )
     parts = []
+    theta = np.broadcast_to(theta, (rows, theta.shape[1]))
     for row in range(rows):
-        candidate_values = {n: np.broadcast_to(np.asarray(v, float), (rows,))[row] for n, v in values.items()}
         candidate_nuisances = {kind: np.broadcast_to(v, (rows, len(histories)))[row] for kind, v in nuisances.items()}
         parts.append(
-            _predict_one(predict_plain, candidate_values, histories, candidate_nuisances, jacobian, modulus_derivative)
+            _predict_one(
+                predict_plain, theta[row : row + 1], histories, candidate_nuisances, sensitivities, modulus_derivative
+            )
         )
     return _concatenated(parts)
 
 
 def _predict_one(
-    predict_plain: PlainPredict, values: Mapping[str, ArrayLike], histories: Sequence[History], nuisances: Mapping[str, Floats],
-    jacobian: bool, modulus_derivative: ModulusDerivative | None,
-) -> Prediction:  # fmt: skip
-    result = predict_plain(values, _perturbed_histories(histories, nuisances), jacobian)
-    if not jacobian:
+    predict_plain: PlainPredict,
+    theta: Floats,
+    histories: Sequence[History],
+    nuisances: Mapping[str, Floats],
+    sensitivities: bool,
+    modulus_derivative: ModulusDerivative | None,
+) -> Prediction:
+    result = predict_plain(theta, _perturbed_histories(histories, nuisances), sensitivities)
+    if not sensitivities:
         return result
     slopes = {}
     for kind in nuisances:
@@ -237,7 +237,7 @@ def _predict_one(
             _perturbed_histories(histories, {**nuisances, kind: nuisances[kind] + s})
             for s in (DIFFERENCE_STEPS[kind], -DIFFERENCE_STEPS[kind])
         )
-        up, down = (predict_plain(values, moved, False).values for moved in ends)
+        up, down = (predict_plain(theta, moved, False).values for moved in ends)
         slopes[kind] = (up - down) / (2 * DIFFERENCE_STEPS[kind])
     return replace(result, nuisance_jacobian=slopes)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 import numpy as np
 
 from creepkit import integration, kernels
-from creepkit.arrays import ArrayLike, Floats
+from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
 from creepkit.records import COMPONENTS, History, NuisanceValues, PointLoading, Prediction, Specimen
@@ -24,10 +24,6 @@ if TYPE_CHECKING:
     from creepkit.integration.tensor_integration import PointTrajectory
     from creepkit.integration.tensor_point import ProportionalLoading
     from creepkit.kernels.interface import CompiledLaw
-    from creepkit.language import CreepLaw
-
-
-if TYPE_CHECKING:
     from creepkit.language import CreepLaw
 
 
@@ -84,18 +80,19 @@ class MaterialPoint:
     def predict(
         self,
         law: CreepLaw,
-        values: Mapping[str, ArrayLike],
+        theta: Floats,
         histories: Sequence[History],
         *,
-        jacobian: bool = False,
         nuisances: NuisanceValues | None = None,
+        sensitivities: bool = False,
     ) -> Prediction:
-        """Predict all components of each history at its times, for numbers or (candidates,) values of the parameters.
+        """Predict all components of each history at its times; see records.Predictor.
 
+        theta : (candidates, parameters) internal values.
         nuisances : "temperature" (K above what the history says) and "modulus" (relative change).
         """
         predict_plain = partial(self._predict, law)
-        return predict_with_nuisances(predict_plain, values, histories, nuisances, jacobian, specimen=self.name)
+        return predict_with_nuisances(predict_plain, theta, histories, nuisances, sensitivities, specimen=self.name)
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> PointRun:
         """Run one test, keeping all tensors and the states of the law; see PointRun."""
@@ -117,17 +114,14 @@ class MaterialPoint:
 
     # ---- one history at a time -------------------------------------------------------------------------------------
 
-    def _predict(
-        self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], jacobian: bool
-    ) -> Prediction:
+    def _predict(self, law: CreepLaw, theta: Floats, histories: Sequence[History], sensitivities: bool) -> Prediction:
         kernel = kernels.lower(law, "numba")
-        theta = np.array(kernel.to_internal(values), dtype=float, ndmin=2)
         steps = DIFFERENCE_STEP * np.array([1.0 if p.scale == "log" else np.inf for p in law.params.values()])
         steps = np.where(np.isinf(steps), DIFFERENCE_STEP * np.maximum(1.0, np.abs(theta)), steps)
-        parts = [self._rows(kernel, theta, history, steps if jacobian else None) for history in histories]
+        parts = [self._rows(kernel, theta, history, steps if sensitivities else None) for history in histories]
         lengths = [h.times.size for h in histories]
         shape = (len(theta), len(histories), max(lengths, default=0), len(OUTPUTS))
-        shown, changes = np.full(shape, np.nan), np.full((*shape, theta.shape[1]), np.nan) if jacobian else None
+        shown, changes = np.full(shape, np.nan), np.full((*shape, theta.shape[1]), np.nan) if sensitivities else None
         for k, part in enumerate(parts):
             shown[:, k, : lengths[k]] = part.values
             if changes is not None and part.jacobian is not None:
@@ -283,7 +277,7 @@ class PointRun(Run):
 def run_material_point(specimen: MaterialPoint, law: CreepLaw, values: Mapping[str, float], plan: History) -> PointRun:
     """Simulate one test and keep all of it."""
     kernel = kernels.lower(law, "numba")
-    result = specimen.simulate(kernel, kernel.to_internal(law.values(values))[0], plan)
+    result = specimen.simulate(kernel, law.to_internal(law.values(values))[0], plan)
     rows = point_outputs(result, plan)
     shown_columns = [k for k, column in enumerate(rows.T) if k == 0 or np.nanmax(np.abs(column), initial=0.0) > 0.0]
     names = [OUTPUTS[k] for k in shown_columns]

@@ -5,7 +5,7 @@ Under constant load the true stress is the nominal one times exp(creep strain). 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar
@@ -13,19 +13,15 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from creepkit import integration
-from creepkit.arrays import ArrayLike, Floats, Ints
+from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
 from creepkit.records import History, Prediction, Specimen, Status, TimesToStrain
 from creepkit.specimens.bar import Bar, elastic_strain, observed_strain
 
 if TYPE_CHECKING:
-    from creepkit.integration import PointTest
-    from creepkit.language import CreepLaw
-
-
-if TYPE_CHECKING:
     from creepkit.integration import Integration, PointTest
+    from creepkit.language import CreepLaw
 
 
 @dataclass(frozen=True)
@@ -49,22 +45,19 @@ class Uniaxial(Bar):
         return np.exp(creep) if history.strain_measure == "engineering" else np.ones_like(creep)
 
     def predict_to_rupture(
-        self, law: CreepLaw, values: Mapping[str, ArrayLike], histories: Sequence[History], *, jacobian: bool = False
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
     ) -> Prediction:
         """Predict as predict() does, and follow each bar to its rupture: by a state's limit, or by the strain limit."""
         levels = [strain_levels(history, self.point_test(history)) for history in histories]
-        result = self._integrate(law, values, [own_values.test for own_values in levels], jacobian)
-        values_found, last = (
-            self._observed_prediction(law, histories, result),
-            np.array([h.times[-1] for h in histories]),
-        )
-        after_last_frame = (result.end_times > last) & (values_found.status == int(Status.RUPTURED))
-        status, ends = (
-            np.where(after_last_frame, int(Status.COMPLETE), values_found.status),
-            np.minimum(values_found.end_times, last),
-        )
+        result = self._integrate(law, theta, [own.test for own in levels], sensitivities)
+        prediction = self._observed_prediction(law, histories, result)
+        last = np.array([h.times[-1] for h in histories])
+        after_last_frame = (result.end_times > last) & (prediction.status == int(Status.RUPTURED))
         return replace(
-            values_found, status=status, end_times=ends, times_to_strain=predicted_life(histories, levels, result)
+            prediction,
+            status=np.where(after_last_frame, int(Status.COMPLETE), prediction.status),
+            end_times=np.minimum(prediction.end_times, last),
+            times_to_strain=predicted_times_to_strain(histories, levels, result),
         )
 
     def modulus_derivative(self, result: Prediction, histories: Sequence[History], modulus_changes: Floats) -> Floats:
@@ -148,8 +141,10 @@ def _measured_creep_strain(history: History) -> Floats:
         return np.log1p(strain)
 
 
-def predicted_life(histories: Sequence[History], levels: Sequence[StrainLevels], result: Integration) -> TimesToStrain:
-    """Arrivals and ruptures on the axes of a prediction."""
+def predicted_times_to_strain(
+    histories: Sequence[History], levels: Sequence[StrainLevels], result: Integration
+) -> TimesToStrain:
+    """Times to the strains of frames, and to rupture, on the axes of a prediction."""
     candidates, longest = result.terminations.shape[0], max((h.times.size for h in histories), default=0)
     shape = candidates, len(histories), longest
     ruptured = result.status == int(Status.RUPTURED)

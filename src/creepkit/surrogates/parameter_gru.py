@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from creepkit.arrays import ArrayLike, Floats, Ints
+from creepkit.arrays import Floats, Ints
 from creepkit.errors import DatasetError, SurrogateError, nearest
 from creepkit.records import History, NuisanceValues, Prediction, Status
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
@@ -91,7 +91,7 @@ class ParameterGru:
         law, history_inputs = LawInputs(data.law), self._history_inputs(data)
         mask = np.asarray(np.isfinite(data.values).all(axis=-1))
         constants, series, domain_rows = _test_inputs(data, history_inputs, progress)
-        rows = law.input_rows(law.internal_rows(data.parameters))
+        rows = law.input_rows(data.law.to_internal(data.parameters))
         arrays = {
             "constants": np.concatenate([rows, constants], axis=1),
             "series": series,
@@ -166,10 +166,10 @@ def load_history_inputs(
 def base_outputs(data: Dataset, progress: ProgressCallback | None = None) -> Floats:
     """(n, frames) what the specimen's stand-in predicts of the first output; its last value after its end."""
     reduced_model = screening_model_of(data.specimen)
-    base = np.empty(data.values.shape[:2])
+    base, theta = np.empty(data.values.shape[:2]), data.law.to_internal(data.parameters)
     for k in range(len(data)):
         plan = data.planned_test(k).replace(times=data.times(k))
-        prediction = reduced_model.predict(data.law, data.values_of(k), [plan])
+        prediction = reduced_model.predict(data.law, theta[k : k + 1], [plan])
         base[k] = hold_last_value(prediction.values[0, 0, :, prediction.outputs.index(data.outputs[0])])
         if progress is not None:
             progress("base", k + 1, len(data), "")
@@ -259,21 +259,21 @@ class ParameterSurrogate(Surrogate):
     def predict(
         self,
         law: CreepLaw,
-        values: Mapping[str, ArrayLike],
+        theta: Floats,
         histories: Sequence[History],
         *,
-        jacobian: bool = False,
         nuisances: NuisanceValues | None = None,
+        sensitivities: bool = False,
     ) -> Prediction:
         """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
         nuisances = nuisances or {}
         check_applicable(self.metadata, histories, nuisances, self.nuisances)
-        parameters = complete_parameters(self.metadata.law, law, values, self._default_values)
+        complete_theta = complete_parameters(self.metadata.law, law, theta)
         frames = prediction_frames(self.metadata.grid, histories)
-        query = self._query(parameters, histories, frames, nuisances)
+        query = self._query(complete_theta, histories, frames, nuisances)
         positions = [self.metadata.law.names.index(name) for name in law.names]
         outputs = self._values(query)
-        derivatives = self._derivatives(query, positions) if jacobian and self.recipe.base == "none" else None
+        derivatives = self._derivatives(query, positions) if sensitivities and self.recipe.base == "none" else None
         return self._prediction(query, histories, frames, outputs, derivatives, tuple(nuisances))
 
     # ---- what the network is asked ---------------------------------------------------------------------------------
@@ -287,11 +287,6 @@ class ParameterSurrogate(Surrogate):
         return LawInputs(self.metadata.law)
 
     @cached_property
-    def _default_values(self) -> dict[str, float]:
-        """Values of parameters whose term is switched off: any will do, the middle of the bounds is inside."""
-        return {name: param.center for name, param in self.metadata.law.table.items()}
-
-    @cached_property
     def _double_precision(self) -> ParameterModule:
         """The network in float64: derivatives by differences need the digits."""
         module = copy.deepcopy(self.module).double()
@@ -300,12 +295,11 @@ class ParameterSurrogate(Surrogate):
 
     def _query(
         self,
-        values: Mapping[str, Any],
+        theta: Floats,
         histories: Sequence[History],
         frames: Sequence[Floats],
         nuisances: NuisanceValues,
     ) -> NetworkQuery:
-        theta = self._law_inputs.internal(values)
         count = max([len(theta), *(len(v) for v in nuisances.values())])
         theta = np.broadcast_to(theta, (count, theta.shape[1]))
         nuisances = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in nuisances.items()}
@@ -318,19 +312,17 @@ class ParameterSurrogate(Surrogate):
             law_rows=self._law_inputs.input_rows(theta),
             constants=np.stack([numbers for numbers, _ in perturbed], axis=1),
             series=np.stack([self._history_inputs.series_values(h, t) for h, t in zip(histories, frames, strict=True)]),
-            base=self._base(values, histories, frames, nuisances, count) if self.recipe.base != "none" else None,
+            base=self._base(theta, histories, frames, nuisances) if self.recipe.base != "none" else None,
             derivatives={kind: np.stack([slopes[kind] for _, slopes in perturbed], axis=1) for kind in nuisances},
         )
 
     def _base(
-        self, values: Mapping[str, Any], histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues,
-        count: int,
-    ) -> Floats:  # fmt: skip
-        """(candidates, tests, frames) what the specimen's stand-in predicts of the first output."""
+        self, theta: Floats, histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues
+    ) -> Floats:
+        """(candidates, tests, frames) what the specimen's reduced-order model predicts of the first output."""
         tests = [h.replace(times=t, outputs={}) for h, t in zip(histories, frames, strict=True)]
-        prediction = screening_model_of(self.specimen).predict(self.metadata.law, values, tests, nuisances=nuisances)
-        first = hold_last_value(prediction.values[..., prediction.outputs.index(self.outputs[0])])
-        return np.broadcast_to(first, (count, *first.shape[1:]))
+        prediction = screening_model_of(self.specimen).predict(self.metadata.law, theta, tests, nuisances=nuisances)
+        return hold_last_value(prediction.values[..., prediction.outputs.index(self.outputs[0])])
 
     # ---- what it answers -------------------------------------------------------------------------------------------
 

@@ -211,18 +211,6 @@ class LawInputs:
         """(parameters,) what a column grows by with its internal parameter."""
         return np.array([1.0 / LN10 if p.scale == "log" else 1.0 for p in self.law.params.values()])
 
-    def internal(self, values: Mapping[str, Any]) -> Floats:
-        """(candidates, parameters) internal, from the author's values; 0 of a coefficient is -inf."""
-        columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[n], float)) for n in self.law.names))
-        return self.internal_rows(np.stack(columns, axis=-1))
-
-    def internal_rows(self, parameters: Floats) -> Floats:
-        """(rows, parameters) internal, from the author's."""
-        theta, on_log_scale = np.array(parameters, float), [p.scale == "log" for p in self.law.params.values()]
-        with np.errstate(divide="ignore"):
-            theta[:, on_log_scale] = np.log(theta[:, on_log_scale])
-        return theta
-
     def input_rows(self, theta: Floats) -> Floats:
         """(rows, columns) of internal parameters (rows, parameters)."""
         off = np.isneginf(theta)
@@ -238,17 +226,22 @@ class LawInputs:
         return derivatives
 
 
-def complete_parameters(
-    trained: CreepLaw, law: CreepLaw, values: Mapping[str, Any], defaults: Mapping[str, float]
-) -> dict[str, Any]:
-    """Values of the trained law that make it `law` with `values`; SurrogateError where it cannot be that law.
+def complete_parameters(trained: CreepLaw, law: CreepLaw, theta: Floats) -> Floats:
+    """Internal values of the trained law that make it `law` at `theta`; SurrogateError where it cannot be that law.
 
-    Terms that `law` lacks are switched off by their coefficients; what else they have stands at `middle`, where it
-    changes nothing.
+    Terms that `law` lacks are switched off by their coefficients; what else they have stands at the middle of its
+    bounds, where it changes nothing.
+
+    theta : (candidates, parameters of `law`). Returns (candidates, parameters of the trained law).
     """
     zero_names = _zero_coefficients(trained, law)
-    missing = {name: 0.0 if name in zero_names else defaults[name] for name in trained.names if name not in law.names}
-    return {**{name: np.asarray(values[name], float) for name in law.names}, **missing}
+    columns = []
+    for name, param in trained.table.items():
+        if name in law.names:
+            columns.append(theta[:, law.names.index(name)])
+        else:
+            columns.append(np.full(len(theta), param.to_internal(0.0 if name in zero_names else param.center)))
+    return np.stack(columns, axis=-1)
 
 
 @lru_cache(maxsize=256)

@@ -6,7 +6,7 @@ The reduced-order model of the dimple follows a law along a reference path. At e
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
@@ -16,7 +16,7 @@ import torch
 from torch import Tensor
 
 from creepkit import kernels
-from creepkit.arrays import ArrayLike, Bools, Floats
+from creepkit.arrays import Bools, Floats
 from creepkit.errors import DatasetError, SurrogateError
 from creepkit.records import History, NuisanceValues, Prediction, Status
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
@@ -37,10 +37,6 @@ from creepkit.surrogates.surrogate import Surrogate, check_applicable, check_his
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
-    from creepkit.surrogates.surrogate import Surrogate
-
-
-if TYPE_CHECKING:
     from creepkit.language import CreepLaw
 
 
@@ -104,7 +100,7 @@ class RateNet:
         """Tensors of a data set: inputs and base at nodes, weights of frames, targets and masks."""
         specimen = bulge_of(data)
         law = kernels.lower(data.law, "numba")
-        theta = law.to_internal(dict(zip(data.parameter_names, data.parameters.T, strict=True)))
+        theta = data.law.to_internal(data.parameters)
         trajectories = []
         for row in range(len(data)):
             trajectories.append(
@@ -233,24 +229,23 @@ class RateSurrogate(Surrogate):
     def predict(
         self,
         law: CreepLaw,
-        values: Mapping[str, ArrayLike],
+        theta: Floats,
         histories: Sequence[History],
         *,
-        jacobian: bool = False,
         nuisances: NuisanceValues | None = None,
+        sensitivities: bool = False,
     ) -> Prediction:
         """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
         nuisances = nuisances or {}
         check_applicable(self.metadata, histories, nuisances, self.nuisances)
         specimen, compiled = self.specimen, kernels.lower(law, "numba")
         assert isinstance(specimen, Bulge)
-        theta = compiled.to_internal(values)
         count = max([len(theta), *(len(v) for v in nuisances.values())])
         theta = np.broadcast_to(theta, (count, theta.shape[1]))
         nuisances = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in nuisances.items()}
         threads = specimen.threads or len(os.sched_getaffinity(0))
         trajectories = simulate_trajectories(
-            specimen, compiled, theta, histories, nuisances=nuisances, factors=self.recipe.factors, exact=jacobian,
+            specimen, compiled, theta, histories, nuisances=nuisances, factors=self.recipe.factors, exact=sensitivities,
             threads=threads,
         )  # fmt: skip
         return self._prediction(trajectories, histories, theta.shape[1], nuisances, threads)

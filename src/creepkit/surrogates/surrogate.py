@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 import numpy as np
 from torch import Tensor
 
-from creepkit.arrays import ArrayLike, Floats
+from creepkit.arrays import Floats
 from creepkit.errors import SurrogateError
 from creepkit.files import safetensors_files
 from creepkit.language.law_codec import law_to_json
-from creepkit.records import History, NuisanceValues, Prediction, Predictor, Specimen
+from creepkit.records import History, NuisanceValues, Prediction, Predictor, Specimen, SupportsReducedOrderModel
 from creepkit.sampling.conditions import TimeGrid, test_kind
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.specimen import Bulge
@@ -23,15 +23,8 @@ from creepkit.specimens.documents import specimen_to_json
 from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, SurrogateModule, Training
 
 if TYPE_CHECKING:
-    from creepkit.language import CreepLaw
-    from creepkit.records import Specimen
-
-
-if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
     from creepkit.language import CreepLaw
-    from creepkit.records import Specimen
-    from creepkit.sampling.conditions import TimeGrid
 
 
 CONTROLLED_QUANTITY = {"bulge": "pressure", "uniaxial": "stress"}
@@ -108,13 +101,13 @@ def interpolation_weights(frames: Floats, times: Floats) -> Floats:
 
 def observed_outputs(specimen: Specimen, history: History, values: Floats) -> Floats:
     """What a history's instrument shows, (candidates, times, outputs): of a bar's creep strain, its own measure."""
-    observe: Any = getattr(specimen, "shown", None)
+    observe: Any = getattr(specimen, "observed_output", None)
     return values if observe is None else np.asarray(observe(history, values[..., 0]))[..., None]
 
 
 def observation_derivative(specimen: Specimen, history: History, values: Floats) -> Floats:
     """Derivative of what is shown to what the network gives, (candidates, times, outputs)."""
-    derivative: Any = getattr(specimen, "slope", None)
+    derivative: Any = getattr(specimen, "output_derivative", None)
     return np.ones_like(values) if derivative is None else np.asarray(derivative(history, values[..., 0]))[..., None]
 
 
@@ -154,11 +147,11 @@ class Surrogate(ABC):
     def predict(
         self,
         law: CreepLaw,
-        values: Mapping[str, ArrayLike],
+        theta: Floats,
         histories: Sequence[History],
         *,
-        jacobian: bool = False,
         nuisances: NuisanceValues | None = None,
+        sensitivities: bool = False,
     ) -> Prediction:
         """Predict each history's outputs at its times; see records.Predictor.
 
@@ -174,10 +167,11 @@ class Surrogate(ABC):
         outputs = self.metadata.metrics.get("outputs", {})
         return {name: 1.2533 * float(errors["mae"]) for name, errors in outputs.items() if "mae" in errors}
 
-    def screening(self) -> Predictor:
-        """A stand-in for searches: that of the specimen, if it has one, else the network itself."""
-        screening_model = getattr(self.specimen, "reduced_order_model", None)
-        return self if screening_model is None else screening_model()
+    def reduced_order_model(self) -> Predictor:
+        """A model for global searches: that of the specimen, if it has one, else the network itself."""
+        if isinstance(self.specimen, SupportsReducedOrderModel):
+            return self.specimen.reduced_order_model()
+        return self
 
     def applies_to(self, specimen: object, histories: Sequence[History]) -> bool:
         """Whether it was trained on this specimen, but for its apex thickness and threads, and knows such histories."""

@@ -1,7 +1,7 @@
 """The verbs, with plugins and predictors made for the occasion."""
 
 import pickle
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -51,9 +51,9 @@ class Steady:
         self.status, self.end = status, end
 
     def predict(
-        self, law: ck.CreepLaw, values: Mapping[str, float], histories: Sequence[History], *, jacobian: bool = False
+        self, law: ck.CreepLaw, theta: np.ndarray, histories: Sequence[History], *, sensitivities: bool = False
     ) -> Prediction:
-        times = histories[0].times
+        times, values = histories[0].times, law.from_internal(theta[0])
         stress = histories[0].loading.program().at(times)
         strain = np.where(times <= self.end, values["A"] * stress ** values["n"] * times, np.nan)
         return Prediction(

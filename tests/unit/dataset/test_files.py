@@ -64,8 +64,8 @@ def test_a_failed_sample_is_data_with_its_text(data):
 def test_a_sample_that_does_not_converge_at_all_has_failed(tmp_path):
     @dataclass(frozen=True)
     class Stuck(type(BAR)):
-        def predict(self, law, values, histories):
-            found = super().predict(law, values, histories)
+        def predict(self, law, theta, histories):
+            found = super().predict(law, theta, histories)
             nothing = np.full_like(found.values, np.nan)
             return replace(found, values=nothing, status=found.status + 2, end_times=found.end_times * 0)
 

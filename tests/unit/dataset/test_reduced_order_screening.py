@@ -105,7 +105,7 @@ def test_whether_samples_are_screened_decides_what_a_campaign_is(tmp_path):
 class Misled:
     """A stand-in that a law of a plugin makes fail."""
 
-    def predict(self, law, values, histories):
+    def predict(self, law, theta, histories):
         raise ZeroDivisionError("of no use")
 
 
@@ -113,7 +113,7 @@ class Misled:
 class Fragile(type(ck.specimen("uniaxial"))):
     """A bar with a stand-in that fails."""
 
-    def screening(self):
+    def reduced_order_model(self):
         return Misled()
 
 

@@ -132,7 +132,7 @@ def test_a_failed_test_predicts_nothing_after_its_end() -> None:
         specimen="bulge", elastic=Elastic(E=150e3),
     )  # fmt: skip
     found = Bulge(refinement=0.5, threads=1, deflection_limit=0.5).predict(
-        NORTON, {"A": np.array([1e-13, 1e-11, 1e-5]), "n": np.array([3.0, 3.0, 8.0])}, [test]
+        NORTON, NORTON.to_internal({"A": np.array([1e-13, 1e-11, 1e-5]), "n": np.array([3.0, 3.0, 8.0])}), [test]
     )
     assert found.status[:, 0].tolist() == [Status.COMPLETE, Status.RUPTURED, Status.RUPTURED]
     for c in range(3):

@@ -29,8 +29,8 @@ class Stranger:
     name: str = "stranger"
     outputs: tuple[str, ...] = ("strain",)
 
-    def predict(self, law, values, histories, *, jacobian=False, nuisances=None):
-        found = BAR.predict(law, values, histories, jacobian=jacobian, nuisances=nuisances)
+    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+        found = BAR.predict(law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)
         status, ends = np.full_like(found.status, int(self.status)), np.full(found.end_times.shape, 3600.0)
         return replace(found, values=found.values + self.more, status=status, end_times=ends)
 

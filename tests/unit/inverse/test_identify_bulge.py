@@ -167,7 +167,7 @@ def test_weights_minimise_the_weighted_relative_error(tests):
     fit = identify(LAW, tests, EXACT, settings=replace(QUICK, frames=24, weights=weights, nuisances=()))
 
     def loss(u):
-        found = EXACT.predict(LAW, fit.coordinates.values(u), tests)
+        found = EXACT.predict(LAW, LAW.to_internal(fit.coordinates.values(u)), tests)
         return sum(
             w * relative_squared_error([h.outputs[o] for h in tests], [found.of(t)[:, k] for t in range(len(tests))])
             for k, (o, w) in enumerate(weights.items())
@@ -298,7 +298,7 @@ def test_nuisances_that_a_predictor_does_not_know_are_refused(tests):
     with pytest.raises(FitError, match="nuisance 'thickness' means nothing to the predictor of these histories"):
         identify(LAW, tests, simple, settings=WITH_THICKNESS)
     with pytest.raises(SolveError, match="does not know the nuisance 'thickness'"):
-        simple.predict(LAW, TRUTH, tests, nuisances={"thickness": np.full((1, len(tests)), 0.5)})
+        simple.predict(LAW, LAW.to_internal(TRUTH), tests, nuisances={"thickness": np.full((1, len(tests)), 0.5)})
 
 
 def test_histories_without_a_predicted_output_or_growth_are_refused(tests):

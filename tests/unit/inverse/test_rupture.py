@@ -38,10 +38,10 @@ def campaign(law, values, stresses, seed, stopped=()):
     rng, tests = np.random.default_rng(seed), []
     for k, stress in enumerate(stresses):
         plan = History(f"t{k}", np.array([1e8]), {}, constant_stress(stress), 1000.0, strain_measure="engineering")
-        life = float(BAR.predict_to_rupture(law, values, [plan]).times_to_strain.rupture_times[0, 0])
+        life = float(BAR.predict_to_rupture(law, law.to_internal(values), [plan]).times_to_strain.rupture_times[0, 0])
         own, rate = (np.exp(SCATTER[name] * rng.standard_normal()) for name in ("life", "rate"))
         times = life * (SHARES[SHARES < 0.5] if k in stopped else SHARES[life * SHARES < life * own])
-        strain = BAR.predict(law, values, [plan.replace(times=times)]).of(0)[:, 0]
+        strain = BAR.predict(law, law.to_internal(values), [plan.replace(times=times)]).of(0)[:, 0]
         strain = strain + SCATTER["noise"] * rng.standard_normal(times.size)
         end = {"unruptured": True} if k in stopped else {"rupture_time": life * own / rate}
         tests.append(plan.replace(times=times / rate, outputs={"strain": strain}, **end))
@@ -81,7 +81,7 @@ def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
     law, values, _, fit = planted
     stresses = np.array([50.0, 80.0, 130.0])
     plans = [History(f"{s}", np.array([1e8]), {}, constant_stress(s), 1000.0) for s in stresses]
-    truth = BAR.predict_to_rupture(law, values, plans).times_to_strain.rupture_times[0]
+    truth = BAR.predict_to_rupture(law, law.to_internal(values), plans).times_to_strain.rupture_times[0]
     time, less, more = fit.rupture_time(stresses, 1000.0)
     assert ((less < truth) & (truth < more)).all()
     np.testing.assert_allclose(time, truth, rtol=0.35)
@@ -215,8 +215,10 @@ def test_bars_are_followed_to_rupture_beside_tests_that_are_not():
     )  # fmt: skip
     both = CompositePredictor({"uniaxial": BAR, "relaxation": Relaxation()})
     given = {name: np.array([value]) for name, value in values.items()}
-    found = predict_to_rupture(both, law, given, [bars[0], held, bars[1]], jacobian=True).times_to_strain
-    alone = BAR.predict_to_rupture(law, given, bars, jacobian=True).times_to_strain
+    found = predict_to_rupture(
+        both, law, law.to_internal(given), [bars[0], held, bars[1]], sensitivities=True
+    ).times_to_strain
+    alone = BAR.predict_to_rupture(law, law.to_internal(given), bars, sensitivities=True).times_to_strain
     np.testing.assert_array_equal(found.rupture_times[0, [0, 2]], alone.rupture_times[0])
     for name in ("arrivals", "slopes", "arrival_jacobian"):
         joined, own = (getattr(life, name)[0] for life in (found, alone))

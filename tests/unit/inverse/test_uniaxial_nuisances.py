@@ -25,24 +25,26 @@ def bar(stress=60.0, temperature=1050.0, includes_elastic=True):
 
 
 def test_a_warmer_bar_is_a_bar_at_that_temperature():
-    warmer = BAR.predict(LAW, VALUES, [bar()], nuisances={"temperature": np.array([[7.0]])})
-    np.testing.assert_allclose(warmer.values, BAR.predict(LAW, VALUES, [bar(temperature=1057.0)]).values, rtol=1e-12)
+    warmer = BAR.predict(LAW, LAW.to_internal(VALUES), [bar()], nuisances={"temperature": np.array([[7.0]])})
+    np.testing.assert_allclose(
+        warmer.values, BAR.predict(LAW, LAW.to_internal(VALUES), [bar(temperature=1057.0)]).values, rtol=1e-12
+    )
 
 
 def test_a_stiffer_bar_has_less_elastic_strain():
     """60 MPa over 120 GPa is 5e-4; with a modulus 25 % larger 4e-4."""
-    plain = BAR.predict(LAW, VALUES, [bar()]).values
-    stiffer = BAR.predict(LAW, VALUES, [bar()], nuisances={"modulus": np.array([[0.25]])}).values
+    plain = BAR.predict(LAW, LAW.to_internal(VALUES), [bar()]).values
+    stiffer = BAR.predict(LAW, LAW.to_internal(VALUES), [bar()], nuisances={"modulus": np.array([[0.25]])}).values
     np.testing.assert_allclose(plain - stiffer, 1e-4, rtol=1e-9)
 
 
 def test_derivatives_are_those_of_differences():
     nuisances = {"temperature": np.array([[3.0, -2.0]]), "modulus": np.array([[0.1, 0.2]])}
     tests = [bar(), bar(80.0, 1030.0)]
-    found = BAR.predict(LAW, VALUES, tests, nuisances=nuisances, jacobian=True)
+    found = BAR.predict(LAW, LAW.to_internal(VALUES), tests, nuisances=nuisances, sensitivities=True)
     for kind, step in (("temperature", 0.5), ("modulus", 1e-3)):
         up, down = (
-            BAR.predict(LAW, VALUES, tests, nuisances={**nuisances, kind: nuisances[kind] + s}).values
+            BAR.predict(LAW, LAW.to_internal(VALUES), tests, nuisances={**nuisances, kind: nuisances[kind] + s}).values
             for s in (step, -step)
         )
         np.testing.assert_allclose(found.nuisance_jacobian[kind], (up - down) / (2 * step), rtol=2e-3)
@@ -51,17 +53,17 @@ def test_derivatives_are_those_of_differences():
 def test_candidates_may_differ_in_their_effects():
     values = {"A": np.array([1e-16, 2e-16]), "n": 5.2, "Q": 350e3}
     nuisances = {"temperature": np.array([[5.0], [-5.0]])}
-    both = BAR.predict(LAW, values, [bar()], nuisances=nuisances, jacobian=True)
+    both = BAR.predict(LAW, LAW.to_internal(values), [bar()], nuisances=nuisances, sensitivities=True)
     for k, A in enumerate(values["A"]):
         own = {"temperature": nuisances["temperature"][k][None]}
-        one = BAR.predict(LAW, {**VALUES, "A": A}, [bar()], nuisances=own, jacobian=True)
+        one = BAR.predict(LAW, LAW.to_internal({**VALUES, "A": A}), [bar()], nuisances=own, sensitivities=True)
         np.testing.assert_allclose(both.values[k], one.values[0], rtol=1e-10)
         np.testing.assert_allclose(both.nuisance_jacobian["temperature"][k], one.nuisance_jacobian["temperature"][0])
 
 
 def test_what_a_bar_does_not_know_is_refused():
     with pytest.raises(SolveError, match="does not know the nuisance 'thickness'; it knows temperature and modulus"):
-        BAR.predict(LAW, VALUES, [bar()], nuisances={"thickness": np.array([[0.5]])})
+        BAR.predict(LAW, LAW.to_internal(VALUES), [bar()], nuisances={"thickness": np.array([[0.5]])})
 
 
 def test_planted_temperature_errors_are_found():
@@ -71,7 +73,9 @@ def test_planted_temperature_errors_are_found():
     conditions = [(s, T) for s in (40.0, 60.0, 80.0) for T in (1020.0, 1050.0, 1080.0)]
     for (stress, T), shift in zip(conditions, off, strict=True):
         plan = bar(stress, T, includes_elastic=False)
-        strain = BAR.predict(LAW, VALUES, [plan], nuisances={"temperature": np.array([[shift]])}).values[0, 0, :, 0]
+        strain = BAR.predict(
+            LAW, LAW.to_internal(VALUES), [plan], nuisances={"temperature": np.array([[shift]])}
+        ).values[0, 0, :, 0]
         tests.append(plan.replace(outputs={"strain": strain + rng.normal(0, 1e-6, TIMES.size)}))
     settings = IdentificationSettings(starts=1, sobol_points=8, nuisances=(Nuisance("temperature", sd=4.0),))
     fit = identify(LAW.fix(A=VALUES["A"], Q=VALUES["Q"]), tests, BAR, settings=settings)

@@ -21,7 +21,7 @@ TIMES = np.arange(1, 97) * 150.0
 class ElasticDimple:
     """Shows 749 mm x (1 + 830 x)^-.723 of amplitude, x = P/E: a published fit for the dimple of .5 mm thickness."""
 
-    def predict(self, law, values, histories, *, jacobian=False, nuisances=None):
+    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
         (history,) = histories
         x = history.loading.program().at(history.times) / history.elastic.E
         value = 749 * x * (1 + 830 * x) ** -0.723

@@ -161,7 +161,7 @@ def informative_share(design, specimen, samples):
         at = hold_times(test)
         times = np.union1d(test.times[::24], at)
         values = dict(zip(design.law.names, draws.parameters[row].tolist(), strict=True))
-        found = specimen.predict(design.law, values, [test.replace(times=times)])
+        found = specimen.predict(design.law, design.law.to_internal(values), [test.replace(times=times)])
         seen = found.of(0)
         end = SimulationOutcome(times, seen, seen[np.searchsorted(times, at)], Status(int(found.status[0, 0])), 0.0, {})
         good += all(c.passes(end) for c in design.criteria if c.stage == "after")

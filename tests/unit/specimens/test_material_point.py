@@ -31,7 +31,7 @@ def plan(loading, times=TIMES, **changes) -> History:
 
 
 def shown(loading, law=NORTON, values=VALUES, specimen=FINE, **changes):
-    found = specimen.predict(law, values, [plan(loading, **changes)])
+    found = specimen.predict(law, law.to_internal(values), [plan(loading, **changes)])
     return {name: found.of(0)[:, k] for k, name in enumerate(found.outputs)}
 
 
@@ -101,7 +101,7 @@ def test_brittle_rupture_follows_the_largest_principal_stress(loading, largest):
     """All have q = 100 MPa. (1 - w)^(v+1) = 1 - (v+1) C s_1^v t: torsion lives 9 times as long as tension (v = 4)."""
     end = (1 - 0.01**5) / (5 * 1e-13 * largest**4) if largest else np.inf
     times = np.array([1e3, 1e4, 1e6])
-    found = FINE.predict(KACHANOV, BRITTLE, [plan(loading, times=times)])
+    found = FINE.predict(KACHANOV, KACHANOV.to_internal(BRITTLE), [plan(loading, times=times)])
     ruptured = largest > 0
     assert found.status[0, 0] == (Status.RUPTURED if ruptured else Status.COMPLETE)
     if ruptured:
@@ -133,7 +133,7 @@ class TestRoutes:
         loading = PointLoading(stress={c: [(t, s * f) for t, f in self.STEPS] for c, s in {"11": 60, "12": 40}.items()})
         test, values = plan(loading, times=np.linspace(0.0, 1e4, 11)), VALUES if law is NORTON else BRITTLE
         assert proportional_loading(loading, 1e4) is not None
-        found = FINE.predict(law, values, [test], jacobian=True)
+        found = FINE.predict(law, law.to_internal(values), [test], sensitivities=True)
         run = FINE.run(law, values, test)
         np.testing.assert_allclose(found.of(0)[:, 0], run.equivalent, rtol=1e-5)
         np.testing.assert_allclose(found.of(0)[:, 1:7], run.creep_strain, rtol=1e-5, atol=1e-12)
@@ -158,11 +158,14 @@ class TestRoutes:
         loading = PointLoading(strain={name: [(0.0, 5e-4), (2e3, 8e-4)]})
         test = plan(loading, times=np.linspace(0.0, 1e4, 6), includes_elastic=True)
         assert proportional_loading(loading, 1e4, (E, NU)) is not None
-        found, run = FINE.predict(KACHANOV, BRITTLE, [test], jacobian=True), FINE.run(KACHANOV, BRITTLE, test)
+        found, run = (
+            FINE.predict(KACHANOV, KACHANOV.to_internal(BRITTLE), [test], sensitivities=True),
+            FINE.run(KACHANOV, BRITTLE, test),
+        )
         np.testing.assert_allclose(found.of(0)[:, 1:7], run.total_strain, rtol=1e-6, atol=1e-10)
         np.testing.assert_allclose(found.of(0)[:, 7:], run.stress, rtol=1e-5, atol=1e-6)
         steps = [{**BRITTLE, "n": 4.0 + s} for s in (1e-4, -1e-4)]
-        up, down = (FINE.predict(KACHANOV, values, [test]).of(0) for values in steps)
+        up, down = (FINE.predict(KACHANOV, KACHANOV.to_internal(values), [test]).of(0) for values in steps)
         assert found.jacobian is not None
         exact, difference = found.jacobian[0, 0, :, :, 1], (up - down) / 2e-4
         scale = np.abs(exact).max(axis=0) + 1e-12
@@ -171,7 +174,7 @@ class TestRoutes:
     def test_differences_are_the_derivatives(self):
         """Two segments of constant stress, creep along each: d(strain)/d(ln A) = strain, to n the sum of p ln q."""
         loading = PointLoading(stress={"11": 60, "12": [(0.0, 0.0), (5e3, 40.0)]})
-        found = FINE.predict(NORTON, VALUES, [plan(loading, times=[1e4])], jacobian=True)
+        found = FINE.predict(NORTON, NORTON.to_internal(VALUES), [plan(loading, times=[1e4])], sensitivities=True)
         q = np.array([60.0, np.sqrt(60.0**2 + 3 * 40.0**2)])
         p = 1e-14 * q**4 * 5e3
         assert found.jacobian is not None
@@ -231,7 +234,7 @@ def test_frames_and_rows_of_programmes_do_not_use_up_the_steps():
     """Every frame ends a step of a stress that turns: the cap is on what the law needs beside them."""
     turning = PointLoading(stress={"11": 60.0, "12": [(0.0, 0.0), (5e3, 35.0)]})
     test = plan(turning, times=np.linspace(0.0, 1e4, 101))
-    found = MaterialPoint(max_steps=10).predict(NORTON, VALUES, [test])
+    found = MaterialPoint(max_steps=10).predict(NORTON, NORTON.to_internal(VALUES), [test])
     assert found.status[0, 0] == Status.COMPLETE
     later = (60.0**2 + 3 * 35.0**2) ** 2
     assert found.of(0)[-1, 0] == pytest.approx(1e-14 * 5e3 * (60.0**4 + later), rel=1e-4)

@@ -22,7 +22,7 @@ def test_arrivals_and_rupture_of_mpc_omega():
     """e = -ln(1 - m r t)/m with r = A s^n: strain e at (1 - exp(-m e))/(m r), 1 being the strain limit."""
     values = {"A": 1e-12, "n": 3.0, "m": 20.0}
     rate, m = 1e-12 * 80.0**3, 20.0
-    life = FINE.predict_to_rupture(OMEGA, values, [bar()], jacobian=True).times_to_strain
+    life = FINE.predict_to_rupture(OMEGA, OMEGA.to_internal(values), [bar()], sensitivities=True).times_to_strain
     expected = (1 - np.exp(-m * STRAINS)) / (m * rate)
     expected[5] = (1 - np.exp(-m)) / (m * rate)  # no strain to arrive at: its rupture
     np.testing.assert_allclose(life.times[0, 0], expected, rtol=1e-6, atol=1e-300)
@@ -39,7 +39,9 @@ def test_arrivals_and_rupture_of_mpc_omega():
 def test_damage_ends_at_the_limit_of_the_state():
     """dw/dt = B s^k/(1-w)^r from 0 to 0.99: t = (1 - 0.01^(1+r))/((1+r) B s^k), whatever the strain does."""
     values = {"A": 1e-16, "n": 4.0, "B": 1e-15, "k": 3.5, "r": 4.0}
-    found = FINE.predict_to_rupture(KACHANOV, values, [bar(times=np.geomspace(1e3, 3e7, 6))], jacobian=True)
+    found = FINE.predict_to_rupture(
+        KACHANOV, KACHANOV.to_internal(values), [bar(times=np.geomspace(1e3, 3e7, 6))], sensitivities=True
+    )
     expected = (1 - 0.01**5) / (5 * 1e-15 * 80.0**3.5)
     np.testing.assert_allclose(found.times_to_strain.rupture_times[0, 0], expected, rtol=1e-6)
     by_r = 0.01**5 * np.log(100.0) / (1 - 0.01**5) - 1 / 5
@@ -55,7 +57,7 @@ def test_norton_under_constant_load_runs_away(measure):
     values, strains = {"A": 1e-12, "n": 3.0}, STRAINS[1:5]
     shown = np.expm1(strains) if measure == "engineering" else strains
     test = bar(60.0, "load", shown, np.geomspace(1.0, 1e5, 4), strain_measure=measure)
-    life = FINE.predict_to_rupture(NORTON, values, [test]).times_to_strain
+    life = FINE.predict_to_rupture(NORTON, NORTON.to_internal(values), [test]).times_to_strain
     rate = 1e-12 * 60.0**3
     np.testing.assert_allclose(life.times[0, 0], (1 - np.exp(-3 * strains)) / (3 * rate), rtol=1e-6)
     stretch = np.exp(strains) if measure == "engineering" else 1.0
@@ -65,7 +67,7 @@ def test_norton_under_constant_load_runs_away(measure):
 
 
 def test_what_never_comes_is_not_a_number():
-    life = FINE.predict_to_rupture(NORTON, {"A": 1e-20, "n": 3.0}, [bar()]).times_to_strain
+    life = FINE.predict_to_rupture(NORTON, NORTON.to_internal({"A": 1e-20, "n": 3.0}), [bar()]).times_to_strain
     assert np.isnan(life.rupture_times).all()
     assert np.isnan(life.times[0, 0, 1:]).all()
     assert life.times[0, 0, 0] == 0.0
@@ -73,7 +75,9 @@ def test_what_never_comes_is_not_a_number():
 
 
 def test_what_breaks_at_once_breaks_at_a_time_that_has_a_logarithm():
-    life = FINE.predict_to_rupture(NORTON, {"A": 1e30, "n": 3.0}, [bar(control="load")], jacobian=True).times_to_strain
+    life = FINE.predict_to_rupture(
+        NORTON, NORTON.to_internal({"A": 1e30, "n": 3.0}), [bar(control="load")], sensitivities=True
+    ).times_to_strain
     assert life.rupture_times[0, 0] == pytest.approx(1e-12)
     assert (life.times[0, 0, 1:] <= 1e-12).all()
 
@@ -82,7 +86,8 @@ def test_the_rest_is_that_of_predict():
     """Following a bar further changes nothing about its frames, those lost in a burst included."""
     values = {"A": np.array([1e-12, 1e-9]), "n": 3.0, "m": 20.0}
     tests = [bar(), bar(40.0, times=np.linspace(1.0, 1e7, 6))]
-    plain, whole = (predict(OMEGA, values, tests) for predict in (FINE.predict, FINE.predict_to_rupture))
+    theta = OMEGA.to_internal(values)
+    plain, whole = (predict(OMEGA, theta, tests) for predict in (FINE.predict, FINE.predict_to_rupture))
     np.testing.assert_array_equal(plain.status, whole.status)
     np.testing.assert_allclose(plain.end_times, whole.end_times, rtol=1e-6)
     np.testing.assert_allclose(plain.values, whole.values, rtol=1e-6)
@@ -96,5 +101,5 @@ def test_a_load_program_is_followed_beyond_its_last_step():
     steps = StressSteps(((0.0, 60.0), (0.3 * life[60.0], 90.0)), "stress")
     plan = History("steps", np.array([1.0]), {}, steps, 1000.0)
     plan = plan.replace(times=np.array([0.4 * life[60.0]]))
-    found = FINE.predict_to_rupture(KACHANOV, values, [plan]).times_to_strain
+    found = FINE.predict_to_rupture(KACHANOV, KACHANOV.to_internal(values), [plan]).times_to_strain
     np.testing.assert_allclose(found.rupture_times[0, 0], 0.3 * life[60.0] + 0.7 * life[90.0], rtol=1e-6)

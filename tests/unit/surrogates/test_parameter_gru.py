@@ -71,7 +71,9 @@ def differences(model: Surrogate, data: Dataset, row: int, step: float = 1e-5) -
         for sign in (step, -step):
             internal = param.to_internal(values[name]) + sign
             ends.append(
-                model.predict(law, {**values, name: param.from_internal(internal)}, [data.planned_test(row)]).values
+                model.predict(
+                    law, law.to_internal({**values, name: param.from_internal(internal)}), [data.planned_test(row)]
+                ).values
             )
         out.append((ends[0] - ends[1]) / (2 * step))
     return np.stack(out, axis=-1)
@@ -81,7 +83,7 @@ def differences(model: Surrogate, data: Dataset, row: int, step: float = 1e-5) -
 @pytest.mark.parametrize("target", ["value", "log"])
 def test_jacobians_are_central_differences(tension: Dataset, cell: str, target: str) -> None:
     model = train(tension, ParameterGru(6, 2, cell=cell, target=target, training=BRIEF))
-    found = model.predict(tension.law, tension.values_of(4), [tension.planned_test(4)], jacobian=True)
+    found = model.predict(tension.law, tension.theta_of(4), [tension.planned_test(4)], sensitivities=True)
     numeric = differences(model, tension, 4)
     assert found.jacobian == pytest.approx(numeric, rel=1e-6, abs=1e-8 * np.abs(numeric).max())
     assert np.abs(numeric).max() > 1e-5
@@ -92,9 +94,12 @@ def test_effects_of_a_dimple_are_central_differences(bulging: Surrogate, plates:
     tests = [plates.planned_test(2), plates.planned_test(5)]
     at = {"modulus": np.array([[0.05, -0.1]]), "thickness": np.array([[0.5, 0.49]])}
     law, values = plates.law, plates.values_of(2)
-    found = bulging.predict(law, values, tests, jacobian=True, nuisances=at)
+    found = bulging.predict(law, law.to_internal(values), tests, sensitivities=True, nuisances=at)
     for kind, step in (("modulus", 1e-5), ("thickness", 1e-6)):
-        ends = [bulging.predict(law, values, tests, nuisances={**at, kind: at[kind] + s}).values for s in (step, -step)]
+        ends = [
+            bulging.predict(law, law.to_internal(values), tests, nuisances={**at, kind: at[kind] + s}).values
+            for s in (step, -step)
+        ]
         numeric = (ends[0] - ends[1]) / (2 * step)
         assert found.nuisance_jacobian[kind] == pytest.approx(numeric, rel=1e-5, abs=1e-6 * np.abs(numeric).max())
     assert found.jacobian is not None
@@ -105,8 +110,8 @@ def test_a_thickness_or_a_modulus_by_effect_is_that_of_another_history(bulging: 
     law, values, test = plates.law, plates.values_of(1), plates.planned_test(1)
     other = test.replace(geometry={"apex_thickness": 0.51}, elastic=ck.Elastic(1.1 * test.elastic.E), used=test.used)
     nuisances = {"thickness": np.array([[0.51]]), "modulus": np.array([[0.1]])}
-    by_effect = bulging.predict(law, values, [test], nuisances=nuisances).values
-    assert by_effect == pytest.approx(bulging.predict(law, values, [other]).values, rel=1e-12)
+    by_effect = bulging.predict(law, law.to_internal(values), [test], nuisances=nuisances).values
+    assert by_effect == pytest.approx(bulging.predict(law, law.to_internal(values), [other]).values, rel=1e-12)
 
 
 # ---- what the network sees -------------------------------------------------------------------------------------------
@@ -125,10 +130,10 @@ def test_slopes_of_inputs_are_central_differences() -> None:
 
 def test_a_coefficient_that_is_off_has_no_number_and_a_switch() -> None:
     inputs = LawInputs(ck.law("norton"))
-    rows = inputs.input_rows(inputs.internal({"A": np.array([0.0, 1e-12]), "n": np.array([4.0, 2.0])}))
+    rows = inputs.input_rows(inputs.law.to_internal({"A": np.array([0.0, 1e-12]), "n": np.array([4.0, 2.0])}))
     assert inputs.names == ("log10 A", "n", "A is off")
     assert rows == pytest.approx(np.array([[np.nan, 4.0, 1.0], [-12.0, 2.0, 0.0]]), nan_ok=True)
-    assert (inputs.derivatives(inputs.internal({"A": 0.0, "n": 4.0}))[0, :, 0] == 0).all()
+    assert (inputs.derivatives(inputs.law.to_internal({"A": 0.0, "n": 4.0}))[0, :, 0] == 0).all()
 
 
 def test_mean_loads_hold_the_time_of_the_jump() -> None:
@@ -145,10 +150,10 @@ def test_mean_loads_hold_the_time_of_the_jump() -> None:
 def test_candidates_and_tests_are_predicted_as_one_by_one(learnt: Surrogate, tension: Dataset) -> None:
     tests = [tension.planned_test(k) for k in (1, 2, 3)]
     values = {name: tension.parameters[[5, 6], k] for k, name in enumerate(tension.law.names)}
-    batch = learnt.predict(tension.law, values, tests).values
+    batch = learnt.predict(tension.law, tension.law.to_internal(values), tests).values
     for c, t in np.ndindex(2, 3):
         own = {name: column[c] for name, column in values.items()}
-        alone = learnt.predict(tension.law, own, [tests[t]]).values[0, 0]
+        alone = learnt.predict(tension.law, tension.law.to_internal(own), [tests[t]]).values[0, 0]
         assert batch[c, t] == pytest.approx(alone, rel=1e-12)
 
 
@@ -157,15 +162,15 @@ def test_frames_of_the_training_are_predicted_as_in_training(learnt: Surrogate, 
     with torch.no_grad():
         known = learnt.module({name: v[:4] for name, v in samples.items()}).numpy()
     for row in range(4):
-        found = learnt.predict(tension.law, tension.values_of(row), [tension.planned_test(row)])
+        found = learnt.predict(tension.law, tension.theta_of(row), [tension.planned_test(row)])
         assert found.values[0, 0] == pytest.approx(known[row], rel=1e-3, abs=1e-6)
 
 
 def test_between_frames_predictions_are_linear_and_short_tests_are_short(learnt: Surrogate, tension: Dataset) -> None:
     plan, values = tension.planned_test(0), tension.values_of(0)
-    frames = learnt.predict(tension.law, values, [plan]).values[0, 0, :, 0]
+    frames = learnt.predict(tension.law, tension.law.to_internal(values), [plan]).values[0, 0, :, 0]
     short = plan.replace(times=np.array([1800.0, 3600.0, 4500.0]))
-    found = learnt.predict(tension.law, values, [short, plan])
+    found = learnt.predict(tension.law, tension.law.to_internal(values), [short, plan])
     assert found.values[0, 0, :3, 0] == pytest.approx(
         [frames[:2].mean(), frames[1], 0.75 * frames[1] + 0.25 * frames[2]]
     )
@@ -175,9 +180,9 @@ def test_between_frames_predictions_are_linear_and_short_tests_are_short(learnt:
 
 def test_an_engineering_strain_with_its_elastic_part_is_shown_as_such(learnt: Surrogate, tension: Dataset) -> None:
     plan, values = tension.planned_test(0), tension.values_of(0)
-    plain = learnt.predict(tension.law, values, [plan], jacobian=True)
+    plain = learnt.predict(tension.law, tension.law.to_internal(values), [plan], sensitivities=True)
     other = replace(plan, strain_measure="engineering", includes_elastic=True, elastic=ck.Elastic(150e3))
-    found = learnt.predict(tension.law, values, [other], jacobian=True)
+    found = learnt.predict(tension.law, tension.law.to_internal(values), [other], sensitivities=True)
     elastic = plan.loading.program().at(plan.times) / 150e3
     assert found.values[0, 0, :, 0] == pytest.approx(np.expm1(plain.values[0, 0, :, 0]) + elastic, rel=1e-12)
     assert found.jacobian == pytest.approx(plain.jacobian * np.exp(plain.values)[..., None], rel=1e-12)
@@ -190,10 +195,10 @@ def test_a_grid_that_stretches_serves_tests_of_any_length() -> None:
     assert len(model.metadata.scaling["series"]) == 4
     assert model.metadata.metrics["loss"] < 0.1
     twenty_minutes = data.planned_test(0).replace(times=np.linspace(60.0, 1300.0, 5), loading=ck.constant_stress(100.0))
-    found = model.predict(data.law, data.values_of(0), [twenty_minutes])
+    found = model.predict(data.law, data.theta_of(0), [twenty_minutes])
     assert found.status[0, 0] == Status.COMPLETE
     week = twenty_minutes.replace(times=np.array([7 * 24 * HOURS]))
-    assert model.predict(data.law, data.values_of(0), [week]).status[0, 0] == Status.OUTSIDE_DOMAIN
+    assert model.predict(data.law, data.theta_of(0), [week]).status[0, 0] == Status.OUTSIDE_DOMAIN
 
 
 # ---- the domain ------------------------------------------------------------------------------------------------------
@@ -201,11 +206,11 @@ def test_a_grid_that_stretches_serves_tests_of_any_length() -> None:
 
 def test_training_rows_are_inside_and_others_are_flagged_with_values(learnt: Surrogate, tension: Dataset) -> None:
     status = [
-        learnt.predict(tension.law, tension.values_of(k), [tension.planned_test(k)]).status[0, 0] for k in range(20)
+        learnt.predict(tension.law, tension.theta_of(k), [tension.planned_test(k)]).status[0, 0] for k in range(20)
     ]
     assert np.mean(np.array(status) == Status.COMPLETE) >= 0.9
     steep = {**tension.values_of(0), "n": 9.0}
-    found = learnt.predict(tension.law, steep, [tension.planned_test(0)])
+    found = learnt.predict(tension.law, tension.law.to_internal(steep), [tension.planned_test(0)])
     assert found.status[0, 0] == Status.OUTSIDE_DOMAIN
     assert np.isfinite(found.values).all()
 
@@ -214,7 +219,7 @@ def test_loads_that_were_never_seen_are_flagged(learnt: Surrogate, tension: Data
     plan, values = tension.planned_test(0), tension.values_of(0)
     for steps in ([(0.0, 400.0)], [(0.0, 80.0), (9000.0, 140.0), (18000.0, 60.0), (27000.0, 140.0)]):
         odd = plan.replace(loading=ck.StressSteps(tuple(steps)))
-        assert learnt.predict(tension.law, values, [odd]).status[0, 0] == Status.OUTSIDE_DOMAIN
+        assert learnt.predict(tension.law, tension.law.to_internal(values), [odd]).status[0, 0] == Status.OUTSIDE_DOMAIN
 
 
 def test_the_noise_of_a_recorded_load_is_no_other_load(learnt: Surrogate, tension: Dataset) -> None:
@@ -222,11 +227,11 @@ def test_the_noise_of_a_recorded_load_is_no_other_load(learnt: Surrogate, tensio
     times = np.linspace(0.0, plan.times[-1], 500)
     noisy = plan.loading.program().at(times) * (1 + 2e-3 * np.random.default_rng(0).normal(size=500))
     record = plan.replace(loading=RecordedLoading(Program(times, noisy), "stress", "load"))
-    assert learnt.predict(tension.law, values, [record, plan]).status.tolist() == [[0, 0]]
+    assert learnt.predict(tension.law, tension.law.to_internal(values), [record, plan]).status.tolist() == [[0, 0]]
 
 
 def test_a_coefficient_switched_off_is_outside_where_training_had_none(learnt: Surrogate, tension: Dataset) -> None:
-    found = learnt.predict(tension.law, {"A": 0.0, "n": 4.0}, [tension.planned_test(0)])
+    found = learnt.predict(tension.law, tension.law.to_internal({"A": 0.0, "n": 4.0}), [tension.planned_test(0)])
     assert found.status[0, 0] == Status.OUTSIDE_DOMAIN
     assert np.isfinite(found.values).all()
 
@@ -237,7 +242,7 @@ def test_a_thickness_that_was_not_varied_is_guarded(plates: Dataset) -> None:
     assert model.nuisances == ("modulus",)
     test = fixed.planned_test(0)
     thin = test.replace(geometry={"apex_thickness": 0.47}, used=test.used)
-    assert model.predict(fixed.law, fixed.values_of(0), [test, thin]).status.tolist() == [[0, 3]]
+    assert model.predict(fixed.law, fixed.theta_of(0), [test, thin]).status.tolist() == [[0, 3]]
 
 
 # ---- other laws, other tests -----------------------------------------------------------------------------------------
@@ -258,9 +263,14 @@ def test_a_reduction_of_the_law_is_the_law_with_its_terms_off(two_terms: tuple[S
     alone = data.law.only("power law")
     values = data.values_of(0)
     whole = model.predict(
-        data.law, {**values, "A_2": 0.0, "n_2": 4.5, "m": -0.5}, [data.planned_test(0)], jacobian=True
+        data.law,
+        data.law.to_internal({**values, "A_2": 0.0, "n_2": 4.5, "m": -0.5}),
+        [data.planned_test(0)],
+        sensitivities=True,
     )
-    found = model.predict(alone, {n: values[n] for n in alone.names}, [data.planned_test(0)], jacobian=True)
+    found = model.predict(
+        alone, alone.to_internal({n: values[n] for n in alone.names}), [data.planned_test(0)], sensitivities=True
+    )
     assert found.jacobian.shape[-1] == 2
     assert found.values[0, 0, -1, 0] == pytest.approx(whole.values[0, 0, -1, 0], rel=0.5)
     assert (whole.jacobian[..., 2] == 0).all()
@@ -269,7 +279,9 @@ def test_a_reduction_of_the_law_is_the_law_with_its_terms_off(two_terms: tuple[S
 def test_another_law_is_refused(learnt: Surrogate, tension: Dataset) -> None:
     law = ck.law("time-hardening")
     with pytest.raises(SurrogateError, match="a surrogate of law 'norton' cannot predict law 'time-hardening'"):
-        learnt.predict(law, {name: p.center for name, p in law.table.items()}, [tension.planned_test(0)])
+        learnt.predict(
+            law, law.to_internal({name: p.center for name, p in law.table.items()}), [tension.planned_test(0)]
+        )
 
 
 def test_other_kinds_of_tests_are_refused(
@@ -287,9 +299,9 @@ def test_other_kinds_of_tests_are_refused(
     ]  # fmt: skip
     for model, data, history, told in cases:
         with pytest.raises(SurrogateError, match=told):
-            model.predict(data.law, data.values_of(0), [history])
+            model.predict(data.law, data.theta_of(0), [history])
     with pytest.raises(SurrogateError, match="does not know the nuisance 'window'; it knows modulus, thickness"):
-        bulging.predict(plates.law, plates.values_of(0), [plate], nuisances={"window": np.ones((1, 1))})
+        bulging.predict(plates.law, plates.theta_of(0), [plate], nuisances={"window": np.ones((1, 1))})
 
 
 @pytest.mark.parametrize(
@@ -318,7 +330,7 @@ def test_a_few_dimples_are_learnt_and_the_file_predicts_the_same(bulging: Surrog
     assert bulging.outputs == ("amplitude", "width", "shape")
     again = load_surrogate(bulging.save(tmp_path / "m.safetensors"))
     for model in (bulging, again):
-        found = model.predict(plates.law, plates.values_of(3), [plates.planned_test(3)], jacobian=True)
+        found = model.predict(plates.law, plates.theta_of(3), [plates.planned_test(3)], sensitivities=True)
         assert found.values[0, 0, -1, 0] == pytest.approx(plates.values[3, -1, 0], rel=0.5)
     assert str(again) == str(bulging)
     assert again.file_header == bulging.file_header
@@ -331,7 +343,7 @@ def test_a_network_on_a_base_is_near_before_it_has_learnt_much(plates: Dataset) 
     model = train(plates, ParameterGru(6, 1, base="one-dof", training=Training(epochs=6, batch=8, rate=1e-2)))
     ratios = []
     for row in range(0, 24, 4):
-        found = model.predict(plates.law, plates.values_of(row), [plates.planned_test(row)], jacobian=True)
+        found = model.predict(plates.law, plates.theta_of(row), [plates.planned_test(row)], sensitivities=True)
         assert found.jacobian is None
         ratios.append(found.values[0, 0, 2:, 0] / plates.values[row, 2:, 0])
     assert np.median(np.abs(np.log(ratios))) < 0.15
@@ -340,7 +352,7 @@ def test_a_network_on_a_base_is_near_before_it_has_learnt_much(plates: Dataset) 
 def test_identify_with_a_network_finds_what_was_planted(learnt: Surrogate, tension: Dataset) -> None:
     truth, tests, noise = tension.values_of(7), [], np.random.default_rng(0)
     for k, row in enumerate((7, 8, 9, 10)):
-        shown = learnt.predict(tension.law, truth, [tension.planned_test(row)]).values[0, 0]
+        shown = learnt.predict(tension.law, tension.law.to_internal(truth), [tension.planned_test(row)]).values[0, 0]
         tests.append(
             measured(
                 tension.planned_test(row), shown * (1 + 1e-3 * noise.normal(size=shown.shape)), ("strain",), f"t{k}"
@@ -356,7 +368,7 @@ def test_identify_with_a_network_finds_what_was_planted(learnt: Surrogate, tensi
 def test_an_answer_outside_the_domain_says_so(learnt: Surrogate, tension: Dataset) -> None:
     plan, truth = tension.planned_test(7), tension.values_of(7)
     odd = plan.replace(loading=ck.StressSteps(((0.0, 80.0), (9000.0, 140.0), (18000.0, 60.0), (27000.0, 140.0))))
-    shown = learnt.predict(tension.law, truth, [odd]).values[0, 0]
+    shown = learnt.predict(tension.law, tension.law.to_internal(truth), [odd]).values[0, 0]
     fit = ck.identify(tension.law, [measured(odd, shown, ("strain",), "odd")], using=learnt, starts=1)
     assert [note for note in fit.notes if "outside the domain that the surrogate was trained in, in test 'odd'" in note]
 
@@ -365,7 +377,9 @@ def test_identify_of_real_bars_with_a_network_is_off_by_its_error(learnt: Surrog
     truth = tension.values_of(7)
     tests = []
     for k, row in enumerate((7, 8, 9, 10)):
-        shown = tension.specimen.predict(tension.law, truth, [tension.planned_test(row)]).values[0, 0]
+        shown = tension.specimen.predict(
+            tension.law, tension.law.to_internal(truth), [tension.planned_test(row)]
+        ).values[0, 0]
         tests.append(measured(tension.planned_test(row), shown, ("strain",), f"t{k}"))
     fit = ck.identify(tension.law, tests, using=learnt, starts=3)
     by_name = {e.name: e.value for e in fit.estimates}

@@ -43,7 +43,7 @@ def dimple(end: float = 12 * HOURS, scale: float = 1.0, **more: object) -> Histo
 
 
 def amplitude(model: RateSurrogate, values: dict[str, float], history: History) -> np.ndarray:
-    return model.predict(NORTON, values, [history]).values[0, 0, :, 0]
+    return model.predict(NORTON, NORTON.to_internal(values), [history]).values[0, 0, :, 0]
 
 
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
@@ -81,7 +81,10 @@ def test_training_corrects_the_base(learnt: RateSurrogate, family: Dataset) -> N
 def test_the_file_holds_the_same_network(learnt: RateSurrogate, tmp_path) -> None:
     again = load_surrogate(learnt.save(tmp_path / "m.safetensors"))
     assert again.file_header == learnt.file_header
-    found = [model.predict(NORTON, norton(5.0), [dimple()], jacobian=True) for model in (learnt, again)]
+    found = [
+        model.predict(NORTON, NORTON.to_internal(norton(5.0)), [dimple()], sensitivities=True)
+        for model in (learnt, again)
+    ]
     assert np.array_equal(found[0].values, found[1].values)
     assert np.array_equal(found[0].jacobian, found[1].jacobian)
 
@@ -101,8 +104,8 @@ DAMAGE = (
 
 @pytest.mark.parametrize(("law", "values"), [SINH, SUM, GRAHAM_WALLES], ids=["sinh", "sum", "graham-walles"])
 def test_laws_never_seen_are_as_finite_elements_have_them(learnt: RateSurrogate, law, values) -> None:
-    found = learnt.predict(law, values, [dimple()])
-    true = learnt.specimen.predict(law, values, [dimple()])
+    found = learnt.predict(law, law.to_internal(values), [dimple()])
+    true = learnt.specimen.predict(law, law.to_internal(values), [dimple()])
     assert found.status[0, 0] == Status.COMPLETE
     assert found.of(0)[:, 0] == pytest.approx(true.of(0)[:, 0], rel=0.04)
     assert found.of(0)[:, 1:] == pytest.approx(true.of(0)[:, 1:], rel=0.1)
@@ -118,9 +121,9 @@ def test_jacobians_are_central_differences(exact: RateSurrogate, law, values) ->
 
     def shown(values: dict, nuisances: dict) -> np.ndarray:
         # with the jacobian, for whose sake steps are solved to 1e-11
-        return exact.predict(law, values, [test], jacobian=True, nuisances=nuisances).values
+        return exact.predict(law, law.to_internal(values), [test], sensitivities=True, nuisances=nuisances).values
 
-    found = exact.predict(law, values, [test], jacobian=True, nuisances=at)
+    found = exact.predict(law, law.to_internal(values), [test], sensitivities=True, nuisances=at)
     for k, (name, param) in enumerate(law.table.items()):
         middle, ends = param.to_internal(values[name]), []
         for step in (1e-5, -1e-5):
@@ -140,7 +143,7 @@ def check(slope: np.ndarray, numeric: np.ndarray) -> None:
 def test_gradients_in_torch_are_the_jacobian(exact: RateSurrogate) -> None:
     values, test = norton(5.0), dimple()
     theta = torch.tensor([[p.to_internal(values[n]) for n, p in NORTON.table.items()]], dtype=torch.float64)
-    found = exact.predict(NORTON, values, [test], jacobian=True)
+    found = exact.predict(NORTON, NORTON.to_internal(values), [test], sensitivities=True)
     slopes = torch.autograd.functional.jacobian(
         lambda t: rate_net.differentiable_outputs(exact, NORTON, t, test), theta
     )
@@ -160,7 +163,7 @@ def test_only_the_product_of_rate_and_time_counts(learnt: RateSurrogate, end: fl
         course = Program(np.array([0.0, 0.01, 0.4, 0.41, 1.0]) * length, np.array([0.0, 8.0, 8.0, 10.0, 10.0]))
         values = norton(5.0, 1e-7 * half_day / length)
         test = dimple(length, loading=RecordedLoading(course, "pressure"))
-        prediction = learnt.predict(NORTON, values, [test])
+        prediction = learnt.predict(NORTON, NORTON.to_internal(values), [test])
         assert prediction.status[0, 0] == Status.COMPLETE
         found.append(prediction.values[0, 0, 1:, 0])
     assert found[1] == pytest.approx(found[0], rel=0.01)
@@ -178,7 +181,7 @@ def test_a_grid_of_150_s_holds_one_of_900_s(learnt: RateSurrogate) -> None:
 
 def test_a_burst_has_values_up_to_it(learnt: RateSurrogate) -> None:
     test = dimple()
-    found = learnt.predict(NORTON, norton(5.0, 2e-4), [test])
+    found = learnt.predict(NORTON, NORTON.to_internal(norton(5.0, 2e-4)), [test])
     assert found.status[0, 0] == Status.RUPTURED
     before = test.times < found.end_times[0, 0]
     assert 0 < before.sum() < 48
@@ -211,7 +214,7 @@ STRANGE = {
 @pytest.mark.parametrize("name", STRANGE)
 def test_what_is_strange_is_flagged_and_has_values(guarded: RateSurrogate, name: str) -> None:
     values, test = STRANGE[name]
-    found = guarded.predict(NORTON, values, [test, dimple()])
+    found = guarded.predict(NORTON, NORTON.to_internal(values), [test, dimple()])
     assert found.status[0].tolist()[0] == Status.OUTSIDE_DOMAIN
     assert np.isfinite(found.values).all()
 
@@ -219,9 +222,9 @@ def test_what_is_strange_is_flagged_and_has_values(guarded: RateSurrogate, name:
 def test_what_is_usual_is_not_flagged(guarded: RateSurrogate) -> None:
     tests = [dimple(), dimple(1200.0), dimple(geometry={"apex_thickness": 0.45}), dimple(elastic=ck.Elastic(E=100e3))]
     for n in (1.5, 3.0, 5.0, 8.0, 12.0):
-        assert (guarded.predict(NORTON, norton(n), tests).status == Status.COMPLETE).all()
+        assert (guarded.predict(NORTON, NORTON.to_internal(norton(n)), tests).status == Status.COMPLETE).all()
     law, hardening = ck.law("strain-hardening"), {"A": 1e-7 / 120.0**5 * 0.01**0.9, "n": 5.0, "m": -0.9}
-    assert (guarded.predict(law, hardening, tests).status == Status.COMPLETE).all()
+    assert (guarded.predict(law, law.to_internal(hardening), tests).status == Status.COMPLETE).all()
 
 
 def test_other_kinds_of_tests_are_refused(learnt: RateSurrogate) -> None:
@@ -238,10 +241,10 @@ def test_other_kinds_of_tests_are_refused(learnt: RateSurrogate) -> None:
     ]
     for history, kind, told in cases:
         with pytest.raises(kind, match=told) as caught:
-            learnt.predict(NORTON, norton(5.0), [history])
+            learnt.predict(NORTON, NORTON.to_internal(norton(5.0)), [history])
         assert "\n" not in str(caught.value)
     with pytest.raises(SurrogateError, match="does not know the nuisance 'window'; it knows thickness, modulus, temp"):
-        learnt.predict(NORTON, norton(5.0), [dimple()], nuisances={"window": np.full((1, 1), 6.0)})
+        learnt.predict(NORTON, NORTON.to_internal(norton(5.0)), [dimple()], nuisances={"window": np.full((1, 1), 6.0)})
 
 
 def test_bars_teach_it_nothing() -> None:
@@ -254,7 +257,9 @@ def test_bars_teach_it_nothing() -> None:
 
 
 def planted(model: RateSurrogate, values: dict[str, float], test: History) -> History:
-    return measured(test, model.predict(NORTON, values, [test]).values[0, 0], model.outputs, "planted")
+    return measured(
+        test, model.predict(NORTON, NORTON.to_internal(values), [test]).values[0, 0], model.outputs, "planted"
+    )
 
 
 def test_identify_with_it_finds_what_was_planted(guarded: RateSurrogate) -> None:

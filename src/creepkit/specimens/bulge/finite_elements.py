@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit import kernels
-from creepkit.arrays import ArrayLike, Floats
+from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.banded_system import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import GeometryDerivative, geometry_derivative
@@ -25,18 +25,8 @@ from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import OBSERVED, Observation
 
 if TYPE_CHECKING:
-    from creepkit.language import Elastic
-    from creepkit.specimens.bulge.specimen import Bulge
-
-
-if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
-    from creepkit.records import History
-
-
-if TYPE_CHECKING:
-    from creepkit.kernels.interface import CompiledLaw
-    from creepkit.language import CreepLaw
+    from creepkit.language import CreepLaw, Elastic
     from creepkit.specimens.bulge.specimen import Bulge
 
 
@@ -276,10 +266,10 @@ class BulgeResponse:
 def predict_bulge(
     specimen: Bulge,
     law: CreepLaw,
-    values: Mapping[str, ArrayLike],
+    theta: Floats,
     histories: Sequence[History],
-    jacobian: bool,
     nuisances: NuisanceValues,
+    sensitivities: bool,
 ) -> Prediction:
     """Predict every candidate in every test; see records.Predictor."""
     for kind in nuisances:
@@ -288,7 +278,6 @@ def predict_bulge(
                 f"a bulge specimen does not know the nuisance '{kind}'; it knows {', '.join(specimen.nuisances)}"
             )
     kernel = kernels.lower(law, "numba")
-    theta = kernel.to_internal(values)
     candidates = max([len(theta), *(len(v) for v in nuisances.values())])
     theta = np.broadcast_to(theta, (candidates, theta.shape[1]))
     broadcast_nuisances = {kind: np.broadcast_to(v, (candidates, len(histories))) for kind, v in nuisances.items()}
@@ -297,7 +286,7 @@ def predict_bulge(
     def run(task: tuple[int, int]) -> BulgeResponse:
         c, k = task
         nuisance_values = {kind: float(value[c, k]) for kind, value in broadcast_nuisances.items()}
-        return simulate_and_observe(specimen, kernel, theta[c], histories[k], nuisance_values, jacobian)
+        return simulate_and_observe(specimen, kernel, theta[c], histories[k], nuisance_values, sensitivities)
 
     workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
     if workers > 1:
@@ -305,7 +294,7 @@ def predict_bulge(
             rows = list(pool.map(run, tasks))
     else:
         rows = [run(task) for task in tasks]
-    return _to_prediction(rows, histories, candidates, theta.shape[1], tuple(nuisances) if jacobian else (), jacobian)
+    return _to_prediction(rows, histories, candidates, theta.shape[1], tuple(nuisances), sensitivities)
 
 
 def simulate_and_observe(
@@ -350,13 +339,13 @@ def _to_prediction(
     candidates: int,
     parameters: int,
     kinds: tuple[str, ...],
-    jacobian: bool,
+    sensitivities: bool,
 ) -> Prediction:
     longest = max((h.times.size for h in histories), default=0)
     shape = (candidates, len(histories), longest, len(OBSERVED))
     values = np.full(shape, np.nan)
-    law_jacobian = np.full((*shape, parameters), np.nan) if jacobian else None
-    nuisance_jacobian = {kind: np.full(shape, np.nan) for kind in kinds}
+    law_jacobian = np.full((*shape, parameters), np.nan) if sensitivities else None
+    nuisance_jacobian = {kind: np.full(shape, np.nan) for kind in kinds} if sensitivities else {}
     for n, response in enumerate(rows):
         c, k = divmod(n, len(histories))
         frames = histories[k].times.size

@@ -194,7 +194,7 @@ def run_bulge(specimen: Bulge, law: CreepLaw, values: Mapping[str, float], plan:
     """Simulate one test and keep all of it."""
     test_setup = set_up_test(specimen, plan, {})
     kernel = kernels.lower(law, "numba")
-    theta = kernel.to_internal(law.values(values))[0]
+    theta = law.to_internal(law.values(values))[0]
     simulation = simulate(
         kernel, theta, test_setup.model, test_setup.load_history, settings=solver_settings(specimen), keep_points=True
     )

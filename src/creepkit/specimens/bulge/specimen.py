@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Floats
+from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
 from creepkit.hookspecs import hookimpl
 from creepkit.records import History, NuisanceValues, Prediction, Predictor, Specimen
@@ -87,16 +87,16 @@ class Bulge:
     def predict(
         self,
         law: CreepLaw,
-        values: Mapping[str, ArrayLike],
+        theta: Floats,
         histories: Sequence[History],
         *,
-        jacobian: bool = False,
         nuisances: NuisanceValues | None = None,
+        sensitivities: bool = False,
     ) -> Prediction:
         """Predict amplitude, width and shape of each history at its times; see records.Predictor."""
         from creepkit.specimens.bulge.finite_elements import predict_bulge
 
-        return predict_bulge(self, law, values, histories, jacobian, nuisances or {})
+        return predict_bulge(self, law, theta, histories, nuisances or {}, sensitivities)
 
     def run(self, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
         """Run one test, keeping displacements, stresses and strains of the whole dimple; see BulgeRun."""

@@ -49,9 +49,9 @@ def test_each_iteration_is_one_prediction_of_all_particles(stand_in, test):
     class Counted:
         name, outputs, nuisances, calls = "counted", stand_in.outputs, stand_in.nuisances, []
 
-        def predict(self, law, values, histories, **options):
-            self.calls.append((max(np.size(v) for v in values.values()), len(histories)))
-            return stand_in.predict(law, values, histories, **options)
+        def predict(self, law, theta, histories, **options):
+            self.calls.append((len(theta), len(histories)))
+            return stand_in.predict(law, theta, histories, **options)
 
     using = Counted()
     identify(NORTON, [test, test.replace(name="twin")], using, search=ParticleSwarm(30, 7, refined_candidates=1))

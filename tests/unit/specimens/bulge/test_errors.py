@@ -237,6 +237,6 @@ def test_a_rate_beyond_all_numbers_is_no_answer() -> None:
 def test_a_predictor_of_candidates_never_holds_numbers_after_an_end() -> None:
     one: CreepLaw = ck.law("norton")
     plan = simulate(times=[0.0, 3600.0, 43200.0])
-    found = ck.specimen("bulge").predict(one, {"A": np.array([5e-13, 5e-10]), "n": 3.0}, [plan])
+    found = ck.specimen("bulge").predict(one, one.to_internal({"A": np.array([5e-13, 5e-10]), "n": 3.0}), [plan])
     assert found.status[:, 0].tolist() == [Status.COMPLETE, Status.RUPTURED]
     assert np.isnan(found.values[1, 0, plan.times > found.end_times[1, 0]]).all()

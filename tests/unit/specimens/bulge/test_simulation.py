@@ -83,7 +83,7 @@ def test_the_answer_does_not_depend_on_the_times_asked_for(run: BulgeRun) -> Non
 
 
 def test_a_run_says_what_prediction_says(run: BulgeRun) -> None:
-    found = ck.specimen("bulge").predict(ck.law("norton"), N3, [run])
+    found = ck.specimen("bulge").predict(ck.law("norton"), ck.law("norton").to_internal(N3), [run])
     np.testing.assert_allclose(found.of(0), np.stack(list(run.outputs.values()), axis=1), rtol=1e-9)
 
 
@@ -189,7 +189,7 @@ def test_a_run_is_a_history_that_files_keep(run: BulgeRun, tmp_path: Path) -> No
     assert (read.operator, read.elastic, read.loading) == ("profile 0-7.5 mm", STIFF, HELD)
     for name, values in thin.outputs.items():
         np.testing.assert_array_equal(read.outputs[name], values)
-    again = ck.specimen("bulge").predict(ck.law("norton"), N3, [read])
+    again = ck.specimen("bulge").predict(ck.law("norton"), ck.law("norton").to_internal(N3), [read])
     np.testing.assert_allclose(again.of(0)[:, 0], thin.outputs["amplitude"], rtol=1e-9)
 
 

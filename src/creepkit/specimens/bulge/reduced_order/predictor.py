@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from creepkit import kernels
-from creepkit.arrays import ArrayLike, Floats
+from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.records import History, NuisanceValues, Prediction, Status
 from creepkit.specimens.bulge.observation import OBSERVED
@@ -43,11 +43,11 @@ class BulgeReducedOrderModel:
     def predict(
         self,
         law: CreepLaw,
-        values: Mapping[str, ArrayLike],
+        theta: Floats,
         histories: Sequence[History],
         *,
-        jacobian: bool = False,
         nuisances: NuisanceValues | None = None,
+        sensitivities: bool = False,
     ) -> Prediction:
         """Predict amplitude, width and shape of each history at its times; see records.Predictor."""
         assumed_nuisances = dict(nuisances or {})
@@ -56,11 +56,10 @@ class BulgeReducedOrderModel:
                 known = ", ".join(self.nuisances)
                 raise SolveError(f"a bulge specimen does not know the nuisance '{kind}'; it knows {known}")
         compiled = kernels.lower(law, "numba")
-        theta = compiled.to_internal(values)
         rows = max([len(theta), *(len(v) for v in assumed_nuisances.values())])
         theta = np.broadcast_to(theta, (rows, theta.shape[1]))
         trajectories = simulate_trajectories(
-            self.specimen, compiled, theta, histories, nuisances=assumed_nuisances, exact=jacobian
+            self.specimen, compiled, theta, histories, nuisances=assumed_nuisances, exact=sensitivities
         )
         return _prediction(histories, trajectories, theta.shape[1], assumed_nuisances)
 

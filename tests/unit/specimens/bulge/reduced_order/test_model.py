@@ -121,7 +121,7 @@ def test_small_creep_at_constant_pressure(law, values, strain):
     test = held(4.0, 3 * HOURS)
     k, kappa = k_and_kappa(1e-3)
     elastic = float(known().elastic_deflection(np.array([4.0 / STIFF.E]), 0.5)[0][0])
-    found = REDUCED.predict(law, values, [test]).of(0)[:, 0]
+    found = REDUCED.predict(law, law.to_internal(values), [test]).of(0)[:, 0]
     expected = elastic + kappa * strain(4.0 * k, test.times)
     assert expected[-1] < 0.025
     # steady growth differs from that of k and kappa by up to 2.4 % (n = 3); the elastic stresses must first have gone
@@ -135,7 +135,7 @@ def test_a_warmer_second_half():
     warm = Program(np.array([0.0, HOURS, HOURS]), np.array([1000.0, 1000.0, 1020.0]))
     loading = RecordedLoading(Program.constant(4.0), "pressure")
     test = history(np.array([0.5, 1.0, 1.5, 2.0]) * HOURS, loading, temperature=warm)
-    D = REDUCED.predict(law, values, [test]).of(0)[:, 0]
+    D = REDUCED.predict(law, law.to_internal(values), [test]).of(0)[:, 0]
     ratio = (D[3] - D[2]) / (D[1] - D[0])
     k, _ = k_and_kappa(1e-3)
     assert ratio == pytest.approx((4.0 * k) ** 0.1, rel=5e-3)
@@ -157,7 +157,7 @@ def test_states_are_integrated_beside_the_strain():
     k, kappa = k_and_kappa(1e-3)
     for rate in (1e-4, 1e-2):
         level = 1.5e-9 * rate
-        D = REDUCED.predict(law, {"A": level, "n": 3.0, "r": rate}, [test]).of(0)[:, 0]
+        D = REDUCED.predict(law, law.to_internal({"A": level, "n": 3.0, "r": rate}), [test]).of(0)[:, 0]
         expected = kappa * level * (4 * k) ** 3 * (-np.expm1(-rate * test.times)) / rate
         np.testing.assert_allclose(D - D[0], expected - expected[0], atol=0.03 * expected[-1])
 
@@ -200,7 +200,7 @@ def test_a_few_per_cent_off_the_finite_elements(kind, median, at_end):
     for law, own in RANDOM[kind]:
         for _ in range(12 // len(RANDOM[kind])):
             values, test = random_case(law, own, rng)
-            exact, cheap = (one.predict(law, values, [test]).of(0) for one in (BULGE, REDUCED))
+            exact, cheap = (one.predict(law, law.to_internal(values), [test]).of(0) for one in (BULGE, REDUCED))
             both = np.isfinite(exact + cheap).all(axis=1)
             errors.append(np.abs(cheap[:, 0] / exact[:, 0] - 1)[both])
             shapes.append(np.abs(cheap - exact)[both, 1:])
@@ -227,10 +227,10 @@ def test_the_specimen_offers_it():
 def test_candidates_and_tests_do_not_know_of_each_other():
     others = [JUMP, held(4.0, HOURS), held(6.0, 7 * HOURS, frames=9)]
     values = {"A": np.array([1e-15, 1e-12, 3e-15]), "n": np.array([3.5, 5.0, 2.0])}
-    together = REDUCED.predict(NORTON, values, others)
+    together = REDUCED.predict(NORTON, NORTON.to_internal(values), others)
     for c in range(3):
         for k, test in enumerate(others):
-            alone = REDUCED.predict(NORTON, {n: v[c] for n, v in values.items()}, [test])
+            alone = REDUCED.predict(NORTON, NORTON.to_internal({n: v[c] for n, v in values.items()}), [test])
             np.testing.assert_allclose(together.of(k, c), alone.of(0), rtol=1e-12)
             assert together.status[c, k] == alone.status[0, 0]
 
@@ -243,20 +243,23 @@ def test_candidates_and_tests_do_not_know_of_each_other():
 def test_effects_are_changed_histories(kind, value, change):
     law = NORTON.with_temperature(n=linear(T_ref=1000.0, slope=(-0.01, 0.01)))
     values = {"A": 3e-15, "n": 3.5, "n_T": 0.01}
-    assumed = REDUCED.predict(law, values, [JUMP, JUMP], nuisances={kind: np.array([[value, value]])})
-    changed = REDUCED.predict(law, values, [JUMP.replace(**change)]).of(0)
+    assumed = REDUCED.predict(law, law.to_internal(values), [JUMP, JUMP], nuisances={kind: np.array([[value, value]])})
+    changed = REDUCED.predict(law, law.to_internal(values), [JUMP.replace(**change)]).of(0)
     np.testing.assert_allclose(assumed.of(1), changed, rtol=1e-12)
-    assert (np.abs(REDUCED.predict(law, values, [JUMP]).of(0)[1:] / changed[1:] - 1) > 1e-4).any()
+    assert (np.abs(REDUCED.predict(law, law.to_internal(values), [JUMP]).of(0)[1:] / changed[1:] - 1) > 1e-4).any()
 
 
 def test_effects_of_candidates_do_not_mix():
     rng, kinds = np.random.default_rng(5), {"thickness": (0.45, 0.55), "modulus": (-0.1, 0.1), "temperature": (-20, 20)}
     nuisances = {kind: rng.uniform(*limits, (4, 2)) for kind, limits in kinds.items()}
     tests = [JUMP, held(6.0, 7 * HOURS, frames=9, elastic=Elastic(1.2e5))]
-    together = REDUCED.predict(NORTON, SLOW, tests, nuisances=nuisances)
+    together = REDUCED.predict(NORTON, NORTON.to_internal(SLOW), tests, nuisances=nuisances)
     for c, k in np.ndindex(4, 2):
         alone = REDUCED.predict(
-            NORTON, SLOW, [tests[k]], nuisances={n: v[c : c + 1, k : k + 1] for n, v in nuisances.items()}
+            NORTON,
+            NORTON.to_internal(SLOW),
+            [tests[k]],
+            nuisances={n: v[c : c + 1, k : k + 1] for n, v in nuisances.items()},
         )
         np.testing.assert_allclose(together.of(k, c), alone.of(0), rtol=1e-12)
 
@@ -264,21 +267,26 @@ def test_effects_of_candidates_do_not_mix():
 def test_a_mark_asked_for_alone_is_the_same_among_others():
     """Ends of segments are nodes, and no spline is needed there."""
     marks = JUMP.times[[12, 24]]
-    alone = REDUCED.predict(NORTON, SLOW, [JUMP.replace(times=marks)]).of(0)
-    np.testing.assert_allclose(alone, REDUCED.predict(NORTON, SLOW, [JUMP]).of(0)[[12, 24]], rtol=1e-12)
+    alone = REDUCED.predict(NORTON, NORTON.to_internal(SLOW), [JUMP.replace(times=marks)]).of(0)
+    np.testing.assert_allclose(
+        alone, REDUCED.predict(NORTON, NORTON.to_internal(SLOW), [JUMP]).of(0)[[12, 24]], rtol=1e-12
+    )
 
 
 def test_a_modulus_that_depends_on_temperature():
     from creepkit.language import symbols
 
     falling = Elastic(1.5e5 - 50.0 * symbols.temperature)
-    same = REDUCED.predict(NORTON, SLOW, [JUMP.replace(elastic=falling)]).of(0)
-    np.testing.assert_allclose(same, REDUCED.predict(NORTON, SLOW, [JUMP]).of(0), rtol=1e-12)
+    same = REDUCED.predict(NORTON, NORTON.to_internal(SLOW), [JUMP.replace(elastic=falling)]).of(0)
+    np.testing.assert_allclose(same, REDUCED.predict(NORTON, NORTON.to_internal(SLOW), [JUMP]).of(0), rtol=1e-12)
     softer = REDUCED.predict(
-        NORTON, SLOW, [JUMP.replace(elastic=falling)], nuisances={"temperature": np.array([[100.0]])}
+        NORTON,
+        NORTON.to_internal(SLOW),
+        [JUMP.replace(elastic=falling)],
+        nuisances={"temperature": np.array([[100.0]])},
     )
     np.testing.assert_allclose(
-        softer.of(0), REDUCED.predict(NORTON, SLOW, [JUMP.replace(elastic=Elastic(9.5e4))]).of(0)
+        softer.of(0), REDUCED.predict(NORTON, NORTON.to_internal(SLOW), [JUMP.replace(elastic=Elastic(9.5e4))]).of(0)
     )
 
 
@@ -287,7 +295,7 @@ def test_what_it_says_is_smooth():
 
     def slope(step):
         A = SLOW["A"] * np.exp(np.array([step, -step]))
-        up, down = REDUCED.predict(NORTON, {"A": A, "n": SLOW["n"]}, [JUMP]).values[:, 0]
+        up, down = REDUCED.predict(NORTON, NORTON.to_internal({"A": A, "n": SLOW["n"]}), [JUMP]).values[:, 0]
         return (up - down)[1:, 0] / (2 * step)
 
     np.testing.assert_allclose(slope(1e-4), slope(1e-3), rtol=5e-3)
@@ -299,13 +307,13 @@ def test_a_jump_to_the_same_pressure_changes_nothing():
     held_on = Program(np.array([0.0, 5.0]), np.array([0.0, 8.0]))
     plain = history(times, RecordedLoading(held_on, "pressure"), elastic=Elastic(1e5))
     split = plain.replace(loading=PressureJump(8.0, 8.0, 20000.0))
-    one, two = (REDUCED.predict(NORTON, SLOW, [test]).of(0) for test in (plain, split))
+    one, two = (REDUCED.predict(NORTON, NORTON.to_internal(SLOW), [test]).of(0) for test in (plain, split))
     np.testing.assert_allclose(one, two, rtol=1e-3)
 
 
 def test_bursts_end_rows():
     values = {"A": np.array([3e-15, 1e-11, 1e-9, 1.0]), "n": 3.5}
-    found = REDUCED.predict(NORTON, values, [JUMP])
+    found = REDUCED.predict(NORTON, NORTON.to_internal(values), [JUMP])
     assert found.status[:, 0].tolist() == [Status.COMPLETE, Status.RUPTURED, Status.RUPTURED, Status.RUPTURED]
     ends = found.end_times[:, 0]
     assert ends[0] == JUMP.times[-1]
@@ -316,20 +324,20 @@ def test_bursts_end_rows():
 
 
 def test_a_rate_that_is_no_number_is_not_an_answer():
-    found = REDUCED.predict(NORTON, {"A": np.nan, "n": 3.0}, [JUMP])
+    found = REDUCED.predict(NORTON, NORTON.to_internal({"A": np.nan, "n": 3.0}), [JUMP])
     assert found.status[0, 0] == Status.NOT_CONVERGED
     assert np.isnan(found.of(0)).all()
 
 
 def test_complaints_are_those_of_the_specimen():
     with pytest.raises(SolveError, match="loaded by pressure, found stress"):
-        REDUCED.predict(NORTON, SLOW, [JUMP.replace(loading=constant_stress(50.0))])
+        REDUCED.predict(NORTON, NORTON.to_internal(SLOW), [JUMP.replace(loading=constant_stress(50.0))])
     with pytest.raises(SolveError, match="needs elastic data"):
-        REDUCED.predict(NORTON, SLOW, [JUMP.replace(elastic=None)])
+        REDUCED.predict(NORTON, NORTON.to_internal(SLOW), [JUMP.replace(elastic=None)])
     with pytest.raises(SolveError, match="does not know the nuisance 'colour'"):
-        REDUCED.predict(NORTON, SLOW, [JUMP], nuisances={"colour": np.zeros((1, 1))})
+        REDUCED.predict(NORTON, NORTON.to_internal(SLOW), [JUMP], nuisances={"colour": np.zeros((1, 1))})
     with pytest.raises(SolveError, match="the modulus is -5000 MPa; it must be above zero"):
-        REDUCED.predict(NORTON, SLOW, [JUMP], nuisances={"modulus": np.array([[-1.05]])})
+        REDUCED.predict(NORTON, NORTON.to_internal(SLOW), [JUMP], nuisances={"modulus": np.array([[-1.05]])})
 
 
 # ---- files ---------------------------------------------------------------------------------------------------------
