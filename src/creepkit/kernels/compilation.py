@@ -34,7 +34,7 @@ from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, assignment_lines
 from creepkit.kernels.log_form import leading_exponents
 from creepkit.kernels.symbolic_kernel import KernelFunction, SymbolicKernel
 from creepkit.language import symbols
-from creepkit.language.law import structure_of
+from creepkit.language.law_record import structure_of
 
 if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw

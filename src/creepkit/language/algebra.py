@@ -5,13 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import sympy
 
 from creepkit.errors import LawError, nearest
-from creepkit.language.law import CreepLaw
+from creepkit.language.law_record import LawRecord
 from creepkit.language.symbols import POINT_VARIABLES, Param, State, temperature
 from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
+
+Law = TypeVar("Law", bound=LawRecord)
+
 
 _INDEXED_NAME = re.compile(r"^(?P<stem>.+?)_(?P<index>[1-9]\d*)$")
 
@@ -19,7 +23,7 @@ _INDEXED_NAME = re.compile(r"^(?P<stem>.+?)_(?P<index>[1-9]\d*)$")
 _INDEXED_LABEL = re.compile(r"^(?P<stem>.+?) (?P<index>[1-9]\d*)$")
 
 
-def add(first: CreepLaw, second: CreepLaw) -> CreepLaw:
+def add(first: Law, second: Law) -> Law:
     """Join two laws; names that collide are numbered in order of appearance: A_1, A_2; m_1, m_2."""
     laws = (first, second)
     symbols = _numbered([[s.name for s in (*law.params, *law.states)] for law in laws])
@@ -35,7 +39,7 @@ def add(first: CreepLaw, second: CreepLaw) -> CreepLaw:
         params |= {replacements[s]: p for s, p in law.params.items()}
         states |= {replacements[s]: replace(z, rate=_renamed(z.rate, replacements)) for s, z in law.states.items()}
         constraints += [_renamed(c, replacements) for c in law.constraints]
-    return CreepLaw(
+    return type(first)(
         name=f"{first.name}+{second.name}",
         title=" + ".join(law.title or law.name for law in laws),
         terms=terms,
@@ -46,19 +50,19 @@ def add(first: CreepLaw, second: CreepLaw) -> CreepLaw:
     )
 
 
-def without(law: CreepLaw, labels: Sequence[str]) -> CreepLaw:
+def without(law: Law, labels: Sequence[str]) -> Law:
     """Drop terms by name."""
     _check_labels(law, labels)
     return _restricted_to_terms(law, [label for label in law.terms if label not in labels])
 
 
-def only(law: CreepLaw, labels: Sequence[str]) -> CreepLaw:
+def only(law: Law, labels: Sequence[str]) -> Law:
     """Keep terms by name."""
     _check_labels(law, labels)
     return _restricted_to_terms(law, [label for label in law.terms if label in labels])
 
 
-def fix(law: CreepLaw, values: Mapping[str, float]) -> CreepLaw:
+def fix(law: Law, values: Mapping[str, float]) -> Law:
     """Replace parameters by numbers; a term that becomes zero is dropped."""
     if not values:
         return law
@@ -76,7 +80,7 @@ def fix(law: CreepLaw, values: Mapping[str, float]) -> CreepLaw:
     return _substituted(law, replacements, f"{law.name}({description})", f"{law.title} with {description}")
 
 
-def times(law: CreepLaw, factor: TemperatureFactor) -> CreepLaw:
+def times(law: Law, factor: TemperatureFactor) -> Law:
     """Multiply every term (not the rates of internal variables) by a factor of temperature."""
     if not isinstance(factor, TemperatureFactor):
         raise LawError(f"law '{law.name}': times() takes a factor such as arrhenius(T_ref=1073), found {factor!r}")
@@ -93,7 +97,7 @@ def times(law: CreepLaw, factor: TemperatureFactor) -> CreepLaw:
     )
 
 
-def with_temperature(law: CreepLaw, forms: Mapping[str, TemperatureForm]) -> CreepLaw:
+def with_temperature(law: Law, forms: Mapping[str, TemperatureForm]) -> Law:
     """Make parameters functions of temperature; the new parameters follow the one they belong to."""
     if not forms:
         return law
@@ -130,7 +134,7 @@ def with_temperature(law: CreepLaw, forms: Mapping[str, TemperatureForm]) -> Cre
     )
 
 
-def at(law: CreepLaw, T: float) -> CreepLaw:
+def at(law: Law, T: float) -> Law:
     """Set the temperature to a number, K."""
     kelvin = law.number(T, "temperature")
     if not 0 < kelvin < 1e4:
@@ -144,7 +148,7 @@ def at(law: CreepLaw, T: float) -> CreepLaw:
 # ---- mechanisms ----------------------------------------------------------------------------------------------------
 
 
-def _substituted(law: CreepLaw, substitutions: Mapping[sympy.Symbol, sympy.Expr], name: str, title: str) -> CreepLaw:
+def _substituted(law: Law, substitutions: Mapping[sympy.Symbol, sympy.Expr], name: str, title: str) -> Law:
     terms = {label: term.subs(substitutions) for label, term in law.terms.items()}
     terms = {label: term for label, term in terms.items() if term != 0}
     if not terms:
@@ -157,7 +161,7 @@ def _substituted(law: CreepLaw, substitutions: Mapping[sympy.Symbol, sympy.Expr]
     return _pruned(law, terms, states, [c for c in constraints if c is not sympy.true], name, title)
 
 
-def _restricted_to_terms(law: CreepLaw, labels: list[str]) -> CreepLaw:
+def _restricted_to_terms(law: Law, labels: list[str]) -> Law:
     if not labels:
         raise LawError(f"law '{law.name}': no term would be left; its terms are {', '.join(law.terms)}")
     terms = {label: law.terms[label] for label in labels}
@@ -168,13 +172,13 @@ def _restricted_to_terms(law: CreepLaw, labels: list[str]) -> CreepLaw:
 
 
 def _pruned(
-    law: CreepLaw,
+    law: Law,
     terms: Mapping[str, sympy.Expr],
     states: Mapping[sympy.Symbol, State],
     constraints: Iterable[sympy.Basic],
     name: str,
     title: str,
-) -> CreepLaw:
+) -> Law:
     """Drop the states that no remaining term needs, then the parameters and constraints nobody uses."""
     needed = set().union(*(t.free_symbols for t in terms.values()))
     while True:
@@ -240,7 +244,7 @@ def _unused_name(name: str, taken: set[str]) -> str:
     return f"{name}_{k}"
 
 
-def _check_labels(law: CreepLaw, labels: Sequence[str]) -> None:
+def _check_labels(law: LawRecord, labels: Sequence[str]) -> None:
     for label in labels:
         if label not in law.terms:
             raise LawError(f"law '{law.name}' has no term '{label}': {nearest(label, law.terms)}")

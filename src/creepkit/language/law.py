@@ -1,383 +1,55 @@
-"""CreepLaw: an immutable record of named sympy terms and a parameter table, its validation and its fingerprint.
-
-The rate of equivalent creep strain is the sum of the terms. Everything else (derivatives, kernels, LaTeX, exports,
-reports) is derived from this record by functions. The fingerprint is the identity of the law's mathematics: a hash of
-the canonical structure and a hash of values at fixed points, computed with 30 digits; titles, bounds and references do
-not enter.
-"""
+"""CreepLaw: the record of a law with its algebra (sums, reductions, temperature) and its notation."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from types import MappingProxyType
+from dataclasses import dataclass
 from typing import Any
 
-import mpmath
-import numpy as np
-import sympy
-from sympy.logic.boolalg import Boolean, BooleanAtom
-
-from creepkit.arrays import ArrayLike, Bools, Floats
-from creepkit.errors import LawError, nearest
-from creepkit.language.expression_trees import evaluate_multiprecision
-from creepkit.language.symbols import POINT_VARIABLES, Param, State
-
-
-def validate_law(law: CreepLaw) -> None:
-    """Raise LawError when the law is not well formed."""
-    _check_names_and_titles(law)
-    origin = f"law '{law.name}'"
-    _check_tables(law, origin)
-    _check_names(law, origin)
-    _check_expressions(law, origin)
-    _check_symbols(law, origin)
-    _check_constraints(law, origin)
-
-
-def symbols_used(law: CreepLaw) -> set[sympy.Basic]:
-    """Every symbol in the law's terms and in the rates of its internal variables."""
-    expressions = [*law.terms.values(), *(state.rate for state in law.states.values())]
-    return set().union(*(e.free_symbols for e in expressions))
-
-
-def _check_names_and_titles(law: CreepLaw) -> None:
-    """Names and labels enter generated source, so that nothing in them may end a comment or a string."""
-    for name in (law.name, *law.terms):
-        if not name.isprintable() or not name.strip() or {'"', "\\"} & set(name):
-            raise LawError(f"{name!r} cannot name a law or term: write one line of words without quotes or backslashes")
-    for text in (law.title, *law.references):
-        if not isinstance(text, str) or not text.isprintable():
-            raise LawError(f"law '{law.name}': the title or reference {text!r} must be one line of text")
-
-
-def _check_tables(law: CreepLaw, origin: str) -> None:
-    for symbol, param in law.params.items():
-        if not isinstance(symbol, sympy.Symbol):
-            raise LawError(f"{origin}: the parameter table must be keyed by symbols, found {symbol!r}")
-        if not isinstance(param, Param):
-            raise LawError(f"{origin}, parameter '{symbol}': found {type(param).__name__}, write Param(...)")
-    for symbol, state in law.states.items():
-        if not isinstance(symbol, sympy.Symbol) or not isinstance(state, State):
-            raise LawError(f"{origin}: states must be written as {{symbol: State(...)}}, found {symbol!r}: {state!r}")
-
-
-def _check_names(law: CreepLaw, origin: str) -> None:
-    reserved = {symbol.name for symbol in POINT_VARIABLES}
-    names = [symbol.name for symbol in (*law.params, *law.states)]
-    for name in names:
-        if name in reserved:
-            raise LawError(f"{origin}: '{name}' is a word of the language and cannot name a parameter or state")
-        if names.count(name) > 1:
-            raise LawError(f"{origin}: the name '{name}' is used twice; give each parameter and state its own")
-        if not name.isidentifier():
-            raise LawError(f"{origin}: '{name}' is not a plain name; use letters, digits and underscores")
-
-
-def _check_expressions(law: CreepLaw, origin: str) -> None:
-    rates: dict[str, Any] = {f"term '{label}'": expression for label, expression in law.terms.items()}
-    rates |= {f"rate of state '{symbol}'": state.rate for symbol, state in law.states.items()}
-    for position, expression in rates.items():
-        if not isinstance(expression, sympy.Expr) or expression.has(sympy.zoo, sympy.nan, sympy.oo, sympy.I):
-            raise LawError(f"{origin}, {position}: the expression {expression} is not finite and real")
-
-
-def _check_symbols(law: CreepLaw, origin: str) -> None:
-    """Declared must equal used, and every symbol must be plain and real."""
-    used = symbols_used(law)
-    for symbol in sorted({*used, *law.params, *law.states}, key=str):
-        if symbol != sympy.Symbol(symbol.name, real=True):
-            raise LawError(
-                f"{origin}: the symbol '{symbol}' is not a plain real one; make it with parameters(\"{symbol}\"), "
-                "or import it from creepkit.language when it is a word of the language"
-            )
-    declared = {*law.params, *law.states, *POINT_VARIABLES}
-    unknown = sorted(str(s) for s in used - declared)
-    if unknown:
-        allowed = ", ".join(sorted(str(s) for s in declared))
-        raise LawError(f"{origin}: unknown symbol {', '.join(unknown)} in a rate; declared are {allowed}")
-    unused = sorted(str(s) for s in set(law.params) - used)
-    if unused:
-        raise LawError(f"{origin}: parameter {', '.join(unused)} is declared but not used in any term")
-
-
-def _check_constraints(law: CreepLaw, origin: str) -> None:
-    declared = {*law.params, *law.states, *POINT_VARIABLES}
-    for relation in law.constraints:
-        if not isinstance(relation, Boolean) or isinstance(relation, (sympy.Symbol, BooleanAtom)):
-            raise LawError(f"{origin}: the constraint {relation} is not a relation, such as n >= 0, that can fail")
-        undeclared = sorted(str(s) for s in relation.free_symbols - declared)
-        if undeclared:
-            raise LawError(f"{origin}: a constraint mentions unknown symbol {', '.join(undeclared)}")
-
-
-_FIXED_POINTS = ((83.0, 0.013, 5.1e3, 1041.0, 71.0, 23.0), (141.0, 2.3e-4, 7.7e4, 1123.0, 131.0, 57.0))
-
-
-def fingerprint_of(law: CreepLaw) -> str:
-    """Return ``structure-numbers``, 12 + 8 hexadecimal digits."""
-    return f"{_hash(structure_of(law))[:12]}-{_hash(_signature(law))[:8]}"
-
-
-def structure_of(law: CreepLaw) -> str:
-    """The law's mathematics as text, for hashing only (it is never parsed)."""
-    parts = [f"{label} = {sympy.srepr(expression)}" for label, expression in law.terms.items()]
-    parts += [f"{s.name}' = {sympy.srepr(v.rate)} from {v.initial!r} to {v.limit!r}" for s, v in law.states.items()]
-    parts += [f"{s.name}: {p.scale}" for s, p in law.params.items()]
-    return "\n".join(parts)
-
-
-def _signature(law: CreepLaw) -> str:
-    """Each rate to 10 digits at two fixed points with parameters drawn from a fixed sequence."""
-    symbols = [*POINT_VARIABLES, *law.states, *law.params]
-    state_values = [0.11 + 0.07 * (k % 7) for k in range(len(law.states))]
-    parameter_values = [1.3 + 0.31 * ((5 * k) % 11) for k in range(len(law.params))]
-    expressions = [*law.terms.values(), *(state.rate for state in law.states.values())]
-    lines = []
-    with mpmath.workdps(30):
-        for point in _FIXED_POINTS:
-            values = [mpmath.mpf(v) for v in (*point, *state_values, *parameter_values)]
-            lines += [_digits_text(expression, dict(zip(symbols, values, strict=True))) for expression in expressions]
-    return "\n".join(lines)
-
-
-def _digits_text(expression: sympy.Expr, values: Mapping[sympy.Symbol, mpmath.mpf]) -> str:
-    try:
-        return str(mpmath.nstr(evaluate_multiprecision(expression, values), 10))
-    except ArithmeticError:
-        return "undefined"
-
-
-def _hash(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
+from creepkit.language import algebra
+from creepkit.language.law_record import LawRecord
+from creepkit.language.printing import law_latex, law_text
 
 
 @dataclass(frozen=True, eq=False)
-class CreepLaw:
-    """A creep law: rate of equivalent creep strain, in 1/s, as a sum of named terms.
+class CreepLaw(LawRecord):
+    """A creep law: rate of equivalent creep strain, in 1/s, as a sum of named terms; its fields are LawRecord's.
 
-    name : short, lower case, unique in the registry.
-    title : one line for people.
-    terms : {term name: sympy expression in 1/s}, kept in this order.
-    params : {symbol: Param}, in the author's order; every parameter must be used and every symbol declared.
-    states : {symbol: State}, internal variables.
-    constraints : relations between parameters and point that must hold, such as n(t) >= 0.
-    references : where the law was published.
+    Every operation takes ordinary laws and gives an ordinary law.
     """
-
-    name: str
-    terms: Mapping[str, sympy.Expr]
-    params: Mapping[sympy.Symbol, Param]
-    title: str = ""
-    states: Mapping[sympy.Symbol, State] = field(default_factory=dict)
-    constraints: Sequence[Boolean] = ()
-    references: Sequence[str] = ()
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name.strip():
-            raise LawError(f"a law needs a name in words, found {self.name!r}")
-        if not isinstance(self.terms, Mapping) or not self.terms:
-            raise LawError(f"law '{self.name}' has no terms: give terms={{'name': expression}}")
-        terms = {}
-        for label, expression in self.terms.items():
-            try:
-                terms[str(label)] = sympy.sympify(expression, strict=True)
-            except sympy.SympifyError:
-                raise LawError(
-                    f"law '{self.name}', term '{label}': {expression!r} is not a sympy expression; "
-                    "text is never evaluated, write the term with the symbols of creepkit.language"
-                ) from None
-        freeze = object.__setattr__
-        freeze(self, "terms", MappingProxyType(terms))
-        freeze(self, "params", MappingProxyType(dict(self.params)))
-        freeze(self, "states", MappingProxyType(dict(self.states)))
-        freeze(self, "constraints", tuple(self.constraints))
-        references = (self.references,) if isinstance(self.references, str) else tuple(self.references)
-        freeze(self, "references", references)
-        validate_law(self)
-
-    # ---- what the law is -------------------------------------------------------------------------------------------
-
-    @property
-    def rate(self) -> sympy.Expr:
-        """The rate of equivalent creep strain, 1/s: the sum of the terms, unevaluated."""
-        values = list(self.terms.values())
-        return values[0] if len(values) == 1 else sympy.Add(*values)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The names of the parameters, in the author's order."""
-        return tuple(symbol.name for symbol in self.params)
-
-    @property
-    def table(self) -> dict[str, Param]:
-        """{parameter name: Param}, in the author's order."""
-        return {symbol.name: param for symbol, param in self.params.items()}
-
-    @property
-    def fingerprint(self) -> str:
-        """Identity of the law's mathematics: structure and a numeric signature, without titles and bounds."""
-        cached = self.__dict__.get("_fingerprint")
-        if cached is None:
-            cached = fingerprint_of(self)
-            object.__setattr__(self, "_fingerprint", cached)
-        return str(cached)
-
-    def uses(self, symbol: sympy.Symbol) -> bool:
-        """Say whether a symbol of the point (stress, strain, time, temperature ...) enters a rate."""
-        return symbol in symbols_used(self)
-
-    def symbol(self, name: str) -> sympy.Symbol:
-        """Return the symbol of the parameter called `name`, or raise LawError naming the nearest one."""
-        for symbol in self.params:
-            if symbol.name == name:
-                return symbol
-        raise LawError(f"law '{self.name}' has no parameter '{name}': {nearest(name, self.names)}")
-
-    def center(self) -> dict[str, float]:
-        """The middle of the bounds, each on its own scale: {name: value}."""
-        return {name: param.center for name, param in self.table.items()}
-
-    def values(self, given: Mapping[str, float]) -> dict[str, float]:
-        """Return `given` completed and in the law's order; every parameter must be there, finite, once."""
-        for name in given:
-            self.symbol(name)
-        missing = [name for name in self.names if name not in given]
-        if missing:
-            raise LawError(f"law '{self.name}' needs a value for {', '.join(missing)}")
-        values = {name: self.number(given[name], f"parameter '{name}'") for name in self.names}
-        for name, value in values.items():
-            if not abs(value) < float("inf"):
-                raise LawError(f"law '{self.name}', parameter '{name}': {value} is not a finite number")
-            if not self.table[name].is_physical(value):
-                description = f"{value:g} is not physical, which is {self.table[name].physical_range_text}"
-                raise LawError(f"law '{self.name}', parameter '{name}': {description}")
-            if self.table[name].scale == "log" and value < 0:
-                raise LawError(f"law '{self.name}', parameter '{name}': {value:g} is negative; it must be positive")
-            if self.table[name].scale == "log" and value == 0 and self.table[name].off != 0:
-                raise LawError(f"law '{self.name}', parameter '{name}': 0 is not allowed, it must be positive")
-        return values
-
-    @property
-    def log_scale(self) -> Bools:
-        """Which internal values are logarithms, (parameters,)."""
-        return np.array([param.scale == "log" for param in self.params.values()], bool)
-
-    def to_internal(self, values: Mapping[str, ArrayLike] | Floats) -> Floats:
-        """Return theta, the internal values: the natural logarithm where the scale is log, -inf of a coefficient of 0.
-
-        values : {name: number or (candidates,)}, or (candidates, parameters) in the law's order, in the author's units.
-        Returns (candidates, parameters), in the law's order.
-        """
-        if isinstance(values, Mapping):
-            missing = [name for name in self.names if name not in values]
-            if missing:
-                raise LawError(f"law '{self.name}' needs a value for {', '.join(missing)}")
-            columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[name], float)) for name in self.names))
-            theta = np.stack(columns, axis=-1) if columns else np.zeros((1, 0))
-        else:
-            theta = np.array(values, dtype=float, ndmin=2)
-        with np.errstate(divide="ignore"):
-            theta[:, self.log_scale] = np.log(theta[:, self.log_scale])
-        return np.ascontiguousarray(theta)
-
-    def from_internal(self, theta: Floats) -> dict[str, Floats]:
-        """Return {name: (...)} in the author's units from internal values; theta : (..., parameters)."""
-        with np.errstate(over="ignore"):
-            return {
-                name: np.exp(theta[..., k]) if param.scale == "log" else np.array(theta[..., k], float)
-                for k, (name, param) in enumerate(self.table.items())
-            }
-
-    def number(self, value: Any, what: str) -> float:
-        """Return `value` as a float, or raise LawError saying that `what` is not a number."""
-        try:
-            return float(value)
-        except (TypeError, ValueError, OverflowError):
-            raise LawError(f"law '{self.name}', {what}: {value!r} is not a number") from None
-
-    def latex(self) -> str:
-        """The law as a LaTeX equation."""
-        from creepkit.language.printing import law_latex
-
-        return law_latex(self)
-
-    # ---- algebra ---------------------------------------------------------------------------------------------------
 
     def __add__(self, other: CreepLaw) -> CreepLaw:
         """The additive law; terms stay apart by name, colliding parameters become A_1, A_2 ..."""
-        from creepkit.language import algebra
-
         return algebra.add(self, other) if isinstance(other, CreepLaw) else NotImplemented
 
     def without(self, *terms: str) -> CreepLaw:
         """The law less the named terms and the parameters that only they used."""
-        from creepkit.language import algebra
-
         return algebra.without(self, terms)
 
     def only(self, *terms: str) -> CreepLaw:
         """The law with the named terms alone."""
-        from creepkit.language import algebra
-
         return algebra.only(self, terms)
 
     def fix(self, **values: float) -> CreepLaw:
         """The law with parameters at fixed numbers; m=0 makes strain hardening a power law."""
-        from creepkit.language import algebra
-
         return algebra.fix(self, values)
 
     def times(self, factor: Any) -> CreepLaw:
         """The law with every term multiplied by a factor such as arrhenius(T_ref=1073)."""
-        from creepkit.language import algebra
-
         return algebra.times(self, factor)
 
     def with_temperature(self, **forms: Any) -> CreepLaw:
         """The law with parameters made functions of temperature, such as n=linear(T_ref=1073)."""
-        from creepkit.language import algebra
-
         return algebra.with_temperature(self, forms)
 
     def at(self, temperature: float) -> CreepLaw:
         """The law at one temperature, in K; parameters that no longer matter there are dropped."""
-        from creepkit.language import algebra
-
         return algebra.at(self, temperature)
 
-    def rename(self, name: str, title: str = "") -> CreepLaw:
-        """The same law under another name."""
-        return replace(self, name=name, title=title or self.title)
-
-    # ---- value semantics -------------------------------------------------------------------------------------------
-
-    def _key(self) -> tuple[Any, ...]:
-        return (
-            self.name,
-            self.title,
-            tuple(self.terms.items()),
-            tuple(self.params.items()),
-            tuple(self.states.items()),
-            self.constraints,
-            self.references,
-        )
-
-    def __eq__(self, other: object) -> bool:
-        return self._key() == other._key() if isinstance(other, CreepLaw) else NotImplemented
-
-    def __hash__(self) -> int:
-        return hash((self.name, tuple(self.terms.items()), self.names))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        state = {f.name: getattr(self, f.name) for f in fields(self)}
-        plain = {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
-        return _rebuild, (plain,)
+    def latex(self) -> str:
+        """The law as a LaTeX equation."""
+        return law_latex(self)
 
     def __str__(self) -> str:
-        from creepkit.language.printing import law_text
-
         return law_text(self)
 
     def __repr__(self) -> str:
@@ -385,7 +57,3 @@ class CreepLaw:
 
     def _repr_latex_(self) -> str:
         return f"$\\displaystyle {self.latex()}$"
-
-
-def _rebuild(state: dict[str, Any]) -> CreepLaw:
-    return CreepLaw(**state)

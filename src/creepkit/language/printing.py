@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import sympy
 from sympy.printing.latex import LatexPrinter
 from sympy.printing.str import StrPrinter
 
+from creepkit.language.law_record import LawRecord
 from creepkit.language.symbols import GAS_CONSTANT, LATEX_SYMBOLS, temperature
-
-if TYPE_CHECKING:
-    from creepkit.language.law import CreepLaw
-
 
 _LATEX_NAMES = {"n_inf": r"n_\infty"}
 
@@ -52,7 +49,7 @@ def _without_rounding(number: sympy.Expr) -> sympy.Expr:
 class LatexLawPrinter(LatexPrinter):  # type: ignore[misc]
     """Print exponentials of reciprocal temperature as Arrhenius factors, everything else as sympy does."""
 
-    def __init__(self, law: CreepLaw) -> None:
+    def __init__(self, law: LawRecord) -> None:
         names = {s: _LATEX_NAMES[s.name] for s in law.params if s.name in _LATEX_NAMES}
         super().__init__({"symbol_names": {**LATEX_SYMBOLS, **names}, "mul_symbol": None})
 
@@ -79,14 +76,14 @@ class LatexLawPrinter(LatexPrinter):  # type: ignore[misc]
         )
 
 
-def law_latex(law: CreepLaw) -> str:
+def law_latex(law: LawRecord) -> str:
     r"""Return ``\dot{\varepsilon}_{cr} = ...`` with one summand a term; states follow as further equations."""
     return r",\quad ".join(
         f"{left} = {' + '.join(right)}" for left, right in latex_equations(law, LatexLawPrinter(law))
     )
 
 
-def latex_equations(law: CreepLaw, printer: LatexLawPrinter) -> list[tuple[str, list[str]]]:
+def latex_equations(law: LawRecord, printer: LatexLawPrinter) -> list[tuple[str, list[str]]]:
     """Return (left side, summands) of the rate of strain, then of each internal variable."""
     states = [(rf"\dot{{{printer.doprint(s)}}}", [printer.doprint(state.rate)]) for s, state in law.states.items()]
     return [(r"\dot{\varepsilon}_{cr}", [printer.doprint(term) for term in law.terms.values()]), *states]
@@ -117,7 +114,7 @@ def expression_text(expression: sympy.Basic) -> str:
     return str(TextPrinter().doprint(expression))
 
 
-def law_text(law: CreepLaw) -> str:
+def law_text(law: LawRecord) -> str:
     """Return the law as a small table for a terminal."""
     lines = [f"{law.name}: {law.title}" if law.title else law.name]
     prefix = "rate ="

@@ -63,7 +63,7 @@ def test_names_that_look_alike_stay_apart() -> None:
 
 def test_a_label_cannot_leave_its_comment(monkeypatch: pytest.MonkeyPatch) -> None:
     """Laws refuse such labels; generated source does not rely on it."""
-    monkeypatch.setattr("creepkit.language.law.validate_law", lambda law_: None)
+    monkeypatch.setattr("creepkit.language.law_record.validate_law", lambda law_: None)
     label = 'creep """\nraise SystemExit("label was run")\r# \x0c\u2028'
     foreign = law({label: A * stress**n}, {A: RATE, n: POWER}, name=label)
 
