@@ -31,6 +31,12 @@ from creepkit.records.prediction import (
     Status,
     TimesToStrain,
 )
+from creepkit.records.prediction_assembly import (
+    HistoryPrediction,
+    assemble_prediction,
+    broadcast_candidates,
+    check_nuisances,
+)
 
 __all__ = [
     "COMPONENTS",
@@ -40,6 +46,7 @@ __all__ = [
     "ZERO_CELSIUS",
     "Exporter",
     "History",
+    "HistoryPrediction",
     "LawWithValues",
     "Loading",
     "Nuisance",
@@ -59,6 +66,9 @@ __all__ = [
     "SupportsRupturePrediction",
     "TimesToStrain",
     "Units",
+    "assemble_prediction",
+    "broadcast_candidates",
+    "check_nuisances",
     "constant_strain",
     "constant_stress",
 ]

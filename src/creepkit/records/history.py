@@ -65,7 +65,7 @@ class History:
     unruptured: bool = False
 
     def __post_init__(self) -> None:
-        origin = self.source or f"history '{self.name}'"
+        origin = self.origin
         times = frozen(self.times)
         if times.ndim != 1 or times.size == 0:
             raise HistoryError(f"{origin}: no frames; a history needs at least one time")
@@ -115,6 +115,11 @@ class History:
         object.__setattr__(self, "rupture_time", time)
 
     @property
+    def origin(self) -> str:
+        """The file it was read from, or its name, as errors begin."""
+        return self.source or f"history '{self.name}'"
+
+    @property
     def end_known(self) -> bool:
         """Whether it is known how the test ended: by rupture, or stopped before."""
         return self.rupture_time is not None or self.unruptured
@@ -148,6 +153,11 @@ class History:
     def temperature_program(self) -> Program:
         """Temperature over time, K."""
         return self.temperature if isinstance(self.temperature, Program) else Program.constant(self.temperature)
+
+    @property
+    def mean_temperature(self) -> float:
+        """The mean of the values of the temperature program, K."""
+        return float(np.mean(self.temperature_program().values))
 
     @property
     def condition(self) -> str:

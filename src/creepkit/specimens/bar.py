@@ -12,7 +12,17 @@ import numpy as np
 from creepkit import integration, kernels
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
-from creepkit.records import History, NuisanceValues, Prediction, Program, Status
+from creepkit.records import (
+    History,
+    HistoryPrediction,
+    NuisanceValues,
+    Prediction,
+    Program,
+    Status,
+    assemble_prediction,
+    broadcast_candidates,
+    check_nuisances,
+)
 from creepkit.specimens.run import Run, run_from_outputs
 
 if TYPE_CHECKING:
@@ -121,33 +131,23 @@ class Bar:
 
     def _predict(self, law: CreepLaw, theta: Floats, histories: Sequence[History], sensitivities: bool) -> Prediction:
         result = self._integrate(law, theta, self._tests(histories), sensitivities)
-        return self._observed_prediction(law, histories, result)
+        return self._observed_prediction(histories, result)
 
     def _tests(self, histories: Sequence[History]) -> list[PointTest]:
         return [self.point_test(history) for history in histories]
 
-    def _observed_prediction(self, law: CreepLaw, histories: Sequence[History], result: Integration) -> Prediction:
+    def _observed_prediction(self, histories: Sequence[History], result: Integration) -> Prediction:
         """What the instruments of the histories show of an integration."""
-        candidates, longest = result.strain.shape[0], max((h.times.size for h in histories), default=0)
-        shown = np.full((candidates, len(histories), longest, 1), np.nan)
-        changes = None if result.jacobian is None else np.full((*shown.shape, len(law.names)), np.nan)
+        parts = []
         for k, history in enumerate(histories):
-            frames, reach = history.times.size, slice(result.starts[k], result.starts[k + 1])
-            creep = result.of(k)
-            shown[:, k, :frames, 0] = self.observed_output(history, creep)
-            if changes is not None and result.jacobian is not None:
-                changes[:, k, :frames, 0] = (
-                    result.jacobian[:, reach] * self.output_derivative(history, creep)[..., None]
-                )
-        return Prediction(
-            values=shown,
-            outputs=self.outputs,
-            lengths=np.array([h.times.size for h in histories], dtype=np.int64),
-            status=result.status,
-            end_times=result.end_times,
-            jacobian=changes,
-            times=tuple(h.times for h in histories),
-        )
+            creep, frames = result.of(k), slice(result.starts[k], result.starts[k + 1])
+            jacobian = None
+            if result.jacobian is not None:
+                derivative = self.output_derivative(history, creep)[..., None]
+                jacobian = (result.jacobian[:, frames] * derivative)[:, :, None]
+            values = self.observed_output(history, creep)[..., None]
+            parts.append(HistoryPrediction(values, result.status[:, k], result.end_times[:, k], jacobian))
+        return assemble_prediction(parts, histories, self.outputs, len(result.strain))
 
     def _integrate(self, law: CreepLaw, theta: Floats, tests: Sequence[PointTest], sensitivities: bool) -> Integration:
         kernel = kernels.lower(law, "numba")
@@ -189,24 +189,14 @@ def predict_with_nuisances(
     """
     if not nuisances:
         return predict_plain(theta, histories, sensitivities)
-    for kind in nuisances:
-        if kind not in NUISANCES:
-            known = " and ".join(NUISANCES)
-            raise SolveError(f"a {specimen} specimen does not know the nuisance '{kind}'; it knows {known}")
-    rows = max(len(v) for v in nuisances.values())
-    if rows == 1:
-        return _predict_one(
-            predict_plain,
-            theta,
-            histories,
-            {kind: v[0] for kind, v in nuisances.items()},
-            sensitivities,
-            modulus_derivative,
-        )
+    check_nuisances(nuisances, NUISANCES, f"a {specimen} specimen")
+    if max(len(v) for v in nuisances.values()) == 1:
+        shared_nuisances = {kind: v[0] for kind, v in nuisances.items()}
+        return _predict_one(predict_plain, theta, histories, shared_nuisances, sensitivities, modulus_derivative)
     parts = []
-    theta = np.broadcast_to(theta, (rows, theta.shape[1]))
-    for row in range(rows):
-        candidate_nuisances = {kind: np.broadcast_to(v, (rows, len(histories)))[row] for kind, v in nuisances.items()}
+    theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
+    for row in range(len(theta)):
+        candidate_nuisances = {kind: v[row] for kind, v in nuisances.items()}
         parts.append(
             _predict_one(
                 predict_plain, theta[row : row + 1], histories, candidate_nuisances, sensitivities, modulus_derivative
@@ -292,7 +282,7 @@ def elastic_strain(history: History) -> Floats:
 
 def isothermal_elasticity(history: History, specimen: str) -> tuple[float, float]:
     """E, MPa, and nu of a test whose strain is prescribed: they must be the same at all its temperatures."""
-    where = history.source or f"history '{history.name}'"
+    where = history.origin
     if history.elastic is None:
         raise SolveError(
             f"{where}: a {specimen} specimen under prescribed strain needs elastic data; set elastic=Elastic(E=150e3), "

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -16,7 +16,16 @@ from creepkit import integration, kernels
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
-from creepkit.records import COMPONENTS, History, NuisanceValues, PointLoading, Prediction, Specimen
+from creepkit.records import (
+    COMPONENTS,
+    History,
+    HistoryPrediction,
+    NuisanceValues,
+    PointLoading,
+    Prediction,
+    Specimen,
+    assemble_prediction,
+)
 from creepkit.specimens.bar import NUISANCES, STEPS_PER_BREAKPOINT, isothermal_elasticity, predict_with_nuisances
 from creepkit.specimens.run import Run, run_from_outputs
 
@@ -36,15 +45,6 @@ DIFFERENCE_STEP = 1e-3
 
 DEFAULT_ELASTICITY = (150e3, 0.3)
 """E, MPa, and nu where stresses alone are prescribed and no elastic data are given: creep does not depend on them."""
-
-
-class PointPrediction(NamedTuple):
-    """One history: values (candidates, frames, outputs), status and end times (candidates,), and derivatives."""
-
-    values: Floats
-    status: Floats
-    ends: Floats
-    jacobian: Floats | None
 
 
 @dataclass(frozen=True)
@@ -118,34 +118,22 @@ class MaterialPoint:
         kernel = kernels.lower(law, "numba")
         steps = DIFFERENCE_STEP * np.array([1.0 if p.scale == "log" else np.inf for p in law.params.values()])
         steps = np.where(np.isinf(steps), DIFFERENCE_STEP * np.maximum(1.0, np.abs(theta)), steps)
-        parts = [self._rows(kernel, theta, history, steps if sensitivities else None) for history in histories]
-        lengths = [h.times.size for h in histories]
-        shape = (len(theta), len(histories), max(lengths, default=0), len(OUTPUTS))
-        shown, changes = np.full(shape, np.nan), np.full((*shape, theta.shape[1]), np.nan) if sensitivities else None
-        for k, part in enumerate(parts):
-            shown[:, k, : lengths[k]] = part.values
-            if changes is not None and part.jacobian is not None:
-                changes[:, k, : lengths[k]] = part.jacobian
-        empty = np.zeros((len(theta), 0))
-        return Prediction(
-            values=shown,
-            outputs=OUTPUTS,
-            lengths=np.array(lengths, dtype=np.int64),
-            status=np.stack([p.status for p in parts], axis=1).astype(np.int64) if parts else empty.astype(np.int64),
-            end_times=np.stack([p.ends for p in parts], axis=1) if parts else empty,
-            jacobian=changes,
-            times=tuple(h.times for h in histories),
-        )
+        parts = [
+            self._predict_history(kernel, theta, history, steps if sensitivities else None) for history in histories
+        ]
+        return assemble_prediction(parts, histories, OUTPUTS, len(theta))
 
-    def _rows(self, kernel: CompiledLaw, theta: Floats, history: History, steps: Floats | None) -> PointPrediction:
+    def _predict_history(
+        self, kernel: CompiledLaw, theta: Floats, history: History, steps: Floats | None
+    ) -> HistoryPrediction:
         """One history; steps : (candidates, P) of the differences, or None to do without derivatives."""
         path = _path(history)
         if path is not None:
             return self._predict_proportional(path, kernel, theta, history, steps is not None)
         runs = [self.simulate(kernel, candidate, history) for candidate in theta]
-        return PointPrediction(
+        return HistoryPrediction(
             np.array([point_outputs(run, history) for run in runs]),
-            np.array([float(run.status) for run in runs]),
+            np.array([int(run.status) for run in runs]),
             np.array([run.end_time for run in runs]),
             None
             if steps is None
@@ -154,7 +142,7 @@ class MaterialPoint:
 
     def _predict_proportional(
         self, path: ProportionalLoading, kernel: CompiledLaw, theta: Floats, history: History, jacobian: bool
-    ) -> PointPrediction:
+    ) -> HistoryPrediction:
         """One history whose stress keeps its direction: what is shown is a straight line in the creep strain."""
         test = integration.PointTest(path.driving, history.temperature_program(), history.times, path.stiffness)
         result = integration.integrate(
@@ -169,7 +157,7 @@ class MaterialPoint:
         slope = np.concatenate([[1.0], path.flow + elastic @ stress_derivative, stress_derivative])
         changes = None if result.jacobian is None else result.jacobian[:, :, None, :] * slope[:, None]
         values = start + result.strain[..., None] * slope
-        return PointPrediction(values, result.status[:, 0].astype(float), result.end_times[:, 0], changes)
+        return HistoryPrediction(values, result.status[:, 0], result.end_times[:, 0], changes)
 
     def simulate(self, kernel: CompiledLaw, theta: Floats, history: History) -> PointTrajectory:
         """March one candidate, theta (P,) in internal form, through one history in six components."""
@@ -209,7 +197,7 @@ class MaterialPoint:
 def _loading(history: History) -> PointLoading:
     if isinstance(history.loading, PointLoading):
         return history.loading
-    where = history.source or f"history '{history.name}'"
+    where = history.origin
     raise SolveError(
         f"{where}: a material point is loaded by components, found {history.loading.quantity}; "
         'use PointLoading(stress={"11": 100})'

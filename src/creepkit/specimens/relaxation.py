@@ -77,7 +77,7 @@ class Relaxation(Bar):
 @lru_cache(maxsize=4096)
 def point_test(history: History) -> PointTest:
     """What the material point of a relaxation history goes through."""
-    where = history.source or f"history '{history.name}'"
+    where = history.origin
     if history.loading.quantity != "strain":
         raise SolveError(
             f"{where}: a relaxation specimen is loaded by strain, found {history.loading.quantity}; "

@@ -50,7 +50,7 @@ class Uniaxial(Bar):
         """Predict as predict() does, and follow each bar to its rupture: by a state's limit, or by the strain limit."""
         levels = [strain_levels(history, self.point_test(history)) for history in histories]
         result = self._integrate(law, theta, [own.test for own in levels], sensitivities)
-        prediction = self._observed_prediction(law, histories, result)
+        prediction = self._observed_prediction(histories, result)
         last = np.array([h.times[-1] for h in histories])
         after_last_frame = (result.end_times > last) & (prediction.status == int(Status.RUPTURED))
         return replace(
@@ -72,7 +72,7 @@ class Uniaxial(Bar):
 @lru_cache(maxsize=4096)
 def point_test(history: History) -> PointTest:
     """What the material point of a uniaxial history goes through."""
-    where = history.source or f"history '{history.name}'"
+    where = history.origin
     if history.loading.quantity != "stress":
         held = "the specimen relaxation" if history.loading.quantity == "strain" else "StressSteps or constant_stress"
         raise SolveError(

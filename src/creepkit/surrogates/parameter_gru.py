@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -14,7 +14,15 @@ from torch import Tensor
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import DatasetError, SurrogateError, nearest
-from creepkit.records import History, NuisanceValues, Prediction, Status
+from creepkit.records import (
+    History,
+    HistoryPrediction,
+    NuisanceValues,
+    Prediction,
+    Status,
+    assemble_prediction,
+    broadcast_candidates,
+)
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.parameter_inputs import (
     CONSTANT_INPUTS,
@@ -266,15 +274,21 @@ class ParameterSurrogate(Surrogate):
         sensitivities: bool = False,
     ) -> Prediction:
         """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
-        nuisances = nuisances or {}
-        check_applicable(self.metadata, histories, nuisances, self.nuisances)
+        check_applicable(self.metadata, histories, nuisances or (), self.nuisances)
         complete_theta = complete_parameters(self.metadata.law, law, theta)
+        complete_theta, nuisances = broadcast_candidates(complete_theta, nuisances, len(histories))
         frames = prediction_frames(self.metadata.grid, histories)
         query = self._query(complete_theta, histories, frames, nuisances)
         positions = [self.metadata.law.names.index(name) for name in law.names]
         outputs = self._values(query)
         derivatives = self._derivatives(query, positions) if sensitivities and self.recipe.base == "none" else None
-        return self._prediction(query, histories, frames, outputs, derivatives, tuple(nuisances))
+        status = self._status(query, histories, frames)
+        parts = []
+        for k, history in enumerate(histories):
+            test_derivatives = None if derivatives is None else derivatives[:, k]
+            part = self._history_prediction(history, frames[k], outputs[:, k], test_derivatives, tuple(nuisances))
+            parts.append(replace(part, status=status[:, k]))
+        return assemble_prediction(parts, histories, self.outputs, len(complete_theta))
 
     # ---- what the network is asked ---------------------------------------------------------------------------------
 
@@ -300,11 +314,8 @@ class ParameterSurrogate(Surrogate):
         frames: Sequence[Floats],
         nuisances: NuisanceValues,
     ) -> NetworkQuery:
-        count = max([len(theta), *(len(v) for v in nuisances.values())])
-        theta = np.broadcast_to(theta, (count, theta.shape[1]))
-        nuisances = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in nuisances.items()}
         perturbed = [
-            self._history_inputs.with_nuisances(h, {kind: v[:, k] for kind, v in nuisances.items()}, count)
+            self._history_inputs.with_nuisances(h, {kind: v[:, k] for kind, v in nuisances.items()}, len(theta))
             for k, h in enumerate(histories)
         ]
         return NetworkQuery(
@@ -362,32 +373,35 @@ class ParameterSurrogate(Surrogate):
         )
         return derivatives.movedim(1, -1).numpy()
 
-    def _prediction(
-        self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats], outputs: Floats,
-        derivatives: Floats | None, nuisance_names: tuple[str, ...],
-    ) -> Prediction:  # fmt: skip
-        """At the times of the histories, as their instruments show it."""
-        lengths = np.array([h.times.size for h in histories], dtype=np.int64)
-        shape = (*outputs.shape[:2], int(lengths.max(initial=0)), outputs.shape[3])
-        values = np.full(shape, np.nan)
-        derivative_array = None if derivatives is None else np.full((*shape, derivatives.shape[-1]), np.nan)
-        for k, (history, frame_times) in enumerate(zip(histories, frames, strict=True)):
-            weights = interpolation_weights(frame_times, history.times)
-            interpolated = np.einsum("tf,cfo->cto", weights, outputs[:, k])
-            values[:, k, : lengths[k]] = observed_outputs(self.specimen, history, interpolated)
-            if derivative_array is not None and derivatives is not None:
-                derivative = np.einsum("tf,cfod->ctod", weights, derivatives[:, k])
-                derivative_array[:, k, : lengths[k]] = (
-                    derivative * observation_derivative(self.specimen, history, interpolated)[..., None]
-                )
-        count = 0 if derivative_array is None else derivative_array.shape[-1] - len(nuisance_names)
-        ends = np.broadcast_to([h.times[-1] for h in histories], outputs.shape[:2]).astype(float)
-        return Prediction(
-            values=values, outputs=self.outputs, lengths=lengths, status=self._status(query, histories, frames),
-            end_times=ends, jacobian=None if derivative_array is None else derivative_array[..., :count],
-            times=tuple(h.times for h in histories),
-            nuisance_jacobian={} if derivative_array is None else {kind: derivative_array[..., count + k] for k, kind in enumerate(nuisance_names)},
-        )  # fmt: skip
+    def _history_prediction(
+        self,
+        history: History,
+        frames: Floats,
+        outputs: Floats,
+        derivatives: Floats | None,
+        nuisances: tuple[str, ...],
+    ) -> HistoryPrediction:
+        """One history at its times, as its instrument shows it.
+
+        frames : (frames,) s. outputs : (candidates, frames, outputs). derivatives : (candidates, frames, outputs,
+        parameters and then nuisances), or None.
+        """
+        weights = interpolation_weights(frames, history.times)
+        interpolated = np.einsum("tf,cfo->cto", weights, outputs)
+        jacobian, nuisance_jacobian = None, {}
+        if derivatives is not None:
+            slope = observation_derivative(self.specimen, history, interpolated)[..., None]
+            shown = np.einsum("tf,cfod->ctod", weights, derivatives) * slope
+            count = shown.shape[-1] - len(nuisances)
+            jacobian = shown[..., :count]
+            nuisance_jacobian = {kind: shown[..., count + k] for k, kind in enumerate(nuisances)}
+        return HistoryPrediction(
+            values=observed_outputs(self.specimen, history, interpolated),
+            status=np.zeros(len(outputs), dtype=np.int64),
+            end_times=np.full(len(outputs), history.times[-1]),
+            jacobian=jacobian,
+            nuisance_jacobian=nuisance_jacobian,
+        )
 
     def _status(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Ints:
         """(candidates, tests): complete, or outside the domain."""

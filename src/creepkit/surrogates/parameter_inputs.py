@@ -121,7 +121,7 @@ class LoadHistoryInputs:
 
 
 def _constant_input(name: str, history: History, specimen: Specimen) -> float:
-    where = history.source or f"history '{history.name}'"
+    where = history.origin
     temperature = history.temperature_program().values
     if name in ("modulus", "temperature") and np.ptp(temperature) > LARGEST_TEMPERATURE_CHANGE:
         raise SurrogateError(
@@ -140,7 +140,7 @@ def _constant_input(name: str, history: History, specimen: Specimen) -> float:
 def _modulus_at(history: History, temperature_changes: Floats) -> Floats:
     """The modulus, MPa, at the temperature of a test and so many K more."""
     assert history.elastic is not None  # _constant has complained
-    T = float(history.temperature_program().values.mean())
+    T = history.mean_temperature
     return np.array([float(history.elastic.at(T + float(step)).E) for step in temperature_changes])
 
 

@@ -18,7 +18,15 @@ from torch import Tensor
 from creepkit import kernels
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import DatasetError, SurrogateError
-from creepkit.records import History, NuisanceValues, Prediction, Status
+from creepkit.records import (
+    History,
+    HistoryPrediction,
+    NuisanceValues,
+    Prediction,
+    Status,
+    assemble_prediction,
+    broadcast_candidates,
+)
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
 from creepkit.specimens.bulge.reduced_order.time_integration import NUISANCE_DIRECTIONS, FeatureFactors
 from creepkit.specimens.bulge.reduced_order.trajectories import Trajectories, simulate_trajectories
@@ -236,55 +244,42 @@ class RateSurrogate(Surrogate):
         sensitivities: bool = False,
     ) -> Prediction:
         """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
-        nuisances = nuisances or {}
-        check_applicable(self.metadata, histories, nuisances, self.nuisances)
+        check_applicable(self.metadata, histories, nuisances or (), self.nuisances)
         specimen, compiled = self.specimen, kernels.lower(law, "numba")
         assert isinstance(specimen, Bulge)
-        count = max([len(theta), *(len(v) for v in nuisances.values())])
-        theta = np.broadcast_to(theta, (count, theta.shape[1]))
-        nuisances = {kind: np.broadcast_to(v, (count, len(histories))) for kind, v in nuisances.items()}
+        theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
         threads = specimen.threads or len(os.sched_getaffinity(0))
         trajectories = simulate_trajectories(
-            specimen, compiled, theta, histories, nuisances=nuisances, factors=self.recipe.factors, exact=sensitivities,
+            specimen,
+            compiled,
+            theta,
+            histories,
+            nuisances=nuisances,
+            factors=self.recipe.factors,
+            exact=sensitivities,
             threads=threads,
-        )  # fmt: skip
-        return self._prediction(trajectories, histories, theta.shape[1], nuisances, threads)
+        )
+        parts = [self._history_prediction(h, k, trajectories, nuisances, threads) for k, h in enumerate(histories)]
+        return assemble_prediction(parts, histories, self.outputs, len(theta))
 
-    def _prediction(
-        self,
-        trajectories: Trajectories,
-        histories: Sequence[History],
-        parameters: int,
-        nuisances: NuisanceValues,
-        threads: int,
-    ) -> Prediction:
-        lengths = np.array([h.times.size for h in histories], dtype=np.int64)
-        count = len(trajectories.values)
-        values = np.full((count, len(histories), int(lengths.max(initial=0)), 3), np.nan)
-        derivatives = (
-            None if trajectories.jacobian is None else np.full((*values.shape, trajectories.jacobian.shape[-1]), np.nan)
-        )
-        status = np.array(trajectories.status)
-        for k, history in enumerate(histories):
-            thickness = self._thickness(trajectories, k, count, nuisances)
-            node_outputs = self._node_outputs(trajectories, k, thickness, threads)
-            values[:, k, : lengths[k]] = trajectories.frames(k, node_outputs.values)
-            if derivatives is not None and node_outputs.derivatives is not None:
-                derivatives[:, k, : lengths[k]] = trajectories.frames(k, node_outputs.derivatives)
-            incomplete = status[:, k] != Status.COMPLETE
-            after_end = incomplete[:, None] & (history.times >= trajectories.end_times[:, k, None])
-            values[:, k, : lengths[k]][after_end] = np.nan
-            status[:, k] = np.where(node_outputs.outside & ~incomplete, int(Status.OUTSIDE_DOMAIN), status[:, k])
-        nuisance_derivatives = (
-            {kind: derivatives[..., parameters + NUISANCE_DIRECTIONS.index(kind)] for kind in nuisances}
-            if derivatives is not None
-            else {}
-        )
-        return Prediction(
-            values=values, outputs=self.outputs, lengths=lengths, status=status, end_times=trajectories.end_times,
-            jacobian=None if derivatives is None else derivatives[..., :parameters], times=tuple(h.times for h in histories),
-            nuisance_jacobian=nuisance_derivatives,
-        )  # fmt: skip
+    def _history_prediction(
+        self, history: History, test: int, trajectories: Trajectories, nuisances: NuisanceValues, threads: int
+    ) -> HistoryPrediction:
+        """The corrected outputs at the times of one history, NaN after the end of a candidate."""
+        status, end_times = trajectories.status[:, test], trajectories.end_times[:, test]
+        thickness = self._thickness(trajectories, test, len(status), nuisances)
+        node_outputs = self._node_outputs(trajectories, test, thickness, threads)
+        values, jacobian, nuisance_jacobian = trajectories.frames(test, node_outputs.values), None, {}
+        incomplete = status != Status.COMPLETE
+        values[incomplete[:, None] & (history.times >= end_times[:, None])] = np.nan
+        if node_outputs.derivatives is not None:
+            derivatives, parameters = trajectories.frames(test, node_outputs.derivatives), trajectories.parameters
+            jacobian = derivatives[..., :parameters]
+            nuisance_jacobian = {
+                kind: derivatives[..., parameters + NUISANCE_DIRECTIONS.index(kind)] for kind in nuisances
+            }
+        status = np.where(node_outputs.outside & ~incomplete, int(Status.OUTSIDE_DOMAIN), status)
+        return HistoryPrediction(values, status, end_times, jacobian, nuisance_jacobian)
 
     def _thickness(self, trajectories: Trajectories, test: int, count: int, nuisances: NuisanceValues) -> Tensor:
         thicknesses = np.full(count, trajectories.schedules[test].setup.geometry.apex_thickness)

@@ -15,7 +15,15 @@ from creepkit.arrays import Floats
 from creepkit.errors import SurrogateError
 from creepkit.files import safetensors_files
 from creepkit.language.law_codec import law_to_json
-from creepkit.records import History, NuisanceValues, Prediction, Predictor, Specimen, SupportsReducedOrderModel
+from creepkit.records import (
+    History,
+    NuisanceValues,
+    Prediction,
+    Predictor,
+    Specimen,
+    SupportsReducedOrderModel,
+    check_nuisances,
+)
 from creepkit.sampling.conditions import TimeGrid, test_kind
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.specimen import Bulge
@@ -40,15 +48,12 @@ def check_applicable(
     """SurrogateError where a history, or an explicit nuisance, is none that the surrogate knows."""
     for history in histories:
         check_history(metadata, history)
-    for kind in nuisances:
-        if kind not in known_nuisances:
-            names = ", ".join(known_nuisances) or "none"
-            raise SurrogateError(f"this surrogate does not know the nuisance '{kind}'; it knows {names}")
+    check_nuisances(nuisances, known_nuisances, "this surrogate", SurrogateError)
 
 
 def check_history(metadata: SurrogateMetadata, history: History) -> None:
     """SurrogateError where a history is of another kind of test than those of the training."""
-    where, specimen = history.source or f"history '{history.name}'", metadata.specimen
+    where, specimen = history.origin, metadata.specimen
     quantity = CONTROLLED_QUANTITY[test_kind(specimen)]
     if history.loading.quantity != quantity:
         raise SurrogateError(f"{where}: its {history.loading.quantity} is prescribed; the surrogate knows {quantity}")

@@ -62,7 +62,7 @@ def test_candidates_may_differ_in_their_effects():
 
 
 def test_what_a_bar_does_not_know_is_refused():
-    with pytest.raises(SolveError, match="does not know the nuisance 'thickness'; it knows temperature and modulus"):
+    with pytest.raises(SolveError, match="does not know the nuisance 'thickness'; it knows temperature, modulus"):
         BAR.predict(LAW, LAW.to_internal(VALUES), [bar()], nuisances={"thickness": np.array([[0.5]])})
 
 

@@ -20,14 +20,24 @@ from creepkit.fem.banded_system import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import GeometryDerivative, geometry_derivative
 from creepkit.fem.simulation import LoadHistory, Simulation, SurfaceSensitivities, sensitivities, simulate
 from creepkit.fem.step_record import SolverSettings
-from creepkit.records import History, NuisanceValues, Prediction, Program, Status
+from creepkit.records import (
+    History,
+    HistoryPrediction,
+    NuisanceValues,
+    Prediction,
+    Program,
+    Status,
+    assemble_prediction,
+    broadcast_candidates,
+    check_nuisances,
+)
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import OBSERVED, Observation
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
     from creepkit.language import CreepLaw, Elastic
-    from creepkit.specimens.bulge.specimen import Bulge
+    from creepkit.specimens.bulge.settings import BulgeSettings
 
 
 MODULUS_TEMPERATURE_STEP = 1.0
@@ -53,9 +63,9 @@ class BulgeSetup:
         return np.asarray(self.model.nodes[self.model.top, 0])
 
 
-def set_up_test(specimen: Bulge, history: History, nuisances: Mapping[str, float]) -> BulgeSetup:
+def set_up_test(specimen: BulgeSettings, history: History, nuisances: Mapping[str, float]) -> BulgeSetup:
     """Prepare one test; nuisances : {kind: value} of its explicit nuisances."""
-    where = history.source or f"history '{history.name}'"
+    where = history.origin
     if history.loading.quantity != "pressure":
         raise SolveError(
             f"{where}: a bulge specimen is loaded by pressure, found {history.loading.quantity}; use PressureJump"
@@ -96,14 +106,14 @@ def model_of_geometry(geometry: DimpleGeometry, refinement: float) -> FiniteElem
 
 
 @lru_cache(maxsize=16)
-def _model_of_mesh(specimen: Bulge) -> FiniteElementModel:
+def _model_of_mesh(specimen: BulgeSettings) -> FiniteElementModel:
     assert specimen.mesh is not None
     if not specimen.mesh.top.size:
         raise SolveError("the mesh of a bulge specimen names no observed surface; give it the nodes of its top")
     return finite_element_model(specimen.mesh)
 
 
-def _geometry(specimen: Bulge, history: History, nuisances: Mapping[str, float]) -> DimpleGeometry:
+def _geometry(specimen: BulgeSettings, history: History, nuisances: Mapping[str, float]) -> DimpleGeometry:
     """The specimen's geometry, with what was measured of this test and then what is assumed of it."""
     changes = {name: value for name, value in history.geometry.items() if name in DimpleGeometry.lengths}
     if "thickness" in nuisances:
@@ -264,7 +274,7 @@ class BulgeResponse:
 
 
 def predict_bulge(
-    specimen: Bulge,
+    specimen: BulgeSettings,
     law: CreepLaw,
     theta: Floats,
     histories: Sequence[History],
@@ -272,20 +282,14 @@ def predict_bulge(
     sensitivities: bool,
 ) -> Prediction:
     """Predict every candidate in every test; see records.Predictor."""
-    for kind in nuisances:
-        if kind not in specimen.nuisances:
-            raise SolveError(
-                f"a bulge specimen does not know the nuisance '{kind}'; it knows {', '.join(specimen.nuisances)}"
-            )
+    check_nuisances(nuisances, specimen.nuisances, "a bulge specimen")
     kernel = kernels.lower(law, "numba")
-    candidates = max([len(theta), *(len(v) for v in nuisances.values())])
-    theta = np.broadcast_to(theta, (candidates, theta.shape[1]))
-    broadcast_nuisances = {kind: np.broadcast_to(v, (candidates, len(histories))) for kind, v in nuisances.items()}
-    tasks = list(product(range(candidates), range(len(histories))))
+    theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
+    tasks = list(product(range(len(theta)), range(len(histories))))
 
     def run(task: tuple[int, int]) -> BulgeResponse:
         c, k = task
-        nuisance_values = {kind: float(value[c, k]) for kind, value in broadcast_nuisances.items()}
+        nuisance_values = {kind: float(value[c, k]) for kind, value in nuisances.items()}
         return simulate_and_observe(specimen, kernel, theta[c], histories[k], nuisance_values, sensitivities)
 
     workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
@@ -294,11 +298,12 @@ def predict_bulge(
             rows = list(pool.map(run, tasks))
     else:
         rows = [run(task) for task in tasks]
-    return _to_prediction(rows, histories, candidates, theta.shape[1], tuple(nuisances), sensitivities)
+    parts = [_history_prediction(rows[k :: len(histories)]) for k in range(len(histories))]
+    return assemble_prediction(parts, histories, OBSERVED, len(theta))
 
 
 def simulate_and_observe(
-    specimen: Bulge,
+    specimen: BulgeSettings,
     kernel: CompiledLaw,
     theta: Floats,
     history: History,
@@ -322,7 +327,7 @@ def simulate_and_observe(
     return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
 
 
-def solver_settings(specimen: Bulge, *, exact: bool = False) -> SolverSettings:
+def solver_settings(specimen: BulgeSettings, *, exact: bool = False) -> SolverSettings:
     """The solver's settings; exact : equilibrium so tight that derivatives are those of the scheme."""
     return SolverSettings(
         tolerance=specimen.tolerance,
@@ -333,34 +338,16 @@ def solver_settings(specimen: Bulge, *, exact: bool = False) -> SolverSettings:
     )
 
 
-def _to_prediction(
-    rows: Sequence[BulgeResponse],
-    histories: Sequence[History],
-    candidates: int,
-    parameters: int,
-    kinds: tuple[str, ...],
-    sensitivities: bool,
-) -> Prediction:
-    longest = max((h.times.size for h in histories), default=0)
-    shape = (candidates, len(histories), longest, len(OBSERVED))
-    values = np.full(shape, np.nan)
-    law_jacobian = np.full((*shape, parameters), np.nan) if sensitivities else None
-    nuisance_jacobian = {kind: np.full(shape, np.nan) for kind in kinds} if sensitivities else {}
-    for n, response in enumerate(rows):
-        c, k = divmod(n, len(histories))
-        frames = histories[k].times.size
-        values[c, k, :frames] = response.values
-        if law_jacobian is not None and response.sensitivities is not None:
-            law_jacobian[c, k, :frames] = response.sensitivities.law
-            for kind in kinds:
-                nuisance_jacobian[kind][c, k, :frames] = response.sensitivities.nuisances[kind]
-    return Prediction(
-        values=values,
-        outputs=OBSERVED,
-        lengths=np.array([h.times.size for h in histories], dtype=np.int64),
-        status=np.array([int(r.status) for r in rows], dtype=np.int64).reshape(shape[:2]),
-        end_times=np.array([r.end_time for r in rows]).reshape(shape[:2]),
-        jacobian=law_jacobian,
-        times=tuple(h.times for h in histories),
-        nuisance_jacobian=nuisance_jacobian,
+def _history_prediction(responses: Sequence[BulgeResponse]) -> HistoryPrediction:
+    """The responses of all candidates in one test."""
+    sensitivities = [r.sensitivities for r in responses if r.sensitivities is not None]
+    return HistoryPrediction(
+        values=np.array([r.values for r in responses]),
+        status=np.array([int(r.status) for r in responses], dtype=np.int64),
+        end_times=np.array([r.end_time for r in responses]),
+        jacobian=np.array([s.law for s in sensitivities]) if sensitivities else None,
+        nuisance_jacobian={
+            kind: np.array([s.nuisances[kind] for s in sensitivities])
+            for kind in (sensitivities[0].nuisances if sensitivities else ())
+        },
     )

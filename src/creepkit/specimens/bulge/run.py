@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     from creepkit.kernels.interface import CompiledLaw
     from creepkit.language import CreepLaw
-    from creepkit.specimens.bulge.specimen import Bulge
+    from creepkit.specimens.bulge.settings import BulgeSettings
 
 
 def uniaxial_points(stresses: Floats, strains: Floats, states: Floats, time: float, temperature: float) -> Floats:
@@ -190,7 +190,7 @@ class BulgeRun(Run):
         return rows if wanted.ndim else np.asarray(rows[0])
 
 
-def run_bulge(specimen: Bulge, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
+def run_bulge(specimen: BulgeSettings, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
     """Simulate one test and keep all of it."""
     test_setup = set_up_test(specimen, plan, {})
     kernel = kernels.lower(law, "numba")
@@ -224,13 +224,18 @@ def run_bulge(specimen: Bulge, law: CreepLaw, values: Mapping[str, float], plan:
     )
 
 
-def _lengths(specimen: Bulge, setup: BulgeSetup) -> dict[str, float]:
+def _lengths(specimen: BulgeSettings, setup: BulgeSetup) -> dict[str, float]:
     """The lengths of the dimple, so that a written history says what was simulated; a mesh from files has none."""
     return {} if specimen.mesh is not None else {name: getattr(setup.geometry, name) for name in setup.geometry.lengths}
 
 
 def _rate_failure(
-    specimen: Bulge, kernel: CompiledLaw, theta: Floats, plan: History, setup: BulgeSetup, simulation: Simulation
+    specimen: BulgeSettings,
+    kernel: CompiledLaw,
+    theta: Floats,
+    plan: History,
+    setup: BulgeSetup,
+    simulation: Simulation,
 ) -> tuple[float, str] | None:
     """Until when the law had a creep rate, and where it has none: at any step, and beyond an early end.
 

@@ -6,83 +6,27 @@ The dimple is simulated by finite elements (see `fem`). Outputs are amplitude, w
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar
-
-import numpy as np
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from creepkit.arrays import Floats
-from creepkit.errors import SolveError, nearest
 from creepkit.hookspecs import hookimpl
 from creepkit.records import History, NuisanceValues, Prediction, Predictor, Specimen
-from creepkit.specimens.bulge.geometry import DimpleGeometry
-from creepkit.specimens.bulge.observation import OBSERVED, Observation
+from creepkit.specimens.bulge.observation import OBSERVED
+from creepkit.specimens.bulge.settings import BulgeSettings
 
 if TYPE_CHECKING:
-    from creepkit.fem.mesh import Mesh
     from creepkit.language import CreepLaw
     from creepkit.specimens.bulge.run import BulgeRun
 
 
-_RANGES = {
-    "tolerance": (1e-6, 0.1),
-    "deflection_limit": (1e-3, 1e3),
-    "strain_limit": (1e-3, 10.0),
-    "max_steps": (10, 100_000),
-}
-
-
 @dataclass(frozen=True)
-class Bulge:
-    """A dimple under gas pressure.
+class Bulge(BulgeSettings):
+    """A dimple under gas pressure, simulated by finite elements; its fields are those of BulgeSettings."""
 
-    geometry : the dimple; its fields may be given to `replace` directly. A history's own geometry (such as its
-        measured apex_thickness, mm) takes precedence in a prediction.
-    observation : the observation operator of histories that name none.
-    mesh : a mesh of another body (read from files, say) in place of the geometry's own; refinement : of the latter.
-    tolerance : estimated error of the displacements in a step, over their largest plus 0.01 mm; with 0.01 the
-        steps of a 12 h history add less than the mesh, some .06 % of its largest displacement in the median and up to
-        1.6 % for sinh laws that are nearly plastic; raise `refinement` for those.
-    deflection_limit : mm, displacement of the top at which the dimple has burst. strain_limit : creep strain at which
-        a point has. max_steps : cap on the steps of one simulation, so on its cost.
-    threads : simulations that run side by side; None for one on each core.
-    """
-
-    geometry: DimpleGeometry = field(default_factory=DimpleGeometry)
-    observation: Observation = field(default_factory=Observation)
-    mesh: Mesh | None = None
-    refinement: float = 1.0
-    tolerance: float = 1e-2
-    deflection_limit: float = 3.0
-    strain_limit: float = 1.0
-    max_steps: int = 1000
-    threads: int | None = None
     name: str = field(default="bulge", init=False)
     title: str = field(default="Bulge test of a dimple under gas pressure, by finite elements", init=False)
     outputs: tuple[str, ...] = field(default=OBSERVED, init=False)
-
-    nuisances: ClassVar[tuple[str, ...]] = ("thickness", "modulus", "temperature", "window")
-    """Kinds of explicit nuisances that predict() understands."""
-
-    def __post_init__(self) -> None:
-        for name, (low, high) in _RANGES.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise SolveError(f"bulge specimen: {name} is {value:g}; allowed are {low:g} to {high:g}")
-        if self.threads is not None and (self.threads != int(self.threads) or self.threads < 1):
-            allowed = "whole numbers above zero, or None for all cores"
-            raise SolveError(f"bulge specimen: threads is {self.threads}; allowed are {allowed}")
-
-    def replace(self, **changes: Any) -> Bulge:
-        """The same specimen with some fields, or lengths of its geometry, changed: replace(apex_thickness=0.48)."""
-        own_fields = {f.name for f in fields(self) if f.init}
-        known = own_fields | {f.name for f in fields(self.geometry)}
-        for name in changes.keys() - known:
-            raise SolveError(f"a bulge specimen has no field '{name}'; {nearest(name, known)}")
-        geometry_changes = {name: changes.pop(name) for name in list(changes) if name not in own_fields}
-        if geometry_changes:
-            changes["geometry"] = changes.get("geometry", self.geometry).replace(**geometry_changes)
-        return replace(self, **changes)
 
     def predict(
         self,
@@ -105,21 +49,10 @@ class Bulge:
         return run_bulge(self, law, values, plan)
 
     def reduced_order_model(self) -> Predictor:
-        """The stand-in of one degree of freedom, for searches."""
+        """The model of one degree of freedom, for global searches."""
         from creepkit.specimens.bulge.reduced_order.predictor import BulgeReducedOrderModel
 
         return BulgeReducedOrderModel(self)
-
-    def reference_stress(self, history: History) -> Floats:
-        """The von Mises stress, MPa, that stands for each pressure level: 12.5 P (t/.5 mm)^-1.15 for the default.
-
-        k = sigma/P of the one-degree-of-freedom model at .3 to .5 mm of deflection of the default dimple; for others
-        scaled as a plate of the same radius to thickness.
-        """
-        thickness = history.geometry.get("apex_thickness", self.geometry.apex_thickness)
-        slenderness = self.geometry.cavity_radius / 7.5 * 0.5 / thickness
-        levels = np.unique(history.loading.program().values)
-        return np.asarray(12.5 * slenderness**1.15 * levels[levels > 0])
 
 
 @hookimpl

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
@@ -10,19 +10,27 @@ import numpy as np
 
 from creepkit import kernels
 from creepkit.arrays import Floats
-from creepkit.errors import SolveError
-from creepkit.records import History, NuisanceValues, Prediction, Status
+from creepkit.records import (
+    History,
+    HistoryPrediction,
+    NuisanceValues,
+    Prediction,
+    Status,
+    assemble_prediction,
+    broadcast_candidates,
+    check_nuisances,
+)
 from creepkit.specimens.bulge.observation import OBSERVED
 from creepkit.specimens.bulge.reduced_order.step_equations import AMPLITUDE_COLUMN
 from creepkit.specimens.bulge.reduced_order.time_integration import NUISANCE_DIRECTIONS
 from creepkit.specimens.bulge.reduced_order.trajectories import Trajectories, simulate_trajectories
+from creepkit.specimens.bulge.settings import BulgeSettings
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
-    from creepkit.specimens.bulge.specimen import Bulge
 
 
-_SEEN = slice(AMPLITUDE_COLUMN, AMPLITUDE_COLUMN + len(OBSERVED))
+_OBSERVED_COLUMNS = slice(AMPLITUDE_COLUMN, AMPLITUDE_COLUMN + len(OBSERVED))
 
 
 @dataclass(frozen=True)
@@ -33,12 +41,12 @@ class BulgeReducedOrderModel:
     states are integrated beside the strain. Derivatives are exact, but for the window, of which there are none.
     """
 
-    specimen: Bulge
+    specimen: BulgeSettings
     name: str = field(default="bulge, one degree of freedom", init=False)
     title: str = field(default="Bulge test with one degree of freedom, for screening", init=False)
     outputs: tuple[str, ...] = field(default=OBSERVED, init=False)
 
-    nuisances: ClassVar[tuple[str, ...]] = ("thickness", "modulus", "temperature", "window")
+    nuisances: ClassVar[tuple[str, ...]] = BulgeSettings.nuisances
 
     def predict(
         self,
@@ -50,53 +58,40 @@ class BulgeReducedOrderModel:
         sensitivities: bool = False,
     ) -> Prediction:
         """Predict amplitude, width and shape of each history at its times; see records.Predictor."""
-        assumed_nuisances = dict(nuisances or {})
-        for kind in assumed_nuisances:
-            if kind not in self.nuisances:
-                known = ", ".join(self.nuisances)
-                raise SolveError(f"a bulge specimen does not know the nuisance '{kind}'; it knows {known}")
+        check_nuisances(nuisances or (), self.nuisances, "a bulge specimen")
         compiled = kernels.lower(law, "numba")
-        rows = max([len(theta), *(len(v) for v in assumed_nuisances.values())])
-        theta = np.broadcast_to(theta, (rows, theta.shape[1]))
+        theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
         trajectories = simulate_trajectories(
-            self.specimen, compiled, theta, histories, nuisances=assumed_nuisances, exact=sensitivities
+            self.specimen, compiled, theta, histories, nuisances=nuisances, exact=sensitivities
         )
-        return _prediction(histories, trajectories, theta.shape[1], assumed_nuisances)
+        parts = [_history_prediction(history, k, trajectories, nuisances) for k, history in enumerate(histories)]
+        return assemble_prediction(parts, histories, OBSERVED, len(theta))
 
     def reference_stress(self, history: History) -> Floats:
         """As the specimen's."""
         return self.specimen.reference_stress(history)
 
 
-def _prediction(
-    histories: Sequence[History], trajectories: Trajectories, parameters: int, nuisances: NuisanceValues
-) -> Prediction:
-    """What was observed at the times of the histories, NaN after the end of a row."""
-    lengths = np.array([h.times.size for h in histories], dtype=np.int64)
-    values = _at_frames(histories, trajectories, trajectories.values)
-    if trajectories.jacobian is None:
-        jacobian, nuisance_jacobian = None, {}
-    else:
-        changes = _at_frames(histories, trajectories, trajectories.jacobian)
-        jacobian = changes[..., :parameters]
+def _history_prediction(
+    history: History, test: int, trajectories: Trajectories, nuisances: Iterable[str]
+) -> HistoryPrediction:
+    """What is observed at the times of one history, NaN after the end of a candidate."""
+    ended = trajectories.status[:, test] != Status.COMPLETE
+    lost = ended[:, None] & (history.times >= trajectories.end_times[:, test, None])
+
+    def at_times(node_values: Floats) -> Floats:
+        outputs = trajectories.frames(test, node_values[:, test, :, _OBSERVED_COLUMNS])
+        outputs[lost] = np.nan
+        return outputs
+
+    values, jacobian, nuisance_jacobian = at_times(trajectories.values), None, {}
+    if trajectories.jacobian is not None:
+        derivatives, parameters = at_times(trajectories.jacobian), trajectories.parameters
+        jacobian = derivatives[..., :parameters]
         nuisance_jacobian = {
-            kind: changes[..., parameters + NUISANCE_DIRECTIONS.index(kind)]
+            kind: derivatives[..., parameters + NUISANCE_DIRECTIONS.index(kind)]
             for kind in nuisances
             if kind in NUISANCE_DIRECTIONS
         }
-    return Prediction(
-        values, OBSERVED, lengths, trajectories.status, trajectories.end_times, jacobian, tuple(h.times for h in histories),
-        nuisance_jacobian,
-    )  # fmt: skip
-
-
-def _at_frames(histories: Sequence[History], trajectories: Trajectories, values: Floats) -> Floats:
-    """Outputs at the times of the histories, (candidates, tests, times, outputs, ...)."""
-    longest = max(h.times.size for h in histories)
-    out = np.full((*values.shape[:2], longest, len(OBSERVED), *values.shape[4:]), np.nan)
-    for k, history in enumerate(histories):
-        outputs = trajectories.frames(k, values[:, k, :, _SEEN])
-        ended = trajectories.status[:, k] != Status.COMPLETE
-        outputs[ended[:, None] & (history.times >= trajectories.end_times[:, k, None])] = np.nan
-        out[:, k, : history.times.size] = outputs
-    return out
+    status, end_times = trajectories.status[:, test], trajectories.end_times[:, test]
+    return HistoryPrediction(values, status, end_times, jacobian, nuisance_jacobian)

@@ -44,7 +44,7 @@ from creepkit.specimens.bulge.reduced_order.deflection_curves import (
 from creepkit.specimens.bulge.reduced_order.step_equations import REDISTRIBUTION, redistribution_sizes
 
 if TYPE_CHECKING:
-    from creepkit.specimens.bulge.specimen import Bulge
+    from creepkit.specimens.bulge.settings import BulgeSettings
 
 
 THICKNESS_RATIOS = (0.85, 1.0, 1.2)
@@ -93,25 +93,25 @@ class OfflineSimulation(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def offline_simulations(specimen: Bulge, geometry: DimpleGeometry) -> tuple[tuple[OfflineSimulation, ...], ...]:
+def offline_simulations(specimen: BulgeSettings, geometry: DimpleGeometry) -> tuple[tuple[OfflineSimulation, ...], ...]:
     """For each thickness the Norton runs and the elastic one."""
     result = []
     for thickness in offline_thicknesses(specimen, geometry):
         body = offline_model(specimen, geometry, thickness)
-        guess = 12.5 * (geometry.cavity_radius / 15.0 / thickness) ** 1.15  # as Bulge.reference_stress
+        guess = 12.5 * (geometry.cavity_radius / 15.0 / thickness) ** 1.15  # as BulgeSettings.reference_stress
         creeping = [_norton(specimen, body, n, guess) for n in EXPONENTS]
         result.append((*creeping, _elastic(specimen, body)))
     return tuple(result)
 
 
-def offline_model(specimen: Bulge, geometry: DimpleGeometry, thickness: float) -> FiniteElementModel:
+def offline_model(specimen: BulgeSettings, geometry: DimpleGeometry, thickness: float) -> FiniteElementModel:
     """The body of a trial; the only one of a mesh from files."""
     if specimen.mesh is not None:
         return finite_element_model(specimen.mesh)
     return finite_element_model(replace(geometry, apex_thickness=thickness).mesh(specimen.refinement))
 
 
-def offline_thicknesses(specimen: Bulge, geometry: DimpleGeometry) -> list[float]:
+def offline_thicknesses(specimen: BulgeSettings, geometry: DimpleGeometry) -> list[float]:
     """Apex thicknesses of the trials, mm: as the plate allows; the only one of a mesh from files."""
     nominal, most = geometry.apex_thickness, geometry.plate_thickness - geometry.roof_axial
     if specimen.mesh is not None:
@@ -119,7 +119,7 @@ def offline_thicknesses(specimen: Bulge, geometry: DimpleGeometry) -> list[float
     return sorted({min(ratio * nominal, most) for ratio in THICKNESS_RATIOS})
 
 
-def _norton(specimen: Bulge, body: FiniteElementModel, exponent: float, guess: float) -> OfflineSimulation:
+def _norton(specimen: BulgeSettings, body: FiniteElementModel, exponent: float, guess: float) -> OfflineSimulation:
     """A Norton run at 1 MPa until the dimple bursts."""
     level = np.log(_RATE) - exponent * np.log(guess)
     pressure = Program(np.array([0.0, 5.0]), np.array([0.0, 1.0]))
@@ -127,7 +127,7 @@ def _norton(specimen: Bulge, body: FiniteElementModel, exponent: float, guess: f
     return simulate_profiles(specimen, body, load_history, np.array([level, exponent]), level)
 
 
-def _elastic(specimen: Bulge, body: FiniteElementModel) -> OfflineSimulation:
+def _elastic(specimen: BulgeSettings, body: FiniteElementModel) -> OfflineSimulation:
     """An elastic run in which P/E rises to the end of its range, or till the dimple is as deep as can be."""
     end = 1e4
     pressure = Program(np.array([0.0, end]), np.array([0.0, 1.0]))
@@ -137,7 +137,7 @@ def _elastic(specimen: Bulge, body: FiniteElementModel) -> OfflineSimulation:
 
 
 def simulate_profiles(
-    specimen: Bulge,
+    specimen: BulgeSettings,
     body: FiniteElementModel,
     load_history: LoadHistory,
     theta: Floats,
@@ -278,14 +278,14 @@ def _extended(curves: Floats) -> Floats:
     return np.ascontiguousarray(np.concatenate([first, curves, last], axis=1).T)
 
 
-def deflection_grid(specimen: Bulge) -> TableGrid:
+def deflection_grid(specimen: BulgeSettings) -> TableGrid:
     """Deflections of the tables, mm, up to where the dimple has burst."""
     least = _SMALLEST * specimen.geometry.apex_thickness
     return TableGrid.spanning(max(specimen.deflection_limit, 2 * least), least, _DEFLECTIONS)
 
 
 @lru_cache(maxsize=64)
-def build_tables(specimen: Bulge, geometry: DimpleGeometry, operator: Observation) -> ReducedOrderTables:
+def build_tables(specimen: BulgeSettings, geometry: DimpleGeometry, operator: Observation) -> ReducedOrderTables:
     """The tables of a dimple as an operator sees it; some seconds of CPU, then kept while the program runs."""
     grid = deflection_grid(specimen)
     rows = [_row(runs, grid.points, operator) for runs in offline_simulations(specimen, geometry)]

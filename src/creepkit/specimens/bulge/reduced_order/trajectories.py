@@ -24,13 +24,13 @@ from creepkit.specimens.bulge.reduced_order.time_integration import (
 )
 
 if TYPE_CHECKING:
-    from creepkit.specimens.bulge.specimen import Bulge
+    from creepkit.specimens.bulge.settings import BulgeSettings
 
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
     from creepkit.language import Elastic
-    from creepkit.specimens.bulge.specimen import Bulge
+    from creepkit.specimens.bulge.settings import BulgeSettings
 
 
 FIRST_STEP, STEP_GROWTH, LARGEST_STEP_FRACTION = 2.5, 1.0, 1.0 / 12.0
@@ -60,7 +60,7 @@ class TimeNodes:
 
 
 @lru_cache(maxsize=1024)
-def time_nodes(specimen: Bulge, history: History) -> TimeNodes:
+def time_nodes(specimen: BulgeSettings, history: History) -> TimeNodes:
     """The schedule of a test; complains as the specimen does where the test cannot be simulated."""
     test_setup = set_up_test(specimen, history, {})
     segments, largest = test_setup.load_history.segments, float(test_setup.load_history.pressure.values.max())
@@ -155,6 +155,11 @@ class Trajectories:
     status: Ints
     end_times: Floats
 
+    @property
+    def parameters(self) -> int:
+        """Number of the law's parameters, P, where there are derivatives."""
+        return 0 if self.jacobian is None else self.jacobian.shape[-1] - len(NUISANCE_DIRECTIONS)
+
     def frames(self, test: int, values: Floats) -> Floats:
         """Values (candidates, nodes, ...) of the nodes of a test at its history's times, (candidates, times, ...)."""
         weights = self.schedules[test].frames
@@ -162,7 +167,7 @@ class Trajectories:
 
 
 def simulate_trajectories(
-    specimen: Bulge,
+    specimen: BulgeSettings,
     law: CompiledLaw,
     theta: Floats,
     histories: Sequence[History],
@@ -231,7 +236,7 @@ class _Dimples:
 
 
 def _dimples(
-    specimen: Bulge, histories: Sequence[History], plans: Sequence[TimeNodes], nuisances: Mapping[str, Floats], rows: int,
+    specimen: BulgeSettings, histories: Sequence[History], plans: Sequence[TimeNodes], nuisances: Mapping[str, Floats], rows: int,
     known_tables: ReducedOrderTables | None,
 ) -> _Dimples:  # fmt: skip
     """Every different dimple, and which one each candidate has in each test."""
@@ -257,7 +262,7 @@ def _dimples(
 
 def _refuse_another(known: ReducedOrderTables, history: History, plan: TimeNodes, window: float) -> None:
     """A test of another dimple than that of the tables."""
-    where, tested = history.source or f"history '{history.name}'", plan.setup.geometry
+    where, tested = history.origin, plan.setup.geometry
     pairs = [(name, getattr(tested, name), getattr(known.geometry, name)) for name in tested.lengths[1:]]
     for name, result, allowed in [*pairs, ("window", window, known.window)]:
         if abs(result - allowed) > 1e-6 * allowed:
@@ -267,7 +272,7 @@ def _refuse_another(known: ReducedOrderTables, history: History, plan: TimeNodes
             )
 
 
-def _tables(specimen: Bulge, plan: TimeNodes, window: float) -> ReducedOrderTables:
+def _tables(specimen: BulgeSettings, plan: TimeNodes, window: float) -> ReducedOrderTables:
     """The tables of the dimple of a test, for all its thicknesses."""
     setup, nominal = plan.setup, specimen.geometry.apex_thickness
     room = setup.geometry.plate_thickness - setup.geometry.roof_axial
@@ -327,8 +332,7 @@ def _modulus_temperature_slope(elastic: Elastic, temperature: float) -> float:
 
 def _refuse_soft(history: History, modulus: Floats) -> None:
     if not modulus.min() > 0:
-        where = history.source or f"history '{history.name}'"
-        raise SolveError(f"{where}: the modulus is {modulus.min():g} MPa; it must be above zero")
+        raise SolveError(f"{history.origin}: the modulus is {modulus.min():g} MPa; it must be above zero")
 
 
 def _beta(law: CompiledLaw, theta: Floats, exact: bool) -> tuple[Floats, Floats]:
