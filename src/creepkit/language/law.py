@@ -21,6 +21,7 @@ from sympy.logic.boolalg import Boolean, BooleanAtom
 from creepkit.errors import LawError, nearest
 from creepkit.language.expression_trees import evaluate_multiprecision
 from creepkit.language.symbols import POINT_VARIABLES, Param, State
+from creepkit.presentation import Presentable, present
 
 
 def validate_law(law: CreepLaw) -> None:
@@ -152,7 +153,7 @@ def _hash(text: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class CreepLaw:
+class CreepLaw(Presentable):
     """A creep law: rate of equivalent creep strain, in 1/s, as a sum of named terms.
 
     name : short, lower case, unique in the registry.
@@ -266,53 +267,37 @@ class CreepLaw:
 
     def latex(self) -> str:
         """The law as a LaTeX equation."""
-        from creepkit.language.printing import law_latex
-
-        return law_latex(self)
+        return present(self, "latex")
 
     # ---- algebra ---------------------------------------------------------------------------------------------------
 
     def __add__(self, other: CreepLaw) -> CreepLaw:
         """The additive law; terms stay apart by name, colliding parameters become A_1, A_2 ..."""
-        from creepkit.language import algebra
-
-        return algebra.add(self, other) if isinstance(other, CreepLaw) else NotImplemented
+        return present(self, "add", other) if isinstance(other, CreepLaw) else NotImplemented
 
     def without(self, *terms: str) -> CreepLaw:
         """The law less the named terms and the parameters that only they used."""
-        from creepkit.language import algebra
-
-        return algebra.without(self, terms)
+        return present(self, "without", terms)
 
     def only(self, *terms: str) -> CreepLaw:
         """The law with the named terms alone."""
-        from creepkit.language import algebra
-
-        return algebra.only(self, terms)
+        return present(self, "only", terms)
 
     def fix(self, **values: float) -> CreepLaw:
         """The law with parameters at fixed numbers; m=0 makes strain hardening a power law."""
-        from creepkit.language import algebra
-
-        return algebra.fix(self, values)
+        return present(self, "fix", values)
 
     def times(self, factor: Any) -> CreepLaw:
         """The law with every term multiplied by a factor such as arrhenius(T_ref=1073)."""
-        from creepkit.language import algebra
-
-        return algebra.times(self, factor)
+        return present(self, "times", factor)
 
     def with_temperature(self, **forms: Any) -> CreepLaw:
         """The law with parameters made functions of temperature, such as n=linear(T_ref=1073)."""
-        from creepkit.language import algebra
-
-        return algebra.with_temperature(self, forms)
+        return present(self, "with_temperature", forms)
 
     def at(self, temperature: float) -> CreepLaw:
         """The law at one temperature, in K; parameters that no longer matter there are dropped."""
-        from creepkit.language import algebra
-
-        return algebra.at(self, temperature)
+        return present(self, "at", temperature)
 
     def rename(self, name: str, title: str = "") -> CreepLaw:
         """The same law under another name."""
@@ -341,11 +326,6 @@ class CreepLaw:
         state = {f.name: getattr(self, f.name) for f in fields(self)}
         plain = {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
         return _rebuild, (plain,)
-
-    def __str__(self) -> str:
-        from creepkit.language.printing import law_text
-
-        return law_text(self)
 
     def __repr__(self) -> str:
         return f"<CreepLaw {self.name}: {len(self.terms)} term(s), parameters {', '.join(self.names) or 'none'}>"

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import sympy
 from sympy.printing.latex import LatexPrinter
 from sympy.printing.str import StrPrinter
 
+from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import GAS_CONSTANT, LATEX_SYMBOLS, temperature
-
-if TYPE_CHECKING:
-    from creepkit.language.law import CreepLaw
-
 
 _LATEX_NAMES = {"n_inf": r"n_\infty"}
 
