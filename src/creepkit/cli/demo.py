@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from creepkit.cli.identify import file_stem, print_ranking, rank_laws, write_ranking
-from creepkit.report.terminal import print_table
+from creepkit.cli.identify import file_stem, rank_laws, write_ranking
+from creepkit.report.ranking import print_ranking, print_truth
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -48,8 +48,8 @@ def command(
     written_files = write_ranking(ranking, to)
     if not uniaxial:
         written_files.append(_plot_section(ranking.best, histories[0], to))
-    print_ranking(ranking, written_files, histories)
-    _print_truth(truth, ranking.best)
+    print_ranking(ranking, written_files, len(histories))
+    print_truth(truth, ranking.best)
 
 
 def compile_kernels() -> None:
@@ -107,18 +107,3 @@ def _plot_section(fit: Identification, test: History, folder: Path) -> Path:
     path = folder / f"{file_stem(fit.law.name)}-section.png"
     run.section(path=path)  # type: ignore[attr-defined]
     return path
-
-
-def _print_truth(truth: dict[str, Any], fit: Identification) -> None:
-    """The planted values beside the identified ones."""
-    law_is_correct = fit.law.name.startswith(truth["law"])
-    rows = []
-    for e in fit.estimates if law_is_correct else ():
-        planted = truth["values"][e.name]
-        inside = "yes" if e.low <= planted <= e.high else "no"
-        rows.append((e.name, f"{planted:.4g}", f"{e.value:.4g}", f"{e.low:.4g} to {e.high:.4g}", inside))
-    if "rate_scatter" in truth:
-        scatter = f"{100 * truth['rate_scatter']:.0f} %", f"{100 * fit.noise_model.rate:.0f} %"
-        rows.append(("rate between tests", *scatter, "", ""))
-    typer.echo("")
-    print_table(f"the truth: {truth['law']}", ("parameter", "planted", "identified", "95 % interval", "inside"), rows)

@@ -75,7 +75,9 @@ def command(
         )
     written = write_temperature_law(temperature_law, to)
     if as_json:
-        print_json(_json_result(temperature_law, written))
+        from creepkit.report.temperature_law import temperature_law_to_json
+
+        print_json(temperature_law_to_json(temperature_law, written))
         return
     typer.echo(str(temperature_law))
     for path in written:
@@ -162,24 +164,3 @@ def write_temperature_law(temperature_law: TemperatureLaw, folder: Path) -> list
         ck.export(temperature_law.valued, language, to=path, force=True)
         written.append(path)
     return written
-
-
-def _json_result(temperature_law: TemperatureLaw, written: Sequence[Path]) -> dict[str, Any]:
-    return {
-        "law": temperature_law.law.name,
-        "judged_by": temperature_law.criterion_data,
-        "range_K": list(temperature_law.temperature_range),
-        "T_ref_K": temperature_law.T_ref,
-        "forms": temperature_law.forms,
-        "sets": {
-            name: [vars(form_weight) for form_weight in form_weights]
-            for name, form_weights in temperature_law.plausible_forms.items()
-        },
-        "parameters": {e.name: {k: v for k, v in vars(e).items() if k != "name"} for e in temperature_law.estimates},
-        "candidates": [
-            {"forms": candidate.forms, "excess": candidate.criterion_difference, "weight": candidate.weight}
-            for candidate in temperature_law.candidates
-        ],
-        "notes": list(temperature_law.notes),
-        "files": [str(path) for path in written],
-    }

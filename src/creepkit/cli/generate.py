@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from creepkit.cli.options import BULGE
-from creepkit.report.terminal import ProgressBar, print_json
+from creepkit.report.terminal import ProgressBar
 
 if TYPE_CHECKING:
-    from creepkit.dataset.dataset import Dataset
     from creepkit.records import Specimen
     from creepkit.sampling.domains import SamplingDesign
 
@@ -63,6 +62,8 @@ def command(
         law, specimen_record, domain, design_changes(ranges or [], end_h, domain, unscreened), interval
     )
     if dry_run:
+        from creepkit.report.sampling import print_acceptance
+
         print_acceptance(design, seed, to, as_json)
         return
     if to is None:
@@ -72,6 +73,8 @@ def command(
             design, specimen_record, samples, draws=draws, seed=seed, to=to, workers=workers, cluster=cluster,
             part=parse_part(part), progress=progress.tick,
         )  # fmt: skip
+    from creepkit.report.dataset import print_dataset
+
     print_dataset(data, to, part, as_json)
 
 
@@ -136,35 +139,3 @@ def parse_part(text: str | None) -> tuple[int, int] | None:
     if not (k.isdecimal() and n.isdecimal() and 1 <= int(k) <= int(n)):
         raise DatasetError(f"--part {text} is not K/N with K from 1 to N, such as 3/16")
     return int(k), int(n)
-
-
-def print_acceptance(design: SamplingDesign, seed: int, to: Path | None, as_json: bool) -> None:
-    """Print what the design would draw, and draw the rates of its samples."""
-    from creepkit.sampling.domains import SamplingDomain, acceptance
-
-    assert isinstance(design, SamplingDomain)  # the command line knows no others
-    acceptance_rates = acceptance(design, seed=seed)
-    plot_file = Path("rates.png") if to is None else to.with_suffix(".rates.png")
-    acceptance_rates.figure(plot_file)
-    if as_json:
-        criterion_fractions = {name: float(passed.mean()) for name, passed in acceptance_rates.criteria_met.items()}
-        fractions = {"simulated": float(acceptance_rates.kept.mean()), "useful": float(acceptance_rates.useful.mean())}
-        print_json(
-            {"draws": len(acceptance_rates.draws), "met": criterion_fractions, **fractions, "picture": str(plot_file)}
-        )
-    else:
-        typer.echo(f"{acceptance_rates}\nwrote {plot_file}; nothing was simulated")
-
-
-def print_dataset(data: Dataset, to: Path, part: str | None, as_json: bool) -> None:
-    """Print what was made, and where it lies."""
-    if as_json:
-        from creepkit.dataset.dataset import summary
-
-        print_json({**summary(data), "file": str(to), "part": part})
-        return
-    typer.echo(f"{data}\n")
-    if part is None:
-        typer.echo(f"wrote {to}: {to.stat().st_size / 1e6:.1f} MB; remove {to}.parts when no more samples are wanted")
-    else:
-        typer.echo(f"part {part} is done in {to}.parts; the same command without --part merges all parts into {to}")

@@ -24,8 +24,7 @@ def command(
     """
     import creepkit as ck
     from creepkit.errors import SolveError
-    from creepkit.report.bulge_plots import describe_tables
-    from creepkit.report.bulge_plots import plot_tables as draw
+    from creepkit.report.simulation import tables_figure, tables_text
     from creepkit.specimens.bulge.reduced_order.tables import build_tables, write_tables
     from creepkit.specimens.bulge.specimen import Bulge
 
@@ -34,8 +33,8 @@ def command(
         raise SolveError(f"--specimen {specimen}: only a bulge has a one-degree-of-freedom model; leave it out")
     specimen_record = specimen_record.replace(**parse_numbers(geometry or [], "--geometry", "cavity_radius=6"))
     model_tables = build_tables(specimen_record, specimen_record.geometry, specimen_record.observation)
-    typer.echo(describe_tables(model_tables))
+    typer.echo(tables_text(model_tables))
     if picture is not None:
-        draw(model_tables, picture)
+        tables_figure(model_tables, picture)
         typer.echo(f"wrote {picture}", err=True)
     typer.echo(f"wrote {write_tables(model_tables, to)}", err=True)

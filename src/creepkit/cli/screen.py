@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from creepkit.cli.options import parse_nuisances, penalty_named
-from creepkit.report.terminal import ProgressBar, print_json, print_table
+from creepkit.report.terminal import ProgressBar
 
 if TYPE_CHECKING:
     from creepkit.records import Predictor
-    from creepkit.screening.results import Plate
 
 
 CONFIRMATION_CHOICES = {"when-in-doubt": "when in doubt", "always": True, "never": False}
@@ -58,6 +57,7 @@ def command(
     """
     from creepkit.inverse.selection.select import SELECTION_FRAMES
     from creepkit.inverse.settings import IdentificationSettings
+    from creepkit.report.screening import print_screening
     from creepkit.screening.screen import screen
 
     with ProgressBar() as progress:
@@ -71,30 +71,6 @@ def command(
     if plate.identified:
         written += [to / "fits", *plate.plot(to / "pictures")]
     print_screening(plate, written, as_json)
-
-
-def print_screening(plate: Plate, written: list[Path], as_json: bool) -> None:
-    """Print the table, what it sums up to, and what was written."""
-    from creepkit.report.screening import TABLE_COLUMNS, summary_lines, table_rows
-
-    if as_json:
-        print_json(_json_result(plate, written))
-        return
-    print_table(f"{len(plate.results)} alloys", TABLE_COLUMNS, table_rows(plate))
-    for line in (*summary_lines(plate), *(f"wrote {path}" for path in written)):
-        typer.echo(line)
-
-
-def _json_result(plate: Plate, written: list[Path]) -> dict[str, Any]:
-    from creepkit.screening.files import result_columns
-
-    return {
-        "alloys": [result_columns(plate, result) for result in plate.results],
-        "shares": plate.law_fractions(),
-        "failed": plate.failures,
-        "notes": list(plate.notes),
-        "files": [str(path) for path in written],
-    }
 
 
 def _surrogate_named(name: str | None) -> Predictor | None:

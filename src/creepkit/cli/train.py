@@ -10,8 +10,7 @@ import typer
 from creepkit.report.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
-    from creepkit.dataset.dataset import Dataset
-    from creepkit.surrogates.surrogate import Recipe, Surrogate
+    from creepkit.surrogates.surrogate import Recipe
 
 
 RECIPE_NAMES = ("parameter-gru", "rate-net")
@@ -52,6 +51,7 @@ def command(
 
     import creepkit as ck
     from creepkit.dataset.storage import read_dataset
+    from creepkit.report.surrogate import write_surrogate_figures
 
     if threads is not None:
         torch.set_num_threads(threads)
@@ -71,7 +71,7 @@ def command(
     )
     with ProgressBar() as progress:
         model = ck.train(samples, selected_recipe, to=to, seed=seed, device=device, progress=progress.tick)
-    plot_files = plot_surrogate(model, samples, plots or to.parent, to.stem)
+    plot_files = write_surrogate_figures(model, samples, plots or to.parent, to.stem)
     if as_json:
         print_json({"file": str(to), "metrics": model.metadata.metrics, "pictures": [str(path) for path in plot_files]})
         return
@@ -101,17 +101,3 @@ def select_recipe(recipe_name: str, network_options: dict[str, Any], training_op
     )
     recipe: Recipe = replace(default_recipe, **given_options, training=training)
     return recipe
-
-
-def plot_surrogate(model: Surrogate, data: Dataset, folder: Path, name: str) -> list[Path]:
-    """Draw the curves, the parity plot and the worst samples; returns their paths."""
-    from creepkit.report import surrogate
-    from creepkit.surrogates.evaluation import evaluate
-
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / f"{name}-{what}.png" for what in ("curves", "parity", "worst")]
-    evaluation = evaluate(model, data)
-    surrogate.training_curves(model.metadata, paths[0])
-    surrogate.parity_figure(evaluation.comparison, evaluation.times, paths[1])
-    surrogate.worst_samples_figure(evaluation.comparison, paths[2])
-    return paths

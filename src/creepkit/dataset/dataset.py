@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import DatasetError
+from creepkit.presentation import Presentable
 from creepkit.records import Status
 from creepkit.sampling.conditions import CONDITION_UNITS, planned_test
 from creepkit.specimens.documents import specimen_to_json
@@ -66,7 +67,7 @@ NOT_SIMULATED = -1
 
 
 @dataclass(frozen=True, eq=False)
-class Dataset:
+class Dataset(Presentable):
     """Simulated tests: n samples of a law with its parameters and conditions.
 
     law, specimen : what was simulated. design_document : everything that decided what was drawn.
@@ -104,11 +105,6 @@ class Dataset:
 
     def __len__(self) -> int:
         return len(self.index)
-
-    def __str__(self) -> str:
-        from creepkit.report.dataset import dataset_text
-
-        return dataset_text(self)
 
     def __repr__(self) -> str:
         accepted = int((self.reasons == 0).sum())

@@ -20,6 +20,7 @@ from creepkit.inverse.identify import identify
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_temperature, with_arrhenius
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, temperature
+from creepkit.presentation import Presentable
 from creepkit.records import History, Predictor
 
 PriorOdds = Mapping[str, Mapping[str, float]]
@@ -98,7 +99,7 @@ StudyProgress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
-class TemperatureStudy:
+class TemperatureStudy(Presentable):
     """The answer of temperature_study().
 
     tests : with the moduli found, where they were. moduli : None where no modulus could be asked for.
@@ -112,11 +113,6 @@ class TemperatureStudy:
     isothermal_fits: tuple[Identification, ...]
     temperature_law: TemperatureLaw | None
     notes: tuple[str, ...]
-
-    def __str__(self) -> str:
-        parts = [self.moduli_fit, self.joint_fit, self.temperature_law]
-        texts = [str(part) for part in parts if part is not None]
-        return "\n\n".join([*texts, *(f"note: {note}" for note in self.notes)])
 
 
 def temperature_study(

@@ -15,6 +15,7 @@ from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.language.elastic import Elastic, wachtman
+from creepkit.presentation import Presentable
 from creepkit.records import History, Nuisance, Predictor
 
 FIRST_FRAMES = 15
@@ -29,7 +30,7 @@ _T0_BOUNDS = (100.0, 3000.0)
 
 
 @dataclass(frozen=True, eq=False)
-class ModulusEstimates:
+class ModulusEstimates(Presentable):
     """What the first frames say of the modulus.
 
     names : of the tests. temperatures : (tests,) K; values, sd : (tests,) MPa.
@@ -43,13 +44,6 @@ class ModulusEstimates:
     sd: Floats
     elastic: Elastic | None
     fit: Identification
-
-    def __str__(self) -> str:
-        rows = zip(self.names, self.temperatures, self.values, self.sd, strict=True)
-        lines = [f"  {name}: {E / 1e3:.1f} +- {s / 1e3:.1f} GPa at {T:.1f} K" for name, T, E, s in rows]
-        return "\n".join(
-            ["modulus from the first frames", *lines, f"  E(T) = {self.elastic.E if self.elastic else '-'}"]
-        )
 
 
 def identify_moduli(

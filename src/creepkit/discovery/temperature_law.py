@@ -24,14 +24,11 @@ from creepkit.inverse.identification_document import identification_to_json as f
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_to_json
+from creepkit.presentation import Presentable, present
 from creepkit.records import LawWithValues
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-if TYPE_CHECKING:
-    from creepkit.discovery.combinations import FormWeight
 
 
 FILE_KIND = "creepkit temperature law"
@@ -152,7 +149,7 @@ class CandidateLaw:
 
 
 @dataclass(frozen=True, eq=False)
-class TemperatureLaw:
+class TemperatureLaw(Presentable):
     """The answer of discover() and of refit().
 
     law : an ordinary law with temperature in it, printed and exported like any other; `valued` has its numbers.
@@ -217,14 +214,7 @@ class TemperatureLaw:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Parameters against temperature, with intervals and the curves of the forms that remain."""
-        from creepkit.report.temperature_law import plot_temperature_law
-
-        return plot_temperature_law(self, path)
-
-    def __str__(self) -> str:
-        from creepkit.report.temperature_law import temperature_law_text
-
-        return temperature_law_text(self)
+        return present(self, "plot", path)
 
 
 def temperature_law_from_combinations(

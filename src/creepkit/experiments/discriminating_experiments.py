@@ -31,6 +31,7 @@ from creepkit.inverse.search.local_refinement import Bounds, bounded_least_squar
 from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE
 from creepkit.inverse.selection.ranking import CREDIBLE_WEIGHT
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
+from creepkit.presentation import Presentable
 from creepkit.records import History, Predictor
 
 REFIT_STEPS = 8
@@ -256,7 +257,7 @@ class DiscriminatingExperiment:
 
 
 @dataclass(frozen=True)
-class DiscriminationDesign:
+class DiscriminationDesign(Presentable):
     """Further tests, the most telling first, if law `true` holds and law `other` is fitted.
 
     now : expected chi-square by the tests that were made. left_out : designs that burst at once.
@@ -276,10 +277,6 @@ class DiscriminationDesign:
             return f"{premise}; none of the {len(self.experiments)} further tests considered brings it above {DISTINGUISHABLE_CHI_SQUARE:.2g}"
         best = self.experiments[0]
         return f"{premise}; one more test, {best.description}, would bring it to {best.chi_square:.2g}"
-
-    def __str__(self) -> str:
-        rows = [f"  {t.chi_square:9.3g}  {t.description}" for t in self.experiments]
-        return "\n".join([self.sentence, *rows, *(f"      burst  {name}" for name in self.excluded)])
 
 
 def discriminating_experiments(

@@ -13,6 +13,7 @@ from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, output_errors
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
+from creepkit.presentation import Presentable
 from creepkit.records import History, Prediction, Predictor, Status
 
 AGREEMENT_LIMIT = 1.0
@@ -60,7 +61,7 @@ class ConfirmedTest:
 
 
 @dataclass(frozen=True)
-class Confirmation:
+class Confirmation(Presentable):
     """The answer of confirm(). law, using : names of what was simulated, and by what."""
 
     law: str
@@ -109,17 +110,6 @@ class Confirmation:
                 if (test.name, one.output) == place:
                     return one
         raise FitError(f"no output '{place[1]}' of a test '{place[0]}' was confirmed")
-
-    def __str__(self) -> str:
-        rows = [f"{self.law}: {self.verdict}"]
-        for test in self.tests:
-            for o in test.outputs:
-                fit_text = "" if o.fit_errors is None else f", of the fit {o.fit_errors.chi_square:.3g}"
-                difference_text = f"; apart {o.rms_difference:.2g} noise" if np.isfinite(o.rms_difference) else ""
-                rows.append(
-                    f"  {test.name}, {o.output}: chi-square {o.simulation_errors.chi_square:.3g}{fit_text}{difference_text}"
-                )
-        return "\n".join(rows)
 
     @property
     def _incomplete_tests(self) -> list[ConfirmedTest]:

@@ -20,6 +20,7 @@ from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate, delta_method, interval_quantile
 from creepkit.language import CreepLaw
+from creepkit.presentation import Presentable, present
 from creepkit.records import SIMULATED_NUISANCES, History, Nuisance, Prediction, Predictor
 
 if TYPE_CHECKING:
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
 
     from creepkit.inverse.search.cost_function import SearchTrace
     from creepkit.inverse.sparsity.result import Sparsity
-    from creepkit.inverse.uncertainty.correlation import Correlation
-    from creepkit.inverse.uncertainty.posterior import PosteriorSamples
-    from creepkit.inverse.uncertainty.profile_likelihood import ProfileLikelihood
     from creepkit.inverse.uncertainty.quantities import DerivedQuantity
     from creepkit.inverse.variance_components import LinearisedProblem
 
@@ -38,7 +36,7 @@ __all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "Outp
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class Identification(Presentable):
     """The answer of identify().
 
     estimates : one Estimate for each parameter, in the law's order.
@@ -200,48 +198,29 @@ class Identification:
             raise FitError(f"this identification was made from '{missing[0]}', which is not among the histories given")
         return replace(self, histories=tuple(by_name[m.name] for m in self.tests), predictor=using)
 
-    def profile(self, quantity: str | DerivedQuantity, *, level: float = 0.95) -> ProfileLikelihood:
-        """Profile likelihood of a parameter, or of another quantity (see inverse.intervals.quantities)."""
-        from creepkit.inverse.uncertainty.profile_likelihood import profile
+    def profile(self, quantity: str | DerivedQuantity, *, level: float = 0.95) -> Any:
+        """The ProfileLikelihood of a parameter, by name, or of another quantity (see uncertainty.quantities)."""
+        return present(self, "profile", quantity, level=level)
 
-        return profile(self, quantity, level=level)
+    def sample(self, *, walkers: int = 32, steps: int = 1000, seed: int = 0, using: Predictor | None = None) -> Any:
+        """PosteriorSamples by Markov chains (emcee, an optional dependency); `using` may be a surrogate."""
+        return present(self, "sample", walkers=walkers, steps=steps, seed=seed, using=using)
 
-    def sample(
-        self, *, walkers: int = 32, steps: int = 1000, seed: int = 0, using: Predictor | None = None
-    ) -> PosteriorSamples:
-        """Draw from the posterior by Markov chains (emcee, an optional dependency); `using` may be a surrogate."""
-        from creepkit.inverse.uncertainty.posterior import sample_posterior
-
-        return sample_posterior(self, walkers=walkers, steps=steps, seed=seed, using=using)
-
-    def correlation(self, frame: Literal["author", "conditioned"] = "author") -> Correlation:
-        """How estimates hang together, of the author's parameters or of the conditioned coordinates."""
-        from creepkit.inverse.uncertainty.correlation import correlation
-
-        return correlation(self, frame)
+    def correlation(self, coordinates: Literal["author", "conditioned"] = "author") -> Any:
+        """The Correlation of the estimates, of the author's parameters or of the conditioned coordinates."""
+        return present(self, "correlation", coordinates)
 
     def undetermined(self) -> tuple[str, ...]:
         """What these tests do not determine, and which combination they do, one sentence each."""
-        from creepkit.inverse.uncertainty.correlation import undetermined
-
-        return undetermined(self)
+        return present(self, "undetermined")
 
     def save(self, path: str | Path) -> Path:
         """Write the identification as JSON (to a temporary name, then renamed)."""
-        from creepkit.inverse.identification_document import save_identification
-
-        return save_identification(self, Path(path))
+        return present(self, "save", Path(path))
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Measured against identified, and residuals; written to `path` when given."""
-        from creepkit.report.identification_plot import identification_figure
-
-        return identification_figure(self, path)
-
-    def __str__(self) -> str:
-        from creepkit.report.identification_text import identification_text
-
-        return identification_text(self)
+        return present(self, "plot", path)
 
     @property
     def _quantile(self) -> float:

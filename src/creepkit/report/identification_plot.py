@@ -1,4 +1,4 @@
-"""Plot of an identification: measured against predicted values, residuals, creep rates with their band, and rupture times."""
+"""Plot of an identification: measured and predicted values, residuals, creep rates with bands, rupture times."""
 
 from __future__ import annotations
 
@@ -15,12 +15,6 @@ from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.records import ZERO_CELSIUS, History, Prediction
 from creepkit.report.figures import empty_figure, save_figure
 from creepkit.report.identification_text import rupture_rows
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from creepkit.inverse.identification import Identification
-
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -108,11 +102,10 @@ def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> No
     for r, colour in ruptures:
         if not np.isfinite(r.predicted):
             continue
-        below, above = r.predicted - r.low, r.high - r.predicted
-        axes.errorbar(
-            r.measured / SECONDS_PER_HOUR, r.predicted / SECONDS_PER_HOUR, yerr=[[below / SECONDS_PER_HOUR], [above / SECONDS_PER_HOUR]], fmt=">" if r.censored else "o",
-            ms=4.5, lw=0.7, color=colour, mfc="white" if r.censored else colour,
-        )  # fmt: skip
+        measured, predicted = r.measured / SECONDS_PER_HOUR, r.predicted / SECONDS_PER_HOUR
+        interval = [[predicted - r.low / SECONDS_PER_HOUR], [r.high / SECONDS_PER_HOUR - predicted]]
+        marker, face = (">", "white") if r.censored else ("o", colour)
+        axes.errorbar(measured, predicted, yerr=interval, fmt=marker, ms=4.5, lw=0.7, color=colour, mfc=face)
     plotted_hours = [t / SECONDS_PER_HOUR for r, _ in ruptures for t in (r.measured, r.predicted) if np.isfinite(t)]
     axis_limits = np.array([0.5 * min(plotted_hours), 2.0 * max(plotted_hours)])
     axes.plot(axis_limits, axis_limits, "k-", lw=1.2)
@@ -154,10 +147,10 @@ def identification_figure(fit: Identification, path: str | Path | None = None) -
     if ruptures:
         draw_ruptures(panels.pop(), fit, _colours(fit.histories))
     rates = panels.pop()
-    found, colours = fit.predict(), _colours(fit.histories)
+    prediction, colours = fit.predict(), _colours(fit.histories)
     for k, output in enumerate(outputs):
         draw = _draw_strains if output in LOGARITHMIC_OUTPUTS else draw_linear
-        draw((panels[2 * k], panels[2 * k + 1]), fit, output, found, colours)
+        draw((panels[2 * k], panels[2 * k + 1]), fit, output, prediction, colours)
     _draw_rates(rates, fit)
     figure.suptitle(f"{fit.law.title or fit.law.name}   ({len(fit.histories)} tests)", fontsize=11)
     return save_figure(figure, path)
@@ -225,8 +218,8 @@ def _finish_residuals(axes: Axes, fit: Identification) -> None:
 
 
 def _draw_rates(axes: Axes, fit: Identification) -> None:
-    levels_of_stress = [v for h in fit.histories for v in reference_stresses(h, fit.predictor) if v > 0]
-    grid = np.geomspace(0.8 * min(levels_of_stress), 1.25 * max(levels_of_stress), 60)
+    stresses = [v for h in fit.histories for v in reference_stresses(h, fit.predictor) if v > 0]
+    grid = np.geomspace(0.8 * min(stresses), 1.25 * max(stresses), 60)
     temperatures = np.unique(np.round([float(np.mean(h.temperature_program().values)) for h in fit.histories], 0))
     temperatures = temperatures[np.linspace(0, temperatures.size - 1, min(temperatures.size, 5)).round().astype(int)]
     for T, colour in zip(temperatures, _shades(temperatures), strict=True):

@@ -1,23 +1,21 @@
-"""An identification as text for a terminal, and as comments for exported laws."""
+"""Text of identifications, for a terminal and as comments for exported laws, and of their confirmation."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from statistics import median
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from creepkit.inverse.goodness_of_fit import RuptureComparison
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.language.printing import expression_text
 
 if TYPE_CHECKING:
+    from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
     from creepkit.inverse.goodness_of_fit import RuptureComparison
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.nuisance_parameters import NuisanceEstimate
-
-
-if TYPE_CHECKING:
-    from creepkit.inverse.identification import Identification
 
 
 LISTED_RUPTURES = 15
@@ -75,14 +73,12 @@ def _tests(count: int) -> str:
 def _strains(fit: Identification) -> list[str]:
     if "strain" not in fit.noise_model.outputs:
         return []
-    strain_noise, strain_tests = (
-        fit.noise_model["strain"],
-        [m for m in fit.tests if m.outputs and m.outputs[0].output == "strain"],
-    )
+    noise = fit.noise_model["strain"]
+    tests = [m for m in fit.tests if m.outputs and m.outputs[0].output == "strain"]
     return [
-        f"  {_tests(len(strain_tests))}, {sum(m.frames for m in strain_tests)} frames: {_rms_label(fit)} {fit.rms:.3g}",
-        f"  scatter (one sd): rate between tests {100 * fit.noise_model.rate:.0f} %, loading strain {strain_noise.offset:.2g}, "
-        f"frame noise {strain_noise.noise:.2g}, what the law cannot follow {100 * strain_noise.drift:.1f} % of strain",
+        f"  {_tests(len(tests))}, {sum(m.frames for m in tests)} frames: {_rms_label(fit)} {fit.rms:.3g}",
+        f"  scatter (one sd): rate between tests {100 * fit.noise_model.rate:.0f} %, "
+        f"loading strain {noise.offset:.2g}, frame noise {noise.noise:.2g}, what the law cannot follow {100 * noise.drift:.1f} % of strain",
     ]
 
 
@@ -132,9 +128,10 @@ def _linear_outputs(fit: Identification) -> list[str]:
         if name in ("strain", RUPTURE_OUTPUT):
             continue
         unit, s = f" {UNITS[name]}" if name in UNITS else "", fit.noise_model[name]
+        rms = f"rms {e.mean_squared_error**0.5:.3g}{unit} ({100 * e.relative_rms_error:.2g} %)"
         lines.append(
-            f"  {name}: relative squared error {e.relative_squared_error:.3g}, rms {e.mean_squared_error**0.5:.3g}{unit} ({100 * e.relative_rms_error:.2g} %), "
-            f"noise {s.noise:.2g}{unit}, offsets {s.offset:.2g}{unit}, reduced chi-square {e.chi_square:.3g}"
+            f"  {name}: relative squared error {e.relative_squared_error:.3g}, {rms}, noise {s.noise:.2g}{unit}, "
+            f"offsets {s.offset:.2g}{unit}, reduced chi-square {e.chi_square:.3g}"
         )
     if lines and "strain" not in fit.errors:
         count = _tests(len(fit.tests))
@@ -155,8 +152,9 @@ def _table(fit: Identification) -> list[str]:
     for m in fit.tests:
         first_output = m.outputs[0]
         test_estimates = [estimates_by_owner.get((kind, m.name)) for kind in kinds]
+        errors = first_output.errors
         lines.append(
-            f"  {m.name:{width}}  {m.condition:22} {first_output.errors.relative_squared_error:9.2g} {first_output.errors.chi_square:8.3g} "
+            f"  {m.name:{width}}  {m.condition:22} {errors.relative_squared_error:9.2g} {errors.chi_square:8.3g} "
             f"{first_output.offset:9.2g} {m.rate_factor:6.2f} {m.weight:6.2f}"
             + "".join(f" {'-' if n is None else _plus_minus(n):>18}" for n in test_estimates)
         )
@@ -209,3 +207,55 @@ def identification_comments(fit: Identification) -> list[str]:
 def rupture_rows(fit: Identification) -> list[tuple[str, str, RuptureComparison]]:
     """(test, condition, rupture) of the tests whose end is known."""
     return [(m.name, m.condition, m.rupture) for m in fit.tests if m.rupture is not None]
+
+
+def confirmation_text(confirmation: Confirmation) -> str:
+    """The verdict, and chi-square of the simulation and of the fit, one line an output of a test."""
+    lines = [f"{confirmation.law}: {confirmation.verdict}"]
+    for test in confirmation.tests:
+        for o in test.outputs:
+            fit = "" if o.fit_errors is None else f", of the fit {o.fit_errors.chi_square:.3g}"
+            difference = f"; apart {o.rms_difference:.2g} noise" if math.isfinite(o.rms_difference) else ""
+            chi_square = f"chi-square {o.simulation_errors.chi_square:.3g}{fit}{difference}"
+            lines.append(f"  {test.name}, {o.output}: {chi_square}")
+    return "\n".join(lines)
+
+
+def confirmation_to_json(confirmation: Confirmation) -> dict[str, Any]:
+    """The same as JSON-able data."""
+    values: dict[str, Any] = _json_value(asdict(confirmation))
+    return {"holds": confirmation.confirmed, "verdict": confirmation.verdict, **values}
+
+
+CONFIRMATION_COLUMNS = ("test", "output", "chi-square", "of the fit", "rms", "apart, noise")
+
+
+def confirmation_rows(confirmation: Confirmation) -> list[tuple[str, ...]]:
+    """One row an output of a test."""
+    return [_confirmation_row(test.name, comparison) for test in confirmation.tests for comparison in test.outputs]
+
+
+def _confirmation_row(test: str, comparison: ConfirmedOutput) -> tuple[str, ...]:
+    fit_chi_square = "" if comparison.fit_errors is None else _number_text(comparison.fit_errors.chi_square)
+    rms = _number_text(math.sqrt(comparison.simulation_errors.mean_squared_error))
+    return (
+        test,
+        comparison.output,
+        _number_text(comparison.simulation_errors.chi_square),
+        fit_chi_square,
+        rms,
+        _number_text(comparison.rms_difference),
+    )
+
+
+def _number_text(number: float) -> str:
+    return "" if math.isnan(number) else f"{number:.3g}"
+
+
+def _json_value(value: Any) -> Any:
+    """The same with null for what JSON cannot hold."""
+    if isinstance(value, dict):
+        return {name: _json_value(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_json_value(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

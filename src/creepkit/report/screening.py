@@ -11,20 +11,10 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.observation_vector import usable_frames
-from creepkit.report.figures import empty_figure
-from creepkit.screening.files import COMPARISON_STRESS, confirmation_text
+from creepkit.report.figures import empty_figure, make_folder, save_figure
+from creepkit.report.terminal import print_json, print_table
+from creepkit.screening.files import COMPARISON_STRESS, confirmation_text, result_columns
 from creepkit.screening.results import AlloyResult, PredictedOutputs, mean_chi_square, mean_relative_squared_error
-
-if TYPE_CHECKING:
-    from creepkit.screening.results import Plate
-
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from creepkit.screening.results import Plate
-
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +28,7 @@ TABLE_COLUMNS = ("alloy", "class", "law", "weight", "rate at 100 MPa, 1/s", "loc
 
 
 def table_rows(plate: Plate) -> list[tuple[str, ...]]:
-    """One row an alloy for people: COLUMNS."""
+    """One row an alloy; its cells are those of TABLE_COLUMNS."""
     return [_table_row(plate, result) for result in plate.results]
 
 
@@ -74,9 +64,14 @@ def _table_row(plate: Plate, result: AlloyResult) -> tuple[str, ...]:
     fit = result.best
     names = fit.law.name + (f" or {', '.join(result.credible_laws[1:])}" if len(result.credible_laws) > 1 else "")
     return (
-        *first_cells, names, f"{result.laws[0].weight:.2f}", _interval_text(fit.rate(COMPARISON_STRESS), 3), _interval_text(fit.local_exponent(COMPARISON_STRESS), 3),
-        f"{mean_chi_square(fit):.3g}", confirmation_text(result),
-    )  # fmt: skip
+        *first_cells,
+        names,
+        f"{result.laws[0].weight:.2f}",
+        _interval_text(fit.rate(COMPARISON_STRESS), 3),
+        _interval_text(fit.local_exponent(COMPARISON_STRESS), 3),
+        f"{mean_chi_square(fit):.3g}",
+        confirmation_text(result),
+    )
 
 
 def _interval_text(interval: Sequence[Any], digits: int) -> str:
@@ -180,8 +175,9 @@ def plot_law_fractions(plate: Plate) -> Figure:
             np.array([_law_fraction(m, law, d) for m in classes.values()]) for d in (True, False)
         )
         axes.bar(positions, decisive_fractions, bottom=bottom, color=f"C{k}", label=law, width=0.6)
-        axes.bar(positions, undecided_fractions, bottom=bottom + decisive_fractions, color=f"C{k}", alpha=0.45, hatch="///", width=0.6,
-                 edgecolor="white", linewidth=0)  # fmt: skip
+        bars = axes.bar(positions, undecided_fractions, bottom=bottom + decisive_fractions, color=f"C{k}", width=0.6)
+        for bar in bars:
+            bar.set(alpha=0.45, hatch="///", edgecolor="white", linewidth=0)
         bottom += decisive_fractions + undecided_fractions
     axes.set_xticks(positions, [f"{name}\n{len(m)} alloy{'s' if len(m) > 1 else ''}" for name, m in classes.items()])
     axes.set(ylim=(0, 1), xlim=(-0.6, max(len(classes), 3) - 0.4), ylabel="share of alloys")
@@ -249,7 +245,10 @@ def plot_screening(plate: Plate, folder: Path) -> list[Path]:
         figures["histories.png"] = plot_histories(plate, bulge_results)
     if dense_results:
         figures["misfit.png"] = plot_misfits(plate, dense_results)
-    return [_save_figure(figure, folder / name) for name, figure in sorted(figures.items())]
+    make_folder(folder, FitError)
+    for name, figure in sorted(figures.items()):
+        save_figure(figure, folder / name, FitError)
+    return [folder / name for name in sorted(figures)]
 
 
 def _plot_parity(plate: Plate, results: list[AlloyResult]) -> Figure:
@@ -302,10 +301,21 @@ def _finish_parity(upper: Axes, lower: Axes, radius: float, errors: Any, axis_li
         lower.set_ylabel("difference, um")
 
 
-def _save_figure(figure: Figure, path: Path) -> Path:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=130)
-    except OSError as error:
-        raise FitError(f"{path}: cannot be written ({error.strerror}); name a folder that can be") from None
-    return path
+def print_screening(plate: Plate, written: list[Path], as_json: bool) -> None:
+    """Print the table, what it sums up to, and what was written."""
+    if as_json:
+        print_json(_plate_to_json(plate, written))
+        return
+    print_table(f"{len(plate.results)} alloys", TABLE_COLUMNS, table_rows(plate))
+    for line in (*summary_lines(plate), *(f"wrote {path}" for path in written)):
+        print(line)
+
+
+def _plate_to_json(plate: Plate, written: list[Path]) -> dict[str, Any]:
+    return {
+        "alloys": [result_columns(plate, result) for result in plate.results],
+        "shares": plate.law_fractions(),
+        "failed": plate.failures,
+        "notes": list(plate.notes),
+        "files": [str(path) for path in written],
+    }

@@ -1,4 +1,4 @@
-"""Text and figures of surrogates: error table, training curves, parity plots (Fig. 4 of the paper), worst samples, size studies."""
+"""Text and figures of surrogates: errors, training curves, parity (Fig. 4 of the paper), worst samples, size study."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.errors import SurrogateError
-from creepkit.report.figures import empty_figure, save_figure
-from creepkit.surrogates.evaluation import PredictionComparison, worst_histories
+from creepkit.report.figures import empty_figure, make_folder, save_figure
+from creepkit.surrogates.evaluation import PredictionComparison, evaluate, worst_histories
 from creepkit.surrogates.recipe import SurrogateMetadata
 from creepkit.surrogates.training import SizeStudyResult
 
@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from creepkit.dataset.dataset import Dataset
+    from creepkit.surrogates.surrogate import Surrogate
 
 
 OUTPUT_LABELS = {"amplitude": "amplitude, mm", "width": "width, mm", "shape": "shape", "strain": "strain"}
@@ -124,9 +123,10 @@ ERROR_COLUMNS = ("rse", "mse", "mae", "r2", "largest_median", "largest_p95")
 ERROR_HEADS = ("RSE (Eq. 4)", "MSE", "MAE", "R2", "largest error, median", "95 %")
 
 
-def surrogate_text(title: str, metadata: SurrogateMetadata) -> str:
+def surrogate_text(surrogate: Surrogate) -> str:
     """Title, errors on the validation rows for each output, and where it came from."""
-    lines, metrics = [title], metadata.metrics
+    metadata = surrogate.metadata
+    lines, metrics = [surrogate.title], metadata.metrics
     if metrics:
         rows = {
             name: [_number_text(errors_of_output[c]) for c in ERROR_COLUMNS]
@@ -152,15 +152,28 @@ def _number_text(value: float | None) -> str:
 def _aligned_rows(heads: tuple[str, ...], rows: Mapping[str, list[str]]) -> list[str]:
     table_rows = [list(heads), *([name, *cells] for name, cells in rows.items())]
     widths = [max(len(row[k]) for row in table_rows) for k in range(len(heads))]
-    return ["  ".join(c.rjust(w) if k else c.ljust(w) for k, (c, w) in enumerate(zip(row, widths, strict=True)))
-            for row in table_rows]  # fmt: skip
+    return [
+        "  ".join(c.rjust(w) if k else c.ljust(w) for k, (c, w) in enumerate(zip(row, widths, strict=True)))
+        for row in table_rows
+    ]
+
+
+def write_surrogate_figures(surrogate: Surrogate, data: Dataset, folder: Path, name: str) -> list[Path]:
+    """Draw the curves, the parity plot and the worst samples; returns their paths."""
+    make_folder(folder, SurrogateError)
+    paths = [folder / f"{name}-{what}.png" for what in ("curves", "parity", "worst")]
+    evaluation = evaluate(surrogate, data)
+    training_curves(surrogate.metadata, paths[0])
+    parity_figure(evaluation.comparison, evaluation.times, paths[1])
+    worst_samples_figure(evaluation.comparison, paths[2])
+    return paths
 
 
 def size_study_rows(results: Sequence[SizeStudyResult]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """The heads and rows of a table, the best first."""
     outputs = list(results[0].outputs) if results else []
-    heads = ("cell", "hidden", "layers", "samples", "weights", "loss (Eq. 4)", "training", "epochs", "best",
-             *(f"RSE {name}" for name in outputs))  # fmt: skip
+    sizes_and_losses = ("cell", "hidden", "layers", "samples", "weights", "loss (Eq. 4)", "training", "epochs", "best")
+    heads = (*sizes_and_losses, *(f"RSE {name}" for name in outputs))
     rows: list[tuple[str, ...]] = []
     for result in sorted(results, key=lambda e: e.loss):
         sizes = tuple(map(str, (result.cell, result.hidden, result.layers, result.samples, result.weight_count)))

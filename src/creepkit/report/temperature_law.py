@@ -1,8 +1,8 @@
-"""A temperature law as text, and its plot: parameters against temperature with the curves of plausible forms."""
+"""Text of temperature laws, studies and moduli, and the plot of parameters against temperature with plausible forms."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,12 +20,10 @@ from creepkit.report.figures import empty_figure, save_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw
-
-
-if TYPE_CHECKING:
     from creepkit.discovery.combinations import FormWeight
-    from creepkit.discovery.temperature_law import TemperatureLaw
+    from creepkit.discovery.discover import TemperatureStudy
+    from creepkit.discovery.elastic_moduli import ModulusEstimates
+    from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw
 
 
 MAX_PANELS_PER_ROW = 3
@@ -163,21 +161,24 @@ EQUIVALENCE_NOTE = {
 def temperature_law_text(temperature_law: TemperatureLaw) -> str:
     """The law, its numbers, the forms that remain for each parameter, and the combinations."""
     low, high = temperature_law.temperature_range
-    return "\n".join([
-        f"{temperature_law.law.title or temperature_law.law.name}",
-        *(f"  {label}: {expression_text(term)}" for label, term in temperature_law.law.terms.items()),
-        "",
-        *_parameter_lines(temperature_law),
-        "",
-        f"  found from {temperature_law.isothermal_estimates.temperatures.size} temperatures, {low:.0f} to {high:.0f} K, and valid between "
-        f"them; T_ref = {temperature_law.T_ref:.2f} K",
-        f"  forms that remain, weighed by {CRITERION[temperature_law.criterion_data]} ({EQUIVALENCE_NOTE[temperature_law.criterion_data]}):",
-        *_form_lines(temperature_law.plausible_forms),
-        "",
-        *_combination_lines(temperature_law),
-        *_prior_lines(temperature_law),
-        *(f"  note: {note}" for note in temperature_law.notes),
-    ])  # fmt: skip
+    count, data = temperature_law.isothermal_estimates.temperatures.size, temperature_law.criterion_data
+    return "\n".join(
+        [
+            f"{temperature_law.law.title or temperature_law.law.name}",
+            *(f"  {label}: {expression_text(term)}" for label, term in temperature_law.law.terms.items()),
+            "",
+            *_parameter_lines(temperature_law),
+            "",
+            f"  found from {count} temperatures, {low:.0f} to {high:.0f} K, and valid between "
+            f"them; T_ref = {temperature_law.T_ref:.2f} K",
+            f"  forms that remain, weighed by {CRITERION[data]} ({EQUIVALENCE_NOTE[data]}):",
+            *_form_lines(temperature_law.plausible_forms),
+            "",
+            *_combination_lines(temperature_law),
+            *_prior_lines(temperature_law),
+            *(f"  note: {note}" for note in temperature_law.notes),
+        ]
+    )
 
 
 def _parameter_lines(temperature_law: TemperatureLaw) -> list[str]:
@@ -209,7 +210,8 @@ def _combination_lines(temperature_law: TemperatureLaw) -> list[str]:
     for candidate in temperature_law.candidates[:MAX_COMBINATIONS_LISTED]:
         forms = ", ".join(f"{name}:{form}" for name, form in candidate.forms.items())
         lines.append(
-            f"    {forms} | {len(candidate.internal_values)} | {candidate.criterion_difference:.1f} | {candidate.weight:.3f}"
+            f"    {forms} | {len(candidate.internal_values)} | {candidate.criterion_difference:.1f} "
+            f"| {candidate.weight:.3f}"
         )
     remaining = len(temperature_law.candidates) - MAX_COMBINATIONS_LISTED
     return [*lines, f"    and {remaining} more"] if remaining > 0 else lines
@@ -225,3 +227,40 @@ def _prior_lines(temperature_law: TemperatureLaw) -> list[str]:
                 f"{name}: {', '.join(f'{form} {odds / largest:.2g}' for form, odds in odds_by_form.items())}"
             )
     return ["  prior odds, the likeliest as 1:", *(f"    {line}" for line in odds_lines)] if odds_lines else []
+
+
+def temperature_study_text(study: TemperatureStudy) -> str:
+    """The moduli, the law of all tests at once and the temperature law, one below the other, then the notes."""
+    parts = [study.moduli_fit, study.joint_fit, study.temperature_law]
+    texts = [str(part) for part in parts if part is not None]
+    return "\n\n".join([*texts, *(f"note: {note}" for note in study.notes)])
+
+
+def modulus_estimates_text(estimates: ModulusEstimates) -> str:
+    """The modulus of each test with its standard deviation, and the form through them."""
+    rows = zip(estimates.names, estimates.temperatures, estimates.values, estimates.sd, strict=True)
+    lines = [f"  {name}: {E / 1e3:.1f} +- {sd / 1e3:.1f} GPa at {T:.1f} K" for name, T, E, sd in rows]
+    form = estimates.elastic.E if estimates.elastic else "-"
+    return "\n".join(["modulus from the first frames", *lines, f"  E(T) = {form}"])
+
+
+def temperature_law_to_json(temperature_law: TemperatureLaw, written: Sequence[Path]) -> dict[str, Any]:
+    """The answer and the files that were written, as JSON-able data."""
+    return {
+        "law": temperature_law.law.name,
+        "judged_by": temperature_law.criterion_data,
+        "range_K": list(temperature_law.temperature_range),
+        "T_ref_K": temperature_law.T_ref,
+        "forms": temperature_law.forms,
+        "sets": {
+            name: [vars(form_weight) for form_weight in form_weights]
+            for name, form_weights in temperature_law.plausible_forms.items()
+        },
+        "parameters": {e.name: {k: v for k, v in vars(e).items() if k != "name"} for e in temperature_law.estimates},
+        "candidates": [
+            {"forms": candidate.forms, "excess": candidate.criterion_difference, "weight": candidate.weight}
+            for candidate in temperature_law.candidates
+        ],
+        "notes": list(temperature_law.notes),
+        "files": [str(path) for path in written],
+    }

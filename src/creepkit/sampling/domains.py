@@ -16,6 +16,7 @@ from creepkit.arrays import Bools, Floats
 from creepkit.errors import DatasetError, nearest
 from creepkit.language import CreepLaw, temperature
 from creepkit.language.law_codec import law_to_json
+from creepkit.presentation import Presentable, present
 from creepkit.records import Specimen
 from creepkit.sampling.coefficients import (
     draw_stress_scales,
@@ -255,7 +256,7 @@ DEFAULT_DRAWS = 4096
 
 
 @dataclass(frozen=True, eq=False)
-class Acceptance:
+class Acceptance(Presentable):
     """What is known of a design without simulating it.
 
     draws : rows of the design. met : {criterion before simulation: (rows,) whether it is met on its own}.
@@ -285,39 +286,9 @@ class Acceptance:
         in_range = (self.log10_strains >= self.useful_strains[:, 0]) & (self.log10_strains <= self.useful_strains[:, 1])
         return np.asarray(self.kept & in_range)
 
-    def figure(self, path: str | Path | None = None) -> Figure:
+    def plot(self, path: str | Path | None = None) -> Figure:
         """Draw the sampled rates, with the useful ones and criteria 1 and 2 marked; write them to `path` if given."""
-        from creepkit.report.dataset import acceptance_figure
-
-        return acceptance_figure(self, path)
-
-    def __str__(self) -> str:
-        return "\n".join([self._title(), *self._table(), self._last()])
-
-    def _title(self) -> str:
-        domain = self.design
-        count = f"{len(self.draws)} draws, seed {self.seed}"
-        return f"law '{domain.law.name}', {domain.name} box, {domain.specimen} test of {domain.grid.frames} frames: {count}"
-
-    def _table(self) -> list[str]:
-        lines, remaining = [f"{'criterion':<14} {'meet it':>8} {'rejected':>9}  asks"], np.ones(len(self.draws), bool)
-        for criterion in self.design.criteria:
-            if criterion.stage == "after":
-                numbers = f"{'after simulation':>18}"
-            else:
-                is_met = self.criteria_met[criterion.name]
-                numbers = f"{_percent(is_met):>8} {_percent(remaining & ~is_met):>9}"
-                remaining = remaining & is_met
-            lines.append(f"{criterion.name:<14} {numbers}  {criterion.text}")
-        return lines
-
-    def _last(self) -> str:
-        simulated, useful = _percent(self.kept), _percent(self.useful)
-        exception = (
-            " but for those that burst far too early by a cheap stand-in" if getattr(self.design, "screened", 0) else ""
-        )
-        description = "a rate at which creep is visible and the test lasts (others may, too)"
-        return f"{simulated} of the draws would be simulated{exception}; {useful} of all have {description}"
+        return present(self, "plot", path)
 
 
 def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0) -> Acceptance:
@@ -335,10 +306,6 @@ def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0
     return Acceptance(
         design, seed, rows, criteria_met, log10_rates + log10_end_times, useful_rates + log10_end_times[:, None]
     )
-
-
-def _percent(mask: Bools) -> str:
-    return f"{100 * float(mask.mean()):.1f} %"
 
 
 @runtime_checkable

@@ -15,6 +15,7 @@ from creepkit.errors import FitError, nearest
 from creepkit.inverse.confirmation import Confirmation
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
+from creepkit.presentation import Presentable, present
 from creepkit.records import History, Predictor
 from creepkit.screening.alloys import UNKNOWN_CLASS, Alloy, Compositions
 
@@ -105,7 +106,7 @@ def mean_chi_square(fit: Identification) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Plate:
+class Plate(Presentable):
     """The answer of screen().
 
     answers : one for each alloy, in the order of their first tests. histories : {alloy: its tests}.
@@ -174,23 +175,12 @@ class Plate:
 
     def to_csv(self, path: str | Path) -> Path:
         """Write one row an alloy: class, law, weight, values with intervals, rate, misfits, notes."""
-        from creepkit.screening.files import write_csv
-
-        return write_csv(self, Path(path))
+        return present(self, "to_csv", Path(path))
 
     def to_hdf5(self, path: str | Path) -> Path:
         """Write everything that is a number: values, covariances, tests as measured and as predicted."""
-        from creepkit.screening.files import write_hdf5
-
-        return write_hdf5(self, Path(path))
+        return present(self, "to_hdf5", Path(path))
 
     def plot(self, folder: str | Path) -> list[Path]:
         """Draw measured against identified displacement, misfit with and without sparsity, and shares of laws."""
-        from creepkit.report.screening import plot_screening
-
-        return plot_screening(self, Path(folder))
-
-    def __str__(self) -> str:
-        from creepkit.report.screening import screening_text
-
-        return screening_text(self)
+        return present(self, "plot", Path(folder))

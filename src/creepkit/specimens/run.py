@@ -10,6 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
+from creepkit.presentation import Presentable
 from creepkit.records import History, Status
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ _RunType = TypeVar("_RunType", bound="Run")
 
 
 @dataclass(frozen=True, eq=False)
-class Run(History):
+class Run(Presentable, History):
     """A simulated test up to where it ended: the times asked for that were reached, and the outputs there.
 
     status : how it ended; end_time : s, where; reason : why, in words (empty when complete).
@@ -39,11 +40,6 @@ class Run(History):
     status: Status = Status.COMPLETE
     end_time: float = 0.0
     reason: str = ""
-
-    def __str__(self) -> str:
-        how = "complete" if self.status is Status.COMPLETE else f"ended at {self.end_time:g} s ({self.reason})"
-        last = ", ".join(f"{name} {values[-1]:.4g}" for name, values in self.outputs.items())
-        return f"{self.name}: {how}; {self.times.size} frames to {self.times[-1]:g} s, where {last}"
 
 
 @runtime_checkable

@@ -15,6 +15,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import SurrogateError
 from creepkit.files import safetensors_files
 from creepkit.language.law_codec import law_to_json
+from creepkit.presentation import Presentable
 from creepkit.records import (
     History,
     NuisanceValues,
@@ -116,7 +117,7 @@ def observation_derivative(specimen: Specimen, history: History, values: Floats)
     return np.ones_like(values) if derivative is None else np.asarray(derivative(history, values[..., 0]))[..., None]
 
 
-class Surrogate(ABC):
+class Surrogate(Presentable, ABC):
     """A trained network in the place of a specimen; a records.Predictor.
 
     recipe, module, told : what it was trained as, its network (on the CPU), and what it knows of its training.
@@ -220,11 +221,6 @@ class Surrogate(ABC):
     def save(self, path: str | Path) -> Path:
         """Write the weights with their header."""
         return safetensors_files.write_safetensors(path, self.module.state_dict(), self.file_header)
-
-    def __str__(self) -> str:
-        from creepkit.report.surrogate import surrogate_text
-
-        return surrogate_text(self.title, self.metadata)
 
     def __repr__(self) -> str:
         return f"<Surrogate: {self.title}>"

@@ -28,7 +28,7 @@ def test_what_criteria_1_and_2_reject_of_nortons_law():
 def test_the_table_says_what_is_known_before_simulation():
     text = str(acceptance(sampling_design(ck.law("combined"), DIMPLE, "paper"), draws=1024, seed=1))
     lines = text.splitlines()
-    assert lines[0] == "law 'combined', paper box, bulge test of 289 frames: 1024 draws, seed 1"
+    assert lines[0] == "law 'combined', paper domain, bulge test of 289 frames: 1024 draws, seed 1"
     assert [line.split()[0] for line in lines[2:7]] == ["1", "2", "3", "4", "5"]
     assert all("after simulation" in line for line in lines[4:7])
     assert "would be simulated" in lines[-1]
@@ -43,9 +43,9 @@ def test_few_laws_of_the_papers_box_are_useful_and_nearly_all_of_the_conditioned
 
 def test_the_figure_is_written(tmp_path):
     found = acceptance(sampling_design(ck.law("combined"), DIMPLE, "paper"), draws=256)
-    figure = found.figure(tmp_path / "rates.png")
+    figure = found.plot(tmp_path / "rates.png")
     assert (tmp_path / "rates.png").stat().st_size > 10_000
     legend = [text.get_text() for text in figure.axes[1].get_legend().get_texts()]
     assert legend[0] == f"in the useful window: {100 * found.useful.mean():.1f} %"
     with pytest.raises(DatasetError, match="cannot be written"):
-        found.figure(tmp_path / "rates.nonsense")
+        found.plot(tmp_path / "rates.nonsense")

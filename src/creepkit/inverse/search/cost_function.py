@@ -15,15 +15,12 @@ from creepkit.inverse.bound_penalties import BoundPenalties
 from creepkit.inverse.residuals import ResidualFunction
 from creepkit.inverse.search.local_refinement import Bounds, IterationCallback, Minimum, bounded_least_squares
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.report.figures import empty_figure, save_figure
+from creepkit.presentation import present
 
 if TYPE_CHECKING:
-    from creepkit.inverse.sparsity.penalties import PenalisedTerms
-
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from creepkit.inverse.sparsity.penalties import PenalisedTerms
 
 
 FAILED_COST = 1e12
@@ -118,14 +115,6 @@ class GlobalSearch(Protocol):
 QUARTILES = (25.0, 50.0, 75.0)
 
 
-SMALLEST_DRAWN_COST = 1e-12
-"""Costs below it are drawn there: the axis is logarithmic."""
-
-
-MARKER_LIMIT = 60
-"""Above this many iterations they are drawn without marks."""
-
-
 @dataclass(frozen=True)
 class SearchTrace:
     """One row for each iteration.
@@ -157,36 +146,4 @@ class SearchTrace:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw the lowest cost, and how the candidates spread; written to `path` when given."""
-        figure = empty_figure(7.0, 4.4)
-        axes = figure.subplots()
-        self._draw_costs(axes)
-        self._draw_evaluations(axes)
-        return save_figure(figure, path)
-
-    def _draw_costs(self, axes: Axes) -> None:
-        iterations = np.arange(1, len(self) + 1)
-        if len(self.quartiles):
-            lower, median, upper = np.maximum(self.quartiles, SMALLEST_DRAWN_COST).T
-            axes.fill_between(iterations, lower, upper, color="C0", alpha=0.18, lw=0, label="middle half of candidates")
-            axes.plot(iterations, median, color="C0", lw=1.0, alpha=0.7, label="their median")
-        marker = "o" if len(self) < MARKER_LIMIT else None
-        best = np.maximum(self.best_cost, SMALLEST_DRAWN_COST)
-        axes.plot(iterations, best, color="C3", lw=2.0, marker=marker, ms=3, label="best so far")
-        if self.refined_cost is not None:
-            label = f"after least squares, {self.refinement_evaluations} more simulations"
-            axes.axhline(max(self.refined_cost, SMALLEST_DRAWN_COST), color="black", lw=1.0, ls="--", label=label)
-        for k, start in enumerate(self.restarts):
-            axes.axvline(start + 1, color="grey", lw=0.8, ls=":", label="restart" if k == 0 else None)
-        axes.set(xlabel="iteration", yscale="log", xlim=(1, max(len(self), 2)))
-        axes.set_ylabel("cost (half of chi-square, walls and penalty included)")
-        axes.set_title(self.search, fontsize=10)
-        axes.grid(alpha=0.25)
-        axes.legend(fontsize=8)
-
-    def _draw_evaluations(self, axes: Axes) -> None:
-        """Evaluations on a second axis above, at ticks of their own."""
-        iterations = np.arange(1, len(self) + 1)
-        top_axis = axes.secondary_xaxis("top")
-        ticks = np.unique(np.linspace(0, len(self) - 1, min(len(self), 6)).astype(int))
-        top_axis.set_xticks(iterations[ticks], [f"{count:,}" for count in self.evaluations[ticks]], fontsize=8)
-        top_axis.set_xlabel("candidates evaluated", fontsize=8)
+        return present(self, "plot", path)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -19,9 +19,9 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.selection.discrimination import under_common_covariance
+from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
-    from creepkit.experiments.discriminating_experiments import DiscriminationDesign
     from creepkit.inverse.selection.discrimination import EquivalentLaws
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 
@@ -51,7 +51,7 @@ class RankedLaw:
 
 
 @dataclass(frozen=True)
-class Ranking:
+class Ranking(Presentable):
     """Identified laws, best first.
 
     by : the criterion; size : independent frames; failed : {law: why it could not be identified}.
@@ -98,16 +98,9 @@ class Ranking:
 
         return equivalent_laws(self)
 
-    def further_tests(self) -> tuple[DiscriminationDesign, ...]:
-        """What tests would tell the remaining laws apart, and by how much (some seconds of simulations)."""
-        from creepkit.experiments.discriminating_experiments import further_tests
-
-        return further_tests(self)
-
-    def __str__(self) -> str:
-        from creepkit.report.ranking_text import ranking_text
-
-        return ranking_text(self)
+    def further_tests(self) -> tuple[Any, ...]:
+        """A DiscriminationDesign for each remaining law: tests that would tell it from the best (some seconds)."""
+        return present(self, "further_tests")
 
 
 def rank(

@@ -21,6 +21,7 @@ from creepkit.inverse.sparsity.reduced_laws import ReducedLaws, TermProblem, ter
 from creepkit.inverse.sparsity.result import TermNames
 from creepkit.inverse.sparsity.term_selection import PredictorOrMapping, choose_terms, identify_full, penalised_fit
 from creepkit.language import CreepLaw
+from creepkit.presentation import Presentable
 from creepkit.records import History
 
 BLOCK_FRAMES = 6
@@ -32,7 +33,7 @@ ZERO_WEIGHT = 1e-12
 
 
 @dataclass(frozen=True)
-class SelectionFrequencies:
+class SelectionFrequencies(Presentable):
     """How often each term, and each set of terms, was kept.
 
     drawn : "tests" or "blocks of frames"; repeats : number of draws; counts : {term: times kept}; sets : {terms: times
@@ -47,15 +48,6 @@ class SelectionFrequencies:
     def interval(self, term: str) -> tuple[float, float]:
         """95 % interval of the frequency of a term, of Clopper and Pearson."""
         return binomial_interval(self.term_counts[term], self.resamples)
-
-    def __str__(self) -> str:
-        lines = [f"{self.resamples} draws of {self.unit}:"]
-        for term, count in self.term_counts.items():
-            low, high = self.interval(term)
-            lines.append(f"  {term}: kept {count} times ({low:.2f} to {high:.2f})")
-        for terms, count in self.set_counts.items():
-            lines.append(f"  {' + '.join(terms)} alone: {count} times")
-        return "\n".join(lines)
 
 
 def binomial_interval(count: int, trials: int, significance: float = 0.05) -> tuple[float, float]:

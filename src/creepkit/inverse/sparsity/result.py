@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from pathlib import Path as File
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scipy.stats import chi2
 
 from creepkit.arrays import Floats
 from creepkit.inverse.goodness_of_fit import OutputErrors
+from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,7 +32,7 @@ class FitStatistics:
 
 
 @dataclass(frozen=True)
-class Sparsity:
+class Sparsity(Presentable):
     """How a sum was reduced; the terms are those of `law`, the sum.
 
     penalty : its class; strength : None of a choice among subsets, which has none.
@@ -143,18 +144,6 @@ class Sparsity:
         }
         return cls(**{**data, **lists, **statistics})
 
-    def __str__(self) -> str:
-        strength = "" if self.strength is None else f" of strength {self.strength:g}"
-        width = max(map(len, self.contributions_without_penalty))
-        lines = [f"{self.penalty}{strength}: {self.verdict}", f"{'':{width}}  without  with  after"]
-        for term, contribution in self.contributions_without_penalty.items():
-            refitted = self.contributions_after_refit.get(term)
-            after_text = "dropped" if refitted is None else f"{refitted:.3f}"
-            lines.append(
-                f"{term:{width}}  {contribution:.3f}  {self.contributions_with_penalty[term]:.3f}  {after_text}"
-            )
-        return "\n".join([*lines, f"(contributions; below {LEAST_CONTRIBUTION:g} a term is dropped)"])
-
 
 def _statistics_to_dict(statistics: FitStatistics) -> dict[str, Any]:
     return {**asdict(statistics), "errors": {name: asdict(errors) for name, errors in statistics.errors.items()}}
@@ -167,7 +156,7 @@ def _quoted_list(names: list[str] | TermNames) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class PenaltyPath:
+class PenaltyPath(Presentable):
     """One row for each strength, the first of which is 0.
 
     penalty : its formula in a word; labels : the terms.
@@ -190,20 +179,9 @@ class PenaltyPath:
         """{term: contribution} of one row, by default the chosen one."""
         return dict(zip(self.terms, map(float, self.contributions[self.chosen if row is None else row]), strict=True))
 
-    def plot(self, file: str | File | None = None) -> Figure:
-        """Shares and misfit against the strength; written to `path` when given."""
-        from creepkit.report.penalty_path_plot import penalty_path_figure
-
-        return penalty_path_figure(self, file)
-
-    def __str__(self) -> str:
-        rows = [["strength", "chi-square", "BIC - least", *self.terms, "kept"]]
-        for k, strength in enumerate(self.strengths):
-            numbers = [f"{strength:g}", f"{self.chi_square[k]:.1f}", f"{self.bic_excess[k]:.1f}"]
-            rows.append([*numbers, *(f"{c:.3f}" for c in self.contributions[k]), ", ".join(self.kept_terms[k])])
-        rows[1 + self.chosen][-1] += "   <- chosen"
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Contributions and rise of chi-square against the strength; written to `path` when given."""
+        return present(self, "plot", path)
 
 
 LEAST_CONTRIBUTION = 0.05

@@ -17,6 +17,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
+from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,7 +39,7 @@ WELL_DETERMINED_SD = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Correlation:
+class Correlation(Presentable):
     """The correlation of estimates, (parameters, parameters), and their standard deviations, (parameters,).
 
     names : as the matrix is to be read, "ln A" where the logarithm is meant, "ln rate" of a conditioned coefficient.
@@ -58,19 +59,7 @@ class Correlation:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """The matrix in colours with its numbers; written to `path` when given."""
-        from creepkit.report.uncertainty_plots import correlation_figure
-
-        return correlation_figure(self, path)
-
-    def __str__(self) -> str:
-        width = max(len(name) for name in self.names) + 1
-        lines = [" " * width + "".join(f"{name:>{max(len(name), 8) + 1}}" for name in self.names)]
-        for name, row in zip(self.names, self.matrix, strict=True):
-            lines.append(
-                f"{name:{width}}"
-                + "".join(f"{v:>{max(len(n), 8) + 1}.4f}" for n, v in zip(self.names, row, strict=True))
-            )
-        return "\n".join(lines)
+        return present(self, "plot", path)
 
 
 def correlation(fit: Identification, coordinates: CoordinateSystem = "author") -> Correlation:

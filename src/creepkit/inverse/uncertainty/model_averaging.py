@@ -27,6 +27,7 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import delta_method
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, local_exponent, log_rate
 from creepkit.language import temperature as TEMPERATURE
+from creepkit.presentation import Presentable, present
 from creepkit.records import ZERO_CELSIUS
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ class WeightedLaws(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class ModelAverage:
+class ModelAverage(Presentable):
     """Laws with weights that add up to one, each with its own posterior."""
 
     fits: tuple[Identification, ...]
@@ -164,16 +165,6 @@ class ModelAverage:
         location, scale = (np.stack([each[k] for each in normals]) for k in (0, 1))
         return MixtureDistribution(np.array(self.weights), degrees_of_freedom(self.fits), location, scale)
 
-    def __str__(self) -> str:
-        reference = self.fits[0].reference
-        rate, low, high = (float(v) for v in self.rate(reference.stress))
-        exponent, exponent_low, exponent_high = (float(v) for v in self.local_exponent(reference.stress))
-        names = ", ".join(f"{fit.law.name} ({w:.2g})" for fit, w in zip(self.fits, self.weights, strict=True))
-        return (
-            f"over the laws {names}: rate at {reference.stress:.4g} MPa, {reference.temperature:.0f} K {rate:.3g} "
-            f"[{low:.3g}, {high:.3g}] 1/s, local stress exponent {exponent:.3g} [{exponent_low:.3g}, {exponent_high:.3g}]"
-        )
-
 
 def degrees_of_freedom(fits: Sequence[Identification]) -> Floats:
     """(fits,) degrees of freedom of their intervals."""
@@ -195,7 +186,7 @@ SAME_TEMPERATURE = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class RateBand:
+class RateBand(Presentable):
     """Creep rates over stress at an uncertain temperature.
 
     stress : (points,) MPa; rate, low, high : (points,) 1/s, median and 95 % band, by parameters, laws and temperature.
@@ -214,16 +205,7 @@ class RateBand:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Rate over stress, both logarithmic, with both bands; written to `path` when given."""
-        from creepkit.report.uncertainty_plots import rate_bands_figure
-
-        return rate_bands_figure([self], path)
-
-    def __str__(self) -> str:
-        temperature_text = f"{self.temperature - ZERO_CELSIUS:.0f} +- {self.temperature_uncertainty:g} C"
-        lines = [f"creep rate at {temperature_text}, 95 % band"]
-        for row in zip(self.stress, self.rate, self.low, self.high, strict=True):
-            lines.append("  {:8.4g} MPa  {:9.3g}  [{:.3g}, {:.3g}] 1/s".format(*row))
-        return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
+        return present(self, "plot", path)
 
 
 def rate_band(

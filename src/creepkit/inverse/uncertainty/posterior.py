@@ -32,6 +32,7 @@ from creepkit.inverse.residuals import ResidualFunction
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.uncertainty.model_averaging import INTERVAL_PROBABILITIES
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity, local_exponent, log_rate, quantity_of
+from creepkit.presentation import Presentable, present
 from creepkit.records import Predictor
 
 if TYPE_CHECKING:
@@ -202,7 +203,7 @@ MAX_START_DRAWS = 50
 
 
 @dataclass(frozen=True, eq=False)
-class PosteriorSamples:
+class PosteriorSamples(Presentable):
     """Draws of a law's values from their posterior.
 
     chain : (steps, walkers, parameters) conditioned coordinates u, all of them; log_probability : (steps, walkers).
@@ -266,22 +267,7 @@ class PosteriorSamples:
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Every pair of parameters, and each alone; written to `path` when given."""
-        from creepkit.report.uncertainty_plots import pairs_figure
-
-        return pairs_figure(self, path)
-
-    def __str__(self) -> str:
-        width = max(len(name) for name in self.coordinates.names)
-        lines = [
-            f"{self.chain.shape[1]} walkers, {len(self.chain)} steps ({self.burn_in} left out): acceptance "
-            f"{self.acceptance_fraction:.2f}, autocorrelation {self.autocorrelation_time.max():.3g} steps, some "
-            f"{self.effective_sample_size:.0f} independent draws"
-        ]
-        for name, param in self.coordinates.law.table.items():
-            middle, low, high = self.interval(name)
-            unit = "" if param.unit == "1" else f" {param.unit}"
-            lines.append(f"  {name:{width}} = {middle:.5g}  [{low:.4g}, {high:.4g}]{unit}")
-        return "\n".join([*lines, *(f"  note: {note}" for note in self.notes)])
+        return present(self, "plot", path)
 
 
 def sample_posterior(

@@ -31,6 +31,7 @@ from creepkit.inverse.noise_model import cholesky_factors
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.posterior import interval_problem
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity, gradient, quantity_of
+from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,7 +58,7 @@ ZERO_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class ProfileLikelihood:
+class ProfileLikelihood(Presentable):
     """The profile of one quantity.
 
     values, chi_square : (points,) values in the quantity's unit, rising, and the rise of chi-square at each.
@@ -78,17 +79,9 @@ class ProfileLikelihood:
     laplace: tuple[float, float]
     notes: tuple[str, ...] = field(default=())
 
-    def __str__(self) -> str:
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        low, high = (f"{end:.4g}" if end is not None else "open" for end in (self.low, self.high))
-        line = f"{self.name} = {self.best:.5g}{unit}, {100 * self.level:g} % interval [{low}, {high}] by its profile"
-        return "; ".join([line, *self.notes])
-
     def plot(self, path: str | Path | None = None) -> Figure:
         """The rise of chi-square over the quantity, with that of Laplace's approximation; written to `path`."""
-        from creepkit.report.uncertainty_plots import profile_figure
-
-        return profile_figure(self, path)
+        return present(self, "plot", path)
 
 
 @dataclass(frozen=True)

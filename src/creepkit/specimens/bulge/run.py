@@ -25,6 +25,7 @@ from creepkit.kernels.interface import (
     TIME,
     call_entry,
 )
+from creepkit.presentation import present
 from creepkit.records import History, Status
 from creepkit.specimens.bulge.finite_elements import BulgeSetup, set_up_test, solver_settings
 from creepkit.specimens.bulge.observation import OBSERVED
@@ -142,15 +143,11 @@ class BulgeRun(Run):
 
     def section(self, time: float | None = None, name: str = STRESS_FIELD, path: str | Path | None = None) -> Figure:
         """A picture of the deformed section, coloured by a field (see `field`), at a time; by default the last."""
-        from creepkit.report.bulge_plots import plot_section
-
-        return plot_section(self, float(self.times[-1]) if time is None else float(time), name, path)
+        return present(self, "section", time, name, path)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """A picture of amplitude, width, shape and pressure over time."""
-        from creepkit.report.bulge_plots import plot_outputs
-
-        return plot_outputs(self, path)
+        return present(self, "plot", path)
 
     @property
     def point_coordinates(self) -> Floats:

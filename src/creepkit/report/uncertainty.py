@@ -1,4 +1,4 @@
-"""Plots of uncertainty: profile likelihood, pairs of posterior samples, correlation, bands of creep rates."""
+"""Text and plots of uncertainty: profile likelihood, posterior samples, correlation, model average, rate bands."""
 
 from __future__ import annotations
 
@@ -18,17 +18,29 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.inverse.uncertainty.correlation import Correlation
-    from creepkit.inverse.uncertainty.model_averaging import RateBand
+    from creepkit.inverse.uncertainty.model_averaging import ModelAverage, RateBand
     from creepkit.inverse.uncertainty.posterior import PosteriorSamples
     from creepkit.inverse.uncertainty.profile_likelihood import ProfileLikelihood
 
 
 MAX_DRAWS = 2000
-"""Draws in a panel of pairs; more are a blot."""
+"""Draws in a panel of pairs; more hide one another."""
 
 
 LOGARITHMIC_RATIO = 30.0
 """Ratio of largest to smallest value beyond which an axis is logarithmic."""
+
+
+def profile_text(profile: ProfileLikelihood) -> str:
+    """One line: the best value and the interval by the profile."""
+    unit = _unit_text(profile.unit)
+    low, high = (f"{end:.4g}" if end is not None else "open" for end in (profile.low, profile.high))
+    interval = f"{100 * profile.level:g} % interval [{low}, {high}] by its profile"
+    return "; ".join([f"{profile.name} = {profile.best:.5g}{unit}, {interval}", *profile.notes])
+
+
+def _unit_text(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"
 
 
 def profile_figure(profile: ProfileLikelihood, path: str | Path | None = None) -> Figure:
@@ -64,13 +76,25 @@ def _with_margin(values: Floats, logarithmic: bool) -> tuple[float, float]:
     return (float(np.exp(lower)), float(np.exp(upper))) if logarithmic else (lower, upper)
 
 
+def posterior_text(samples: PosteriorSamples) -> str:
+    """How the chain went, then the median and 95 % interval of every parameter."""
+    width = max(len(name) for name in samples.coordinates.names)
+    lines = [
+        f"{samples.chain.shape[1]} walkers, {len(samples.chain)} steps ({samples.burn_in} left out): acceptance "
+        f"{samples.acceptance_fraction:.2f}, autocorrelation {samples.autocorrelation_time.max():.3g} steps, some "
+        f"{samples.effective_sample_size:.0f} independent draws"
+    ]
+    for name, param in samples.coordinates.law.table.items():
+        median, low, high = samples.interval(name)
+        lines.append(f"  {name:{width}} = {median:.5g}  [{low:.4g}, {high:.4g}]{_unit_text(param.unit)}")
+    return "\n".join([*lines, *(f"  note: {note}" for note in samples.notes)])
+
+
 def pairs_figure(samples: PosteriorSamples, path: str | Path | None = None) -> Figure:
     """Histograms of every parameter and clouds of every pair, in the author's units, coefficients as log10."""
-    from matplotlib.figure import Figure
-
     columns = _columns(samples)
     count = len(columns)
-    figure = Figure(figsize=(1.2 + 2.0 * count, 1.0 + 2.0 * count), layout="constrained")
+    figure = empty_figure(1.2 + 2.0 * count, 1.0 + 2.0 * count)
     panels = np.atleast_2d(np.asarray(figure.subplots(count, count, squeeze=False)))
     names = list(columns)
     for row, first in enumerate(names):
@@ -81,7 +105,7 @@ def pairs_figure(samples: PosteriorSamples, path: str | Path | None = None) -> F
 
 
 def _columns(samples: PosteriorSamples) -> dict[str, Floats]:
-    """{label: (draws,)}, at most SHOWN draws."""
+    """{label: (draws,)}, at most MAX_DRAWS draws."""
     table = samples.coordinates.law.table
     stride = max(len(samples.u) // MAX_DRAWS, 1)
     return {
@@ -101,8 +125,8 @@ def _draw_pair(
         return
     if row == column:
         axes.hist(columns[first], bins=40, color="C0", alpha=0.7)
-        for share in np.quantile(columns[first], (0.025, 0.5, 0.975)):
-            axes.axvline(float(share), color="black", lw=0.8, ls=":")
+        for quantile in np.quantile(columns[first], (0.025, 0.5, 0.975)):
+            axes.axvline(float(quantile), color="black", lw=0.8, ls=":")
         axes.set_yticks([])
     else:
         axes.plot(columns[second], columns[first], ".", ms=1.5, color="C0", alpha=0.3, rasterized=True)
@@ -113,6 +137,18 @@ def _draw_pair(
     axes.tick_params(labelsize=7)
 
 
+def correlation_text(correlation: Correlation) -> str:
+    """The matrix with its names, four digits."""
+    widths = [max(len(name), 8) + 1 for name in correlation.names]
+    first_width = max(len(name) for name in correlation.names) + 1
+    heads = (f"{name:>{width}}" for name, width in zip(correlation.names, widths, strict=True))
+    lines = [" " * first_width + "".join(heads)]
+    for name, row in zip(correlation.names, correlation.matrix, strict=True):
+        cells = (f"{value:>{width}.4f}" for value, width in zip(row, widths, strict=True))
+        lines.append(f"{name:{first_width}}" + "".join(cells))
+    return "\n".join(lines)
+
+
 def correlation_figure(correlation: Correlation, path: str | Path | None = None) -> Figure:
     """The matrix in colours from -1 to 1, with its numbers."""
     count = len(correlation.names)
@@ -121,13 +157,39 @@ def correlation_figure(correlation: Correlation, path: str | Path | None = None)
     for row in range(count):
         for column in range(count):
             value = correlation.matrix[row, column]
-            axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8,
-                      color="white" if abs(value) > 0.6 else "black")  # fmt: skip
+            colour = "white" if abs(value) > 0.6 else "black"
+            axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8, color=colour)
     axes.set_xticks(range(count), correlation.names, rotation=45, ha="right")
     axes.set_yticks(range(count), correlation.names)
     axes.set_title(correlation.title, fontsize=10)
     figure.colorbar(image, ax=axes, shrink=0.8, label="correlation")
     return save_figure(figure, path)
+
+
+def model_average_text(average: ModelAverage) -> str:
+    """One line: the laws with their weights, rate and local exponent at the reference point."""
+    reference = average.fits[0].reference
+    rate, low, high = (float(v) for v in average.rate(reference.stress))
+    exponent, exponent_low, exponent_high = (float(v) for v in average.local_exponent(reference.stress))
+    names = ", ".join(f"{fit.law.name} ({w:.2g})" for fit, w in zip(average.fits, average.weights, strict=True))
+    return (
+        f"over the laws {names}: rate at {reference.stress:.4g} MPa, {reference.temperature:.0f} K {rate:.3g} "
+        f"[{low:.3g}, {high:.3g}] 1/s, local stress exponent {exponent:.3g} [{exponent_low:.3g}, {exponent_high:.3g}]"
+    )
+
+
+def rate_band_text(band: RateBand) -> str:
+    """Median rate and 95 % band, one line a stress."""
+    temperature = f"{band.temperature - ZERO_CELSIUS:.0f} +- {band.temperature_uncertainty:g} C"
+    lines = [f"creep rate at {temperature}, 95 % band"]
+    for stress, rate, low, high in zip(band.stress, band.rate, band.low, band.high, strict=True):
+        lines.append(f"  {stress:8.4g} MPa  {rate:9.3g}  [{low:.3g}, {high:.3g}] 1/s")
+    return "\n".join([*lines, *(f"  note: {note}" for note in band.notes)])
+
+
+def rate_band_figure(band: RateBand, path: str | Path | None = None) -> Figure:
+    """Rates over stress of one band."""
+    return rate_bands_figure([band], path)
 
 
 def rate_bands_figure(bands: Sequence[RateBand], path: str | Path | None = None) -> Figure:

@@ -1,4 +1,4 @@
-"""Plots and texts of bulge tests: deformed section, outputs over time, tables of the reduced-order model."""
+"""Text and plots of simulated tests: outputs over time, deformed section, tables of the reduced-order model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, SIDES, outline, shape_functions
-from creepkit.report.figures import empty_figure
+from creepkit.records import Status
+from creepkit.report.figures import empty_figure, save_figure
 from creepkit.specimens.bulge.reduced_order.deflection_curves import LOG_GROWTH, LOG_STRESS
 from creepkit.specimens.bulge.reduced_order.step_equations import growth_multiplier, redistribution_sizes
 from creepkit.specimens.bulge.reduced_order.tables import LOADS, ReducedOrderTables
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.specimens.bulge.run import BulgeRun
+    from creepkit.specimens.run import Run
 
 
 SUBDIVISIONS = 6
@@ -32,10 +34,21 @@ _LABELS = {"stress": "von Mises stress, MPa", "creep strain": "equivalent creep 
 _GREY = "0.45"
 
 
-def plot_section(run: BulgeRun, time: float, name: str, path: str | Path | None = None) -> Figure:
-    """The deformed section, both halves, coloured by a field, over the outline at rest; true to scale."""
+def run_text(run: Run) -> str:
+    """One line: how the test ended, its frames, and the last value of each output."""
+    how = "complete" if run.status is Status.COMPLETE else f"ended at {run.end_time:g} s ({run.reason})"
+    last = ", ".join(f"{name} {values[-1]:.4g}" for name, values in run.outputs.items())
+    return f"{run.name}: {how}; {run.times.size} frames to {run.times[-1]:g} s, where {last}"
+
+
+def section_figure(run: BulgeRun, time: float | None, name: str, path: str | Path | None = None) -> Figure:
+    """The deformed section, both halves, coloured by a field, over the outline at rest; true to scale.
+
+    time : s, by default that of the last frame.
+    """
     from matplotlib.tri import Triangulation
 
+    time = float(run.times[-1]) if time is None else float(time)
     field = run.field(name, time)
     body = run.setup.model
     moved = body.nodes + run._at(run.simulation.displacements, time)
@@ -54,11 +67,10 @@ def plot_section(run: BulgeRun, time: float, name: str, path: str | Path | None 
     axes.set(aspect="equal", xlabel="r, mm", ylabel="z, mm")
     axes.set_title(f"{run.name}: {_duration(time)}, {pressure:.3g} MPa (dashed: at rest)", fontsize=10)
     axes.spines[["top", "right"]].set_visible(False)
-    _save(figure, path)
-    return figure
+    return save_figure(figure, path, SolveError)
 
 
-def plot_outputs(run: BulgeRun, path: str | Path | None = None) -> Figure:
+def outputs_figure(run: BulgeRun, path: str | Path | None = None) -> Figure:
     """Amplitude, width, shape and pressure over time, one below the other."""
     figure = empty_figure(6.4, 6.6)
     panels = figure.subplots(4, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0, 0.8))
@@ -78,8 +90,7 @@ def plot_outputs(run: BulgeRun, path: str | Path | None = None) -> Figure:
     ended = f", ended at {_duration(run.end_time)}: {run.reason}" if run.reason else ""
     figure.suptitle(f"{run.name}{ended}", fontsize=10)
     figure.align_ylabels(panels)
-    _save(figure, path)
-    return figure
+    return save_figure(figure, path, SolveError)
 
 
 def _facets(nodes: Floats) -> tuple[Floats, Ints]:
@@ -130,16 +141,6 @@ def _duration(time: float) -> str:
     return f"{time / 3600:.4g} h" if time >= 3600 else f"{time:.4g} s"
 
 
-def _save(figure: Figure, path: str | Path | None) -> None:
-    if path is None:
-        return
-    try:
-        figure.savefig(path, dpi=160)
-    except (OSError, ValueError) as error:
-        message = str(error).splitlines()[0]
-        raise SolveError(f"{path}: the picture cannot be written ({message}); name a .png, .svg or .pdf file") from None
-
-
 _SHOWN = (0.05, 0.1, 0.2, 0.4, 0.6, 0.9, 1.2, 1.6, 2.0, 2.6, 3.2, 4.0, 4.8)
 """Deflections of the text over the apex thickness."""
 
@@ -153,7 +154,7 @@ _STRAINS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 _COLUMN = 8
 
 
-def describe_tables(tables: ReducedOrderTables) -> str:
+def tables_text(tables: ReducedOrderTables) -> str:
     """k and kappa at some deflections for each thickness, the elastic deflection, and the multiplier."""
     nominal, grid = tables.geometry.apex_thickness, tables.grid
     deflections = np.array([d for d in nominal * np.array(_SHOWN) if d <= grid.points[-1]])
@@ -185,7 +186,7 @@ def _table(title: str, corner: str, columns: Floats, labels: Floats, rows: list[
     return "\n".join([title, head, *lines])
 
 
-def plot_tables(tables: ReducedOrderTables, path: str | Path) -> None:
+def tables_figure(tables: ReducedOrderTables, path: str | Path | None = None) -> Figure:
     """k and kappa against D for each thickness, and the multiplier against creep strain, side by side."""
     figure = empty_figure(11.0, 3.6)
     left, middle, right = figure.subplots(1, 3)
@@ -206,4 +207,4 @@ def plot_tables(tables: ReducedOrderTables, path: str | Path) -> None:
     right.legend(frameon=False, fontsize=8)
     for axes in (left, middle, right):
         axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path, dpi=150)
+    return save_figure(figure, path, SolveError)

@@ -1,0 +1,118 @@
+"""How records print, plot and save themselves although the modules that do so import the records.
+
+A method of a record says `return present(self, "plot", path)`. The table PRESENTERS names the function that does it,
+which takes the record first; its module is imported when it is first asked for. So records import nothing above them,
+and `fit.plot()`, `print(fit)` and `fit.save()` work. The same holds for methods that work something out by functions of
+higher modules, such as `fit.profile("n")`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from typing import Any, TypeVar
+
+Result = TypeVar("Result")
+
+
+PRESENTERS: dict[str, dict[str, str]] = {
+    # specimens
+    "Run": {"text": "creepkit.report.simulation:run_text"},
+    "BulgeRun": {
+        "plot": "creepkit.report.simulation:outputs_figure",
+        "section": "creepkit.report.simulation:section_figure",
+    },
+    # sampling, data sets, surrogates
+    "Acceptance": {
+        "text": "creepkit.report.sampling:acceptance_text",
+        "plot": "creepkit.report.sampling:acceptance_figure",
+    },
+    "Dataset": {"text": "creepkit.report.dataset:dataset_text"},
+    "Surrogate": {"text": "creepkit.report.surrogate:surrogate_text"},
+    # inverse
+    "Identification": {
+        "text": "creepkit.report.identification_text:identification_text",
+        "plot": "creepkit.report.identification_plot:identification_figure",
+        "save": "creepkit.inverse.identification_document:save_identification",
+        "profile": "creepkit.inverse.uncertainty.profile_likelihood:profile",
+        "sample": "creepkit.inverse.uncertainty.posterior:sample_posterior",
+        "correlation": "creepkit.inverse.uncertainty.correlation:correlation",
+        "undetermined": "creepkit.inverse.uncertainty.correlation:undetermined",
+    },
+    "Confirmation": {"text": "creepkit.report.identification_text:confirmation_text"},
+    "SearchTrace": {"plot": "creepkit.report.search:search_figure"},
+    "Ranking": {
+        "text": "creepkit.report.ranking:ranking_text",
+        "further_tests": "creepkit.experiments.discriminating_experiments:further_tests",
+    },
+    "Sparsity": {"text": "creepkit.report.search:sparsity_text"},
+    "PenaltyPath": {
+        "text": "creepkit.report.search:penalty_path_text",
+        "plot": "creepkit.report.search:penalty_path_figure",
+    },
+    "SelectionFrequencies": {"text": "creepkit.report.search:selection_frequencies_text"},
+    "ProfileLikelihood": {
+        "text": "creepkit.report.uncertainty:profile_text",
+        "plot": "creepkit.report.uncertainty:profile_figure",
+    },
+    "PosteriorSamples": {
+        "text": "creepkit.report.uncertainty:posterior_text",
+        "plot": "creepkit.report.uncertainty:pairs_figure",
+    },
+    "Correlation": {
+        "text": "creepkit.report.uncertainty:correlation_text",
+        "plot": "creepkit.report.uncertainty:correlation_figure",
+    },
+    "ModelAverage": {"text": "creepkit.report.uncertainty:model_average_text"},
+    "RateBand": {
+        "text": "creepkit.report.uncertainty:rate_band_text",
+        "plot": "creepkit.report.uncertainty:rate_band_figure",
+    },
+    # screening, discovery, experiments
+    "Plate": {
+        "text": "creepkit.report.screening:screening_text",
+        "plot": "creepkit.report.screening:plot_screening",
+        "to_csv": "creepkit.screening.files:write_csv",
+        "to_hdf5": "creepkit.screening.files:write_hdf5",
+    },
+    "TemperatureLaw": {
+        "text": "creepkit.report.temperature_law:temperature_law_text",
+        "plot": "creepkit.report.temperature_law:plot_temperature_law",
+    },
+    "TemperatureStudy": {"text": "creepkit.report.temperature_law:temperature_study_text"},
+    "ModulusEstimates": {"text": "creepkit.report.temperature_law:modulus_estimates_text"},
+    "DiscriminationDesign": {"text": "creepkit.report.ranking:discrimination_design_text"},
+}
+"""{class: {verb: "module:function"}}. The verb "text" is what `str` and `print` show; other verbs are methods."""
+
+
+class Presentable:
+    """A record whose text for a terminal is written by the function that the table names under "text"."""
+
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        return present(self, "text")
+
+
+def present(record: object, verb: str, /, *arguments: Any, **options: Any) -> Result:  # type: ignore[type-var]
+    """The result of the function that the table names for the class of a record and a verb.
+
+    record : its first argument; a class without an entry of its own uses that of the class it derives from. The result
+    has the type that the calling method declares, which a test compares with that of the function.
+    """
+    for kind in type(record).__mro__:
+        functions = PRESENTERS.get(kind.__name__, {})
+        if verb in functions:
+            result: Result = presenter(functions[verb])(record, *arguments, **options)
+            return result
+    raise AttributeError(f"no function is registered that gives '{verb}' of a record of class {type(record).__name__}")
+
+
+@cache
+def presenter(name: str) -> Callable[..., Any]:
+    """The function that "module:function" names."""
+    module, _, function = name.partition(":")
+    resolved: Callable[..., Any] = getattr(import_module(module), function)
+    return resolved

@@ -1,0 +1,119 @@
+"""Text of rankings of laws, as a whole and as rows of a table, and of tests that would decide between laws."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from creepkit.report.terminal import print_table
+
+if TYPE_CHECKING:
+    from creepkit.experiments.discriminating_experiments import DiscriminationDesign
+    from creepkit.inverse.identification import Identification
+    from creepkit.inverse.selection.discrimination import EquivalentLaws
+    from creepkit.inverse.selection.ranking import Ranking
+
+
+_CRITERION_NAMES = {"bic": "BIC", "aicc": "AICc", "hold-out": "hold-out"}
+
+
+def ranking_text(ranking: Ranking) -> str:
+    """The verdict, then a line for each law."""
+    width = max(len(r.fit.law.name) for r in ranking.laws)
+    header = f"{'law':{width}}   weight  {_CRITERION_NAMES[ranking.criterion]} - best  chi-square"
+    rows = [f"{r.fit.law.name:{width}}   {r.weight:6.3f}  {r.excess:10.1f}  {r.chi_square:10.1f}" for r in ranking.laws]
+    failed = [f"{name}: {reason}" for name, reason in ranking.failed.items()]
+    equivalent = [] if ranking.decisive else [f"- {pair}" for pair in _equivalents_among_remaining(ranking)]
+    return "\n".join([ranking.verdict, *equivalent, "", header, *rows, *failed])
+
+
+def _equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
+    names = {r.fit.law.name for r in ranking.credible}
+    if any(r.fit.predictor is None or not r.fit.histories for r in ranking.laws):
+        return []
+    return [pair for pair in ranking.equivalents() if {pair.first, pair.second} <= names]
+
+
+def discrimination_design_text(design: DiscriminationDesign) -> str:
+    """The most telling test in a sentence, then the expected chi-square of each, and those that burst at once."""
+    rows = [f"  {test.chi_square:9.3g}  {test.description}" for test in design.experiments]
+    return "\n".join([design.sentence, *rows, *(f"      burst  {name}" for name in design.excluded)])
+
+
+def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) -> None:
+    """Print the table of laws, the verdict, the best law and what was written."""
+    rows = [
+        (
+            entry.fit.law.name,
+            str(len(entry.fit.law.params)),
+            *_misfit_cells(entry.fit),
+            f"{entry.excess:.1f}",
+            f"{entry.weight:.3f}",
+        )
+        for entry in ranking.laws
+    ]
+    columns = ("law", "parameters", *_misfit_columns(ranking.best), "BIC - best", "weight")
+    print_table(f"{test_count} tests", columns, rows)
+    print(f"{ranking.verdict}\n\n{ranking.best}\n")
+    for path in written:
+        print(f"wrote {path}")
+
+
+def _misfit_columns(fit: Identification) -> tuple[str, ...]:
+    output = next(iter(fit.errors))
+    return ("rms ln strain" if output == "strain" else f"error of {output}", "test to test", "not followed")
+
+
+def _misfit_cells(fit: Identification) -> tuple[str, ...]:
+    output = next(iter(fit.errors))
+    misfit = f"{fit.rms:.3f}" if output == "strain" else f"{fit.errors[output].relative_squared_error:.3g}"
+    return misfit, f"{100 * fit.noise_model.rate:.0f} %", f"{100 * fit.noise_model[output].drift:.0f} %"
+
+
+def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]:
+    """The same as JSON-able data."""
+    return {
+        "verdict": ranking.verdict,
+        "laws": [
+            {**_fit_to_json(ranked.fit), "bic_excess": ranked.excess, "weight": ranked.weight}
+            for ranked in ranking.laws
+        ],
+        "files": [str(path) for path in written],
+    }
+
+
+def _fit_to_json(fit: Identification) -> dict[str, Any]:
+    return {
+        "law": fit.law.name,
+        **({"rms_ln_strain": fit.rms} if "strain" in fit.errors else {}),
+        "errors": {name: _json_numbers(vars(e)) for name, e in fit.errors.items()},
+        "parameters": {
+            e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
+            for e in fit.estimates
+        },
+        "nuisances": [_json_numbers(vars(n)) for n in fit.nuisances],
+        "scatter": fit.noise_model.to_dict(),
+        "notes": list(fit.notes),
+    }
+
+
+def _json_numbers(record: dict[str, Any]) -> dict[str, Any]:
+    """The same with null for what JSON cannot hold."""
+    return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in record.items()}
+
+
+def print_truth(truth: dict[str, Any], fit: Identification) -> None:
+    """The planted values beside the identified ones."""
+    law_is_correct = fit.law.name.startswith(truth["law"])
+    rows = []
+    for e in fit.estimates if law_is_correct else ():
+        planted = truth["values"][e.name]
+        inside = "yes" if e.low <= planted <= e.high else "no"
+        rows.append((e.name, f"{planted:.4g}", f"{e.value:.4g}", f"{e.low:.4g} to {e.high:.4g}", inside))
+    if "rate_scatter" in truth:
+        scatter = f"{100 * truth['rate_scatter']:.0f} %", f"{100 * fit.noise_model.rate:.0f} %"
+        rows.append(("rate between tests", *scatter, "", ""))
+    print()
+    print_table(f"the truth: {truth['law']}", ("parameter", "planted", "identified", "95 % interval", "inside"), rows)
