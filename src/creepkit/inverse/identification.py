@@ -228,9 +228,9 @@ class Identification:
 
     def save(self, path: str | Path) -> Path:
         """Write the identification as JSON (to a temporary name, then renamed)."""
-        from creepkit.inverse.identification_document import save_identification
+        from creepkit.inverse.identification_document import write_identification
 
-        return save_identification(self, Path(path))
+        return write_identification(self, path)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Measured against identified, and residuals; written to `path` when given."""

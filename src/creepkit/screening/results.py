@@ -180,9 +180,9 @@ class Plate:
 
     def to_hdf5(self, path: str | Path) -> Path:
         """Write everything that is a number: values, covariances, tests as measured and as predicted."""
-        from creepkit.screening.files import write_hdf5
+        from creepkit.screening.files import write_plate
 
-        return write_hdf5(self, Path(path))
+        return write_plate(self, Path(path))
 
     def plot(self, folder: str | Path) -> list[Path]:
         """Draw measured against identified displacement, misfit with and without sparsity, and shares of laws."""
