@@ -143,8 +143,8 @@ class Campaign:
         if existing != self.document:
             difference = first_difference(existing, self.document, "")
             raise DatasetError(
-                f"{self.folder}: holds shards of another campaign (there and here {difference}); choose another name, or "
-                "remove the folder"
+                f"{self.folder}: holds shards of another campaign (there and here {difference}); choose another name, "
+                "or remove the folder"
             )
 
 

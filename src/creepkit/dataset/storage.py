@@ -1,9 +1,9 @@
 """Data sets as HDF5 files, readable without creepkit.
 
 Layout 1. Attributes of the file: `format` is "creepkit-dataset" and `layout` 1; `units` says "MPa, mm, s, K" of
-everything that follows; lists of strings `outputs`, `parameter_names`, `condition_names`, `reason_names`, `reason_texts`;
-JSON texts `law` (creepkit.language.law_codec), `specimen` (its name and fields), `design` (what decided the draws) and
-`provenance` (versions, seed, when, fingerprint).
+everything that follows; lists of strings `outputs`, `parameter_names`, `condition_names`, `reason_names` and
+`reason_texts`; JSON texts `law` (creepkit.language.law_codec), `specimen` (its name and fields), `design` (what decided
+the draws) and `provenance` (versions, seed, when, fingerprint).
 
 Arrays, the first axis being the sample, in the order of the Sobol sequence, rejected and failed samples included:
 
@@ -100,7 +100,7 @@ def check_shapes(file: h5py.File, expected: dict[str, Any], source: str) -> None
 
 
 def check_attributes(attributes: dict[str, Any], source: str) -> None:
-    """DatasetError when the words of a file do not fit each other; told : attributes by name, documents parsed."""
+    """DatasetError when the attributes of a file, by name and with documents parsed, do not fit each other."""
     for name in ("design", "provenance"):
         if not isinstance(attributes[name], dict):
             raise DatasetError(f"{source}: the attribute '{name}' is no record; the file is damaged")

@@ -72,7 +72,7 @@ def _open_regular(path: Path, kind: FileKind, *, any_size: bool = False) -> int:
     try:
         descriptor = os.open(path, _OPEN_FLAGS)
     except FileNotFoundError:
-        raise kind.error(f"{path}: there is no such file; {kind.advice}") from None
+        raise kind.error(f"{path}: there is no such file; check its name") from None
     except (OSError, ValueError) as error:  # ValueError: a name with a null byte
         raise kind.error(f"{path}: cannot be read ({_cause(error)})") from None
     status = os.fstat(descriptor)

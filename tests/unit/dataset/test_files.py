@@ -144,7 +144,7 @@ def test_rows_keep_what_belongs_to_them(data):
     assert part.failures == {1: data.failures[row]}
     assert part.values_of(0) == data.values_of(31)
     assert part.index.tolist() == [31, row]
-    assert part.plan(0).loading.program() == data.plan(31).loading.program()
+    assert part.planned_test(0).loading.program() == data.planned_test(31).loading.program()
     np.testing.assert_array_equal(part.times(0), GRID.values)
 
 
@@ -333,12 +333,16 @@ def enormous(file):
         (replaced("time_grid", np.zeros((4, 4))), "a time grid needs"),
         (replaced("time_grid", np.array([b"0", b"1", b"2", b"3"])), "its time grid is |S1"),
         (lambda file: file["time_grid"].attrs.__delitem__("relative"), "cannot be read, it seems damaged"),
+        (lambda file: file.__setitem__("marks", h5py.ExternalLink("b.h5", "/values")), "is a link to elsewhere"),
+        (lambda file: file.__setitem__("marks", h5py.SoftLink("/values")), "is a link to elsewhere"),
+        (lambda file: file.create_dataset("x", (4,), "i4", external="x.bin"), "'x' lies in other files"),
+        (lambda file: file.__setitem__("failures/again", file["failures"]), "links in a circle"),
         (lambda file: file.__delitem__("time_grid"), "cannot be read, it seems damaged"),
         (lambda file: file.__delitem__("failures"), "cannot be read, it seems damaged"),
         (replaced("failures/rows", np.array([1, 2, 3])), "cannot be read, it seems damaged"),
         (lambda file: file.attrs.__setitem__("provenance", "[]"), "the attribute 'provenance' is no record"),
         (lambda file: file.attrs.__setitem__("design", "3"), "the attribute 'design' is no record"),
-        (lambda file: file.attrs.__setitem__("law", "[" * 100_000), "cannot be read, it seems damaged"),
+        (lambda file: file.attrs.__setitem__("law", "[" * 100_000), "its law: lists nested too deep"),
         (lambda file: file.attrs.__setitem__("outputs", 3.0), "cannot be read, it seems damaged"),
         (lambda file: file.attrs.__setitem__("parameter_names", ["n", "A"]), "its parameters are n, A, those of its"),
         (lambda file: file.attrs.__setitem__("reason_texts", ["met"]), "not a text for each reason"),

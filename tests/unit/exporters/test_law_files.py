@@ -112,7 +112,7 @@ def _json(**changes):
         ("", "mine.json, line 1: not JSON"),
         ("[" * 100_000, "nested too deep"),
         ('{"format": ' + "9" * 5000 + "}", "integer too long"),
-        ("[]", "not a law that creepkit exported"),
+        ("[]", "not a law that creepkit wrote"),
         (_json(version=1), "in version 1 of the format; this one reads version 3: export the law again"),
         (_json(ranges={"temperature": [1100, 900]}), "ranges.temperature is 1100 to 900; the lower number comes first"),
         (_json(script="import os"), "unknown key 'script'; known: gas_constant, law"),
