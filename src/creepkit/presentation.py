@@ -34,7 +34,7 @@ PRESENTERS: dict[str, dict[str, str]] = {
     "Identification": {
         "text": "creepkit.report.identification_text:identification_text",
         "plot": "creepkit.report.identification_plot:identification_figure",
-        "save": "creepkit.inverse.identification_document:save_identification",
+        "save": "creepkit.inverse.identification_document:write_identification",
         "profile": "creepkit.inverse.uncertainty.profile_likelihood:profile",
         "sample": "creepkit.inverse.uncertainty.posterior:sample_posterior",
         "correlation": "creepkit.inverse.uncertainty.correlation:correlation",
@@ -74,7 +74,7 @@ PRESENTERS: dict[str, dict[str, str]] = {
         "text": "creepkit.report.screening:screening_text",
         "plot": "creepkit.report.screening:plot_screening",
         "to_csv": "creepkit.screening.files:write_csv",
-        "to_hdf5": "creepkit.screening.files:write_hdf5",
+        "to_hdf5": "creepkit.screening.files:write_plate",
     },
     "TemperatureLaw": {
         "text": "creepkit.report.temperature_law:temperature_law_text",

@@ -185,7 +185,7 @@ def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] 
 
 def load(path: str | Path) -> Identification:
     """Return the identification saved in a JSON file; attach its histories again with `.on(histories, using)`."""
-    from creepkit.inverse.identification_document import load_identification as run
+    from creepkit.inverse.identification_document import read_identification as run
 
     return run(path)
 

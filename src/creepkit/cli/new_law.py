@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit.errors import LawError, PluginError
+from creepkit.files.writing import write_text
+
 if TYPE_CHECKING:
     from string import Template
 
@@ -88,7 +91,6 @@ def command(
 ) -> None:
     """Write a law of some 20 lines to start from, as a package."""
     from creepkit import registry
-    from creepkit.errors import LawError
 
     if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name):
         raise typer.BadParameter(f"'{name}' is not a law's name: use lower-case words joined by '-', such as my-law")
@@ -101,7 +103,7 @@ def _write_file(name: str) -> str:
     """Write the law alone; say what to do next."""
     path = Path(f"{name.replace('-', '_')}.py")
     _check_absent(path)
-    path.write_text(_fill_template(LAW_TEMPLATE, name), encoding="utf-8")
+    write_text(_fill_template(LAW_TEMPLATE, name), path, LawError)
     return (
         f"wrote {path}; next: edit its terms and params, then run 'creepkit check {path}', "
         f"and 'creepkit --plugin {path}' before any other command"
@@ -120,7 +122,7 @@ def _write_package(name: str) -> str:
         f"tests/test_{name.replace('-', '_')}.py": TEST_TEMPLATE,
     }
     for path, text in texts.items():
-        (folder / path).write_text(_fill_template(text, name), encoding="utf-8")
+        write_text(_fill_template(text, name), folder / path, LawError)
     law = folder / f"{module}.py"
     return (
         f"wrote {folder}/ ({', '.join(texts)})\n"
@@ -143,7 +145,5 @@ def _fill_template(text: Template, name: str) -> str:
 
 def _check_absent(path: Path) -> None:
     """What exists is left as it is."""
-    from creepkit.errors import PluginError
-
     if path.exists():
         raise PluginError(f"{path} exists already; it was left as it is, choose another name or move it")

@@ -1,12 +1,12 @@
 """Shards: blocks of rows of a design, each simulated once, kept in its own file, and merged into one data set.
 
-A shard is done when its file exists, belongs to this campaign and is complete. The file is written under a temporary name and renamed by the holder of the shard lock.
+A shard is done when its file exists, belongs to this campaign and is complete. The file is written under a temporary
+name and renamed by the holder of the shard lock.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
 import logging
 import time
 from collections.abc import Callable, Sequence
@@ -26,8 +26,10 @@ from creepkit.dataset.dataset import COLUMNS, Dataset, first_difference
 from creepkit.dataset.simulation import SampleFailedError, empty_dataset, simulate_rows
 from creepkit.dataset.storage import LAYOUT_VERSION
 from creepkit.errors import DatasetError
-from creepkit.files.fault_tolerant import create_hdf5
-from creepkit.files.writing import remove_temporary_files, replace_on_success, write_if_absent
+from creepkit.files.hdf5_files import open_hdf5, write_hdf5
+from creepkit.files.json_documents import as_read_back, canonical_json, json_text, read_json
+from creepkit.files.reading import FileKind
+from creepkit.files.writing import remove_temporary_files, write_if_absent
 from creepkit.jobs.shard_progress import ShardLock
 from creepkit.jobs.worker import TaskResult
 from creepkit.language.law_codec import law_to_json
@@ -49,6 +51,11 @@ SHARD_ROWS = 256
 
 MOST_PROCESS_DEATHS = 2
 """How often a sample may kill its process before it counts as failed."""
+
+
+CAMPAIGN_FILE = FileKind(
+    "the settings of a campaign", DatasetError, "it is damaged; remove it if the shards beside it are of this campaign"
+)
 
 
 _log = logging.getLogger("creepkit.dataset")
@@ -90,12 +97,12 @@ class Campaign:
             "layout": LAYOUT_VERSION,
             "creepkit": version("creepkit"),
         }
-        return dict(json.loads(json.dumps(document)))
+        return dict(as_read_back(document))
 
     @cached_property
     def fingerprint(self) -> str:
         """Of the document."""
-        return hashlib.sha256(json.dumps(self.document, sort_keys=True).encode()).hexdigest()[:24]
+        return hashlib.sha256(canonical_json(self.document)).hexdigest()[:24]
 
     @cached_property
     def header(self) -> Dataset:
@@ -129,17 +136,15 @@ class Campaign:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             if not path.exists():
-                write_if_absent(path, json.dumps(self.document, indent=1))
-            existing = json.loads(path.read_text(encoding="utf-8"))
+                write_if_absent(path, json_text(self.document))
         except OSError as error:
             raise DatasetError(f"{self.folder}: no shards can be written there ({error.strerror})") from None
-        except ValueError:
-            raise DatasetError(f"{path}: damaged; remove it if the shards beside it are of this campaign") from None
+        existing = read_json(path, CAMPAIGN_FILE)
         if existing != self.document:
             difference = first_difference(existing, self.document, "")
             raise DatasetError(
-                f"{self.folder}: holds shards of another campaign (there and here {difference}); choose another name, or "
-                "remove the folder"
+                f"{self.folder}: holds shards of another campaign (there and here {difference}); choose another name, "
+                "or remove the folder"
             )
 
 
@@ -173,7 +178,7 @@ def _start_guard(lock: ShardLock) -> Callable[[int], None]:
 
 def write_shard(campaign: Campaign, number: int, samples: Dataset) -> None:
     """Write the file of a shard."""
-    with replace_on_success(campaign.path(number)) as temporary, create_hdf5(temporary) as file:
+    with write_hdf5(campaign.path(number), DatasetError, storage.WRITE_ADVICE) as file:
         storage.write_header(file, samples)
         storage.append_samples(file, samples)
         file.attrs.update({"campaign": campaign.fingerprint, "shard": number, "checksum": sample_checksum(samples)})
@@ -190,7 +195,7 @@ def sample_checksum(samples: Dataset) -> str:
 def read_shard(campaign: Campaign, number: int) -> Dataset:
     """The samples of a shard; DatasetError when it is not whole, or of another campaign."""
     path = campaign.path(number)
-    with storage.open_hdf5(path) as file:
+    with open_hdf5(path, storage.DATASET_FILE) as file:
         if file.attrs.get("campaign") != campaign.fingerprint or file.attrs.get("shard") != number:
             raise DatasetError(f"{path}: a shard of another campaign")
         samples = storage.read_samples(file, campaign.header)
@@ -235,7 +240,7 @@ def is_complete(campaign: Campaign, record: ProgressRecord, path: Path) -> bool:
         return False
     if path.is_dir():
         raise DatasetError(f"{path}: is a folder; name a file for the data set")
-    with storage.open_hdf5(path) as file:
+    with open_hdf5(path, storage.DATASET_FILE) as file:
         header = storage.read_header(file, str(path))
         if header.provenance.get("fingerprint") != campaign.fingerprint:
             difference = first_difference(_identity(header), _identity(campaign.header), "")
@@ -263,7 +268,7 @@ def merge_shards(campaign: Campaign, record: ProgressRecord, path: Path, progres
 
 def _write_merged(campaign: Campaign, record: ProgressRecord, path: Path, progress: ProgressCallback | None) -> None:
     numbers, remaining = record.leading_run() or [], record.draws
-    with replace_on_success(path) as temporary, create_hdf5(temporary) as file:
+    with write_hdf5(path, DatasetError, storage.WRITE_ADVICE) as file:
         storage.write_header(file, campaign.header)
         for done, number in enumerate(numbers, start=1):
             samples = read_shard(campaign, number)
@@ -282,4 +287,4 @@ def _identity(data: Dataset) -> dict[str, Any]:
         "seed": data.provenance.get("seed"),
         "creepkit": data.provenance.get("creepkit"),
     }
-    return dict(json.loads(json.dumps(document)))
+    return dict(as_read_back(document))

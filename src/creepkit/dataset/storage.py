@@ -1,9 +1,9 @@
 """Data sets as HDF5 files, readable without creepkit.
 
 Layout 1. Attributes of the file: `format` is "creepkit-dataset" and `layout` 1; `units` says "MPa, mm, s, K" of
-everything that follows; lists of strings `outputs`, `parameter_names`, `condition_names`, `reason_names`, `reason_texts`;
-JSON texts `law` (creepkit.language.law_codec), `specimen` (its name and fields), `design` (what decided the draws) and
-`provenance` (versions, seed, when, fingerprint).
+everything that follows; lists of strings `outputs`, `parameter_names`, `condition_names`, `reason_names` and
+`reason_texts`; JSON texts `law` (creepkit.language.law_codec), `specimen` (its name and fields), `design` (what decided
+the draws) and `provenance` (versions, seed, when, fingerprint).
 
 Arrays, the first axis being the sample, in the order of the Sobol sequence, rejected and failed samples included:
 
@@ -27,12 +27,9 @@ The group `failures` has `rows` (k,) int64 and `texts` (k,): which samples faile
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
@@ -41,15 +38,18 @@ from numpy.typing import NDArray
 from creepkit.arrays import Bools
 from creepkit.dataset.dataset import COLUMNS, HOLD_TIMES, Dataset, empty_columns
 from creepkit.errors import DatasetError, LawError
-from creepkit.files.fault_tolerant import create_hdf5
-from creepkit.files.writing import replace_on_success
+from creepkit.files.hdf5_files import open_hdf5, write_hdf5, write_names
+from creepkit.files.json_documents import compact_json, parse_json
+from creepkit.files.reading import FileKind
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.sampling.conditions import MOST_FRAMES, TimeGrid
 from creepkit.specimens.documents import specimen_from_json, specimen_to_json
 
-if TYPE_CHECKING:
-    from creepkit.dataset.dataset import Dataset
+DATASET_FILE = FileKind("a data set", DatasetError, "give a data set that creepkit generated", maximum_bytes=2**50)
+
+
+WRITE_ADVICE = "choose another folder and start again, nothing done is lost"
 
 
 FORMAT = "creepkit-dataset"
@@ -100,7 +100,7 @@ def check_shapes(file: h5py.File, expected: dict[str, Any], source: str) -> None
 
 
 def check_attributes(attributes: dict[str, Any], source: str) -> None:
-    """DatasetError when the words of a file do not fit each other; told : attributes by name, documents parsed."""
+    """DatasetError when the attributes of a file, by name and with documents parsed, do not fit each other."""
     for name in ("design", "provenance"):
         if not isinstance(attributes[name], dict):
             raise DatasetError(f"{source}: the attribute '{name}' is no record; the file is damaged")
@@ -120,8 +120,8 @@ def check_values(columns: dict[str, Any], header: Dataset, source: str) -> None:
     invalid_reasons = np.flatnonzero((columns["reasons"] < -1) | (columns["reasons"] >= len(header.reason_names)))
     if invalid_reasons.size:
         raise DatasetError(
-            f"{source}: the reason of sample {invalid_reasons[0]} is {columns['reasons'][invalid_reasons[0]]}; allowed are -1 to "
-            f"{len(header.reason_names) - 1}; the file is damaged"
+            f"{source}: the reason of sample {invalid_reasons[0]} is {columns['reasons'][invalid_reasons[0]]}; allowed "
+            f"are -1 to {len(header.reason_names) - 1}; the file is damaged"
         )
     accepted = columns["reasons"] == 0
     has_history = np.isfinite(columns["values"][accepted, :, 0]).any(axis=1) & np.isfinite(
@@ -141,7 +141,7 @@ COMPRESSION = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 def write_dataset(data: Dataset, path: str | Path) -> Path:
     """Write a data set; the file is whole or absent, and one that is there is replaced."""
     path = Path(path)
-    with replace_on_success(path) as temporary, create_hdf5(temporary) as file:
+    with write_hdf5(path, DatasetError, WRITE_ADVICE) as file:
         write_header(file, data)
         append_samples(file, data)
     return path
@@ -150,9 +150,8 @@ def write_dataset(data: Dataset, path: str | Path) -> Path:
 def write_header(file: h5py.File, data: Dataset) -> None:
     """Write everything but the samples, with room for these."""
     file.attrs.update({"format": FORMAT, "layout": LAYOUT_VERSION, "units": FILE_UNITS})
-    text = h5py.string_dtype()
     for name in NAME_LISTS:
-        file.attrs.create(name, np.array(getattr(data, name), dtype=object), dtype=text)
+        write_names(file, name, getattr(data, name))
     documents = {
         "law": law_to_json(data.law),
         "specimen": specimen_to_json(data.specimen),
@@ -160,7 +159,7 @@ def write_header(file: h5py.File, data: Dataset) -> None:
         "provenance": data.provenance,
     }
     for name, document in documents.items():
-        file.attrs[name] = json.dumps(document, sort_keys=True)
+        file.attrs[name] = compact_json(document, sort_keys=True)
     grid = file.create_dataset("time_grid", data=data.grid.values, dtype=np.float64)
     grid.attrs["relative"] = bool(data.grid.relative)
     sizes = {**{name: len(getattr(data, name)) for name in NAME_LISTS}, "holds": HOLD_TIMES, "frames": grid.size}
@@ -171,7 +170,7 @@ def write_header(file: h5py.File, data: Dataset) -> None:
         file.create_dataset(name, (0, *shape), column.file_type, maxshape=(None, *shape), chunks=chunks, **COMPRESSION)
     failures = file.create_group("failures")
     failures.create_dataset("rows", (0,), np.int64, maxshape=(None,), chunks=(1024,))
-    failures.create_dataset("texts", (0,), text, maxshape=(None,), chunks=(1024,))
+    failures.create_dataset("texts", (0,), h5py.string_dtype(), maxshape=(None,), chunks=(1024,))
 
 
 def append_samples(file: h5py.File, data: Dataset) -> None:
@@ -198,33 +197,18 @@ def read_dataset(path: str | Path, *, accepted_only: bool = False) -> Dataset:
 
     accepted_only : leave rejected and failed samples in the file, which spares their memory.
     """
-    with open_hdf5(Path(path)) as file:
+    with open_hdf5(Path(path), DATASET_FILE) as file:
         return read_samples(file, read_header(file, str(path)), accepted_only)
-
-
-@contextmanager
-def open_hdf5(path: Path) -> Iterator[h5py.File]:
-    """The file open for reading; DatasetError when there is none, when it is no HDF5, or when it is damaged."""
-    try:
-        with h5py.File(path, "r") as file:
-            yield file
-    except FileNotFoundError:
-        raise DatasetError(f"{path}: there is no such file") from None
-    except MemoryError:
-        raise DatasetError(f"{path}: holds more than there is memory for") from None
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
-        if path.is_dir():
-            raise DatasetError(f"{path}: is a folder; give a data set that creepkit generated") from None
-        if path.is_file() and not h5py.is_hdf5(path):
-            raise DatasetError(f"{path}: not an HDF5 file; give a data set that creepkit generated") from None
-        raise DatasetError(f"{path}: cannot be read, it seems damaged: {' '.join(str(error).split())}") from None
 
 
 def read_header(file: h5py.File, source: str) -> Dataset:
     """The data set of a file with no samples in it yet."""
     check_format(file, source)
     name_lists: dict[str, Any] = {name: tuple(str(word) for word in file.attrs[name]) for name in NAME_LISTS}
-    documents = {name: json.loads(file.attrs[name]) for name in ("law", "specimen", "design", "provenance")}
+    documents = {
+        name: parse_json(str(file.attrs[name]), f"{source}: its {name}", DATASET_FILE)
+        for name in ("law", "specimen", "design", "provenance")
+    }
     check_attributes({**name_lists, **documents}, source)
     sizes = {
         **{name: len(values) for name, values in name_lists.items()},

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -18,12 +17,13 @@ from creepkit.discovery.combinations import FormWeight, RankedCombinations
 from creepkit.discovery.forms import CandidateForm, evaluate_forms, law_with_forms
 from creepkit.discovery.regression import INFINITE_FREEDOM, IsothermalEstimates
 from creepkit.errors import FitError, nearest
-from creepkit.files.writing import write_text_atomically
+from creepkit.files.json_documents import DocumentFormat, write_json
+from creepkit.files.reading import FileKind
+from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identification_document import identification_to_json as fit_to_json
+from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate
 from creepkit.language import CreepLaw
-from creepkit.language.law_codec import law_to_json
 from creepkit.presentation import Presentable, present
 from creepkit.records import LawWithValues
 
@@ -31,10 +31,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-FILE_KIND = "creepkit temperature law"
+if TYPE_CHECKING:
+    from creepkit.discovery.combinations import FormWeight
 
 
-FILE_VERSION = 1
+TEMPERATURE_LAW = DocumentFormat(
+    "creepkit-temperature-law",
+    2,
+    FileKind("a temperature law", FitError, "give a file that TemperatureLaw.save wrote"),
+    remedy="run discover again",
+)
 
 
 MAX_COMBINATIONS_WRITTEN = 20
@@ -44,48 +50,50 @@ MAX_COMBINATIONS_WRITTEN = 20
 def temperature_law_to_json(temperature_law: TemperatureLaw) -> dict[str, Any]:
     """The answer as JSON-able data."""
     estimates = temperature_law.isothermal_estimates
-    return {
-        "kind": FILE_KIND,
-        "version": FILE_VERSION,
+    content = {
         "creepkit": version("creepkit"),
-        "law": law_to_json(temperature_law.law),
-        "base": law_to_json(temperature_law.isothermal_law),
+        "law": temperature_law.law,
+        "isothermal_law": temperature_law.isothermal_law,
         "T_ref": temperature_law.T_ref,
-        "range": list(temperature_law.temperature_range),
-        "judged_by": temperature_law.criterion_data,
-        "estimates": [vars(e) for e in temperature_law.estimates],
-        "sets": {name: [vars(form) for form in forms] for name, forms in temperature_law.plausible_forms.items()},
-        "odds": {name: dict(own) for name, own in temperature_law.prior_odds.items()},
+        "temperature_range": temperature_law.temperature_range,
+        "criterion_data": temperature_law.criterion_data,
+        "estimates": temperature_law.estimates,
+        "plausible_forms": temperature_law.plausible_forms,
+        "prior_odds": temperature_law.prior_odds,
         "candidates": [
-            _candidate_to_json(candidate) for candidate in temperature_law.candidates[:MAX_COMBINATIONS_WRITTEN]
+            {
+                "forms": candidate.forms,
+                "internal_values": candidate.internal_values,
+                "covariance": candidate.covariance,
+                "criterion_difference": candidate.criterion_difference,
+                "weight": candidate.weight,
+            }
+            for candidate in temperature_law.candidates[:MAX_COMBINATIONS_WRITTEN]
         ],
-        "points": {
-            "temperatures": estimates.temperatures.tolist(),
-            "internal": estimates.theta.tolist(),
-            "covariance": estimates.covariance.tolist(),
-            "inflation": temperature_law.combinations.overdispersion,
+        "isothermal_estimates": {
+            "temperatures": estimates.temperatures,
+            "theta": estimates.theta,
+            "covariance": estimates.covariance,
+            "overdispersion": temperature_law.combinations.overdispersion,
         },
-        "reference": vars(estimates.reference),
-        "fit": None if temperature_law.fit is None else fit_to_json(temperature_law.fit),
-        "notes": list(temperature_law.notes),
+        "reference": estimates.reference,
+        "fit": temperature_law.fit,
+        "notes": temperature_law.notes,
     }
+    return {**TEMPERATURE_LAW.heading, **CODEC.to_json(content)}
 
 
-def _candidate_to_json(candidate: CandidateLaw) -> dict[str, Any]:
-    return {
-        "forms": candidate.forms,
-        "internal": dict(candidate.internal_values),
-        "covariance": candidate.covariance.tolist(),
-        "excess": candidate.criterion_difference,
-        "weight": candidate.weight,
-    }
-
-
-def write_temperature_law(temperature_law: TemperatureLaw, path: Path) -> Path:
+def write_temperature_law(temperature_law: TemperatureLaw, path: str | Path) -> Path:
     """Write a file that is whole or absent."""
-    return write_text_atomically(
-        json.dumps(temperature_law_to_json(temperature_law), indent=1, allow_nan=False) + "\n", path
-    )
+    return write_json(temperature_law_to_json(temperature_law), Path(path), TEMPERATURE_LAW.kind)
+
+
+CODEC = RecordCodec(
+    values={
+        CreepLaw: LAW_CODEC,
+        Identification: ValueCodec(identification_to_json, identification_from_json),
+    }
+)
 
 
 TAIL_PROBABILITY = 0.025

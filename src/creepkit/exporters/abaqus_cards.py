@@ -15,7 +15,7 @@ from creepkit.exporters.creep_forms import (
     CreepForm,
     card_heading,
     creep_forms_of,
-    elastic_constants,
+    elastic_table,
     exp_in_range,
     format_number,
     temperature_grid,
@@ -47,7 +47,10 @@ _TABLE_NOTE = (
 
 @dataclass(frozen=True)
 class AbaqusCards:
-    """Material cards with one of Abaqus' own creep laws; low, high : K, of tables where no tests are known."""
+    """Material cards with one of Abaqus' own creep laws.
+
+    lowest_temperature, highest_temperature : K, of tables where no tests are known.
+    """
 
     name: str = "abaqus-cards"
     title: str = "Abaqus material cards with one of its own creep laws (*CREEP)"
@@ -62,9 +65,7 @@ class AbaqusCards:
         names = Identifiers((), ignore_case=True, max_length=80)
         requested = source.name or source.law.name
         label = names.unique(requested)
-        rows = elastic_constants(
-            source, temperature_grid(*temperature_span(source, self.lowest_temperature, self.highest_temperature), 25.0)
-        )
+        rows = elastic_table(source, (self.lowest_temperature, self.highest_temperature), step=25.0)
         elastic = [_data_line(m.E, m.nu, *_optional_value(m.T)) for m in rows]
         cards = [f"*MATERIAL, NAME={label}", *(["*ELASTIC", *elastic] if elastic else []), *creep.cards]
         missing_elasticity = [] if elastic else ["*ELASTIC is missing: no modulus was given; write it beside *CREEP."]
@@ -152,9 +153,11 @@ class _PowerLawNotation:
         q0 = 100.0 / source.units.megapascals
         rates = [(exp_in_range(self.log_rate(ln, math.log(q0)), "e0", source), T) for ln, T in rows]
         data = [_data_line(q0, self.n, self.m, rate, *_optional_value(T)) for rate, T in rates]
-        reason = f"A of LAW={self.law} would be below {_SMALLEST_COEFFICIENT:g}, against which the manual warns; LAW={self.newer_law}"
+        reason = f"A of LAW={self.law} would be below {_SMALLEST_COEFFICIENT:g}, against which the manual warns"
         comments.insert(
-            0, f"{reason} is in the manual of 2022, not in that of 2017: {self.newer_formula}. q0, n, m, e0."
+            0,
+            f"{reason}; LAW={self.newer_law} is in the manual of 2022, not in that of 2017: {self.newer_formula}. "
+            "q0, n, m, e0.",
         )
         return _CreepCards([f"*CREEP, LAW={self.newer_law}", *data], comments)
 

@@ -14,11 +14,9 @@ from creepkit.exporters.creep_forms import (
     ElasticConstants,
     card_heading,
     creep_forms_of,
-    elastic_constants,
+    elastic_table,
     exp_in_range,
     format_number,
-    temperature_grid,
-    temperature_span,
 )
 from creepkit.records import LawWithValues
 
@@ -39,7 +37,10 @@ _CREEP_OPTIONS = {
 
 @dataclass(frozen=True)
 class AnsysCards:
-    """APDL commands of one material; low, high : K, of a table of moduli against temperature."""
+    """APDL commands of one material.
+
+    lowest_temperature, highest_temperature : K, of a table of moduli where no tests are known.
+    """
 
     name: str = "ansys"
     title: str = "Ansys Mechanical APDL commands with one of its implicit creep laws (TB,CREEP)"
@@ -57,16 +58,8 @@ class AnsysCards:
         if any(form.time_exponent for form in forms):
             comments.append("t is the analysis time, which must start with the load.")
         comments.append(f"Material number 1 is {source.name or source.law.name}.")
-        lines = [
-            *_elastic_commands(
-                elastic_constants(
-                    source,
-                    temperature_grid(
-                        *temperature_span(source, self.lowest_temperature, self.highest_temperature), 50.0
-                    ),
-                )
-            )
-        ]
+        moduli = elastic_table(source, (self.lowest_temperature, self.highest_temperature), step=50.0)
+        lines = [*_elastic_commands(moduli)]
         lines += [f"TB,CREEP,1,1,{len(constants)},{option}"]
         lines += [f"TBDATA,{k + 1},{_comma_separated(constants[k : k + 6])}" for k in range(0, len(constants), 6)]
         return "\n".join([*card_heading(source, "!", comments), *lines]) + "\n"

@@ -12,7 +12,7 @@ from typing import Any
 
 import sympy
 
-from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode
+from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, factor_text
 from creepkit.exporters.law_description import comment_lines, heading, printable_text
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
 from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, stress, time
@@ -213,7 +213,7 @@ class _CFile:
         ]
         return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
-    # ---- what is told ----------------------------------------------------------------------------------------------
+    # ---- comments --------------------------------------------------------------------------------------------------
 
     def _header(self) -> list[str]:
         mentions_floors = any(
@@ -257,7 +257,7 @@ class _CFile:
     def _rate_function(self) -> list[str]:
         labels = [comment_safe(printable_text(label)) for label in self.law.terms]
         comment = f"/* Rate of equivalent creep strain, 1/{self.units.time}: {' + '.join(labels)}. */"
-        body = [f"return {self._time_factor()}{_factor_operand(self.rate.outputs[0], self.units.seconds)};"]
+        body = [f"return {factor_text(self.units.seconds)}{_factor_operand(self.rate.outputs[0], self.units.seconds)};"]
         return self._function_definition(comment, self._declaration("double", "rate"), self.rate, body)
 
     def _log_rate_function(self) -> list[str]:
@@ -279,7 +279,8 @@ class _CFile:
         body = []
         for k in range(count):
             derivatives = function.outputs[count + k * width : count + (k + 1) * width]
-            body += [f"rates[{k}] = {self._time_factor()}{_factor_operand(function.outputs[k], self.units.seconds)};"]
+            rate = _factor_operand(function.outputs[k], self.units.seconds)
+            body.append(f"rates[{k}] = {factor_text(self.units.seconds)}{rate};")
             body += self._derivative_lines(f"slopes[{k}]", derivatives, self.units.seconds)
         comment = f"/* Rates of internal variables, 1/{self.units.time}, and their derivatives, a row each. */"
         return self._function_definition(
@@ -323,9 +324,6 @@ class _CFile:
     def _state_arguments(self) -> tuple[str, str]:
         count = len(self.law.states)
         return f"double rates[{count}]", f"double slopes[{count}][{len(self.input_indices)}]"
-
-    def _time_factor(self) -> str:
-        return "" if self.units.seconds == 1 else f"{self.units.seconds!r} * "
 
 
 def _factor_operand(expression: sympy.Expr, factor: float) -> str:

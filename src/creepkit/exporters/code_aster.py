@@ -15,13 +15,14 @@ from creepkit.errors import ExportError
 from creepkit.exporters.creep_forms import (
     CreepForm,
     card_heading,
+    constant_elasticity,
     creep_forms_of,
-    elastic_constants,
+    elastic_expressions,
+    elasticity_varies,
     exp_in_range,
     format_number,
 )
 from creepkit.exporters.law_code import Identifiers
-from creepkit.language.symbols import temperature
 from creepkit.records import LawWithValues
 
 _ALTERNATIVE = "export it as 'mfront', which code_aster reads with RELATION='MFRONT'"
@@ -56,17 +57,8 @@ class CodeAsterMaterial:
             else []
         )
         call = [f"{label} = DEFI_MATERIAU(", *(f"    {line}," for line in (*elastic_keywords, creep_keyword)), ")"]
-        return (
-            "\n".join(
-                [
-                    *card_heading(source, "#", [*comments, *names.renaming_notes([requested])]),
-                    *elastic_formulas,
-                    *creep_formulas,
-                    *call,
-                ]
-            )
-            + "\n"
-        )
+        lines = card_heading(source, "#", [*comments, *names.renaming_notes([requested])])
+        return "\n".join([*lines, *elastic_formulas, *creep_formulas, *call]) + "\n"
 
 
 def _lemaitre_form(source: LawWithValues, forms: tuple[CreepForm, ...]) -> CreepForm:
@@ -95,9 +87,10 @@ def _creep_keyword(source: LawWithValues, form: CreepForm, label: str) -> tuple[
         )
         return [], f"LEMAITRE=_F({constants})"
     slope = form.activation_temperature / form.n
+    inverse_K_formula = f"{format_number(inverse_K)} * exp({format_number(-slope)} / TEMP)"
     formulas = [
         f"{label}_N = DEFI_CONSTANTE(VALE={format_number(form.n)})",
-        f"{label}_K = FORMULE(NOM_PARA='TEMP', VALE='{format_number(inverse_K)} * exp({format_number(-slope)} / TEMP)')",
+        f"{label}_K = FORMULE(NOM_PARA='TEMP', VALE='{inverse_K_formula}')",
         f"{label}_M = DEFI_CONSTANTE(VALE={format_number(hardening)})",
     ]
     return formulas, f"LEMAITRE_FO=_F(N={label}_N, UN_SUR_K={label}_K, UN_SUR_M={label}_M)"
@@ -106,14 +99,11 @@ def _creep_keyword(source: LawWithValues, form: CreepForm, label: str) -> tuple[
 def _elastic_keywords(source: LawWithValues, label: str) -> tuple[list[str], list[str]]:
     """Formulas of moduli that depend on temperature, and the keyword for the moduli."""
     elastic = source.elastic
-    if elastic is None:
-        return [], []
-    varies = [isinstance(v, sympy.Expr) and bool(v.free_symbols) for v in (elastic.E, elastic.nu)]
-    if not any(varies):
-        ((constants),) = elastic_constants(source)
-        return [], [f"ELAS=_F(E={format_number(constants.E)}, NU={format_number(constants.nu)})"]
-    scaled = (sympy.sympify(elastic.E) / source.units.megapascals, sympy.sympify(elastic.nu))
-    texts = [sympy.sstr(e.xreplace({temperature: sympy.Symbol("TEMP")}), full_prec=False) for e in scaled]
+    if elastic is None or not elasticity_varies(elastic):
+        moduli = constant_elasticity(source)
+        text = "" if moduli is None else f"ELAS=_F(E={format_number(moduli.E)}, NU={format_number(moduli.nu)})"
+        return [], [text] if text else []
+    texts = [sympy.sstr(e, full_prec=False) for e in elastic_expressions(source, elastic, "TEMP")]
     named_texts = zip((f"{label}_E", f"{label}_P"), texts, strict=True)
     formulas = [f"{name} = FORMULE(NOM_PARA='TEMP', VALE='{text}')" for name, text in named_texts]
     return formulas, [f"ELAS_FO=_F(E={label}_E, NU={label}_P)"]

@@ -8,7 +8,7 @@ code needs besides stands here too: the heading, numbers within a double's range
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -37,10 +37,11 @@ StressFunction = Literal["power", "sinh", "exponential"]
 
 @dataclass(frozen=True)
 class CreepForm:
-    """One product A f(s) e^strain t^time exp(-Q/(R T)).
+    """One product A f(s) e^m t^k exp(-Q/(R T)), of stress s, creep strain e and time t.
 
-    shape : f is s^n ("power"), sinh(s/B)^n ("sinh") or exp(s/B) ("exponential"); B in MPa, or the unit of stress.
-    log_coefficient : ln A, as A at infinite temperature may lie outside the range of a double.
+    stress_function : f is s^n ("power"), sinh(s/B)^n ("sinh") or exp(s/B) ("exponential"). log_coefficient : ln A, as A
+        at infinite temperature may lie outside the range of a double. stress_scale : B in MPa, or the unit of stress.
+    strain_exponent, time_exponent : m and k.
     Q : J/mol; 0 where temperature does not matter.
     """
 
@@ -81,7 +82,7 @@ class CreepForm:
 def creep_forms_of(source: LawWithValues, target: str, alternative: str) -> tuple[CreepForm, ...]:
     """The forms whose sum is the law, in the units of `source`.
 
-    target, instead : for the ExportError where a term is none: what has no form for it, and what to do.
+    target, alternative : for the ExportError where a term is none: what has no form for it, and what to do.
     """
     source = source.without_inactive_terms()
     law = source.law
@@ -156,7 +157,7 @@ class _ProductFactors:
 
 
 def _form_of_product(label: str, product: sympy.Expr) -> CreepForm:
-    """The product as a form; _NotAForm with the reason where it is none."""
+    """The product as a form; _UnsupportedFormError with the reason where it is none."""
     factors = _ProductFactors()
     factors.multiply(product, 1.0)
     n, strain_power, time_power = (factors.powers[s] for s in (stress, strain, time))
@@ -219,8 +220,8 @@ def exp_in_range(logarithm: float, quantity: str, source: LawWithValues) -> floa
     """exp(logarithm); ExportError where that is no double."""
     if not -700.0 < logarithm < 700.0:
         raise ExportError(
-            f"law '{source.law.name}': {quantity} would be 1e{logarithm / math.log(10):.0f}, beyond the range of a double; "
-            "give the temperature of the analysis, export(..., temperature=1073)"
+            f"law '{source.law.name}': {quantity} would be 1e{logarithm / math.log(10):.0f}, beyond the range of a "
+            "double; give the temperature of the analysis, export(..., temperature=1073)"
         )
     return math.exp(logarithm)
 
@@ -250,22 +251,45 @@ class ElasticConstants:
     nu: float
 
 
-def elastic_constants(source: LawWithValues, temperatures: Sequence[float] = ()) -> list[ElasticConstants]:
-    """The moduli at each temperature, or once where they do not depend on it; none where they are not given.
-
-    temperatures : of a table; ExportError where one is needed and there are none.
-    """
+def constant_elasticity(source: LawWithValues) -> ElasticConstants | None:
+    """The moduli where they do not depend on temperature, None where none are given; else ExportError."""
     elastic = source.elastic
     if elastic is None:
-        return []
-    if not any(isinstance(value, sympy.Expr) and value.free_symbols for value in (elastic.E, elastic.nu)):
-        return [_elastic_constants_at(source, elastic, None)]
-    if not temperatures:
+        return None
+    if elasticity_varies(elastic):
         raise ExportError(
             f"law '{source.law.name}': the elastic moduli depend on temperature, and this text takes numbers; "
             "give elastic.at(1073)"
         )
+    return _elastic_constants_at(source, elastic, None)
+
+
+def elastic_table(source: LawWithValues, limits: tuple[float, float], step: float) -> list[ElasticConstants]:
+    """The moduli in steps of temperature, or once where they do not depend on it; none where they are not given.
+
+    limits : K, of the table where no tests are known. step : K.
+    """
+    elastic = source.elastic
+    if elastic is None:
+        return []
+    if not elasticity_varies(elastic):
+        return [_elastic_constants_at(source, elastic, None)]
+    temperatures = temperature_grid(*temperature_span(source, *limits), step)
     return [_elastic_constants_at(source, elastic.at(T), T) for T in temperatures]
+
+
+def elasticity_varies(elastic: Elastic) -> bool:
+    """Whether a modulus depends on temperature."""
+    return any(isinstance(value, sympy.Expr) and value.free_symbols for value in (elastic.E, elastic.nu))
+
+
+def elastic_expressions(
+    source: LawWithValues, elastic: Elastic, temperature_name: str
+) -> tuple[sympy.Expr, sympy.Expr]:
+    """Young's modulus in the text's unit of stress, and Poisson's ratio, as formulas of a temperature in K."""
+    named = {temperature: sympy.Symbol(temperature_name)}
+    E, nu = sympy.sympify(elastic.E) / source.units.megapascals, sympy.sympify(elastic.nu)
+    return E.xreplace(named), nu.xreplace(named)
 
 
 def _elastic_constants_at(source: LawWithValues, elastic: Elastic, T: float | None) -> ElasticConstants:

@@ -37,10 +37,10 @@ class CreepSubroutine:
     solver: ClassVar[str]
     """The code in words."""
     state_template: ClassVar[str] = ""
-    """Template that keeps internal variables between increments, for a code that does not."""
+    """Template that stores internal variables between increments, for a code that does not."""
 
     def text(self, source: LawWithValues) -> str:
-        """Return the file's text; ExportError where CREEP is not told what the law needs."""
+        """Return the file's text; ExportError where CREEP is not given what the law needs."""
         self._check_inputs(source.law)
         stem = Identifiers(("creep",), ignore_case=True, max_length=_MAX_STEM_LENGTH).unique(
             source.name or source.law.name
@@ -154,7 +154,9 @@ class CalculixCreepSubroutine(CreepSubroutine):
         yield "TYPE=TEMPERATURE whether or not the law depends on temperature."
         if code.states:
             state_list = ", ".join(s.name for s in code.law.states)
-            yield f"Internal variables ({state_list}) are kept in the routine itself, so a restart of ccx begins afresh."
+            yield (
+                f"Internal variables ({state_list}) are kept in the routine itself, so a restart of ccx begins afresh."
+            )
         yield from _time_notes(code)
 
     def _check_inputs(self, law: CreepLaw) -> None:

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import mpmath
 import sympy
 
-from creepkit.exporters import law_description
-from creepkit.exporters.law_description import comment_lines
+from creepkit.exporters.law_description import ParameterRow, comment_lines, note_lines, parameter_rows, remarks
 from creepkit.exporters.unit_conversion import ConvertedValues, convert_values
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import ArrheniusExponent, LatexLawPrinter, arrhenius_exponent, latex_equations
@@ -21,9 +20,17 @@ from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import LawWithValues
 
 _LATEX_ESCAPES = {
-    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "%": r"\%", "_": r"\_",
-    "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
-}  # fmt: skip
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "$": r"\$",
+    "&": r"\&",
+    "#": r"\#",
+    "%": r"\%",
+    "_": r"\_",
+    "^": r"\textasciicircum{}",
+    "~": r"\textasciitilde{}",
+}
 
 
 @dataclass(frozen=True)
@@ -64,7 +71,7 @@ def _align_environment(rows: Sequence[str]) -> list[str]:
 def _value_table(source: LawWithValues, converted_values: ConvertedValues, printer: LatexLawPrinter) -> list[str]:
     rows = [
         (f"{printer.doprint(row.symbol)}{'(0)' if row.is_initial else ''}", row.meaning, row.value, row.unit)
-        for row in law_description.parameter_rows(source, converted_values)
+        for row in parameter_rows(source, converted_values)
     ]
     return [
         r"\begin{tabular}{llll}",
@@ -178,14 +185,14 @@ class MarkdownExporter:
         """Return the section, under a heading of the first level."""
         law, converted_values, printer = source.law, convert_values(source), LatexLawPrinter(source.law)
         lines = [f"# {markdown_escaped(source.title)}", "", "$$", r"\begin{aligned}"]
-        lines.append(" \\\\\n".join(_aligned_equation(*pair) for pair in latex_equations(law, printer)))
+        rows = [row for left, right in latex_equations(law, printer) for row in _equation_rows(left, right)]
+        lines.append(" \\\\\n".join(rows))
         lines += [r"\end{aligned}", "$$", "", "| Symbol | Meaning | Value | Unit |", "| --- | --- | --- | --- |"]
-        lines += [_markdown_row(row, printer) for row in law_description.parameter_rows(source, converted_values)]
-        lines += ["", *(markdown_escaped(sentence) for sentence in law_description.remarks(source, converted_values))]
+        lines += [_markdown_row(row, printer) for row in parameter_rows(source, converted_values)]
+        lines += ["", *(markdown_escaped(sentence) for sentence in remarks(source, converted_values))]
         lines += [f"Valid where ${printer.doprint(relation)}$." for relation in law.constraints]
-        lines += _markdown_section("Notes", law_description.note_lines(source)) + _markdown_section(
-            "References", law.references
-        )
+        lines += _markdown_section("Notes", note_lines(source))
+        lines += _markdown_section("References", law.references)
         return "\n".join(lines) + "\n"
 
 
@@ -194,13 +201,7 @@ def markdown_escaped(text: str) -> str:
     return re.sub(r"([\\`*_\[\]<>#|$~])", r"\\\1", " ".join(text.split()))
 
 
-def _aligned_equation(left: str, summands: Sequence[str]) -> str:
-    """One equation, a summand a row."""
-    first, *rest = summands
-    return " \\\\\n".join([f"{left} &= {first}", *(rf"&\quad + {summand}" for summand in rest)])
-
-
-def _markdown_row(row: law_description.ParameterRow, printer: LatexLawPrinter) -> str:
+def _markdown_row(row: ParameterRow, printer: LatexLawPrinter) -> str:
     symbol = f"{printer.doprint(row.symbol)}{'(0)' if row.is_initial else ''}"
     return (
         f"| ${symbol}$ | {markdown_escaped(row.meaning)} | ${latex_number(row.value)}$ | {markdown_escaped(row.unit)} |"

@@ -23,10 +23,10 @@ from creepkit.records import LawWithValues
 
 
 class Identifiers:
-    """Hands out identifiers, each once.
+    """Identifiers of a language, each given out once.
 
     reserved : words of the language and names that the text uses itself. ignore_case : whether A and a are the same
-    name (Fortran). longest : characters allowed.
+    name (Fortran). max_length : characters allowed.
     """
 
     def __init__(self, reserved: Collection[str], *, ignore_case: bool = False, max_length: int = 63) -> None:
@@ -36,7 +36,7 @@ class Identifiers:
         self.renamings: dict[str, str] = {}
 
     def unique(self, requested: str) -> str:
-        """The identifier for `wanted`: itself where the language allows it and it is free."""
+        """The identifier for a requested name: itself where the language allows it and it is free."""
         ascii_name = unicodedata.normalize("NFKD", requested).encode("ascii", "ignore").decode()
         stem = (
             ascii_name
@@ -58,8 +58,13 @@ class Identifiers:
         return [self.unique(name) for name in requested]
 
     def renaming_notes(self, original_names: Collection[str]) -> list[str]:
-        """One line for each of the author's names `of` that had to change."""
+        """One line for each of the author's names that had to change."""
         return [f"'{old}' is called {new} here" for old, new in self.renamings.items() if old in original_names]
+
+
+def factor_text(factor: float) -> str:
+    """A factor before an expression, such as "3600.0 * "; nothing for one."""
+    return "" if factor == 1 else f"{factor!r} * "
 
 
 Assignments = tuple[tuple[sympy.Symbol, sympy.Expr], ...]
@@ -72,8 +77,8 @@ _kernel_entries = lru_cache(maxsize=128)(symbolic_kernel)
 class CodeFunction:
     """One function to be printed, in names of the target.
 
-    read : the variables of the point and states that it reads. steps : named subexpressions, each after those it needs.
-    outputs : expressions, in the order of creepkit.kernels.interface.
+    inputs : the variables of the point and states that it reads. assignments : named subexpressions, each after those
+    it needs. outputs : expressions, in the order of creepkit.kernels.interface.
     """
 
     inputs: tuple[sympy.Symbol, ...]
@@ -81,7 +86,7 @@ class CodeFunction:
     outputs: tuple[sympy.Expr, ...]
 
     def with_outputs(self, indices: Sequence[int]) -> CodeFunction:
-        """The same for some of its outputs, with the steps that those need."""
+        """The same for some of its outputs, with the assignments that those need."""
         outputs = tuple(self.outputs[k] for k in indices)
         used = set().union(*(e.free_symbols for e in outputs))
         assignments = []
@@ -102,7 +107,7 @@ class LawCode:
     def __init__(
         self, source: LawWithValues, identifiers: Identifiers, target_names: Mapping[str, str] | None = None
     ) -> None:
-        """called : {name of a variable of the point or of a state: what the target's code calls it}."""
+        """target_names : {name of a variable of the point or of a state: its name in the target's code}."""
         self.source = source.without_inactive_terms()
         self.law, self.identifiers = self.source.law, identifiers
         try:

@@ -1,7 +1,8 @@
-"""What exported texts state about their law: heading comments, the table of parameters, remarks on units and failure."""
+"""What exported texts state about their law: heading, table of parameters, remarks on units and failure."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -12,14 +13,14 @@ from creepkit.kernels.log_form import FLOOR, TIME_FLOOR
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import expression_text
 from creepkit.language.symbols import GAS_CONSTANT, temperature
-from creepkit.records import LawWithValues
+from creepkit.records import LawWithValues, Units
 
 
 def heading(source: LawWithValues, *, units: str = "", mentions_floors: bool = False) -> Iterator[str]:
     """Title, equation, parameters with values and units, where the law holds, its notes and references.
 
     units : the sentence on units; by default that of `source.units`, for texts that convert on entry.
-    floors : whether to say what bases of powers act as below their floors.
+    mentions_floors : whether to say what bases of powers act as below their floors.
     """
     law = source.law
     yield f"{law.name}: {law.title}" if law.title else law.name
@@ -44,7 +45,8 @@ def units_sentence(source: LawWithValues) -> str:
     sentence = f"Stress in {source.units.stress}, time in {source.units.time}, rates in 1/{source.units.time}"
     if source.law.uses(temperature):
         sentence += f", temperature in K (R = {GAS_CONSTANT} J/(mol K))"
-    return f"{sentence}. {'' if source.units.is_native else 'Converted on entry: '}{reference_sentence(type(source.units)())}."
+    conversion = "" if source.units.is_native else "Converted on entry: "
+    return f"{sentence}. {conversion}{reference_sentence(Units())}."
 
 
 def equation_lines(law: CreepLaw) -> Iterator[str]:
@@ -65,7 +67,7 @@ def parameter_lines(law: CreepLaw, values: Mapping[str, float]) -> Iterator[str]
 
 
 def comment_lines(lines: Iterable[str], marker: str, width: int = 0) -> list[str]:
-    """Each line after a comment mark; whatever could end a comment, or carry it on to the next line, is taken out.
+    """Each line after a marker; whatever could end a comment, or carry it on to the next line, is taken out.
 
     width : 0, or the longest line allowed; longer ones are broken between words.
     """
@@ -83,8 +85,6 @@ def printable_text(text: str) -> str:
 def _wrapped(text: str, width: int) -> list[str]:
     if width <= 0 or len(text) <= width:
         return [text]
-    import textwrap
-
     indent = " " * (len(text) - len(text.lstrip()) + 4)
     return textwrap.wrap(text, width, subsequent_indent=indent, drop_whitespace=True) or [text]
 
@@ -101,7 +101,7 @@ class ParameterRow:
 
 
 def parameter_rows(source: LawWithValues, converted_values: ConvertedValues) -> Iterator[ParameterRow]:
-    """Parameters in the author's order, then internal variables at time zero; no unit is told as an empty text."""
+    """Parameters in the author's order, then internal variables at time zero; "" is the unit of pure numbers."""
     for symbol, param in source.law.params.items():
         unit = converted_values.units[symbol.name]
         yield ParameterRow(symbol, param.meaning, converted_values.values[symbol.name], "" if unit == "1" else unit)

@@ -15,9 +15,8 @@ from typing import Any
 import sympy
 from sympy.printing.mathml import MathMLPresentationPrinter
 
-from creepkit.exporters import law_description
 from creepkit.exporters.latex import latex_number
-from creepkit.exporters.law_description import printable_text
+from creepkit.exporters.law_description import ParameterRow, note_lines, parameter_rows, printable_text, remarks
 from creepkit.exporters.unit_conversion import convert_values
 from creepkit.language.law import CreepLaw
 from creepkit.language.printing import ArrheniusExponent, arrhenius_exponent
@@ -28,9 +27,13 @@ MATHML_NAMESPACE = "http://www.w3.org/1998/Math/MathML"
 
 
 _VARIABLE_NAMES = {
-    stress: ("σ", "e"), strain: ("ε", "cr"), time: ("t", ""), temperature: ("T", ""), principal_stress: ("σ", "1"),
+    stress: ("σ", "e"),
+    strain: ("ε", "cr"),
+    time: ("t", ""),
+    temperature: ("T", ""),
+    principal_stress: ("σ", "1"),
     mean_stress: ("σ", "m"),
-}  # fmt: skip
+}
 
 
 _XML_ENTITIES = ("amp", "lt", "gt", "quot", "apos")
@@ -61,11 +64,11 @@ class MathmlExporter:
             *_equations(law, printer),
             "<table>",
             "<tr><th>Symbol</th><th>Meaning</th><th>Value</th><th>Unit</th></tr>",
-            *(_html_row(row, printer) for row in law_description.parameter_rows(source, converted_values)),
+            *(_html_row(row, printer) for row in parameter_rows(source, converted_values)),
             "</table>",
-            *(f"<p>{_xml_escaped(sentence)}</p>" for sentence in law_description.remarks(source, converted_values)),
+            *(f"<p>{_xml_escaped(sentence)}</p>" for sentence in remarks(source, converted_values)),
             *(f"<p>Valid where {_math_element(printer.doprint(relation))}.</p>" for relation in law.constraints),
-            *_html_section("Notes", law_description.note_lines(source)),
+            *_html_section("Notes", note_lines(source)),
             *_html_section("References", law.references),
             "</body>",
             "</html>",
@@ -78,9 +81,8 @@ class MathmlPrinter(MathMLPresentationPrinter):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__({"mul_symbol": None})
-        create_text_node = (
-            self.dom.createTextNode
-        )  # sympy writes its texts as they are, the sign < of a relation among them
+        # sympy writes its texts as they are, the sign < of a relation among them
+        create_text_node = self.dom.createTextNode
         self.dom.createTextNode = lambda text: create_text_node(text.replace("<", "&lt;").replace(">", "&gt;"))
 
     def doprint(self, expr: sympy.Basic) -> str:
@@ -176,13 +178,14 @@ def _math_element(content: str, attributes: str = "") -> str:
     return f'<math xmlns="{MATHML_NAMESPACE}"{attributes}>{content}</math>'
 
 
-def _html_row(row: law_description.ParameterRow, printer: MathmlPrinter) -> str:
+def _html_row(row: ParameterRow, printer: MathmlPrinter) -> str:
     initial = "<mo>(</mo><mn>0</mn><mo>)</mo>" if row.is_initial else ""
     symbol, value = (
         _math_element(f"<mrow>{printer.doprint(row.symbol)}{initial}</mrow>"),
         _math_element(_mathml_number(row.value)),
     )
-    return f"<tr><td>{symbol}</td><td>{_xml_escaped(row.meaning)}</td><td>{value}</td><td>{_xml_escaped(row.unit)}</td></tr>"
+    cells = (symbol, _xml_escaped(row.meaning), value, _xml_escaped(row.unit))
+    return f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
 
 def _mathml_number(value: float) -> str:

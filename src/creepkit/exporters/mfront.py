@@ -28,9 +28,9 @@ from creepkit.exporters.c import (
     cpp_lambda_definition,
     stable_functions_in,
 )
-from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode
+from creepkit.exporters.creep_forms import elastic_expressions
+from creepkit.exporters.law_code import CodeFunction, Identifiers, LawCode, factor_text
 from creepkit.exporters.law_description import comment_lines, heading, printable_text
-from creepkit.language.elastic import Elastic
 from creepkit.language.symbols import POINT_VARIABLES, mean_stress, principal_stress, strain, stress, temperature, time
 from creepkit.records import LawWithValues
 
@@ -55,7 +55,7 @@ TimeUnderLoad
 
 
 _DERIVATIVE_NAMES = {stress: "stress", principal_stress: "principal", mean_stress: "mean", strain: "strain"}
-"""What a derivative of a rate is called after."""
+"""{variable: how the name of a derivative to it ends}."""
 
 
 class IntegratorBlock:
@@ -91,8 +91,8 @@ class IntegratorBlock:
         """One line for each name of the author's that MFront cannot keep."""
         state_names = dict(zip((s.name for s in self._law.states), self.states, strict=True))
         notes = [f"'{old}' is called {new} here" for old, new in state_names.items() if old != new]
-        code_notes = [line for line in self.code.renaming_notes() if not line.endswith("_now here")]
-        return [*notes, *(line for line in code_notes if line not in notes)]
+        variables = {*self._law.names, *(s.name for s in POINT_VARIABLES)}
+        return [*notes, *(line for line in self.code.identifiers.renaming_notes(variables) if line not in notes)]
 
     def stable_functions(self) -> list[str]:
         """The stable functions that the law calls."""
@@ -124,7 +124,7 @@ class IntegratorBlock:
 
     def point_lines(self) -> list[str]:
         """The variables of the point and the internal ones at t + theta dt, in the law's own units."""
-        megapascals, seconds = self._factor_text(self._units.megapascals), self._factor_text(self._units.seconds)
+        megapascals, seconds = factor_text(self._units.megapascals), factor_text(self._units.seconds)
         texts = {
             stress: f"{megapascals}seq",
             strain: "p + theta * dp",
@@ -154,13 +154,13 @@ class IntegratorBlock:
         code, update, time_factor = self.code, self._update_function, self._units.seconds
         logs = [f"const real {ln} = log({plain});" for ln, plain in code.logarithms_used(update).items()]
         lines = [*logs, *c_assignments(update.assignments, "const real")]
-        lines.append(f"const real rate = {self._factor_text(time_factor)}exp({c_expression(update.outputs[0])});")
+        lines.append(f"const real rate = {factor_text(time_factor)}exp({c_expression(update.outputs[0])});")
         for row, name in enumerate(self._rate_names[1:], 1):
-            lines.append(f"const real {name} = {self._factor_text(time_factor)}({c_expression(update.outputs[row])});")
+            lines.append(f"const real {name} = {factor_text(time_factor)}({c_expression(update.outputs[row])});")
         for row, name in enumerate(self._rate_names):
             for k, label in self._derivative_columns(row):
-                weight = "rate * " if row == 0 else self._factor_text(time_factor)
-                unit = self._factor_text(self._units.megapascals) if k in (0, 4, 5) else ""
+                weight = "rate * " if row == 0 else factor_text(time_factor)
+                unit = factor_text(self._units.megapascals) if k in (0, 4, 5) else ""
                 lines.append(
                     f"const real {name}_by_{label} = {unit}{weight}({c_expression(self._derivative(row, k))});"
                 )
@@ -219,10 +219,6 @@ class IntegratorBlock:
             *enumerate(self.states, len(POINT_VARIABLES)),
         ]
         return [(k, label) for k, label in labels if self._derivative(row, k) != 0]
-
-    @staticmethod
-    def _factor_text(factor: float) -> str:
-        return "" if factor == 1 else f"{factor!r} * "
 
 
 _ELASTIC_STRAIN_DERIVATIVES = {
@@ -329,12 +325,8 @@ def _mfront_elasticity(source: LawWithValues) -> Iterator[str]:
         yield "@MaterialProperty real nu;"
         yield 'nu.setGlossaryName("PoissonRatio");'
     else:
-        young, nu = _elastic_formulas(source.elastic, source.units.megapascals)
+        young, nu = map(_formula, elastic_expressions(source, source.elastic, "T"))
         yield f"@ElasticMaterialProperties {{{young}, {nu}}};"
-
-
-def _elastic_formulas(elastic: Elastic, megapascals: float) -> tuple[str, str]:
-    return _formula(sympy.sympify(elastic.E) / megapascals), _formula(sympy.sympify(elastic.nu))
 
 
 def _formula(expression: sympy.Expr) -> str:
@@ -344,11 +336,11 @@ def _formula(expression: sympy.Expr) -> str:
     unsupported = [node for node in sympy.preorder_traversal(expression) if not isinstance(node, _FORMULA_NODES)]
     if unsupported:
         raise ExportError(
-            f"the elastic data hold {unsupported[0]}, which no formula of MFront can; export with Elastic at a temperature"
+            f"the elastic data hold {unsupported[0]}, which no formula of MFront can; "
+            "export with Elastic at a temperature"
         )
     numbers = {n: sympy.Float(repr(float(n)), 17) for n in expression.atoms(sympy.Float)}
-    text = sympy.sstr(expression.xreplace(numbers).xreplace({temperature: sympy.Symbol("T")}))
-    return f'"{text}"'
+    return f'"{sympy.sstr(expression.xreplace(numbers))}"'
 
 
 def _state_variables(behaviour: IntegratorBlock) -> Iterator[str]:

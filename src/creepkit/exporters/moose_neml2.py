@@ -18,8 +18,8 @@ from creepkit.errors import ExportError
 from creepkit.exporters.creep_forms import (
     CreepForm,
     card_heading,
+    constant_elasticity,
     creep_forms_of,
-    elastic_constants,
     exp_in_range,
     format_number,
 )
@@ -88,10 +88,10 @@ class MooseBlock:
 
 
 def _moose_elasticity(source: LawWithValues) -> dict[str, HitBlock]:
-    constants = elastic_constants(source)
-    if not constants:
+    moduli = constant_elasticity(source)
+    if moduli is None:
         return {}
-    entries = {"youngs_modulus": constants[0].E, "poissons_ratio": constants[0].nu}
+    entries = {"youngs_modulus": moduli.E, "poissons_ratio": moduli.nu}
     return {"elasticity": {"type": "ComputeIsotropicElasticityTensor", **entries}}
 
 
@@ -111,7 +111,7 @@ def _check_moose_form(source: LawWithValues, form: CreepForm) -> None:
 
 
 def _moose_creep_model(source: LawWithValues, form: CreepForm, base_name: str) -> HitBlock:
-    """One creep model; base : of the names of its properties, which the models of a sum must not share."""
+    """One creep model; base_name : of its properties, whose names the models of a sum must not share."""
     entries: dict[str, str | float] = {
         "type": "PowerLawCreepStressUpdate",
         "coefficient": exp_in_range(form.log_coefficient, "coefficient", source),
@@ -179,10 +179,10 @@ class Neml2Model:
 
 def _check_neml2_form(source: LawWithValues, form: CreepForm) -> None:
     if not (form.stress_function == "power" and form.is_steady and form.n > 0.0):
-        description = f"{form.stress_function} of stress, strain exponent {form.strain_exponent:g}, time exponent {form.time_exponent:g}"
+        exponents = f"strain exponent {form.strain_exponent:g}, time exponent {form.time_exponent:g}"
         raise ExportError(
             f"law '{source.law.name}', term '{form.label}': NEML2 3.1 has steady power laws of stress only, "
-            f"and this is a {description}; {_NEML2_ALTERNATIVE}"
+            f"and this is a {form.stress_function} of stress, {exponents}; {_NEML2_ALTERNATIVE}"
         )
 
 
@@ -213,14 +213,14 @@ def _flow_rate_blocks(source: LawWithValues, forms: dict[str, CreepForm]) -> dic
 
 
 def _neml2_elasticity(source: LawWithValues) -> HitBlock:
-    constants = elastic_constants(source)
-    if not constants:
+    moduli = constant_elasticity(source)
+    if moduli is None:
         raise ExportError(
             f"law '{source.law.name}': a NEML2 model needs the moduli; give elastic=Elastic(E=150e3, nu=0.3)"
         )
     return {
         "type": "LinearIsotropicElasticity",
-        "coefficients": hit_list([format_number(constants[0].E), format_number(constants[0].nu)]),
+        "coefficients": hit_list([format_number(moduli.E), format_number(moduli.nu)]),
         "coefficient_types": "'YOUNGS_MODULUS POISSONS_RATIO'",
         "rate_form": "true",
     }

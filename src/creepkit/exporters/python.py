@@ -18,7 +18,7 @@ import numpy as np
 import sympy
 
 from creepkit.errors import ExportError, LawError
-from creepkit.exporters.law_code import Identifiers
+from creepkit.exporters.law_code import Identifiers, factor_text
 from creepkit.exporters.law_description import comment_lines, heading, printable_text
 from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
 from creepkit.kernels.log_form import FLOOR, TIME_FLOOR, log_form
@@ -94,7 +94,7 @@ class _ModuleFunctions:
         rate = self._function_text("rate", title, self._return_statement(), self.terms)
         if not self.law.states:
             return rate
-        factor = self._factor_text(self.source.units.seconds)
+        factor = factor_text(self.source.units.seconds)
         rates = [f"{factor}({text})" if factor else text for text in map(self._printed, self.state_rates)]
         lines = [f'    "{s.name}": {text},' for s, text in zip(self.law.states, rates, strict=True)]
         title = f"Rates of the internal variables, 1/{self.source.units.time}."
@@ -108,7 +108,7 @@ class _ModuleFunctions:
         texts = [self._printed(sympy.exp(term, evaluate=False)) for term in self.terms]
         labels, factor = (
             [printable_text(label) for label in self.law.terms],
-            self._factor_text(self.source.units.seconds),
+            factor_text(self.source.units.seconds),
         )
         if len(texts) == 1:
             return [f"# {labels[0]}", f"return {factor}{texts[0]}"]
@@ -164,10 +164,6 @@ class _ModuleFunctions:
 
     def _printed(self, expression: sympy.Expr) -> str:
         return str(self.dialect.printer.doprint(expression))
-
-    @staticmethod
-    def _factor_text(factor: float) -> str:
-        return "" if factor == 1 else f"{factor!r} * "
 
 
 def _docstring_safe(text: str) -> str:

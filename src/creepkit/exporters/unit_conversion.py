@@ -147,9 +147,9 @@ def _sample_points(law: CreepLaw) -> Sequence[Sequence[float]]:
 def _unit_powers(unit: str) -> tuple[int, int]:
     """The powers of MPa and of s in a unit such as MPa/K or 1/s."""
     numerator, _, denominator = unit.partition("/")
-    counts = [len(re.findall(rf"(?<!\w){word}(?![\w^])", numerator)) - len(re.findall(rf"(?<!\w){word}(?![\w^])", denominator))
-              for word in ("MPa", "s")]  # fmt: skip
-    return counts[0], counts[1]
+    patterns = [rf"(?<!\w){word}(?![\w^])" for word in ("MPa", "s")]
+    stress, time = (len(re.findall(p, numerator)) - len(re.findall(p, denominator)) for p in patterns)
+    return stress, time
 
 
 def _unit_factor(unit: str, units: Units) -> float:

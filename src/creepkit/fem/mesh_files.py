@@ -6,7 +6,6 @@ Four-node elements become eight-node ones by nodes in the middle of their straig
 from __future__ import annotations
 
 import csv
-import json
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -17,6 +16,8 @@ from typing import Any, TypeVar
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.mesh import Mesh
 from creepkit.fem.mesh_builder import ElementNodes, MeshBuilder
+from creepkit.files.json_documents import read_json
+from creepkit.files.reading import FileKind, read_text
 
 
 def read_mesh(
@@ -61,6 +62,9 @@ def read_input_deck(path: str | Path, *, pressed: str | None = None, top: str | 
     return builder_from_deck(Path(path), pressed, top).mesh()
 
 
+MESH_FILE = FileKind("a mesh", SolveError, "a mesh is read from text files in UTF-8", maximum_bytes=500_000_000)
+
+
 _CORNERS = ("n1", "n2", "n3", "n4")
 
 
@@ -72,12 +76,7 @@ class _Sets:
 
     def __init__(self, path: Path, draft: MeshBuilder) -> None:
         self.path, self.draft = path, draft
-        try:
-            content = json.loads(read_text(path))
-        except json.JSONDecodeError as error:
-            raise SolveError(
-                f"{path}:{error.lineno}: not a JSON file ({error.msg}); write an object of lists"
-            ) from error
+        content = read_json(path, MESH_FILE)
         if not isinstance(content, dict):
             raise SolveError(f'{path}: holds no object; write sets by name, such as {{"top": [1, 6]}}')
         self.content: dict[str, Any] = content
@@ -106,7 +105,7 @@ class _Sets:
 
 def _rows(path: Path, columns: Sequence[str], more: Sequence[str] = ()) -> Iterator[tuple[str, int, dict[str, str]]]:
     """Place, number and cells of each row; the columns `more` belong to it when all of them are there."""
-    lines = csv.reader(read_text(path).splitlines())
+    lines = csv.reader(read_text(path, MESH_FILE).splitlines())
     names = [name.strip() for name in next(lines, [])]
     for name in ("id", *columns):
         if name not in names:
@@ -185,7 +184,7 @@ def _cards(path: Path) -> Iterator[KeywordCard]:
     """The cards of a deck; a keyword line that ends in a comma goes on in the next line."""
     card: KeywordCard | None = None
     head = ""
-    for line, text in enumerate(read_text(path).splitlines(), 1):
+    for line, text in enumerate(read_text(path, MESH_FILE).splitlines(), 1):
         text, place = text.strip(), f"{path}:{line}"
         if not text or text.startswith("**"):
             continue
@@ -334,16 +333,6 @@ def _face(place: str, cells: list[str], letter: str) -> int:
 
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", re.ASCII)
-
-
-def read_text(path: Path) -> str:
-    """The text of a file in UTF-8, or SolveError."""
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise SolveError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except UnicodeDecodeError as error:
-        raise SolveError(f"{path}: is not text in UTF-8; a mesh is read from text files only") from error
 
 
 def parse_number(place: str, name: str, cell: str) -> float:

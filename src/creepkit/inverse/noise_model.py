@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,10 +85,6 @@ class NoiseModel:
     def with_output(self, output: str, **components: float) -> NoiseModel:
         """The same with other sizes of one output."""
         return replace(self, outputs={**self.outputs, output: replace(self.outputs[output], **components)})
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain numbers by name."""
-        return {"rate": float(self.rate), "outputs": {n: asdict(s) for n, s in self.outputs.items()}}
 
 
 def initial_working_noise(observations: ObservationVector, nuisances: Sequence[Nuisance]) -> NoiseModel:

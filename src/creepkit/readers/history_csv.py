@@ -18,7 +18,6 @@ linear, and a column of that name was recorded. `_sd` names a standard deviation
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +26,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import HistoryError
+from creepkit.files.writing import write_text
 from creepkit.readers.assembly import assemble_history
 from creepkit.readers.text_tables import peek_columns, read_table
 from creepkit.readers.vocabulary import LENGTH, SPECIMEN_NAME_PATTERN, HeaderVocabulary, QuantityKind
@@ -67,16 +67,7 @@ def write_history(history: History, path: str | Path) -> Path:
     All is kept but `source`, which is the file from then on. A loading without words of its own is written as its
     program, and elastic data that depend on temperature as their values at the temperature of the test.
     """
-    text = history_text(history)
-    path = Path(path)
-    try:
-        with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
-            temporary_file = Path(folder) / path.name
-            temporary_file.write_text(text, encoding="utf-8", newline="\n")
-            temporary_file.replace(path)
-    except OSError as error:
-        raise HistoryError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
-    return path
+    return write_text(history_text(history), Path(path), HistoryError)
 
 
 def history_text(history: History) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import HistoryError, nearest
+from creepkit.files.reading import FileKind, read_bytes, read_text
 from creepkit.readers.vocabulary import HeaderVocabulary, QuantityKind, split_unit
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -99,12 +100,14 @@ def read_table(path: Path) -> TextTable:
     return TextTable(path, _header(path, lines[:start]), columns, start + 1, rows)
 
 
+TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV in UTF-8", maximum_bytes=1_000_000_000)
+
+
 def peek_columns(path: Path, byte_limit: int = 65536) -> tuple[str, ...]:
     """The columns of a file as far as its beginning tells, () when it has none; never raises for what it holds."""
     try:
-        with path.open("rb") as stream:
-            text = stream.read(byte_limit).decode("utf-8-sig", errors="replace")
-    except OSError:
+        text = read_bytes(path, TABLE_FILE, first=byte_limit).decode("utf-8-sig", errors="replace")
+    except HistoryError:
         return ()
     lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
     return tuple(cell.strip() for cell in next(lines, "").split(","))
@@ -112,14 +115,7 @@ def peek_columns(path: Path, byte_limit: int = 65536) -> tuple[str, ...]:
 
 def _lines(path: Path) -> list[str]:
     """The lines of a text file as an editor counts them (str.splitlines also breaks at form feeds and the like)."""
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise HistoryError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        description = f"byte 0x{error.object[error.start]:02x} is not text in UTF-8"
-        raise HistoryError(f"{path}:{line}: {description}; save the table as CSV in UTF-8") from error
+    text = read_text(path, TABLE_FILE)
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -88,20 +87,15 @@ def _fit_to_json(fit: Identification) -> dict[str, Any]:
     return {
         "law": fit.law.name,
         **({"rms_ln_strain": fit.rms} if "strain" in fit.errors else {}),
-        "errors": {name: _json_numbers(vars(e)) for name, e in fit.errors.items()},
+        "errors": dict(fit.errors),
         "parameters": {
             e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
             for e in fit.estimates
         },
-        "nuisances": [_json_numbers(vars(n)) for n in fit.nuisances],
-        "scatter": fit.noise_model.to_dict(),
+        "nuisances": list(fit.nuisances),
+        "noise_model": fit.noise_model,
         "notes": list(fit.notes),
     }
-
-
-def _json_numbers(record: dict[str, Any]) -> dict[str, Any]:
-    """The same with null for what JSON cannot hold."""
-    return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in record.items()}
 
 
 def print_truth(truth: dict[str, Any], fit: Identification) -> None:

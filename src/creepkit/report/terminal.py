@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Iterable, Sequence
@@ -28,8 +27,11 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
 
 
 def print_json(value: Any) -> None:
-    """Print an answer as JSON."""
-    typer.echo(json.dumps(value, indent=2, ensure_ascii=False))
+    """Print an answer, records and arrays among it, as JSON."""
+    from creepkit.files.json_documents import json_text
+    from creepkit.files.record_codec import record_to_json
+
+    typer.echo(json_text(record_to_json(value)), nl=False)
 
 
 class ProgressBar:

@@ -22,17 +22,20 @@ import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
 
 from creepkit.errors import FitError
-from creepkit.files.writing import replace_on_success, write_text_atomically
-from creepkit.inverse.confirmation import Confirmation
+from creepkit.files.hdf5_files import write_hdf5
+from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
+from creepkit.files.reading import FileKind
+from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError, ValueCodec
+from creepkit.files.writing import write_text
+from creepkit.inverse.confirmation import ConfirmedOutput
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identification_document import MAXIMUM_BYTES, identification_from_json, identification_to_json
+from creepkit.inverse.identification_document import CODEC as FIT_CODEC
+from creepkit.inverse.identification_document import identification_from_json, identification_to_json
 from creepkit.records import History
 from creepkit.screening.results import AlloyResult, PredictedOutputs, WeightedLaw, mean_relative_squared_error
 
@@ -40,105 +43,48 @@ if TYPE_CHECKING:
     from creepkit.screening.results import Plate
 
 
-class WeightedLawDocument(BaseModel):
-    """One identified law."""
+ALLOY_RESULT = DocumentFormat(
+    "creepkit-alloy-result",
+    2,
+    FileKind("the result of an alloy", FitError, "remove it, and it is worked out again"),
+    remedy="remove it, and it is worked out again",
+)
 
-    model_config = ConfigDict(extra="forbid")
-    fit: dict[str, Any]
-    bic_difference: float
-    weight: float
 
-
-class AlloyResultDocument(BaseModel):
-    """What must stand in the file, and nothing else may. NaN and infinity stand there as words."""
-
-    model_config = ConfigDict(extra="forbid", ser_json_inf_nan="strings")
-    kind: Literal["creepkit alloy"] = "creepkit alloy"
-    version: Literal[1] = 1
-    alloy: str
-    fingerprint: str
-    laws: list[WeightedLawDocument]
-    failed_laws: dict[str, str]
-    verdict: str
-    equivalents: list[str]
-    failure: str
-    dense_fit: dict[str, Any] | None
-    sparse_fit: dict[str, Any] | None
-    confirmation: Confirmation | None
-    predicted: dict[str, dict[str, list[float]]]
-    notes: list[str]
-    cpu_seconds: float
+CODEC = RecordCodec(
+    ranges={
+        AlloyResult: {"predicted": ANY_NUMBER},
+        ConfirmedOutput: {"rms_difference": ANY_NUMBER},
+        **FIT_CODEC.ranges,
+    },
+    values={Identification: ValueCodec(identification_to_json, identification_from_json)},
+)
+"""Of the result of an alloy; its identifications are documents of their own inside it."""
 
 
 def write_result(result: AlloyResult, path: Path) -> Path:
-    """Write the answer; the file is whole or absent."""
-    return write_text_atomically(_result_document(result).model_dump_json(indent=1) + "\n", path)
+    """Write the result of an alloy; the file is whole or absent."""
+    return write_json({**ALLOY_RESULT.heading, **CODEC.to_json(result)}, path, ALLOY_RESULT.kind)
 
 
 def read_result(path: Path) -> AlloyResult:
-    """Read an answer; FitError, in one sentence, for a file that is none."""
+    """Read the result of an alloy; FitError, in one sentence, for any other file."""
+    content = check_heading(read_json(path, ALLOY_RESULT.kind), str(path), ALLOY_RESULT)
     try:
-        if path.stat().st_size > MAXIMUM_BYTES:
-            raise FitError(f"{path}: larger than {MAXIMUM_BYTES // 1_000_000} MB, which no answer for an alloy is")
-        document = AlloyResultDocument.model_validate_json(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise FitError(f"{path}: cannot be read ({error.strerror})") from None
-    except (ValidationError, UnicodeDecodeError) as error:
-        problem = "text" if isinstance(error, UnicodeDecodeError) else error.errors()[0]["msg"].lower()
-        raise FitError(
-            f"{path}: not the answer for an alloy ({problem}); remove it, and it is worked out again"
-        ) from None
-    source = str(path)
-    return AlloyResult(
-        alloy=document.alloy,
-        fingerprint=document.fingerprint,
-        laws=tuple(
-            WeightedLaw(identification_from_json(w.fit, source), w.bic_difference, w.weight) for w in document.laws
-        ),
-        failed_laws=document.failed_laws,
-        verdict=document.verdict,
-        equivalents=tuple(document.equivalents),
-        failure=document.failure,
-        dense_fit=_optional_identification(document.dense_fit, source),
-        sparse_fit=_optional_identification(document.sparse_fit, source),
-        confirmation=document.confirmation,
-        predicted={t: {name: np.array(row) for name, row in rows.items()} for t, rows in document.predicted.items()},
-        notes=tuple(document.notes),
-        cpu_seconds=document.cpu_seconds,
-    )
+        return CODEC.from_json(AlloyResult, content)
+    except RecordError as error:
+        raise FitError(f"{path}: {error}; {ALLOY_RESULT.remedy}") from None
 
 
-def _result_document(result: AlloyResult) -> AlloyResultDocument:
-    return AlloyResultDocument(
-        alloy=result.alloy,
-        fingerprint=result.fingerprint,
-        laws=[
-            WeightedLawDocument(fit=identification_to_json(w.fit), bic_difference=w.bic_difference, weight=w.weight)
-            for w in result.laws
-        ],
-        failed_laws=dict(result.failed_laws),
-        verdict=result.verdict,
-        equivalents=list(result.equivalents),
-        failure=result.failure,
-        dense_fit=None if result.dense_fit is None else identification_to_json(result.dense_fit),
-        sparse_fit=None if result.sparse_fit is None else identification_to_json(result.sparse_fit),
-        confirmation=result.confirmation,
-        predicted={t: {name: row.tolist() for name, row in rows.items()} for t, rows in result.predicted.items()},
-        notes=list(result.notes),
-        cpu_seconds=result.cpu_seconds,
-    )
-
-
-def _optional_identification(data: dict[str, Any] | None, source: str) -> Identification | None:
-    return None if data is None else identification_from_json(data, source)
+WRITE_ADVICE = "choose a file in a folder that exists and has room"
 
 
 HDF5_FORMAT, HDF5_LAYOUT, HDF5_UNITS = "creepkit-plate", 1, "MPa, mm, s, K"
 
 
-def write_hdf5(plate: Plate, path: Path) -> Path:
+def write_plate(plate: Plate, path: Path) -> Path:
     """Write the file; it is whole or absent."""
-    with replace_on_success(path) as temporary, h5py.File(temporary, "w") as file:
+    with write_hdf5(path, FitError, WRITE_ADVICE) as file:
         file.attrs.update({"format": HDF5_FORMAT, "layout": HDF5_LAYOUT, "units": HDF5_UNITS})
         for k, result in enumerate(plate.results):
             group = file.create_group(f"alloys/{k:04d}")
@@ -266,7 +212,7 @@ def write_csv(plate: Plate, path: Path) -> Path:
     writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    return write_text_atomically(text.getvalue(), path)
+    return write_text(text.getvalue(), path, FitError)
 
 
 def _interval_columns(name: str, interval: Sequence[Any]) -> dict[str, str]:

@@ -7,7 +7,6 @@ asked for or in doubt.
 from __future__ import annotations
 
 import hashlib
-import json
 import pickle
 import re
 import time
@@ -21,6 +20,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from creepkit.errors import CreepkitError, DatasetError
+from creepkit.files.json_documents import canonical_json
 from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.confirmation import Confirmation, confirm, outside_domain
 from creepkit.inverse.identification import Identification
@@ -72,9 +72,9 @@ def _serialised_predictor(predictor: Predictor) -> bytes:
         return b"".join(name.encode() + _serialised_predictor(p) for name, p in sorted(untyped.predictors.items()))
     if _is_surrogate(untyped):
         weights = b"".join(tensor.detach().numpy().tobytes() for tensor in untyped.module.state_dict().values())
-        return json.dumps(untyped.header, sort_keys=True).encode() + weights
+        return canonical_json(untyped.header) + weights
     try:
-        return json.dumps(specimen_to_json(untyped), sort_keys=True).encode()
+        return canonical_json(specimen_to_json(untyped))
     except (DatasetError, AttributeError):  # a mesh of its own, or no record at all
         return pickle.dumps(predictor)
 

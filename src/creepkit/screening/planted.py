@@ -21,7 +21,7 @@ import numpy as np
 from creepkit import kernels, registry
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError
-from creepkit.files.writing import write_text_atomically
+from creepkit.files.writing import write_text
 from creepkit.language import Elastic
 from creepkit.readers.history_csv import write_history
 from creepkit.records import History, PressureJump, Status
@@ -109,10 +109,10 @@ class PlantedPlate:
             write_history(history, tests / f"{history.name}.csv")
         composition_file = folder / "compositions.csv"
         contents = [{"alloy": a, **{e: f"{x:.4f}" for e, x in c.items()}} for a, c in self.compositions.atomic.items()]
-        write_text_atomically("# unit: at.%\n" + _csv_text(contents), composition_file)
+        write_text("# unit: at.%\n" + _csv_text(contents), composition_file, SolveError)
         rows = [{"alloy": a, "law": t.law, **t.values, "thickness_mm": t.thickness, **t.base_fractions}
                 for a, t in self.truth.items()]  # fmt: skip
-        write_text_atomically(_csv_text(rows), folder / "truth.csv")
+        write_text(_csv_text(rows), folder / "truth.csv", SolveError)
         return tests, composition_file
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 from creepkit import registry
 from creepkit.errors import CreepkitError, DatasetError
+from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError
 
 if TYPE_CHECKING:
     from creepkit.records import Specimen
@@ -16,6 +17,9 @@ COMPUTATION_FIELDS = ("threads",)
 """Fields that say how, not what, is computed."""
 
 
+CODEC = RecordCodec(omitted={object: COMPUTATION_FIELDS}, default_range=ANY_NUMBER)
+
+
 def specimen_to_json(specimen: Specimen) -> dict[str, Any]:
     """The specimen as JSON-able data: its name and the fields that decide what it predicts."""
     record: Any = specimen
@@ -23,49 +27,31 @@ def specimen_to_json(specimen: Specimen) -> dict[str, Any]:
         raise DatasetError(
             f"specimen '{specimen.name}' is no dataclass, so that a data set cannot say which one it was made with"
         )
-    return {"name": specimen.name, "fields": _to_json(record, specimen.name)}
+    try:
+        _refuse_arrays(record, specimen.name)
+        return {"name": specimen.name, "fields": CODEC.to_json(record, specimen.name)}
+    except RecordError as error:
+        raise DatasetError(f"{error}; allowed are numbers, words and records of them") from None
 
 
-def _to_json(record: Any, path: str) -> Any:
-    if record is None or isinstance(record, bool | int | float | str):
-        return record
-    if isinstance(record, tuple | list):
-        return [_to_json(item, path) for item in record]
-    if is_dataclass(record) and not isinstance(record, type) and _has_no_arrays(record):
-        field_names = [f.name for f in fields(record) if f.init and f.name not in COMPUTATION_FIELDS]
-        return {name: _to_json(getattr(record, name), f"{path}.{name}") for name in field_names}
-    raise DatasetError(
-        f"{path} is a {type(record).__name__}, which a data set cannot hold; allowed are numbers, words and records "
-        "of them"
-    )
-
-
-def _has_no_arrays(record: Any) -> bool:
-    """Whether a record is rebuilt from its fields by putting them into the registered specimen's own."""
-    return all(not hasattr(getattr(record, f.name), "shape") for f in fields(record) if f.init)
+def _refuse_arrays(record: Any, place: str) -> None:
+    """RecordError for records that hold arrays, such as meshes."""
+    for f in (f for f in fields(record) if f.init):
+        value = getattr(record, f.name)
+        if not is_dataclass(value):
+            continue
+        if any(hasattr(getattr(value, inner.name), "shape") for inner in fields(value) if inner.init):
+            raise RecordError(f"{place}.{f.name} is a {type(value).__name__}, which a data set cannot hold")
+        _refuse_arrays(value, f"{place}.{f.name}")
 
 
 def specimen_from_json(document: Any, source: str) -> Specimen:
-    """The specimen that `specimen_document` told of; DatasetError, naming `source`, when that cannot be."""
+    """The specimen that `specimen_to_json` described; DatasetError, naming `source`, when that cannot be."""
     if not (isinstance(document, dict) and isinstance(document.get("name"), str) and "fields" in document):
         raise DatasetError(f"{source}: does not say its specimen; it is damaged or was not written by creepkit")
+    name = document["name"]
     try:
-        specimen: Specimen = _with_fields(registry.default_registry().specimen(document["name"]), document["fields"])
-    except (CreepkitError, TypeError, AttributeError) as error:
-        raise DatasetError(f"{source}: its specimen '{document['name']}' cannot be rebuilt here: {error}") from None
-    return specimen
-
-
-def _with_fields(template: Any, values: Any) -> Any:
-    changes = {}
-    for name, value in values.items():
-        current = getattr(template, name)
-        if isinstance(value, dict):
-            changes[name] = _with_fields(current, value)
-        else:
-            changes[name] = _to_tuples(value)
-    return replace(template, **changes)
-
-
-def _to_tuples(value: Any) -> Any:
-    return tuple(_to_tuples(item) for item in value) if isinstance(value, list) else value
+        template: Specimen = registry.default_registry().specimen(name)
+        return CODEC.updated(template, document["fields"])
+    except CreepkitError as error:
+        raise DatasetError(f"{source}: its specimen '{name:.40}' cannot be rebuilt here: {error}") from None

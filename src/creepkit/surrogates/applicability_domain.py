@@ -9,9 +9,8 @@ vary at all.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -28,9 +27,6 @@ LEAST_VARIANCE = 1e-9
 
 INPUTS_NAMED = 3
 """Inputs named when a row is outside."""
-
-
-ARRAY_FIELDS = ("low", "high", "margin", "mean", "scale", "whitening")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +46,12 @@ class ApplicabilityDomain:
     scale: Floats
     whitening: Floats
     limit: float
+
+    def __post_init__(self) -> None:
+        inputs = len(self.names)
+        vectors = (self.low, self.high, self.margin, self.mean, self.scale)
+        if any(v.shape != (inputs,) for v in vectors) or self.whitening.shape[:1] != (inputs,):
+            raise SurrogateError(f"the domain of a surrogate: its arrays do not belong to {inputs} inputs; train again")
 
     @classmethod
     def from_rows(cls, names: Sequence[str], rows: Floats, margin: ArrayLike = DEFAULT_MARGIN) -> ApplicabilityDomain:
@@ -98,24 +100,6 @@ class ApplicabilityDomain:
             f"{self.names[k]} = {row[k]:.4g} (trained on {self.low[k]:.4g} to {self.high[k]:.4g})" for k in farthest
         ]
         return ", ".join(descriptions) or "a combination of inputs far from those of the training"
-
-    def document(self) -> dict[str, Any]:
-        """The domain as JSON-able data."""
-        arrays = {name: getattr(self, name).tolist() for name in ARRAY_FIELDS}
-        return {"names": list(self.names), "limit": self.limit if np.isfinite(self.limit) else None, **arrays}
-
-    @classmethod
-    def from_document(cls, data: Mapping[str, Any]) -> ApplicabilityDomain:
-        """The domain that `document` wrote."""
-        try:
-            names, limit = tuple(str(n) for n in data["names"]), data["limit"]
-            arrays = {name: np.array(data[name], float) for name in ARRAY_FIELDS}
-            domain = cls(names, **arrays, limit=np.inf if limit is None else float(limit))
-        except (KeyError, TypeError, ValueError):
-            raise SurrogateError("the domain in the header of this surrogate is damaged; train it again") from None
-        if any(a.shape[0] != len(names) for a in arrays.values()):
-            raise SurrogateError("the domain in the header of this surrogate is damaged; train it again")
-        return domain
 
 
 def _leave_one_out_distance(square: Floats, n: int) -> Floats:

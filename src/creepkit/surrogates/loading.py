@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from creepkit.errors import CreepkitError, SurrogateError, nearest
-from creepkit.files import safetensors_files
-from creepkit.language.law_codec import law_from_json
-from creepkit.sampling.conditions import TimeGrid
-from creepkit.specimens.documents import specimen_from_json
-from creepkit.surrogates.applicability_domain import ApplicabilityDomain
-from creepkit.surrogates.recipe import SurrogateMetadata, Training
+from creepkit.files.json_documents import check_keys
+from creepkit.surrogates.recipe import SurrogateMetadata
 from creepkit.surrogates.surrogate import Recipe, Surrogate
-
-if TYPE_CHECKING:
-    pass
-
+from creepkit.surrogates.weight_files import CODEC, read_weights
 
 WEIGHTS_FOLDER = Path(__file__).with_name("weights")
 
@@ -53,12 +42,13 @@ RECIPE_CLASSES = {
 
 def load_surrogate(path: str | Path) -> Surrogate:
     """Return the surrogate in a file; SurrogateError says what is wrong with any other file."""
-    tensors, header = safetensors_files.read_safetensors(path)
-    if header["kind"] == "checkpoint":
-        raise SurrogateError(f"{path}: a training that was interrupted; run the same training again to finish it")
+    tensors, header = read_weights(path)
     try:
-        recipe = recipe_from_config(header["kind"], header["config"])
-        metadata = _metadata_from_header(header, str(path))
+        problem = check_keys(header, ("kind", "recipe", "metadata"), "its header")
+        if problem:
+            raise SurrogateError(f"{problem}; train it again")
+        recipe = CODEC.from_json(_recipe_class(header["kind"]), header["recipe"], "recipe")
+        metadata = CODEC.from_json(SurrogateMetadata, header["metadata"], "metadata")
         module = recipe.empty_module(metadata)
         module.load_state_dict(tensors)
     except CreepkitError as error:
@@ -68,30 +58,10 @@ def load_surrogate(path: str | Path) -> Surrogate:
     return recipe.surrogate(module, metadata)
 
 
-def recipe_from_config(kind: str, config: Mapping[str, Any]) -> Recipe:
-    """The recipe with these fields."""
-    if kind not in RECIPE_CLASSES:
-        raise SurrogateError(f"kind '{kind}' is unknown here (known: {', '.join(RECIPE_CLASSES)}); update creepkit")
+def _recipe_class(kind: Any) -> type[Recipe]:
+    """The class of the recipes of a kind."""
+    if not isinstance(kind, str) or kind not in RECIPE_CLASSES:
+        raise SurrogateError(f"kind '{kind!s:.40}' is unknown here; {nearest(str(kind)[:40], RECIPE_CLASSES)}")
     module, _, name = RECIPE_CLASSES[kind].partition(":")
-    recipe_class: Any = getattr(import_module(module), name)
-    field_names = {f.name for f in fields(recipe_class) if f.init}
-    values = {name: tuple(v) if isinstance(v, list) else v for name, v in config.items() if name in field_names}
-    recipe: Recipe = recipe_class(**{**values, "training": Training(**config["training"])})
-    return recipe
-
-
-def _metadata_from_header(header: Mapping[str, Any], source: str) -> SurrogateMetadata:
-    return SurrogateMetadata(
-        law=law_from_json(header["law"], source),
-        specimen=specimen_from_json(header["specimen"], source),
-        outputs=tuple(header["outputs"]),
-        grid=TimeGrid(np.array(header["grid"]["values"], float), bool(header["grid"]["relative"])),
-        parameters=tuple(header["parameters"]),
-        conditions=tuple(header["conditions"]),
-        scaling=header["scaling"],
-        domain=None if header["domain"] is None else ApplicabilityDomain.from_document(header["domain"]),
-        metrics=header["metrics"],
-        curves=header["curves"],
-        provenance=header["provenance"],
-        notes=tuple(header["notes"]),
-    )
+    recipe_class: type[Recipe] = getattr(import_module(module), name)
+    return recipe_class

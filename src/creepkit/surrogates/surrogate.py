@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -13,8 +12,6 @@ from torch import Tensor
 
 from creepkit.arrays import Floats
 from creepkit.errors import SurrogateError
-from creepkit.files import safetensors_files
-from creepkit.language.law_codec import law_to_json
 from creepkit.presentation import Presentable
 from creepkit.records import (
     History,
@@ -28,8 +25,8 @@ from creepkit.records import (
 from creepkit.sampling.conditions import TimeGrid, test_kind
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.specimens.documents import specimen_to_json
 from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, SurrogateModule, Training
+from creepkit.surrogates.weight_files import CODEC, write_weights
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
@@ -200,27 +197,12 @@ class Surrogate(Presentable, ABC):
     @property
     def file_header(self) -> dict[str, Any]:
         """Everything that a file says beside the weights."""
-        metadata = self.metadata
-        return {
-            "kind": self.recipe.kind,
-            "config": asdict(self.recipe),  # type: ignore[call-overload]
-            "law": law_to_json(metadata.law),
-            "specimen": specimen_to_json(metadata.specimen),
-            "grid": metadata.grid.document(),
-            "outputs": list(metadata.outputs),
-            "parameters": list(metadata.parameters),
-            "conditions": list(metadata.conditions),
-            "scaling": dict(metadata.scaling),
-            "domain": None if metadata.domain is None else metadata.domain.document(),
-            "metrics": dict(metadata.metrics),
-            "curves": dict(metadata.curves),
-            "provenance": dict(metadata.provenance),
-            "notes": list(metadata.notes),
-        }
+        recipe, metadata = CODEC.to_json(self.recipe), CODEC.to_json(self.metadata)
+        return {"kind": self.recipe.kind, "recipe": recipe, "metadata": metadata}
 
     def save(self, path: str | Path) -> Path:
         """Write the weights with their header."""
-        return safetensors_files.write_safetensors(path, self.module.state_dict(), self.file_header)
+        return write_weights(path, self.module.state_dict(), self.file_header)
 
     def __repr__(self) -> str:
         return f"<Surrogate: {self.title}>"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
@@ -16,7 +15,7 @@ import torch
 from torch import Tensor
 
 from creepkit.errors import SurrogateError
-from creepkit.files import safetensors_files
+from creepkit.files.json_documents import as_read_back
 from creepkit.surrogates.evaluation import compare_predictions, comparison_metrics, evaluation_times
 from creepkit.surrogates.loading import load_surrogate
 from creepkit.surrogates.parameter_gru import ParameterGru
@@ -30,6 +29,7 @@ from creepkit.surrogates.training_loop import (
     trainable_samples,
     training_split,
 )
+from creepkit.surrogates.weight_files import CHECKPOINT, read_weights, write_weights
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
@@ -37,16 +37,13 @@ if TYPE_CHECKING:
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
-
-
-CHECKPOINT_KIND = "checkpoint"
 
 
 def training_request(data: Dataset, recipe: Recipe, seed: int) -> dict[str, Any]:
     """What was asked for, as JSON-able data: the same call goes on where it was interrupted."""
     config: Any = asdict(recipe)  # type: ignore[call-overload]
-    request: dict[str, Any] = json.loads(
-        json.dumps({"data": dataset_fingerprint(data), "kind": recipe.kind, "recipe": config, "seed": seed})
+    request: dict[str, Any] = as_read_back(
+        {"data": dataset_fingerprint(data), "kind": recipe.kind, "recipe": config, "seed": seed}
     )
     return request
 
@@ -61,28 +58,23 @@ class Checkpoint:
     def save(self, state_of_training: NetworkTraining) -> None:
         """Leave a fit as it is, in the place of what was left before."""
         if self.path is not None:
-            safetensors_files.write_safetensors(
-                self.path,
-                state_of_training.state(),
-                {"kind": CHECKPOINT_KIND, "call": self.request, "curves": state_of_training.curves},
-            )
+            header = {"call": self.request, "curves": state_of_training.curves}
+            write_weights(self.path, state_of_training.state(), header, CHECKPOINT)
 
     def restore(self, state_of_training: NetworkTraining) -> None:
         """Bring a fresh fit to where the same call was interrupted, if it was."""
         if self.path is None or not self.path.exists():
             return
-        tensors, header = safetensors_files.read_safetensors(self.path)
-        if header["kind"] != CHECKPOINT_KIND:
-            raise SurrogateError(f"{self.path}: not a checkpoint of a training; remove it, or choose another name")
+        tensors, header = read_weights(self.path, CHECKPOINT)
         if header.get("call") != self.request:
             differences = ", ".join(_differences(self.request, header.get("call") or {}))
             raise SurrogateError(
-                f"{self.path}: left by another training (it differs in {differences}); finish that one, remove the file, or "
-                "choose another name"
+                f"{self.path}: left by another training (it differs in {differences}); finish that one, remove the "
+                "file, or choose another name"
             )
         try:
             state_of_training.restore(tensors, header["curves"])
-        except (KeyError, RuntimeError, ValueError, AttributeError):
+        except (KeyError, RuntimeError, ValueError, TypeError, AttributeError):
             raise SurrogateError(f"{self.path}: this checkpoint is damaged; remove it to begin again") from None
 
     def remove(self) -> None:
@@ -170,9 +162,10 @@ def _training_metadata(
 
 def _load_finished(path: Path, request: dict[str, Any]) -> Surrogate:
     """The surrogate that the same call has written; SurrogateError where something else lies there."""
-    _, header = safetensors_files.read_safetensors(path)
-    provenance = header.get("provenance", {})
-    if any(provenance.get(name) != value for name, value in request.items()):
+    _, header = read_weights(path)
+    metadata = header.get("metadata")
+    provenance = metadata.get("provenance") if isinstance(metadata, dict) else None
+    if not isinstance(provenance, dict) or any(provenance.get(name) != value for name, value in request.items()):
         raise SurrogateError(f"{path}: another surrogate is there already; remove it or choose another name")
     return load_surrogate(path)
 

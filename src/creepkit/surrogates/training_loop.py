@@ -6,7 +6,6 @@ Every epoch has its own random seed, derived from the seed of the training and t
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -17,6 +16,7 @@ from torch import Tensor
 
 from creepkit.arrays import Bools
 from creepkit.errors import DatasetError, SurrogateError
+from creepkit.files.json_documents import canonical_json
 from creepkit.sampling.conditions import CONDITION_UNITS
 from creepkit.specimens.documents import specimen_to_json
 from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateModule, Training
@@ -276,7 +276,7 @@ def _with_prefix(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:
 def dataset_fingerprint(data: Dataset) -> str:
     """Identity of what can be learnt from a data set: 16 hexadecimal digits."""
     document = [data.law.fingerprint, specimen_to_json(data.specimen), data.grid.relative, data.outputs]
-    digest = hashlib.sha256(json.dumps([*document, data.parameter_names, data.condition_names]).encode())
+    digest = hashlib.sha256(canonical_json([*document, data.parameter_names, data.condition_names]))
     for array in (data.grid.values, data.parameters, data.conditions, data.values):
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()[:16]

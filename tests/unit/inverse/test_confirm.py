@@ -9,7 +9,7 @@ import pytest
 import creepkit as ck
 from creepkit.errors import FitError
 from creepkit.inverse.confirmation import confirm, outside_domain
-from creepkit.inverse.identification_document import load_identification
+from creepkit.inverse.identification_document import read_identification
 from creepkit.readers.history_csv import write_history
 from creepkit.records import Status
 from helpers.command_line import creepkit, one_line
@@ -86,7 +86,7 @@ def test_only_the_guard_of_a_surrogate_doubts(fit):
 
 
 def test_a_fit_from_a_file_is_held_against_the_misfit_it_tells(fit, tmp_path):
-    found = load_identification(fit.save(tmp_path / "fit.json"))
+    found = read_identification(fit.save(tmp_path / "fit.json"))
     told = confirm(found, TESTS, BAR)
     assert np.isnan(told["X-60", "strain"].rms_difference)
     assert told.noise_ratio == pytest.approx(0.0, abs=1e-3)

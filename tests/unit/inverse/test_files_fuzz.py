@@ -12,7 +12,7 @@ from creepkit.inverse.identification import Identification, IdentificationSettin
 from creepkit.inverse.identification_document import (
     identification_from_json,
     identification_to_json,
-    load_identification,
+    read_identification,
 )
 from creepkit.inverse.identify import identify
 from creepkit.laws.norton import NORTON
@@ -69,4 +69,4 @@ def test_any_bytes(tmp_path_factory, content):
     path = tmp_path_factory.mktemp("fuzz") / "fit.json"
     path.write_bytes(content)
     with pytest.raises(CreepkitError, match=r"fit\.json"):
-        load_identification(path)
+        read_identification(path)

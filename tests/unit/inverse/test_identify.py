@@ -12,7 +12,7 @@ from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identification_document import (
     identification_from_json,
     identification_to_json,
-    load_identification,
+    read_identification,
 )
 from creepkit.inverse.identify import identify, refit
 from creepkit.inverse.selection import rank
@@ -96,7 +96,7 @@ def test_power_law_and_sinh_over_a_narrow_stress_range_are_not_told_apart():
 
 
 def test_round_trip_through_json(fit, tmp_path):
-    again = load_identification(fit.save(tmp_path / "fit.json"))
+    again = read_identification(fit.save(tmp_path / "fit.json"))
     assert str(again) == str(fit)
     assert again.law == fit.law
     assert identification_to_json(again) == identification_to_json(fit)
@@ -112,7 +112,7 @@ def test_damaged_files_are_refused_in_one_sentence(fit, tmp_path):
     path = tmp_path / "cut.json"
     path.write_text(json.dumps(data)[:200])
     with pytest.raises(FitError, match=r"cut\.json, line 1: not JSON"):
-        load_identification(path)
+        read_identification(path)
 
 
 def test_refit_on_other_tests_starts_where_the_first_ended(fit, tests):

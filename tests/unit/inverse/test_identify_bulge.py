@@ -10,7 +10,7 @@ from creepkit.errors import FitError, SolveError
 from creepkit.inverse.cross_validation import leave_one_test_out, pooled_relative_squared_error
 from creepkit.inverse.goodness_of_fit import relative_squared_error
 from creepkit.inverse.identification import IdentificationSettings
-from creepkit.inverse.identification_document import identification_to_json, load_identification
+from creepkit.inverse.identification_document import identification_to_json, read_identification
 from creepkit.inverse.identify import identify, refit
 from creepkit.language import arrhenius
 from creepkit.laws.norton import NORTON
@@ -239,7 +239,7 @@ def test_text_says_what_a_bulge_test_needs(fit):
 def test_round_trip_through_json(fit, tests, tmp_path):
     free = replace(WITH_THICKNESS, nuisances=(Nuisance("thickness", mean=MEAN, sd=np.inf, bounds=(0.4, 0.6)),))
     for one in (fit, replace(fit, settings=replace(free, weights={"amplitude": 0.99}))):
-        again = load_identification(one.save(tmp_path / "fit.json"))
+        again = read_identification(one.save(tmp_path / "fit.json"))
         assert identification_to_json(again) == identification_to_json(one)
         assert again.settings == one.settings
     np.testing.assert_array_equal(again.with_histories(tests, EXACT).predict().values, fit.predict().values)
@@ -248,8 +248,8 @@ def test_round_trip_through_json(fit, tests, tmp_path):
 def test_files_of_the_first_version_are_refused(fit, tmp_path):
     path = tmp_path / "old.json"
     path.write_text(json.dumps({**identification_to_json(fit), "version": 1}))
-    with pytest.raises(FitError, match="earlier creepkit, in version 1 of the format; identify again"):
-        load_identification(path)
+    with pytest.raises(FitError, match="in version 1 of the format; this one reads version 5: identify again"):
+        read_identification(path)
 
 
 def test_a_test_that_was_left_out_is_predicted(fit, tests):

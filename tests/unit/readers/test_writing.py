@@ -102,6 +102,6 @@ def test_one_frame_is_refused():
 def test_old_file_survives_a_failed_writing(tmp_path):
     path = tmp_path / "x.csv"
     path.mkdir()  # a folder in the place of the file, which cannot be replaced by one
-    with pytest.raises(HistoryError, match=r"x.csv: cannot be written \(Is a directory\)"):
+    with pytest.raises(HistoryError, match=r"x.csv: cannot be written: it is a folder"):
         write_history(HISTORIES[0], path)
     assert [p.name for p in tmp_path.iterdir()] == ["x.csv"]

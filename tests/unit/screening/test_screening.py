@@ -113,7 +113,7 @@ def test_where_a_guard_doubts_the_specimen_is_asked(excess, holds):
 def test_an_answer_is_read_back_as_it_was(plate, tmp_path):
     answer = plate["X"]
     found = files.read_result(files.write_result(answer, tmp_path / "X.json"))
-    for field in ("alloy", "verdict", "notes", "failed", "equivalents", "seconds", "confirmation"):
+    for field in ("alloy", "verdict", "notes", "failed_laws", "equivalents", "cpu_seconds", "confirmation"):
         assert getattr(found, field) == getattr(answer, field)
     assert found.best.values == answer.best.values
     np.testing.assert_array_equal(found.predicted["X-60"]["strain"], answer.predicted["X-60"]["strain"])

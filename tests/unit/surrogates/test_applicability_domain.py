@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creepkit.errors import SurrogateError
+from creepkit.errors import CreepkitError
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
+from creepkit.surrogates.weight_files import CODEC
 
 
 def mahalanobis(row: np.ndarray, others: np.ndarray) -> float:
@@ -64,10 +65,10 @@ def test_each_input_is_forgiven_what_it_is_told() -> None:
 
 def test_a_document_without_margins_is_damaged() -> None:
     rows = np.stack([np.linspace(0.0, 1.0, 50), np.random.default_rng(8).normal(size=50)], axis=1)
-    document = {**ApplicabilityDomain.from_rows("ab", rows, 0.5).document(), "limit": None}
+    document = CODEC.to_json(ApplicabilityDomain.from_rows("ab", rows, 0.5))
     del document["margin"]
-    with pytest.raises(SurrogateError, match="damaged"):
-        ApplicabilityDomain.from_document(document)
+    with pytest.raises(CreepkitError, match="'margin' is missing"):
+        CODEC.from_json(ApplicabilityDomain, document)
 
 
 def test_inputs_that_are_not_there_are_not_far() -> None:
@@ -88,12 +89,19 @@ def test_few_rows_leave_the_box_alone() -> None:
 def test_the_document_is_json_and_gives_the_same_distances() -> None:
     rows = np.random.default_rng(5).normal(size=(40, 4))
     domain = ApplicabilityDomain.from_rows("abcd", rows)
-    again = ApplicabilityDomain.from_document(json.loads(json.dumps(domain.document())))
+    again = CODEC.from_json(ApplicabilityDomain, json.loads(json.dumps(CODEC.to_json(domain))))
     assert np.array_equal(again.distance(rows), domain.distance(rows))
 
 
 def test_a_damaged_document_says_so() -> None:
-    document = ApplicabilityDomain.from_rows("ab", np.random.default_rng(6).normal(size=(9, 2))).document()
-    for changes in ({"low": [0.0]}, {"mean": "x"}, {"names": None}, {"whitening": [[1.0, 0.0]]}):
-        with pytest.raises(SurrogateError, match="the domain in the header of this surrogate is damaged"):
-            ApplicabilityDomain.from_document({**document, **changes})
+    document = CODEC.to_json(ApplicabilityDomain.from_rows("ab", np.random.default_rng(6).normal(size=(9, 2))))
+    for changes, message in (
+        ({"low": [0.0]}, "its arrays do not belong to 2 inputs"),
+        ({"mean": "x"}, "mean is 'x', where a list of numbers is needed"),
+        ({"names": None}, "names is null, where a list is needed"),
+        ({"whitening": [[1.0, 0.0]]}, "its arrays do not belong to 2 inputs"),
+        ({"whitening": [[1.0], 0.0]}, "whitening holds lists of different lengths"),
+        ({"limits": 1.0}, "unknown key 'limits'; did you mean 'limit'"),
+    ):
+        with pytest.raises(CreepkitError, match=message):
+            CODEC.from_json(ApplicabilityDomain, {**document, **changes})

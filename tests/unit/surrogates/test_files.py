@@ -8,18 +8,16 @@ import torch
 from safetensors.torch import save_file
 
 from creepkit.errors import SurrogateError
-from creepkit.files import safetensors_files
 from creepkit.surrogates.loading import load_surrogate, surrogate_by_name
+from creepkit.surrogates.weight_files import read_weights, write_weights
 
 HEADER = {"kind": "parameter-gru"}
 WEIGHTS = {"a": torch.arange(6.0).reshape(2, 3), "b": torch.tensor(3, dtype=torch.int64)}
 
 
 def test_tensors_and_header_come_back(tmp_path: Path) -> None:
-    path = safetensors_files.write_safetensors(
-        tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "curves": {"loss": [1.0, 0.5]}}
-    )
-    tensors, header = safetensors_files.read_safetensors(path)
+    path = write_weights(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "curves": {"loss": [1.0, 0.5]}})
+    tensors, header = read_weights(path)
     assert all(
         torch.equal(tensors[name], WEIGHTS[name]) and tensors[name].dtype == WEIGHTS[name].dtype for name in WEIGHTS
     )
@@ -28,13 +26,13 @@ def test_tensors_and_header_come_back(tmp_path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
-    path = safetensors_files.write_safetensors(tmp_path / "m.safetensors", WEIGHTS, HEADER)
+    path = write_weights(tmp_path / "m.safetensors", WEIGHTS, HEADER)
     before = path.read_bytes()
     with pytest.raises(ValueError, match="JSON"):
-        safetensors_files.write_safetensors(path, WEIGHTS, {**HEADER, "loss": float("nan")})
+        write_weights(path, WEIGHTS, {**HEADER, "loss": float("nan")})
     assert path.read_bytes() == before
     with pytest.raises(SurrogateError, match="cannot be written"):
-        safetensors_files.write_safetensors(tmp_path / "nowhere" / "m.safetensors", WEIGHTS, HEADER)
+        write_weights(tmp_path / "nowhere" / "m.safetensors", WEIGHTS, HEADER)
 
 
 @pytest.mark.parametrize(
@@ -43,14 +41,14 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> Non
         (lambda raw: raw[: len(raw) - 7], "damaged, or not a safetensors file"),
         (lambda raw: b"", "damaged, or not a safetensors file"),
         (lambda raw: b"PK\x03\x04" + raw, "damaged, or not a safetensors file"),
-        (lambda raw: raw.replace(b'\\"version\\": 1', b'\\"version\\": 9'), "written by a newer creepkit"),
-        (lambda raw: raw.replace(b'\\"version\\": 1', b'\\"version\\":-1'), "of an unknown version"),
-        (lambda raw: raw.replace(b"creepkit-surrogate", b"creepkit-something"), "its header is damaged"),
+        (lambda raw: raw.replace(b'\\"version\\": 2', b'\\"version\\": 9'), "written by a newer creepkit"),
+        (lambda raw: raw.replace(b'\\"version\\": 2', b'\\"version\\":-1'), "in version -1 of the format"),
+        (lambda raw: raw.replace(b"creepkit-surrogate", b"creepkit-something"), "this is not a surrogate that creepkit wrote"),
         (lambda raw: raw.replace(b"parameter-gru", b"hyper-network"), "kind 'hyper-network' is unknown here"),
     ],
 )  # fmt: skip
 def test_a_file_that_is_not_a_surrogate_says_why(tmp_path: Path, spoil, told: str) -> None:
-    path = safetensors_files.write_safetensors(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "config": {}})
+    path = write_weights(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "recipe": {}, "metadata": {}})
     path.write_bytes(spoil(path.read_bytes()))
     with pytest.raises(SurrogateError, match=told) as caught:
         load_surrogate(path)
@@ -60,15 +58,13 @@ def test_a_file_that_is_not_a_surrogate_says_why(tmp_path: Path, spoil, told: st
 
 def test_weights_of_another_program_are_told_apart(tmp_path: Path) -> None:
     save_file(WEIGHTS, tmp_path / "other.safetensors")
-    with pytest.raises(SurrogateError, match="weights of another program"):
+    with pytest.raises(SurrogateError, match="written by another program"):
         load_surrogate(tmp_path / "other.safetensors")
 
 
 def test_a_header_without_its_parts_says_so(tmp_path: Path) -> None:
-    path = safetensors_files.write_safetensors(
-        tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "config": {"training": {}}}
-    )
-    with pytest.raises(SurrogateError, match="its header and its weights do not belong together"):
+    path = write_weights(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "recipe": {"training": {}}, "metadata": {}})
+    with pytest.raises(SurrogateError, match="metadata: 'law' is missing"):
         load_surrogate(path)
 
 
@@ -80,7 +76,7 @@ def test_names_that_nobody_knows(tmp_path: Path) -> None:
 
 
 def test_the_header_is_plain_json(tmp_path: Path) -> None:
-    raw = safetensors_files.write_safetensors(tmp_path / "m.safetensors", WEIGHTS, HEADER).read_bytes()
+    raw = write_weights(tmp_path / "m.safetensors", WEIGHTS, HEADER).read_bytes()
     size = int.from_bytes(raw[:8], "little")
     told = json.loads(raw[8 : 8 + size])["__metadata__"]["creepkit"]
-    assert json.loads(told) == {"format": "creepkit-surrogate", "version": 1, "kind": "parameter-gru"}
+    assert json.loads(told) == {"format": "creepkit-surrogate", "version": 2, "kind": "parameter-gru"}

@@ -9,7 +9,7 @@
       double precision esw(2), p, qtild, temp, dtemp, predef(*)
       double precision dpred(*), time(2), dtime, coords(*)
 !
-      double precision y($ny), slope($ny, 2), warm(2), finish, start
+      double precision y($ny), slope($ny, 2), temps(2), finish, start
       double precision q, wanted, change, initial($ny), first($ny)
       integer pass
 !
@@ -24,14 +24,14 @@
 !
       finish = (time(2) - t_first)*seconds
       start = finish - dtime*seconds
-      warm = temp + to_kelvin
+      temps = temp + to_kelvin
 $initial
       first = initial
 $fetch!
 !     Isotropic elasticity: the increment for a stress QTILD.
       if (lend .ne. 3) then
         y = first
-        call ${id}_increment(start, finish, warm,
+        call ${id}_increment(start, finish, temps,
      &   max(qtild*mpa, 1.0d-30), 0.0d0, ec(1), y, slope)
         decra(1) = y(1)
         decra(5) = max(slope(1, 1)*mpa, 1.0d-90)
@@ -44,7 +44,7 @@ $store        return
       q = 100.0d0
       do pass = 1, 60
         y = first
-        call ${id}_increment(start, finish, warm, q, 0.0d0,
+        call ${id}_increment(start, finish, temps, q, 0.0d0,
      &   ec(1), y, slope)
         if (.not. y(1) > 0.0d0 .or. .not. slope(1, 1) > 0.0d0) then
           q = 10.0d0*q

@@ -14,11 +14,11 @@
 !   slope derivatives of y at the end: to the stress (MPa), and to
 !         the mean stress (MPa)
 ! ---------------------------------------------------------------
-      subroutine ${id}_increment(start, finish, warm, stress, mean,
+      subroutine ${id}_increment(start, finish, temps, stress, mean,
      &    strain, y, slope)
         implicit none
         integer, parameter :: ny = $ny
-        double precision, intent(in) :: start, finish, warm(2)
+        double precision, intent(in) :: start, finish, temps(2)
         double precision, intent(in) :: stress, mean, strain
         double precision, intent(inout) :: y(ny)
         double precision, intent(out) :: slope(ny, 2)
@@ -29,7 +29,7 @@
         origin = 0.0d0
 $late        low = max(start - origin, 0.0d0)**beta
         high = max(finish - origin, 0.0d0)**beta
-        point = (/ start, finish - start, warm(1), warm(2), beta,
+        point = (/ start, finish - start, temps(1), temps(2), beta,
      &      strain, origin /)
         slope = 0.0d0
         most = high - low

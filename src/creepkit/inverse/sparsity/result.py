@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from scipy.stats import chi2
 
@@ -106,47 +106,6 @@ class Sparsity(Presentable):
         return (
             f"{sentence}. The penalty had dropped {restored} too, but without BIC is higher than that of the whole sum"
         )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain numbers and names, without the path."""
-        names = (
-            "law",
-            "penalty",
-            "strength",
-            "kept_terms",
-            "dropped_terms",
-            "exponents_off",
-            "proposed_terms",
-            "observations",
-        )
-        contributions = {
-            name: dict(getattr(self, name))
-            for name in ("contributions_without_penalty", "contributions_with_penalty", "contributions_after_refit")
-        }
-        values = {name: getattr(self, name) for name in names}
-        values = {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
-        return {
-            **values,
-            **contributions,
-            "full": _statistics_to_dict(self.full),
-            "reduced": _statistics_to_dict(self.reduced),
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Sparsity:
-        """The record that to_dict wrote."""
-        lists = {name: tuple(data[name]) for name in ("kept_terms", "dropped_terms", "exponents_off", "proposed_terms")}
-        statistics = {
-            name: FitStatistics(
-                **{**data[name], "errors": {k: OutputErrors(**v) for k, v in data[name]["errors"].items()}}
-            )
-            for name in ("full", "reduced")
-        }
-        return cls(**{**data, **lists, **statistics})
-
-
-def _statistics_to_dict(statistics: FitStatistics) -> dict[str, Any]:
-    return {**asdict(statistics), "errors": {name: asdict(errors) for name, errors in statistics.errors.items()}}
 
 
 def _quoted_list(names: list[str] | TermNames) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
+from creepkit.inverse.identification_document import CODEC
 from creepkit.inverse.search.derivative_free import ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.bootstrap import (
@@ -189,8 +190,9 @@ def test_the_record_says_what_was_dropped_and_survives_a_file(reduced):
     told = reduced.sparsity
     assert "without 'hyperbolic sine' and 'time hardening' of 'combined' chi-square rises by" in told.verdict
     assert "'strain hardening' suffices" in told.verdict
-    assert Sparsity.from_dict(json.loads(json.dumps(told.to_dict()))) == told
-    back = replace(told, proposed=())
+    stored = json.loads(json.dumps(CODEC.to_json(told)))
+    assert CODEC.from_json(Sparsity, stored) == told
+    back = replace(told, proposed_terms=())
     assert "The penalty had dropped 'strain hardening' too" in back.verdict
 
 

@@ -5,18 +5,13 @@ In steady Norton creep of a dimple of apex thickness h the amplitude D grows as 
 
 from __future__ import annotations
 
-import json
-import os
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save
 from scipy.interpolate import CubicSpline
 
 from creepkit import kernels
@@ -25,6 +20,10 @@ from creepkit.errors import SolveError
 from creepkit.fem.banded_system import FiniteElementModel, finite_element_model
 from creepkit.fem.simulation import LoadHistory, simulate
 from creepkit.fem.step_record import SolverSettings
+from creepkit.files.json_documents import DocumentFormat
+from creepkit.files.reading import FileKind
+from creepkit.files.record_codec import RecordCodec, RecordError
+from creepkit.files.safetensors_files import read_safetensors, write_safetensors
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.records import Program
 from creepkit.specimens.bulge.geometry import DimpleGeometry
@@ -189,7 +188,27 @@ LOADS = TableGrid.spanning(LOAD_RANGE[1], 1e-6, _LOADS)
 """P/E of the elastic tables."""
 
 
-_FORMAT = "creepkit-one-degree-of-freedom-1"
+_FORMAT = DocumentFormat(
+    "creepkit-reduced-order-tables",
+    2,
+    FileKind("a file of tables", SolveError, "make it again with 'creepkit reduced-model'", maximum_bytes=2**30),
+    remedy="make it again with 'creepkit reduced-model'",
+)
+
+
+@dataclass(frozen=True)
+class TablesHeader:
+    """What a file of tables says beside its arrays.
+
+    deflections, loads : offset, step and number of points of the grids. exponents : of the Norton laws simulated.
+    window : mm, of the observation. geometry : of the dimple; its thickness is that of the middle table.
+    """
+
+    deflections: TableGrid
+    loads: TableGrid
+    exponents: tuple[float, ...]
+    window: float
+    geometry: DimpleGeometry
 
 
 _ARRAYS = ("thicknesses", "curves", "elastic", "redistribution")
@@ -212,32 +231,6 @@ class ReducedOrderTables:
     grid: TableGrid
     geometry: DimpleGeometry
     window: float
-
-    def to_tensors(self) -> tuple[dict[str, Floats], dict[str, Any]]:
-        """Arrays and a JSON-able document from which `from_tensors` makes the same tables without any simulation."""
-        arrays = {name: np.ascontiguousarray(getattr(self, name)) for name in _ARRAYS}
-        return arrays, {
-            "format": _FORMAT, "deflections": list(self.grid), "loads": list(LOADS), "exponents": list(EXPONENTS),
-            "window": self.window, "geometry": asdict(self.geometry),
-        }  # fmt: skip
-
-    @classmethod
-    def from_tensors(cls, arrays: Mapping[str, Any], document: Mapping[str, Any]) -> ReducedOrderTables:
-        """The tables that `to_tensors` wrote; SolveError for any others."""
-        ours = {"format": _FORMAT, "loads": list(LOADS), "exponents": list(EXPONENTS)}
-        for name, value in ours.items():
-            if document.get(name) != value:
-                raise SolveError(
-                    f"tables of a one-degree-of-freedom model: {name} is {document.get(name)}, this creepkit reads "
-                    f"{value}; make them again with 'creepkit reduced-model'"
-                )
-        length = {"clamped": tuple(document["geometry"]["clamped"])}
-        geometry = DimpleGeometry(**{**document["geometry"], **length})
-        offset, step, points = document["deflections"]
-        values = {name: np.asarray(arrays[name], float) for name in _ARRAYS}
-        return cls(
-            **values, grid=TableGrid(offset, step, int(points)), geometry=geometry, window=float(document["window"])
-        )
 
     def dimple(self, thickness: float) -> DimpleCurves:
         """The curves of one thickness and their derivatives to it, with a point more at each end."""
@@ -375,40 +368,25 @@ def _monotonic(amplitude: Floats) -> Bools:
     return np.asarray(amplitude > 1.0005 * highest)
 
 
-_HEADER_KEY = "creepkit"
-
-
 def write_tables(tables: ReducedOrderTables, path: str | Path) -> Path:
-    """Write to a temporary name, then rename: a file is whole or absent."""
-    path = Path(path)
-    arrays, document = tables.to_tensors()
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        temporary.write_bytes(save(arrays, metadata={_HEADER_KEY: json.dumps(document)}))
-        os.replace(temporary, path)
-    except OSError as error:
-        why = f"cannot be written ({error.strerror})"
-        raise SolveError(f"{path}: {why}; choose a file in a folder that exists and has room") from None
-    finally:
-        temporary.unlink(missing_ok=True)
-    return path
+    """Write the tables; the file is whole or absent."""
+    arrays = {name: getattr(tables, name) for name in _ARRAYS}
+    header = TablesHeader(tables.grid, LOADS, EXPONENTS, tables.window, tables.geometry)
+    return write_safetensors(path, arrays, RecordCodec().to_json(header), _FORMAT)
 
 
 def read_tables(path: str | Path) -> ReducedOrderTables:
     """The tables of a file; SolveError says what is wrong with any other."""
-    path = Path(path)
-    if not path.is_file():
-        raise SolveError(f"{path}: there is no such file; give one that creepkit reduced-model wrote")
+    arrays, content = read_safetensors(path, _FORMAT)
     try:
-        with safe_open(path, framework="numpy") as file:
-            message = (file.metadata() or {}).get(_HEADER_KEY, "{}")
-            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (a handle, not a mapping)
-        document = json.loads(message)
-    except (SafetensorError, json.JSONDecodeError):
-        raise SolveError(
-            f"{path}: damaged, or not a file of tables; make it again with 'creepkit reduced-model'"
-        ) from None
-    try:
-        return ReducedOrderTables.from_tensors(arrays, document)
-    except SolveError as error:
-        raise SolveError(f"{path}: {error}") from None
+        header = RecordCodec().from_json(TablesHeader, content)
+        values = {name: np.asarray(arrays[name], float) for name in _ARRAYS}
+    except (RecordError, KeyError, ValueError, TypeError) as error:
+        raise SolveError(f"{path}: damaged ({error}); {_FORMAT.remedy}") from None
+    for name, found, expected in (
+        ("loads", tuple(header.loads), tuple(LOADS)),
+        ("exponents", header.exponents, EXPONENTS),
+    ):
+        if found != expected:
+            raise SolveError(f"{path}: {name} is {found}, this creepkit reads {expected}; {_FORMAT.remedy}")
+    return ReducedOrderTables(**values, grid=header.deflections, geometry=header.geometry, window=header.window)

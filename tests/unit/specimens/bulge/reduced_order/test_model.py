@@ -359,5 +359,5 @@ def test_files_that_are_no_tables(tmp_path):
     with pytest.raises(SolveError, match="there is no such file"):
         read_tables(tmp_path / "none")
     (tmp_path / "text").write_text("not tables")
-    with pytest.raises(SolveError, match="damaged, or not a file of tables"):
+    with pytest.raises(SolveError, match="damaged, or not a safetensors file"):
         read_tables(tmp_path / "text")

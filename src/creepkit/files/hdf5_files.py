@@ -1,0 +1,117 @@
+"""HDF5 files: written whole or not at all with write errors reported once, and read without following external links.
+
+HDF5 tries to write again whenever one of its objects is closed, and h5py prints a traceback for each failure. The first
+error is kept, later writes are discarded, and the error is raised when HDF5 is done.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from creepkit.errors import CreepkitError
+from creepkit.files.reading import FileKind, check_readable
+from creepkit.files.writing import replace_on_success
+
+MAXIMUM_OBJECTS = 100_000
+"""Groups and arrays in a file that is read; a data set has some twenty."""
+
+
+class FaultTolerantFile(io.FileIO):
+    """A new file that keeps its first failure to write, for `raise_failure` to raise."""
+
+    failure: OSError | None = None
+
+    def write(self, data: Any, /) -> int:
+        """Write all of it, or keep the failure."""
+        remaining = memoryview(data).cast("B")
+        size = len(remaining)
+        while remaining:
+            written = self._attempt(super().write, remaining)
+            if not written:
+                break
+            remaining = remaining[written:]
+        return size
+
+    def truncate(self, size: int | None = None, /) -> int:
+        """Change the size, or keep the failure."""
+        self._attempt(super().truncate, size)
+        return self.tell() if size is None else size
+
+    def raise_failure(self) -> None:
+        """Raise the failure that was kept."""
+        if self.failure is not None:
+            raise self.failure
+
+    def _attempt(self, operation: Callable[[Any], int | None], argument: Any) -> int | None:
+        """What the operation returns; None once one has failed."""
+        if self.failure is None:
+            try:
+                return operation(argument)
+            except OSError as error:
+                self.failure = error
+        return None
+
+
+@contextmanager
+def write_hdf5(path: Path, error: type[CreepkitError], advice: str) -> Iterator[h5py.File]:
+    """A new file, open for writing, that takes the place of `path` when all of it is written."""
+    with replace_on_success(path, error, advice) as temporary, create_hdf5(temporary) as file:
+        yield file
+
+
+@contextmanager
+def create_hdf5(path: Path) -> Iterator[h5py.File]:
+    """A new file, of a version in which attributes may be long; OSError when there is no room for it."""
+    with FaultTolerantFile(path, "w+") as raw:
+        try:
+            with h5py.File(raw, "w", libver=("v110", "v110")) as file:
+                yield file
+        finally:
+            raw.raise_failure()  # in the place of what HDF5 says when it reads what was dropped
+
+
+@contextmanager
+def open_hdf5(path: Path, kind: FileKind) -> Iterator[h5py.File]:
+    """A file open for reading; the error of `kind` when there is none, it is no HDF5, damaged, or points elsewhere."""
+    check_readable(path, kind)
+    try:
+        with h5py.File(path, "r") as file:
+            _check_links(file, path, kind)
+            yield file
+    except MemoryError:
+        raise kind.error(f"{path}: holds more than there is memory for") from None
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        if path.is_file() and not h5py.is_hdf5(path):
+            raise kind.error(f"{path}: not an HDF5 file; {kind.advice}") from None
+        raise kind.error(f"{path}: cannot be read, it seems damaged: {' '.join(str(error).split())}") from None
+
+
+def write_names(group: h5py.Group, name: str, words: tuple[str, ...]) -> None:
+    """Write an attribute that is a list of texts."""
+    group.attrs.create(name, np.array(words, dtype=object), dtype=h5py.string_dtype())
+
+
+def _check_links(file: h5py.File, path: Path, kind: FileKind) -> None:
+    """Raise the error of `kind` for a file that would have HDF5 open other files, or that has no end."""
+    groups: list[h5py.Group] = [file]
+    visited = 0
+    while groups:
+        group = groups.pop()
+        for name in group:
+            visited += 1
+            if visited > MAXIMUM_OBJECTS:  # hard links may also lead back to where they came from
+                raise kind.error(f"{path}: more than {MAXIMUM_OBJECTS} objects, or links in a circle; {kind.advice}")
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                raise kind.error(f"{path}: '{name}' is a link to elsewhere, which is not followed; {kind.advice}")
+            item = group[name]
+            if isinstance(item, h5py.Group):
+                groups.append(item)
+            elif isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
+                raise kind.error(f"{path}: the array '{name}' lies in other files, which are not opened; {kind.advice}")

@@ -1,0 +1,153 @@
+"""JSON, strictly: no repeated keys, no numbers that JSON does not know, limited size and depth."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from creepkit.errors import nearest
+from creepkit.files.reading import FileKind, read_text
+from creepkit.files.writing import write_text
+
+MAXIMUM_DEPTH = 200
+"""Lists and objects inside one another; the equations of laws are the deepest, with some 60."""
+
+
+@dataclass(frozen=True)
+class DocumentFormat:
+    """A document with a format name and a version, such as the identification's.
+
+    name, version : stand first in every document. kind : of the file that holds it.
+    remedy : what to do about a document of an older version: "identify again".
+    """
+
+    name: str
+    version: int
+    kind: FileKind
+    remedy: str
+
+    @property
+    def heading(self) -> dict[str, str | int]:
+        """The two entries that stand first in every document."""
+        return {"format": self.name, "version": self.version}
+
+
+def json_text(data: Any) -> str:
+    """JSON-able data as indented text; ValueError for NaN and infinities, which a codec must have replaced."""
+    return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def compact_json(data: Any, *, sort_keys: bool = False) -> str:
+    """JSON-able data on one line, as the headers of binary files hold it."""
+    return json.dumps(data, allow_nan=False, sort_keys=sort_keys)
+
+
+def canonical_json(data: Any) -> bytes:
+    """JSON-able data in one defined form, keys sorted: what fingerprints are made from."""
+    return json.dumps(data, sort_keys=True).encode()
+
+
+def as_read_back(data: Any) -> Any:
+    """JSON-able data as a file would give them back, with lists for tuples."""
+    return json.loads(json.dumps(data))
+
+
+def write_json(data: Any, path: Path, kind: FileKind) -> Path:
+    """Write JSON-able data, whole or not at all."""
+    return write_text(json_text(data), path, kind.error)
+
+
+def read_json(path: Path, kind: FileKind) -> Any:
+    """The data of a JSON file; the error of `kind` says what is wrong with any other."""
+    return parse_json(read_text(path, kind), str(path), kind)
+
+
+def parse_json(text: str, source: str, kind: FileKind) -> Any:
+    """The data of a JSON text; the error of `kind`, naming `source`, for any other text."""
+    try:
+        data = json.loads(text, object_pairs_hook=_unique_keys, parse_constant=_no_constant, parse_float=_finite_number)
+        _check_depth(data)
+    except json.JSONDecodeError as error:
+        problem = f"{source}, line {error.lineno}: not JSON: {error.msg[:1].lower()}{error.msg[1:]}"
+        raise kind.error(f"{problem}; {kind.advice}") from None
+    except RecursionError:
+        raise kind.error(f"{source}: lists nested too deep for {kind.noun}; {kind.advice}") from None
+    except _JsonError as error:
+        raise kind.error(f"{source}: {error}; {kind.advice}") from None
+    except ValueError:  # Python limits the digits of an integer
+        raise kind.error(f"{source}: an integer too long for {kind.noun}; {kind.advice}") from None
+    return data
+
+
+def check_heading(data: Any, source: str, document: DocumentFormat) -> dict[str, Any]:
+    """The entries of a document below its heading; the error of its kind when it is no such document or version."""
+    kind = document.kind
+    if not isinstance(data, dict) or data.get("format") != document.name:
+        raise kind.error(
+            f"{source}: this is not {kind.noun} that creepkit wrote (format '{document.name}', version "
+            f"{document.version}); {kind.advice}"
+        )
+    version = data.get("version")
+    if type(version) is not int or version != document.version:
+        newer = type(version) is int and version > document.version
+        advice = f"written by a newer creepkit: update creepkit, or {document.remedy}" if newer else document.remedy
+        raise kind.error(
+            f"{source}: in version {version!r:.40} of the format; this one reads version {document.version}: {advice}"
+        )
+    return {key: value for key, value in data.items() if key not in ("format", "version")}
+
+
+def check_keys(data: Mapping[str, Any], allowed: tuple[str, ...], place: str, *, optional: bool = False) -> str:
+    """What is wrong with the keys of an object, in one clause: "" when they are those allowed, in any order.
+
+    optional : whether keys may be missing.
+    """
+    for key in data:
+        if key not in allowed:
+            return f"{place}: unknown key {str(key)[:40]!r}; {nearest(str(key)[:40], allowed)}"
+    missing = [key for key in allowed if key not in data]
+    return f"{place}: '{missing[0]}' is missing" if missing and not optional else ""
+
+
+class _JsonError(ValueError):
+    """Text that Python takes for JSON, and JSON does not."""
+
+
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    result = dict(pairs)
+    if len(result) < len(pairs):
+        keys = [key for key, _ in pairs]
+        repeated = next(key for key in result if keys.count(key) > 1)
+        raise _JsonError(f"the key {repeated[:40]!r} stands twice in one object")
+    return result
+
+
+def _no_constant(word: str) -> float:
+    raise _JsonError(f"{word} is no number of JSON")
+
+
+def _finite_number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise _JsonError(f"the number {text[:40]} is too large")
+    return value
+
+
+def _check_depth(data: Any) -> None:
+    """RecursionError beyond the largest depth; by levels, so that the check itself cannot recurse too deep."""
+    level, depth = [data], 0
+    while level:
+        depth += 1
+        if depth > MAXIMUM_DEPTH:
+            raise RecursionError
+        inner: list[Any] = []
+        for item in level:
+            if isinstance(item, dict):
+                inner.extend(value for value in item.values() if isinstance(value, dict | list))
+            elif isinstance(item, list):
+                inner.extend(value for value in item if isinstance(value, dict | list))
+        level = inner

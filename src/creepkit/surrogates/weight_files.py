@@ -1,0 +1,67 @@
+"""Files of surrogates and of interrupted trainings: PyTorch weights below a JSON header."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from creepkit.errors import SurrogateError
+from creepkit.files.json_documents import DocumentFormat
+from creepkit.files.reading import FileKind
+from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, ValueCodec
+from creepkit.files.safetensors_files import read_safetensors, write_safetensors
+from creepkit.language import CreepLaw
+from creepkit.language.law_codec import law_from_json, law_to_json
+from creepkit.records import Specimen
+from creepkit.sampling.conditions import TimeGrid
+from creepkit.specimens.documents import specimen_from_json, specimen_to_json
+from creepkit.surrogates.applicability_domain import ApplicabilityDomain
+
+SURROGATE = DocumentFormat(
+    "creepkit-surrogate",
+    2,
+    FileKind("a surrogate", SurrogateError, "train again or take a copy", maximum_bytes=2**32),
+    remedy="train again",
+)
+
+
+CHECKPOINT = DocumentFormat(
+    "creepkit-training-checkpoint",
+    1,
+    FileKind("a checkpoint of a training", SurrogateError, "remove it to begin again", maximum_bytes=2**34),
+    remedy="remove it to begin again",
+)
+
+
+CODEC = RecordCodec(
+    values={
+        CreepLaw: ValueCodec(law_to_json, law_from_json),
+        Specimen: ValueCodec(specimen_to_json, specimen_from_json),
+    },
+    names={
+        "CreepLaw": CreepLaw,
+        "Specimen": Specimen,
+        "TimeGrid": TimeGrid,
+        "ApplicabilityDomain": ApplicabilityDomain,
+    },
+    default_range=ANY_NUMBER,
+)
+"""Of recipes, and of what a surrogate knows beside its weights."""
+
+
+def write_weights(
+    path: str | Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any], document: DocumentFormat = SURROGATE
+) -> Path:
+    """Write tensors of any shapes with a JSON-able header; the file is whole or absent."""
+    arrays = {name: tensor.detach().cpu().numpy() for name, tensor in tensors.items()}
+    return write_safetensors(path, arrays, header, document)
+
+
+def read_weights(path: str | Path, document: DocumentFormat = SURROGATE) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """The tensors and the header of a file; SurrogateError says what is wrong with any other."""
+    arrays, header = read_safetensors(path, document)
+    return {name: torch.from_numpy(array) for name, array in arrays.items()}, header
