@@ -99,7 +99,7 @@ def steady_velocity(mesh: Mesh, pressure, values, *, modulus: float, elastic: fl
 
 def equal_steps(made: Simulation, count: int, first: int = 2) -> Simulation:
     """A pattern for `like`: `count` equal steps in one segment, whose first step is row `first` of the record."""
-    return replace(made, places=np.full((count + first, 2), 1.0 / count))
+    return replace(made, positions=np.full((count + first, 2), 1.0 / count))
 
 
 def coaxial_stresses(mesh: Mesh, made: Simulation, modulus: float, poisson: float, row: int = -1):
