@@ -1,5 +1,47 @@
 """What all tests share."""
 
+import pytest
+
 from creepkit.cli import set_numba_cache
+from helpers.compilers import compiler_or_skip, skipped_without_need
 
 set_numba_cache()
+
+
+@pytest.fixture(scope="session")
+def gfortran() -> str:
+    """The Fortran compiler."""
+    return compiler_or_skip("gfortran")
+
+
+@pytest.fixture(scope="session")
+def gcc() -> str:
+    """The C compiler."""
+    return compiler_or_skip("gcc")
+
+
+@pytest.fixture(scope="session")
+def gxx() -> str:
+    """The C++ compiler."""
+    return compiler_or_skip("g++")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--no-needless-skips",
+        action="store_true",
+        help="fail when a test was skipped although the compiler or the data that it needs are there",
+    )
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Runs where reports of all workers arrive; workers have no terminal."""
+    terminal = session.config.pluginmanager.get_plugin("terminalreporter")
+    if terminal is None or not session.config.getoption("--no-needless-skips"):
+        return
+    reasons = [report.longrepr[2] for report in terminal.stats.get("skipped", ())]
+    needless = skipped_without_need(reasons)
+    for reason in sorted(set(needless)):
+        terminal.write_line(f"skipped {needless.count(reason)} times without need: {reason}", red=True)
+    if needless:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED

@@ -1,7 +1,6 @@
 """Bulges to be observed: planted ones, and profiles that CalculiX made of the true dimple."""
 
 import numpy as np
-import pytest
 from scipy.interpolate import CubicSpline
 
 from helpers.paths import SHARED
@@ -10,7 +9,6 @@ NODES = np.linspace(0.0, 10.0, 41)
 FINE = np.linspace(0.0, 10.0, 10001)
 LOOKED_AT = np.linspace(0.0, 7.5, 76)
 TABLES = SHARED / "benchmarks" / "dabi_ccx"
-beside = pytest.mark.skipif(not TABLES.is_dir(), reason="the tables of CalculiX do not lie beside this checkout")
 
 
 def bell(r, D, S, p):

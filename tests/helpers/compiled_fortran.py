@@ -3,36 +3,30 @@
 from __future__ import annotations
 
 import ctypes
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-FLAGS = ("-shared", "-fPIC", "-O1", "-Wall", "-Wno-zerotrip", "-Wno-unused-dummy-argument")
+from helpers.compilers import shared_library
+
+FLAGS = ("-O1", "-Wall", "-Wno-zerotrip", "-Wno-unused-dummy-argument")
 PARAMETERS = "      implicit real*8(a-h,o-z)\n      parameter (nprecd=2)\n"
 """What Abaqus' own ABA_PARAM.INC declares on double-precision machines."""
 
 
-def compiled(text: str, folder: Path, stem: str) -> tuple[ctypes.CDLL, str]:
+def compile_fortran(gfortran: str, text: str, folder: Path, stem: str) -> tuple[ctypes.CDLL, str]:
     """A shared library of Fortran, and the compiler's warnings."""
-    if shutil.which("gfortran") is None:
-        pytest.skip("gfortran is not installed; CI installs it")
     (folder / "ABA_PARAM.INC").write_text(PARAMETERS)
-    source, library = folder / f"{stem}.f", folder / f"{stem}.so"
+    source = folder / f"{stem}.f"
     source.write_text(text)
-    command = ["gfortran", *FLAGS, "-o", library, source]
-    found = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert found.returncode == 0, found.stderr
-    return ctypes.CDLL(str(library)), found.stderr
+    return shared_library([gfortran, *FLAGS, source], folder / f"{stem}.so")
 
 
 class Routine:
     """The subroutine CREEP of one exported file."""
 
-    def __init__(self, text: str, folder: Path, stem: str) -> None:
-        self.library, self.warnings = compiled(text, folder, stem)
+    def __init__(self, gfortran: str, text: str, folder: Path, stem: str) -> None:
+        self.library, self.warnings = compile_fortran(gfortran, text, folder, stem)
 
     def creep(
         self,

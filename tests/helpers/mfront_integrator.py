@@ -2,7 +2,6 @@
 
 import ctypes
 import re
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +10,11 @@ from creepkit.exporters.mfront import MfrontExporter
 from creepkit.language import Elastic
 from creepkit.language.symbols import POINT_VARIABLES
 from creepkit.records import LawWithValues, Units
+from helpers.compilers import shared_library
 from helpers.export_cases import renamed
 
 STUB = Path(__file__).with_name("tfel_stub.hxx")
+STRICT = ("-std=c++17", "-Wall", "-Wextra", "-Werror", "-O0")
 ELASTIC = Elastic(150e3, 0.3)
 
 
@@ -32,14 +33,11 @@ def declared(text, keyword):
     return dict(re.findall(rf"^@{keyword} (?:\w+ )?(\w+)(?: = (.+?))?;", text, re.MULTILINE))
 
 
-def compiled(folder, code):
+def compile_cpp(gxx, folder, code):
     """C++ as a library, without a warning."""
-    (folder / "block.cpp").write_text(code, encoding="utf-8")
-    command = ["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-O0", "-shared", "-fPIC", "-o"]
-    command += [str(folder / "block.so"), str(folder / "block.cpp")]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert run.returncode == 0, run.stderr[:3000]
-    return ctypes.CDLL(str(folder / "block.so"))
+    source = folder / "block.cpp"
+    source.write_text(code, encoding="utf-8")
+    return shared_library([gxx, *STRICT, source], folder / "block.so")[0]
 
 
 COLUMNS = {"stress": 0, "strain": 1, "principal": 4, "mean": 5}
@@ -67,12 +65,12 @@ def scalar_function(name, law, text):
 class Block:
     """@Integrator of a file, compiled with the stub: residuals and Jacobian in deel (6), dp and internal variables."""
 
-    def __init__(self, folder, law, values=None, units=None):
+    def __init__(self, gxx, folder, law, values=None, units=None):
         text = exported(law, values, elastic=ELASTIC, units=units or Units())
         self.states = [*declared(text, "StateVariable")][1:]
         self.size = 7 + len(self.states)
         self.modulus = ELASTIC.E / (units or Units()).megapascals
-        self._integrate = compiled(folder, self._class(text)).integrate
+        self._integrate = compile_cpp(gxx, folder, self._class(text)).integrate
 
     def _class(self, text):
         members = [f"real {name} = {value};" for name, value in declared(text, "Parameter").items()]

@@ -68,7 +68,7 @@ SEVERAL_EXPONENTS = ("combined", "drifting exponent")
 
 
 @pytest.fixture(scope="module")
-def routines(tmp_path_factory):
+def routines(tmp_path_factory, gfortran):
     """{name: compiled routine}."""
     folder = tmp_path_factory.mktemp("creep")
     made = {}
@@ -80,7 +80,7 @@ def routines(tmp_path_factory):
             place = folder / f"r{len(made)}"
             place.mkdir()
             text = exporter().text(LawWithValues(law, values, name="mine", **how))
-            made[key] = Routine(text, place, f"mine{len(made)}")
+            made[key] = Routine(gfortran, text, place, f"mine{len(made)}")
         return made[key]
 
     return routine
@@ -158,13 +158,13 @@ def test_damage_follows_its_closed_form_and_stays_at_its_limit(routines):
 
 
 @pytest.mark.parametrize("folds", [1.0, 5.0, 40.0, 1e6])
-def test_a_state_that_feeds_its_own_growth_never_runs_backwards(folds, tmp_path):
+def test_a_state_that_feeds_its_own_growth_never_runs_backwards(folds, tmp_path, gfortran):
     """q' = B (q + c) and rate = q': from q = 0 the strain is c (exp(B t) - 1), at least c B t in any increment."""
     law = CreepLaw(
         "growth", {"term": B * (omega + c)}, {B: RATE, c: POWER}, states={omega: State(0.0, B * (omega + c))}
     )
     routine, inner = (
-        Routine(AbaqusCreepSubroutine().text(LawWithValues(law, {"B": 1e-4, "c": 1e-3})), tmp_path, "growth"),
+        Routine(gfortran, AbaqusCreepSubroutine().text(LawWithValues(law, {"B": 1e-4, "c": 1e-3})), tmp_path, "growth"),
         np.zeros(10),
     )
     found, _ = routine.creep(60.0, 0.0, folds / 1e-4, folds / 1e-4, states=inner)
@@ -194,10 +194,10 @@ def test_the_derivatives_are_those_of_the_update(name, creep, routines):
     assert (found[1:4] == 0.0).all()
 
 
-def test_the_derivative_to_the_pressure(tmp_path):
+def test_the_derivative_to_the_pressure(tmp_path, gfortran):
     law = CreepLaw("mean", {"term": A * (stress + 0.5 * mean_stress) ** n}, {A: RATE, n: POWER})
     text = AbaqusCreepSubroutine().text(LawWithValues(law, {"A": 1e-16, "n": 4.0}, units=Units("Pa", "h")))
-    routine = Routine(text, tmp_path, "mean")
+    routine = Routine(gfortran, text, tmp_path, "mean")
     found = [routine.creep(70e6, 0.0, 2.0, 2.0, pressure=p)[0] for p in (-30e6, -30e6 + 1e3, -30e6 - 1e3)]
     assert found[0][0] == pytest.approx(1e-16 * 85.0**4 * 7200.0, rel=1e-12)
     assert found[0][3] == pytest.approx((found[1][0] - found[2][0]) / 2e3, rel=1e-6)
@@ -210,9 +210,9 @@ def test_pascal_and_hours_give_the_same_strain(name, routines):
     assert other == pytest.approx(plain, rel=1e-10)
 
 
-def test_temperature_steps_agree_with_the_integrator(tmp_path):
+def test_temperature_steps_agree_with_the_integrator(tmp_path, gfortran):
     law, values = ck.law("norton").times(ck.arrhenius(T_ref=1000.0)), {"A": 1e-16, "n": 4.0, "Q": 3e5}
-    routine = Routine(AbaqusCreepSubroutine().text(LawWithValues(law, values)), tmp_path, "warm")
+    routine = Routine(gfortran, AbaqusCreepSubroutine().text(LawWithValues(law, values)), tmp_path, "warm")
     ramp = (np.array([0.0, 2e4, 2.2e4, END]), np.array([1000.0, 1000.0, 1080.0, 1080.0]))
     exact = reference(law, values, temperature=Program(*ramp))
     errors = [abs(marched(routine, count, warm=ramp)[0] / exact - 1) for count in (150, 300, 600)]
@@ -266,10 +266,12 @@ def test_calculix_is_given_the_stress_for_an_increment_where_elasticity_is_aniso
 
 
 @pytest.mark.parametrize("name", ["damage", "a state that starts at one"])
-def test_calculix_routines_keep_states_themselves_through_iterations_and_cutbacks(name, routines, tmp_path):
+def test_calculix_routines_keep_states_themselves_through_iterations_and_cutbacks(name, routines, tmp_path, gfortran):
     """Against Abaqus' STATEV: an iteration at another stress and a step that fails must leave nothing behind."""
     law, values = CASES[name]
-    routine = Routine(CalculixCreepSubroutine().text(LawWithValues(law, values, name="mine")), tmp_path, "fresh")
+    routine = Routine(
+        gfortran, CalculixCreepSubroutine().text(LawWithValues(law, values, name="mine")), tmp_path, "fresh"
+    )
     inner, creep = np.zeros(10), 0.0
     for before, after in pairwise(np.linspace(0.0, 3e4, 11)):
         routine.creep(95.0, creep, before + 4 * (after - before), 4 * (after - before))  # cut back

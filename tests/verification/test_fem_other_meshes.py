@@ -14,9 +14,10 @@ from creepkit.records import PressureJump, Program, Status
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import Observation
 from helpers.fem_cases import BENCHMARKS, course, run
+from helpers.paths import NO_SHARED_DATA
 
 if not BENCHMARKS.is_dir():
-    pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)
+    pytest.skip(NO_SHARED_DATA, allow_module_level=True)
 
 DECKS = BENCHMARKS / "dabi_ccx"
 PAPER = BENCHMARKS.parent / "dabi"

@@ -10,9 +10,10 @@ import pytest
 from creepkit.fem.mesh import Mesh, StripMesh
 from creepkit.records import Program
 from helpers.fem_cases import BENCHMARKS, block, course, mesh_of, run, steady_velocity
+from helpers.paths import NO_SHARED_DATA
 
 if not BENCHMARKS.is_dir():
-    pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)
+    pytest.skip(NO_SHARED_DATA, allow_module_level=True)
 
 RADIUS, E, NU = 100.0, 2e5, 0.3
 TABLE = json.loads((BENCHMARKS / "closed_form_references.json").read_text())["thin_circular_plate_norton"]["table"]

@@ -25,9 +25,10 @@ from helpers.fem_cases import (
     shell,
     steady_velocity,
 )
+from helpers.paths import NO_SHARED_DATA
 
 if not BENCHMARKS.is_dir():
-    pytest.skip("the reference numbers do not lie beside this checkout", allow_module_level=True)
+    pytest.skip(NO_SHARED_DATA, allow_module_level=True)
 
 CLOSED_FORMS = json.loads((BENCHMARKS / "closed_form_references.json").read_text())
 TUBES = {case["name"]: case for case in CLOSED_FORMS["thick_cylinder_plane_strain_norton"]["cases"]}

@@ -11,10 +11,10 @@ import creepkit as ck
 from creepkit.cli.app import app
 from creepkit.inverse.cross_validation import leave_one_condition_out, loading_strains, times_to_strain
 from creepkit.language import CreepLaw, Param, parameters, strain, stress
-from helpers.paths import SHARED
+from helpers.paths import SHARED, needs_shared_data
 
 CURVES = SHARED / "uniaxial" / "cmsx6"
-pytestmark = pytest.mark.skipif(not CURVES.is_dir(), reason="the measured curves lie beside the project, not in it")
+pytestmark = needs_shared_data
 
 
 @pytest.fixture(scope="module")

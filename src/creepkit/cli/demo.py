@@ -17,11 +17,14 @@ if TYPE_CHECKING:
     from creepkit.records import History
 
 
-PLANTED = Path(__file__).parent / "planted"
+EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
+
+
+PLANTED = EXAMPLE_DATA / "planted_creep_curves"
 """Nine creep curves of bars, and the truth behind them."""
 
 
-PLANTED_BULGE = Path(__file__).parent / "planted_bulge"
+PLANTED_BULGE = EXAMPLE_DATA / "planted_bulge_test"
 """A bulge test of one dimple, and the truth behind it."""
 
 

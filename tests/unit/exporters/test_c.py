@@ -2,7 +2,6 @@
 
 import ctypes
 import math
-import subprocess
 
 import numpy as np
 import pytest
@@ -16,21 +15,19 @@ from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import LawWithValues, Units
+from helpers.compilers import shared_library
 from helpers.export_cases import LAWS, TOLERANCE, case
 
-STRICT = ("gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 COEFFICIENT = Param("rate coefficient", (1e-40, 1e-5), "1/s", "log", 0.0)
 
 
-def compiled(folder, sources):
+def compile_c(gcc, folder, sources):
     """The exported sources as one library, all in one call of the compiler without a warning."""
     for k, source in enumerate(sources):
         (folder / f"law{k}.c").write_text(CExporter().text(source), encoding="utf-8")
-    files = [str(path) for path in sorted(folder.glob("law*.c"))]
-    command = [*STRICT, "-O1", "-shared", "-fPIC", "-o", str(folder / "laws.so"), *files, "-lm"]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert run.returncode == 0, run.stderr[:2000]
-    return ctypes.CDLL(str(folder / "laws.so"))
+    files = sorted(folder.glob("law*.c"))
+    return shared_library([gcc, *STRICT, "-O1", *files, "-lm"], folder / "laws.so")[0]
 
 
 class Compiled:
@@ -74,7 +71,7 @@ class Compiled:
         return rows, log
 
 
-def test_every_law_agrees_with_50_digits(tmp_path):
+def test_every_law_agrees_with_50_digits(tmp_path, gcc):
     sources, places = [], {}
     for name in LAWS:
         for values in case(name).sets:
@@ -82,7 +79,7 @@ def test_every_law_agrees_with_50_digits(tmp_path):
             if key not in places:
                 places[key] = f"law_{len(sources)}"
                 sources.append(LawWithValues(LAWS[name], values, name=places[key]))
-    library = compiled(tmp_path, sources)
+    library = compile_c(gcc, tmp_path, sources)
 
     bad = []
     for name in LAWS:
@@ -144,13 +141,13 @@ def test_a_function_without_a_form_in_c_is_refused():
 # ---- what the compiled file does -----------------------------------------------------------------------------------
 
 
-def test_units_are_converted_on_entry_and_on_exit(tmp_path):
+def test_units_are_converted_on_entry_and_on_exit(tmp_path, gcc):
     """With stress in Pa and time in h, rates are per hour and slopes per Pa and per hour."""
     law = LAWS["foreign Kachanov-Rabotnov"] + TIME_HARDENING
     values = law.center()
     units = Units("Pa", "h")
     sources = [LawWithValues(law, values, name="native"), LawWithValues(law, values, name="converted", units=units)]
-    library = compiled(tmp_path, sources)
+    library = compile_c(gcc, tmp_path, sources)
     plain, other = (Compiled(library, name, law) for name in ("native", "converted"))
     point = np.array([120.0, 0.01, 7.2e4, 1000.0, 90.0, 40.0, 0.3])
     scales = np.array([1e6, 1.0, 1 / 3600, 1.0, 1e6, 1e6, 1.0])
@@ -161,14 +158,14 @@ def test_units_are_converted_on_entry_and_on_exit(tmp_path):
     assert found_log == pytest.approx(log + math.log(3600), rel=1e-14)
 
 
-def test_internal_variables_start_and_end_as_the_law_says(tmp_path):
+def test_internal_variables_start_and_end_as_the_law_says(tmp_path, gcc):
     law = LAWS["foreign Kachanov-Rabotnov"]
-    library = compiled(tmp_path, [LawWithValues(law, law.center(), name="damage")])
+    library = compile_c(gcc, tmp_path, [LawWithValues(law, law.center(), name="damage")])
     assert ctypes.c_double.in_dll(library, "damage_initial").value == 0.0
     assert ctypes.c_double.in_dll(library, "damage_limit").value == 0.99
 
 
-def test_names_that_c_keeps_for_itself_are_renamed_openly(tmp_path):
+def test_names_that_c_keeps_for_itself_are_renamed_openly(tmp_path, gcc):
     words = parameters("double log y0 printf x least slopes odd_rate new")
     law = CreepLaw(
         "odd",
@@ -180,17 +177,17 @@ def test_names_that_c_keeps_for_itself_are_renamed_openly(tmp_path):
     text = CExporter().text(source)
     for name in ("double", "log", "y0", "printf", "slopes", "odd_rate", "new"):
         assert f" * '{name}' is called {name}_2 here" in text
-    assert Compiled(compiled(tmp_path, [source]), "odd", law).rate([8.0]) == pytest.approx(1e-9 * math.exp(-0.5))
+    assert Compiled(compile_c(gcc, tmp_path, [source]), "odd", law).rate([8.0]) == pytest.approx(1e-9 * math.exp(-0.5))
 
 
-def test_nothing_in_a_note_becomes_code(tmp_path):
+def test_nothing_in_a_note_becomes_code(tmp_path, gcc):
     notes = ["*/ broken", "/* nested", "*/*/ twice", "trigraph ??/", "back\\", "line\n*/ two", "\x00\u2028*/"]
-    library = compiled(tmp_path, [LawWithValues(NORTON, {"A": 1e-16, "n": 5.0}, notes)])
+    library = compile_c(gcc, tmp_path, [LawWithValues(NORTON, {"A": 1e-16, "n": 5.0}, notes)])
     assert Compiled(library, "norton", NORTON).rate([100.0]) == pytest.approx(1e-6, rel=1e-12)
 
 
-def test_virgin_and_unloaded_material_has_finite_numbers(tmp_path):
-    library = compiled(tmp_path, [LawWithValues(COMBINED, COMBINED.center())])
+def test_virgin_and_unloaded_material_has_finite_numbers(tmp_path, gcc):
+    library = compile_c(gcc, tmp_path, [LawWithValues(COMBINED, COMBINED.center())])
     law = Compiled(library, "combined", COMBINED)
     for point in ([100.0, 0.0, 0.0], [0.0, 0.01, 1.0], [0.0, 0.0, 0.0]):
         rows, log = law.rows(point + [0.0] * 3)
@@ -198,10 +195,10 @@ def test_virgin_and_unloaded_material_has_finite_numbers(tmp_path):
         assert math.isfinite(log)
 
 
-def test_beyond_doubles_the_rate_is_infinite_and_its_logarithm_is_not(tmp_path):
+def test_beyond_doubles_the_rate_is_infinite_and_its_logarithm_is_not(tmp_path, gcc):
     """ln A sinh(x)^n = ln A + n (x - ln 2) for large x."""
     law = LAWS["registered hyperbolic-sine"]
-    library = compiled(tmp_path, [LawWithValues(law, {"A": 1e-5, "n": 8.0, "B": 1.0})])
+    library = compile_c(gcc, tmp_path, [LawWithValues(law, {"A": 1e-5, "n": 8.0, "B": 1.0})])
     found = Compiled(library, "hyperbolic_sine", law)
     assert found.rate([2000.0]) == math.inf
     log, slopes = found.log_rate([2000.0])

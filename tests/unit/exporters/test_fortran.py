@@ -2,7 +2,6 @@
 
 import ctypes
 import re
-import shutil
 import subprocess
 
 import numpy as np
@@ -24,7 +23,7 @@ from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import LawWithValues, Units
-from helpers.compiled_fortran import PARAMETERS, compiled, pointer
+from helpers.compiled_fortran import PARAMETERS, compile_fortran, pointer
 from helpers.export_cases import LAWS, TOLERANCE, case
 
 A, n, a = parameters("A n a")
@@ -44,7 +43,7 @@ def routine_of(values, name):
 # ---- the law -------------------------------------------------------------------------------------------------------
 
 
-def test_every_law_agrees_with_50_digits(tmp_path):
+def test_every_law_agrees_with_50_digits(tmp_path, gfortran):
     places, lines = {}, []
     for name in LAWS:
         for values in case(name).sets:
@@ -52,7 +51,7 @@ def test_every_law_agrees_with_50_digits(tmp_path):
             if key not in places:
                 places[key] = f"law{len(places)}"
                 lines += routine_of(LawWithValues(LAWS[name], values), places[key])
-    library = compiled("\n".join(lines) + "\n", tmp_path, "laws")[0]
+    library = compile_fortran(gfortran, "\n".join(lines) + "\n", tmp_path, "laws")[0]
 
     bad = []
     for name in LAWS:
@@ -76,7 +75,7 @@ def rows_of(library, name, point, judged):
     return np.column_stack([values, slopes]), out[0]
 
 
-def test_functions_that_fortran_lacks_keep_their_digits_near_zero(tmp_path):
+def test_functions_that_fortran_lacks_keep_their_digits_near_zero(tmp_path, gfortran):
     import mpmath
 
     lines = [
@@ -89,7 +88,7 @@ def test_functions_that_fortran_lacks_keep_their_digits_near_zero(tmp_path):
     from creepkit.exporters.fortran_code import fortran_statements, stable_function_definitions
 
     text = fortran_statements([*lines, "contains", *stable_function_definitions(PROBED), "end subroutine probe"])
-    library = compiled("\n".join(text) + "\n", tmp_path, "probe")[0]
+    library = compile_fortran(gfortran, "\n".join(text) + "\n", tmp_path, "probe")[0]
     for a in (1e-12, 3e-5, 0.02, 0.4, 0.6, 0.9, 1.1, 5.0, 40.0, 600.0):
         out = np.empty(6)
         library.probe_(ctypes.byref(ctypes.c_double(a)), pointer(out))
@@ -131,8 +130,7 @@ def test_every_file_is_fixed_form(name):
         assert line.startswith(("!", "      ", "     &"))
 
 
-@pytest.mark.skipif(shutil.which("gfortran") is None, reason="gfortran is not installed; CI installs it")
-def test_files_compile_without_a_warning(tmp_path):
+def test_files_compile_without_a_warning(tmp_path, gfortran):
     sources = []
     for k, name in enumerate(["combined with temperature", "registered drifting-exponent", "foreign names of Python"]):
         for exporter in (AbaqusCreepSubroutine(), CalculixCreepSubroutine()):
@@ -140,7 +138,7 @@ def test_files_compile_without_a_warning(tmp_path):
             sources[-1].write_text(exporter.text(LawWithValues(LAWS[name], LAWS[name].center())))
     (tmp_path / "ABA_PARAM.INC").write_text("      implicit real*8(a-h,o-z)\n")
     flags = ["-fsyntax-only", "-Wall", "-Wno-zerotrip", "-Wno-unused-dummy-argument"]
-    run = subprocess.run(["gfortran", *flags, *sources], cwd=tmp_path, capture_output=True, text=True, check=False)
+    run = subprocess.run([gfortran, *flags, *sources], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (run.returncode, run.stderr) == (0, "")
 
 
@@ -177,16 +175,16 @@ def test_a_name_is_made_an_identifier_and_short_enough():
 
 
 @pytest.mark.parametrize("exporter", [AbaqusCreepSubroutine(), CalculixCreepSubroutine()])
-def test_names_that_are_long_or_those_of_routines_compile(exporter, tmp_path):
+def test_names_that_are_long_or_those_of_routines_compile(exporter, tmp_path, gfortran):
     clash, long, longer = parameters(f"foreign_law a_{80 * 'y'} a_{80 * 'y'}z")
     source = law(clash * stress**long * longer, {clash: RATE, long: POWER, longer: POWER})
     text = exporter.text(LawWithValues(source, {clash.name: 1e-16, long.name: 5, longer.name: 2}))
     assert "! 'foreign_law' is called foreign_law_2 here" in text
     assert max(len(line) for line in text.splitlines() if line[:1] != "!") <= 72
-    assert not compiled(text, tmp_path, "clash")[1]
+    assert not compile_fortran(gfortran, text, tmp_path, "clash")[1]
 
 
-def test_a_saturating_rate_raises_no_floating_point_exception_at_long_times(tmp_path):
+def test_a_saturating_rate_raises_no_floating_point_exception_at_long_times(tmp_path, gfortran):
     text = AbaqusCreepSubroutine().text(LawWithValues(LAWS["foreign saturating"], {"A": 1e-20, "r": 1e-3, "n": 4.0}))
     driver = """
       program trapped
@@ -197,7 +195,7 @@ def test_a_saturating_rate_raises_no_floating_point_exception_at_long_times(tmp_
       end program"""
     (tmp_path / "ABA_PARAM.INC").write_text(PARAMETERS)
     (tmp_path / "law.f").write_text(text + driver + "\n")
-    trap = ["gfortran", "-w", "-ffpe-trap=invalid,zero,overflow", "-finit-real=snan", "-o", "law", "law.f"]
+    trap = [gfortran, "-w", "-ffpe-trap=invalid,zero,overflow", "-finit-real=snan", "-o", "law", "law.f"]
     subprocess.run(trap, cwd=tmp_path, check=True)
     assert subprocess.run([tmp_path / "law"], check=False).returncode == 0
 

@@ -20,12 +20,12 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import Units
 from helpers.export_cases import LAWS, TOLERANCE, case, renamed
-from helpers.mfront_integrator import ELASTIC, Block, compiled, declared, exported, scalar_function
+from helpers.mfront_integrator import ELASTIC, Block, compile_cpp, declared, exported, scalar_function
 
 # ---- the law's statements against 50 digits ------------------------------------------------------------------------
 
 
-def test_every_law_agrees_with_50_digits(tmp_path):
+def test_every_law_agrees_with_50_digits(tmp_path, gxx):
     """The derivatives to time and temperature, which are known at t + theta dt, are not in the file."""
     functions, places = [], {}
     for name, law in LAWS.items():
@@ -35,7 +35,7 @@ def test_every_law_agrees_with_50_digits(tmp_path):
                 places[key] = f"law_{len(functions)}"
                 functions.append(scalar_function(places[key], law, exported(law, values)))
     start = "#include <cmath>\nusing namespace std;\nusing real = double;"
-    library = compiled(tmp_path, "\n".join([start, *functions]))
+    library = compile_cpp(gxx, tmp_path, "\n".join([start, *functions]))
 
     bad = []
     for name, law in LAWS.items():
@@ -64,12 +64,12 @@ SKEW = np.array([8e-4, -3e-4, 1e-4, 2e-4, -1e-4, 3e-4])
     "name", ["registered combined", "multiaxial", "foreign Liu-Murakami", "foreign Kachanov-Rabotnov"]
 )
 @pytest.mark.parametrize("units", [Units(), Units("Pa", "h")], ids=["MPa s", "Pa h"])
-def test_the_jacobian_is_that_of_the_residuals(name, units, tmp_path):
+def test_the_jacobian_is_that_of_the_residuals(name, units, tmp_path, gxx):
     """Against central differences of the residuals, whose error is some 1e-9 of the largest entry of a row."""
     law = LAWS[name]
     values = {n: 1e-14 if p.unit == "1/s" else p.center for n, p in law.table.items()}
     values |= {"A": 1e-8} if name == "multiaxial" else {}
-    block = Block(tmp_path, law, values, units)
+    block = Block(gxx, tmp_path, law, values, units)
     state = np.array([0.01, *[0.3] * len(block.states)])
     unknown = np.array([1e-5, -2e-5, 1e-5, 3e-5, -1e-5, 2e-5, 1e-4, *[1e-3] * len(block.states)])
     place = {"eel": SKEW, "state": state, "dt": 200.0 / units.seconds, "elapsed": 1e4 / units.seconds}
@@ -84,10 +84,10 @@ def test_the_jacobian_is_that_of_the_residuals(name, units, tmp_path):
     assert np.abs(jacobian[6, :6]).max() > 1e-6
 
 
-def test_relaxation_follows_the_closed_form_to_second_order(tmp_path):
+def test_relaxation_follows_the_closed_form_to_second_order(tmp_path, gxx):
     """Norton at constant strain: s^(1-n) = s_0^(1-n) + 3 G A (n - 1) t for the von Mises stress s, G = E/(2 (1+nu))."""
     A, n, seconds = 1e-20, 5.0, 2e6
-    block = Block(tmp_path, NORTON, {"A": A, "n": n})
+    block = Block(gxx, tmp_path, NORTON, {"A": A, "n": n})
     shear = ELASTIC.E / 2 / 1.3
     start = 2 * shear * 1e-3 * np.sqrt(3)  # pure shear: eel_12 = 1e-3, in the basis of 2^(1/2) eel_12
     exact = (start ** (1 - n) + 3 * shear * A * (n - 1) * seconds) ** (1 / (1 - n))
@@ -103,9 +103,9 @@ def test_relaxation_follows_the_closed_form_to_second_order(tmp_path):
 
 
 @pytest.mark.parametrize("m", [-0.3, -0.6, -0.9])
-def test_the_first_increment_from_zero_strain_converges(m, tmp_path):
+def test_the_first_increment_from_zero_strain_converges(m, tmp_path, gxx):
     """dp = dt A s^n (dp/2)^m at a stress that hardly relaxes: dp = (dt A s^n 2^-m)^(1/(1-m))."""
-    block = Block(tmp_path, STRAIN_HARDENING, {"A": 1e-22, "n": 5.0, "m": m})
+    block = Block(gxx, tmp_path, STRAIN_HARDENING, {"A": 1e-22, "n": 5.0, "m": m})
     eel = np.array([0, 0, 0, 1e-3 * np.sqrt(2), 0, 0])
     stress_ = ELASTIC.E / 1.3 * 1e-3 * np.sqrt(3)
     _, state, iterations = block.step(eel, np.zeros(1), 60.0, guess=1e-6)
@@ -113,8 +113,8 @@ def test_the_first_increment_from_zero_strain_converges(m, tmp_path):
     assert iterations < 40
 
 
-def test_no_stress_leaves_the_material_as_it_is(tmp_path):
-    block = Block(tmp_path, COMBINED)
+def test_no_stress_leaves_the_material_as_it_is(tmp_path, gxx):
+    block = Block(gxx, tmp_path, COMBINED)
     residual, jacobian = block(np.zeros(7), np.zeros(6), np.zeros(1), 10.0)
     assert np.isfinite(jacobian).all()
     np.testing.assert_allclose(residual, 0.0, atol=1e-30)

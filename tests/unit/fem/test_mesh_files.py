@@ -12,10 +12,9 @@ from creepkit.fem.mesh import Mesh, discretize, half_bandwidth, mesh_quality
 from creepkit.fem.mesh_builder import renumbered
 from creepkit.fem.mesh_files import read_input_deck, read_mesh
 from creepkit.specimens.bulge.geometry import DimpleGeometry
-from helpers.paths import SHARED
+from helpers.paths import SHARED, needs_shared_data
 
 DATA = SHARED
-beside = pytest.mark.skipif(not DATA.is_dir(), reason="the mesh files do not lie beside this checkout")
 
 NODES = """id,r_mm,z_mm
 1,0,0
@@ -88,7 +87,7 @@ def push(mesh: Mesh) -> np.ndarray:
     return np.array([(first - last)[:, 1].sum(), 0.5 * (last**2 - first**2)[:, 0].sum()])
 
 
-@beside
+@needs_shared_data
 def test_the_mesh_of_the_paper():
     folder = DATA / "dabi"
     mesh = read_mesh(*(folder / f"paper_mesh_{name}" for name in ("nodes.csv", "quads.csv", "sets.json")))
@@ -111,7 +110,7 @@ def test_the_mesh_of_the_paper():
     assert half_bandwidth(mesh.elements) < 400
 
 
-@beside
+@needs_shared_data
 @pytest.mark.parametrize("name", ["dabi_timehardening.inp", "dabi_norton_in625_800C_steady.inp"])
 def test_decks_of_calculix(name):
     mesh = read_input_deck(DATA / "benchmarks" / "dabi_ccx" / name)

@@ -9,10 +9,9 @@ from creepkit.language import Elastic
 from creepkit.quality import check_data_quality, exclude_suspect_frames
 from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.records import History, Prediction, PressureJump, StressSteps
-from helpers.paths import SHARED
+from helpers.paths import SHARED, needs_shared_data
 
 DATA = SHARED
-needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the measured curves do not lie beside this checkout")
 NOISE = 1.5e-3
 HOUR = 3600.0
 TIMES = np.arange(1, 97) * 150.0
@@ -66,7 +65,7 @@ def measured():
     return read_histories(DATA / "dabi/in625", creepkit_readers())
 
 
-@needs_data
+@needs_shared_data
 def test_verdict_on_the_nine_bulges(measured):
     """Test 11 after its jump, test 12 beside its twin test 08; cold tests begin high; every last frame is unloading."""
     found = check_data_quality(measured, ElasticDimple())
@@ -80,7 +79,7 @@ def test_verdict_on_the_nine_bulges(measured):
     assert "though the pressure was raised to 10 MPa" in told["test_11", "falling"]
 
 
-@needs_data
+@needs_shared_data
 def test_the_second_part_of_test_11_can_be_left_out(measured):
     """The jump is at 4.05 h; 28950 and 29100 s are after the end of that test."""
     (jumped,) = (h for h in exclude_suspect_frames(measured) if h.name == "test_11")
@@ -90,7 +89,7 @@ def test_the_second_part_of_test_11_can_be_left_out(measured):
     assert all("suspect" not in h.labels for h in others)
 
 
-@needs_data
+@needs_shared_data
 def test_unloading_is_seen_without_being_told(measured):
     """Without the end times of the headers: the last frame of tests 01 to 09."""
     naive = [h.replace(used=np.ones(h.times.size, bool), labels={}) for h in measured]
@@ -98,7 +97,7 @@ def test_unloading_is_seen_without_being_told(measured):
     assert found == {f"test_{k:02d}": (96,) for k in (1, 2, 3, 4, 6, 8, 9)}
 
 
-@needs_data
+@needs_shared_data
 def test_uniaxial_curves_are_mostly_believed():
     """Some tens of frames of 94 tests with 14 thousand frames; no falling strain, no outliers in the smooth CMSX-6."""
     steel = read_histories(DATA / "uniaxial/alloy617", creepkit_readers())

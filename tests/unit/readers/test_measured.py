@@ -8,10 +8,10 @@ import pytest
 from creepkit.quality.comparison import duplicate_tests
 from creepkit.readers.reading import creepkit_readers, read_histories
 from creepkit.records import History, PressureJump
-from helpers.paths import SHARED
+from helpers.paths import SHARED, needs_shared_data
 
 DATA = SHARED
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the measured curves do not lie beside this checkout")
+pytestmark = needs_shared_data
 
 
 def read(folder: str) -> dict[str, History]:

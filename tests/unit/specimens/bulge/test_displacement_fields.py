@@ -6,7 +6,8 @@ import pytest
 from creepkit.errors import FitError
 from creepkit.fem.mesh import surface_interpolation
 from creepkit.specimens.bulge.observation import Observation, fit_field
-from helpers.bulge_profiles import beside, cross, profile_with_apex
+from helpers.bulge_profiles import cross, profile_with_apex
+from helpers.paths import needs_shared_data
 
 
 def pixels(points=50):
@@ -44,7 +45,7 @@ def test_lost_and_wild_points():
     np.testing.assert_allclose([fit.amplitude, fit.width, fit.shape], [0.35, 3.6, 2.3], rtol=0.005)
 
 
-@beside
+@needs_shared_data
 def test_field_and_operator_see_the_same():
     nodes, profile = profile_with_apex(0.81)
     x, y = pixels(160)

@@ -12,13 +12,13 @@ from helpers.bulge_profiles import (
     LOOKED_AT,
     NODES,
     bell,
-    beside,
     cross,
     plates,
     profile_with_apex,
     richardson,
     table,
 )
+from helpers.paths import needs_shared_data
 
 FORMS = [Observation(), Observation("field"), Observation("profile", 5.3, 51), Observation("field", 4.7)]
 
@@ -214,7 +214,7 @@ def test_slopes_to_a_motion_of_the_nodes(operator):
 # Finite elements' profiles: CalculiX on the true dimple, u_z at eight radii and a fit made elsewhere
 
 
-@beside
+@needs_shared_data
 @pytest.mark.parametrize("name", ["dabi_norton_in625_800C_steady.csv", "dabi_timehardening.csv"])
 def test_fits_of_calculix_profiles(name):
     # the fits of the tables are unweighted ones over the nodes; tolerances are three times what the spline leaves
@@ -226,7 +226,7 @@ def test_fits_of_calculix_profiles(name):
     assert (error < [2e-4, 8e-4, 2e-3]).all()
 
 
-@beside
+@needs_shared_data
 def test_window_at_an_apex_of_two_thirds_of_a_mm():
     # printed to three digits with the sentence "the window matters" of the notes on the true dimple
     nodes, profile = profile_with_apex(0.66)
@@ -236,7 +236,7 @@ def test_window_at_an_apex_of_two_thirds_of_a_mm():
         assert abs(p - shape) < 6e-3
 
 
-@beside
+@needs_shared_data
 def test_the_two_forms_part_on_a_real_profile():
     # Eq. (3) .805, 3.853, 2.203 and Eq. (7) .814, 3.789, 2.133 are quoted for another law at the same apex
     nodes, profile = profile_with_apex(0.81)
