@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from creepkit import registry
 from creepkit.errors import CreepkitError, DatasetError
 
 if TYPE_CHECKING:
@@ -45,12 +45,15 @@ def _has_no_arrays(record: Any) -> bool:
     return all(not hasattr(getattr(record, f.name), "shape") for f in fields(record) if f.init)
 
 
-def specimen_from_json(document: Any, source: str) -> Specimen:
-    """The specimen that `specimen_document` told of; DatasetError, naming `source`, when that cannot be."""
+def specimen_from_json(document: Any, source: str, registered: Callable[[str], Specimen]) -> Specimen:
+    """The specimen that specimen_to_json wrote; DatasetError, naming `source`, when that cannot be.
+
+    registered : gives the registered specimen of a name.
+    """
     if not (isinstance(document, dict) and isinstance(document.get("name"), str) and "fields" in document):
         raise DatasetError(f"{source}: does not say its specimen; it is damaged or was not written by creepkit")
     try:
-        specimen: Specimen = _with_fields(registry.default_registry().specimen(document["name"]), document["fields"])
+        specimen: Specimen = _with_fields(registered(document["name"]), document["fields"])
     except (CreepkitError, TypeError, AttributeError) as error:
         raise DatasetError(f"{source}: its specimen '{document['name']}' cannot be rebuilt here: {error}") from None
     return specimen

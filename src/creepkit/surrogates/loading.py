@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from creepkit import registry
 from creepkit.errors import CreepkitError, SurrogateError, nearest
 from creepkit.files import safetensors_files
 from creepkit.language.law_codec import law_from_json
@@ -18,10 +19,6 @@ from creepkit.specimens.documents import specimen_from_json
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.recipe import SurrogateMetadata, Training
 from creepkit.surrogates.surrogate import Recipe, Surrogate
-
-if TYPE_CHECKING:
-    pass
-
 
 WEIGHTS_FOLDER = Path(__file__).with_name("weights")
 
@@ -83,7 +80,7 @@ def recipe_from_config(kind: str, config: Mapping[str, Any]) -> Recipe:
 def _metadata_from_header(header: Mapping[str, Any], source: str) -> SurrogateMetadata:
     return SurrogateMetadata(
         law=law_from_json(header["law"], source),
-        specimen=specimen_from_json(header["specimen"], source),
+        specimen=specimen_from_json(header["specimen"], source, registry.default_registry().specimen),
         outputs=tuple(header["outputs"]),
         grid=TimeGrid(np.array(header["grid"]["values"], float), bool(header["grid"]["relative"])),
         parameters=tuple(header["parameters"]),
