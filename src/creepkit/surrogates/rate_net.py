@@ -29,7 +29,11 @@ from creepkit.records import (
 )
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
 from creepkit.specimens.bulge.reduced_order.time_integration import NUISANCE_DIRECTIONS, FeatureFactors
-from creepkit.specimens.bulge.reduced_order.trajectories import Trajectories, simulate_trajectories
+from creepkit.specimens.bulge.reduced_order.trajectories import (
+    Trajectories,
+    TrajectoryOptions,
+    simulate_trajectories,
+)
 from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.rate_network import (
@@ -113,7 +117,11 @@ class RateNet:
         for row in range(len(data)):
             trajectories.append(
                 simulate_trajectories(
-                    specimen, law, theta[row : row + 1], [data.planned_test(row)], factors=self.factors
+                    specimen,
+                    law,
+                    theta[row : row + 1],
+                    [data.planned_test(row)],
+                    options=TrajectoryOptions(factors=self.factors),
                 )
             )
             if progress is not None:
@@ -255,9 +263,7 @@ class RateSurrogate(Surrogate):
             theta,
             histories,
             nuisances=nuisances,
-            factors=self.recipe.factors,
-            exact=sensitivities,
-            threads=threads,
+            options=TrajectoryOptions(factors=self.recipe.factors, exact=sensitivities, threads=threads),
         )
         parts = [self._history_prediction(h, k, trajectories, nuisances, threads) for k, h in enumerate(histories)]
         return assemble_prediction(parts, histories, self.outputs, len(theta))

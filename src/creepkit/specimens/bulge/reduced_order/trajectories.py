@@ -166,6 +166,22 @@ class Trajectories:
         return np.asarray(np.moveaxis(np.tensordot(weights, values[:, : weights.shape[1]], axes=(1, 1)), 0, 1))
 
 
+@dataclass(frozen=True, eq=False)
+class TrajectoryOptions:
+    """How trajectories are simulated; they are the same for any number of threads.
+
+    factors : of stress and strain at which rates are recorded, the features of RateNet.
+    exact : whether derivatives are integrated too.
+    tables : in place of those of the specimen; a test of another dimple than theirs (but for its apex thickness), or of
+        another window, is a SolveError.
+    """
+
+    factors: FeatureFactors = WITHOUT_FEATURES
+    exact: bool = False
+    threads: int = 1
+    tables: ReducedOrderTables | None = None
+
+
 def simulate_trajectories(
     specimen: BulgeSettings,
     law: CompiledLaw,
@@ -173,23 +189,20 @@ def simulate_trajectories(
     histories: Sequence[History],
     *,
     nuisances: Mapping[str, Floats] | None = None,
-    factors: FeatureFactors = WITHOUT_FEATURES,
-    exact: bool = False,
-    threads: int = 1,
-    tables: ReducedOrderTables | None = None,
+    options: TrajectoryOptions | None = None,
 ) -> Trajectories:
-    """March candidates, theta (candidates, P) internal, through all tests.
+    """Integrate candidates, theta (candidates, P) internal values, through all tests.
 
-    nuisances : {kind: (candidates or 1, tests)}, see records.Predictor; "window" too. factors : of the features.
-    exact : with derivatives. Results are the same for any number of threads. known : tables to go by, in place of those
-    of the specimen; a test of another dimple than theirs (but for its apex thickness), or window, is a SolveError.
+    nuisances : {kind: (candidates or 1, tests)}, see records.Predictor; "window" too.
     """
+    options = options or TrajectoryOptions()
+    factors, exact = options.factors, options.exact
     theta = np.array(theta, dtype=float, order="C", ndmin=2)
     broadcast_nuisances = {kind: np.atleast_2d(value) for kind, value in (nuisances or {}).items()}
     schedules = tuple(time_nodes(specimen, history) for history in histories)
     counts = np.array([plan.times.size for plan in schedules], dtype=np.int64)
     rows = max([len(v) for v in broadcast_nuisances.values()], default=1)
-    geometries = _dimples(specimen, histories, schedules, broadcast_nuisances, rows, tables)
+    geometries = _dimples(specimen, histories, schedules, broadcast_nuisances, rows, options.tables)
     tests, modulus_changes = _tests(histories, schedules, broadcast_nuisances, geometries, counts, rows)
     shape = (
         len(theta),
@@ -210,7 +223,7 @@ def simulate_trajectories(
             out, changes, status, end_times,
         )  # fmt: skip
 
-    _in_threads(part, len(theta), threads)
+    _in_threads(part, len(theta), options.threads)
     return Trajectories(out, changes if exact else None, schedules, status, end_times)
 
 
