@@ -28,7 +28,7 @@ from creepkit.records import (
     broadcast_candidates,
 )
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
-from creepkit.specimens.bulge.reduced_order.time_integration import NUISANCE_DIRECTIONS, FeatureFactors
+from creepkit.specimens.bulge.reduced_order.step_solution import NUISANCE_DIRECTIONS, FeatureFactors
 from creepkit.specimens.bulge.reduced_order.trajectories import (
     Trajectories,
     TrajectoryOptions,

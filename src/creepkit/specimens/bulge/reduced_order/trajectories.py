@@ -16,12 +16,9 @@ from creepkit.errors import SolveError
 from creepkit.records import History
 from creepkit.specimens.bulge.finite_elements import MODULUS_TEMPERATURE_STEP, BulgeSetup, set_up_test
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
+from creepkit.specimens.bulge.reduced_order.step_solution import NUISANCE_DIRECTIONS, FeatureFactors
 from creepkit.specimens.bulge.reduced_order.tables import ReducedOrderTables, build_tables
-from creepkit.specimens.bulge.reduced_order.time_integration import (
-    NUISANCE_DIRECTIONS,
-    FeatureFactors,
-    integrate_candidates,
-)
+from creepkit.specimens.bulge.reduced_order.time_integration import integrate_candidates
 
 if TYPE_CHECKING:
     from creepkit.specimens.bulge.settings import BulgeSettings
@@ -217,11 +214,30 @@ def simulate_trajectories(
 
     def part(first: int, last: int) -> None:
         integrate_candidates(
-            law.update, law.sensitivity, law.rate, first, last, theta, beta, beta_slopes, modulus_changes, counts, tests,
-            *geometries.arrays, geometries.row, geometries.grid, np.array(law.initial), np.array(law.limits),
-            (specimen.deflection_limit, specimen.strain_limit), factors, _EXACT_TOLERANCE if exact else _TOLERANCE,
-            out, changes, status, end_times,
-        )  # fmt: skip
+            law.update,
+            law.sensitivity,
+            law.rate,
+            first,
+            last,
+            theta,
+            beta,
+            beta_slopes,
+            modulus_changes,
+            counts,
+            tests,
+            *geometries.arrays,
+            geometries.row,
+            geometries.grid,
+            np.array(law.initial),
+            np.array(law.limits),
+            (specimen.deflection_limit, specimen.strain_limit),
+            factors,
+            _EXACT_TOLERANCE if exact else _TOLERANCE,
+            out,
+            changes,
+            status,
+            end_times,
+        )
 
     _in_threads(part, len(theta), options.threads)
     return Trajectories(out, changes if exact else None, schedules, status, end_times)
@@ -249,9 +265,13 @@ class _Dimples:
 
 
 def _dimples(
-    specimen: BulgeSettings, histories: Sequence[History], plans: Sequence[TimeNodes], nuisances: Mapping[str, Floats], rows: int,
+    specimen: BulgeSettings,
+    histories: Sequence[History],
+    plans: Sequence[TimeNodes],
+    nuisances: Mapping[str, Floats],
+    rows: int,
     known_tables: ReducedOrderTables | None,
-) -> _Dimples:  # fmt: skip
+) -> _Dimples:
     """Every different dimple, and which one each candidate has in each test."""
     own_values = np.array(
         [(k, p.setup.observation.window, p.setup.geometry.apex_thickness) for k, p in enumerate(plans)]
@@ -294,9 +314,13 @@ def _tables(specimen: BulgeSettings, plan: TimeNodes, window: float) -> ReducedO
 
 
 def _tests(
-    histories: Sequence[History], plans: Sequence[TimeNodes], nuisances: Mapping[str, Floats], dimples: _Dimples,
-    counts: Ints, rows: int,
-) -> tuple[Floats, Floats]:  # fmt: skip
+    histories: Sequence[History],
+    plans: Sequence[TimeNodes],
+    nuisances: Mapping[str, Floats],
+    dimples: _Dimples,
+    counts: Ints,
+    rows: int,
+) -> tuple[Floats, Floats]:
     """Each test as in `reduced_problem`, (candidates or 1, tests, 8, nodes), and relative changes of the modulus."""
     shape = (rows, len(plans))
     out = np.zeros((*shape, 8, int(counts.max())))
