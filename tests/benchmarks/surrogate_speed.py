@@ -26,7 +26,11 @@ from creepkit import kernels
 from creepkit.records import History
 from creepkit.sampling.conditions import TimeGrid
 from creepkit.specimens.bulge.observation import OBSERVED
-from creepkit.specimens.bulge.reduced_order.trajectories import WITHOUT_FEATURES, simulate_trajectories
+from creepkit.specimens.bulge.reduced_order.trajectories import (
+    WITHOUT_FEATURES,
+    TrajectoryOptions,
+    simulate_trajectories,
+)
 from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.loading import load_surrogate
@@ -81,8 +85,16 @@ def row(name: str, count: int, simulated: int, file: str | None) -> str:
     thickness = {"thickness": np.full((1, 1), exact.geometry.apex_thickness)}
     some = {n: v[: max(1, count // 10)] for n, v in many.items()}
     spent = in_turns(
-        (lambda: simulate_trajectories(exact, compiled, theta, [TEST], factors=WITHOUT_FEATURES), count),
-        (lambda: simulate_trajectories(exact, compiled, theta, [TEST], factors=factors), count),
+        (
+            lambda: simulate_trajectories(
+                exact, compiled, theta, [TEST], options=TrajectoryOptions(factors=WITHOUT_FEATURES)
+            ),
+            count,
+        ),
+        (
+            lambda: simulate_trajectories(exact, compiled, theta, [TEST], options=TrajectoryOptions(factors=factors)),
+            count,
+        ),
         (lambda: surrogate.predict(law, law.to_internal(many), [TEST]), count),
         (
             lambda: surrogate.predict(law, law.to_internal(some), [TEST], sensitivities=True, nuisances=thickness),
@@ -106,7 +118,12 @@ def walls(name: str, count: int, file: str | None) -> str:
     theta, factors = compiled.to_internal(many), surrogate.recipe.factors
     spent = in_turns(
         (lambda: surrogate.predict(law, law.to_internal(many), [TEST]), 1),
-        (lambda: simulate_trajectories(Bulge(), compiled, theta, [TEST], factors=factors, threads=cores), 1),
+        (
+            lambda: simulate_trajectories(
+                Bulge(), compiled, theta, [TEST], options=TrajectoryOptions(factors=factors, threads=cores)
+            ),
+            1,
+        ),
         (gru(count, 49, cores), 1),
         (gru(count, TEST.times.size, cores), 1),
         clock=time.perf_counter,

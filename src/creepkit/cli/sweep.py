@@ -38,7 +38,7 @@ def command(
     from creepkit.dataset.storage import read_dataset
     from creepkit.report.surrogate import size_study_figure, size_study_rows
     from creepkit.surrogates.parameter_gru import ParameterGru
-    from creepkit.surrogates.training import size_study
+    from creepkit.surrogates.training import NetworkSizes, size_study
 
     if threads is not None:
         torch.set_num_threads(threads)
@@ -47,10 +47,19 @@ def command(
     assert isinstance(recipe, ParameterGru)
     with ProgressBar() as progress:
         entries = size_study(
-            read_dataset(data, accepted_only=True), recipe, to=to, layers=parse_whole_numbers(layers, "--layers"),
-            hidden=parse_whole_numbers(hidden, "--hidden"), cells=tuple(cell.split(",")),  # type: ignore[arg-type]  # words; ParameterGru says which it knows
-            samples=parse_whole_numbers(samples, "--samples") if samples else (), seed=seed, device=device, progress=progress.tick,
-        )  # fmt: skip
+            read_dataset(data, accepted_only=True),
+            recipe,
+            NetworkSizes(
+                layers=parse_whole_numbers(layers, "--layers"),
+                hidden=parse_whole_numbers(hidden, "--hidden"),
+                cells=tuple(cell.split(",")),  # type: ignore[arg-type]  # words; ParameterGru says which it knows
+                samples=parse_whole_numbers(samples, "--samples") if samples else (),
+            ),
+            to=to,
+            seed=seed,
+            device=device,
+            progress=progress.tick,
+        )
     size_study_figure(entries, to / "sweep.png")
     if as_json:
         print_json({"trainings": [vars(e) for e in entries], "picture": str(to / "sweep.png")})

@@ -35,6 +35,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from creepkit import registry
 from creepkit.arrays import Bools
 from creepkit.dataset.dataset import COLUMNS, HOLD_TIMES, Dataset, empty_columns
 from creepkit.errors import DatasetError, LawError
@@ -219,7 +220,7 @@ def read_header(file: h5py.File, source: str) -> Dataset:
     check_shapes(file, columns, source)
     return Dataset(
         law=_read_law(documents["law"], name_lists["parameter_names"], source),
-        specimen=specimen_from_json(documents["specimen"], source),
+        specimen=specimen_from_json(documents["specimen"], source, registry.default_registry().specimen),
         design_document=documents["design"],
         grid=_read_grid(file["time_grid"], source),
         provenance=documents["provenance"],

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
-from creepkit import registry
 from creepkit.errors import CreepkitError, DatasetError
 from creepkit.files.record_codec import ANY_NUMBER, RecordCodec, RecordError
 
@@ -45,13 +45,16 @@ def _refuse_arrays(record: Any, place: str) -> None:
         _refuse_arrays(value, f"{place}.{f.name}")
 
 
-def specimen_from_json(document: Any, source: str) -> Specimen:
-    """The specimen that `specimen_to_json` described; DatasetError, naming `source`, when that cannot be."""
+def specimen_from_json(document: Any, source: str, registered: Callable[[str], Specimen]) -> Specimen:
+    """The specimen that specimen_to_json wrote; DatasetError, naming `source`, when that cannot be.
+
+    registered : gives the registered specimen of a name.
+    """
     if not (isinstance(document, dict) and isinstance(document.get("name"), str) and "fields" in document):
         raise DatasetError(f"{source}: does not say its specimen; it is damaged or was not written by creepkit")
     name = document["name"]
     try:
-        template: Specimen = registry.default_registry().specimen(name)
+        template = registered(name)
         return CODEC.updated(template, document["fields"])
     except CreepkitError as error:
         raise DatasetError(f"{source}: its specimen '{name:.40}' cannot be rebuilt here: {error}") from None

@@ -60,8 +60,12 @@ class PredictionComparison:
         """True and predicted outputs at a time, (samples that last so long, outputs), linear between frames."""
         last = np.where(self.mask, self.times, -np.inf).max(axis=1)
         rows = [k for k in np.flatnonzero(last >= time) if self.times[k, self.mask[k]][0] <= time]
-        values = [np.stack([_interpolated(time, self.times[k], v[k], self.mask[k]) for k in rows]) if rows else
-                  np.zeros((0, len(self.outputs))) for v in (self.true, self.predicted)]  # fmt: skip
+        values = [
+            np.stack([_interpolated(time, self.times[k], v[k], self.mask[k]) for k in rows])
+            if rows
+            else np.zeros((0, len(self.outputs)))
+            for v in (self.true, self.predicted)
+        ]
         return values[0], values[1]
 
     def largest_errors(self) -> Floats:

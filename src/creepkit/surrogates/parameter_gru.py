@@ -13,12 +13,13 @@ import torch
 from torch import Tensor
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import DatasetError, SurrogateError, nearest
+from creepkit.errors import SurrogateError, nearest
 from creepkit.records import (
     History,
     HistoryPrediction,
     NuisanceValues,
     Prediction,
+    Specimen,
     Status,
     assemble_prediction,
     broadcast_candidates,
@@ -29,9 +30,11 @@ from creepkit.surrogates.parameter_inputs import (
     SERIES_INPUTS,
     LawInputs,
     LoadHistoryInputs,
+    base_outputs,
     complete_parameters,
     hold_last_value,
-    screening_model_of,
+    load_history_arrays,
+    reduced_order_model_of,
 )
 from creepkit.surrogates.parameter_network import ParameterModule, RecurrentCell, recurrent_with_derivatives
 from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, SurrogateModule, Training
@@ -46,10 +49,6 @@ from creepkit.surrogates.surrogate import (
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
-    from creepkit.surrogates.surrogate import Surrogate
-
-
-if TYPE_CHECKING:
     from creepkit.language import CreepLaw
 
 
@@ -98,7 +97,7 @@ class ParameterGru:
         """Tensors of a data set: constants, series, targets, mask, base, and "domain" for the guard."""
         law, history_inputs = LawInputs(data.law), self._history_inputs(data)
         mask = np.asarray(np.isfinite(data.values).all(axis=-1))
-        constants, series, domain_rows = _test_inputs(data, history_inputs, progress)
+        constants, series, domain_rows = load_history_arrays(data, history_inputs, progress)
         rows = law.input_rows(data.law.to_internal(data.parameters))
         arrays = {
             "constants": np.concatenate([rows, constants], axis=1),
@@ -154,56 +153,17 @@ class ParameterGru:
         """What is seen at each frame."""
         return self.inputs or (SERIES_INPUTS if relative else SERIES_INPUTS[:1])
 
+    def history_inputs(self, specimen: Specimen, conditions: tuple[str, ...], relative: bool) -> LoadHistoryInputs:
+        """The inputs that tests give: which of CONSTANT_INPUTS varied in training, and the series."""
+        constants = tuple(name for name in CONSTANT_INPUTS if name in conditions)
+        return LoadHistoryInputs(specimen, constants, self.series_inputs(relative), relative)
+
     def _history_inputs(self, data: Dataset) -> LoadHistoryInputs:
-        return load_history_inputs(self, data.specimen, data.condition_names, data.grid.relative)
+        return self.history_inputs(data.specimen, data.condition_names, data.grid.relative)
 
     def _network(self, sizes: tuple[int, int, int]) -> ParameterModule:
         log, based = self.target == "log", self.base != "none"
         return ParameterModule(sizes, self.hidden, self.layers, self.cell, logarithm=log, corrects_base=based)
-
-
-def load_history_inputs(
-    recipe: ParameterGru, specimen: Any, conditions: tuple[str, ...], relative: bool
-) -> LoadHistoryInputs:
-    """The inputs that tests give: what of CONSTANTS was varied, and the recipe's series."""
-    return LoadHistoryInputs(
-        specimen, tuple(n for n in CONSTANT_INPUTS if n in conditions), recipe.series_inputs(relative), relative
-    )
-
-
-def base_outputs(data: Dataset, progress: ProgressCallback | None = None) -> Floats:
-    """(n, frames) what the specimen's stand-in predicts of the first output; its last value after its end."""
-    reduced_model = screening_model_of(data.specimen)
-    base, theta = np.empty(data.values.shape[:2]), data.law.to_internal(data.parameters)
-    for k in range(len(data)):
-        plan = data.planned_test(k).replace(times=data.times(k))
-        prediction = reduced_model.predict(data.law, theta[k : k + 1], [plan])
-        base[k] = hold_last_value(prediction.values[0, 0, :, prediction.outputs.index(data.outputs[0])])
-        if progress is not None:
-            progress("base", k + 1, len(data), "")
-    return base
-
-
-def _test_inputs(
-    data: Dataset, history_inputs: LoadHistoryInputs, progress: ProgressCallback | None
-) -> tuple[Floats, ...]:
-    """Constants (n, C), series (n, frames, S) and what the guard sees (n, ...) of all tests."""
-    parts = []
-    for k in range(len(data)):
-        plan, times = data.planned_test(k), data.times(k)
-        parts.append(
-            (
-                history_inputs.constant_values(plan),
-                history_inputs.series_values(plan, times),
-                history_inputs.domain_inputs(plan, times),
-            )
-        )
-        if progress is not None and (k + 1) % 1000 == 0:
-            progress("inputs", k + 1, len(data), "")
-    constants, series, domain_rows = (np.stack(part) for part in zip(*parts, strict=True))
-    if not np.isfinite(series).all():
-        raise DatasetError("the load of some sample of this data set is not a number; the file is damaged")
-    return constants, series, domain_rows
 
 
 def _scale_pairs(names: tuple[str, ...], scale: Any) -> dict[str, list[float]]:
@@ -294,7 +254,7 @@ class ParameterSurrogate(Surrogate):
 
     @cached_property
     def _history_inputs(self) -> LoadHistoryInputs:
-        return load_history_inputs(self.recipe, self.specimen, self.metadata.conditions, self.metadata.grid.relative)
+        return self.recipe.history_inputs(self.specimen, self.metadata.conditions, self.metadata.grid.relative)
 
     @cached_property
     def _law_inputs(self) -> LawInputs:
@@ -332,7 +292,7 @@ class ParameterSurrogate(Surrogate):
     ) -> Floats:
         """(candidates, tests, frames) what the specimen's reduced-order model predicts of the first output."""
         tests = [h.replace(times=t, outputs={}) for h, t in zip(histories, frames, strict=True)]
-        prediction = screening_model_of(self.specimen).predict(self.metadata.law, theta, tests, nuisances=nuisances)
+        prediction = reduced_order_model_of(self.specimen).predict(self.metadata.law, theta, tests, nuisances=nuisances)
         return hold_last_value(prediction.values[..., prediction.outputs.index(self.outputs[0])])
 
     # ---- what it answers -------------------------------------------------------------------------------------------

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.errors import SurrogateError
+from creepkit.errors import DatasetError, SurrogateError
 from creepkit.kernels.log_form import log_form
 from creepkit.language import CreepLaw
 from creepkit.records import History, Program, Specimen, SupportsReducedOrderModel
+from creepkit.surrogates.recipe import ProgressCallback
 
 if TYPE_CHECKING:
-    pass
+    from creepkit.dataset.dataset import Dataset
 
 
 CONSTANT_INPUTS = ("modulus", "apex_thickness", "temperature")
@@ -272,7 +273,42 @@ def _term_coefficient(law: CreepLaw, label: str) -> str | None:
     return None
 
 
-def screening_model_of(specimen: Any) -> Any:
+def base_outputs(data: Dataset, progress: ProgressCallback | None = None) -> Floats:
+    """(n, frames) what the specimen's stand-in predicts of the first output; its last value after its end."""
+    reduced_model = reduced_order_model_of(data.specimen)
+    base, theta = np.empty(data.values.shape[:2]), data.law.to_internal(data.parameters)
+    for k in range(len(data)):
+        plan = data.planned_test(k).replace(times=data.times(k))
+        prediction = reduced_model.predict(data.law, theta[k : k + 1], [plan])
+        base[k] = hold_last_value(prediction.values[0, 0, :, prediction.outputs.index(data.outputs[0])])
+        if progress is not None:
+            progress("base", k + 1, len(data), "")
+    return base
+
+
+def load_history_arrays(
+    data: Dataset, history_inputs: LoadHistoryInputs, progress: ProgressCallback | None
+) -> tuple[Floats, ...]:
+    """Constants (n, C), series (n, frames, S) and what the guard sees (n, ...) of all tests."""
+    parts = []
+    for k in range(len(data)):
+        plan, times = data.planned_test(k), data.times(k)
+        parts.append(
+            (
+                history_inputs.constant_values(plan),
+                history_inputs.series_values(plan, times),
+                history_inputs.domain_inputs(plan, times),
+            )
+        )
+        if progress is not None and (k + 1) % 1000 == 0:
+            progress("inputs", k + 1, len(data), "")
+    constants, series, domain_rows = (np.stack(part) for part in zip(*parts, strict=True))
+    if not np.isfinite(series).all():
+        raise DatasetError("the load of some sample of this data set is not a number; the file is damaged")
+    return constants, series, domain_rows
+
+
+def reduced_order_model_of(specimen: Any) -> Any:
     """The specimen's cheap stand-in; SurrogateError where it has none."""
     if not isinstance(specimen, SupportsReducedOrderModel):
         raise SurrogateError(f"specimen '{specimen.name}' has no stand-in of one degree of freedom; use base='none'")

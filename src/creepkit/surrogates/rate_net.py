@@ -28,8 +28,12 @@ from creepkit.records import (
     broadcast_candidates,
 )
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
-from creepkit.specimens.bulge.reduced_order.time_integration import NUISANCE_DIRECTIONS, FeatureFactors
-from creepkit.specimens.bulge.reduced_order.trajectories import Trajectories, simulate_trajectories
+from creepkit.specimens.bulge.reduced_order.step_solution import NUISANCE_DIRECTIONS, FeatureFactors
+from creepkit.specimens.bulge.reduced_order.trajectories import (
+    Trajectories,
+    TrajectoryOptions,
+    simulate_trajectories,
+)
 from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.rate_network import (
@@ -41,7 +45,7 @@ from creepkit.surrogates.rate_network import (
     with_running_means,
 )
 from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, SurrogateModule, Training
-from creepkit.surrogates.surrogate import Surrogate, check_applicable, check_history
+from creepkit.surrogates.surrogate import Surrogate, check_applicable
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
@@ -113,7 +117,11 @@ class RateNet:
         for row in range(len(data)):
             trajectories.append(
                 simulate_trajectories(
-                    specimen, law, theta[row : row + 1], [data.planned_test(row)], factors=self.factors
+                    specimen,
+                    law,
+                    theta[row : row + 1],
+                    [data.planned_test(row)],
+                    options=TrajectoryOptions(factors=self.factors),
                 )
             )
             if progress is not None:
@@ -255,9 +263,7 @@ class RateSurrogate(Surrogate):
             theta,
             histories,
             nuisances=nuisances,
-            factors=self.recipe.factors,
-            exact=sensitivities,
-            threads=threads,
+            options=TrajectoryOptions(factors=self.recipe.factors, exact=sensitivities, threads=threads),
         )
         parts = [self._history_prediction(h, k, trajectories, nuisances, threads) for k, h in enumerate(histories)]
         return assemble_prediction(parts, histories, self.outputs, len(theta))
@@ -327,10 +333,6 @@ class RateSurrogate(Surrogate):
         assert isinstance(self.module, RateModule)
         return self.module
 
-    def at_nodes(self, trajectory: Tensor, thickness: Tensor) -> Tensor:
-        """(candidates, nodes, 3) corrected outputs, from courses (candidates, nodes, columns) and thicknesses, mm."""
-        return self._module.at_nodes(network_inputs(trajectory, thickness), base_columns(trajectory))
-
     def _derivatives(self, trajectory: Tensor, thickness: Tensor, trajectory_derivatives: Tensor) -> Floats:
         """Derivatives of outputs at nodes: forward through inputs and network, all directions at once."""
         directions = trajectory_derivatives.shape[-1]
@@ -351,39 +353,3 @@ class RateSurrogate(Surrogate):
                 node_inputs, base_columns(trajectory), input_directions, base_columns(trajectory_directions)
             ).movedim(0, -1)
         return np.asarray(derivatives.double().numpy())
-
-
-class _TrajectoryFunction(torch.autograd.Function):
-    """Courses as a function of the law's internal parameters; the backward pass is a product with their derivatives."""
-
-    @staticmethod
-    def forward(ctx: Any, theta: Tensor, derivatives: Tensor, values: Tensor) -> Tensor:
-        ctx.save_for_backward(derivatives)
-        return values
-
-    @staticmethod
-    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None, None]:
-        (derivatives,) = ctx.saved_tensors
-        return (gradients[0][..., None] * derivatives).sum(dim=(1, 2)), None, None
-
-
-def differentiable_outputs(surrogate: RateSurrogate, law: CreepLaw, theta: Tensor, history: History) -> Tensor:
-    """(candidates, times, outputs) of one test, for internal parameters theta (candidates, P) float64.
-
-    Internal means the natural logarithm where the scale of a parameter is logarithmic. Gradients are exact; they do not
-    go through the integration in torch.
-    """
-    check_history(surrogate.metadata, history)
-    compiled, specimen = kernels.lower(law, "numba"), surrogate.specimen
-    assert isinstance(specimen, Bulge)
-    trajectories = simulate_trajectories(
-        specimen, compiled, theta.detach().numpy(), [history], factors=surrogate.recipe.factors, exact=True
-    )
-    assert trajectories.jacobian is not None
-    node_count = trajectories.schedules[0].times.size
-    values = torch.from_numpy(trajectories.values[:, 0, :node_count])
-    derivatives = torch.from_numpy(trajectories.jacobian[:, 0, :node_count, :, : theta.shape[1]])
-    thickness = torch.full((len(theta),), trajectories.schedules[0].setup.geometry.apex_thickness, dtype=torch.float64)
-    trajectory = _TrajectoryFunction.apply(theta, derivatives, values)  # type: ignore[no-untyped-call]
-    node_outputs = surrogate.at_nodes(trajectory, thickness)
-    return torch.from_numpy(trajectories.schedules[0].frames).to(node_outputs.dtype) @ node_outputs

@@ -16,9 +16,18 @@ FEATURE_START = len(TRAJECTORY_COLUMNS)
 
 
 LOCAL_INPUTS = (
-    "ln P/E", "log10 age", "ln D", "ln D/D_elastic", "stress exponent", "strain exponent", "fast", "slow",
-    "ln multiplier", "log10 strain/(rate time)", "apex thickness",
-)  # fmt: skip
+    "ln P/E",
+    "log10 age",
+    "ln D",
+    "ln D/D_elastic",
+    "stress exponent",
+    "strain exponent",
+    "fast",
+    "slow",
+    "ln multiplier",
+    "log10 strain/(rate time)",
+    "apex thickness",
+)
 """What is known at a node beside the features; see specimens.reduced_courses for the columns they are made of."""
 
 

@@ -112,9 +112,14 @@ class SurrogateMetadata:
     def from_dataset(cls, data: Dataset, **fields: Any) -> SurrogateMetadata:
         """What a data set says; more : the other fields."""
         return cls(
-            law=data.law, specimen=data.specimen, outputs=data.outputs, grid=data.grid,
-            parameters=data.parameter_names, conditions=data.condition_names, **fields,
-        )  # fmt: skip
+            law=data.law,
+            specimen=data.specimen,
+            outputs=data.outputs,
+            grid=data.grid,
+            parameters=data.parameter_names,
+            conditions=data.condition_names,
+            **fields,
+        )
 
 
 CONSTANT_TOLERANCE = 1e-6

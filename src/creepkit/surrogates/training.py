@@ -207,24 +207,45 @@ class SizeStudyResult:
         return f"{self.cell} {self.hidden} x {self.layers}, {self.samples} samples"
 
 
+@dataclass(frozen=True)
+class NetworkSizes:
+    """Values to be combined in a size study; what is empty stays as the recipe has it.
+
+    samples : numbers of samples to learn from.
+    """
+
+    layers: Sequence[int] = ()
+    hidden: Sequence[int] = ()
+    cells: Sequence[RecurrentCell] = ()
+    samples: Sequence[int] = ()
+
+
 def size_study(
-    data: Dataset, recipe: ParameterGru, *, to: str | Path, layers: Sequence[int] = (), hidden: Sequence[int] = (),
-    cells: Sequence[RecurrentCell] = (), samples: Sequence[int] = (), seed: int = 0, device: str = "auto",
+    data: Dataset,
+    recipe: ParameterGru,
+    sizes: NetworkSizes,
+    *,
+    to: str | Path,
+    seed: int = 0,
+    device: str = "auto",
     progress: ProgressCallback | None = None,
-) -> list[SizeStudyResult]:  # fmt: skip
+) -> list[SizeStudyResult]:
     """Train every combination, each to a file of its own in the folder `to`; those that are there already are read.
 
-    What is not given stays as the recipe has it; samples are numbers to learn from. Every training is judged by the
-    same rows, a share of the whole data set that none of them learns from.
+    Every training is judged by the same rows, a share of the whole data set that none of them learns from.
     """
     data, folder = trainable_samples(data), Path(to)
     training_count = len(training_split(len(data), recipe.training, seed)[0])
-    counts = [*samples] or [training_count]
-    training_split(
-        len(data), replace(recipe.training, samples=max(counts)), seed
-    )  # complains now, not after hours of training
+    counts = [*sizes.samples] or [training_count]
+    # an error now, not after hours of training
+    training_split(len(data), replace(recipe.training, samples=max(counts)), seed)
     folder.mkdir(parents=True, exist_ok=True)
-    combinations = list(product(cells or [recipe.cell], layers or [recipe.layers], hidden or [recipe.hidden], counts))
+    cells, layers, hidden = (
+        sizes.cells or (recipe.cell,),
+        sizes.layers or (recipe.layers,),
+        sizes.hidden or (recipe.hidden,),
+    )
+    combinations = list(product(cells, layers, hidden, counts))
     results = []
     for k, (cell, depth, width, count) in enumerate(combinations):
         settings = replace(recipe.training, samples=count)
@@ -246,13 +267,16 @@ def _study_result(model: Surrogate, recipe: ParameterGru, count: int, path: Path
     metadata, provenance = model.metadata, model.metadata.provenance
     best = int(provenance["best_epoch"])
     return SizeStudyResult(
-        recipe.cell, recipe.hidden, recipe.layers, count,
+        cell=recipe.cell,
+        hidden=recipe.hidden,
+        layers=recipe.layers,
+        samples=count,
         weight_count=sum(weight.numel() for weight in model.module.parameters()),
         loss=float(metadata.metrics["loss"]),
         training=float(metadata.curves["loss"][best - 1]),
         epochs=int(provenance["epochs"]),
         best_epoch=best,
-        outputs={name: float(errors_of_output["rse"]) for name, errors_of_output in metadata.metrics["outputs"].items()},
+        outputs={name: float(errors["rse"]) for name, errors in metadata.metrics["outputs"].items()},
         losses=tuple(metadata.curves["rse"]),
         file=path.name,
-    )  # fmt: skip
+    )

@@ -133,9 +133,14 @@ class NetworkTraining:
     """
 
     def __init__(
-        self, module: SurrogateModule, samples: SampleTensors, rows: tuple[Tensor, Tensor], training: Training, seed: int,
+        self,
+        module: SurrogateModule,
+        samples: SampleTensors,
+        rows: tuple[Tensor, Tensor],
+        training: Training,
+        seed: int,
         device: torch.device,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.module, self.device = module.to(device), device
         self.samples = {name: tensor.to(device) for name, tensor in samples.items()}
         self.train, self.validation = (part.to(device) for part in rows)

@@ -9,6 +9,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from creepkit import registry
 from creepkit.errors import SurrogateError
 from creepkit.files.json_documents import DocumentFormat
 from creepkit.files.reading import FileKind
@@ -37,10 +38,14 @@ CHECKPOINT = DocumentFormat(
 )
 
 
+def _registered_specimen(document: Any, source: str) -> Specimen:
+    return specimen_from_json(document, source, registry.default_registry().specimen)
+
+
 CODEC = RecordCodec(
     values={
         CreepLaw: ValueCodec(law_to_json, law_from_json),
-        Specimen: ValueCodec(specimen_to_json, specimen_from_json),
+        Specimen: ValueCodec(specimen_to_json, _registered_specimen),
     },
     names={
         "CreepLaw": CreepLaw,

@@ -12,7 +12,6 @@ from creepkit.dataset.dataset import Dataset
 from creepkit.errors import DatasetError, SolveError, SurrogateError
 from creepkit.language import symbols
 from creepkit.records import History, Program, RecordedLoading, Status
-from creepkit.surrogates import rate_net
 from creepkit.surrogates.loading import load_surrogate
 from creepkit.surrogates.rate_net import RateNet, RateSurrogate
 from creepkit.surrogates.recipe import Training
@@ -138,18 +137,6 @@ def check(slope: np.ndarray, numeric: np.ndarray) -> None:
     """Each output to 1e-4 of its largest derivative."""
     largest = np.abs(numeric).max(axis=(0, 1, 2))
     assert (np.abs(slope - numeric) <= 1e-4 * largest + 1e-9).all()
-
-
-def test_gradients_in_torch_are_the_jacobian(exact: RateSurrogate) -> None:
-    values, test = norton(5.0), dimple()
-    theta = torch.tensor([[p.to_internal(values[n]) for n, p in NORTON.table.items()]], dtype=torch.float64)
-    found = exact.predict(NORTON, NORTON.to_internal(values), [test], sensitivities=True)
-    slopes = torch.autograd.functional.jacobian(
-        lambda t: rate_net.differentiable_outputs(exact, NORTON, t, test), theta
-    )
-    assert slopes[0, :, :, 0].numpy() == pytest.approx(found.jacobian[0, 0], rel=1e-9, abs=1e-12)
-    shown = rate_net.differentiable_outputs(exact, NORTON, theta, test)[0]
-    assert shown.detach().numpy() == pytest.approx(found.values[0, 0], rel=1e-12)
 
 
 # ---- tests of any length ---------------------------------------------------------------------------------------------

@@ -141,9 +141,14 @@ class BulgeSensitivities:
 
 
 def output_sensitivities(
-    setup: BulgeSetup, kernel: CompiledLaw, theta: Floats, history: History, simulation: Simulation, profiles: Floats,
+    setup: BulgeSetup,
+    kernel: CompiledLaw,
+    theta: Floats,
+    history: History,
+    simulation: Simulation,
+    profiles: Floats,
     names: Sequence[str],
-) -> tuple[Floats, BulgeSensitivities]:  # fmt: skip
+) -> tuple[Floats, BulgeSensitivities]:
     """Outputs (times, 3) and their derivatives.
 
     names : "modulus" (relative), "temperature" (K), "thickness" (mm) and any length of the dimple, "window" (mm), and

@@ -22,8 +22,12 @@ from creepkit.records import (
 )
 from creepkit.specimens.bulge.observation import OBSERVED
 from creepkit.specimens.bulge.reduced_order.step_equations import AMPLITUDE_COLUMN
-from creepkit.specimens.bulge.reduced_order.time_integration import NUISANCE_DIRECTIONS
-from creepkit.specimens.bulge.reduced_order.trajectories import Trajectories, simulate_trajectories
+from creepkit.specimens.bulge.reduced_order.step_solution import NUISANCE_DIRECTIONS
+from creepkit.specimens.bulge.reduced_order.trajectories import (
+    Trajectories,
+    TrajectoryOptions,
+    simulate_trajectories,
+)
 from creepkit.specimens.bulge.settings import BulgeSettings
 
 if TYPE_CHECKING:
@@ -60,11 +64,16 @@ class BulgeReducedOrderModel:
         """Predict amplitude, width and shape of each history at its times; see records.Predictor."""
         check_nuisances(nuisances or (), self.nuisances, "a bulge specimen")
         compiled = kernels.lower(law, "numba")
-        theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
+        theta, _ = broadcast_candidates(theta, nuisances, len(histories))
         trajectories = simulate_trajectories(
-            self.specimen, compiled, theta, histories, nuisances=nuisances, exact=sensitivities
+            self.specimen,
+            compiled,
+            theta,
+            histories,
+            nuisances=nuisances,
+            options=TrajectoryOptions(exact=sensitivities),
         )
-        parts = [_history_prediction(history, k, trajectories, nuisances) for k, history in enumerate(histories)]
+        parts = [_history_prediction(history, k, trajectories, nuisances or ()) for k, history in enumerate(histories)]
         return assemble_prediction(parts, histories, OBSERVED, len(theta))
 
     def reference_stress(self, history: History) -> Floats:

@@ -266,9 +266,26 @@ def growth_multiplier(strains: Floats, exponent: float, *, size: float = 1.0, sh
 
 
 TRAJECTORY_COLUMNS = (
-    "elastic", "creep", "amplitude", "width", "shape", "strain", "stress", "age", "fast", "slow", "pressure", "modulus",
-    "temperature", "time", "middle", "log_rate", "log_multiplier", "exponent", "hardening",
-)  # fmt: skip
+    "elastic",
+    "creep",
+    "amplitude",
+    "width",
+    "shape",
+    "strain",
+    "stress",
+    "age",
+    "fast",
+    "slow",
+    "pressure",
+    "modulus",
+    "temperature",
+    "time",
+    "middle",
+    "log_rate",
+    "log_multiplier",
+    "exponent",
+    "hardening",
+)
 """See `reduced_courses`."""
 
 

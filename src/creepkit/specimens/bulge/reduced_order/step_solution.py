@@ -119,10 +119,17 @@ def reduced_workspace(states: int, count: int) -> ReducedWorkspace:
     """Allocate for `count` features."""
     width, size = POINT_SIZE + states, 1 + states
     return ReducedWorkspace(
-        np.zeros((PROBES, width)), np.zeros((PROBES, size * (1 + width))), np.zeros((count, width)),
-        np.zeros(count * size), np.zeros(CURVES), np.zeros(PROBES), np.zeros(states), np.ones(states),
-        np.zeros((2 + states, 1)), np.zeros((2 + states, 2 + states)),
-    )  # fmt: skip
+        np.zeros((PROBES, width)),
+        np.zeros((PROBES, size * (1 + width))),
+        np.zeros((count, width)),
+        np.zeros(count * size),
+        np.zeros(CURVES),
+        np.zeros(PROBES),
+        np.zeros(states),
+        np.ones(states),
+        np.zeros((2 + states, 1)),
+        np.zeros((2 + states, 2 + states)),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -134,12 +141,24 @@ def sensitivity_workspace(
     said = (1 + states) * (1 + width + parameters)
     kind = np.complex128
     return ReducedSensitivities(
-        np.zeros((PROBES, width), kind), np.zeros(CURVES, kind), np.zeros(PROBES, kind), np.zeros(states, kind),
-        np.zeros(size, kind), np.zeros(STATES + states, kind), np.zeros(size, kind), np.zeros(columns, kind),
-        np.zeros((PROBES, said)), np.zeros(some * count * said), np.zeros((size, size)), np.zeros((size, directions)),
-        np.zeros((size + directions, STATES + states + width + columns)), np.zeros((directions, STATES + states)),
-        np.zeros((directions, width)), np.zeros(directions), np.zeros(directions),
-    )  # fmt: skip
+        np.zeros((PROBES, width), kind),
+        np.zeros(CURVES, kind),
+        np.zeros(PROBES, kind),
+        np.zeros(states, kind),
+        np.zeros(size, kind),
+        np.zeros(STATES + states, kind),
+        np.zeros(size, kind),
+        np.zeros(columns, kind),
+        np.zeros((PROBES, said)),
+        np.zeros(some * count * said),
+        np.zeros((size, size)),
+        np.zeros((size, directions)),
+        np.zeros((size + directions, STATES + states + width + columns)),
+        np.zeros((directions, STATES + states)),
+        np.zeros((directions, width)),
+        np.zeros(directions),
+        np.zeros(directions),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -167,9 +186,18 @@ def real_node(test: Floats, j: int, beta: float) -> StepData:
     i = j - 1
     share, time, weight = midpoint_time(test[TIMES, i], test[TIMES, j], beta)
     return StepData(
-        test[PRESSURE, i], test[PRESSURE, j], test[TEMPERATURES, i], test[TEMPERATURES, j], test[MODULUS, i],
-        test[MODULUS, j], test[ELASTIC, i], test[ELASTIC, j], share, time, weight,
-    )  # fmt: skip
+        test[PRESSURE, i],
+        test[PRESSURE, j],
+        test[TEMPERATURES, i],
+        test[TEMPERATURES, j],
+        test[MODULUS, i],
+        test[MODULUS, j],
+        test[ELASTIC, i],
+        test[ELASTIC, j],
+        share,
+        time,
+        weight,
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -190,11 +218,18 @@ def complex_node(
     warm = COMPLEX_STEP * 1j if effect == 2 else 0j
     first, last = _change(test, i, effect, stiffer), _change(test, j, effect, stiffer)
     return StepData(
-        test[PRESSURE, i], test[PRESSURE, j], test[TEMPERATURES, i] + warm, test[TEMPERATURES, j] + warm,
-        test[MODULUS, i] + COMPLEX_STEP * 1j * first, test[MODULUS, j] + COMPLEX_STEP * 1j * last,
+        test[PRESSURE, i],
+        test[PRESSURE, j],
+        test[TEMPERATURES, i] + warm,
+        test[TEMPERATURES, j] + warm,
+        test[MODULUS, i] + COMPLEX_STEP * 1j * first,
+        test[MODULUS, j] + COMPLEX_STEP * 1j * last,
         test[ELASTIC, i] + COMPLEX_STEP * 1j * _lifted(test, i, effect, first),
-        test[ELASTIC, j] + COMPLEX_STEP * 1j * _lifted(test, j, effect, last), share, time, weight,
-    )  # fmt: skip
+        test[ELASTIC, j] + COMPLEX_STEP * 1j * _lifted(test, j, effect, last),
+        share,
+        time,
+        weight,
+    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -16,12 +16,9 @@ from creepkit.errors import SolveError
 from creepkit.records import History
 from creepkit.specimens.bulge.finite_elements import MODULUS_TEMPERATURE_STEP, BulgeSetup, set_up_test
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
+from creepkit.specimens.bulge.reduced_order.step_solution import NUISANCE_DIRECTIONS, FeatureFactors
 from creepkit.specimens.bulge.reduced_order.tables import ReducedOrderTables, build_tables
-from creepkit.specimens.bulge.reduced_order.time_integration import (
-    NUISANCE_DIRECTIONS,
-    FeatureFactors,
-    integrate_candidates,
-)
+from creepkit.specimens.bulge.reduced_order.time_integration import integrate_candidates
 
 if TYPE_CHECKING:
     from creepkit.specimens.bulge.settings import BulgeSettings
@@ -166,6 +163,22 @@ class Trajectories:
         return np.asarray(np.moveaxis(np.tensordot(weights, values[:, : weights.shape[1]], axes=(1, 1)), 0, 1))
 
 
+@dataclass(frozen=True, eq=False)
+class TrajectoryOptions:
+    """How trajectories are simulated; they are the same for any number of threads.
+
+    factors : of stress and strain at which rates are recorded, the features of RateNet.
+    exact : whether derivatives are integrated too.
+    tables : in place of those of the specimen; a test of another dimple than theirs (but for its apex thickness), or of
+        another window, is a SolveError.
+    """
+
+    factors: FeatureFactors = WITHOUT_FEATURES
+    exact: bool = False
+    threads: int = 1
+    tables: ReducedOrderTables | None = None
+
+
 def simulate_trajectories(
     specimen: BulgeSettings,
     law: CompiledLaw,
@@ -173,23 +186,20 @@ def simulate_trajectories(
     histories: Sequence[History],
     *,
     nuisances: Mapping[str, Floats] | None = None,
-    factors: FeatureFactors = WITHOUT_FEATURES,
-    exact: bool = False,
-    threads: int = 1,
-    tables: ReducedOrderTables | None = None,
+    options: TrajectoryOptions | None = None,
 ) -> Trajectories:
-    """March candidates, theta (candidates, P) internal, through all tests.
+    """Integrate candidates, theta (candidates, P) internal values, through all tests.
 
-    nuisances : {kind: (candidates or 1, tests)}, see records.Predictor; "window" too. factors : of the features.
-    exact : with derivatives. Results are the same for any number of threads. known : tables to go by, in place of those
-    of the specimen; a test of another dimple than theirs (but for its apex thickness), or window, is a SolveError.
+    nuisances : {kind: (candidates or 1, tests)}, see records.Predictor; "window" too.
     """
+    options = options or TrajectoryOptions()
+    factors, exact = options.factors, options.exact
     theta = np.array(theta, dtype=float, order="C", ndmin=2)
     broadcast_nuisances = {kind: np.atleast_2d(value) for kind, value in (nuisances or {}).items()}
     schedules = tuple(time_nodes(specimen, history) for history in histories)
     counts = np.array([plan.times.size for plan in schedules], dtype=np.int64)
     rows = max([len(v) for v in broadcast_nuisances.values()], default=1)
-    geometries = _dimples(specimen, histories, schedules, broadcast_nuisances, rows, tables)
+    geometries = _dimples(specimen, histories, schedules, broadcast_nuisances, rows, options.tables)
     tests, modulus_changes = _tests(histories, schedules, broadcast_nuisances, geometries, counts, rows)
     shape = (
         len(theta),
@@ -204,13 +214,32 @@ def simulate_trajectories(
 
     def part(first: int, last: int) -> None:
         integrate_candidates(
-            law.update, law.sensitivity, law.rate, first, last, theta, beta, beta_slopes, modulus_changes, counts, tests,
-            *geometries.arrays, geometries.row, geometries.grid, np.array(law.initial), np.array(law.limits),
-            (specimen.deflection_limit, specimen.strain_limit), factors, _EXACT_TOLERANCE if exact else _TOLERANCE,
-            out, changes, status, end_times,
-        )  # fmt: skip
+            law.update,
+            law.sensitivity,
+            law.rate,
+            first,
+            last,
+            theta,
+            beta,
+            beta_slopes,
+            modulus_changes,
+            counts,
+            tests,
+            *geometries.arrays,
+            geometries.row,
+            geometries.grid,
+            np.array(law.initial),
+            np.array(law.limits),
+            (specimen.deflection_limit, specimen.strain_limit),
+            factors,
+            _EXACT_TOLERANCE if exact else _TOLERANCE,
+            out,
+            changes,
+            status,
+            end_times,
+        )
 
-    _in_threads(part, len(theta), threads)
+    _in_threads(part, len(theta), options.threads)
     return Trajectories(out, changes if exact else None, schedules, status, end_times)
 
 
@@ -236,9 +265,13 @@ class _Dimples:
 
 
 def _dimples(
-    specimen: BulgeSettings, histories: Sequence[History], plans: Sequence[TimeNodes], nuisances: Mapping[str, Floats], rows: int,
+    specimen: BulgeSettings,
+    histories: Sequence[History],
+    plans: Sequence[TimeNodes],
+    nuisances: Mapping[str, Floats],
+    rows: int,
     known_tables: ReducedOrderTables | None,
-) -> _Dimples:  # fmt: skip
+) -> _Dimples:
     """Every different dimple, and which one each candidate has in each test."""
     own_values = np.array(
         [(k, p.setup.observation.window, p.setup.geometry.apex_thickness) for k, p in enumerate(plans)]
@@ -281,9 +314,13 @@ def _tables(specimen: BulgeSettings, plan: TimeNodes, window: float) -> ReducedO
 
 
 def _tests(
-    histories: Sequence[History], plans: Sequence[TimeNodes], nuisances: Mapping[str, Floats], dimples: _Dimples,
-    counts: Ints, rows: int,
-) -> tuple[Floats, Floats]:  # fmt: skip
+    histories: Sequence[History],
+    plans: Sequence[TimeNodes],
+    nuisances: Mapping[str, Floats],
+    dimples: _Dimples,
+    counts: Ints,
+    rows: int,
+) -> tuple[Floats, Floats]:
     """Each test as in `reduced_problem`, (candidates or 1, tests, 8, nodes), and relative changes of the modulus."""
     shape = (rows, len(plans))
     out = np.zeros((*shape, 8, int(counts.max())))

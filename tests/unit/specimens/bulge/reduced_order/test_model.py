@@ -16,7 +16,7 @@ from creepkit.records import History, Predictor, PressureJump, Program, Recorded
 from creepkit.specimens.bulge.reduced_order.deflection_curves import LOG_GROWTH, LOG_STRESS, curve_value, grid_position
 from creepkit.specimens.bulge.reduced_order.predictor import BulgeReducedOrderModel
 from creepkit.specimens.bulge.reduced_order.tables import build_tables, read_tables, write_tables
-from creepkit.specimens.bulge.reduced_order.trajectories import simulate_trajectories
+from creepkit.specimens.bulge.reduced_order.trajectories import TrajectoryOptions, simulate_trajectories
 from creepkit.specimens.bulge.specimen import Bulge
 
 BULGE = Bulge(threads=1)
@@ -348,11 +348,14 @@ def test_tables_come_back_from_their_file(tmp_path):
     back = read_tables(file)
     compiled = lower(NORTON, "numba")
     theta = compiled.to_internal(SLOW)
-    own, theirs = (simulate_trajectories(BULGE, compiled, theta, [JUMP], tables=tables) for tables in (None, back))
+    own, theirs = (
+        simulate_trajectories(BULGE, compiled, theta, [JUMP], options=TrajectoryOptions(tables=tables))
+        for tables in (None, back)
+    )
     assert np.array_equal(own.values, theirs.values)
     other = JUMP.replace(geometry={"cavity_radius": 7.0, "roof_radial": 7.0})
     with pytest.raises(SolveError, match="cavity_radius is 7 mm, but the tables .* are for 7.5 mm"):
-        simulate_trajectories(BULGE, compiled, theta, [other], tables=back)
+        simulate_trajectories(BULGE, compiled, theta, [other], options=TrajectoryOptions(tables=back))
 
 
 def test_files_that_are_no_tables(tmp_path):

@@ -13,7 +13,7 @@ from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import History, PressureJump, Program, RecordedLoading
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
 from creepkit.specimens.bulge.reduced_order.time_integration import NUISANCE_DIRECTIONS, FeatureFactors
-from creepkit.specimens.bulge.reduced_order.trajectories import simulate_trajectories
+from creepkit.specimens.bulge.reduced_order.trajectories import TrajectoryOptions, simulate_trajectories
 from creepkit.specimens.bulge.specimen import Bulge
 
 BULGE = Bulge(threads=1)
@@ -52,7 +52,9 @@ CASES = {
 
 def values_of(law, theta, history, **nuisances):
     assumed = {kind: np.array([[value]]) for kind, value in nuisances.items()}
-    found = simulate_trajectories(BULGE, law, theta, [history], nuisances=assumed, factors=FACTORS, exact=True)
+    found = simulate_trajectories(
+        BULGE, law, theta, [history], nuisances=assumed, options=TrajectoryOptions(factors=FACTORS, exact=True)
+    )
     assert (found.status == 0).all()
     return found
 
@@ -89,7 +91,10 @@ def test_threads_do_the_same():
     compiled = kernels.lower(law, "numba")
     theta = compiled.to_internal({**values, "n": np.linspace(2.5, 3.5, 7)})
     one, three = (
-        simulate_trajectories(BULGE, compiled, theta, [JUMP, DOWN], factors=FACTORS, threads=n) for n in (1, 3)
+        simulate_trajectories(
+            BULGE, compiled, theta, [JUMP, DOWN], options=TrajectoryOptions(factors=FACTORS, threads=n)
+        )
+        for n in (1, 3)
     )
     assert np.array_equal(one.values, three.values)
 
@@ -98,8 +103,8 @@ def test_features_of_a_power_law_are_its_exponents():
     """f ~ s^3 eps^-0.5: log10 of the rate changes by 3 log10(1.6), and by -0.5 log10(0.2)."""
     law, values = CASES["strain hardening"]
     compiled = kernels.lower(law, "numba")
-    found = simulate_trajectories(BULGE, compiled, compiled.to_internal(values), [JUMP], factors=FACTORS).values[
-        0, 0, 1:, len(TRAJECTORY_COLUMNS) :
-    ]
+    found = simulate_trajectories(
+        BULGE, compiled, compiled.to_internal(values), [JUMP], options=TrajectoryOptions(factors=FACTORS)
+    ).values[0, 0, 1:, len(TRAJECTORY_COLUMNS) :]
     expected = 3 * np.log10(FACTORS.stress) - 0.5 * np.log10(FACTORS.strain)[:, None]
     np.testing.assert_allclose(found, np.broadcast_to(expected.ravel(), found.shape), rtol=1e-3, atol=1e-9)
