@@ -17,18 +17,6 @@ Result = TypeVar("Result")
 
 
 PRESENTERS: dict[str, dict[str, str]] = {
-    # laws
-    "CreepLaw": {
-        "text": "creepkit.language.printing:law_text",
-        "latex": "creepkit.language.printing:law_latex",
-        "add": "creepkit.language.algebra:add",
-        "without": "creepkit.language.algebra:without",
-        "only": "creepkit.language.algebra:only",
-        "fix": "creepkit.language.algebra:fix",
-        "times": "creepkit.language.algebra:times",
-        "with_temperature": "creepkit.language.algebra:with_temperature",
-        "at": "creepkit.language.algebra:at",
-    },
     # specimens
     "Run": {"text": "creepkit.report.simulation:run_text"},
     "BulgeRun": {

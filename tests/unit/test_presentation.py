@@ -25,7 +25,7 @@ from helpers.source_tree import public_classes
 ENTRIES = [(name, verb, function) for name, verbs in PRESENTERS.items() for verb, function in verbs.items()]
 each_entry = pytest.mark.parametrize(("name", "verb", "function"), ENTRIES, ids=[f"{n}.{v}" for n, v, _ in ENTRIES])
 
-METHODS = {"text": "__str__", "add": "__add__"}
+METHODS = {"text": "__str__"}
 """{verb: method that asks for it} where the two are not of one name."""
 
 
@@ -84,7 +84,6 @@ def test_a_verb_without_an_entry_is_an_error_that_names_both() -> None:
 
 AXIS = np.array([10.0, 100.0])
 RECORDS = [
-    NORTON,
     Correlation(("ln A", "n"), np.array([[1.0, -0.5], [-0.5, 1.0]]), np.ones(2)),
     ProfileLikelihood("n", "1", AXIS, np.ones(2), 4.0, None, 5.0, 3.84, 0.95, (3.0, 5.0)),
     RateBand(AXIS, 1e-9 * AXIS, 5e-10 * AXIS, 2e-9 * AXIS, (6e-10 * AXIS, 1.5e-9 * AXIS), 1073.0, 5.0),

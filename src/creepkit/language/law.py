@@ -21,7 +21,6 @@ from sympy.logic.boolalg import Boolean, BooleanAtom
 from creepkit.errors import LawError, nearest
 from creepkit.language.expression_trees import evaluate_multiprecision
 from creepkit.language.symbols import POINT_VARIABLES, Param, State
-from creepkit.presentation import Presentable, present
 
 
 def validate_law(law: CreepLaw) -> None:
@@ -153,7 +152,7 @@ def _hash(text: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class CreepLaw(Presentable):
+class CreepLaw:
     """A creep law: rate of equivalent creep strain, in 1/s, as a sum of named terms.
 
     name : short, lower case, unique in the registry.
@@ -267,37 +266,53 @@ class CreepLaw(Presentable):
 
     def latex(self) -> str:
         """The law as a LaTeX equation."""
-        return present(self, "latex")
+        from creepkit.language.printing import law_latex
+
+        return law_latex(self)
 
     # ---- algebra ---------------------------------------------------------------------------------------------------
 
     def __add__(self, other: CreepLaw) -> CreepLaw:
         """The additive law; terms stay apart by name, colliding parameters become A_1, A_2 ..."""
-        return present(self, "add", other) if isinstance(other, CreepLaw) else NotImplemented
+        from creepkit.language import algebra
+
+        return algebra.add(self, other) if isinstance(other, CreepLaw) else NotImplemented
 
     def without(self, *terms: str) -> CreepLaw:
         """The law less the named terms and the parameters that only they used."""
-        return present(self, "without", terms)
+        from creepkit.language import algebra
+
+        return algebra.without(self, terms)
 
     def only(self, *terms: str) -> CreepLaw:
         """The law with the named terms alone."""
-        return present(self, "only", terms)
+        from creepkit.language import algebra
+
+        return algebra.only(self, terms)
 
     def fix(self, **values: float) -> CreepLaw:
         """The law with parameters at fixed numbers; m=0 makes strain hardening a power law."""
-        return present(self, "fix", values)
+        from creepkit.language import algebra
+
+        return algebra.fix(self, values)
 
     def times(self, factor: Any) -> CreepLaw:
         """The law with every term multiplied by a factor such as arrhenius(T_ref=1073)."""
-        return present(self, "times", factor)
+        from creepkit.language import algebra
+
+        return algebra.times(self, factor)
 
     def with_temperature(self, **forms: Any) -> CreepLaw:
         """The law with parameters made functions of temperature, such as n=linear(T_ref=1073)."""
-        return present(self, "with_temperature", forms)
+        from creepkit.language import algebra
+
+        return algebra.with_temperature(self, forms)
 
     def at(self, temperature: float) -> CreepLaw:
         """The law at one temperature, in K; parameters that no longer matter there are dropped."""
-        return present(self, "at", temperature)
+        from creepkit.language import algebra
+
+        return algebra.at(self, temperature)
 
     def rename(self, name: str, title: str = "") -> CreepLaw:
         """The same law under another name."""
@@ -326,6 +341,11 @@ class CreepLaw(Presentable):
         state = {f.name: getattr(self, f.name) for f in fields(self)}
         plain = {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
         return _rebuild, (plain,)
+
+    def __str__(self) -> str:
+        from creepkit.language.printing import law_text
+
+        return law_text(self)
 
     def __repr__(self) -> str:
         return f"<CreepLaw {self.name}: {len(self.terms)} term(s), parameters {', '.join(self.names) or 'none'}>"

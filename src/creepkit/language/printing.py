@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy
 from sympy.printing.latex import LatexPrinter
 from sympy.printing.str import StrPrinter
 
-from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import GAS_CONSTANT, LATEX_SYMBOLS, temperature
+
+if TYPE_CHECKING:
+    from creepkit.language.law import CreepLaw
+
 
 _LATEX_NAMES = {"n_inf": r"n_\infty"}
 
