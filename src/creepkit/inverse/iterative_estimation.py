@@ -180,9 +180,7 @@ class WorkingNoise:
         ):
             initial_drift = max(noise_model[name].drift, drift) if drift > 0 and name != RUPTURE_OUTPUT else 0.0
             initial_noise = max(float(noise), SMALLEST_NOISE * scale.floor)
-            noise_model = noise_model.with_output(
-                name, noise=initial_noise, drift=initial_drift, correlation_length=1.0
-            )
+            noise_model = noise_model.with_output(name, noise=initial_noise, drift=initial_drift, correlation_length=1.0)
         return noise_model
 
     def _in_ratio_of_weights(self, noise_model: NoiseModel, scale: float) -> NoiseModel:
