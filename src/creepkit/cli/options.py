@@ -77,9 +77,9 @@ def check_options(specimen: str, options: dict[str, object]) -> None:
         return
     for option, option_value in options.items():
         if option_value not in (None, []) and specimen not in SPECIMENS_OF_OPTION[option]:
-            allowed = " or ".join(SPECIMENS_OF_OPTION[option])
+            allowed_specimens = " or ".join(SPECIMENS_OF_OPTION[option])
             raise SolveError(
-                f"{option} belongs to --specimen {allowed}, found --specimen {specimen}; leave one of them out"
+                f"{option} belongs to --specimen {allowed_specimens}, found --specimen {specimen}; leave one of them out"
             )
 
 

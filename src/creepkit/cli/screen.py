@@ -62,11 +62,20 @@ def command(
 
     with ProgressBar() as progress:
         plate = screen(
-            folder, law, _surrogate_named(surrogate), compositions=compositions, to=to, nuisances=parse_nuisances(nuisance),
-            settings=IdentificationSettings(seed=seed, frames=SELECTION_FRAMES), through=_surrogate_named(through),
-            dense=None if dense == "none" else dense, penalty=penalty_named(penalty), confirm=_confirmation_choice(confirm),
-            workers=workers, progress=progress.tick,
-        )  # fmt: skip
+            folder,
+            law,
+            _surrogate_named(surrogate),
+            compositions=compositions,
+            to=to,
+            nuisances=parse_nuisances(nuisance),
+            settings=IdentificationSettings(seed=seed, frames=SELECTION_FRAMES),
+            through=_surrogate_named(through),
+            dense=None if dense == "none" else dense,
+            penalty=penalty_named(penalty),
+            confirm=_confirmation_choice(confirm),
+            workers=workers,
+            progress=progress.tick,
+        )
     written = [plate.to_csv(to / "plate.csv"), plate.to_hdf5(to / "plate.h5")]
     if plate.identified:
         written += [to / "fits", *plate.plot(to / "pictures")]

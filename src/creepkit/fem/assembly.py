@@ -77,7 +77,7 @@ class PointStates(NamedTuple):
 class ForceWorkspace(NamedTuple):
     """residual : (size + width + 4,) internal less external forces; band, flat : the tangent, as rows and laid flat.
 
-    block : room of the factorisation; element : (3, 8, 8) rr, rz, zz; local : (2, 8) displacements;
+    block : workspace of the factorisation; element : (3, 8, 8) rr, rz, zz; local : (2, 8) displacements;
     inner : (2, 8) forces; products : (16, 8); side : (2, 3); sides : (4, 3, 3); ends : (2, 3) current coordinates.
     """
 

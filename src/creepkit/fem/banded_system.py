@@ -1,4 +1,4 @@
-"""The finite element model as compiled code reads it: equation numbers and banded matrices with their factorisations."""
+"""The finite element model as compiled code reads it: equation numbers, banded matrices and their factors."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ def padded(size: int) -> int:
 def factorize(band: Floats, size: int, width: int, block: Floats) -> bool:
     """Cholesky factor in place, its diagonal as reciprocals; False when the matrix is not positive definite.
 
-    band : (padded(size) + width + BLOCK, width + 1 + BLOCK); width : half-bandwidth; block : (BLOCK, width + 1) room.
+    band : (padded(size) + width + BLOCK, width + 1 + BLOCK) the matrix; width : half-bandwidth.
+    block : (BLOCK, width + 1) workspace.
     """
     for j in range(size, padded(size)):
         band[j, 0] = 1.0

@@ -1,4 +1,4 @@
-"""Meshes of eight-node quadrilaterals: shape functions, integration points, quality, structured strips, surface interpolation.
+"""Meshes of eight-node quadrilaterals: shape functions, integration points, quality, surface interpolation.
 
 Serendipity functions as in Zienkiewicz and Taylor, The Finite Element Method, vol. 1, with 2 x 2 integration points.
 """

@@ -51,7 +51,7 @@ LANES = 16
 
 
 _NUDGE = 1e-4
-"""Share of a segment's length by which its ends are moved to difference its clock."""
+"""Share of a segment's length by which its ends are moved to difference its time transformation."""
 
 
 BY_PRESSURE, BY_MOMENT, BY_LOAD_TEMPERATURE, BY_STIFFNESS, BY_WEIGHT = range(5)
@@ -263,8 +263,8 @@ def creep_response(
 
 @njit(cache=True, error_model="numpy", inline="always")
 def stress_sensitivities(
-    stage: StageConditions, elastic: ElasticPredictor, moduli: tuple[Four, Four, Four, Four], increment: float, base: Floats, own: Floats,
-    k: int, dy: Floats,
+    stage: StageConditions, elastic: ElasticPredictor, moduli: tuple[Four, Four, Four, Four], increment: float,
+    base: Floats, own: Floats, k: int, dy: Floats,
 ) -> None:  # fmt: skip
     """Changes (3, C) of y, conjugate to w, at fixed strain: w falls as the history rises, D changes on its own."""
     a00 = moduli[HOOP][HOOP] - moduli[HOOP][SUM] - moduli[SUM][HOOP] + moduli[SUM][SUM]

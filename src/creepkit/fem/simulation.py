@@ -80,13 +80,18 @@ class LoadHistory:
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A march that was made: its accepted steps, and how it ended.
+    """A finished simulation: its accepted steps, and how it ended.
 
-    times : (steps,) s, from rest at 0 on. displacements : (steps, nodes, 2) mm. mises : (steps, points) MPa.
-    places : (steps, 2) where each step began in its segment, and its length.
+    times : (steps,) s, from rest at 0 on.
+    displacements : (steps, nodes, 2) mm, u_r and u_z.
+    mises : (steps, points) MPa, von Mises stress of the Cauchy stress.
     values : (steps, points, 4 + S) creep components, equivalent creep strain and states, or None if not kept.
-    status, end_time, reason : how it ended. counts : accepted and rejected steps, full and light passes of equilibrium.
-    beta : exponent of the clock (see integration.clock). record : what `differentiate` replays, if kept.
+    status, end_time, reason : how it ended; s.
+    iterations : (4,) accepted and rejected steps; equilibrium iterations with and without a new tangent.
+    timeline : interpolation between the accepted steps.
+    beta : exponent of the time transformation (see integration.time_discretisation).
+    positions : (steps, 2) where each step began in its segment, and its length, in the transformed time.
+    record : what `differentiate` replays, if kept.
     """
 
     times: Floats
@@ -108,13 +113,20 @@ class Simulation:
 
 
 def simulate(
-    law: CompiledLaw, theta: Floats, model: FiniteElementModel, load_history: LoadHistory, *, settings: SolverSettings | None = None,
-    keep_points: bool = False, keep_stages: bool = False, same_steps_as: Simulation | None = None,
-) -> Simulation:  # fmt: skip
-    """March one body through its course; theta : (P,) internal parameters.
+    law: CompiledLaw,
+    theta: Floats,
+    model: FiniteElementModel,
+    load_history: LoadHistory,
+    *,
+    settings: SolverSettings | None = None,
+    keep_points: bool = False,
+    keep_stages: bool = False,
+    same_steps_as: Simulation | None = None,
+) -> Simulation:
+    """Simulate one body under its load history; theta : (P,) internal parameters.
 
     keep_points : keep strains and states of all points; keep_stages : keep what `differentiate` needs.
-    like : make the very steps of another simulation, so that the two may be differenced.
+    same_steps_as : make the very steps of another simulation, so that the two may be differenced.
     """
     settings = settings or SolverSettings()
     theta = np.ascontiguousarray(theta, dtype=float)
@@ -175,7 +187,7 @@ def _record(
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSensitivities:
-    """Derivatives of a march.
+    """Derivatives of a simulation.
 
     surface : (steps, top, C) of u_z of the observed nodes, to the law's internal parameters, then to the directions
         of the load program, then to the numbers of the geometry.
@@ -190,9 +202,9 @@ def sensitivities(
     law: CompiledLaw, theta: Floats, model: FiniteElementModel, load_history: LoadHistory, simulation: Simulation, *,
     directions: Floats | None = None, velocities: Sequence[tuple[GeometryDerivative, Floats]] = (),
 ) -> SurfaceSensitivities:  # fmt: skip
-    """Exact derivatives of a march that kept its stages.
+    """Exact derivatives of a simulation that kept its stages.
 
-    directions : (D, segments, 10) derivatives of `course.segments`.
+    directions : (D, segments, 10) derivatives of `load_history.segments`.
     velocities : for each number of the geometry its GeometryChange and the velocities (nodes, 2) of the nodes.
     """
     if simulation.record is None:

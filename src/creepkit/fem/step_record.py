@@ -35,7 +35,7 @@ START, END, PRESSURE, END_PRESSURE, START_TEMPERATURE, FINAL_TEMPERATURE, MODULU
 
 
 class SolverSettings(NamedTuple):
-    """How accurately, and how far, to march.
+    """How accurately, and how far, to simulate.
 
     tolerance : estimated error of a step's displacements over (0.01 mm + the largest of them).
     newton : last correction of equilibrium over the same.
@@ -56,7 +56,7 @@ class StepRecord(NamedTuple):
     """Accepted steps: (records,) times s, segment of each; displacements (records, 2 nodes); and if kept, the points.
 
     values : (records or 0, points, V). mises : (records, points) MPa. counts : (4,) accepted, rejected, full and light
-    passes of equilibrium. places : (records, 2) where a step began and its length, in the position of its clock.
+    passes of equilibrium. places : (records, 2) where a step began and its length, in its transformed time.
     stages, slopes : if kept, what the stages found: displacements (records or 0, stages, 2 nodes), and d value/ds
     (records or 0, stages, points, V).
     """
@@ -73,8 +73,9 @@ class StepRecord(NamedTuple):
 
 
 class SolverWorkspace(NamedTuple):
-    """Working arrays of a march: points, one point, forces; displacements (2 nodes,) now, at the start of the step, and
-    (stages, 2 nodes) at the stages.
+    """Working arrays of a simulation: points, one point, forces, and displacements in mm.
+
+    displacement, start : (2 nodes,) now and at the start of the step; stages : (stages, 2 nodes) at the stages.
     """
 
     points: PointStates
@@ -154,7 +155,7 @@ SHORT = 0.2
 
 @dataclass(frozen=True, eq=False)
 class TimeInterpolation:
-    """The accepted steps of a march.
+    """The accepted steps of a simulation.
 
     times : (steps,) s. starts : (segments reached,) s. rows : first and last step of each segment; without a jump of
     the load the first is the last one of the segment before. origins : (segments reached,) s, zero of the time y.

@@ -86,8 +86,9 @@ def integrate_program(
     """Run the program; fill `record` from its first row on, which holds the body at rest.
 
     segments : (segments, 10). pattern : (2 nodes,) displacement of held nodes for a unit of motion, mm.
-    initial, limits : (S,) states. script : (records, 2) places of another march, to make the very same steps; (0, 2)
-    for steps by error control.
+    initial, limits : (S,) states.
+    script : (records, 2) positions of another simulation, to make the very same steps; (0, 2) for steps by error
+        control.
     """
     make_virgin(rooms.points, initial)
     clear(rooms.displacement)
@@ -100,8 +101,8 @@ def integrate_program(
             if ended.code != REACHED_END:
                 return ended
         ended = _segment(
-            update, theta, segment_transformation(segment, beta), poisson, body, segment, n, pattern, limits, initial, settings,
-            tableau, rooms, script, record, ended,
+            update, theta, segment_transformation(segment, beta), poisson, body, segment, n, pattern, limits, initial,
+            settings, tableau, rooms, script, record, ended,
         )  # fmt: skip
         if ended.code != REACHED_END:
             return ended
@@ -119,8 +120,8 @@ def _jumps(before: Three, segment: Floats) -> bool:
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _jump(
-    update: Any, theta: Floats, poisson: float, body: FiniteElementModel, segment: Floats, n: int, pattern: Floats, before: Three,
-    settings: SolverSettings, rooms: SolverWorkspace, record: StepRecord, ended: Termination,
+    update: Any, theta: Floats, poisson: float, body: FiniteElementModel, segment: Floats, n: int, pattern: Floats,
+    before: Three, settings: SolverSettings, rooms: SolverWorkspace, record: StepRecord, ended: Termination,
 ) -> Termination:  # fmt: skip
     """The elastic change at a sudden change of load, in as many parts as it needs; recorded at the segment's start."""
     points, u, start = rooms.points, rooms.displacement, rooms.start
@@ -155,11 +156,11 @@ def _jump(
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _segment(
-    update: Any, theta: Floats, clock: TimeTransformation, poisson: float, body: FiniteElementModel, segment: Floats, n: int, pattern: Floats,
-    limits: Floats, initial: Floats, settings: SolverSettings, tableau: Tableau, rooms: SolverWorkspace, script: Floats, record: StepRecord,
-    ended: Termination,
+    update: Any, theta: Floats, clock: TimeTransformation, poisson: float, body: FiniteElementModel, segment: Floats,
+    n: int, pattern: Floats, limits: Floats, initial: Floats, settings: SolverSettings, tableau: Tableau,
+    rooms: SolverWorkspace, script: Floats, record: StepRecord, ended: Termination,
 ) -> Termination:  # fmt: skip
-    """March over one segment in the position s of its clock, from 0 to 1."""
+    """Integrate over one segment in its transformed time s, from 0 to 1."""
     s, elapsed, length = 0.0, 0.0, segment[END] - segment[START]
     h = position(clock, segment[START] + min(settings.first, length))
     first, failures = ended.records - 1, 0
@@ -255,8 +256,8 @@ def differentiate_program(
 ) -> int:
     """Fill `surface` (records, top, C), changes of u_z of the observed nodes, and `times` (records, D), s.
 
-    record : of a march that kept its stages; count : its rows. The first row is the body at rest; a row whose step has
-    no length is a sudden change of load, with one stage.
+    record : of a simulation that kept its stages; count : its rows. The first row is the body at rest; a row whose step
+        has no length is a sudden change of load, with one stage.
     """
     _start_sensitivities(room, initial)
     for row in range(1, count):

@@ -203,8 +203,9 @@ def prescribe_motion(body: FiniteElementModel, pattern: Floats, motion: float, u
 
 @njit(cache=True, error_model="numpy", inline="always")
 def attempt_step(
-    update: Any, theta: Floats, clock: TimeTransformation, poisson: float, body: FiniteElementModel, segment: Floats, pattern: Floats,
-    settings: SolverSettings, tableau: Tableau, rooms: SolverWorkspace, record: StepRecord, first: int, rows: int, s: float, h: float,
+    update: Any, theta: Floats, clock: TimeTransformation, poisson: float, body: FiniteElementModel, segment: Floats,
+    pattern: Floats, settings: SolverSettings, tableau: Tableau, rooms: SolverWorkspace, record: StepRecord, first: int,
+    rows: int, s: float, h: float,
 ) -> tuple[int, float]:  # fmt: skip
     """Try one step from `s`; the displacement ends where the last stage does.
 
@@ -255,8 +256,8 @@ def _guess(points: PointStates, share: float, i: int, last: int) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _predict(
-    record: StepRecord, first: int, rows: int, stage_u: Floats, i: int, start: Floats, clock: TimeTransformation, segment: Floats,
-    s: float, tableau: Tableau, h: float, u: Floats,
+    record: StepRecord, first: int, rows: int, stage_u: Floats, i: int, start: Floats, clock: TimeTransformation,
+    segment: Floats, s: float, tableau: Tableau, h: float, u: Floats,
 ) -> None:  # fmt: skip
     """Guess the displacements of stage `i` along a straight line through what was found last."""
     if i > 0:

@@ -56,7 +56,7 @@ class PointTest:
 
     driving : MPa; stress, nominal stress under constant load, or E times the total strain in relaxation.
     temperature : K. times : (times,) s, non-decreasing. stiffness : MPa; 0 unless the strain is prescribed.
-    levels : (levels,) increasing creep strains whose times of arrival are wanted; until : s, integrate so far for them.
+    levels : (levels,) increasing creep strains whose times are wanted; until : s, integrate so far for them.
     """
 
     driving: Program
@@ -96,11 +96,14 @@ class Integration:
 
     strain : (candidates, frames), NaN after an end; starts : (tests + 1,) where each test's frames begin.
     jacobian : (candidates, frames, P) or None, derivatives to the internal parameters.
-    endings : (candidates, tests) codes, see REASONS; end_times : s; steps : (candidates, tests, 2) accepted, rejected.
+    terminations : (candidates, tests) codes, see REASONS.
+    end_times : (candidates, tests) s.
+    steps : (candidates, tests, 2) accepted and rejected steps.
     end_jacobian : (candidates, tests, P) or None, derivatives of ln(end time) to the internal parameters; NaN unless
         the test burst.
-    arrivals, arrival_slopes : (candidates, levels) s, and dp/d(ln t) there, NaN for levels that were not reached, tests
-        one behind another; arrival_jacobian : (candidates, levels, P) or None, of ln t.
+    level_times, level_rates : (candidates, levels) s at which strains were reached, and dp/d(ln t) there; NaN for
+        levels that were not reached; tests one behind another.
+    level_time_jacobian : (candidates, levels, P) or None, derivatives of ln t.
     """
 
     strain: Floats

@@ -1,6 +1,7 @@
 """Event location and termination: limits of strain and states, times at given strains, and their derivatives.
 
-A time t at which an unknown v takes a given value depends on the parameters as dt/dtheta = -(dv/dtheta at fixed t) / (dv/dt).
+A time t at which an unknown v takes a given value depends on the parameters as
+dt/dtheta = -(dv/dtheta at fixed t) / (dv/dt).
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ REACHED_END, STRAIN_LIMIT, STATE_LIMIT, DIVERGED, STEP_TOO_SMALL, TOO_MANY_STEPS
 
 
 TERMINATION_MARGIN = 1e-7
-"""Share of the time passed, within which a limit ahead is the end of a march whose steps have shrunk to nothing."""
+"""Fraction of the time passed, within which a limit ahead ends a simulation whose steps have shrunk to nothing."""
 
 
 class TerminationLimits(NamedTuple):
@@ -119,7 +120,7 @@ def locate_levels(
     arrivals: LevelEvents,
     reached: int,
 ) -> int:
-    """Write the arrivals within the step, up to its `share`; return how many levels are reached."""
+    """Write the times of the levels reached within the step, up to its `share`; return how many levels are reached."""
     end = dense_value(tableau, work, h, share, 0)
     while reached < arrivals.levels.size and arrivals.levels[reached] <= end:
         level, low, high = arrivals.levels[reached], 0.0, share

@@ -99,8 +99,9 @@ def integrate_point(
     jacobian: Floats,
     arrivals: LevelEvents,
 ) -> IntegrationProgress:
-    """Integrate from time zero; fill `strain` (times,), `jacobian` (times, P), `arrivals` up to the end reached.
+    """Integrate from time zero; fill strain, jacobian and the times of the levels, up to the end reached.
 
+    strain : (times,), NaN after the end.
     segments : (segments, 6); times : (times,) s, non-decreasing, none beyond the last segment.
     jacobian : (times, P), or (0, P) to do without.
     """
@@ -159,7 +160,7 @@ def _integrate_segment(
     arrivals: LevelEvents,
     progress: IntegrationProgress,
 ) -> IntegrationProgress:
-    """March over one segment in the position s of its clock, from 0 to 1."""
+    """Integrate over one segment in its transformed time s, from 0 to 1."""
     done, reached, steps, rejected = progress.done, progress.reached, progress.steps, progress.rejected
     clock, rate = choose_time_transformation(update, kernel.theta, kernel.beta, drive, segment, work.value, work)
     if jacobian.shape[0] > 0:

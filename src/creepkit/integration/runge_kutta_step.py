@@ -1,6 +1,7 @@
 """One Runge-Kutta step of a material point, its dense output, error estimate and sensitivities.
 
-Sensitivities are the exact derivatives of the discrete scheme at fixed positions in the transformed time, which may itself depend on the parameters.
+Sensitivities are the exact derivatives of the discrete scheme at fixed positions in the transformed time, which may
+itself depend on the parameters.
 """
 
 from __future__ import annotations
@@ -108,7 +109,7 @@ def _set_stage(
     h: float,
     i: int,
 ) -> StageProblem:
-    """Write history, time and temperature of stage `i` into the room; return its problem.
+    """Write history, time and temperature of stage `i` into the workspace; return its problem.
 
     Where strain starts as a high power of s, weights below zero can make its history negative: laws never see that.
     """
@@ -218,7 +219,7 @@ def _stage_change(
     h: float,
     i: int,
 ) -> None:
-    """Chain the response of stage `i` to the changes of its history and of its clock."""
+    """Chain the response of stage `i` to the changes of its history and of its time transformation."""
     size, parameters = work.change.shape
     for v in range(size):
         for p in range(parameters):

@@ -1,6 +1,7 @@
 """The nonlinear problem of one implicit stage: its statement, its unknown, and its exact derivatives.
 
-The derivatives follow from the implicit function theorem; the finite element solver takes its consistent tangent from them, the integration its sensitivities to the parameters.
+The derivatives follow from the implicit function theorem; the finite element solver takes its consistent tangent from
+them, the integration its sensitivities to the parameters.
 """
 
 from __future__ import annotations
@@ -181,7 +182,7 @@ def differentiate_stage(
     """Fill `response` with the derivatives of (D, z); False when the stage's equations are singular.
 
     state_rates : (S,) g at the solution; gradient : (1 + S, 6 + S) of [w f, w g].
-    matrix : (1 + S, 1 + S), room.
+    matrix : (1 + S, 1 + S), workspace.
     response : (1 + S, 7 + S + P); on entry its last P columns hold the derivatives of [w f, w g] to the parameters.
     """
     size = matrix.shape[0]

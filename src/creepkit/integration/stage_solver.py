@@ -5,7 +5,9 @@ Unknown are the creep increment D and the states z at the end of the stage:
     D = w f(sigma, p0 + D, t, T, z)                 z = z0 + w g(sigma, p0 + D, t, T, z)
     sigma = (trial - k D) exp(load D)
 
-with w the weight of the stage in s, p0 and z0 the history, trial the stress in MPa without further creep, and k = 3G in a finite element, E in relaxation, 0 under prescribed stress. load = 1 is uniaxial tension under constant load, else 0. The unknown of the iteration is x = ln[D / (1 - k D/trial)].
+with w the weight of the stage in s, p0 and z0 the history, trial the stress in MPa without further creep, and k = 3G in
+a finite element, E in relaxation, 0 under prescribed stress. load = 1 is uniaxial tension under constant load, else 0.
+The unknown of the iteration is x = ln[D / (1 - k D/trial)].
 """
 
 from __future__ import annotations
@@ -56,7 +58,7 @@ def solve_stage(
 
     update : compiled entry; theta : (P,); states : (S,) z0.
     row : (6 + S,) in: time and temperature of the stage, and a guess of the states; out: the solution.
-    out : ((1 + S)(7 + S),) room for the entry's output.
+    out : ((1 + S)(7 + S),) workspace for the entry's output.
     guess : of the increment; any positive number will do.
     tolerance : on the last Newton correction of ln D (and of the states, relative); the error left is its square.
     """

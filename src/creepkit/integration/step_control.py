@@ -42,7 +42,7 @@ class IntegrationSettings(NamedTuple):
     smallest : strain below which the error is relative to this instead.
     strain_limit : creep strain at which the point has burst.
     max_steps : cap on steps, accepted and rejected, of one history.
-    first, longest : first and longest step, as shares of a segment (in the position of its clock).
+    first, longest : first and longest step, as shares of a segment (in its transformed time).
     """
 
     rtol: float = 1e-5
@@ -157,7 +157,10 @@ _NUDGE = 1e-6
 def choose_time_transformation(
     update: Any, theta: Floats, beta: float, drive: StressControl, segment: Segment, value: Floats, work: StepWorkspace
 ) -> tuple[TimeTransformation, float]:
-    """The clock of a segment that begins with `value` (strain, states), and the rate there (0: not known)."""
+    """The time transformation of a segment, and the rate at its start (0: not known).
+
+    value : (1 + S,) strain and states there.
+    """
     length = segment.end - segment.start
     strain = value[0]
     if strain < _ZERO_STRAIN and beta < 1.0:
@@ -238,10 +241,11 @@ def differentiate_time_transformation(
     first: float,
     work: StepWorkspace,
 ) -> None:
-    """Write into the room how the clock moves with each parameter, (2, P); `first` is the first output time, s.
+    """Write into the workspace how the time transformation moves with each parameter, (2, P).
 
-    Any motion gives right sensitivities, since they are exact for a moving clock. This one, by differences, keeps
-    them as smooth in s as the strain itself: it follows the exponent that prevails when the first output is due.
+    first : s, the first output time. Any motion gives right sensitivities, since they are exact for a moving time
+    transformation. This one, by differences, keeps them as smooth in s as the strain itself: it follows the exponent
+    that prevails when the first output is due.
     """
     for p in range(theta.size):
         work.clock_change[0, p] = work.clock_change[1, p] = 0.0

@@ -59,7 +59,7 @@ def tensor_segments(programs: list[Program], end: float) -> list[TensorSegment]:
 
 
 class TensorIntegrator:
-    """A march of a virgin point from time zero; `history` holds its vectors at the output times reached."""
+    """The integration of a virgin point from time zero; `history` holds its vectors at the output times reached."""
 
     def __init__(self, point: TensorPoint, settings: IntegrationSettings, tableau: Tableau, outputs: Floats) -> None:
         self.point, self.settings, self.tableau, self.outputs = point, settings, tableau, outputs
@@ -82,7 +82,7 @@ class TensorIntegrator:
             self.history.append(self.value)
 
     def _through(self, segment: TensorSegment) -> int:
-        """March over one segment in the position s of its clock, from 0 to 1."""
+        """Integrate over one segment in its transformed time s, from 0 to 1."""
         clock = self._clock(segment)
         s, h = 0.0, self.settings.first
         while s < 1.0:
@@ -111,7 +111,7 @@ class TensorIntegrator:
         return REACHED_END
 
     def _clock(self, segment: TensorSegment) -> TimeTransformation:
-        """A clock in which a virgin point creeps evenly, else plain time."""
+        """A time transformation in which a virgin point creeps evenly, else plain time."""
         length = segment.end - segment.start
         if self.value[EQUIVALENT_STRAIN] > 0.0:
             return linear_time(segment.start, length)

@@ -1,6 +1,8 @@
 """The implicit stage of one material point in six components, and its reduction to a scalar problem.
 
-Small strain, isotropic elasticity, creep along the deviator of stress. Under proportional loading the problem is a scalar one with exact derivatives. Tensors are vectors of the components 11, 22, 33, 12, 23, 13, with tensor shear strains (half of the engineering ones).
+Small strain, isotropic elasticity, creep along the deviator of stress. Under proportional loading the problem is a
+scalar one with exact derivatives. Tensors are vectors of the components 11, 22, 33, 12, 23, 13, with tensor shear
+strains (half of the engineering ones).
 """
 
 from __future__ import annotations

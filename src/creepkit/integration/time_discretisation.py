@@ -1,6 +1,7 @@
 """Time discretisation of creep: Runge-Kutta tableaux, segments of a load program, and time transformations.
 
-The tableaux are diagonally implicit and stiffly accurate. Within each segment of the load program steps are taken in a transformed time in which creep strain is nearly a straight line.
+The tableaux are diagonally implicit and stiffly accurate. Within each segment of the load program steps are taken in a
+transformed time in which creep strain is nearly a straight line.
 """
 
 from __future__ import annotations
@@ -242,13 +243,13 @@ def linear_time(start: float, length: float) -> TimeTransformation:
 
 @njit(cache=True, error_model="numpy")
 def power_law_time(start: float, length: float, beta: float) -> TimeTransformation:
-    """The clock of a segment that begins without creep strain; `beta` is the leading exponent of time."""
+    """The time transformation of a segment that begins without creep strain; `beta` is the leading exponent of time."""
     return TimeTransformation(start, length, min(max(beta, SMALLEST_EXPONENT), 1.0), 0.0)
 
 
 @njit(cache=True, error_model="numpy")
 def shifted_power_law_time(start: float, length: float, bend: float, bend_rate: float) -> TimeTransformation:
-    """The clock of a segment that begins after some creep.
+    """The time transformation of a segment that begins after some creep.
 
     With p'' = r p', a curve (1 + y/tau)^beta has r = (beta - 1)/(tau + y), so r and its rate give beta and tau.
     """

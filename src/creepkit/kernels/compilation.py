@@ -1,9 +1,9 @@
 """The numba target: a law as C functions, generated, compiled once and kept on disk with checksums.
 
 Each generated module has a folder of its own, named after the hash of all that it was made from, with the source,
-numba's machine code and the SHA-256 of every file. A folder is built under a temporary name and renamed into place whole;
-one whose checksums do not match is built anew. Machine code from the cache is executed: keep the folder writable for
-yourself alone, as it is by default.
+numba's machine code and the SHA-256 of every file. A folder is built under a temporary name and renamed into place
+whole; one whose checksums do not match is built anew. Machine code from the cache is executed: keep the folder writable
+for yourself alone, as it is by default.
 """
 
 from __future__ import annotations

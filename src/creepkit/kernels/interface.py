@@ -71,7 +71,7 @@ class CompiledLaw:
     rate, update, sensitivity : entries, to be passed to numba functions declared with ENTRY; each has `.address`.
     initial : (S,) states at time zero; limits : (S,) values at which the point has failed (inf: none).
     log_scale : (P,) which internal parameters are logarithms.
-    leading : function of theta (..., P) giving the exponent beta of time in strain ~ t^beta as t -> 0+ from a
+    leading_exponent : function of theta (..., P) giving the exponent beta of time in strain ~ t^beta as t -> 0+ from a
         virgin state at constant stress, (...,). Where an exponent varies with the point, a second argument
         (..., 6 + S) says which; else it is taken at 100 MPa and 1000 K.
     """

@@ -1,7 +1,8 @@
 """The functions in which kernels are written, free of overflow and cancellation, and the printer of kernels.
 
 A class states its partial derivatives, one for each argument, and `plain`, the same function in ordinary sympy. Printed
-names (exp, log_floor, larger, choose ...) are defined once a target in numpy_functions, torch_functions, numba_functions.
+names (exp, log_floor, larger, choose ...) are defined once a target in numpy_functions, torch_functions and
+numba_functions.
 """
 
 from __future__ import annotations

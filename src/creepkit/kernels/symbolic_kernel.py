@@ -1,7 +1,7 @@
 """The functions of a kernel as symbols: which numbers rate, update and sensitivity return, under printable names.
 
-Steps carry the author's terms where there are any: `ln_stress`, `B = exp(ln_B)`, `strain_hardening` for the term of that
-name; other common subexpressions are called x0, x1 ...
+Steps carry the author's terms where there are any: `ln_stress`, `B = exp(ln_B)`, `strain_hardening` for the term of
+that name; other common subexpressions are called x0, x1 ...
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ _TEMPORARY_PATTERN = re.compile(r"[xy]\d+")
 class PrintableNames:
     """Printable symbols of one law.
 
-    inputs : the point, the states and theta, in order.
-    theta : the last of them. constants : theta, and the parameters of log scale themselves.
-    terms, logs_of_terms, shares : one symbol a term, for its rate, the logarithm of it and its share in the largest.
+    Attributes: `inputs` are the point, the states and theta, in order; `theta` the last of them; `constants` theta and
+    the parameters of log scale themselves; `terms`, `log_terms` and `scaled_terms` hold one symbol a term, for its
+    rate, the logarithm of it, and its fraction of the largest.
     """
 
     def __init__(self, law: CreepLaw, form: LogForm) -> None:

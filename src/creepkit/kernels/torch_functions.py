@@ -133,10 +133,10 @@ def as_array(value: Any) -> Any:
 
 
 def with_derivatives(values: TensorFunction, derivatives: TensorFunction, width: int) -> TensorFunction:
-    """Return values(*tensors) as a function whose derivatives are those that slopes(*tensors) gives.
+    """Return values(*tensors) as a function whose derivatives are those that derivatives(*tensors) gives.
 
-    slopes : gives the results again, then their derivatives to the first `width` inputs, result by result, then those
-        to the rest, as `sensitivity` of kernels.interface does.
+    derivatives : gives the results again, then their derivatives to the first `width` inputs, result by result, then
+        those to the rest, as `sensitivity` of kernels.interface does.
     """
 
     def by_input(inputs: Sequence[Any], results: int) -> list[Sequence[Any]]:
@@ -146,7 +146,7 @@ def with_derivatives(values: TensorFunction, derivatives: TensorFunction, width:
         to_point, to_rest = found[results : results * (1 + width)], found[results * (1 + width) :]
         return [to_point[k::width] for k in range(width)] + [to_rest[k::rest] for k in range(rest)]
 
-    class WithSlopes(torch.autograd.Function):
+    class WithDerivatives(torch.autograd.Function):
         generate_vmap_rule = True
 
         @staticmethod
@@ -173,7 +173,7 @@ def with_derivatives(values: TensorFunction, derivatives: TensorFunction, width:
             pushed = [_directional_derivative(tangents, [column[k] for column in columns]) for k in range(ctx.results)]
             return tuple(_broadcast_results([0.0 if v is None else v for v in pushed], ctx.saved_tensors))
 
-    entry: TensorFunction = WithSlopes.apply
+    entry: TensorFunction = WithDerivatives.apply
     return entry
 
 

@@ -78,7 +78,8 @@ def _strains(fit: Identification) -> list[str]:
     return [
         f"  {_tests(len(tests))}, {sum(m.frames for m in tests)} frames: {_rms_label(fit)} {fit.rms:.3g}",
         f"  scatter (one sd): rate between tests {100 * fit.noise_model.rate:.0f} %, "
-        f"loading strain {noise.offset:.2g}, frame noise {noise.noise:.2g}, what the law cannot follow {100 * noise.drift:.1f} % of strain",
+        f"loading strain {noise.offset:.2g}, frame noise {noise.noise:.2g}, "
+        f"what the law cannot follow {100 * noise.drift:.1f} % of strain",
     ]
 
 

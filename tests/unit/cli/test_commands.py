@@ -352,7 +352,7 @@ def test_a_point_is_loaded_by_components() -> None:
         ),
         (
             (*DIMPLE, "--pressure", "8", "--picture", "none/section.png"),
-            "none/section.png: the picture cannot be written",
+            "none/section.png: the plot cannot be written",
         ),
     ],
 )

@@ -1,0 +1,99 @@
+"""The sources of creepkit as syntax trees: modules, the imports between them, classes and functions."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import creepkit
+
+PACKAGE = Path(creepkit.__file__).parent
+
+
+@cache
+def modules() -> dict[str, Path]:
+    """{dotted name: file} of every module; a package goes by its own name."""
+    paths = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+        paths[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return paths
+
+
+@cache
+def tree(module: str) -> ast.Module:
+    """The syntax tree of a module."""
+    return ast.parse(modules()[module].read_text(encoding="utf-8"))
+
+
+def imported_modules(module: str) -> set[str]:
+    """The modules of creepkit that one imports anywhere: in functions and for type checking too."""
+    names = set()
+    for node in ast.walk(tree(module)):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module} has a relative import"
+            submodules = {f"{node.module}.{alias.name}" for alias in node.names}
+            names |= submodules & modules().keys() or {str(node.module)}
+    return names & modules().keys() - {module, "creepkit"}
+
+
+def import_cycles() -> list[list[str]]:
+    """Sets of modules each of which is reached from every other, by Tarjan's algorithm."""
+    order: dict[str, int] = {}
+    lowest: dict[str, int] = {}
+    stack: list[str] = []
+    cycles = []
+
+    def visit(module: str) -> None:
+        order[module] = lowest[module] = len(order)
+        stack.append(module)
+        for other in imported_modules(module):
+            if other not in order:
+                visit(other)
+            if other in stack:
+                lowest[module] = min(lowest[module], lowest[other])
+        if lowest[module] == order[module]:
+            position = stack.index(module)
+            component = stack[position:]
+            del stack[position:]
+            if len(component) > 1:
+                cycles.append(sorted(component))
+
+    for module in modules():
+        if module not in order:
+            visit(module)
+    return cycles
+
+
+def public_classes(base: str | None = None) -> Iterator[tuple[str, str]]:
+    """(name, module) of every class without a leading underscore; those that name `base` as a base, where given."""
+    for module in modules():
+        for node in ast.walk(tree(module)):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                bases = {b.id for b in node.bases if isinstance(b, ast.Name)}
+                if base is None or base in bases:
+                    yield node.name, module
+
+
+def functions() -> Iterator[tuple[str, ast.FunctionDef]]:
+    """(module, definition) of every function and method."""
+    for module in modules():
+        for node in ast.walk(tree(module)):
+            if isinstance(node, ast.FunctionDef):
+                yield module, node
+
+
+def parameter_count(function: ast.FunctionDef) -> int:
+    """The number of named parameters, `self` and `cls` apart."""
+    names = [argument.arg for argument in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)]
+    return len(names) - (names[:1] in (["self"], ["cls"]))
+
+
+def is_compiled(function: ast.FunctionDef) -> bool:
+    """Whether numba compiles a function: whether a decorator is njit, or a call of it."""
+    decorators = [d.func if isinstance(d, ast.Call) else d for d in function.decorator_list]
+    return any(isinstance(d, ast.Name) and d.id in ("njit", "cfunc", "vectorize") for d in decorators)
