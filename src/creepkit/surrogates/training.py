@@ -252,7 +252,7 @@ def _study_result(model: Surrogate, recipe: ParameterGru, count: int, path: Path
         training=float(metadata.curves["loss"][best - 1]),
         epochs=int(provenance["epochs"]),
         best_epoch=best,
-        outputs={name: float(errors_of_output["rse"]) for name, errors_of_output in metadata.metrics["outputs"].items()},
+        outputs={name: float(errors["rse"]) for name, errors in metadata.metrics["outputs"].items()},
         losses=tuple(metadata.curves["rse"]),
         file=path.name,
     )  # fmt: skip
