@@ -14,8 +14,8 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import DatasetError
 from creepkit.presentation import Presentable
 from creepkit.records import Status
+from creepkit.registry.specimen_documents import specimen_to_json
 from creepkit.sampling.conditions import CONDITION_UNITS, planned_test
-from creepkit.specimens.documents import specimen_to_json
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw

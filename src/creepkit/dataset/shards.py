@@ -33,7 +33,7 @@ from creepkit.files.writing import remove_temporary_files, write_if_absent
 from creepkit.jobs.shard_progress import ShardLock
 from creepkit.jobs.worker import TaskResult
 from creepkit.language.law_codec import law_to_json
-from creepkit.specimens.documents import specimen_to_json
+from creepkit.registry.specimen_documents import specimen_to_json
 
 if TYPE_CHECKING:
     from creepkit.records import Specimen

@@ -44,8 +44,8 @@ from creepkit.files.json_documents import compact_json, parse_json
 from creepkit.files.reading import FileKind
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
+from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import MOST_FRAMES, TimeGrid
-from creepkit.specimens.documents import specimen_from_json, specimen_to_json
 
 DATASET_FILE = FileKind("a data set", DatasetError, "give a data set that creepkit generated", maximum_bytes=2**50)
 

@@ -104,7 +104,7 @@ class CreepSubroutine:
             "ns": str(len(states)),
             "nx": str(len(POINT_VARIABLES) + len(states)),
             "beta": fortran_number(code.leading_time_exponent()),
-            "late": "" if law.uses(time) else "        if (.not. strain > 0.0d0) origin = max(start, 0.0d0)\n",
+            "shift_origin": "" if law.uses(time) else "        if (.not. strain > 0.0d0) origin = max(start, 0.0d0)\n",
             "mpa": fortran_number(units.megapascals),
             "seconds": fortran_number(units.seconds),
             "stress": units.stress,
@@ -169,8 +169,8 @@ class CalculixCreepSubroutine(CreepSubroutine):
             return {"fetch": "", "store": ""}
         arguments = "noel, npt, start, finish"
         return {
-            "fetch": f"      call {stem}_kept({arguments}, .false., first(2:))\n      first = first + initial\n",
-            "store": f"      y(2:) = y(2:) - initial(2:)\n      call {stem}_kept({arguments}, .true., y(2:))\n",
+            "fetch": f"      call {stem}_stored({arguments}, .false., first(2:))\n      first = first + initial\n",
+            "store": f"      y(2:) = y(2:) - initial(2:)\n      call {stem}_stored({arguments}, .true., y(2:))\n",
         }
 
 

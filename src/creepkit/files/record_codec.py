@@ -179,7 +179,10 @@ class RecordCodec:
         if isinstance(origin, type) and issubclass(origin, Mapping):
             if not isinstance(data, dict):
                 raise RecordError(f"{place} {_shown(data)}, where an object is needed")
-            return {key: self._value(arguments[1], item, f"{place}.{key[:40]}", allowed) for key, item in data.items()}
+            return {
+                key: self._value(arguments[1], item, f"{place}.{repr(key)[1:-1][:40]}", allowed)
+                for key, item in data.items()
+            }
         if isinstance(origin, type) and issubclass(origin, Sequence):
             values = self._sequence(arguments, data, place, allowed)
             return list(values) if origin is list else values

@@ -1,4 +1,4 @@
-"""Identifications as JSON documents, read and written field by field; the law is rebuilt and its fingerprint checked."""
+"""Identifications as JSON documents, read and written field by field; the law is rebuilt, its fingerprint checked."""
 
 from __future__ import annotations
 

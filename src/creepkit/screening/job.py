@@ -34,10 +34,10 @@ from creepkit.inverse.sparsity.term_selection import identify_full, identify_red
 from creepkit.jobs.worker import TaskResult
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor, Program
+from creepkit.registry.specimen_documents import specimen_to_json
 from creepkit.screening import files
 from creepkit.screening.alloys import Alloy, check_tests, limitations
 from creepkit.screening.results import AlloyResult, PredictedOutputs, WeightedLaw
-from creepkit.specimens.documents import specimen_to_json
 
 
 def single_threaded(predictor: Predictor) -> Predictor:

@@ -33,9 +33,9 @@ INPUTS_NAMED = 3
 class ApplicabilityDomain:
     """Where training rows lie.
 
-    names : of the inputs. low, high : their ranges; forgiven : share of it by which each may leave it; mean, scale :
-    their middle and deviation, (inputs,) each. whitening : (inputs, directions), standardised inputs to independent
-    ones; limit : largest distance inside.
+    names : of the inputs. low, high : (inputs,) their ranges, in their units. margin : (inputs,) share of its range by
+    which an input may leave it. mean, scale : (inputs,) their mean and standard deviation. whitening : (inputs,
+    directions), from standardised inputs to independent ones. limit : largest Mahalanobis distance inside.
     """
 
     names: tuple[str, ...]

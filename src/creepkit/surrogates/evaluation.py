@@ -16,7 +16,7 @@ from torch import Tensor
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.dataset.dataset import first_difference
 from creepkit.errors import DatasetError
-from creepkit.specimens.documents import specimen_to_json
+from creepkit.registry.specimen_documents import specimen_to_json
 from creepkit.surrogates.recipe import SampleTensors, SurrogateMetadata, SurrogateModule
 from creepkit.surrogates.surrogate import Surrogate
 from creepkit.surrogates.training_loop import dataset_fingerprint, output_deviation, trainable_samples, training_split

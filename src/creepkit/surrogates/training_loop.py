@@ -17,8 +17,8 @@ from torch import Tensor
 from creepkit.arrays import Bools
 from creepkit.errors import DatasetError, SurrogateError
 from creepkit.files.json_documents import canonical_json
+from creepkit.registry.specimen_documents import specimen_to_json
 from creepkit.sampling.conditions import CONDITION_UNITS
-from creepkit.specimens.documents import specimen_to_json
 from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateModule, Training
 
 if TYPE_CHECKING:

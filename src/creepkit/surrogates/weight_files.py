@@ -18,8 +18,8 @@ from creepkit.files.safetensors_files import read_safetensors, write_safetensors
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.records import Specimen
+from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid
-from creepkit.specimens.documents import specimen_from_json, specimen_to_json
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 
 SURROGATE = DocumentFormat(

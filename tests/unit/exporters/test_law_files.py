@@ -121,7 +121,7 @@ def _json(**changes):
         (_json(values={"A": 1e-16}), "needs a value for n"),
         (_json(values={"A": 1e-16, "n": float("inf")}), "Infinity is no number of JSON"),
         (_json(notes="text"), "notes is 'text', where a list is needed"),
-        (_json(law={}), "mine.json: format: field required"),
+        (_json(law={}), "mine.json: this is not a law that creepkit wrote"),
         ('{"format": "creepkit-valued-law", "format": 1}', "the key 'format' stands twice"),
         ('{"format": 1e999}', "the number 1e999 is too large"),
         (_json(gas_constant=8.31), "'gas_constant' is 8.31; creepkit reads 8.314462618 alone"),

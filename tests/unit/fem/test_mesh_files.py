@@ -264,7 +264,7 @@ def test_files_that_are_no_meshes(tmp_path):
     with pytest.raises(SolveError, match=r"nodes.csv: there is no such file"):
         read_mesh(tmp_path / "nodes.csv", tmp_path / "quads.csv", tmp_path / "sets.json")
     (tmp_path / "bad.inp").write_bytes(b"*NODE\n\xff\xfe")
-    with pytest.raises(SolveError, match="bad.inp: is not text in UTF-8; a mesh is read from text files only"):
+    with pytest.raises(SolveError, match="bad.inp:2: byte 0xff is not text in UTF-8; a mesh is read from text files"):
         read_input_deck(tmp_path / "bad.inp")
     (tmp_path / "empty.inp").write_text("")
     with pytest.raises(SolveError, match="empty.inp: the mesh has no elements; it needs quadrilaterals of four or"):

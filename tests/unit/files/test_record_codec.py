@@ -168,15 +168,19 @@ ANYTHING = st.recursive(
 )
 
 
-@given(st.sampled_from(sorted(DATA)), ANYTHING)
+def sentence(data):
+    """What is wrong with the data; "" when nothing is."""
+    try:
+        CODEC.from_json(Outer, data)
+    except CreepkitError as error:
+        return str(error)
+    return ""
+
+
+@given(st.sampled_from(sorted({*DATA} - {"law"})), ANYTHING)  # the codec of `law` checks nothing
 @settings(max_examples=300, deadline=None)
 def test_any_change_gives_a_record_or_an_error(key, value):
-    try:
-        CODEC.from_json(Outer, {**DATA, key: value})
-    except CreepkitError as error:
-        assert "\n" not in str(error)
-    except (TypeError, ValueError, OverflowError):
-        assert key == "law"  # the codec of this test checks nothing
+    assert "\n" not in sentence({**DATA, key: value})
 
 
 # ---- JSON ----------------------------------------------------------------------------------------------------------

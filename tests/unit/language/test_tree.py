@@ -209,16 +209,31 @@ def _changed(*path, to):
 
 
 BAD_FILES = {
-    "not an object": ([], "the whole: "),
-    "missing": (_changed("terms", to=KeyError), "terms: field required"),
-    "extra": (_changed("script", to="import os"), "script: extra inputs are not permitted"),
-    "another format": (_changed("format", to="other"), "format: "),
-    "a later version": (_changed("version", to=2), "version: "),
-    "number as text": (_changed("params", 1, "bounds", to=["1", 8]), r"params.1.bounds.0: "),
-    "three bounds": (_changed("params", 1, "bounds", to=[1, 2, 3]), "params.1.bounds: "),
-    "infinite bound": (_changed("params", 1, "bounds", to=[1, float("inf")]), "params.1.bounds.1: "),
+    "not an object": ([], "this is not a law that creepkit wrote"),
+    "missing": (_changed("terms", to=KeyError), "the document: 'terms' is missing"),
+    "extra": (_changed("script", to="import os"), "unknown key 'script'; "),
+    "another format": (_changed("format", to="other"), "this is not a law that creepkit wrote"),
+    "a later version": (
+        _changed("version", to=3),
+        "in version 3 of the format; this one reads version 2: written by a newer",
+    ),
+    "number as text": (
+        _changed("params", 1, "bounds", to=["1", 8]),
+        r"params.1.bounds.0 is '1', where a number is needed",
+    ),
+    "three bounds": (
+        _changed("params", 1, "bounds", to=[1, 2, 3]),
+        "params.1.bounds is a list of 3, where 2 are needed",
+    ),
+    "infinite bound": (
+        _changed("params", 1, "bounds", to=[1, "inf"]),
+        "params.1.bounds.1 is inf, where a finite number",
+    ),
     "reversed bounds": (_changed("params", 1, "bounds", to=[8, 1]), "bounds are reversed"),
-    "unknown scale": (_changed("params", 1, "scale", to="cubic"), "params.1.scale: "),
+    "unknown scale": (
+        _changed("params", 1, "scale", to="cubic"),
+        "params.1.scale is 'cubic'; allowed are 'linear', 'log'",
+    ),
     "same name": (_changed("params", 1, "name", to="A"), "parameter or state name 'A' is used twice"),
     "same term": (_changed("terms", 1, "name", to="creep"), "term name 'creep' is used twice"),
     "no term": (_changed("terms", to=[]), "has no terms"),

@@ -1,14 +1,14 @@
 !
 ! ---------------------------------------------------------------
-! Creep over one increment at constant stress: the implicit
-! midpoint rule in the clock s = t**beta, in which creep begins as
-! a straight line, so t = 0 and zero strain are no singularities.
+! Creep over one increment at constant stress: the implicit mid-
+! point rule in the transformed time s = t**beta, in which creep
+! begins as a straight line: t = 0 and zero strain are regular.
 ! t is the time of the law or, where that does not matter and there
 ! is no creep strain as yet, the time since the increment began.
 ! The strain at the end is solved for here (Newton in ln of the
 ! increment); where that fails the step is halved, and halved again.
 ! The very first increment, in which a sum of terms is smooth in no
-! clock, is taken in 16 steps. Derivatives are those of the
+! such time, is taken in 16 steps. Derivatives are those of the
 ! converged update, by the implicit function theorem.
 !   y     creep strain gained (0 at the start), internal variables
 !   slope derivatives of y at the end: to the stress (MPa), and to
@@ -27,7 +27,7 @@
         double precision origin
         logical solved
         origin = 0.0d0
-$late        low = max(start - origin, 0.0d0)**beta
+$shift_origin        low = max(start - origin, 0.0d0)**beta
         high = max(finish - origin, 0.0d0)**beta
         point = (/ start, finish - start, temps(1), temps(2), beta,
      &      strain, origin /)
@@ -54,7 +54,7 @@ $late        low = max(start - origin, 0.0d0)**beta
         enddo
       end subroutine ${id}_increment
 !
-! One step of the clock, from s to s + ds; y and slope stay as they
+! One step of that time, from s to s + ds; y and slope stay as they
 ! are where it has no solution. One with a diagonal term of Newton's
 ! matrix below zero is none: a variable that feeds its own growth
 ! runs backwards in it, as the step is too long. So is one in whose
@@ -111,18 +111,18 @@ $late        low = max(start - origin, 0.0d0)**beta
         call ${id}_hold(y, slope)
       end subroutine ${id}_step
 !
-! The middle of a step of the clock: point x of the law, and the
+! The middle of a step of that time: point x of the law, and the
 ! time h that the step amounts to at the rate there.
 !
       subroutine ${id}_place(s, ds, point, stress, mean, x, h)
         implicit none
         double precision, intent(in) :: s, ds, point(7), stress, mean
         double precision, intent(out) :: x($nx), h
-        double precision middle, time, clock
+        double precision middle, time, elapsed
         middle = s + 0.5d0*ds
-        clock = middle**(1.0d0/point(5))
-        time = point(7) + clock
-        h = ds*clock/(point(5)*middle)
+        elapsed = middle**(1.0d0/point(5))
+        time = point(7) + elapsed
+        h = ds*elapsed/(point(5)*middle)
         x = 0.0d0
         x(1) = stress
         x(3) = time
