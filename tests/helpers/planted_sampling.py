@@ -44,7 +44,7 @@ class Visible:
             with Path(self.log).open("ab") as file:
                 file.write(b".")
         time.sleep(self.seconds)
-        return outcome.last > 1e-5
+        return outcome.last_output > 1e-5
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,14 @@ if TYPE_CHECKING:
     from creepkit.records import History
 
 
-PLANTED = Path(__file__).parent / "planted"
+EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
+
+
+PLANTED = EXAMPLE_DATA / "planted_creep_curves"
 """Nine creep curves of bars, and the truth behind them."""
 
 
-PLANTED_BULGE = Path(__file__).parent / "planted_bulge"
+PLANTED_BULGE = EXAMPLE_DATA / "planted_bulge_test"
 """A bulge test of one dimple, and the truth behind it."""
 
 
@@ -101,9 +104,15 @@ def _plot_section(fit: Identification, test: History, folder: Path) -> Path:
     import creepkit as ck
 
     run = ck.simulate(
-        fit.law, "bulge", fit.values, loading=test.loading, times=test.times, temperature=test.temperature,
-        elastic=test.elastic, name=f"{test.name}, {fit.law.name} as identified",
-    )  # fmt: skip
+        fit.law,
+        "bulge",
+        fit.values,
+        loading=test.loading,
+        times=test.times,
+        temperature=test.temperature,
+        elastic=test.elastic,
+        name=f"{test.name}, {fit.law.name} as identified",
+    )
     path = folder / f"{file_stem(fit.law.name)}-section.png"
     run.section(path=path)  # type: ignore[attr-defined]
     return path

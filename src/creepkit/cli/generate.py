@@ -69,9 +69,15 @@ def command(
         raise DatasetError("--to FILE is missing: name the HDF5 file to write, such as --to combined.h5")
     with ProgressBar() as progress:
         data = ck.generate(
-            design, specimen_record, samples, draws=draws, seed=seed, to=to, workers=workers, cluster=cluster,
-            part=parse_part(part), progress=progress.tick,
-        )  # fmt: skip
+            design,
+            specimen_record,
+            samples,
+            draws=draws,
+            seed=seed,
+            to=to,
+            execution=ck.ParallelExecution(workers, cluster, parse_part(part)),
+            progress=progress.tick,
+        )
     print_dataset(data, to, part, as_json)
 
 
@@ -88,7 +94,7 @@ def design_changes(ranges: list[str], end_h: float | None, domain: str | None, u
         changes["end_time"] = 3600.0 * end_h
     if unscreened:
         if domain != "paper":
-            raise DatasetError("--unscreened belongs to --box paper; nothing else leaves samples out")
+            raise DatasetError("--unscreened belongs to --domain paper; nothing else leaves samples out")
         changes["screened"] = False
     return changes
 
@@ -118,9 +124,10 @@ def select_design(
     from creepkit.sampling.rate_family import END_TIME_RANGE
 
     if law != RATE_FAMILY:
-        return resolve_design(law, specimen, domain, changes if interval is None else {**changes, "every": interval})
+        given = {name: value for name, value in (("domain", domain), ("every", interval)) if value is not None}
+        return resolve_design(law, specimen, **given, **changes)
     if domain is not None:
-        raise DatasetError(f"--box {domain}: {RATE_FAMILY} has a box of its own; leave --box out")
+        raise DatasetError(f"--domain {domain}: {RATE_FAMILY} has a sampling domain of its own; leave --domain out")
     if interval is not None:
         changes["grid"] = TimeGrid.every(interval, np.max(changes.get("end_time", END_TIME_RANGE[1])))
     return ck.rate_family(specimen, **changes)

@@ -96,12 +96,14 @@ def _fit_to_json(fit: Identification) -> dict[str, Any]:
         "law": fit.law.name,
         **({"rms_ln_strain": fit.rms} if "strain" in fit.errors else {}),
         "errors": {name: _json_numbers(vars(e)) for name, e in fit.errors.items()},
-        "parameters": {e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
-                       for e in fit.estimates},
+        "parameters": {
+            e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
+            for e in fit.estimates
+        },
         "nuisances": [_json_numbers(vars(n)) for n in fit.nuisances],
         "scatter": fit.noise_model.to_dict(),
         "notes": list(fit.notes),
-    }  # fmt: skip
+    }
 
 
 def _json_numbers(record: dict[str, Any]) -> dict[str, Any]:

@@ -52,18 +52,26 @@ def _law_to_json(entry: Registered[CreepLaw]) -> dict[str, Any]:
         "terms": {label: str(term) for label, term in law.terms.items()},
         "parameters": {
             name: {
-                "meaning": p.meaning, "unit": p.unit, "bounds": p.bounds, "scale": p.scale, "off": p.off,
+                "meaning": p.meaning,
+                "unit": p.unit,
+                "bounds": p.bounds,
+                "scale": p.scale,
+                "off": p.off,
                 "limits": None if p.limits is None else [x if abs(x) < float("inf") else None for x in p.limits],
             }
             for name, p in table
         },
         "states": {
             symbol.name: {
-                "meaning": s.meaning, "unit": s.unit, "rate": str(s.rate), "initial": s.initial, "limit": s.limit,
+                "meaning": s.meaning,
+                "unit": s.unit,
+                "rate": str(s.rate),
+                "initial": s.initial,
+                "limit": s.limit,
             }
             for symbol, s in law.states.items()
         },
         "constraints": [str(relation) for relation in law.constraints],
         "references": list(law.references),
         "latex": law.latex(),
-    }  # fmt: skip
+    }

@@ -56,17 +56,28 @@ def command(
 
     Interrupted, it goes on where it was when it is started again in the same way.
     """
-    from creepkit.inverse.selection.select import SELECTION_FRAMES
-    from creepkit.inverse.settings import IdentificationSettings
-    from creepkit.screening.screen import screen
+    import creepkit as ck
+    from creepkit.api.identification import change_settings
 
+    settings = change_settings(ck.ScreeningOptions().settings, {"seed": seed, "nuisances": parse_nuisances(nuisance)})
+    options = ck.ScreeningOptions(
+        settings=settings,
+        through=_surrogate_named(through),
+        dense=None if dense == "none" else dense,
+        penalty=penalty_named(penalty),
+        confirm=_confirmation_choice(confirm),
+    )
     with ProgressBar() as progress:
-        plate = screen(
-            folder, law, _surrogate_named(surrogate), compositions=compositions, to=to, nuisances=parse_nuisances(nuisance),
-            settings=IdentificationSettings(seed=seed, frames=SELECTION_FRAMES), through=_surrogate_named(through),
-            dense=None if dense == "none" else dense, penalty=penalty_named(penalty), confirm=_confirmation_choice(confirm),
-            workers=workers, progress=progress.tick,
-        )  # fmt: skip
+        plate = ck.screen(
+            folder,
+            law,
+            _surrogate_named(surrogate),
+            compositions=compositions,
+            to=to,
+            options=options,
+            workers=workers,
+            progress=progress.tick,
+        )
     written = [plate.to_csv(to / "plate.csv"), plate.to_hdf5(to / "plate.h5")]
     if plate.identified:
         written += [to / "fits", *plate.plot(to / "pictures")]

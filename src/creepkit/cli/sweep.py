@@ -47,10 +47,17 @@ def command(
     assert isinstance(recipe, ParameterGru)
     with ProgressBar() as progress:
         entries = size_study(
-            read_dataset(data, accepted_only=True), recipe, to=to, layers=parse_whole_numbers(layers, "--layers"),
-            hidden=parse_whole_numbers(hidden, "--hidden"), cells=tuple(cell.split(",")),  # type: ignore[arg-type]  # words; ParameterGru says which it knows
-            samples=parse_whole_numbers(samples, "--samples") if samples else (), seed=seed, device=device, progress=progress.tick,
-        )  # fmt: skip
+            read_dataset(data, accepted_only=True),
+            recipe,
+            to=to,
+            layers=parse_whole_numbers(layers, "--layers"),
+            hidden=parse_whole_numbers(hidden, "--hidden"),
+            cells=tuple(cell.split(",")),  # type: ignore[arg-type]  # words; ParameterGru says which it knows
+            samples=parse_whole_numbers(samples, "--samples") if samples else (),
+            seed=seed,
+            device=device,
+            progress=progress.tick,
+        )
     size_study_figure(entries, to / "sweep.png")
     if as_json:
         print_json({"trainings": [vars(e) for e in entries], "picture": str(to / "sweep.png")})

@@ -55,8 +55,14 @@ def command(
 
     if threads is not None:
         torch.set_num_threads(threads)
-    network_options = {"hidden": hidden, "layers": layers, "cell": cell, "target": target, "base": base,
-             "inputs": None if inputs is None else tuple(inputs.split(","))}  # fmt: skip
+    network_options = {
+        "hidden": hidden,
+        "layers": layers,
+        "cell": cell,
+        "target": target,
+        "base": base,
+        "inputs": None if inputs is None else tuple(inputs.split(",")),
+    }
     training_options = {
         "epochs": epochs,
         "batch": batch,

@@ -1,1 +1,1 @@
-"""Data sets: designs of experiments, what makes a sample worth keeping, campaigns of simulations and their files."""
+"""Data sets: designs of experiments, what makes a sample worth keeping, generations of simulations and their files."""

@@ -1,6 +1,7 @@
 """Simulation of the rows of a sampling design, with screening by the reduced-order model and the acceptance criteria.
 
-Where the specimen has a reduced-order model, a sample that bursts far too early in it is rejected without a simulation. Samples are simulated one at a time on one thread.
+Where the specimen has a reduced-order model, a sample that bursts far too early in it is rejected without a simulation.
+Samples are simulated one at a time on one thread.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ Few combinations are all tried; many are searched greedily, one parameter at a t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -21,6 +21,7 @@ from creepkit.arrays import Floats
 from creepkit.discovery.forms import ARRHENIUS, CandidateForm
 from creepkit.discovery.regression import IsothermalEstimates, Regression, regress
 from creepkit.errors import FitError
+from creepkit.inverse.search.local_refinement import IterationCallback
 
 MAX_EXHAUSTIVE = 150
 """Up to so many combinations are all tried."""
@@ -84,7 +85,7 @@ class RankedCombinations:
 def rank_combinations(
     points: IsothermalEstimates,
     candidates: Mapping[str, Sequence[CandidateForm]],
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: IterationCallback | None = None,
 ) -> RankedCombinations:
     """Fit combinations of one library for each parameter, and weigh them."""
     names, combination_count = list(candidates), int(np.prod([len(forms) for forms in candidates.values()]))
@@ -119,9 +120,7 @@ def rank_combinations(
 class _RegressionCache:
     """Regressions of combinations, each made once; total : how many there may be."""
 
-    def __init__(
-        self, points: IsothermalEstimates, total: int, progress: Callable[[str, int, int], None] | None
-    ) -> None:
+    def __init__(self, points: IsothermalEstimates, total: int, progress: IterationCallback | None) -> None:
         self.points, self.total, self.progress = points, total, progress
         self._regressions: dict[tuple[str, ...], Regression] = {}
 

@@ -89,9 +89,14 @@ def law_with_forms(law: CreepLaw, forms: Sequence[CandidateForm]) -> CreepLaw:
 
 
 def candidate_forms(
-    law: CreepLaw, parameter: str, is_rate_coefficient: bool, T_ref: float, temperatures: Floats, forms: Sequence[str] | None = None,
+    law: CreepLaw,
+    parameter: str,
+    is_rate_coefficient: bool,
+    T_ref: float,
+    temperatures: Floats,
+    forms: Sequence[str] | None = None,
     prior: Mapping[str, float] | None = None,
-) -> list[CandidateForm]:  # fmt: skip
+) -> list[CandidateForm]:
     """The forms that a parameter may take, the constant first, each with its prior odds.
 
     rate : whether the parameter is the coefficient of a rate, which Arrhenius' factor is for.

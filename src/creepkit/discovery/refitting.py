@@ -10,7 +10,7 @@ searched for again over the whole of its bounds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
+from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
@@ -114,9 +115,6 @@ def _plausible_forms_of_refits(
     return tuple(FormWeight(form, weights.get(form, 0.0), form in represented) for form in (*retained, *represented))
 
 
-RefitProgress = Callable[[str, int, int], None]
-
-
 MAX_FORMS = 6
 """Forms of one parameter that are refitted."""
 
@@ -133,7 +131,7 @@ def refit(
     max_forms: int = MAX_FORMS,
     settings: IdentificationSettings | None = None,
     search_again: bool = True,
-    progress: RefitProgress | None = None,
+    progress: IterationCallback | None = None,
 ) -> TemperatureLaw:
     """Refit the forms that remain to the tests, and weigh them by how well they follow these.
 
@@ -143,7 +141,7 @@ def refit(
         Arrhenius with every other parameter constant, is always among the combinations.
     confirm : whether the best law is searched for anew from the whole of its bounds.
     """
-    check_temperatures([float(np.mean(h.temperature_program().values)) for h in histories])
+    check_temperatures([h.mean_temperature for h in histories])
     cache = _RefitCache(
         temperature_law.isothermal_estimates,
         list(histories),
@@ -182,7 +180,7 @@ class _RefitCache:
     histories: list[History]
     predictor: Predictor
     settings: IdentificationSettings
-    progress: RefitProgress | None
+    progress: IterationCallback | None
     fitted: dict[tuple[str, ...], RefittedCombination] = field(default_factory=dict)
     failed: dict[tuple[str, ...], str] = field(default_factory=dict)
     total: int = 0

@@ -116,26 +116,31 @@ def check_identifications(fits: Sequence[Identification]) -> None:
 
 def check_temperatures(temperatures: Sequence[float]) -> None:
     """Say what fewer than three temperatures leave unknown."""
-    distinct = _distinct_temperatures(temperatures)
+    distinct = [temperatures[group[0]] for group in isothermal_groups(temperatures)]
     if len(distinct) == 1:
         raise FitError(
-            f"all tests are at {distinct[0]:.0f} K: from one temperature neither an activation energy nor how any other "
-            "parameter depends on temperature can be known; add tests at two other temperatures or more"
+            f"all tests are at {distinct[0]:.0f} K: from one temperature neither an activation energy nor how any "
+            "other parameter depends on temperature can be known; add tests at two other temperatures or more"
         )
     if len(distinct) < MIN_TEMPERATURES:
         raise FitError(
-            f"the tests are at {distinct[0]:.0f} and {distinct[1]:.0f} K alone: two temperatures give an activation energy "
-            "but no form; identify the law times arrhenius(), or add a third temperature"
+            f"the tests are at {distinct[0]:.0f} and {distinct[1]:.0f} K alone: two temperatures give an activation "
+            "energy but no form; identify the law times arrhenius(), or add a third temperature"
         )
 
 
-def _distinct_temperatures(temperatures: Sequence[float]) -> list[float]:
-    """Temperatures that differ by more than ONE_TEMPERATURE, ascending."""
-    distinct: list[float] = []
-    for T in sorted(temperatures):
-        if not distinct or T - distinct[-1] > ISOTHERMAL_RANGE:
-            distinct.append(float(T))
-    return distinct
+def isothermal_groups(temperatures: Sequence[float], tolerance: float = ISOTHERMAL_RANGE) -> list[list[int]]:
+    """Positions of temperatures in groups that ascend; each within `tolerance` K of the lowest of its group.
+
+    temperatures : (n,) K.
+    """
+    groups: list[list[int]] = []
+    for k in sorted(range(len(temperatures)), key=temperatures.__getitem__):
+        if groups and temperatures[k] - temperatures[groups[-1][0]] <= tolerance:
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    return groups
 
 
 def _theta_covariance(fit: Identification) -> Floats:

@@ -231,8 +231,12 @@ def temperature_law_from_combinations(
     estimates: IsothermalEstimates, combinations: RankedCombinations, prior_odds: Mapping[str, Mapping[str, float]]
 ) -> TemperatureLaw:
     """The answer that the points alone give."""
-    degrees_of_freedom = [INFINITE_FREEDOM if combinations.overdispersion == 1.0 else max(combination.regression.rows - combination.regression.parameter_count, 1)
-               for combination in combinations.combinations]  # fmt: skip
+    degrees_of_freedom = [
+        INFINITE_FREEDOM
+        if combinations.overdispersion == 1.0
+        else max(combination.regression.rows - combination.regression.parameter_count, 1)
+        for combination in combinations.combinations
+    ]
     candidates = tuple(
         CandidateLaw(
             weighted.regression.candidate_forms,

@@ -1,7 +1,7 @@
 """Data quality: checks of measured histories, each flag stated with numbers; nothing is dropped unless asked for.
 
-Of frames: unloading, a creep output that decreases though its load does not, single outliers. Of tests: one far from its
-replicates or from the trend of the others, a modulus off the trend, a first frame that is not elastic.
+Of frames: unloading, a creep output that decreases though its load does not, single outliers. Of tests: one far from
+its replicates or from the trend of the others, a modulus off the trend, a first frame that is not elastic.
 """
 
 from __future__ import annotations

@@ -116,8 +116,8 @@ def replicate_deviations(histories: Sequence[History]) -> dict[int, str]:
             creep_of_test, creep_of_replicate = (_creep_increment(histories[j], end) for j in (k, other))
             results[k] = (
                 f"grows {_creep_ratio(histories[k], histories[other], end):.2f} times as much as its twin "
-                f"{histories[other].name} (to {end:g} s by {creep_of_test:.3g} and {creep_of_replicate:.3g}), at {_celsius_text(histories[k])} and "
-                f"{_celsius_text(histories[other])}"
+                f"{histories[other].name} (to {end:g} s by {creep_of_test:.3g} and {creep_of_replicate:.3g}), "
+                f"at {_celsius_text(histories[k])} and {_celsius_text(histories[other])}"
             )
     return results
 
@@ -199,8 +199,8 @@ def first_frame_deviations(histories: Sequence[History], specimen: Predictor) ->
         ):
             results[k] = (
                 f"{output} begins {'above' if deviation > 0 else 'below'} the elastic one by {abs(deviation):.3g}: "
-                f"{intercept:.3g} (its first {_FIRST_FRAMES} frames carried back to 0 s), where {_youngs_modulus(history) / 1e3:.4g} GPa "
-                f"make {elastic:.3g}"
+                f"{intercept:.3g} (its first {_FIRST_FRAMES} frames carried back to 0 s), where "
+                f"{_youngs_modulus(history) / 1e3:.4g} GPa make {elastic:.3g}"
             )
     return results
 
@@ -315,7 +315,7 @@ def _arrhenius_point(history: History, end: float) -> tuple[float, float]:
 
 
 def _mean_temperature(history: History) -> float:
-    """Mean temperature, K."""
+    """Mean temperature over the frames, K."""
     return float(history.temperature_program().at(history.times).mean())
 
 

@@ -99,8 +99,10 @@ def _unloaded_end(history: History, frames: Ints) -> Iterator[FlaggedFrames]:
         expected, standard_error = _extrapolate(t[before], y[before], t[-count])
         shortfall = expected - y[-count]
         if shortfall > END_THRESHOLD * sigma * standard_error and (y[-count:] < y[-count - 1] - sigma).all():
-            description = f"{_difference_text(history, shortfall)} below what the {END_FIT_FRAMES} frames before it lead to, {shortfall / sigma:.0f} times"
-            reason = f"at {t[-count]:g} s {description} the noise: the load was taken off"
+            reason = (
+                f"at {t[-count]:g} s {_difference_text(history, shortfall)} below what the {END_FIT_FRAMES} frames "
+                f"before it lead to, {shortfall / sigma:.0f} times the noise: the load was taken off"
+            )
             yield FlaggedFrames(tuple(map(int, frames[-count:])), reason)
             return
 
@@ -131,7 +133,8 @@ def decreasing_frames(history: History) -> Iterator[FlaggedFrames]:
             DECREASE_THRESHOLD * noise_standard_deviation(t, y), DECREASE_FRACTION * float(np.abs(smoothed).max())
         ):
             lowest = highest + int(np.argmin(smoothed[highest:]))
-            load_text = f"{history.loading.quantity} {'is held at' if segment.is_first else 'was raised to'} {segment.load:g} MPa"
+            change = "is held at" if segment.is_first else "was raised to"
+            load_text = f"{history.loading.quantity} {change} {segment.load:g} MPa"
             reason = (
                 f"falls by {_difference_text(history, decrease)} from {t[highest]:g} s to {t[lowest]:g} s, "
                 f"{decrease / noise_standard_deviation(t, y):.0f} times the noise, though the {load_text}"
@@ -158,7 +161,10 @@ def outlier_frames(history: History) -> Iterator[FlaggedFrames]:
                 break
             deviation_text = _difference_text(history, float(residuals[worst] * residual_scale[worst]))
             frame = int(frames[worst + 2])
-            reason = f"at {history.times[frame]:g} s off its neighbours by {deviation_text}, {standardised[worst]:.0f} times the noise"
+            reason = (
+                f"at {history.times[frame]:g} s off its neighbours by {deviation_text}, "
+                f"{standardised[worst]:.0f} times the noise"
+            )
             yield FlaggedFrames((frame,), reason)
             frames = np.delete(frames, worst + 2)
 

@@ -150,6 +150,11 @@ class History:
         return self.temperature if isinstance(self.temperature, Program) else Program.constant(self.temperature)
 
     @property
+    def mean_temperature(self) -> float:
+        """Mean temperature over the breakpoints of the program, K."""
+        return float(np.mean(self.temperature_program().values))
+
+    @property
     def condition(self) -> str:
         """The nominal condition in words, '850 C, 43 MPa': what leave-one-condition-out holds out."""
         celsius = self.temperature_program().values - ZERO_CELSIUS

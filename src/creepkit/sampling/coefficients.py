@@ -1,6 +1,9 @@
 """Parameters of a law from prescribed mean rates: rate coefficients, stress scales, and rate coefficients of damage.
 
-Terms that share a rate coefficient A form a group whose rate is proportional to it: ln f = ln A + ln g, so that ln A follows from the prescribed rate. A parameter B in MPa is drawn through the ratio of the reference stress to it, 0.05 to 4, where the local stress exponent is above 0 and at most 12. The rate coefficient of an internal variable with a limit follows from the ratio of test duration to life.
+Terms that share a rate coefficient A form a group whose rate is proportional to it: ln f = ln A + ln g, so that ln A
+follows from the prescribed rate. A parameter B in MPa is drawn through the ratio of the reference stress to it, 0.05 to
+4, where the local stress exponent is above 0 and at most 12. The rate coefficient of an internal variable with a limit
+follows from the ratio of test duration to life.
 """
 
 from __future__ import annotations
@@ -57,7 +60,7 @@ def term_groups(law: CreepLaw) -> tuple[TermGroup, ...]:
             labels = "', '".join(list(law.terms)[k] for k in term_numbers)
             raise DatasetError(
                 f"law '{law.name}': term '{labels}' has no linear rate coefficient (of log scale, with off=0) to set "
-                "its rate with; use the paper's box"
+                "its rate with; use the paper's sampling domain"
             )
         group_law = law.only(*(list(law.terms)[k] for k in term_numbers))
         positions = tuple(law.names.index(name) for name in group_law.names)

@@ -1,6 +1,9 @@
-"""Test conditions of a data set: their names and units, the ranges they are drawn from, the time grid, and the test they describe.
+"""Test conditions of a data set: their names and units, the ranges they are drawn from, the time grid, and the test
+they describe.
 
-Bulge test: modulus, P1, P2 (MPa), Tj, end_time (s), apex_thickness (mm). Uniaxial test: stress_1, stress_2 (MPa), Tj, end_time (s). Both: temperature (K). An absent condition has its default: the last time of the grid, the thickness of the specimen, 293.15 K, no load jump.
+Bulge test: modulus, P1, P2 (MPa), Tj, end_time (s), apex_thickness (mm). Uniaxial test: stress_1, stress_2 (MPa), Tj,
+end_time (s). Both: temperature (K). An absent condition has its default: the last time of the grid, the thickness of
+the specimen, 293.15 K, no load jump.
 """
 
 from __future__ import annotations
@@ -56,7 +59,8 @@ class TimeGrid:
             raise DatasetError(f"frames every {interval:g} s until {end:g} s: the interval must lie from 0 to the end")
         if end / interval > MOST_FRAMES:
             raise DatasetError(
-                f"frames every {interval:g} s until {end:g} s are {end / interval:.0f}; at most {MOST_FRAMES} are simulated"
+                f"frames every {interval:g} s until {end:g} s are {end / interval:.0f}; "
+                f"at most {MOST_FRAMES} are simulated"
             )
         frames = int(np.floor(end / interval * (1 + 1e-12)))
         return cls(interval * np.arange(frames + 1, dtype=float))

@@ -1,6 +1,8 @@
 """Acceptance criteria of samples: before simulation (rates, bounds, constraints of the law) and after it.
 
-Criteria 1 to 5 are those of the paper (Materials and Methods, "Data generation and preparation"). Criterion 4 of the paper asks for an apex displacement above 0.01 mm, meant to remove samples without creep. The elastic deflection alone is 0.01 to 0.2 mm, so criterion 4 is applied here to the growth of the amplitude by creep within each of the two holds.
+Criteria 1 to 5 are those of the paper (Materials and Methods, "Data generation and preparation"). Criterion 4 of the
+paper asks for an apex displacement above 0.01 mm, meant to remove samples without creep. The elastic deflection alone
+is 0.01 to 0.2 mm, so criterion 4 is applied here to the growth of the amplitude by creep within each of the two holds.
 """
 
 from __future__ import annotations
@@ -249,7 +251,7 @@ def paper_criteria(kind: str) -> tuple[Criterion, ...]:
 
 
 def conditioned_criteria(law: CreepLaw, kind: str, end: float) -> tuple[Criterion, ...]:
-    """What the conditioned box asks: a law as its author means it, a full history, and visible creep."""
+    """What the conditioned sampling domain asks: a law as its author means it, a full history, and visible creep."""
     label = ("constraints", "what the law declares of its parameters holds throughout the test")
     constraint_criteria = (ConstraintsHold(*label, end),) if law.constraints else ()
     return (

@@ -1,6 +1,8 @@
 """Sampling domains: what is drawn of the parameters of a law and of its tests, and the share of draws that is accepted.
 
-The paper domain is uniform in the bounds of the law (Materials and Methods and Table 1 of the paper). The conditioned domain is uniform in the logarithm of the mean rate at the reference stress, so that most samples creep visibly and survive the test.
+The paper domain is uniform in the bounds of the law (Materials and Methods and Table 1 of the paper). The conditioned
+domain is uniform in the logarithm of the mean rate at the reference stress, so that most samples creep visibly and
+survive the test.
 """
 
 from __future__ import annotations
@@ -92,7 +94,7 @@ class SamplingDomain:
         raise NotImplementedError
 
     def document(self) -> dict[str, Any]:
-        """Everything that decides the draws, as JSON-able data; boxes add what is theirs."""
+        """Everything that decides the draws, as JSON-able data; each kind of domain adds what is theirs."""
         return {
             "domain": self.name,
             "version": 1,
@@ -138,10 +140,16 @@ class PaperDomain(SamplingDomain):
 
 
 def paper_domain(
-    law: CreepLaw, specimen: Specimen, *, every: float = PAPER_INTERVAL, grid: TimeGrid | None = None,
-    screened: bool = True, **ranges: Any,
-) -> PaperDomain:  # fmt: skip
-    """Return the paper's box of any law: its bounds, E 50 to 300 GPa, Tj 2 to 10 h of 12 h, P1 <= P2 from 3 to 25 MPa.
+    law: CreepLaw,
+    specimen: Specimen,
+    *,
+    every: float = PAPER_INTERVAL,
+    grid: TimeGrid | None = None,
+    screened: bool = True,
+    **ranges: Any,
+) -> PaperDomain:
+    """Return the paper's sampling domain of any law: its bounds, E 50 to 300 GPa, Tj 2 to 10 h of 12 h, P1 <= P2 from 3
+    to 25 MPa.
 
     every : s between frames. grid : in its place, other times. screened : see PaperBox. given : other ranges of
     conditions, see design_of.
@@ -237,7 +245,7 @@ class ConditionedDomain(SamplingDomain):
 def conditioned_domain(
     law: CreepLaw, specimen: Specimen, *, every: float = PAPER_INTERVAL, grid: TimeGrid | None = None, **ranges: Any
 ) -> ConditionedDomain:
-    """Return the conditioned box for any law whose terms have rate coefficients (else DatasetError).
+    """Return the conditioned sampling domain for any law whose terms have rate coefficients (else DatasetError).
 
     every : s between frames. grid : in its place, other times. given : other ranges of conditions, see design_of.
     """
@@ -280,8 +288,8 @@ class Acceptance:
     def useful(self) -> Bools:
         """Which of them have a useful rate, (rows,); of the others some may be useful, too.
 
-        Of Eq. (2) in the paper's box 8 % have, and 16 % of 600 simulated draws crept visibly and lasted: a dimple
-        relieves itself of stress as it deflects, and so outlasts rates above the window.
+        Of Eq. (2) in the paper's sampling domain 8 % have, and 16 % of 600 simulated draws crept visibly and lasted: a
+        dimple relieves itself of stress as it deflects, and so outlasts rates above the window.
         """
         in_range = (self.log10_strains >= self.useful_strains[:, 0]) & (self.log10_strains <= self.useful_strains[:, 1])
         return np.asarray(self.kept & in_range)
@@ -298,7 +306,8 @@ class Acceptance:
     def _title(self) -> str:
         domain = self.design
         count = f"{len(self.draws)} draws, seed {self.seed}"
-        return f"law '{domain.law.name}', {domain.name} box, {domain.specimen} test of {domain.grid.frames} frames: {count}"
+        test = f"{domain.specimen} test of {domain.grid.frames} frames"
+        return f"law '{domain.law.name}', {domain.name} sampling domain, {test}: {count}"
 
     def _table(self) -> list[str]:
         lines, remaining = [f"{'criterion':<14} {'meet it':>8} {'rejected':>9}  asks"], np.ones(len(self.draws), bool)
@@ -388,11 +397,11 @@ class SamplingDesign(Protocol):
 def sampling_design(law: CreepLaw, specimen: Specimen, domain: str = "conditioned", **changes: Any) -> SamplingDesign:
     """Return a design for a law and a specimen; see paper_box.paper_box and conditioned_box.conditioned_box.
 
-    box : "conditioned", whose samples creep visibly, or "paper", uniform in the law's bounds.
+    domain : "conditioned", whose samples creep visibly, or "paper", uniform in the law's bounds.
     changes : ranges of conditions, (low, high) or a number: P1=(5, 20), apex_thickness=(.44, .6), end_time=3600;
         `every`, s between frames, or `grid`, a TimeGrid.
     """
     domains: dict[str, Callable[..., SamplingDesign]] = {"conditioned": conditioned_domain, "paper": paper_domain}
     if domain not in domains:
-        raise DatasetError(f"there is no box '{domain}': {nearest(domain, domains)}")
+        raise DatasetError(f"there is no sampling domain '{domain}': {nearest(domain, domains)}")
     return domains[domain](law, specimen, **changes)

@@ -1,6 +1,7 @@
 """Draws of a sampling design: the scrambled Sobol sequence, drawn rows, and which terms of a law a row contains.
 
-Rows of the sequence do not depend on the block in which they are drawn. Sobol (1967), USSR Comput. Math. Math. Phys. 7, 86; Owen scrambling as in scipy.stats.qmc.
+Rows of the sequence do not depend on the block in which they are drawn. Sobol (1967), USSR Comput. Math. Math. Phys. 7,
+86; Owen scrambling as in scipy.stats.qmc.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """The rate family: a sampling domain of diverse rate functions, to train surrogates that take creep rates as input.
 
-One to three terms A stress^n strain^m time^k exp(-q time). It contains neither sinh nor n(t), so that the named laws remain unseen in training.
+One to three terms A stress^n strain^m time^k exp(-q time). It contains neither sinh nor n(t), so that the named laws
+remain unseen in training.
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Creep rates of many parameter rows at once, and the mean rate of a test at its reference stress.
 
-Bulge test: reference stress k P with k = 14.69 (h/0.5 mm)^-1.17 for a cavity radius of 7.5 mm and apex thickness h, P the geometric mean of both pressures. The amplitude grows by 42.3 (h/0.5 mm)^-0.486 mm per unit of reference strain. Both were fitted to simulations with the Norton law, n from 1 to 8, h from 0.44 to 0.60 mm. A tensile bar has the stresses of its two holds.
+Bulge test: reference stress k P with k = 14.69 (h/0.5 mm)^-1.17 for a cavity radius of 7.5 mm and apex thickness h, P
+the geometric mean of both pressures. The amplitude grows by 42.3 (h/0.5 mm)^-0.486 mm per unit of reference strain.
+Both were fitted to simulations with the Norton law, n from 1 to 8, h from 0.44 to 0.60 mm. A tensile bar has the
+stresses of its two holds.
 """
 
 from __future__ import annotations

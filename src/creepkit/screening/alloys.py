@@ -98,8 +98,9 @@ def _check_creep(alloy: Alloy, creep_outputs: Sequence[tuple[History, str]]) -> 
         return
     output, largest = max(detections, key=lambda pair: pair[1].increase)
     raise FitError(
-        f"alloy '{alloy.name}': elastic only, there is no creep to identify: its {output} grows by {largest.increase:.2g} "
-        f"while the load is held, within its noise of {largest.noise:.2g}; test it longer, hotter or at a higher load"
+        f"alloy '{alloy.name}': elastic only, there is no creep to identify: its {output} grows by "
+        f"{largest.increase:.2g} while the load is held, within its noise of {largest.noise:.2g}; "
+        "test it longer, hotter or at a higher load"
     )
 
 
@@ -155,8 +156,9 @@ class Compositions:
         return tuple(
             f"{self.source or 'the compositions'}: no alloy '{name}', whose class stays unknown; "
             f"{nearest(name, self.atomic)}"
-            for name in alloys if name not in self.atomic
-        )  # fmt: skip
+            for name in alloys
+            if name not in self.atomic
+        )
 
 
 def atomic_percent(weights: Mapping[str, float]) -> dict[str, float]:

@@ -110,8 +110,10 @@ class PlantedPlate:
         composition_file = folder / "compositions.csv"
         contents = [{"alloy": a, **{e: f"{x:.4f}" for e, x in c.items()}} for a, c in self.compositions.atomic.items()]
         write_text_atomically("# unit: at.%\n" + _csv_text(contents), composition_file)
-        rows = [{"alloy": a, "law": t.law, **t.values, "thickness_mm": t.thickness, **t.base_fractions}
-                for a, t in self.truth.items()]  # fmt: skip
+        rows = [
+            {"alloy": a, "law": t.law, **t.values, "thickness_mm": t.thickness, **t.base_fractions}
+            for a, t in self.truth.items()
+        ]
         write_text_atomically(_csv_text(rows), folder / "truth.csv")
         return tests, composition_file
 
@@ -153,8 +155,9 @@ def _simulate_test(
     for _ in range(MAX_DRAWS):
         thickness = round(max(rng.normal(*THICKNESS_MEAN_SD), MIN_THICKNESS), 3)
         values = _draw_values(law, rng)
-        planned_test = History(name, TIMES, {}, LOADING, TEMPERATURE, "bulge", ELASTIC, alloy=name,
-                       geometry={"apex_thickness": thickness})  # fmt: skip
+        planned_test = History(
+            name, TIMES, {}, LOADING, TEMPERATURE, "bulge", ELASTIC, alloy=name, geometry={"apex_thickness": thickness}
+        )
         specimen = coarse_specimen.replace(refinement=2.0, tolerance=1e-3)
         prediction = specimen.predict(registry.default_registry().law(law), values, [planned_test])
         if prediction.status[0, 0] == Status.COMPLETE:

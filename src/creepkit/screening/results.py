@@ -121,9 +121,13 @@ class Plate:
 
     @classmethod
     def from_results(
-        cls, alloys: Sequence[Alloy], results: Sequence[AlloyResult], predictor: Predictor,
-        compositions: Compositions | None, folder: Path | None,
-    ) -> Plate:  # fmt: skip
+        cls,
+        alloys: Sequence[Alloy],
+        results: Sequence[AlloyResult],
+        predictor: Predictor,
+        compositions: Compositions | None,
+        folder: Path | None,
+    ) -> Plate:
         """The plate of these alloys, with tests and predictor attached to their identifications."""
         notes = () if compositions is None else compositions.missing([a.name for a in alloys])
         attached = tuple(

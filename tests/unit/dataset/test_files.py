@@ -14,15 +14,15 @@ import pytest
 import creepkit as ck
 from creepkit.dataset import storage
 from creepkit.dataset.dataset import COLUMNS
-from creepkit.dataset.shards import Campaign
+from creepkit.dataset.shards import GenerationJob
 from creepkit.dataset.simulation import rounded_outputs, simulate_rows
 from creepkit.errors import DatasetError
 from helpers.planted_sampling import BAR, GRID, Planted, Raising, strain, stress_of
 
 
 def simulated(tmp_path, design=None, first=0, rows=32, seed=0, specimen=BAR):
-    campaign = Campaign(design or Planted(), specimen, seed, tmp_path / "parts", rows)
-    return simulate_rows(campaign.design, campaign.header, seed, first, rows, lambda row: None)
+    job = GenerationJob(design or Planted(), specimen, seed, tmp_path / "parts", rows)
+    return simulate_rows(job.design, job.header, seed, first, rows, lambda row: None)
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def test_histories_are_those_of_nortons_law_under_constant_load(data):
         expected = strain(data.values_of(row), data.conditions_of(row), GRID.values)
         np.testing.assert_allclose(data.values[row, :, 0], expected, rtol=1e-4, atol=1e-12)
         marks = strain(data.values_of(row), data.conditions_of(row), np.array([0.0, 2000.0, 2000.0, 3600.0]))
-        np.testing.assert_allclose(data.marks[row, :, 0], marks, rtol=1e-4, atol=1e-12)
+        np.testing.assert_allclose(data.hold_outputs[row, :, 0], marks, rtol=1e-4, atol=1e-12)
 
 
 def test_samples_fall_out_for_the_first_criterion_that_they_do_not_meet(data):
@@ -142,7 +142,7 @@ def test_rows_keep_what_belongs_to_them(data):
     assert part.failures == {1: data.failures[row]}
     assert part.values_of(0) == data.values_of(31)
     assert part.index.tolist() == [31, row]
-    assert part.plan(0).loading.program() == data.plan(31).loading.program()
+    assert part.planned_test(0).loading.program() == data.planned_test(31).loading.program()
     np.testing.assert_array_equal(part.times(0), GRID.values)
 
 
@@ -237,8 +237,8 @@ def test_arrays_that_are_missing_or_of_another_length(data, tmp_path):
         file["reasons"].resize(3, axis=0)
     assert "the array 'reasons' is int8 (3,), which does not fit the others" in sentence(path)
     with h5py.File(path, "r+") as file:
-        del file["marks"]
-    assert "the array 'marks' is missing" in sentence(path)
+        del file["hold_outputs"]
+    assert "the array 'hold_outputs' is missing" in sentence(path)
 
 
 def test_columns_that_are_not_numbers(data, tmp_path):
@@ -357,9 +357,8 @@ def test_an_accepted_sample_needs_a_history(data, tmp_path):
 
 
 def test_nothing_from_a_file_is_unpickled():
-    """Pickles travel between a campaign and its workers, through pipes; none is read from a file."""
-    folder = Path(storage.__file__).parent
-    assert {path.name for path in folder.glob("*.py") if "import pickle" in path.read_text()} == {
-        "worker.py", "workers.py"
-    }  # fmt: skip
-    assert "allow_pickle" not in "".join(path.read_text() for path in folder.glob("*.py"))
+    """Pickles travel between a generation and its workers, through pipes; none is read from a file."""
+    sources = Path(storage.__file__).parents[1]
+    texts = {path: path.read_text() for name in ("dataset", "jobs", "files") for path in (sources / name).glob("*.py")}
+    assert {path.name for path, text in texts.items() if "import pickle" in text} == {"worker.py", "workers.py"}
+    assert "allow_pickle" not in "".join(texts.values())

@@ -42,9 +42,14 @@ def bulge(rng, *, celsius=770.0, P2=8.0, amplitude=None, noise=NOISE, name="plan
     growth = growth * (1 + (P2 / 8 - 1) * 3 * later / (4 * HOUR))
     clean = 0.055 * np.where(TIMES > 2 * HOUR, P2 / 8, 1.0) + offset + growth if amplitude is None else amplitude
     return History(
-        name, TIMES, {"amplitude": clean + noise * rng.normal(size=TIMES.size)}, PressureJump(8.0, P2, 2 * HOUR), T,
-        specimen="bulge", elastic=Elastic(180e3 - 100 * celsius),
-    )  # fmt: skip
+        name,
+        TIMES,
+        {"amplitude": clean + noise * rng.normal(size=TIMES.size)},
+        PressureJump(8.0, P2, 2 * HOUR),
+        T,
+        specimen="bulge",
+        elastic=Elastic(180e3 - 100 * celsius),
+    )
 
 
 def bar(rng, *, times=None, noise=2e-5, amount=0.02, steps=((0.0, 100.0),)):

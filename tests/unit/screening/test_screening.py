@@ -7,14 +7,14 @@ import h5py
 import numpy as np
 import pytest
 
-from creepkit.api.simulation import specimen
+from creepkit.api.objects import specimen
 from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import Sqrt
 from creepkit.readers.history_csv import write_history
 from creepkit.screening import files
 from creepkit.screening.alloys import Compositions
-from creepkit.screening.screen import screen
+from creepkit.screening.screen import ScreeningOptions, screen
 from helpers.planted_alloys import NORTON, Deadly, Doubting, bars, bulge
 
 QUICK = IdentificationSettings(starts=2, sobol_points=16)
@@ -23,7 +23,11 @@ TWO = [*bars("X"), *bars("Y", values={"A": 4e-14, "n": 3.5}, seed=2)]
 
 
 def screened(histories, **how):
-    return screen(histories, **{"laws": ["norton"], "dense": None, "workers": 1, "settings": QUICK, **how})
+    how = {"laws": ["norton"], "dense": None, "workers": 1, "settings": QUICK, **how}
+    options = ScreeningOptions(
+        **{f.name: how.pop(f.name) for f in dataclasses.fields(ScreeningOptions) if f.name in how}
+    )
+    return screen(histories, options=options, **how)
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +45,9 @@ def test_planted_values_lie_in_their_intervals(plate):
 
 
 def test_shares_of_laws_go_by_class_and_add_up_to_one(plate):
-    assert list(plate.classes()) == ["Fe-rich", "near-equimolar"]
-    assert [sum(share.values()) for share in plate.shares().values()] == pytest.approx([1.0, 1.0])
-    assert plate.shares()["Fe-rich"]["norton"] == pytest.approx(plate["X"].laws[0].weight)
+    assert list(plate.by_class()) == ["Fe-rich", "near-equimolar"]
+    assert [sum(share.values()) for share in plate.law_fractions().values()] == pytest.approx([1.0, 1.0])
+    assert plate.law_fractions()["Fe-rich"]["norton"] == pytest.approx(plate["X"].laws[0].weight)
 
 
 def test_the_table_has_a_row_an_alloy(plate, tmp_path):
@@ -113,7 +117,7 @@ def test_where_a_guard_doubts_the_specimen_is_asked(excess, holds):
 def test_an_answer_is_read_back_as_it_was(plate, tmp_path):
     answer = plate["X"]
     found = files.read_result(files.write_result(answer, tmp_path / "X.json"))
-    for field in ("alloy", "verdict", "notes", "failed", "equivalents", "seconds", "confirmation"):
+    for field in ("alloy", "verdict", "notes", "failed_laws", "equivalents", "cpu_seconds", "confirmation"):
         assert getattr(found, field) == getattr(answer, field)
     assert found.best.values == answer.best.values
     np.testing.assert_array_equal(found.predicted["X-60"]["strain"], answer.predicted["X-60"]["strain"])
