@@ -120,7 +120,8 @@ data = generate(Planted((Strong(), Visible(log={log!r}, seconds={seconds}))), BA
 def started(to, log="", seconds=0.0, samples=40, workers=2, **how):
     """A generation in a process of its own; a script without a main guard."""
     program = SCRIPT.format(to=str(to), log=str(log), seconds=seconds, samples=samples, workers=workers)
-    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    path = os.pathsep.join([str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+    env = {**os.environ, "PYTHONPATH": path.rstrip(os.pathsep)}
     # a test run in the background of a shell inherits that SIGINT is ignored
     program = f"import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n{program}"
     return subprocess.Popen([sys.executable, "-c", program], env=env, stderr=subprocess.PIPE, text=True, **how)

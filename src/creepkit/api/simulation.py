@@ -46,7 +46,7 @@ def simulate(
     loading : holds its last value beyond its last breakpoint. times : (frames,) s; temperature : K.
     elastic : E in MPa; a bulge test needs it, and a uniaxial strain then includes the elastic part.
 
-    A test that bursts, meets its limit load or loses convergence is an answer too: the history ends there, and says so
+    A test that bursts, meets its limit load or loses convergence is a result too: the history ends there, and says so
     in `status`, `end_time` and `reason`. A specimen may return more, such as the stresses of a BulgeRun.
     """
     law, using = resolve_law(law), resolve_predictor(using)

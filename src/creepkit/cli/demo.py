@@ -40,7 +40,7 @@ def command(
 ) -> None:
     """Identify a planted law from a virtual bulge test.
 
-    The truth is printed beside the answer.
+    The truth is printed beside the result.
     """
     import creepkit as ck
 

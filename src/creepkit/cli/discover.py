@@ -47,7 +47,7 @@ def command(
     ] = False,
     starts: Annotated[int, typer.Option(min=1, help="Starts of each search.")] = 8,
     seed: Annotated[int, typer.Option(help="Seed of the searches.")] = 0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Find forms of temperature for the parameters of a law.
 
@@ -133,7 +133,7 @@ def _temperature_law_of(study: TemperatureStudy) -> TemperatureLaw:
 
 
 def write_temperature_law(temperature_law: TemperatureLaw, folder: Path) -> list[Path]:
-    """Write the answer as JSON, plot, LaTeX and Python; returns the paths."""
+    """Write the law as JSON, plot, LaTeX and Python; returns the paths."""
     import creepkit as ck
 
     folder.mkdir(parents=True, exist_ok=True)

@@ -41,7 +41,10 @@ def command(
         ),
     ] = None,
     unscreened: Annotated[
-        bool, typer.Option("--unscreened", help="Simulate what bursts far too early by a cheap stand-in, too (paper).")
+        bool,
+        typer.Option(
+            "--unscreened", help="Simulate what bursts far too early by the reduced-order model, too (paper)."
+        ),
     ] = False,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
     cluster: Annotated[str | None, typer.Option(metavar="URL", help="A dask scheduler, tcp://host:port.")] = None,
@@ -49,7 +52,7 @@ def command(
         str | None, typer.Option(metavar="K/N", help="Simulate every N-th shard only, from the K-th on; do not merge.")
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Tell what would be drawn; simulate nothing.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Simulate a data set for training.
 

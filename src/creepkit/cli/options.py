@@ -73,7 +73,7 @@ SPECIMENS_OF_OPTION = {
 
 
 def check_options(specimen: str, options: dict[str, object]) -> None:
-    """Options of another specimen would go unheard; what a plugin's specimen takes is its own affair."""
+    """SolveError for an option of another specimen; which options a plugin's specimen takes is not checked."""
     from creepkit.errors import SolveError
 
     if specimen not in {name for specimens in SPECIMENS_OF_OPTION.values() for name in specimens}:

@@ -26,7 +26,7 @@ def command(
     compositions: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Table alloy,Fe,Ni,... below a line '# unit: wt.%'.")
     ] = None,
-    to: Annotated[Path, typer.Option(help="Folder for answers; what it holds already is not done again.")] = Path(
+    to: Annotated[Path, typer.Option(help="Folder for results; what it holds already is not done again.")] = Path(
         "screened"
     ),
     surrogate: Annotated[
@@ -50,7 +50,7 @@ def command(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the search.")] = 0,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Identify the laws of all alloys of a plate.
 

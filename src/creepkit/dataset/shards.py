@@ -36,13 +36,9 @@ from creepkit.language.law_codec import law_to_json
 from creepkit.specimens.documents import specimen_to_json
 
 if TYPE_CHECKING:
+    from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord
     from creepkit.records import Specimen
     from creepkit.sampling.domains import SamplingDesign
-
-
-if TYPE_CHECKING:
-    from creepkit.dataset.dataset import Dataset
-    from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord
 
 
 MOST_PROCESS_DEATHS = 2
@@ -73,7 +69,7 @@ class GenerationJob:
         return replace(self, specimen=self.specimen.replace(threads=1))  # type: ignore[attr-defined]
 
     def run(self, number: int) -> TaskResult:
-        """Simulate a shard; see run() below."""
+        """Simulate a shard; see run_shard() below."""
         return run_shard(self, number)
 
     @cached_property
@@ -92,7 +88,7 @@ class GenerationJob:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Of the document."""
+        """SHA-256 of the document, shortened: data sets of one fingerprint hold the same samples."""
         return hashlib.sha256(json.dumps(self.document, sort_keys=True).encode()).hexdigest()[:24]
 
     @cached_property
@@ -151,14 +147,14 @@ def run_shard(job: GenerationJob, number: int) -> TaskResult:
         if accepted is None:
             remove_temporary_files(path)
             first, rows = number * job.rows, job.rows
-            samples = simulate_rows(job.design, job.header, job.seed, first, rows, _start_guard(lock))
+            samples = simulate_rows(job.design, job.header, job.seed, first, rows, _death_check(lock))
             write_shard(job, number, samples)
             accepted = int((samples.reasons == 0).sum())
         lock.remove()
     return TaskResult(number, "done", accepted)
 
 
-def _start_guard(lock: ShardLock) -> Callable[[int], None]:
+def _death_check(lock: ShardLock) -> Callable[[int], None]:
     """Note each sample before it is simulated; those that killed their process too often are not."""
 
     def starting(row: int) -> None:
@@ -178,7 +174,7 @@ def write_shard(job: GenerationJob, number: int, samples: Dataset) -> None:
 
 
 def sample_checksum(samples: Dataset) -> str:
-    """Of all that a data set holds of its samples."""
+    """SHA-256 of all that a data set holds of its samples."""
     digest = hashlib.sha256(repr(sorted(samples.failures.items())).encode())
     for name, column in COLUMNS.items():
         digest.update(np.ascontiguousarray(getattr(samples, name), dtype=column.file_type).tobytes())
@@ -224,7 +220,7 @@ def read_shards(job: GenerationJob, numbers: Sequence[int]) -> Dataset:
 
 
 POLL_INTERVAL = 0.5
-"""s, after which what another process is at is looked at again."""
+"""s, after which a shard that another process holds is checked again."""
 
 
 def is_complete(job: GenerationJob, record: ProgressRecord, path: Path) -> bool:

@@ -31,7 +31,7 @@ from creepkit.language import CreepLaw, Param, temperature
 from creepkit.records import ZERO_CELSIUS
 
 UNDETERMINED_WIDTH = 0.15
-"""Standard deviation over the width of the bounds above which a parameter is hardly known; .29 is that of nothing."""
+"""Standard deviation over the width of the bounds above which a parameter is hardly known; 0.29 is that of nothing."""
 
 
 INFINITE_FREEDOM = 1e9

@@ -25,11 +25,11 @@ from creepkit.errors import DatasetError
 from creepkit.jobs.worker import ShardedJob
 
 UNSUPPORTED_LOCK_ERRORS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
-"""What file systems without locks answer."""
+"""Errors of file systems without locks."""
 
 
 MOST_DIGITS = 19
-"""Of the number of a sample; what has more is none."""
+"""Digits of the number of a sample; longer ones are damage."""
 
 
 class ShardLock:
@@ -83,16 +83,16 @@ def _locked(file: int) -> bool:
 
 
 MOST_DRAWS_WITHOUT_ACCEPTED = 16384
-"""Draws after which a design of which none was accepted is given up."""
+"""Draws after which a design is given up of which none was accepted."""
 
 
 @dataclass
 class ProgressRecord:
-    """The account of a job.
+    """The shards of a job that are done, and how many are wanted.
 
     samples : accepted ones wanted; or draws : rows wanted, accepted or not. part : (k, n), only shards k-1, k-1+n ...,
-    and so many samples as make an n-th of all.
-    done : {shard: accepted samples} of this part. at_work : shards that are being simulated, here or elsewhere.
+        and as many samples as make an n-th of all.
+    done : {shard: accepted samples} of this part. running : shards that are being simulated, here or elsewhere.
     """
 
     job: ShardedJob
@@ -126,7 +126,7 @@ class ProgressRecord:
 
     @property
     def target(self) -> int:
-        """What `reached` has to come to: accepted samples, or rows."""
+        """Value of `count` at which the job is done: accepted samples, or rows."""
         if self.samples is None:
             return self.job.rows * len(list(self._shard_numbers()))
         return self.samples if self.part is None else -(-self.samples // self.part[1])
@@ -159,7 +159,7 @@ class ProgressRecord:
         return run
 
     def next_shard(self) -> int | None:
-        """The next shard to simulate; None when what is done and at work should do."""
+        """The next shard to simulate; None when those done and running are expected to be enough."""
         expected = 0.0
         for number in self._shard_numbers():
             if self.samples is not None and expected >= self.target:
@@ -195,11 +195,11 @@ class ProgressRecord:
 
 
 ProgressCallback: TypeAlias = Callable[[str, int, int, str], None]
-"""Called with a task, how much of it is done, of how much, and a note on rate, time left and share accepted."""
+"""Called with a task, how much of it is done, of how much, and a note on rate, time left and acceptance."""
 
 
 class ProgressReporter:
-    """Tells the progress of a generation; rates count what was done since it was made."""
+    """Reports the progress of a job; rates count the work since the reporter was made."""
 
     def __init__(self, record: ProgressRecord, progress: ProgressCallback | None) -> None:
         self._record = record
@@ -209,7 +209,7 @@ class ProgressReporter:
         self._last_reported = -1
 
     def report(self) -> None:
-        """Tell how far it is, when that has changed."""
+        """Report the progress when it has changed."""
         done = self._record.count
         if self._progress is None or done == self._last_reported:
             return

@@ -204,7 +204,7 @@ def _draw_rates(axes: Axes, acceptance: Acceptance) -> None:
     axes.set_xticks([20, 50, 100, 200, 400, 700], minor=False)
     axes.tick_params(axis="x", which="minor", labelbottom=False)
     axes.grid(alpha=0.25)
-    axes.set_title(f"{len(curves)} of the sampled laws; domain: useful rates at reference stresses", fontsize=10)
+    axes.set_title(f"{len(curves)} of the sampled laws; box: useful rates at reference stresses", fontsize=10)
 
 
 def _rate_curves(acceptance: Acceptance, stress: Floats) -> Floats:

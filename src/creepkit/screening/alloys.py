@@ -50,14 +50,14 @@ def check_tests(alloy: Alloy, predictor: Predictor) -> None:
     for test, output in creep_outputs:
         if output not in test.outputs or not np.isfinite(test.outputs[output][test.used]).any():
             raise FitError(
-                f"alloy '{alloy.name}': test '{test.name}' has no {output}, without which creep cannot be told; it has "
+                f"alloy '{alloy.name}': test '{test.name}' has no {output}, without which creep cannot be seen; it has "
                 f"{', '.join(test.outputs) or 'no output'}"
             )
     _check_creep(alloy, creep_outputs)
 
 
 def limitations(alloy: Alloy, predictor: Predictor) -> tuple[str, ...]:
-    """What the tests of an alloy leave open, whatever is identified from them."""
+    """What cannot be known from the tests of an alloy, whatever law is identified from them."""
     notes, tests = [], alloy.tests
     if len(tests) == 1:
         notes.append("one test: how dimples or bars of this alloy differ cannot be known from it")

@@ -58,7 +58,7 @@ PARAMETER_SD = {"n": 0.3, "m": 0.05, "B": 8.0}
 
 
 RATE_FACTOR_RANGE = (0.16, 1.0)
-"""Factor on the rate at 100 MPa and a strain of .01, drawn on a logarithmic scale."""
+"""Factor on the rate at 100 MPa and a strain of 0.01, drawn on a logarithmic scale."""
 
 
 LAW_PROBABILITIES = {"Fe-rich": (0.8, 0.1, 0.1), "Co-rich": (0.0, 0.5, 0.5)}
@@ -182,7 +182,7 @@ def _draw_values(law: str, rng: np.random.Generator) -> dict[str, float]:
 
 
 def _rate_at_100_MPa(law: str, values: Mapping[str, float]) -> float:
-    """Creep rate at 100 MPa and a strain of .01, 1/s."""
+    """Creep rate in 1/s at 100 MPa and a strain of 0.01."""
     kernel = kernels.lower(registry.default_registry().law(law), "numpy")
     return float(kernel.rate(values, stress=100.0, strain=0.01, time=3600.0, temperature=TEMPERATURE))
 

@@ -111,7 +111,7 @@ def test_parameters_that_may_not_depend_on_temperature(alone):
 
 
 def test_beyond_its_range_a_law_is_not_asked(trend):
-    with pytest.raises(FitError, match="holds between 973 and 1083 K; it was asked beyond"):
+    with pytest.raises(FitError, match="holds between 973 and 1083 K; it was evaluated outside"):
         trend.parameters_at(1100.0)
     with pytest.raises(FitError, match="has no parameter 'n_t': did you mean 'n_T'"):
         trend.estimate("n_t")
