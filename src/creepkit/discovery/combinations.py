@@ -64,8 +64,9 @@ class FormWeight:
 class RankedCombinations:
     """All combinations that were tried, best first.
 
-    inflation : c, by which the covariances of the points fell short. sets : {parameter: forms that remain, best
-        first}: those that hold 95 % of the belief, and those equivalent to the best that have no more numbers.
+    overdispersion : c, by which the covariances of the estimates are too small.
+    plausible_forms : {parameter: forms that remain, best first}: those that have 95 % of the weight, and those
+        equivalent to the best with no more numbers.
     """
 
     combinations: tuple[WeightedCombination, ...]

@@ -31,7 +31,8 @@ from creepkit.language import CreepLaw, Param, temperature
 from creepkit.records import ZERO_CELSIUS
 
 UNDETERMINED_WIDTH = 0.15
-"""Standard deviation over the width of the bounds above which a parameter is hardly known; 0.29 is that of nothing."""
+"""Standard deviation over the width of the bounds above which a parameter counts as undetermined; that of the uniform
+distribution over them is 0.29."""
 
 
 INFINITE_FREEDOM = 1e9
@@ -62,7 +63,7 @@ class IsothermalEstimates:
 
     @classmethod
     def from_identifications(cls, fits: Sequence[Identification]) -> IsothermalEstimates:
-        """The points of identifications of one law, each at one temperature; FitError where they are not that."""
+        """The estimates of identifications of one law, each at one temperature; FitError where they are not that."""
         check_identifications(fits)
         order = np.argsort([fit.reference.temperature for fit in fits])
         ordered = [fits[int(k)] for k in order]
@@ -83,7 +84,7 @@ class IsothermalEstimates:
         return np.asarray(np.linalg.inv(np.linalg.cholesky(scaled)) / sd[:, None, :])
 
     def has_undetermined_parameters(self) -> bool:
-        """Whether some parameter is hardly known at most temperatures, but for a coefficient: that goes with others."""
+        """Whether some parameter, rate coefficients aside, is undetermined at most temperatures."""
         coordinates = Coordinates(self.law, self.reference)
         bound_widths = np.array(
             [p.to_internal(p.bounds[1]) - p.to_internal(p.bounds[0]) for p in self.law.params.values()]
@@ -182,8 +183,9 @@ BOUND_TOLERANCE_SD = 2.0
 class Regression:
     """Forms of all parameters, fitted to the points.
 
-    values : {name: value} of coefficients and of what is inside exponentials, internal (logarithm of a coefficient of
-        log scale); covariance in the same order. curves : (temperatures, parameters) of theta. chi_square : of rows.
+    values : {name: internal value} of coefficients and of what is inside exponentials (the logarithm of a coefficient
+        of log scale). covariance : (numbers, numbers) in the same order.
+    fitted_theta : (temperatures, parameters) internal values on the curves. chi_square : of `rows` residuals.
     """
 
     candidate_forms: tuple[CandidateForm, ...]

@@ -46,8 +46,8 @@ REPLICATE_TEMPERATURE_TOLERANCE = 3.0
 
 
 REPLICATE_FACTOR = {"amplitude": 1.6, "strain": 3.0}
-"""Between the creep of replicates. Dimples: three standard deviations of 2^.5 times 11 %, which is what thicknesses that
-scatter by 5.5 % do to a deflection. Bars: rates scatter by a factor of two, and products and environments differ.
+"""Between the creep of replicates. Dimples: three standard deviations of 2^0.5 times 11 %, which is what thicknesses
+that scatter by 5.5 % do to a deflection. Bars: rates scatter by a factor of two, and products and environments differ.
 """
 
 

@@ -12,11 +12,11 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.records import History
 
 OUTLIER_THRESHOLD = 6.0
-"""Robust standard deviations by which a single frame must miss its neighbours: of Gaussian noise 2 in 1e9 do."""
+"""Robust standard deviations by which a single frame must differ from its neighbours: 2 in 1e9 of Gaussian noise do."""
 
 
 FEW_FRAMES_CORRECTION = 10.0
-"""The threshold is JUMP (1 + FEW / frames): few frames say little about their own noise."""
+"""The threshold is OUTLIER_THRESHOLD (1 + this / frames): few frames say little about their own noise."""
 
 
 DECREASE_FRACTION = 0.02
@@ -42,7 +42,7 @@ LOAD_TOLERANCE, TEMPERATURE_TOLERANCE = 0.01, 2.0
 
 
 OPPOSITE_NEIGHBOUR_FRACTION = 0.3
-"""Of a frame's miss: how far its neighbours must miss the other way if it is to be off alone."""
+"""Fraction of a frame's residual that its neighbours must have with the other sign if it is to be a single outlier."""
 
 
 _ROUNDING_FRACTION = 0.5
@@ -63,7 +63,8 @@ class FlaggedFrames(NamedTuple):
 class LoadSegment(NamedTuple):
     """Frames under one load and temperature.
 
-    load : MPa. raised : whether it is at least what it was before. first : whether the part is the test's first.
+    frames : (n,) positions in the history. load : MPa. load_increased : whether it is at least the load before.
+    is_first : whether the segment is the first of the test.
     """
 
     frames: Ints
@@ -188,7 +189,10 @@ def load_segments(history: History) -> list[LoadSegment]:
 
 
 def noise_standard_deviation(times: Floats, values: Floats) -> float:
-    """Standard deviation of white noise, robust, from what frames miss the cubic through their neighbours by."""
+    """Standard deviation of white noise, robust, from the residuals of the cubic through each frame's neighbours.
+
+    times : (frames,) s. values : (frames,) mm or strain, whose unit the result has.
+    """
     residuals, _ = _interpolation_residuals(times, values)
     differences = np.abs(np.diff(values))
     rounding = (
@@ -200,9 +204,9 @@ def noise_standard_deviation(times: Floats, values: Floats) -> float:
 
 
 def _interpolation_residuals(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """What each frame but the outer two misses the cubic of its neighbours by, over what unit noise makes it, and that.
+    """Standardised residual of each frame but the outer two from the cubic of its neighbours, and its scale, (n - 4,) each.
 
-    The cubic is one in time or in its logarithm, whichever misses less: some tests are read evenly, some over decades.
+    The cubic is one in time or in its logarithm, whichever fits better: some tests are read evenly, some over decades.
     """
     results = [_cubic_residuals(x, values) for x in (times, np.log(times))]
     return min(results, key=lambda pair: float(np.median(np.abs(pair[0]))))

@@ -120,7 +120,7 @@ class RateEvaluationPoints:
         return RateArguments(stress, REFERENCE_STRAIN, seconds, temperature)
 
     def rows(self, rows: Ints) -> RateEvaluationPoints:
-        """Some of the rows."""
+        """Some of the rows, by their numbers (k,)."""
         return RateEvaluationPoints(self.stress[rows], self.times[rows], self.temperature[rows])
 
     @property
