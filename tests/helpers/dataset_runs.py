@@ -1,4 +1,4 @@
-"""What tests of campaigns share: a small one with processes or without, what it leaves behind, what it makes."""
+"""What tests of generations share: a small one with processes or without, what it leaves behind, what it makes."""
 
 from contextlib import nullcontext
 from dataclasses import dataclass, field
@@ -6,46 +6,48 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from creepkit.dataset import generation
 from creepkit.dataset.dataset import COLUMNS
 from creepkit.dataset.generation import generate
-from creepkit.dataset.shards import Campaign
+from creepkit.dataset.shards import GenerationJob
 from creepkit.jobs.worker import run_task
+from creepkit.jobs.workers import ParallelExecution
 from helpers.planted_sampling import BAR, Planted
 
 ROWS = 16
+EXECUTION = {"workers", "cluster", "part", "shard_rows"}
 
 
 def run(to, design=None, **how):
-    """A campaign with worker processes."""
-    how = {"samples": 40, "seed": 0, "workers": 2, "rows": ROWS, **how}
-    return generate(design or Planted(), BAR, to=to, **how)
+    """A generation with worker processes."""
+    how = {"samples": 40, "seed": 0, "workers": 2, "shard_rows": ROWS, **how}
+    execution = ParallelExecution(**{name: how.pop(name) for name in EXECUTION & how.keys()})
+    return generate(design or Planted(), BAR, to=to, execution=execution, **how)
 
 
 @dataclass
 class Here:
     """A worker that is this very process: where no process matters, none is started."""
 
-    generation: Campaign
-    asked: list = field(default_factory=list)
+    job: GenerationJob
+    submitted: list = field(default_factory=list)
 
     @property
-    def free(self):
-        return 1 - len(self.asked)
+    def free_slots(self):
+        return 1 - len(self.submitted)
 
     def submit(self, number):
-        self.asked.append(number)
+        self.submitted.append(number)
 
-    def answers(self, timeout):
-        found = [run_task(self.campaign, number) for number in self.asked]
-        self.asked.clear()
-        return found
+    def results(self, timeout):
+        results = [run_task(self.job, number) for number in self.submitted]
+        self.submitted.clear()
+        return results
 
 
 def run_here(to, design=None, **how):
-    """The same campaign without processes."""
+    """The same generation without processes."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(generation, "_crew", lambda one, workers, cluster: nullcontext(Here(one)))
+        patched.setattr(ParallelExecution, "start", lambda execution, job: nullcontext(Here(job)))
         return run(to, design, **how)
 
 
@@ -60,8 +62,8 @@ def shards_of(to):
 
 
 def left_behind(folder):
-    """Temporary files and claims."""
-    return [p.name for p in folder.rglob("*") if p.name.endswith(".part") or p.name.endswith(".claim")]
+    """Temporary files and locks."""
+    return [p.name for p in folder.rglob("*") if p.name.endswith(".part") or p.name.endswith(".lock")]
 
 
 def whole_of(tmp_path_factory):

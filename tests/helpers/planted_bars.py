@@ -17,9 +17,14 @@ SPL = {"A": 0.02**1.3 / 1.3 / END / 50.0**N, "n": N, "m": M}
 
 
 def bars(
-    law: CreepLaw, values: Mapping[str, float], loadings: Sequence[Loading], *, seed: int, noise: float = 2e-5,
+    law: CreepLaw,
+    values: Mapping[str, float],
+    loadings: Sequence[Loading],
+    *,
+    seed: int,
+    noise: float = 2e-5,
     frames: int = 30,
-) -> list[History]:  # fmt: skip
+) -> list[History]:
     """One test for each loading."""
     rng, times = np.random.default_rng(seed), np.geomspace(1e-3, 1.0, frames) * END
     blank = [History(f"bar {k}", times, {"strain": 0 * times}, one, 1000.0) for k, one in enumerate(loadings)]

@@ -31,8 +31,10 @@ def bars(count: int = 96, grid: TimeGrid | None = None, ends: tuple[float, float
     columns = {"stress_1": low, "stress_2": low * (1.05 + 0.2 * unit[:, 3]), "Tj": last * (0.25 + 0.5 * unit[:, 4])}
     if ends is not None:
         columns["end_time"] = last
-    values = [strains(*parameters[k], *(column[k] for column in [*columns.values()][:3]), grid.times(last[k]))
-              for k in range(count)]  # fmt: skip
+    values = [
+        strains(*parameters[k], *(column[k] for column in [*columns.values()][:3]), grid.times(last[k]))
+        for k in range(count)
+    ]
     return data_set("uniaxial", ck.law("norton"), grid, parameters, columns, np.array(values)[..., None])
 
 
@@ -74,26 +76,42 @@ def unsimulated_rates(count: int) -> Dataset:
     family = rate_family()
     drawn = family.draw(0, count, 1)
     columns = dict(zip(family.condition_names, drawn.conditions.T, strict=True))
-    return data_set("bulge", family.law, family.grid, drawn.parameters, columns,
-                    np.zeros((count, family.grid.frames, 3)))  # fmt: skip
+    return data_set(
+        "bulge", family.law, family.grid, drawn.parameters, columns, np.zeros((count, family.grid.frames, 3))
+    )
 
 
 def data_set(
-    specimen: str, law: ck.CreepLaw, grid: TimeGrid, parameters: np.ndarray, columns: Mapping[str, np.ndarray],
+    specimen: str,
+    law: ck.CreepLaw,
+    grid: TimeGrid,
+    parameters: np.ndarray,
+    columns: Mapping[str, np.ndarray],
     values: np.ndarray,
-) -> Dataset:  # fmt: skip
+) -> Dataset:
     """A data set of accepted samples."""
     count, outputs = len(parameters), ck.specimen(specimen).outputs
     ends = columns.get("end_time", np.full(count, grid.values[-1]))
     return Dataset(
-        law=law, specimen=ck.specimen(specimen), design_document={"name": "planted"}, grid=grid, outputs=outputs,
-        parameter_names=law.names, condition_names=tuple(columns), parameters=np.array(parameters, float),
-        conditions=np.stack([*columns.values()], axis=1), values=np.array(values, np.float32),
-        hold_outputs=np.full((count, 4, len(outputs)), np.nan, np.float32), status=np.zeros(count, np.int64),
-        end_times=np.array(ends, float), reasons=np.zeros(count, np.int64),
-        reason_names=("accepted",), reason_texts=("all criteria are met",),
-        index=np.arange(count), provenance={"seed": 1},
-    )  # fmt: skip
+        law=law,
+        specimen=ck.specimen(specimen),
+        design_document={"name": "planted"},
+        grid=grid,
+        outputs=outputs,
+        parameter_names=law.names,
+        condition_names=tuple(columns),
+        parameters=np.array(parameters, float),
+        conditions=np.stack([*columns.values()], axis=1),
+        values=np.array(values, np.float32),
+        hold_outputs=np.full((count, 4, len(outputs)), np.nan, np.float32),
+        status=np.zeros(count, np.int64),
+        end_times=np.array(ends, float),
+        reasons=np.zeros(count, np.int64),
+        reason_names=("accepted",),
+        reason_texts=("all criteria are met",),
+        index=np.arange(count),
+        provenance={"seed": 1},
+    )
 
 
 def measured(plan: History, outputs: np.ndarray, names: tuple[str, ...], name: str) -> History:

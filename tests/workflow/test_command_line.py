@@ -84,8 +84,22 @@ def test_exported_python_gives_the_identified_rate(identified):
 
 def test_simulate_writes_a_curve_that_identify_reads(tmp_path):
     path = tmp_path / "curve.csv"
-    result = creepkit("simulate", "norton", "--set", "A=1e-16", "--set", "n=5", "--stress", 100, "--end-h", 10,
-                      "--control", "stress", "--to", path)  # fmt: skip
+    result = creepkit(
+        "simulate",
+        "norton",
+        "--set",
+        "A=1e-16",
+        "--set",
+        "n=5",
+        "--stress",
+        100,
+        "--end-h",
+        10,
+        "--control",
+        "stress",
+        "--to",
+        path,
+    )
     assert result.exit_code == 0, result.output
     (history,) = ck.read_histories(path)
     assert history.outputs["strain"][-1] == pytest.approx(1e-16 * 100**5 * 36000, rel=1e-6)
@@ -197,11 +211,15 @@ def test_a_cut_forgets_how_every_test_ended():
     times = np.linspace(3600, 36000, 5)
     tests = [
         ck.History(
-            name=name, times=times, outputs={"strain": np.linspace(0.01, end, 5)}, loading=ck.constant_stress(100),
-            temperature=1000.0, unruptured=True,
+            name=name,
+            times=times,
+            outputs={"strain": np.linspace(0.01, end, 5)},
+            loading=ck.constant_stress(100),
+            temperature=1000.0,
+            unruptured=True,
         )
         for name, end in (("far", 0.1), ("near", 0.03))
-    ]  # fmt: skip
+    ]
     assert [(h.rupture_time, h.unruptured) for h in _truncate_at_strain(tests, 0.05)] == [(None, False)] * 2
 
 

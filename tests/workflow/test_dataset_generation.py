@@ -1,4 +1,4 @@
-"""Campaigns that are killed, meet one another or a cluster: nothing is lost or counts twice."""
+"""Generations that are killed, meet one another or a cluster: nothing is lost or counts twice."""
 
 import os
 import re
@@ -22,7 +22,7 @@ def whole(tmp_path_factory):
     return whole_of(tmp_path_factory)
 
 
-# ---- a campaign as it should be ------------------------------------------------------------------------------------
+# ---- a generation as it should be ------------------------------------------------------------------------------------
 
 
 def test_the_leading_shards_that_hold_enough_are_taken_whoever_made_them(whole, tmp_path):
@@ -52,7 +52,7 @@ def test_draws_are_counted_whatever_becomes_of_them(whole, tmp_path):
     assert_same(part, whole.rows(slice(0, 20)))
 
 
-def test_a_finished_campaign_is_not_made_again_and_a_larger_one_goes_on(tmp_path):
+def test_a_finished_data_set_is_not_made_again_and_a_larger_one_goes_on(tmp_path):
     log, to = tmp_path / "log", tmp_path / "a.h5"
     design = Planted((Strong(), Visible(log=str(log))))
     first = run_here(to, design)
@@ -78,7 +78,7 @@ def test_parts_of_a_job_array_become_one_file(whole, tmp_path):
 
 def test_nothing_is_left_behind(tmp_path):
     run_here(tmp_path / "a.h5")
-    assert left_behind(tmp_path) == ["merging.claim"]
+    assert left_behind(tmp_path) == ["merging.lock"]
 
 
 # ---- deaths --------------------------------------------------------------------------------------------------------
@@ -110,16 +110,18 @@ def test_a_sample_that_kills_its_worker_each_time_fails(whole, tmp_path):
 SCRIPT = """
 import sys
 from helpers.planted_sampling import *
-from creepkit.dataset.campaign import generate
+from creepkit.dataset.generation import generate
+from creepkit.jobs.workers import ParallelExecution
 data = generate(Planted((Strong(), Visible(log={log!r}, seconds={seconds}))), BAR, samples={samples}, seed=0,
-                to={to!r}, workers={workers}, rows=16)
+                to={to!r}, execution=ParallelExecution({workers}, shard_rows=16))
 """
 
 
 def started(to, log="", seconds=0.0, samples=40, workers=2, **how):
-    """A campaign in a process of its own; a script without a main guard."""
+    """A generation in a process of its own; a script without a main guard."""
     program = SCRIPT.format(to=str(to), log=str(log), seconds=seconds, samples=samples, workers=workers)
-    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    path = os.pathsep.join([str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+    env = {**os.environ, "PYTHONPATH": path.rstrip(os.pathsep)}
     # a test run in the background of a shell inherits that SIGINT is ignored
     program = f"import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n{program}"
     return subprocess.Popen([sys.executable, "-c", program], env=env, stderr=subprocess.PIPE, text=True, **how)
@@ -137,7 +139,7 @@ def wait_for(what, seconds=60.0):
 
 
 @pytest.mark.parametrize("workers_too", [True, False])
-def test_a_campaign_that_is_killed_goes_on_where_it_was(whole, tmp_path, workers_too):
+def test_a_generation_that_is_killed_goes_on_where_it_was(whole, tmp_path, workers_too):
     to, log = tmp_path / "a.h5", tmp_path / "log"
     first = started(to, log, seconds=0.03, workers=1)
     wait_for(lambda: len(shards_of(to)) >= 1)
@@ -152,31 +154,31 @@ def test_a_campaign_that_is_killed_goes_on_where_it_was(whole, tmp_path, workers
     made = {path: path.stat().st_mtime_ns for path in shards_of(to)}
     assert_same(run_here(to), whole)
     assert made.items() <= {path: path.stat().st_mtime_ns for path in shards_of(to)}.items()
-    assert left_behind(tmp_path) == ["merging.claim"]
+    assert left_behind(tmp_path) == ["merging.lock"]
 
 
 def test_ctrl_c_ends_the_workers_and_counts_no_death(tmp_path):
     to = tmp_path / "a.h5"
     first = started(to, seconds=0.1, workers=1)
-    wait_for(lambda: len(children(first.pid)) == 1 and list(to.with_name("a.h5.parts").glob("*.claim")))
+    wait_for(lambda: len(children(first.pid)) == 1 and list(to.with_name("a.h5.parts").glob("*.lock")))
     workers = children(first.pid)
     time.sleep(0.5)
     first.send_signal(signal.SIGINT)
     assert "KeyboardInterrupt" in first.communicate()[1]
     assert not any(Path(f"/proc/{pid}").exists() for pid in workers)
-    assert [path.read_bytes() for path in to.with_name("a.h5.parts").glob("*.claim")] == [b""]
+    assert [path.read_bytes() for path in to.with_name("a.h5.parts").glob("*.lock")] == [b""]
 
 
-def test_a_claim_of_the_dead_does_not_block(whole, tmp_path):
+def test_a_lock_of_the_dead_does_not_block(whole, tmp_path):
     to = tmp_path / "a.h5"
     parts = tmp_path / "a.h5.parts"
     parts.mkdir()
-    (parts / "00000.claim").write_text("3\n")
-    (parts / "00001.claim").write_bytes(b"\xff\x00garbage")
+    (parts / "00000.lock").write_text("3\n")
+    (parts / "00001.lock").write_bytes(b"\xff\x00garbage")
     assert_same(run_here(to), whole)
 
 
-def test_two_campaigns_in_one_folder_share_the_work(whole, tmp_path):
+def test_two_generations_in_one_folder_share_the_work(whole, tmp_path):
     to, log = tmp_path / "a.h5", tmp_path / "log"
     both = [started(to, log, seconds=0.02, workers=1) for _ in range(2)]
     assert [process.communicate()[1] for process in both] == ["", ""]

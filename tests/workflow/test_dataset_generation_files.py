@@ -1,4 +1,4 @@
-"""Campaigns that meet damaged files, a full disk, or a wish that cannot be met: nothing is lost, and it is said."""
+"""Generations that meet damaged files, a full disk, or a wish that cannot be met: nothing is lost, and it is said."""
 
 import os
 import re
@@ -30,20 +30,20 @@ def test_a_damaged_shard_is_made_again(whole, tmp_path, caplog, damage):
     path = shards_of(to)[1]
     held = bytearray(path.read_bytes())
     with h5py.File(path) as file:
-        place = file["marks"].id.get_chunk_info(0)
+        place = file["hold_outputs"].id.get_chunk_info(0)
     held[place.byte_offset + place.size // 2] ^= 0xFF if damage == "flipped" else 0
     path.write_bytes({"truncated": held[: len(held) // 2], "flipped": held, "empty": b"", "text": b"no"}[damage])
     assert_same(run_here(to), whole)
     assert re.search(r"00001\.h5: .*; it is simulated again", caplog.text)
 
 
-def test_a_shard_of_another_campaign_is_not_counted(whole, tmp_path, caplog):
+def test_a_shard_of_another_data_set_is_not_counted(whole, tmp_path, caplog):
     other = tmp_path / "other.h5"
     run_here(other, seed=1, part=(1, 1))
     (tmp_path / "a.h5.parts").mkdir()
     (tmp_path / "a.h5.parts" / "00000.h5").write_bytes(shards_of(other)[0].read_bytes())
     assert_same(run_here(tmp_path / "a.h5"), whole)
-    assert "a shard of another campaign; it is simulated again" in caplog.text
+    assert "a shard of another data set; it is simulated again" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -51,12 +51,12 @@ def test_a_shard_of_another_campaign_is_not_counted(whole, tmp_path, caplog):
     [
         ({"seed": 1}, "there and here seed is 0 and 1"),
         ({"design": Planted(low=60.0)}, "there and here design.low is 50.0 and 60.0"),
-        ({"rows": 32}, "there and here rows is 16 and 32"),
+        ({"shard_rows": 32}, "there and here rows is 16 and 32"),
     ],
 )
-def test_a_folder_of_another_campaign_is_refused(tmp_path, change, difference):
+def test_a_folder_of_another_data_set_is_refused(tmp_path, change, difference):
     run_here(tmp_path / "a.h5", part=(1, 1))
-    with pytest.raises(DatasetError, match=rf"a\.h5\.parts: holds shards of another campaign \({difference}\)"):
+    with pytest.raises(DatasetError, match=rf"a\.h5\.parts: holds shards of another data set \({difference}\)"):
         run_here(tmp_path / "a.h5", **change)
 
 
@@ -78,10 +78,10 @@ def test_a_target_that_is_something_else_is_refused_before_any_work(tmp_path, wh
     assert os.listdir(tmp_path) == ["a.h5"]
 
 
-def test_a_damaged_account_of_the_campaign_is_said(tmp_path):
+def test_a_damaged_record_of_the_generation_is_said(tmp_path):
     (tmp_path / "a.h5.parts").mkdir()
-    (tmp_path / "a.h5.parts" / "campaign.json").write_text('{"seed": ')
-    with pytest.raises(DatasetError, match=r"campaign\.json: damaged; remove it"):
+    (tmp_path / "a.h5.parts" / "generation.json").write_text('{"seed": ')
+    with pytest.raises(DatasetError, match=r"generation\.json: damaged; remove it"):
         run_here(tmp_path / "a.h5")
 
 
@@ -107,7 +107,7 @@ def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
     assert re.search(r"a\.h5: cannot be written: File too large; make room and start again", complaint(3 * shard // 2))
     made = {path: path.stat().st_mtime_ns for path in shards_of(to)}
     assert len(made) * ROWS >= len(expected)
-    assert left_behind(tmp_path / "a.h5.parts") == ["merging.claim"]
+    assert left_behind(tmp_path / "a.h5.parts") == ["merging.lock"]
     assert_same(run_here(to, samples=300), expected)
     assert made == {path: path.stat().st_mtime_ns for path in shards_of(to)}
 
@@ -131,13 +131,13 @@ def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
     ],
 )
 def test_what_cannot_be_asked_for(tmp_path, how, message, monkeypatch):
-    monkeypatch.setattr("creepkit.jobs.workers.WAIT", 0.5)
+    monkeypatch.setattr("creepkit.jobs.workers.CONNECT_TIMEOUT", 0.5)
     with pytest.raises(DatasetError, match=message):
         run(tmp_path / "a.h5", **how)
 
 
 def test_a_design_of_which_nothing_is_accepted_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr("creepkit.jobs.shard_progress.HOPELESS", 64)
+    monkeypatch.setattr("creepkit.jobs.shard_progress.MOST_DRAWS_WITHOUT_ACCEPTED", 64)
     with pytest.raises(
         DatasetError, match="none of the first 64 draws was accepted; see 'creepkit generate --dry-run'"
     ):

@@ -71,7 +71,7 @@ def test_data_draws_inputs_and_histories(made, tmp_path):
 
 
 def test_the_verbs_of_a_notebook_ask_for_the_same_file(made):
-    """The file is the answer as it is: of any other campaign it would be refused, as it is to another seed."""
+    """The file is the answer as it is: of any other generation it would be refused, as it is to another seed."""
     to, _ = made
     before = to.stat().st_mtime_ns
     data = ck.generate("norton", "uniaxial", seed=1, draws=300, to=to, every=3600.0)
@@ -82,7 +82,7 @@ def test_the_verbs_of_a_notebook_ask_for_the_same_file(made):
 
 
 def test_a_dry_run_simulates_nothing(tmp_path):
-    result = creepkit("generate", "combined", "--box", "paper", "--dry-run", "--to", tmp_path / "a.h5")
+    result = creepkit("generate", "combined", "--domain", "paper", "--dry-run", "--to", tmp_path / "a.h5")
     assert result.exit_code == 0, result.output
     assert "criterion" in result.stdout
     assert os.listdir(tmp_path) == ["a.rates.png"]
@@ -107,8 +107,14 @@ def test_ranges_of_conditions_and_what_is_left_out_can_be_said():
         (("generate", "norton"), "--to FILE is missing"),
         (("generate", "norton", "--to", "a.h5"), "say either how many accepted samples"),
         (("generate", "norton", "--to", "a.h5", "--samples", 9, "--part", "0/4"), "--part 0/4 is not K/N"),
-        (("generate", "norton", "--to", "a.h5", "--samples", 9, "--box", "pandora"), "there is no box 'pandora'"),
-        (("generate", "rate-family", "--box", "paper", "--to", "a.h5"), "rate-family has a box of its own"),
+        (
+            ("generate", "norton", "--to", "a.h5", "--samples", 9, "--domain", "pandora"),
+            "there is no sampling domain 'pandora'",
+        ),
+        (
+            ("generate", "rate-family", "--domain", "paper", "--to", "a.h5"),
+            "rate-family has a sampling domain of its own",
+        ),
         (("generate", "nortn", "--to", "a.h5", "--samples", 9), "did you mean 'norton'"),
         (("generate", "norton", "--specimen", "relaxation", "--to", "a.h5", "--samples", 9), "relaxation"),
         (("generate", "norton", "--to", "", "--samples", 9), "'.' is no name of a file"),
@@ -118,7 +124,7 @@ def test_ranges_of_conditions_and_what_is_left_out_can_be_said():
         (("generate", "norton", "--to", "a.h5", "--range", "P1=9:2"), "the range (9, 2) is reversed"),
         (("generate", "norton", "--to", "a.h5", "--range", "P1=5", "--range", "P1=6"), "a condition is given twice"),
         (("generate", "norton", "--range", "end_time=9", "--end-h", 3), "both say when tests end"),
-        (("generate", "norton", "--to", "a.h5", "--unscreened"), "--unscreened belongs to --box paper"),
+        (("generate", "norton", "--to", "a.h5", "--unscreened"), "--unscreened belongs to --domain paper"),
         (("generate", "dorn", "--to", "a.h5", "--samples", 9), "or --range temperature=1000:1100"),
         (("data", "nowhere.h5"), "nowhere.h5: there is no such file"),
         (("data", "."), "is a folder"),
@@ -137,7 +143,7 @@ def test_a_job_array_without_slurm_is_one_job(tmp_path):
     fake.chmod(0o755)
     env |= {"SLURM_ARRAY_TASK_ID": "3", "SLURM_ARRAY_TASK_COUNT": "16", "SLURM_CPUS_PER_TASK": "4"}
     done = subprocess.run(["bash", EXAMPLES / "job_array.sh"], env=env, capture_output=True, text=True, check=True)
-    words = "--box conditioned --samples 1 --seed 1 --to"
+    words = "--domain conditioned --samples 1 --seed 1 --to"
     assert done.stdout == f"generate combined --specimen bulge {words} {tmp_path}/a.h5 --workers 4 --part 3/16\n"
 
 

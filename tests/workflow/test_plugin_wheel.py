@@ -75,29 +75,75 @@ STEPS = {
     "new-law": [["new-law", "softer-steel"]],
     "simulate": [
         *(
-            ["simulate", "soft-steel", *SET, "--temperature-c", C, "--stress", s, "--control", "stress", "--end-h", end,
-             "--points", "40", "--to", f"curve_{s}.csv"]
+            [
+                "simulate",
+                "soft-steel",
+                *SET,
+                "--temperature-c",
+                C,
+                "--stress",
+                s,
+                "--control",
+                "stress",
+                "--end-h",
+                end,
+                "--points",
+                "40",
+                "--to",
+                f"curve_{s}.csv",
+            ]
             for s, (C, end) in CURVES.items()
         ),
         [*SIMULATE, "800", "--specimen", "relaxation", "--strain", "0.001", "--end-h", "20", "--points", "30"],
-        [*SIMULATE, "800", "--specimen", "point", "--stress", "11=60", "--stress", "12=3600:30", "--end-h", "5",
-         "--points", "10"],
+        [
+            *SIMULATE,
+            "800",
+            "--specimen",
+            "point",
+            "--stress",
+            "11=60",
+            "--stress",
+            "12=3600:30",
+            "--end-h",
+            "5",
+            "--points",
+            "10",
+        ],
         [*SIMULATE, "800", "--specimen", "bulge", "--pressure", "6", "--end-h", "1", "--points", "4"],
     ],
     "identify": [["identify", *(f"curve_{s}.csv" for s in CURVES), "--law", "soft-steel", "--starts", "2", "--json"]],
     "confirm": [["confirm", "identified/soft-steel.json", *(f"curve_{s}.csv" for s in CURVES), "--json"]],
-    "screen": [["screen", ".", "--law", "soft-steel", "--dense", "none", "--workers", "1", "--to", "screened",
-                "--json"]],
+    "screen": [
+        ["screen", ".", "--law", "soft-steel", "--dense", "none", "--workers", "1", "--to", "screened", "--json"]
+    ],
     "discover": [],  # asks for laws without temperature
     "export": [["export", "identified/soft-steel.json", "--to", "python"]],
-    "generate": [["generate", "soft-steel", "--specimen", "uniaxial", "--draws", "48", "--interval", "2400", "--range",
-                  "temperature=1050:1100", "--seed", "1", "--workers", "1", "--to", "set.h5"]],
+    "generate": [
+        [
+            "generate",
+            "soft-steel",
+            "--specimen",
+            "uniaxial",
+            "--draws",
+            "48",
+            "--interval",
+            "2400",
+            "--range",
+            "temperature=1050:1100",
+            "--seed",
+            "1",
+            "--workers",
+            "1",
+            "--to",
+            "set.h5",
+        ]
+    ],
     "data": [["data", "set.h5", "--json"]],
     "train": [["train", "set.h5", "--hidden", "4", "--layers", "1", "--epochs", "2", "--to", "net.safetensors"]],
     "sweep": [["sweep", "set.h5", "--hidden", "4", "--layers", "1", "--epochs", "1", "--to", "sweep"]],
-    "base": [],  # has no law
+    "reduced-model": [],  # has no law
     "demo": [],  # has a law of its own
-}  # fmt: skip
+}
 
 
 def run(*words: object, cwd: Path, stdin: str = "") -> None:

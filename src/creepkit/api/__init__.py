@@ -1,1 +1,1 @@
-"""The public verbs, as typed in a notebook; each looks up names in the registry and passes the work on."""
+"""The public functions: each resolves names of laws and specimens and passes the work on; `creepkit` lists them all."""

@@ -1,8 +1,8 @@
 """The command line: one command a file, and nothing heavy is imported before a command runs.
 
-Compiled code has a folder of its own for each state of the sources: numba looks at the file of a compiled function
-alone, not at those it calls, so code cached beside the sources would outlive an edit or an upgrade. The command line,
-the set-up and the tests share this folder.
+Compiled code has a folder of its own for each state of the sources: numba checks the file of a compiled function
+alone, not those of the functions it calls, so code cached beside the sources would outlive an edit or an upgrade. The
+command line, the set-up and the tests share this folder.
 """
 
 from __future__ import annotations

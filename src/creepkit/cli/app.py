@@ -115,7 +115,7 @@ def global_options(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
-    """Creep laws: look at them, simulate them, and identify them from creep curves.
+    """Creep laws: list them, simulate them, and identify them from creep curves.
 
     Plugins may add laws and commands: 'creepkit plugins' lists what they bring.
     """

@@ -14,9 +14,9 @@ def command(
     fit: Annotated[Path, typer.Argument(metavar="FIT.json", help="An identification that was saved.")],
     tests: Annotated[list[str], typer.Argument(metavar="TESTS...", help="Measured files, folders or patterns.")],
     surrogate: Annotated[
-        str | None, typer.Option(metavar="NAME", help="What it was identified through, to tell how far that is off.")
+        str | None, typer.Option(metavar="NAME", help="What it was identified through, to say how far that is off.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Simulate an identified law for each test."""
     from dataclasses import replace

@@ -40,7 +40,7 @@ def command(
 ) -> None:
     """Identify a planted law from a virtual bulge test.
 
-    The truth is printed beside the answer.
+    The truth is printed beside the result.
     """
     import creepkit as ck
 
@@ -104,9 +104,15 @@ def _plot_section(fit: Identification, test: History, folder: Path) -> Path:
     import creepkit as ck
 
     run = ck.simulate(
-        fit.law, "bulge", fit.values, loading=test.loading, times=test.times, temperature=test.temperature,
-        elastic=test.elastic, name=f"{test.name}, {fit.law.name} as identified",
-    )  # fmt: skip
+        fit.law,
+        "bulge",
+        fit.values,
+        loading=test.loading,
+        times=test.times,
+        temperature=test.temperature,
+        elastic=test.elastic,
+        name=f"{test.name}, {fit.law.name} as identified",
+    )
     path = folder / f"{file_stem(fit.law.name)}-section.png"
     run.section(path=path)  # type: ignore[attr-defined]
     return path

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit.cli.options import check_folder, parse_nuisances
 from creepkit.report.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from creepkit.api.identification import SettingChanges
+    from creepkit.discovery.discover import FormOptions, TemperatureStudy
     from creepkit.discovery.temperature_law import TemperatureLaw
-    from creepkit.inverse.identification import Identification
 
 
 def command(
@@ -45,7 +47,7 @@ def command(
     ] = False,
     starts: Annotated[int, typer.Option(min=1, help="Starts of each search.")] = 8,
     seed: Annotated[int, typer.Option(help="Seed of the searches.")] = 0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Find forms of temperature for the parameters of a law.
 
@@ -53,26 +55,27 @@ def command(
     From saved identifications forms are found alone, for want of the tests. JSON, a plot, LaTeX and Python go to a
     folder.
     """
-    from creepkit.cli.options import check_folder
+    import creepkit as ck
+    from creepkit.api.identification import change_settings
 
     check_folder(to)
-    forms, prior_odds = parse_forms(form), parse_prior_odds(prior)
+    form_options: FormOptions = {"forms": parse_forms(form), "prior": parse_prior_odds(prior)}
     if all(name.endswith(".json") for name in files):
-        temperature_law = _discover_from_identifications(files, forms, prior_odds)
+        temperature_law = _discover_from_identifications(files, form_options)
     else:
-        temperature_law = _discover_from_tests(
-            files,
-            reader,
-            law,
-            through,
-            forms,
-            prior_odds,
-            nuisance,
-            within=within,
-            starts=starts,
-            seed=seed,
-            moduli=moduli,
-        )
+        changes: SettingChanges = {"starts": starts, "seed": seed, "nuisances": parse_nuisances(nuisance)}
+        with ProgressBar() as progress:
+            study = ck.temperature_study(
+                law,
+                ck.read_histories(files, reader),
+                None if through is None else ck.surrogate(through),
+                moduli=moduli,
+                within=within,
+                settings=change_settings(ck.IdentificationSettings(), changes),
+                progress=progress.tick,
+                **form_options,
+            )
+        temperature_law = _temperature_law_of(study)
     written = write_temperature_law(temperature_law, to)
     if as_json:
         from creepkit.report.temperature_law import temperature_law_to_json
@@ -112,48 +115,27 @@ def parse_prior_odds(texts: Sequence[str] | None) -> dict[str, dict[str, float]]
     return odds_by_parameter
 
 
-def _discover_from_identifications(files: Sequence[str], forms: Any, prior: Any) -> TemperatureLaw:
+def _discover_from_identifications(files: Sequence[str], form_options: FormOptions) -> TemperatureLaw:
     import creepkit as ck
-    from creepkit.discovery.discover import discover
 
-    fits: list[Identification] = [ck.load(Path(name)) for name in files]
+    fits = [ck.load(Path(name)) for name in files]
     with ProgressBar() as progress:
-        return discover(fits, forms=forms, prior=prior, progress=progress.tick)
+        return ck.discover(fits, progress=progress.tick, **form_options)
 
 
-def _discover_from_tests(
-    files: Sequence[str], reader: str | None, law: str, through: str | None, forms: Any, prior: Any,
-    nuisance: Sequence[str] | None, *, within: float, starts: int, seed: int, moduli: bool,
-) -> TemperatureLaw:  # fmt: skip
-    import creepkit as ck
-    from creepkit.api.simulation import specimens_of_histories
-    from creepkit.cli.options import parse_nuisances
-    from creepkit.discovery.discover import temperature_study
+def _temperature_law_of(study: TemperatureStudy) -> TemperatureLaw:
+    """The temperature law of a study, whose notes are printed; FitError where there is none."""
     from creepkit.errors import FitError
-    from creepkit.inverse.settings import IdentificationSettings
 
-    tests = ck.read_histories(list(files), reader)
-    using = ck.surrogate(through) if through else specimens_of_histories(tests)
-    if isinstance(using, dict):
-        raise FitError(f"the tests are of several specimens, {', '.join(using)}; discover() takes those of one")
-    nuisances = parse_nuisances(nuisance)
-    settings = IdentificationSettings(starts=starts, seed=seed)
-    if nuisances is not None:
-        settings = IdentificationSettings(starts=starts, seed=seed, nuisances=tuple(nuisances))
-    with ProgressBar() as progress:
-        result = temperature_study(
-            ck.law(law), tests, using, moduli=moduli, within=within, forms=forms, prior=prior, settings=settings,
-            progress=progress.tick,
-        )  # fmt: skip
-    for note in result.notes:
+    for note in study.notes:
         typer.echo(f"note: {note}", err=True)
-    if result.temperature_law is None:
-        raise FitError(result.notes[-1])
-    return result.temperature_law
+    if study.temperature_law is None:
+        raise FitError(study.notes[-1])
+    return study.temperature_law
 
 
 def write_temperature_law(temperature_law: TemperatureLaw, folder: Path) -> list[Path]:
-    """Write the answer as JSON, plot, LaTeX and Python; returns the paths."""
+    """Write the law as JSON, plot, LaTeX and Python; returns the paths."""
     import creepkit as ck
 
     folder.mkdir(parents=True, exist_ok=True)

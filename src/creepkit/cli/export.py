@@ -39,7 +39,6 @@ def command(
     Intervals and the range of validity travel as comments.
     """
     import creepkit as ck
-    from creepkit.language import Elastic
     from creepkit.records import ZERO_CELSIUS
 
     if to == "list":
@@ -47,14 +46,12 @@ def command(
             typer.echo(f"{target.name:16} {target.suffix:8} {target.title}")
         return
     law_source = _resolve_source(source)
+    elastic = None if modulus_gpa is None else ck.Elastic(E=1e3 * modulus_gpa, nu=poisson)
     text = ck.export(
-        law_source,
+        ck.law_with_values(law_source, _merged_values(law_source, value), elastic=elastic, name=name),
         to,
-        _merged_values(law_source, value),
         units={"stress": stress_unit, "time": time_unit},
         temperature=None if temperature_c is None else temperature_c + ZERO_CELSIUS,
-        elastic=None if modulus_gpa is None else Elastic(E=1e3 * modulus_gpa, nu=poisson),
-        name=name,
         to=output,
         force=force,
     )

@@ -40,7 +40,10 @@ def command(
         ),
     ] = None,
     unscreened: Annotated[
-        bool, typer.Option("--unscreened", help="Simulate what bursts far too early by a cheap stand-in, too (paper).")
+        bool,
+        typer.Option(
+            "--unscreened", help="Simulate what bursts far too early by the reduced-order model, too (paper)."
+        ),
     ] = False,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
     cluster: Annotated[str | None, typer.Option(metavar="URL", help="A dask scheduler, tcp://host:port.")] = None,
@@ -48,7 +51,7 @@ def command(
         str | None, typer.Option(metavar="K/N", help="Simulate every N-th shard only, from the K-th on; do not merge.")
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Tell what would be drawn; simulate nothing.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Simulate a data set for training.
 
@@ -70,9 +73,15 @@ def command(
         raise DatasetError("--to FILE is missing: name the HDF5 file to write, such as --to combined.h5")
     with ProgressBar() as progress:
         data = ck.generate(
-            design, specimen_record, samples, draws=draws, seed=seed, to=to, workers=workers, cluster=cluster,
-            part=parse_part(part), progress=progress.tick,
-        )  # fmt: skip
+            design,
+            specimen_record,
+            samples,
+            draws=draws,
+            seed=seed,
+            to=to,
+            execution=ck.ParallelExecution(workers, cluster, parse_part(part)),
+            progress=progress.tick,
+        )
     from creepkit.report.dataset import print_dataset
 
     print_dataset(data, to, part, as_json)
@@ -91,7 +100,7 @@ def design_changes(ranges: list[str], end_h: float | None, domain: str | None, u
         changes["end_time"] = 3600.0 * end_h
     if unscreened:
         if domain != "paper":
-            raise DatasetError("--unscreened belongs to --box paper; nothing else leaves samples out")
+            raise DatasetError("--unscreened belongs to --domain paper; nothing else leaves samples out")
         changes["screened"] = False
     return changes
 
@@ -121,9 +130,10 @@ def select_design(
     from creepkit.sampling.rate_family import END_TIME_RANGE
 
     if law != RATE_FAMILY:
-        return resolve_design(law, specimen, domain, changes if interval is None else {**changes, "every": interval})
+        given = {name: value for name, value in (("domain", domain), ("every", interval)) if value is not None}
+        return resolve_design(law, specimen, **given, **changes)
     if domain is not None:
-        raise DatasetError(f"--box {domain}: {RATE_FAMILY} has a box of its own; leave --box out")
+        raise DatasetError(f"--domain {domain}: {RATE_FAMILY} has a sampling domain of its own; leave --domain out")
     if interval is not None:
         changes["grid"] = TimeGrid.every(interval, np.max(changes.get("end_time", END_TIME_RANGE[1])))
     return ck.rate_family(specimen, **changes)

@@ -61,7 +61,8 @@ def command(
     seed: Annotated[int, typer.Option(help="Seed of the search.")] = 0,
     loss: Annotated[str, typer.Option(help="Of frames: linear, soft_l1, huber, cauchy or arctan.")] = "linear",
     test_loss: Annotated[
-        str, typer.Option(help="Of whole tests: gaussian; or student, with which one far from its twins weighs less.")
+        str,
+        typer.Option(help="Of whole tests: gaussian; or student, with which one far from its replicates weighs less."),
     ] = "gaussian",
     weights: Annotated[
         str,
@@ -73,13 +74,13 @@ def command(
     ] = None,
     sums: Annotated[bool, typer.Option("--sums", help="With --weights likelihood: sums of two laws as well.")] = False,
     further: Annotated[
-        bool, typer.Option("--further-tests", help="Say which tests would tell the remaining laws apart.")
+        bool, typer.Option("--further-tests", help="Say which tests would distinguish the remaining laws.")
     ] = False,
     nuisance: Annotated[
         list[str] | None,
         typer.Option(metavar="KIND[=MEAN[:SD]]", help="What differs between tests, such as thickness=0.4935:0.027."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Fit laws to creep curves and rank them.
 

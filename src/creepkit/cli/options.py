@@ -43,8 +43,11 @@ def penalty_named(name: str | None) -> ContributionPenalty | Subsets | None:
     from creepkit.inverse.sparsity.penalties import L2, GroupL2, Sqrt, Subsets
 
     penalties: dict[str, Callable[[], ContributionPenalty | Subsets]] = {
-        "l2": L2, "group-l2": GroupL2, "sqrt": Sqrt, "subsets": Subsets,
-    }  # fmt: skip
+        "l2": L2,
+        "group-l2": GroupL2,
+        "sqrt": Sqrt,
+        "subsets": Subsets,
+    }
     if name is not None and name not in penalties:
         raise FitError(f"--penalty {name} is not known; allowed are {', '.join(penalties)}")
     return None if name is None else penalties[name]()
@@ -70,7 +73,7 @@ SPECIMENS_OF_OPTION = {
 
 
 def check_options(specimen: str, options: dict[str, object]) -> None:
-    """Options of another specimen would go unheard; what a plugin's specimen takes is its own affair."""
+    """SolveError for an option of another specimen; which options a plugin's specimen takes is not checked."""
     from creepkit.errors import SolveError
 
     if specimen not in {name for specimens in SPECIMENS_OF_OPTION.values() for name in specimens}:
@@ -79,7 +82,8 @@ def check_options(specimen: str, options: dict[str, object]) -> None:
         if option_value not in (None, []) and specimen not in SPECIMENS_OF_OPTION[option]:
             allowed_specimens = " or ".join(SPECIMENS_OF_OPTION[option])
             raise SolveError(
-                f"{option} belongs to --specimen {allowed_specimens}, found --specimen {specimen}; leave one of them out"
+                f"{option} belongs to --specimen {allowed_specimens}, found --specimen {specimen}; "
+                "leave one of them out"
             )
 
 

@@ -18,7 +18,7 @@ def command(
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Picture of k, kappa and redistribution to write.")] = None,
 ) -> None:
-    """Tabulate the cheap stand-in of a dimple.
+    """Tabulate the reduced-order model of a dimple.
 
     k(D, h), kappa(D, h), redistribution, elastic deflection and shapes; some seconds.
     """

@@ -25,7 +25,7 @@ def command(
     compositions: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Table alloy,Fe,Ni,... below a line '# unit: wt.%'.")
     ] = None,
-    to: Annotated[Path, typer.Option(help="Folder for answers; what it holds already is not done again.")] = Path(
+    to: Annotated[Path, typer.Option(help="Folder for results; what it holds already is not done again.")] = Path(
         "screened"
     ),
     surrogate: Annotated[
@@ -49,36 +49,39 @@ def command(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the search.")] = 0,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the answer as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Identify the laws of all alloys of a plate.
 
     Interrupted, it goes on where it was when it is started again in the same way.
     """
-    from creepkit.inverse.selection.select import SELECTION_FRAMES
-    from creepkit.inverse.settings import IdentificationSettings
-    from creepkit.report.screening import print_screening
-    from creepkit.screening.screen import screen
+    import creepkit as ck
+    from creepkit.api.identification import change_settings
 
+    settings = change_settings(ck.ScreeningOptions().settings, {"seed": seed, "nuisances": parse_nuisances(nuisance)})
+    options = ck.ScreeningOptions(
+        settings=settings,
+        through=_surrogate_named(through),
+        dense=None if dense == "none" else dense,
+        penalty=penalty_named(penalty),
+        confirm=_confirmation_choice(confirm),
+    )
     with ProgressBar() as progress:
-        plate = screen(
+        plate = ck.screen(
             folder,
             law,
             _surrogate_named(surrogate),
             compositions=compositions,
             to=to,
-            nuisances=parse_nuisances(nuisance),
-            settings=IdentificationSettings(seed=seed, frames=SELECTION_FRAMES),
-            through=_surrogate_named(through),
-            dense=None if dense == "none" else dense,
-            penalty=penalty_named(penalty),
-            confirm=_confirmation_choice(confirm),
+            options=options,
             workers=workers,
             progress=progress.tick,
         )
     written = [plate.to_csv(to / "plate.csv"), plate.to_hdf5(to / "plate.h5")]
     if plate.identified:
         written += [to / "fits", *plate.plot(to / "pictures")]
+    from creepkit.report.screening import print_screening
+
     print_screening(plate, written, as_json)
 
 

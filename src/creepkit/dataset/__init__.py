@@ -1,1 +1,1 @@
-"""Data sets: designs of experiments, what makes a sample worth keeping, campaigns of simulations and their files."""
+"""Data sets: the simulated tests of a sampling design, made in shards and kept in HDF5 files."""

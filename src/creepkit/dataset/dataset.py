@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class Column(NamedTuple):
     """An array whose first axis is the sample.
 
-    stored, held : types in a file and in memory. axes : the other axes, named for the sizes of a data set.
+    file_type, memory_type : of its numbers. axes : the other axes, named for the sizes of a data set.
     chunk : samples that are compressed together.
     """
 
@@ -53,7 +53,10 @@ HOLD_TIMES = 4
 
 
 def empty_columns(sizes: Mapping[str, int]) -> dict[str, Any]:
-    """Every column with no samples in it yet; sizes : of its axes, by their names."""
+    """Every column without samples, {name: (0, ...)}.
+
+    sizes : {axis: length}.
+    """
     shapes = {name: tuple(sizes[axis] for axis in column.axes) for name, column in COLUMNS.items()}
     return {name: np.empty((0, *shapes[name]), column.memory_type) for name, column in COLUMNS.items()}
 
@@ -74,9 +77,9 @@ class Dataset(Presentable):
     grid : the times of the frames. outputs : names along the last axis of values.
     parameters : (n, P) the author's values, columns parameter_names; 0 = switched off where the law allows it.
     conditions : (n, C) MPa, s, mm, K; columns condition_names.
-    values : (n, frames, outputs) float32, NaN after the end; all NaN where nothing was simulated.
-    marks : (n, 4, outputs) float32 at the end of the first ramp, just before the jump, at the end of the second ramp
-        and at the end of the test; NaN where the simulation did not get.
+    values : (n, frames, outputs) mm or strain, float32, NaN after the end; all NaN where nothing was simulated.
+    hold_outputs : (n, 4, outputs) mm or strain, float32, at the end of the first ramp, just before the jump, at the end
+        of the second ramp and at the end of the test; NaN where the simulation ended before.
     status : (n,) records.Status, or -1 where nothing was simulated. end_times : (n,) s, where the simulation ended.
     reasons : (n,) 0 accepted, k the criterion reason_names[k] that was not met first, -1 failed.
     index : (n,) row of the Sobol sequence. reason_texts : what each criterion asks.
@@ -116,7 +119,7 @@ class Dataset(Presentable):
         return self.rows(self.reasons == 0)
 
     def rows(self, selection: Sequence[int] | slice | Ints | Bools) -> Dataset:
-        """The data set of some rows, by their numbers or a mask."""
+        """The data set of some rows: a slice, numbers (k,), or a mask (n,)."""
         numbers = np.arange(len(self))[selection]
         new_row = {int(old): new for new, old in enumerate(numbers)}
         columns = {name: getattr(self, name)[numbers] for name in COLUMNS}
@@ -147,7 +150,7 @@ class Dataset(Presentable):
         return self.grid.times(end)
 
     def output(self, name: str) -> NDArray[np.float32]:
-        """(n, frames) of one output."""
+        """(n, frames) mm or strain, one output."""
         if name not in self.outputs:
             raise DatasetError(f"a data set of {self.specimen.name} has no output '{name}'; it has {self.outputs}")
         return self.values[..., self.outputs.index(name)]
@@ -214,7 +217,7 @@ def _check_no_shared_rows(one: Dataset, other: Dataset) -> None:
 def first_difference(one: Any, other: Any, name: str) -> str:
     """Where two documents first differ: 'specimen.tolerance is 0.01 and 0.02'; '' when they do not.
 
-    place : what both are called; "" when only what is within has a name.
+    name : of both documents; "" when only their entries have names.
     """
     if isinstance(one, dict) and isinstance(other, dict):
         for key in sorted({*one, *other}):
@@ -236,11 +239,11 @@ def _shortened(value: Any) -> str:
 
 
 OUTPUT_UNITS = {"amplitude": "mm", "width": "mm"}
-"""Of outputs that have one."""
+"""Units of outputs that have one."""
 
 
 def summary(data: Dataset) -> dict[str, Any]:
-    """What there is to know of a data set, as JSON-able data; ranges are those of its accepted samples."""
+    """Counts, reasons, ranges and provenance of a data set, as JSON-able data; ranges are those of accepted samples."""
     accepted = data.reasons == 0
     return {
         "law": data.law.name,
@@ -307,7 +310,7 @@ def accepted_ranges(data: Dataset) -> Iterator[tuple[str, dict[str, float]]]:
 
 
 def summary_columns(data: Dataset) -> Iterator[tuple[str, Floats]]:
-    """What samples are drawn by and what they end with: {name: (n,)}."""
+    """Parameters, conditions and last outputs of the samples: (name, (n,) in the unit of column_units())."""
     for names, values in ((data.parameter_names, data.parameters), (data.condition_names, data.conditions)):
         yield from ((name, values[:, k]) for k, name in enumerate(names))
     yield "end of simulation", np.where(data.status >= 0, data.end_times, np.nan)
@@ -316,7 +319,10 @@ def summary_columns(data: Dataset) -> Iterator[tuple[str, Floats]]:
 
 
 def last_values(values: Any) -> Floats:
-    """(n,) the last value of each row that is a number; NaN where there is none."""
+    """(n,) last finite value of each row, NaN where there is none.
+
+    values : (n, frames).
+    """
     finite = np.isfinite(values)
     frame = values.shape[1] - 1 - np.argmax(finite[:, ::-1], axis=1)
     return np.where(finite.any(axis=1), values[np.arange(len(values)), frame], np.nan).astype(float)

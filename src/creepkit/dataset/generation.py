@@ -1,4 +1,4 @@
-"""Generation of a data set: shards of a design are simulated until enough samples are accepted, then merged into one file.
+"""Generation of a data set: shards of a design are simulated until enough samples are accepted, then merged.
 
 Shards are taken in order and without gaps, so that the content of the file does not depend on the number of workers.
 """
@@ -6,27 +6,23 @@ Shards are taken in order and without gaps, so that the content of the file does
 from __future__ import annotations
 
 import logging
-import os
 import time
-from collections import Counter
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.dataset import shards, storage
-from creepkit.dataset.shards import POLL_INTERVAL, Campaign, is_complete, merge_shards
+from creepkit.dataset.shards import POLL_INTERVAL, GenerationJob, is_complete, merge_shards
 from creepkit.errors import DatasetError
 from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord, ProgressReporter
 from creepkit.jobs.worker import TaskResult
-from creepkit.jobs.workers import ProcessWorkers, Workers
+from creepkit.jobs.workers import ParallelExecution, WorkerDeaths, Workers
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
     from creepkit.records import Specimen
     from creepkit.sampling.domains import SamplingDesign
-
 
 _log = logging.getLogger("creepkit.dataset")
 
@@ -40,38 +36,35 @@ def generate(
     specimen: Specimen,
     *,
     samples: int | None = None,
+    draws: int | None = None,
     seed: int,
     to: str | Path,
-    workers: int | None = None,
-    cluster: str | None = None,
-    draws: int | None = None,
-    part: tuple[int, int] | None = None,
+    execution: ParallelExecution | None = None,
     progress: ProgressCallback | None = None,
-    rows: int = shards.SHARD_ROWS,
 ) -> Dataset:
     """Simulate samples of a design until enough are accepted, write them to a file, and return them.
 
     samples : accepted ones wanted, in whole shards, so that there may be some more; or draws : samples simulated or
         rejected, whatever becomes of them.
     to : the HDF5 file; its shards are kept in a folder beside it, and a call that was interrupted goes on from them.
-    workers : processes, by default one for each core; or cluster : address of a dask scheduler, tcp://host:port.
-    part : (k, n) simulates only every n-th shard, from the k-th on, and leaves merging to a call without it.
-    progress : called as progress(task, done, total, note). rows : of a shard.
+    execution : processes or a cluster, and which part of the shards; by default a process for each core does them all.
+    progress : called as progress(task, done, total, note).
     """
-    path = Path(to)
+    path, execution = Path(to), execution or ParallelExecution()
     if not path.name:
         raise DatasetError(f"'{to}' is no name of a file; name the HDF5 file to write, such as combined.h5")
-    campaign = Campaign(design, specimen, _whole_number("seed", seed), path.with_name(f"{path.name}.parts"), rows)
-    record = ProgressRecord(campaign, samples, draws, part)
-    if part is None and is_complete(campaign, record, path):
+    folder = path.with_name(f"{path.name}.parts")
+    job = GenerationJob(design, specimen, _whole_number("seed", seed), folder, execution.shard_rows)
+    record = ProgressRecord(job, samples, draws, execution.part)
+    if execution.part is None and is_complete(job, record, path):
         return storage.read_dataset(path)
-    campaign.open_folder()
+    job.open_folder()
     record.scan_finished()
-    with _start_workers(campaign, workers, cluster) as pool:
-        run_until_enough(record, pool, progress)
-    if part is not None:
-        return shards.read_shards(campaign, sorted(record.done))
-    merge_shards(campaign, record, path, progress)
+    with execution.start(job) as workers:
+        run_until_enough(record, workers, progress)
+    if execution.part is not None:
+        return shards.read_shards(job, sorted(record.done))
+    merge_shards(job, record, path, progress)
     return storage.read_dataset(path)
 
 
@@ -82,55 +75,39 @@ def _whole_number(name: str, value: object) -> int:
     return int(value)
 
 
-def run_until_enough(record: ProgressRecord, pool: Workers, progress: ProgressCallback | None) -> None:
+def run_until_enough(record: ProgressRecord, workers: Workers, progress: ProgressCallback | None) -> None:
     """Have shards simulated until there are enough; DatasetError when one cannot be."""
     reporter = ProgressReporter(record, progress)
     locked_elsewhere: dict[int, float] = {}
-    deaths: Counter[int] = Counter()
+    deaths = WorkerDeaths(MOST_WORKER_DEATHS)
     while record.leading_run() is None:
-        for number in [n for n, since in locked_elsewhere.items() if time.monotonic() - since > POLL_INTERVAL][
-            : pool.free_slots
-        ]:
+        due = [number for number, since in locked_elsewhere.items() if time.monotonic() - since > POLL_INTERVAL]
+        for number in due[: workers.free_slots]:
             del locked_elsewhere[number]
-            pool.submit(number)
-        while pool.free_slots and (shard := record.next_shard()) is not None:
+            workers.submit(number)
+        while workers.free_slots and (shard := record.next_shard()) is not None:
             record.running.add(shard)
-            pool.submit(shard)
-        for result in pool.results(POLL_INTERVAL):
-            _record_result(result, record, locked_elsewhere)
-            if result.status == "died":
-                _resubmit(result, deaths, pool)
+            workers.submit(shard)
+        for result in workers.results(POLL_INTERVAL):
+            if result.status == "taken":
+                locked_elsewhere[result.number] = time.monotonic()
+            elif result.status == "died":
+                _resubmit(result, deaths, workers)
+            else:
+                _record_result(result, record)
         reporter.report()
 
 
-def _record_result(result: TaskResult, record: ProgressRecord, locked_elsewhere: dict[int, float]) -> None:
-    """Enter what became of a shard; DatasetError when it cannot be done."""
-    if result.status == "done":
-        record.mark_done(result.number, result.accepted)
-    elif result.status == "taken":
-        locked_elsewhere[result.number] = time.monotonic()
-    elif result.status == "error":
+def _record_result(result: TaskResult, record: ProgressRecord) -> None:
+    """Enter a shard that is done; DatasetError for one that cannot be."""
+    if result.status == "error":
         raise DatasetError(result.text)
+    record.mark_done(result.number, result.accepted)
 
 
-def _resubmit(result: TaskResult, deaths: Counter[int], pool: Workers) -> None:
+def _resubmit(result: TaskResult, deaths: WorkerDeaths, workers: Workers) -> None:
     """Have a shard done again whose worker died."""
-    deaths[result.number] += 1
-    if deaths[result.number] > MOST_WORKER_DEATHS:
-        raise DatasetError(
-            f"shard {result.number}: its worker process died {MOST_WORKER_DEATHS} times, the last time by {result.text}; "
-            "is there memory enough for so many workers?"
-        )
+    if not deaths.may_retry(result):
+        raise DatasetError(f"shard {result.number}: {deaths.description(result)}")
     _log.warning("a worker process died (%s); its shard %d is simulated again", result.text, result.number)
-    pool.submit(result.number)
-
-
-def _start_workers(campaign: Campaign, workers: int | None, cluster: str | None) -> AbstractContextManager[Workers]:
-    """Who simulates: processes here, or a cluster."""
-    if cluster is not None:
-        from creepkit.jobs.workers import ClusterWorkers
-
-        return ClusterWorkers(campaign, cluster, workers)
-    if workers is not None and workers < 1:
-        raise DatasetError(f"workers is {workers}; allowed are whole numbers above zero, or None for one on each core")
-    return ProcessWorkers(campaign, workers or len(os.sched_getaffinity(0)))
+    workers.submit(result.number)

@@ -1,6 +1,6 @@
 """Shards: blocks of rows of a design, each simulated once, kept in its own file, and merged into one data set.
 
-A shard is done when its file exists, belongs to this campaign and is complete. The file is written under a temporary
+A shard is done when its file exists, belongs to this generation and is complete. The file is written under a temporary
 name and renamed by the holder of the shard lock.
 """
 
@@ -32,29 +32,22 @@ from creepkit.files.reading import FileKind
 from creepkit.files.writing import remove_temporary_files, write_if_absent
 from creepkit.jobs.shard_progress import ShardLock
 from creepkit.jobs.worker import TaskResult
+from creepkit.jobs.workers import SHARD_ROWS
 from creepkit.language.law_codec import law_to_json
 from creepkit.registry.specimen_documents import specimen_to_json
 
 if TYPE_CHECKING:
+    from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord
     from creepkit.records import Specimen
     from creepkit.sampling.domains import SamplingDesign
-
-
-if TYPE_CHECKING:
-    from creepkit.dataset.dataset import Dataset
-    from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord
-
-
-SHARD_ROWS = 256
-"""Rows of a shard: some seconds of a dimple, so that little is lost when a process dies."""
 
 
 MOST_PROCESS_DEATHS = 2
 """How often a sample may kill its process before it counts as failed."""
 
 
-CAMPAIGN_FILE = FileKind(
-    "the settings of a campaign", DatasetError, "it is damaged; remove it if the shards beside it are of this campaign"
+GENERATION_FILE = FileKind(
+    "the settings of a data set", DatasetError, "it is damaged; remove it if the shards beside it are of this data set"
 )
 
 
@@ -62,7 +55,7 @@ _log = logging.getLogger("creepkit.dataset")
 
 
 @dataclass(frozen=True)
-class Campaign:
+class GenerationJob:
     """What is simulated, and in which folder its shards lie.
 
     rows : of a shard. Worker processes are sent this record.
@@ -75,14 +68,14 @@ class Campaign:
     rows: int = SHARD_ROWS
     task_name: ClassVar[str] = "shard"
 
-    def on_one_thread(self) -> Campaign:
-        """The campaign with a specimen that simulates on one thread."""
+    def on_one_thread(self) -> GenerationJob:
+        """The generation with a specimen that simulates on one thread."""
         if getattr(self.specimen, "threads", 1) == 1:
             return self
         return replace(self, specimen=self.specimen.replace(threads=1))  # type: ignore[attr-defined]
 
     def run(self, number: int) -> TaskResult:
-        """Simulate a shard; see run() below."""
+        """Simulate a shard; see run_shard() below."""
         return run_shard(self, number)
 
     @cached_property
@@ -131,41 +124,41 @@ class Campaign:
         return accepted_count(self, number)
 
     def open_folder(self) -> None:
-        """Make the folder, or check that the one that is there belongs to this campaign."""
-        path = self.folder / "campaign.json"
+        """Make the folder, or check that the one that is there belongs to this job."""
+        path = self.folder / "generation.json"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             if not path.exists():
                 write_if_absent(path, json_text(self.document))
         except OSError as error:
             raise DatasetError(f"{self.folder}: no shards can be written there ({error.strerror})") from None
-        existing = read_json(path, CAMPAIGN_FILE)
+        existing = read_json(path, GENERATION_FILE)
         if existing != self.document:
             difference = first_difference(existing, self.document, "")
             raise DatasetError(
-                f"{self.folder}: holds shards of another campaign (there and here {difference}); choose another name, "
+                f"{self.folder}: holds shards of another data set (there and here {difference}); choose another name, "
                 "or remove the folder"
             )
 
 
-def run_shard(campaign: Campaign, number: int) -> TaskResult:
+def run_shard(job: GenerationJob, number: int) -> TaskResult:
     """Simulate a shard and write its file, unless it is done or another process is at it."""
-    path = campaign.path(number)
-    with ShardLock(path.with_suffix(".claim")) as lock:
+    path = job.path(number)
+    with ShardLock(path.with_suffix(".lock")) as lock:
         if not lock.held:
             return TaskResult(number, "taken")
-        accepted = accepted_count(campaign, number, quiet=True)
+        accepted = accepted_count(job, number, quiet=True)
         if accepted is None:
             remove_temporary_files(path)
-            first, rows = number * campaign.rows, campaign.rows
-            samples = simulate_rows(campaign.design, campaign.header, campaign.seed, first, rows, _start_guard(lock))
-            write_shard(campaign, number, samples)
+            first, rows = number * job.rows, job.rows
+            samples = simulate_rows(job.design, job.header, job.seed, first, rows, _death_check(lock))
+            write_shard(job, number, samples)
             accepted = int((samples.reasons == 0).sum())
         lock.remove()
     return TaskResult(number, "done", accepted)
 
 
-def _start_guard(lock: ShardLock) -> Callable[[int], None]:
+def _death_check(lock: ShardLock) -> Callable[[int], None]:
     """Note each sample before it is simulated; those that killed their process too often are not."""
 
     def starting(row: int) -> None:
@@ -176,65 +169,65 @@ def _start_guard(lock: ShardLock) -> Callable[[int], None]:
     return starting
 
 
-def write_shard(campaign: Campaign, number: int, samples: Dataset) -> None:
+def write_shard(job: GenerationJob, number: int, samples: Dataset) -> None:
     """Write the file of a shard."""
-    with write_hdf5(campaign.path(number), DatasetError, storage.WRITE_ADVICE) as file:
+    with write_hdf5(job.path(number), DatasetError, storage.WRITE_ADVICE) as file:
         storage.write_header(file, samples)
         storage.append_samples(file, samples)
-        file.attrs.update({"campaign": campaign.fingerprint, "shard": number, "checksum": sample_checksum(samples)})
+        file.attrs.update({"generation": job.fingerprint, "shard": number, "checksum": sample_checksum(samples)})
 
 
 def sample_checksum(samples: Dataset) -> str:
-    """Of all that a data set holds of its samples."""
+    """SHA-256 of all that a data set holds of its samples."""
     digest = hashlib.sha256(repr(sorted(samples.failures.items())).encode())
     for name, column in COLUMNS.items():
         digest.update(np.ascontiguousarray(getattr(samples, name), dtype=column.file_type).tobytes())
     return digest.hexdigest()
 
 
-def read_shard(campaign: Campaign, number: int) -> Dataset:
-    """The samples of a shard; DatasetError when it is not whole, or of another campaign."""
-    path = campaign.path(number)
+def read_shard(job: GenerationJob, number: int) -> Dataset:
+    """The samples of a shard; DatasetError when it is not whole, or of another data set."""
+    path = job.path(number)
     with open_hdf5(path, storage.DATASET_FILE) as file:
-        if file.attrs.get("campaign") != campaign.fingerprint or file.attrs.get("shard") != number:
-            raise DatasetError(f"{path}: a shard of another campaign")
-        samples = storage.read_samples(file, campaign.header)
+        if file.attrs.get("generation") != job.fingerprint or file.attrs.get("shard") != number:
+            raise DatasetError(f"{path}: a shard of another data set")
+        samples = storage.read_samples(file, job.header)
         expected = file.attrs["checksum"]
     if sample_checksum(samples) != expected:
         raise DatasetError(f"{path}: damaged, its checksum is not that of what it holds")
     return samples
 
 
-def accepted_count(campaign: Campaign, number: int, *, quiet: bool = False) -> int | None:
+def accepted_count(job: GenerationJob, number: int, *, quiet: bool = False) -> int | None:
     """How many samples of a shard were accepted; None when it has to be simulated, or again, which is logged."""
-    path = campaign.path(number)
+    path = job.path(number)
     if not path.exists():
         return None
     try:
-        return int((read_shard(campaign, number).reasons == 0).sum())
+        return int((read_shard(job, number).reasons == 0).sum())
     except DatasetError as error:
         if not quiet:
             _log.warning("%s; it is simulated again", error)
         return None
 
 
-def read_shards(campaign: Campaign, numbers: Sequence[int]) -> Dataset:
+def read_shards(job: GenerationJob, numbers: Sequence[int]) -> Dataset:
     """The samples of several shards."""
-    parts = [read_shard(campaign, number) for number in numbers] or [campaign.header]
+    parts = [read_shard(job, number) for number in numbers] or [job.header]
     columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
     failures: dict[int, str] = {}
     offset = 0
     for shard_samples in parts:
         failures.update({offset + row: text for row, text in shard_samples.failures.items()})
         offset += len(shard_samples)
-    return replace(campaign.header, **columns, failures=failures)
+    return replace(job.header, **columns, failures=failures)
 
 
 POLL_INTERVAL = 0.5
-"""s, after which what another process is at is looked at again."""
+"""s, after which a shard that another process holds is checked again."""
 
 
-def is_complete(campaign: Campaign, record: ProgressRecord, path: Path) -> bool:
+def is_complete(job: GenerationJob, record: ProgressRecord, path: Path) -> bool:
     """Whether the file is there already and holds what is wanted; DatasetError when it is something else."""
     if not path.exists():
         return False
@@ -242,8 +235,8 @@ def is_complete(campaign: Campaign, record: ProgressRecord, path: Path) -> bool:
         raise DatasetError(f"{path}: is a folder; name a file for the data set")
     with open_hdf5(path, storage.DATASET_FILE) as file:
         header = storage.read_header(file, str(path))
-        if header.provenance.get("fingerprint") != campaign.fingerprint:
-            difference = first_difference(_identity(header), _identity(campaign.header), "")
+        if header.provenance.get("fingerprint") != job.fingerprint:
+            difference = first_difference(_identity(header), _identity(job.header), "")
             description = f"there and here {difference}" if difference else "of shards of another size"
             raise DatasetError(f"{path}: holds another data set ({description}); choose another name")
         reasons = file["reasons"][:]
@@ -252,26 +245,26 @@ def is_complete(campaign: Campaign, record: ProgressRecord, path: Path) -> bool:
     return int((reasons == 0).sum()) >= record.samples
 
 
-def merge_shards(campaign: Campaign, record: ProgressRecord, path: Path, progress: ProgressCallback | None) -> None:
+def merge_shards(job: GenerationJob, record: ProgressRecord, path: Path, progress: ProgressCallback | None) -> None:
     """Write the shortest leading run of shards that is enough, unless another process does so meanwhile."""
     while True:
-        with ShardLock(campaign.folder / "merging.claim") as lock:
+        with ShardLock(job.folder / "merging.lock") as lock:
             if lock.held:
-                if not is_complete(campaign, record, path):
+                if not is_complete(job, record, path):
                     remove_temporary_files(path)
-                    _write_merged(campaign, record, path, progress)
+                    _write_merged(job, record, path, progress)
                     for number in record.done:  # of processes that died between writing a shard and saying so
-                        campaign.path(number).with_suffix(".claim").unlink(missing_ok=True)
+                        job.path(number).with_suffix(".lock").unlink(missing_ok=True)
                 return
         time.sleep(POLL_INTERVAL)
 
 
-def _write_merged(campaign: Campaign, record: ProgressRecord, path: Path, progress: ProgressCallback | None) -> None:
+def _write_merged(job: GenerationJob, record: ProgressRecord, path: Path, progress: ProgressCallback | None) -> None:
     numbers, remaining = record.leading_run() or [], record.draws
     with write_hdf5(path, DatasetError, storage.WRITE_ADVICE) as file:
-        storage.write_header(file, campaign.header)
+        storage.write_header(file, job.header)
         for done, number in enumerate(numbers, start=1):
-            samples = read_shard(campaign, number)
+            samples = read_shard(job, number)
             storage.append_samples(file, samples if remaining is None else samples.rows(slice(0, remaining)))
             remaining = None if remaining is None else remaining - len(samples)
             if progress is not None:

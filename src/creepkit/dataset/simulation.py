@@ -22,11 +22,6 @@ from creepkit.sampling.conditions import hold_times, planned_test
 from creepkit.sampling.criteria import CreepInEachHold, SimulationOutcome, SurvivesTime
 
 if TYPE_CHECKING:
-    from creepkit.dataset.dataset import Dataset
-    from creepkit.sampling.domains import SamplingDesign
-
-
-if TYPE_CHECKING:
     from creepkit.records import Specimen
     from creepkit.sampling.domains import SamplingDesign
     from creepkit.sampling.draws import Draws
@@ -51,7 +46,7 @@ def rejected_by_screening(design: SamplingDesign, samples: Dataset) -> Ints:
 def _screening_outcome(
     design: SamplingDesign, samples: Dataset, row: int, reduced_model: Predictor
 ) -> SimulationOutcome:
-    """What the stand-in makes of one sample, looked at when the holds begin and end."""
+    """The outcome of one sample by the reduced-order model, at the times when the holds begin and end."""
     conditions = samples.conditions_of(row)
     test = planned_test(samples.specimen, conditions, design.grid)
     hold_instants = hold_times(test)
@@ -72,11 +67,11 @@ def _first_rejection(design: SamplingDesign, screening_outcome: SimulationOutcom
 
 
 TOO_MANY_FAILURES = 8
-"""Samples of a shard of which all fail: something is wrong with all of them, and nobody wants a file of that."""
+"""First samples of a shard after whose failure, all of them, the shard is given up."""
 
 
 REJECTED_DIGITS = 12
-"""Of the histories of rejected samples: 1 part in 4000, for a look at what was rejected, not for learning."""
+"""Binary digits of the histories of rejected samples, 1 part in 4000: these serve inspection, not training."""
 
 
 class SampleFailedError(DatasetError):
@@ -112,7 +107,7 @@ def simulate_rows(
 ) -> Dataset:
     """Rows first to first + count of a design, simulated.
 
-    starting : called with the row that is about to be simulated; may raise SampleFailed.
+    before_sample : called with the row that is about to be simulated; may raise SampleFailedError.
     """
     draws = design.draw(first, count, seed)
     samples = _unsimulated(header, draws, _reasons_before(design, draws), first)
@@ -135,7 +130,7 @@ def simulate_rows(
 
 
 def rounded_outputs(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The same to DIGITS binary digits, which take a third of the room in a compressed file."""
+    """Values (...,) rounded to REJECTED_DIGITS binary digits, which take a third of the space in a compressed file."""
     fractions, exponents = np.frexp(values)
     return np.asarray(
         np.ldexp(np.round(fractions * 2**REJECTED_DIGITS) / 2**REJECTED_DIGITS, exponents), dtype=np.float32
@@ -153,7 +148,7 @@ def _reasons_before(design: SamplingDesign, draws: Draws) -> Ints:
 
 
 def _unsimulated(header: Dataset, draws: Draws, reasons: Ints, first: int) -> Dataset:
-    """Samples with nothing simulated yet."""
+    """Samples that are not simulated yet, with the reasons of those rejected before."""
     rows = len(draws)
 
     def not_available(name: str) -> NDArray[np.float32]:

@@ -11,7 +11,7 @@ Few combinations are all tried; many are searched greedily, one parameter at a t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -21,6 +21,7 @@ from creepkit.arrays import Floats
 from creepkit.discovery.forms import ARRHENIUS, CandidateForm
 from creepkit.discovery.regression import IsothermalEstimates, Regression, regress
 from creepkit.errors import FitError
+from creepkit.inverse.search.local_refinement import IterationCallback
 
 MAX_EXHAUSTIVE = 150
 """Up to so many combinations are all tried."""
@@ -52,7 +53,7 @@ class WeightedCombination:
 
 @dataclass(frozen=True)
 class FormWeight:
-    """A form of one parameter: its share of belief, and whether the points can tell it from the best one."""
+    """A form of one parameter: its weight, and whether the estimates cannot distinguish it from the best one."""
 
     name: str
     weight: float
@@ -63,8 +64,9 @@ class FormWeight:
 class RankedCombinations:
     """All combinations that were tried, best first.
 
-    inflation : c, by which the covariances of the points fell short. sets : {parameter: forms that remain, best
-        first}: those that hold 95 % of the belief, and those equivalent to the best that have no more numbers.
+    overdispersion : c, by which the covariances of the estimates are too small.
+    plausible_forms : {parameter: forms that remain, best first}: those that have 95 % of the weight, and those
+        equivalent to the best with no more numbers.
     """
 
     combinations: tuple[WeightedCombination, ...]
@@ -84,7 +86,7 @@ class RankedCombinations:
 def rank_combinations(
     points: IsothermalEstimates,
     candidates: Mapping[str, Sequence[CandidateForm]],
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: IterationCallback | None = None,
 ) -> RankedCombinations:
     """Fit combinations of one library for each parameter, and weigh them."""
     names, combination_count = list(candidates), int(np.prod([len(forms) for forms in candidates.values()]))
@@ -106,8 +108,7 @@ def rank_combinations(
         raise FitError(f"no form of {', '.join(names)} within its bounds has fewer numbers than these points allow")
     overdispersion = max(1.0, min(one.chi_square / (one.rows - one.parameter_count) for one in admissible))
     scores = np.array([_quasi_aicc(one, overdispersion) for one in admissible])
-    weights = np.exp(-0.5 * (scores - scores.min()))
-    weights /= weights.sum()
+    weights = akaike_weights(scores)
     order = np.argsort(scores, kind="stable")
     combinations = [
         WeightedCombination(admissible[k], float(scores[k] - scores.min()), float(weights[k])) for k in order
@@ -119,9 +120,7 @@ def rank_combinations(
 class _RegressionCache:
     """Regressions of combinations, each made once; total : how many there may be."""
 
-    def __init__(
-        self, points: IsothermalEstimates, total: int, progress: Callable[[str, int, int], None] | None
-    ) -> None:
+    def __init__(self, points: IsothermalEstimates, total: int, progress: IterationCallback | None) -> None:
         self.points, self.total, self.progress = points, total, progress
         self._regressions: dict[tuple[str, ...], Regression] = {}
 
@@ -171,6 +170,19 @@ def squared_mahalanobis(
     return float((whitened**2).sum() / overdispersion)
 
 
+def akaike_weights(scores: Floats) -> Floats:
+    """(n,) weights that sum to 1, of criteria (n,) such as BIC or AICc."""
+    weights = np.exp(-0.5 * (scores - scores.min()))
+    return np.asarray(weights / weights.sum())
+
+
+def weight_of_better_forms(weights: Mapping[str, float]) -> dict[str, float]:
+    """{form: weight of all forms before it}, best first; below CREDIBLE_MASS a form belongs to the credible set."""
+    ranked = sorted(weights, key=lambda form: -weights[form])
+    cumulative = np.cumsum([0.0, *(weights[form] for form in ranked)])
+    return dict(zip(ranked, cumulative[:-1].tolist(), strict=True))
+
+
 def _plausible_forms(
     name: str, combinations: Sequence[WeightedCombination], points: IsothermalEstimates, overdispersion: float
 ) -> tuple[FormWeight, ...]:
@@ -180,8 +192,8 @@ def _plausible_forms(
         form = combination.forms[name]
         weights[form] = weights.get(form, 0.0) + combination.weight
         best_regression.setdefault(form, combination.regression)
-    ranked = sorted(weights, key=lambda form: -weights[form])
-    cumulative_weight = np.cumsum([0.0, *(weights[form] for form in ranked)])
+    weight_before = weight_of_better_forms(weights)
+    ranked = list(weight_before)
     equivalent = {
         form: squared_mahalanobis(best_regression[form], best_regression[ranked[0]], points, overdispersion)
         < CHI_SQUARE_95
@@ -189,11 +201,7 @@ def _plausible_forms(
     }
     sizes = {form: _parameter_count(best_regression[form], name) for form in ranked}
     equivalent_and_no_larger = {form: equivalent[form] and sizes[form] <= sizes[ranked[0]] for form in ranked}
-    retained = [
-        form
-        for form, mass_before in zip(ranked, cumulative_weight, strict=False)
-        if mass_before < CREDIBLE_MASS or equivalent_and_no_larger[form]
-    ]
+    retained = [form for form in ranked if weight_before[form] < CREDIBLE_MASS or equivalent_and_no_larger[form]]
     return tuple(FormWeight(form, weights[form], equivalent[form]) for form in retained)
 
 

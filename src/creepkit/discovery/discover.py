@@ -1,51 +1,54 @@
-"""discover: a law with temperature in it, from identifications at single temperatures; temperature_study: from tests."""
+"""discover: a law of temperature from identifications at single temperatures; temperature_study: from tests."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-
-import numpy as np
+from typing import TypedDict, Unpack
 
 from creepkit.discovery.combinations import rank_combinations
 from creepkit.discovery.elastic_moduli import FIRST_FRAMES, ModulusEstimates, identify_moduli
 from creepkit.discovery.forms import CONSTANT, CandidateForm, candidate_forms
 from creepkit.discovery.refitting import refit
-from creepkit.discovery.regression import IsothermalEstimates, check_temperatures
+from creepkit.discovery.regression import IsothermalEstimates, check_temperatures, isothermal_groups
 from creepkit.discovery.temperature_law import TemperatureLaw, temperature_law_from_combinations
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_temperature, with_arrhenius
+from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw, temperature
 from creepkit.presentation import Presentable
 from creepkit.records import History, Predictor
+from creepkit.registry.arguments import check_histories, resolve_law, resolve_predictor, resolve_predictors
+
+Forms = Sequence[str] | Mapping[str, Sequence[str]]
+"""Names of temperature forms, or {parameter: names}."""
+
 
 PriorOdds = Mapping[str, Mapping[str, float]]
-
-
-ProgressCallback = Callable[[str, int, int], None]
+"""{parameter: {form: odds}}."""
 
 
 def discover(
     fits: Sequence[Identification],
     *,
-    forms: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
+    forms: Forms | None = None,
     prior: PriorOdds | None = None,
     parameters: Sequence[str] | None = None,
     histories: Sequence[History] | None = None,
-    using: Predictor | None = None,
+    using: Predictor | str | None = None,
     settings: IdentificationSettings | None = None,
-    progress: ProgressCallback | None = None,
+    progress: IterationCallback | None = None,
 ) -> TemperatureLaw:
     """Find closed forms of the parameters against temperature, and judge them by the tests where those are given.
 
     fits : identifications of one law, each at one temperature; three temperatures or more.
     forms : names of registered temperature forms, or {parameter: names}; by default all that suit a parameter.
     prior : {parameter: {form: odds}} in the place of the default, which counts 1/T four times for the coefficient of a
-        rate and shares equal odds among forms of equally many numbers; printed with the answer.
+        rate and shares equal odds among forms of equally many numbers; printed with the result.
     parameters : those that may depend on temperature; by default all.
     histories : all tests; the forms are then put back into the law and refitted to them (see refit). using, settings :
         the predictor and the settings of that; by default those of the first identification.
@@ -60,15 +63,16 @@ def discover(
     temperature_law = temperature_law_from_combinations(estimates, combinations, odds)
     if histories is None:
         return temperature_law
-    predictor = using or fits[0].predictor
+    predictor = fits[0].predictor if using is None else resolve_predictor(using)
     if predictor is None:
         raise FitError("the identifications were loaded from files: give using=, the specimen they were made with")
-    return refit(temperature_law, histories, predictor, settings=settings or fits[0].settings, progress=progress)
+    tests = check_histories(histories)
+    return refit(temperature_law, tests, predictor, settings=settings or fits[0].settings, progress=progress)
 
 
 def candidate_forms_of(
     estimates: IsothermalEstimates,
-    forms: Sequence[str] | Mapping[str, Sequence[str]] | None,
+    forms: Forms | None,
     prior: PriorOdds,
     parameters: Sequence[str] | None,
 ) -> dict[str, list[CandidateForm]]:
@@ -95,16 +99,21 @@ def candidate_forms_of(
     return forms_by_parameter
 
 
-StudyProgress = Callable[[str, int, int], None]
+class FormOptions(TypedDict, total=False):
+    """Which forms discover() tries, by the names of its parameters."""
+
+    forms: Forms | None
+    prior: PriorOdds | None
+    parameters: Sequence[str] | None
 
 
 @dataclass(frozen=True, eq=False)
 class TemperatureStudy(Presentable):
-    """The answer of temperature_study().
+    """The result of temperature_study().
 
-    tests : with the moduli found, where they were. moduli : None where no modulus could be asked for.
-    joint : the law times Arrhenius' factor, from all tests at once. alone : one identification a temperature.
-    trend : None where there are too few temperatures, which notes then say.
+    tests : with the moduli found, where they were. moduli_fit : None where no modulus could be identified.
+    joint_fit : the law times Arrhenius' factor, from all tests at once. isothermal_fits : one for each temperature.
+    temperature_law : None where there are too few temperatures, which notes then say.
     """
 
     tests: tuple[History, ...]
@@ -116,25 +125,35 @@ class TemperatureStudy(Presentable):
 
 
 def temperature_study(
-    law: CreepLaw, tests: Sequence[History], predictor: Predictor, *, moduli: bool | None = None,
-    within: float = ISOTHERMAL_RANGE, forms: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
-    prior: Mapping[str, Mapping[str, float]] | None = None,
-    settings: IdentificationSettings | None = None, progress: StudyProgress | None = None,
-) -> TemperatureStudy:  # fmt: skip
+    law: CreepLaw | str,
+    tests: Sequence[History],
+    using: Predictor | str | None = None,
+    *,
+    moduli: bool = False,
+    within: float = ISOTHERMAL_RANGE,
+    settings: IdentificationSettings | None = None,
+    progress: IterationCallback | None = None,
+    **form_options: Unpack[FormOptions],
+) -> TemperatureStudy:
     """Identify moduli, then the law times Arrhenius, then each temperature alone, and discover forms of temperature.
 
-    law : without temperature. moduli : whether to find them from the first 15 frames of each test; by default where
-    every test states one and the predictor knows that effect. within : K, tests that near to the coldest of a group
-    are at one temperature. forms, prior : as discover() takes them. A temperature that cannot be identified alone is
-    noted and left out of the forms.
+    law : without temperature. using : a predictor, or the name of a specimen; by default the one that the tests name.
+    moduli : whether to find each test's modulus from its first 15 frames before; every test states one to begin from.
+    within : K, tests so near to the coldest of a group are at one temperature.
+    form_options : forms, prior and parameters, as discover() takes them.
+
+    A temperature that cannot be identified alone is noted and left out of the forms.
     """
+    law, predictor = resolve_law(law), resolve_predictors(using, check_histories(tests))
+    if isinstance(predictor, dict):
+        raise FitError(f"the tests are of several specimens, {', '.join(predictor)}; a study takes those of one")
     if law.uses(temperature):
         raise FitError(f"law '{law.name}' depends on temperature already; give it without: forms are what is sought")
     if not tests:
         raise FitError("there are no histories to study")
     settings, histories, notes = settings or IdentificationSettings(), list(tests), []
     moduli_fit = None
-    if moduli if moduli is not None else _can_identify_moduli(histories, predictor):
+    if moduli:
         moduli_fit = identify_moduli(with_arrhenius(law, histories), histories, predictor, frames=FIRST_FRAMES)
         if moduli_fit.elastic is not None:
             histories = [h.replace(elastic=moduli_fit.elastic) for h in histories]
@@ -149,12 +168,11 @@ def temperature_study(
     else:
         temperature_law = discover(
             isothermal_fits,
-            forms=forms,
-            prior=prior,
             histories=histories,
             using=predictor,
             settings=settings,
             progress=progress,
+            **form_options,
         )
     return TemperatureStudy(
         tuple(histories), moduli_fit, joint_fit, tuple(isothermal_fits), temperature_law, tuple(notes)
@@ -164,36 +182,26 @@ def temperature_study(
 def group_by_temperature(
     tests: Sequence[History], temperature_tolerance: float = ISOTHERMAL_RANGE
 ) -> list[list[History]]:
-    """Tests by temperature, ascending; each within so many K of the coldest of its group."""
-    groups: list[list[History]] = []
-    for test in sorted(tests, key=_mean_temperature):
-        if groups and _mean_temperature(test) - _mean_temperature(groups[-1][0]) <= temperature_tolerance:
-            groups[-1].append(test)
-        else:
-            groups.append([test])
-    return groups
+    """Tests by temperature, ascending; each within `temperature_tolerance` K of the coldest of its group."""
+    groups = isothermal_groups([test.mean_temperature for test in tests], temperature_tolerance)
+    return [[tests[k] for k in group] for group in groups]
 
 
 def _isothermal_fits(
-    law: CreepLaw, tests: Sequence[History], predictor: Predictor, temperature_tolerance: float, settings: IdentificationSettings,
-    progress: StudyProgress | None,
-) -> tuple[list[Identification], list[str]]:  # fmt: skip
+    law: CreepLaw,
+    tests: Sequence[History],
+    predictor: Predictor,
+    temperature_tolerance: float,
+    settings: IdentificationSettings,
+    progress: IterationCallback | None,
+) -> tuple[list[Identification], list[str]]:
     fits, failures = [], []
     groups = group_by_temperature(tests, temperature_tolerance)
     for k, group in enumerate(groups):
         try:
             fits.append(identify(law, group, predictor, settings=settings))
         except CreepkitError as error:
-            failures.append(f"at {_mean_temperature(group[0]):.0f} K alone: {error}")
+            failures.append(f"at {group[0].mean_temperature:.0f} K alone: {error}")
         if progress is not None:
             progress("temperature", k + 1, len(groups))
     return fits, failures
-
-
-def _can_identify_moduli(tests: Sequence[History], predictor: Predictor) -> bool:
-    has_modulus = "modulus" in getattr(predictor, "nuisances", ())
-    return has_modulus and all(h.elastic is not None and "amplitude" in h.outputs for h in tests)
-
-
-def _mean_temperature(history: History) -> float:
-    return float(np.mean(history.temperature_program().values))

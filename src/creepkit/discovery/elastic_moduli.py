@@ -47,9 +47,13 @@ class ModulusEstimates(Presentable):
 
 
 def identify_moduli(
-    law: CreepLaw, histories: Sequence[History], using: Predictor, *, frames: int = FIRST_FRAMES,
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: Predictor,
+    *,
+    frames: int = FIRST_FRAMES,
     settings: IdentificationSettings | None = None,
-) -> ModulusEstimates:  # fmt: skip
+) -> ModulusEstimates:
     """Identify the modulus of each test from its first used frames; every history states a modulus to begin from."""
     without_modulus = [h.name for h in histories if h.elastic is None]
     if without_modulus:
@@ -65,7 +69,7 @@ def identify_moduli(
     stated = np.array([_stated_modulus(h) for h in histories])
     values = stated * (1.0 + np.array([estimates[h.name].value for h in histories]))
     sd = stated * np.array([estimates[h.name].sd for h in histories])
-    temperatures = np.array([_mean_temperature(h) for h in histories])
+    temperatures = np.array([h.mean_temperature for h in histories])
     first_elastic = histories[0].elastic
     poisson_ratio = first_elastic.at(float(temperatures[0])).nu if first_elastic is not None else 0.3
     elastic = (
@@ -92,10 +96,6 @@ def fit_wachtman(temperatures: Floats, values: Floats, sd: Floats) -> tuple[floa
     return float(E0), float(b), T0
 
 
-def _mean_temperature(history: History) -> float:
-    return float(np.mean(history.temperature_program().values))
-
-
 def _stated_modulus(history: History) -> float:
     assert history.elastic is not None
-    return float(history.elastic.at(_mean_temperature(history)).E)
+    return float(history.elastic.at(history.mean_temperature).E)

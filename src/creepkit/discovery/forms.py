@@ -39,8 +39,8 @@ class CandidateForm:
     """A candidate form of one parameter.
 
     terms : {coefficient: sympy function of temperature (and of what is inside exponentials)}; the first coefficient
-        is the parameter itself, at T_ref. inner : {symbol: Param} inside exponentials. offset : a function of
-        temperature that has no coefficient. form : None for a constant. odds : prior odds of the form.
+        is the parameter itself, at T_ref. nonlinear_parameters : {symbol: Param} inside exponentials. offset : a
+        function of temperature that has no coefficient. form : None for a constant. prior_odds : of the form.
     """
 
     name: str
@@ -69,13 +69,19 @@ class CandidateForm:
         return [sympy.lambdify((temperature, *self.nonlinear_parameters), term, "numpy") for term in expressions]
 
     def basis_values(self, T: Floats, nonlinear_values: Sequence[float]) -> Floats:
-        """(temperatures, terms + 1) values of the terms, then of the offset."""
+        """(temperatures, terms + 1) values of the terms, then of the offset.
+
+        T : (temperatures,) K.
+        """
         values = [np.broadcast_to(np.asarray(f(T, *nonlinear_values), float), T.shape) for f in self.functions]
         return np.stack(values, axis=1)
 
 
 def evaluate_forms(forms: Sequence[CandidateForm], values: Mapping[str, float], T: Floats) -> Floats:
-    """(temperatures, parameters) of internal parameters, from the internal values {name: value} of all numbers."""
+    """(temperatures, parameters) internal values of the parameters.
+
+    values : {name: internal value} of all numbers. T : (temperatures,) K.
+    """
     columns = []
     for form in forms:
         basis = form.basis_values(np.asarray(T, float), [values[s.name] for s in form.nonlinear_parameters])
@@ -89,15 +95,21 @@ def law_with_forms(law: CreepLaw, forms: Sequence[CandidateForm]) -> CreepLaw:
 
 
 def candidate_forms(
-    law: CreepLaw, parameter: str, is_rate_coefficient: bool, T_ref: float, temperatures: Floats, forms: Sequence[str] | None = None,
+    law: CreepLaw,
+    parameter: str,
+    is_rate_coefficient: bool,
+    T_ref: float,
+    temperatures: Floats,
+    forms: Sequence[str] | None = None,
     prior: Mapping[str, float] | None = None,
-) -> list[CandidateForm]:  # fmt: skip
+) -> list[CandidateForm]:
     """The forms that a parameter may take, the constant first, each with its prior odds.
 
-    rate : whether the parameter is the coefficient of a rate, which Arrhenius' factor is for.
+    is_rate_coefficient : whether the parameter is the coefficient of a rate, which Arrhenius' factor is for.
+    temperatures : (temperatures,) K of the estimates; T_ref : K.
     forms : names of those wanted; by default all that are registered. Two that span the same functions are one.
-    prior : {form: odds}; in the others' place the default: forms of equally many numbers share equal odds, and for
-        rates 1/T counts PREFERRED times.
+    prior : {form: odds}; the others have the default: forms of equally many numbers share equal odds, and for rates 1/T
+        counts ARRHENIUS_ODDS times.
     """
     param, registered = law.table[parameter], registry.default_registry().temperature_forms()
     form_names = _checked_form_names(forms, [CONSTANT, *registered])

@@ -10,13 +10,19 @@ searched for again over the whole of its bounds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.discovery.combinations import CREDIBLE_MASS, FormWeight, squared_mahalanobis
+from creepkit.discovery.combinations import (
+    CREDIBLE_MASS,
+    FormWeight,
+    akaike_weights,
+    squared_mahalanobis,
+    weight_of_better_forms,
+)
 from creepkit.discovery.forms import ARRHENIUS, CandidateForm, law_with_forms
 from creepkit.discovery.regression import IsothermalEstimates, Regression, check_temperatures, regress
 from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw, averaged_estimates
@@ -24,6 +30,7 @@ from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
+from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
@@ -49,13 +56,15 @@ def curve_distance(temperature_law: TemperatureLaw, first: Regression, second: R
 def weigh_refits(
     temperature_law: TemperatureLaw, refits: Sequence[RefittedCombination], failed: Mapping[tuple[str, ...], str]
 ) -> TemperatureLaw:
-    """The trend as the tests see it; failed : {forms: why they could not be refitted}, which become notes."""
+    """The temperature law with forms weighed by the tests.
+
+    failed : {forms: why they could not be refitted}, which become notes.
+    """
     ranking = rank([refit.fit for refit in refits])
     bic_differences = {id(entry.fit): entry.excess for entry in ranking.laws}
     odds = np.array([one.regression.prior_odds for one in refits])
     scores = np.array([bic_differences[id(one.fit)] for one in refits]) - 2.0 * np.log(odds)
-    weights = np.exp(-0.5 * (scores - scores.min()))
-    weights /= weights.sum()
+    weights = akaike_weights(scores)
     order = np.argsort(scores, kind="stable")
     candidates = tuple(_candidate_law(refits[k], float(scores[k] - scores.min()), float(weights[k])) for k in order)
     best = candidates[0]
@@ -93,15 +102,11 @@ def _candidate_law(refit: RefittedCombination, criterion_difference: float, weig
 def _plausible_forms_of_refits(
     temperature_law: TemperatureLaw, candidates: Sequence[CandidateLaw], name: str
 ) -> tuple[FormWeight, ...]:
-    """Forms that hold 95 % of the belief, then those not refitted whose nearest neighbour is among them."""
+    """Forms that have 95 % of the weight, then those not refitted whose nearest neighbour is among them."""
     weights: dict[str, float] = {}
     for candidate in candidates:
         weights[candidate.forms[name]] = weights.get(candidate.forms[name], 0.0) + candidate.weight
-    ranked = sorted(weights, key=lambda form: -weights[form])
-    cumulative_weight = np.cumsum([0.0, *(weights[form] for form in ranked)])
-    retained = [
-        form for form, mass_before in zip(ranked, cumulative_weight, strict=False) if mass_before < CREDIBLE_MASS
-    ]
+    retained = [form for form, weight in weight_of_better_forms(weights).items() if weight < CREDIBLE_MASS]
     not_refitted = [form.name for form in temperature_law.plausible_forms[name] if form.name not in weights]
     with_form = temperature_law.combinations.with_form
 
@@ -112,9 +117,6 @@ def _plausible_forms_of_refits(
 
     represented = [form for form in not_refitted if nearest(form) in retained]
     return tuple(FormWeight(form, weights.get(form, 0.0), form in represented) for form in (*retained, *represented))
-
-
-RefitProgress = Callable[[str, int, int], None]
 
 
 MAX_FORMS = 6
@@ -133,17 +135,17 @@ def refit(
     max_forms: int = MAX_FORMS,
     settings: IdentificationSettings | None = None,
     search_again: bool = True,
-    progress: RefitProgress | None = None,
+    progress: IterationCallback | None = None,
 ) -> TemperatureLaw:
     """Refit the forms that remain to the tests, and weigh them by how well they follow these.
 
     settings : where values are to come from frames of equal weight ("noise", the default) the likelihood takes its
         place: combinations must be judged under one covariance, with scatter between tests and autocorrelation in it.
-    most : forms of one parameter that are tried; where every identification is dear, 3 will do. The plain law,
-        Arrhenius with every other parameter constant, is always among the combinations.
-    confirm : whether the best law is searched for anew from the whole of its bounds.
+    max_forms : forms of one parameter that are tried; where an identification is expensive, 3 are enough. The simplest
+        law, Arrhenius with every other parameter constant, is always among the combinations.
+    search_again : whether the best law is searched for again over the whole of its bounds.
     """
-    check_temperatures([float(np.mean(h.temperature_program().values)) for h in histories])
+    check_temperatures([h.mean_temperature for h in histories])
     cache = _RefitCache(
         temperature_law.isothermal_estimates,
         list(histories),
@@ -182,7 +184,7 @@ class _RefitCache:
     histories: list[History]
     predictor: Predictor
     settings: IdentificationSettings
-    progress: RefitProgress | None
+    progress: IterationCallback | None
     fitted: dict[tuple[str, ...], RefittedCombination] = field(default_factory=dict)
     failed: dict[tuple[str, ...], str] = field(default_factory=dict)
     total: int = 0
@@ -245,7 +247,7 @@ class _RefitCache:
         return next(one for one in self.fitted.values() if one.fit is ranking.best)
 
     def search_again(self) -> None:
-        """Search the best law anew, and keep the better of the two answers."""
+        """Search the best law anew, and keep the better of the two results."""
         best_refit = self.best
         new_fit = self._identify(best_refit.fit.law, None)
         if new_fit.log_likelihood > best_refit.fit.log_likelihood:
@@ -254,7 +256,7 @@ class _RefitCache:
 
 
 def _coordinates_within_bounds(law: CreepLaw, values: Mapping[str, float], estimates: IsothermalEstimates) -> Floats:
-    """Conditioned coordinates of internal values, within the bounds."""
+    """Conditioned coordinates, (parameters,), of internal values, within the bounds."""
     bounds = [[p.to_internal(b) for b in p.bounds] for p in law.params.values()]
     low, high = np.array(bounds).T
     theta = np.clip([values[name] for name in law.names], low, high)
@@ -262,7 +264,7 @@ def _coordinates_within_bounds(law: CreepLaw, values: Mapping[str, float], estim
 
 
 def _forms_to_try(temperature_law: TemperatureLaw, name: str, max_forms: int) -> list[CandidateForm]:
-    """The forms of one parameter to try: first those that the points can tell apart, then their neighbours.
+    """The forms of one parameter to try: first those that the estimates can distinguish, then their neighbours.
 
     Where points leave parameters open, they do not rule out a form that the tests may well ask for.
     """

@@ -31,7 +31,8 @@ from creepkit.language import CreepLaw, Param, temperature
 from creepkit.records import ZERO_CELSIUS
 
 UNDETERMINED_WIDTH = 0.15
-"""Standard deviation over the width of the bounds above which a parameter is hardly known; .29 is that of nothing."""
+"""Standard deviation over the width of the bounds above which a parameter counts as undetermined; that of the uniform
+distribution over them is 0.29."""
 
 
 INFINITE_FREEDOM = 1e9
@@ -62,7 +63,7 @@ class IsothermalEstimates:
 
     @classmethod
     def from_identifications(cls, fits: Sequence[Identification]) -> IsothermalEstimates:
-        """The points of identifications of one law, each at one temperature; FitError where they are not that."""
+        """The estimates of identifications of one law, each at one temperature; FitError where they are not that."""
         check_identifications(fits)
         order = np.argsort([fit.reference.temperature for fit in fits])
         ordered = [fits[int(k)] for k in order]
@@ -83,7 +84,7 @@ class IsothermalEstimates:
         return np.asarray(np.linalg.inv(np.linalg.cholesky(scaled)) / sd[:, None, :])
 
     def has_undetermined_parameters(self) -> bool:
-        """Whether some parameter is hardly known at most temperatures, but for a coefficient: that goes with others."""
+        """Whether some parameter, rate coefficients aside, is undetermined at most temperatures."""
         coordinates = Coordinates(self.law, self.reference)
         bound_widths = np.array(
             [p.to_internal(p.bounds[1]) - p.to_internal(p.bounds[0]) for p in self.law.params.values()]
@@ -116,26 +117,31 @@ def check_identifications(fits: Sequence[Identification]) -> None:
 
 def check_temperatures(temperatures: Sequence[float]) -> None:
     """Say what fewer than three temperatures leave unknown."""
-    distinct = _distinct_temperatures(temperatures)
+    distinct = [temperatures[group[0]] for group in isothermal_groups(temperatures)]
     if len(distinct) == 1:
         raise FitError(
-            f"all tests are at {distinct[0]:.0f} K: from one temperature neither an activation energy nor how any other "
-            "parameter depends on temperature can be known; add tests at two other temperatures or more"
+            f"all tests are at {distinct[0]:.0f} K: from one temperature neither an activation energy nor how any "
+            "other parameter depends on temperature can be known; add tests at two other temperatures or more"
         )
     if len(distinct) < MIN_TEMPERATURES:
         raise FitError(
-            f"the tests are at {distinct[0]:.0f} and {distinct[1]:.0f} K alone: two temperatures give an activation energy "
-            "but no form; identify the law times arrhenius(), or add a third temperature"
+            f"the tests are at {distinct[0]:.0f} and {distinct[1]:.0f} K alone: two temperatures give an activation "
+            "energy but no form; identify the law times arrhenius(), or add a third temperature"
         )
 
 
-def _distinct_temperatures(temperatures: Sequence[float]) -> list[float]:
-    """Temperatures that differ by more than ONE_TEMPERATURE, ascending."""
-    distinct: list[float] = []
-    for T in sorted(temperatures):
-        if not distinct or T - distinct[-1] > ISOTHERMAL_RANGE:
-            distinct.append(float(T))
-    return distinct
+def isothermal_groups(temperatures: Sequence[float], tolerance: float = ISOTHERMAL_RANGE) -> list[list[int]]:
+    """Positions of temperatures in groups that ascend; each within `tolerance` K of the lowest of its group.
+
+    temperatures : (n,) K.
+    """
+    groups: list[list[int]] = []
+    for k in sorted(range(len(temperatures)), key=temperatures.__getitem__):
+        if groups and temperatures[k] - temperatures[groups[-1][0]] <= tolerance:
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    return groups
 
 
 def _theta_covariance(fit: Identification) -> Floats:
@@ -177,8 +183,9 @@ BOUND_TOLERANCE_SD = 2.0
 class Regression:
     """Forms of all parameters, fitted to the points.
 
-    values : {name: value} of coefficients and of what is inside exponentials, internal (logarithm of a coefficient of
-        log scale); covariance in the same order. curves : (temperatures, parameters) of theta. chi_square : of rows.
+    values : {name: internal value} of coefficients and of what is inside exponentials (the logarithm of a coefficient
+        of log scale). covariance : (numbers, numbers) in the same order.
+    fitted_theta : (temperatures, parameters) internal values on the curves. chi_square : of `rows` residuals.
     """
 
     candidate_forms: tuple[CandidateForm, ...]

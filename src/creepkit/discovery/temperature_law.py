@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.stats import t as student
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.discovery.combinations import FormWeight, RankedCombinations
@@ -23,6 +21,7 @@ from creepkit.files.record_codec import RecordCodec, ValueCodec
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate
+from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import LawWithValues
@@ -96,41 +95,22 @@ CODEC = RecordCodec(
 )
 
 
-TAIL_PROBABILITY = 0.025
-
-
-def mixture_interval(
-    values: Floats, standard_deviations: Floats, weights: Floats, degrees_of_freedom: Sequence[float]
-) -> tuple[float, float]:
-    """The 95 % interval of a mixture of Student distributions, (candidates,) each; weights sum to 1."""
-    scales, freedom_of_each = (
-        np.maximum(standard_deviations, 1e-300),
-        np.maximum(np.asarray(degrees_of_freedom, float), 1.0),
-    )
-
-    def below(x: float) -> float:
-        return float(weights @ student.cdf((x - values) / scales, freedom_of_each))
-
-    half_widths = student.ppf(1 - TAIL_PROBABILITY / 100, freedom_of_each) * scales
-    bracket = float((values - half_widths).min()), float((values + half_widths).max())
-    low, high = (float(brentq(lambda x, p=p: below(x) - p, *bracket)) for p in (TAIL_PROBABILITY, 1 - TAIL_PROBABILITY))
-    return low, high
-
-
 NOTED_OVERDISPERSION = 1.5
-"""Inflation of covariances that is worth a word."""
+"""Inflation of covariances from which a note is made."""
 
 
 UNDETERMINED_FRACTION = 0.8
-"""Share of the bounds that an interval fills which says nothing."""
+"""Fraction of the bounds from which an interval that fills it says that the parameter is not determined."""
 
 
 @dataclass(frozen=True, eq=False)
 class CandidateLaw:
     """One combination of forms with its numbers.
 
-    internal : {name: value} of all numbers, the logarithm where the scale is log; covariance in the same order.
-    excess : of the criterion over the best's; weight : share of belief. fit : the identification, once refitted.
+    internal_values : {name: value} of all numbers, the logarithm where the scale is log.
+    covariance : (numbers, numbers) of the internal values, in the same order.
+    criterion_difference : criterion less that of the best. weight : Akaike weight. fit : the identification, once
+        refitted.
     """
 
     candidate_forms: tuple[CandidateForm, ...]
@@ -147,7 +127,10 @@ class CandidateLaw:
         return {form.parameter: form.name for form in self.candidate_forms}
 
     def theta(self, T: Floats) -> Floats:
-        """(temperatures, parameters) of internal parameters."""
+        """(temperatures, parameters) internal values.
+
+        T : (temperatures,) K.
+        """
         return evaluate_forms(self.candidate_forms, self.internal_values, T)
 
     def standard_deviation(self, name: str) -> float:
@@ -158,15 +141,15 @@ class CandidateLaw:
 
 @dataclass(frozen=True, eq=False)
 class TemperatureLaw(Presentable):
-    """The answer of discover() and of refit().
+    """The result of discover() and of refit().
 
     law : an ordinary law with temperature in it, printed and exported like any other; `valued` has its numbers.
-    base : the law without. T_ref : K, where its parameters have the values stated.
+    isothermal_law : the law without temperature. T_ref : K, where its parameters have the values stated.
     estimates : its numbers with 95 % intervals, over all candidates that share the form they belong to.
-    range : K, the temperatures it was found from. judged_by : "points" when regression on estimates chose the forms,
-        "histories" when the tests themselves did.
-    sets : {parameter: forms that remain, best first}. candidates : combinations of forms, best first.
-    odds : {parameter: {form: prior odds}}. fit : the identification of `law` from all tests, once refitted.
+    temperature_range : K, the temperatures it was found from. criterion_data : "points" when regression on isothermal
+        estimates chose the forms, "histories" when the tests themselves did.
+    plausible_forms : {parameter: forms that remain, best first}. candidates : combinations of forms, best first.
+    prior_odds : {parameter: {form: odds}}. fit : the identification of `law` from all tests, once refitted.
     """
 
     law: CreepLaw
@@ -206,11 +189,14 @@ class TemperatureLaw(Presentable):
         raise FitError(f"law '{self.law.name}' has no parameter '{name}': {nearest(name, self.law.names)}")
 
     def parameters_at(self, T: ArrayLike) -> dict[str, Floats]:
-        """{parameter of `base`: (temperatures,) its values} at temperatures in K; FitError outside the range."""
+        """{parameter of `isothermal_law`: (temperatures,) its values}; FitError outside the range.
+
+        T : a number or (temperatures,) K.
+        """
         temperatures = np.atleast_1d(np.asarray(T, float))
         low, high = self.temperature_range
         if ((temperatures < low - 1e-6) | (temperatures > high + 1e-6)).any():
-            raise FitError(f"law '{self.law.name}' holds between {low:.0f} and {high:.0f} K; it was asked beyond")
+            raise FitError(f"law '{self.law.name}' holds between {low:.0f} and {high:.0f} K; it was evaluated outside")
         theta = self.candidates[0].theta(temperatures)
         scale = [p.scale for p in self.isothermal_law.params.values()]
         values = np.where([s == "log" for s in scale], np.exp(np.minimum(theta, 700.0)), theta)
@@ -228,9 +214,13 @@ class TemperatureLaw(Presentable):
 def temperature_law_from_combinations(
     estimates: IsothermalEstimates, combinations: RankedCombinations, prior_odds: Mapping[str, Mapping[str, float]]
 ) -> TemperatureLaw:
-    """The answer that the points alone give."""
-    degrees_of_freedom = [INFINITE_FREEDOM if combinations.overdispersion == 1.0 else max(combination.regression.rows - combination.regression.parameter_count, 1)
-               for combination in combinations.combinations]  # fmt: skip
+    """The temperature law that the isothermal estimates alone give."""
+    degrees_of_freedom = [
+        INFINITE_FREEDOM
+        if combinations.overdispersion == 1.0
+        else max(combination.regression.rows - combination.regression.parameter_count, 1)
+        for combination in combinations.combinations
+    ]
     candidates = tuple(
         CandidateLaw(
             weighted.regression.candidate_forms,
@@ -280,9 +270,13 @@ def _estimate(name: str, form: CandidateForm, candidates: Sequence[CandidateLaw]
         np.array(v)
         for v in zip(*[(one.internal_values[name], one.standard_deviation(name)) for one in candidates], strict=True)
     )
-    low, high = mixture_interval(
-        values, standard_deviations, weights / weights.sum(), [one.degrees_of_freedom for one in candidates]
+    mixture = MixtureDistribution(
+        weights / weights.sum(),
+        np.maximum([one.degrees_of_freedom for one in candidates], 1.0),
+        values,
+        np.maximum(standard_deviations, 1e-300),
     )
+    _, low, high = (float(end) for end in mixture.interval())
     lower_bound, upper_bound = (param.to_internal(b) for b in param.bounds)
     value, low, high = (float(np.clip(v, lower_bound, upper_bound)) for v in (value, low, high))
     verdict = "determined"

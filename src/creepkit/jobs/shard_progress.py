@@ -1,6 +1,8 @@
 """Progress of sharded work: a lock for each shard, the record of finished shards, and the rate with the time left.
 
-The operating system releases a lock when its process dies. The lock file names the sample being simulated, so that a sample that kills its process is known. On a file system without locks a shard may be simulated twice, with the same result, and counts once.
+The operating system releases a lock when its process dies. The lock file names the sample being simulated, so that a
+sample that kills its process is known. On a file system without locks a shard may be simulated twice, with the same
+result, and counts once.
 """
 
 from __future__ import annotations
@@ -23,15 +25,15 @@ from creepkit.errors import DatasetError
 from creepkit.jobs.worker import ShardedJob
 
 UNSUPPORTED_LOCK_ERRORS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
-"""What file systems without locks answer."""
+"""Errors of file systems without locks."""
 
 
 MOST_DIGITS = 19
-"""Of the number of a sample; what has more is none."""
+"""Digits of the number of a sample; longer ones are damage."""
 
 
 class ShardLock:
-    """The claim on a shard; a context, `held` in it when nobody else has it.
+    """The lock of a shard; a context, `held` in it when nobody else has it.
 
     deaths : {sample: how often its process died in it}.
     """
@@ -81,19 +83,19 @@ def _locked(file: int) -> bool:
 
 
 MOST_DRAWS_WITHOUT_ACCEPTED = 16384
-"""Draws after which a design of which none was accepted is given up."""
+"""Draws after which a design is given up of which none was accepted."""
 
 
 @dataclass
 class ProgressRecord:
-    """The account of a campaign.
+    """The shards of a job that are done, and how many are wanted.
 
     samples : accepted ones wanted; or draws : rows wanted, accepted or not. part : (k, n), only shards k-1, k-1+n ...,
-    and so many samples as make an n-th of all.
-    done : {shard: accepted samples} of this part. at_work : shards that are being simulated, here or elsewhere.
+        and as many samples as make an n-th of all.
+    done : {shard: accepted samples} of this part. running : shards that are being simulated, here or elsewhere.
     """
 
-    campaign: ShardedJob
+    job: ShardedJob
     samples: int | None
     draws: int | None
     part: tuple[int, int] | None = None
@@ -111,9 +113,9 @@ class ProgressRecord:
 
     def scan_finished(self) -> None:
         """Find the shards that are done already."""
-        for path in sorted(self.campaign.folder.glob("[0-9]*.h5")):
+        for path in sorted(self.job.folder.glob("[0-9]*.h5")):
             if path.stem.isdigit() and self._in_part(int(path.stem)):
-                self.mark_done(int(path.stem), self.campaign.accepted_count(int(path.stem)))
+                self.mark_done(int(path.stem), self.job.accepted_count(int(path.stem)))
 
     def mark_done(self, number: int, accepted: int | None) -> None:
         """A shard is done."""
@@ -124,9 +126,9 @@ class ProgressRecord:
 
     @property
     def target(self) -> int:
-        """What `reached` has to come to: accepted samples, or rows."""
+        """Value of `count` at which the job is done: accepted samples, or rows."""
         if self.samples is None:
-            return self.campaign.rows * len(list(self._shard_numbers()))
+            return self.job.rows * len(list(self._shard_numbers()))
         return self.samples if self.part is None else -(-self.samples // self.part[1])
 
     @property
@@ -137,7 +139,7 @@ class ProgressRecord:
     @property
     def acceptance_rate(self) -> float:
         """Accepted samples per draw, so far; 1 before the first are known."""
-        return self.accepted / (len(self.done) * self.campaign.rows) if self.done else 1.0
+        return self.accepted / (len(self.done) * self.job.rows) if self.done else 1.0
 
     @property
     def accepted(self) -> int:
@@ -157,7 +159,7 @@ class ProgressRecord:
         return run
 
     def next_shard(self) -> int | None:
-        """The next shard to simulate; None when what is done and at work should do."""
+        """The next shard to simulate; None when those done and running are expected to be enough."""
         expected = 0.0
         for number in self._shard_numbers():
             if self.samples is not None and expected >= self.target:
@@ -165,7 +167,7 @@ class ProgressRecord:
             if number in self.done:
                 expected += self._contribution(number)
             elif number in self.running:
-                expected += self.acceptance_rate * self.campaign.rows
+                expected += self.acceptance_rate * self.job.rows
             else:
                 return number
         return None
@@ -175,16 +177,16 @@ class ProgressRecord:
         first, step = (0, 1) if self.part is None else (self.part[0] - 1, self.part[1])
         if self.draws is None:
             return itertools.count(first, step)
-        return range(first, -(-self.draws // self.campaign.rows), step)
+        return range(first, -(-self.draws // self.job.rows), step)
 
     def _contribution(self, number: int) -> int:
-        return self.done[number] if self.draws is None else self.campaign.rows
+        return self.done[number] if self.draws is None else self.job.rows
 
     def _in_part(self, number: int) -> bool:
         return self.part is None or number % self.part[1] == self.part[0] - 1
 
     def _check_acceptance(self) -> None:
-        drawn = len(self.done) * self.campaign.rows
+        drawn = len(self.done) * self.job.rows
         if self.samples is not None and drawn >= MOST_DRAWS_WITHOUT_ACCEPTED and not self.accepted:
             raise DatasetError(
                 f"none of the first {drawn} draws was accepted; see 'creepkit generate --dry-run', change the "
@@ -193,11 +195,11 @@ class ProgressRecord:
 
 
 ProgressCallback: TypeAlias = Callable[[str, int, int, str], None]
-"""Called with a task, how much of it is done, of how much, and a note on rate, time left and share accepted."""
+"""Called with a task, how much of it is done, of how much, and a note on rate, time left and acceptance."""
 
 
 class ProgressReporter:
-    """Tells the progress of a campaign; rates count what was done since it was made."""
+    """Reports the progress of a job; rates count the work since the reporter was made."""
 
     def __init__(self, record: ProgressRecord, progress: ProgressCallback | None) -> None:
         self._record = record
@@ -207,7 +209,7 @@ class ProgressReporter:
         self._last_reported = -1
 
     def report(self) -> None:
-        """Tell how far it is, when that has changed."""
+        """Report the progress when it has changed."""
         done = self._record.count
         if self._progress is None or done == self._last_reported:
             return

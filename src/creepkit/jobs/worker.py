@@ -1,4 +1,4 @@
-"""The worker process, `python -m creepkit.jobs.worker`: receives a job, then task numbers, and reports a result for each.
+"""The worker process, `python -m creepkit.jobs.worker`: it receives a job, then numbers of tasks, and reports results.
 
 The job is pickled by the process that started the worker, as multiprocessing does.
 """
@@ -13,20 +13,88 @@ import struct
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Protocol
+from typing import IO, Any, Protocol
 
 from creepkit.errors import CreepkitError
 
-if TYPE_CHECKING:
-    pass
+
+@dataclass(frozen=True)
+class TaskResult:
+    """What became of a task.
+
+    number : of the task. status : "done"; "taken", by another process; "died", its own process did; "error", as `text`
+        says. accepted : how many samples it left that count.
+    """
+
+    number: int
+    status: str
+    accepted: int = 0
+    text: str = ""
 
 
-if TYPE_CHECKING:
-    pass
+class Job(Protocol):
+    """What worker processes are sent, pickled, to do tasks of."""
+
+    @property
+    def task_name(self) -> str:
+        """What a task is called, such as "shard"."""
+        ...
+
+    def on_one_thread(self) -> Job:
+        """The same job, to be done on one thread."""
+        ...
+
+    def run(self, number: int) -> TaskResult:
+        """Do one task and leave its outcome in a file."""
+        ...
+
+
+class ShardedJob(Job, Protocol):
+    """A job whose tasks are shards of `rows` samples, each a file in `folder`."""
+
+    def on_one_thread(self) -> ShardedJob:
+        """The same job, to be done on one thread."""
+        ...
+
+    @property
+    def folder(self) -> Path:
+        """Where the files of the shards lie."""
+        ...
+
+    @property
+    def rows(self) -> int:
+        """Samples of a shard."""
+        ...
+
+    def path(self, number: int) -> Path:
+        """The file of a shard."""
+        ...
+
+    def accepted_count(self, number: int) -> int | None:
+        """How many samples of a shard were accepted; None when it has to be simulated."""
+        ...
+
+
+def run_task(job: Job, number: int) -> TaskResult:
+    """Run one task; an error is a result too, whatever a design or a criterion of a plugin raises."""
+    try:
+        return job.run(number)
+    except CreepkitError as error:
+        return TaskResult(number, "error", text=error_text(error))
+    except Exception as error:
+        return TaskResult(number, "error", text=f"{job.task_name} {number} cannot be simulated: {error_text(error)}")
+
+
+def error_text(error: Exception) -> str:
+    """One line on what happened; errors that are not ours are named."""
+    text = " ".join(str(error).split())
+    if isinstance(error, CreepkitError):
+        return text
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 def main() -> None:
-    """Answer each number with what became of its shard, a line of JSON."""
+    """Do the task of each number read from standard input, and write its result, a line of JSON."""
     signal.signal(signal.SIGTERM, _terminate)
     stdin, stdout = sys.stdin.buffer, os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # whatever else is printed belongs on stderr
@@ -51,87 +119,8 @@ def _write_result(stream: IO[bytes], document: dict[str, Any]) -> None:
     try:
         stream.write(json.dumps(document).encode() + b"\n")
     except BrokenPipeError:
-        raise SystemExit(0) from None  # who asked is gone; the shard is done all the same
-
-
-def run_task(job: Job, number: int) -> Any:
-    """Run a part; an error is an answer too, whatever a design or a criterion of somebody raises."""
-    from creepkit.errors import CreepkitError
-
-    try:
-        return job.run(number)
-    except CreepkitError as error:
-        return TaskResult(number, "error", text=error_text(error))
-    except Exception as error:
-        return TaskResult(number, "error", text=f"{job.task_name} {number} cannot be simulated: {error_text(error)}")
+        raise SystemExit(0) from None  # the process that asked has ended; the task is done all the same
 
 
 if __name__ == "__main__":
     main()
-
-
-# ---- one shard -----------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class TaskResult:
-    """What became of a shard that was asked for.
-
-    kind : "done"; "taken", by another process; "died", its own process did; "error", as text says.
-    """
-
-    number: int
-    status: str
-    accepted: int = 0
-    text: str = ""
-
-
-class Job(Protocol):
-    """What worker processes are sent, pickled, to do parts of."""
-
-    @property
-    def task_name(self) -> str:
-        """What a part is called, such as "shard"."""
-        ...
-
-    def on_one_thread(self) -> Job:
-        """The same work, to be done on one thread."""
-        ...
-
-    def run(self, number: int) -> TaskResult:
-        """Do one part and leave what came of it in a file."""
-        ...
-
-
-class ShardedJob(Job, Protocol):
-    """A job whose parts are shards of `rows` samples, each a file in `folder`."""
-
-    def on_one_thread(self) -> ShardedJob:
-        """The same work, to be done on one thread."""
-        ...
-
-    @property
-    def folder(self) -> Path:
-        """Where the files of the shards lie."""
-        ...
-
-    @property
-    def rows(self) -> int:
-        """Samples of a shard."""
-        ...
-
-    def path(self, number: int) -> Path:
-        """The file of a shard."""
-        ...
-
-    def accepted_count(self, number: int) -> int | None:
-        """How many samples of a shard were accepted; None when it has to be simulated."""
-        ...
-
-
-def error_text(error: Exception) -> str:
-    """One line on what happened; errors that are not ours are named."""
-    text = " ".join(str(error).split())
-    if isinstance(error, CreepkitError):
-        return text
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -1,6 +1,7 @@
 """Workers that run the tasks of a job: processes of this machine with one thread each, or a dask cluster.
 
-A worker process receives task numbers on standard input and writes results to standard output. It is started as a new interpreter, because a fork would copy locks of numba and torch.
+A worker process receives task numbers on standard input and writes results to standard output. It is started as a new
+interpreter, because a fork would copy locks of numba and torch.
 """
 
 from __future__ import annotations
@@ -15,13 +16,18 @@ import struct
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from collections import Counter
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from types import TracebackType
 from typing import IO, Any, Protocol
 
-from creepkit.errors import DatasetError
+from creepkit.errors import CreepkitError, DatasetError
 from creepkit.jobs.worker import Job, ShardedJob, TaskResult, run_task
+
+SHARD_ROWS = 256
+"""Samples of a shard: some seconds of work, so that little is lost when a process dies."""
+
 
 ADDRESS = re.compile(r"inproc://.+|[a-z]+://.+:[0-9]+/?")
 
@@ -31,11 +37,11 @@ CONNECT_TIMEOUT = 30
 
 
 LEAST_QUEUED = 8
-"""Shards handed over while a cluster has few workers or none: an adaptive one grows by what waits."""
+"""Shards handed over while a cluster has few workers or none: an adaptive one grows with its queue."""
 
 
 DEAD_WORKER_ERRORS = ("KilledWorker", "FutureCancelledError", "CancelledError")
-"""What dask says of a task whose workers died."""
+"""Errors that dask gives a task whose workers died."""
 
 
 class ClusterWorkers:
@@ -80,7 +86,7 @@ class ClusterWorkers:
         self._futures[self._client.submit(run_task, self._job, number, pure=False)] = number
 
     def results(self, timeout: float) -> list[TaskResult]:
-        """Wait for answers, at most so many s."""
+        """Wait for results, at most `timeout` s."""
         from distributed import wait
 
         if not self._futures:
@@ -92,7 +98,7 @@ class ClusterWorkers:
         return [self._result(future, self._futures.pop(future)) for future in finished]
 
     def _result(self, future: Any, number: int) -> TaskResult:
-        """What a task returned; a worker that died in it often enough is an answer too."""
+        """What a task returned; that its workers died is a result too."""
         error = future.exception()
         if error is None:
             result: TaskResult = future.result()
@@ -102,7 +108,7 @@ class ClusterWorkers:
         return TaskResult(number, "error", text=f"a dask worker could not run its shard: {_one_line(error)}")
 
     def _checked(self, result: TaskResult) -> TaskResult:
-        """The answer, unless what was done there cannot be seen here."""
+        """The result, unless its file cannot be seen from this machine."""
         if result.status == "done" and not self._job.path(result.number).exists():
             text = f"a dask worker wrote {self._job.path(result.number)}, which is not there on this machine"
             return TaskResult(result.number, "error", text=f"{text}; name a file in a folder that all machines share")
@@ -114,7 +120,7 @@ def _one_line(error: BaseException) -> str:
 
 
 THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMBA")
-"""Those that start threads of their own: two on one busy core are many times slower than one."""
+"""Libraries that start threads of their own: two threads on one busy core are many times slower than one."""
 
 
 ONE_THREAD = dict.fromkeys((f"{library}_NUM_THREADS" for library in THREADED_LIBRARIES), "1")
@@ -125,25 +131,72 @@ TERMINATION_TIMEOUT = 5
 
 
 class Workers(Protocol):
-    """Whoever does parts of some work."""
+    """Processes or threads that run the tasks of a job."""
 
     @property
     def free_slots(self) -> int:
-        """How many more parts can be worked on at once."""
+        """How many more tasks can be submitted now."""
         ...
 
     def submit(self, number: int) -> None:
-        """Have a part done."""
+        """Have a task done."""
         ...
 
     def results(self, timeout: float) -> list[TaskResult]:
-        """Wait for answers, at most so many s."""
+        """Wait for results, at most `timeout` s."""
         ...
+
+
+@dataclass(frozen=True)
+class ParallelExecution:
+    """How the shards of a data set are divided among processes and machines.
+
+    workers : processes of this machine, by default one for each core; of a cluster, its threads that are used at once.
+    cluster : address of a dask scheduler, tcp://host:port, whose workers simulate instead of processes of this machine.
+    part : (k, n) simulates every n-th shard only, from the k-th on, for an array of jobs; a call without it merges.
+    shard_rows : samples of a shard, which is the unit of work that is kept.
+    """
+
+    workers: int | None = None
+    cluster: str | None = None
+    part: tuple[int, int] | None = None
+    shard_rows: int = SHARD_ROWS
+
+    def start(self, job: ShardedJob) -> AbstractContextManager[Workers]:
+        """The workers, which run in the context that is returned."""
+        if self.cluster is not None:
+            return ClusterWorkers(job, self.cluster, self.workers)
+        return ProcessWorkers(job, process_count(self.workers))
+
+
+def process_count(workers: int | None, error: type[CreepkitError] = DatasetError) -> int:
+    """How many processes are meant: `workers`, or one for each core; `error` for what is no number of them."""
+    if workers is not None and (workers != int(workers) or workers < 1):
+        raise error(f"workers is {workers}; allowed are whole numbers above zero, or None for one on each core")
+    return workers or len(os.sched_getaffinity(0))
+
+
+class WorkerDeaths:
+    """Deaths of worker processes by task: a task is given out again until it has cost `limit` processes."""
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._counts: Counter[int] = Counter()
+
+    def may_retry(self, result: TaskResult) -> bool:
+        """Count the death that a result reports; whether its task is to be given out again."""
+        self._counts[result.number] += 1
+        return self._counts[result.number] < self._limit
+
+    def description(self, result: TaskResult) -> str:
+        """One sentence on a task that is given up."""
+        times = self._counts[result.number]
+        return f"its worker process died {times} times, the last time by {result.text}; is there memory enough?"
 
 
 @dataclass
 class WorkerProcess:
-    """A worker process. shard : the part it is at, None when it is idle. ready : whether it has started."""
+    """A worker process. task : the one it does, None when it is idle. ready : whether it has started."""
 
     popen: subprocess.Popen[bytes]
     task: int | None = None
@@ -154,27 +207,27 @@ class WorkerProcess:
 class ProcessWorkers:
     """Worker processes of this machine; a context."""
 
-    def __init__(self, job: Job, process_count: int) -> None:
+    def __init__(self, job: Job, processes: int) -> None:
         paths = pickle.dumps(sys.path)
         self._setup_message = b"".join(struct.pack("!Q", len(part)) + part for part in (paths, pickle.dumps(job)))
-        self._size = process_count
+        self._size = processes
         self._processes: list[WorkerProcess] = []
         self._selector = selectors.DefaultSelector()
 
     @property
     def free_slots(self) -> int:
-        """How many more parts can be worked on at once."""
+        """How many more tasks can be submitted now."""
         return self._size - sum(process.task is not None for process in self._processes)
 
     def submit(self, number: int) -> None:
-        """Give a part to an idle worker, or to a new one."""
+        """Give a task to an idle worker, or to a new one."""
         idle = [process for process in self._processes if process.task is None]
         process = idle[0] if idle else self._start()
         process.task = number
         _send(process.popen, b"%d\n" % number)
 
     def results(self, timeout: float) -> list[TaskResult]:
-        """Wait for answers, at most so many s."""
+        """Wait for results, at most `timeout` s."""
         return [result for key, _ in self._selector.select(timeout) for result in self._read_results(key.data)]
 
     def __enter__(self) -> ProcessWorkers:
@@ -205,7 +258,7 @@ class ProcessWorkers:
         return process
 
     def _read_results(self, process: WorkerProcess) -> list[TaskResult]:
-        """What a process says: that it is ready, what became of its part, or, by silence, that it is dead."""
+        """What a process reports: that it is ready, or its result; the end of its output means that it died."""
         data = _pipe(process.popen.stdout).read(1 << 16)
         if not data:
             return self._after_death(process)
@@ -220,7 +273,7 @@ class ProcessWorkers:
         code = self._close(process)
         cause = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
         if code > 0 and not process.ready:
-            raise DatasetError(f"a worker process ended as it started ({cause}); what it said is above")
+            raise DatasetError(f"a worker process ended as it started ({cause}); its own message is above")
         return [] if process.task is None else [TaskResult(process.task, "died", text=cause)]
 
     def _close(self, process: WorkerProcess) -> int:
@@ -236,7 +289,7 @@ class ProcessWorkers:
 
 
 def _send(popen: subprocess.Popen[bytes], data: bytes) -> None:
-    """Write to a worker; that it has died is heard where its answers are."""
+    """Write to a worker; that it has died is found where its results are read."""
     with suppress(BrokenPipeError):
         _pipe(popen.stdin).write(data)
 

@@ -1,7 +1,7 @@
 """Data quality: checks of measured histories, each flag stated with numbers; nothing is dropped unless asked for.
 
-Of frames: unloading, a creep output that decreases though its load does not, single outliers. Of tests: one far from its
-replicates or from the trend of the others, a modulus off the trend, a first frame that is not elastic.
+Of frames: unloading, a creep output that decreases though its load does not, single outliers. Of tests: one far from
+its replicates or from the trend of the others, a modulus off the trend, a first frame that is not elastic.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from creepkit.quality.comparison import (
 from creepkit.quality.frames import FlaggedFrames, decreasing_frames, outlier_frames, unloading_frames
 from creepkit.records import History, Predictor
 
-FlagKind = Literal["unloading", "falling", "outlier", "twin", "first frame", "temperature", "modulus"]
+FlagKind = Literal["unloading", "falling", "outlier", "replicate", "first frame", "temperature", "modulus"]
 
 
 FRAME_FLAG_KINDS: tuple[FlagKind, ...] = ("unloading", "falling", "outlier")
@@ -55,7 +55,7 @@ def check_data_quality(histories: Sequence[History], specimen: Predictor | None 
     """
     results = [[*_frame_flags(history, FRAME_FLAG_KINDS)] for history in histories]
     test_checks: list[tuple[FlagKind, dict[int, str]]] = [
-        ("twin", replicate_deviations(histories)),
+        ("replicate", replicate_deviations(histories)),
         ("temperature", temperature_trend_outliers(histories)),
         ("modulus", modulus_trend_outliers(histories)),
     ]
@@ -83,7 +83,7 @@ def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] 
 
 
 def _frame_flags(history: History, kinds: Collection[str]) -> list[QualityFlag]:
-    """Suspect frames of a history; each kind looks at what those before it have left."""
+    """Suspect frames of a history; each check uses the frames that those before it have left."""
     result, remaining = [], history
     kind_findings: list[tuple[FlagKind, FlaggedFrames]] = []
     for kind, search in zip(FRAME_FLAG_KINDS, (unloading_frames, decreasing_frames, outlier_frames), strict=True):

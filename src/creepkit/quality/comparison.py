@@ -42,17 +42,17 @@ def _same_program(a: Program, b: Program) -> bool:
 
 
 REPLICATE_TEMPERATURE_TOLERANCE = 3.0
-"""K between twins; at 400 kJ/mol and 800 C it changes rates by 13 %."""
+"""K between replicates; at 400 kJ/mol and 800 C it changes rates by 13 %."""
 
 
 REPLICATE_FACTOR = {"amplitude": 1.6, "strain": 3.0}
-"""Between the growths of twins. Dimples: three standard deviations of 2^.5 times 11 %, which is what thicknesses that
-scatter by 5.5 % do to a deflection. Bars: rates scatter by a factor of two, and products and environments differ.
+"""Between the creep of replicates. Dimples: three standard deviations of 2^0.5 times 11 %, which is what thicknesses
+that scatter by 5.5 % do to a deflection. Bars: rates scatter by a factor of two, and products and environments differ.
 """
 
 
 _COMPARISON_FRACTIONS = np.linspace(0.2, 1.0, 9)
-"""Of the common time, at which twins are compared; the median counts, for the end of a failing test tells little."""
+"""Of the common time, at which replicates are compared; the median counts, as the end of a failing test says little."""
 
 
 COMMON_TIME_FRACTION = 0.5
@@ -98,11 +98,11 @@ _NO_CREEP_LAW = CreepLaw(
         _n: Param("exponent", bounds=(1, 8)),
     },
     references=("a rate of zero",),
-)  # fmt: skip
+)
 
 
 def replicate_deviations(histories: Sequence[History]) -> dict[int, str]:
-    """{test: reason}; of two twins that differ the one that is farther from the trend of the others, else both."""
+    """{test: reason}; of two replicates that differ the one that is farther from the trend of the others, else both."""
     results: dict[int, str] = {}
     for a, b in combinations(range(len(histories)), 2):
         one, two = histories[a], histories[b]
@@ -115,15 +115,15 @@ def replicate_deviations(histories: Sequence[History]) -> dict[int, str]:
         for k, other in _deviating_tests(histories, a, b, end):
             creep_of_test, creep_of_replicate = (_creep_increment(histories[j], end) for j in (k, other))
             results[k] = (
-                f"grows {_creep_ratio(histories[k], histories[other], end):.2f} times as much as its twin "
-                f"{histories[other].name} (to {end:g} s by {creep_of_test:.3g} and {creep_of_replicate:.3g}), at {_celsius_text(histories[k])} and "
-                f"{_celsius_text(histories[other])}"
+                f"grows {_creep_ratio(histories[k], histories[other], end):.2f} times as much as its replicate "
+                f"{histories[other].name} (to {end:g} s by {creep_of_test:.3g} and {creep_of_replicate:.3g}), "
+                f"at {_celsius_text(histories[k])} and {_celsius_text(histories[other])}"
             )
     return results
 
 
 def _deviating_tests(histories: Sequence[History], a: int, b: int, end: float) -> list[tuple[int, int]]:
-    """(culprit, twin): the one farther from the trend of the tests loaded alike, both if there is none."""
+    """(deviating test, replicate): the one farther from the trend of the tests loaded alike, both if there is none."""
     pair = (a, b)
     others = [
         k for k, h in enumerate(histories) if k not in pair and (_same_loading_until(histories[a], h) or 0) >= end
@@ -199,8 +199,8 @@ def first_frame_deviations(histories: Sequence[History], specimen: Predictor) ->
         ):
             results[k] = (
                 f"{output} begins {'above' if deviation > 0 else 'below'} the elastic one by {abs(deviation):.3g}: "
-                f"{intercept:.3g} (its first {_FIRST_FRAMES} frames carried back to 0 s), where {_youngs_modulus(history) / 1e3:.4g} GPa "
-                f"make {elastic:.3g}"
+                f"{intercept:.3g} (its first {_FIRST_FRAMES} frames carried back to 0 s), where "
+                f"{_youngs_modulus(history) / 1e3:.4g} GPa make {elastic:.3g}"
             )
     return results
 
@@ -315,7 +315,7 @@ def _arrhenius_point(history: History, end: float) -> tuple[float, float]:
 
 
 def _mean_temperature(history: History) -> float:
-    """Mean temperature, K."""
+    """Mean temperature over the frames, K."""
     return float(history.temperature_program().at(history.times).mean())
 
 

@@ -12,11 +12,11 @@ from creepkit.arrays import Bools, Floats, Ints
 from creepkit.records import History
 
 OUTLIER_THRESHOLD = 6.0
-"""Robust standard deviations by which a single frame must miss its neighbours: of Gaussian noise 2 in 1e9 do."""
+"""Robust standard deviations by which a single frame must differ from its neighbours: 2 in 1e9 of Gaussian noise do."""
 
 
 FEW_FRAMES_CORRECTION = 10.0
-"""The threshold is JUMP (1 + FEW / frames): few frames say little about their own noise."""
+"""The threshold is OUTLIER_THRESHOLD (1 + this / frames): few frames say little about their own noise."""
 
 
 DECREASE_FRACTION = 0.02
@@ -42,7 +42,7 @@ LOAD_TOLERANCE, TEMPERATURE_TOLERANCE = 0.01, 2.0
 
 
 OPPOSITE_NEIGHBOUR_FRACTION = 0.3
-"""Of a frame's miss: how far its neighbours must miss the other way if it is to be off alone."""
+"""Fraction of a frame's residual that its neighbours must have with the other sign if it is to be a single outlier."""
 
 
 _ROUNDING_FRACTION = 0.5
@@ -63,7 +63,8 @@ class FlaggedFrames(NamedTuple):
 class LoadSegment(NamedTuple):
     """Frames under one load and temperature.
 
-    load : MPa. raised : whether it is at least what it was before. first : whether the part is the test's first.
+    frames : (n,) positions in the history. load : MPa. load_increased : whether it is at least the load before.
+    is_first : whether the segment is the first of the test.
     """
 
     frames: Ints
@@ -99,8 +100,10 @@ def _unloaded_end(history: History, frames: Ints) -> Iterator[FlaggedFrames]:
         expected, standard_error = _extrapolate(t[before], y[before], t[-count])
         shortfall = expected - y[-count]
         if shortfall > END_THRESHOLD * sigma * standard_error and (y[-count:] < y[-count - 1] - sigma).all():
-            description = f"{_difference_text(history, shortfall)} below what the {END_FIT_FRAMES} frames before it lead to, {shortfall / sigma:.0f} times"
-            reason = f"at {t[-count]:g} s {description} the noise: the load was taken off"
+            reason = (
+                f"at {t[-count]:g} s {_difference_text(history, shortfall)} below what the {END_FIT_FRAMES} frames "
+                f"before it lead to, {shortfall / sigma:.0f} times the noise: the load was taken off"
+            )
             yield FlaggedFrames(tuple(map(int, frames[-count:])), reason)
             return
 
@@ -131,7 +134,8 @@ def decreasing_frames(history: History) -> Iterator[FlaggedFrames]:
             DECREASE_THRESHOLD * noise_standard_deviation(t, y), DECREASE_FRACTION * float(np.abs(smoothed).max())
         ):
             lowest = highest + int(np.argmin(smoothed[highest:]))
-            load_text = f"{history.loading.quantity} {'is held at' if segment.is_first else 'was raised to'} {segment.load:g} MPa"
+            change = "is held at" if segment.is_first else "was raised to"
+            load_text = f"{history.loading.quantity} {change} {segment.load:g} MPa"
             reason = (
                 f"falls by {_difference_text(history, decrease)} from {t[highest]:g} s to {t[lowest]:g} s, "
                 f"{decrease / noise_standard_deviation(t, y):.0f} times the noise, though the {load_text}"
@@ -158,7 +162,10 @@ def outlier_frames(history: History) -> Iterator[FlaggedFrames]:
                 break
             deviation_text = _difference_text(history, float(residuals[worst] * residual_scale[worst]))
             frame = int(frames[worst + 2])
-            reason = f"at {history.times[frame]:g} s off its neighbours by {deviation_text}, {standardised[worst]:.0f} times the noise"
+            reason = (
+                f"at {history.times[frame]:g} s off its neighbours by {deviation_text}, "
+                f"{standardised[worst]:.0f} times the noise"
+            )
             yield FlaggedFrames((frame,), reason)
             frames = np.delete(frames, worst + 2)
 
@@ -182,7 +189,10 @@ def load_segments(history: History) -> list[LoadSegment]:
 
 
 def noise_standard_deviation(times: Floats, values: Floats) -> float:
-    """Standard deviation of white noise, robust, from what frames miss the cubic through their neighbours by."""
+    """Standard deviation of white noise, robust, from the residuals of the cubic through each frame's neighbours.
+
+    times : (frames,) s. values : (frames,) mm or strain, whose unit the result has.
+    """
     residuals, _ = _interpolation_residuals(times, values)
     differences = np.abs(np.diff(values))
     rounding = (
@@ -194,9 +204,9 @@ def noise_standard_deviation(times: Floats, values: Floats) -> float:
 
 
 def _interpolation_residuals(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """What each frame but the outer two misses the cubic of its neighbours by, over what unit noise makes it, and that.
+    """Standardised residual of each frame but the outer two from the cubic of its neighbours, and its scale, (n - 4,) each.
 
-    The cubic is one in time or in its logarithm, whichever misses less: some tests are read evenly, some over decades.
+    The cubic is one in time or in its logarithm, whichever fits better: some tests are read evenly, some over decades.
     """
     results = [_cubic_residuals(x, values) for x in (times, np.log(times))]
     return min(results, key=lambda pair: float(np.median(np.abs(pair[0]))))

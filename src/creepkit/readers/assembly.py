@@ -36,8 +36,8 @@ def assemble_history(
 ) -> History:
     """Return the history of one test.
 
-    entries : what is said once for the test; place : where that stands; table : its frames, without reading the
-    columns in `skip`; source : what the history says of its origin.
+    entries : what is said once for the test; location : where that stands; table : its frames, without reading the
+    columns in `skipped_columns`; source : what the history says of its origin.
     """
     conditions = StatedConditions(entries, vocabulary, location)
     frames = read_frames(table, vocabulary, skipped_columns)
@@ -69,7 +69,7 @@ def assemble_history(
         source=source,
         rupture_time=rupture_time,
         unruptured=unruptured,
-        # Last, for whatever nobody has taken by now is refused.
+        # Last: entries that nothing has used by now are refused.
         labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
     )
 
@@ -81,7 +81,7 @@ def _merge_label(frames: Frames) -> dict[str, str]:
 def _specimen_and_outputs(
     conditions: StatedConditions, frames: Frames, vocabulary: HeaderVocabulary, location: str
 ) -> tuple[str, dict[str, Floats]]:
-    """The specimen, as named or as the outputs tell, and its outputs."""
+    """The specimen, as named or as its outputs identify it, and its outputs."""
     stated_specimen = conditions.take_text("specimen")
     identifiable = {
         name: outputs

@@ -127,7 +127,7 @@ class StatedConditions:
         return HistoryError(f"{self.location}: no {what}{label_note}; {advice}")
 
     def all_labels(self) -> dict[str, str]:
-        """The labels, with what was assumed; refuses numbers and texts that nobody took."""
+        """The labels, with what was assumed; refuses numbers and texts that nothing has used."""
         unread = [(number.location, number.key) for number in self._numbers.values()]
         unread += [(entry.location, key) for key, entry in self._texts.items()]
         for location, key in unread:

@@ -38,7 +38,7 @@ class HistoryCsvReader:
     """Reader of files that hold one history each.
 
     columns : columns by which a file of this laboratory is recognised; () accepts every CSV file.
-    words : what the laboratory calls things.
+    vocabulary : names that the laboratory uses in heads and columns.
     """
 
     name: str

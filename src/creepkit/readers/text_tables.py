@@ -104,7 +104,7 @@ TABLE_FILE = FileKind("a table of a test", HistoryError, "save the table as CSV 
 
 
 def peek_columns(path: Path, byte_limit: int = 65536) -> tuple[str, ...]:
-    """The columns of a file as far as its beginning tells, () when it has none; never raises for what it holds."""
+    """The columns of a file as far as its beginning shows them, () when it has none; never raises for what it holds."""
     try:
         text = read_bytes(path, TABLE_FILE, first=byte_limit).decode("utf-8-sig", errors="replace")
     except HistoryError:
@@ -156,7 +156,7 @@ class Frames:
 
     values : {quantity: (frames,)} in MPa, mm, s, K; "time" is among them and increases strictly.
     lines : (frames,) the line of the file in which each frame stands.
-    merged : number of frames that were merged into another one of the same time.
+    merged_count : number of frames that were merged into another one of the same time.
     """
 
     path: Path

@@ -155,7 +155,7 @@ SPECIMEN_OUTPUTS: Mapping[str, Mapping[str, QuantityKind]] = {
 
 
 IDENTIFIABLE_SPECIMENS = ("uniaxial", "bulge")
-"""Specimens that a file need not name: their outputs tell."""
+"""Specimens that a file need not name: their outputs identify them."""
 
 
 LOADING_KINDS: Mapping[str, QuantityKind] = {"stress": STRESS, "pressure": STRESS, "temperature": TEMPERATURE}
@@ -210,12 +210,12 @@ CREEP_MACHINE_DEFAULTS: Mapping[str, str] = {
 class HeaderVocabulary:
     """How a laboratory names things.
 
-    rename : {its name: ours}, for columns and conditions alike, such as {"youngs_MPa": "modulus_MPa"}.
-    assumed : {text: value} for what its files leave unsaid; recorded in the label "assumed".
-    averaged : {label: columns} whose mean over the whole test is kept as a label, such as thermocouples.
+    synonyms : {its name: ours}, for columns and conditions alike, such as {"youngs_MPa": "modulus_MPa"}.
+    default_texts : {text: value} for what its files leave out; recorded in the label "assumed".
+    averaged_columns : {label: columns} whose mean over the whole test is kept as a label, such as thermocouples.
     outputs : {specimen: {output: kind}}.
-    endings : {its word: "ruptured" or "stopped"} for how a test ended, beside these two themselves; in a column of
-        rupture times such a word may stand in the place of a number.
+    end_of_test_terms : {its word: "ruptured" or "stopped"} for how a test ended, beside these two themselves; in a
+        column of rupture times such a word may stand in the place of a number.
     """
 
     synonyms: Mapping[str, str] = field(default_factory=dict)

@@ -156,7 +156,7 @@ class History:
 
     @property
     def mean_temperature(self) -> float:
-        """The mean of the values of the temperature program, K."""
+        """Mean temperature over the breakpoints of the program, K."""
         return float(np.mean(self.temperature_program().values))
 
     @property

@@ -70,7 +70,7 @@ class Registered(Generic[_T]):
 class Plugin:
     """One plugin: where it came from, and what it offers or why it cannot be used.
 
-    offers : {kind: {name: thing}} with the kinds "law", "specimen", "reader", "exporter", "temperature form".
+    contributions : {kind: {name: thing}} with the kinds "law", "specimen", "reader", "exporter", "temperature form".
     commands : whether it adds commands to the command line.
     problem : one sentence when the plugin is broken, else empty.
     """
@@ -131,9 +131,9 @@ class Registry:
         return law
 
     def distributions_of(self, law: CreepLaw) -> str:
-        """Return the distributions, with versions, of the laws that a law's name tells it was made of.
+        """Return the distributions, with versions, of the laws that a law's name says it was made of.
 
-        'creepkit-damage 0.1.0' of 'kachanov-rabotnov*arrhenius'; empty when nobody offers them.
+        'creepkit-damage 0.1.0' of 'kachanov-rabotnov*arrhenius'; empty when no plugin has them.
         """
         parts = set(re.split(r"[^a-z0-9-]+", law.name))
         return ", ".join(sorted({one.provenance.origin for name, one in self.laws().items() if name in parts}))

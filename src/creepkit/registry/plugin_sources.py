@@ -129,9 +129,9 @@ COMMANDS_HOOK = "creepkit_commands"
 
 @dataclass(frozen=True)
 class ContributionKind:
-    """One kind of thing: its word, the hook that offers it, the error when a name is unknown, and its record.
+    """One kind of contribution: its name, the hook that returns it, the error when a name is unknown, and its record.
 
-    home : module of the record that each thing must be; imported when there is a thing to check, for it is not light.
+    record_module : module of the record that each thing must be; imported when there is a thing to check.
     """
 
     label: str

@@ -146,7 +146,7 @@ def _title_line(acceptance: Acceptance) -> str:
     domain = acceptance.design
     count = f"{len(acceptance.draws)} draws, seed {acceptance.seed}"
     test = f"{domain.specimen} test of {domain.grid.frames} frames"
-    return f"law '{domain.law.name}', {domain.name} domain, {test}: {count}"
+    return f"law '{domain.law.name}', {domain.name} sampling domain, {test}: {count}"
 
 
 def _criterion_lines(acceptance: Acceptance) -> list[str]:

@@ -1,1 +1,1 @@
-"""creepkit.sampling"""
+"""Sampling designs: which parameters and test conditions are simulated, and which samples are kept."""

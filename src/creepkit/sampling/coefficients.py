@@ -1,6 +1,9 @@
 """Parameters of a law from prescribed mean rates: rate coefficients, stress scales, and rate coefficients of damage.
 
-Terms that share a rate coefficient A form a group whose rate is proportional to it: ln f = ln A + ln g, so that ln A follows from the prescribed rate. A parameter B in MPa is drawn through the ratio of the reference stress to it, 0.05 to 4, where the local stress exponent is above 0 and at most 12. The rate coefficient of an internal variable with a limit follows from the ratio of test duration to life.
+Terms that share a rate coefficient A form a group whose rate is proportional to it: ln f = ln A + ln g, so that ln A
+follows from the prescribed rate. A parameter B in MPa is drawn through the ratio of the reference stress to it, 0.05 to
+4, where the local stress exponent is above 0 and at most 12. The rate coefficient of an internal variable with a limit
+follows from the ratio of test duration to life.
 """
 
 from __future__ import annotations
@@ -25,10 +28,10 @@ LARGEST_LN_COEFFICIENT = 690.0
 
 @dataclass(frozen=True)
 class TermGroup:
-    """Terms of a law with one coefficient.
+    """Terms of a law with one rate coefficient.
 
     law : these terms alone. positions : of its parameters in the whole law. coefficient : position of the coefficient
-        there. slope : power of the coefficient, 1 as a rule.
+        there. exponent : power of the coefficient, 1 as a rule.
     """
 
     law: CreepLaw
@@ -37,16 +40,16 @@ class TermGroup:
     exponent: float
 
     def ln_mean_rate(self, theta: Floats, points: RateEvaluationPoints, stress_factor: float = 1.0) -> Floats:
-        """ln of the part's mean rate over a test, 1/s, (rows, ...).
+        """ln of the group's mean rate over a test, (rows, ...), the rate in 1/s.
 
-        theta : (rows, ..., parameters) internal ones of the whole law. factor : on the stresses.
+        theta : (rows, ..., parameters) internal values of the whole law. stress_factor : multiplies the stresses.
         """
         return mean_ln_rate(self.law, theta[..., list(self.positions)], points, stress_factor)
 
 
 @lru_cache(maxsize=64)
 def term_groups(law: CreepLaw) -> tuple[TermGroup, ...]:
-    """The parts of a law; DatasetError where a term has no coefficient to set its rate with."""
+    """The groups of a law; DatasetError where a term has no coefficient to set its rate with."""
     exponents = coefficient_exponents(law)
     groups = []
     for term_numbers in _connected_terms(exponents):
@@ -57,7 +60,7 @@ def term_groups(law: CreepLaw) -> tuple[TermGroup, ...]:
             labels = "', '".join(list(law.terms)[k] for k in term_numbers)
             raise DatasetError(
                 f"law '{law.name}': term '{labels}' has no linear rate coefficient (of log scale, with off=0) to set "
-                "its rate with; use the paper's box"
+                "its rate with; use the paper's sampling domain"
             )
         group_law = law.only(*(list(law.terms)[k] for k in term_numbers))
         positions = tuple(law.names.index(name) for name in group_law.names)
@@ -68,9 +71,9 @@ def term_groups(law: CreepLaw) -> tuple[TermGroup, ...]:
 def solve_coefficients(
     groups: Sequence[TermGroup], theta: Floats, ln_rates: Floats, points: RateEvaluationPoints
 ) -> Floats:
-    """Return theta with coefficients that give each part its mean rate over the test.
+    """Return theta, (rows, parameters), with coefficients that give each group its mean rate over the test.
 
-    theta : (rows, parameters) internal. rates : (rows, parts) ln of the wanted rates, -inf: off.
+    theta : (rows, parameters) internal values. ln_rates : (rows, groups) ln of the wanted rates in 1/s, -inf: off.
     """
     solved = np.array(theta)
     solved[:, [group.coefficient for group in groups]] = 0.0
@@ -103,7 +106,7 @@ def _connected_terms(exponents: Sequence[dict[int, float]]) -> list[list[int]]:
 
 
 LIFE_FRACTIONS = (0.03, 0.7)
-"""Of the life of the material that a test takes: damage is hardly seen, or soon breaks it."""
+"""Fraction of the life of the material that a test takes: damage is hardly seen, or soon breaks it."""
 
 
 QUADRATURE_POINTS = 64
@@ -112,9 +115,10 @@ QUADRATURE_POINTS = 64
 
 @dataclass(frozen=True)
 class DamageRateScaling:
-    """One internal variable: part is its rate as a law; initial, reach : where it starts, and from there to its limit.
+    """The rate coefficient of one internal variable, from the fraction of life that a test takes.
 
-    place : of the variable among the law's states.
+    group : the rate of the variable as a law. state_index : of the variable among the law's states. initial : its
+        value before the test; range : from there to its limit.
     """
 
     group: TermGroup
@@ -123,13 +127,13 @@ class DamageRateScaling:
     range: float
 
     def ln_initial_rate(self, theta: Floats, life_fraction: Floats, points: RateEvaluationPoints) -> Floats:
-        """ln of the virgin variable's rate, 1/s, for which a test takes `share` of life, (rows,)."""
+        """ln of the initial rate in 1/s, (rows,), for which a test takes `life_fraction` (rows,) of the life."""
         return np.asarray(
             np.log(life_fraction * abs(self.range) / points.end_times) + self._ln_life_factor(theta, points)
         )
 
     def _ln_life_factor(self, theta: Floats, points: RateEvaluationPoints) -> Floats:
-        """ln of life times the virgin rate over the reach: 0 where the rate stays as it begins, (rows,)."""
+        """ln of life times the initial rate over the range, (rows,): 0 where the rate stays as it begins."""
         law = self.group.law
         states: list[float | Floats] = [state.initial for state in law.states.values()]
         group_theta, arguments = theta[:, None, list(self.group.positions)], points.midpoint_arguments(axes=1)
@@ -159,7 +163,10 @@ def damage_rate_scalings(law: CreepLaw) -> tuple[DamageRateScaling, ...]:
 def solve_damage_coefficients(
     law: CreepLaw, theta: Floats, unit_coordinates: Floats, points: RateEvaluationPoints
 ) -> Floats:
-    """Return theta with coefficients that make tests take a share of life; unit : (rows, parameters), their own."""
+    """Return theta, (rows, parameters), with coefficients that make tests take a fraction of the life.
+
+    theta : (rows, parameters) internal values. unit_coordinates : (rows, parameters) from 0 to 1.
+    """
     solved, (low, high) = np.array(theta), np.log(LIFE_FRACTIONS)
     for scaling in damage_rate_scalings(law):
         k, group = scaling.group.coefficient, scaling.group
@@ -200,7 +207,7 @@ LARGEST_STRESS_EXPONENT = 12.0
 
 
 RATIO_INTERVALS = 32
-"""Into which the range of a ratio is cut to see where it may lie."""
+"""Intervals into which the range of a ratio is divided to find where it may lie."""
 
 
 def stress_scale_positions(law: CreepLaw) -> tuple[int, ...]:
@@ -216,9 +223,10 @@ def draw_stress_scales(
     ln_rates: Floats,
     points: RateEvaluationPoints,
 ) -> Floats:
-    """Return theta with its stress scales drawn, one after another.
+    """Return theta, (rows, parameters), with its stress scales drawn, one after another.
 
-    unit : (rows, scales) coordinates from 0 to 1. rates : (rows, parts) ln of the wanted rates, -inf: off.
+    theta : (rows, parameters) internal values. unit_coordinates : (rows, scales) from 0 to 1.
+    ln_rates : (rows, groups) ln of the wanted rates in 1/s, -inf: off.
     """
     result, parameters = np.array(theta), list(law.params.values())
     ratio_ranges = {k: _RatioRange.from_bounds(parameters[k], points.mean_stress) for k in stress_scale_positions(law)}
@@ -237,7 +245,10 @@ def draw_stress_scales(
 
 @dataclass(frozen=True, eq=False)
 class _RatioRange:
-    """The range of one parameter's ratio that keeps it within its bounds; all but `param` (rows, 1)."""
+    """The range of stress over one parameter that keeps it within its bounds.
+
+    stress : (rows, 1) MPa. low, high : (rows, 1) ends of the ratio.
+    """
 
     param: Param
     stress: Floats
@@ -252,13 +263,13 @@ class _RatioRange:
         return cls(param, stress[:, None], low[:, None], high[:, None])
 
     def internal_value(self, unit_coordinates: Floats) -> Floats:
-        """The internal parameter at coordinates from 0 to 1 of the range, (rows, coordinates)."""
+        """The internal value, (rows, n), at coordinates (rows, n) from 0 to 1 of the range."""
         value = np.clip(self.stress / (self.low + unit_coordinates * (self.high - self.low)), *self.param.bounds)
         return np.asarray(np.log(value) if self.param.scale == "log" else value)
 
 
 def _allowed(law: CreepLaw, group: TermGroup, theta: Floats, ln_rate: Floats, points: RateEvaluationPoints) -> Bools:
-    """Where a part has a stress exponent and a coefficient that will do, (rows, cells)."""
+    """Where a group has an allowed stress exponent and coefficient, (rows, intervals)."""
     theta[..., group.coefficient] = 0.0
     ln_coefficient = (ln_rate[:, None] - group.ln_mean_rate(theta, points)) / group.exponent
     low, high = np.log(list(law.params.values())[group.coefficient].bounds)
@@ -269,13 +280,16 @@ def _allowed(law: CreepLaw, group: TermGroup, theta: Floats, ln_rate: Floats, po
 
 
 def local_stress_exponent(group: TermGroup, theta: Floats, points: RateEvaluationPoints) -> Floats:
-    """d ln f / d ln stress of a part, by a difference of 2 %."""
+    """d ln f / d ln stress of a group, (rows, ...), by a difference of 2 %.
+
+    theta : (rows, ..., parameters) internal values of the whole law.
+    """
     ln_rate_above, ln_rate_below = (group.ln_mean_rate(theta, points, factor) for factor in (1.01, 1 / 1.01))
     return np.asarray((ln_rate_above - ln_rate_below) / (2 * np.log(1.01)))
 
 
 def _uniform_over_allowed(allowed: Bools, coordinates: Floats) -> Floats:
-    """Coordinates from 0 to 1 that are uniform over the allowed cells; over all where none is."""
+    """Coordinates from 0 to 1 that are uniform over the allowed intervals; over all where none is."""
     weights = np.where(allowed.any(axis=1, keepdims=True), allowed, True).astype(float)
     sums = np.cumsum(weights, axis=1)
     target = coordinates * sums[:, -1]

@@ -1,6 +1,9 @@
-"""Test conditions of a data set: their names and units, the ranges they are drawn from, the time grid, and the test they describe.
+"""Test conditions of a data set: their names and units, the ranges they are drawn from, the time grid, and the test
+they describe.
 
-Bulge test: modulus, P1, P2 (MPa), Tj, end_time (s), apex_thickness (mm). Uniaxial test: stress_1, stress_2 (MPa), Tj, end_time (s). Both: temperature (K). An absent condition has its default: the last time of the grid, the thickness of the specimen, 293.15 K, no load jump.
+Bulge test: modulus, P1, P2 (MPa), Tj, end_time (s), apex_thickness (mm). Uniaxial test: stress_1, stress_2 (MPa), Tj,
+end_time (s). Both: temperature (K). An absent condition has its default: the last time of the grid, the thickness of
+the specimen, 293.15 K, no load jump.
 """
 
 from __future__ import annotations
@@ -22,7 +25,7 @@ PAPER_INTERVAL, PAPER_END = 150.0, 43200.0
 
 
 MOST_FRAMES = 100_000
-"""Frames of a sample: a typing error should not ask for all the memory."""
+"""Largest number of frames of a sample: a typing error should not ask for all the memory."""
 
 
 RELATIVE_TIMES = (0.0, 60 / 43200, 240 / 43200, *(k / 48 for k in range(1, 49)))
@@ -56,7 +59,8 @@ class TimeGrid:
             raise DatasetError(f"frames every {interval:g} s until {end:g} s: the interval must lie from 0 to the end")
         if end / interval > MOST_FRAMES:
             raise DatasetError(
-                f"frames every {interval:g} s until {end:g} s are {end / interval:.0f}; at most {MOST_FRAMES} are simulated"
+                f"frames every {interval:g} s until {end:g} s are {end / interval:.0f}; "
+                f"at most {MOST_FRAMES} are simulated"
             )
         frames = int(np.floor(end / interval * (1 + 1e-12)))
         return cls(interval * np.arange(frames + 1, dtype=float))
@@ -125,7 +129,7 @@ LOAD_LEVELS = {BULGE: ("P1", "P2"), UNIAXIAL: ("stress_1", "stress_2")}
 
 
 def test_kind(specimen: Specimen) -> str:
-    """Which kind of test a specimen is put through: bulge or uniaxial (stand-ins say so before a comma)."""
+    """Which kind of test a specimen is put through, bulge or uniaxial; a reduced-order model says so before a comma."""
     kind = specimen.name.split(",")[0]
     if kind not in CONDITIONS:
         raise DatasetError(f"no design knows how to load a specimen '{specimen.name}'; {nearest(kind, CONDITIONS)}")
@@ -158,7 +162,7 @@ def planned_test(specimen: Specimen, conditions: Mapping[str, float], grid: Time
 
 
 def hold_times(test: History) -> Floats:
-    """When the holds of a planned test begin and end, (4,) s: after the first ramp, before and after the jump, the end.
+    """(4,) s, when the holds of a planned test begin and end: after the first ramp, before and after the jump, the end.
 
     Growth between two of them is creep: no elastic jump lies within a hold.
     """
@@ -179,7 +183,7 @@ def check_condition_names(kind: str, names: Mapping[str, object]) -> None:
 
 
 def _load_levels(kind: str, conditions: Mapping[str, float], end: float) -> tuple[tuple[float, float], float]:
-    """Both levels and when the second begins; without a jump the level stays."""
+    """Both levels, MPa, and when the second begins, s; without a jump the level stays."""
     first_name, second_name = LOAD_LEVELS[kind]
     if (second_name in conditions) != ("Tj" in conditions):
         raise DatasetError(f"a jump of a {kind} test needs both {second_name} and Tj; give both or neither")
@@ -197,16 +201,19 @@ PAPER_RANGES = {
     "bulge": {"modulus": (50e3, 300e3), "P1": (3.0, 25.0), "P2": (3.0, 25.0)},
     "uniaxial": {"stress_1": (40.0, 300.0), "stress_2": (40.0, 300.0)},
 }
-"""The paper's ranges of a bulge test, and for a bar what its dimple of .5 mm feels under them (about 12.5 P)."""
+"""The paper's ranges of a bulge test, and for a bar the stresses of its dimple of 0.5 mm under them, about 12.5 P."""
 
 
 PAPER_JUMP_FRACTIONS = (1 / 6, 5 / 6)
-"""The paper's Tj, 2 to 10 h, over its 12 h."""
+"""The paper's Tj, 2 to 10 h, as fractions of its 12 h."""
 
 
 @dataclass(frozen=True)
 class ConditionRange:
-    """One number, uniform from `low` to `high` on its scale; share_of : the condition of which it is a share."""
+    """One number, uniform from `low` to `high` on its scale.
+
+    fraction_of : the condition of which it is a fraction.
+    """
 
     low: float
     high: float
@@ -214,7 +221,7 @@ class ConditionRange:
     fraction_of: str = ""
 
     def values(self, unit_coordinates: Floats) -> Floats:
-        """Values at coordinates from 0 to 1."""
+        """Values, (rows,) in the unit of the condition, at coordinates (rows,) from 0 to 1."""
         if self.scale == "log":
             return np.asarray(np.exp(np.log(self.low) + unit_coordinates * np.log(self.high / self.low)))
         return self.low + unit_coordinates * (self.high - self.low)
@@ -241,7 +248,7 @@ class ConditionRanges:
         return tuple(name for name, _ in self.ranges)
 
     def draw(self, unit_coordinates: Floats) -> Floats:
-        """Conditions at coordinates (rows, conditions) from 0 to 1."""
+        """Conditions, (rows, conditions) in MPa, s, mm and K, at coordinates of that shape from 0 to 1."""
         drawn = {
             name: condition_range.values(u)
             for (name, condition_range), u in zip(self.ranges, unit_coordinates.T, strict=True)
@@ -261,9 +268,9 @@ class ConditionRanges:
 def condition_ranges(
     kind: str, grid: TimeGrid, given: Mapping[str, Any], defaults: Mapping[str, Any], *, needs_temperature: bool
 ) -> ConditionRanges:
-    """Return what is drawn: `defaults` with `given` in their place; a number holds a condition where it is.
+    """Return what is drawn: `given` in the place of `defaults`; a number fixes a condition.
 
-    warm : whether the law depends on temperature, which must then be given.
+    needs_temperature : whether the law depends on temperature, whose range must then be given.
     """
     check_condition_names(kind, given)
     if needs_temperature and "temperature" not in {**defaults, **given}:
@@ -282,7 +289,7 @@ def condition_ranges(
 
 
 def condition_range(name: str, value: Any) -> ConditionRange:
-    """A range from a number, a pair or a Range; all conditions are positive."""
+    """A range from a number, a pair or a ConditionRange; all conditions are positive."""
     if isinstance(value, ConditionRange):
         return value
     try:
@@ -319,4 +326,4 @@ def _check_jump(jump: ConditionRange, end: float) -> None:
 
 
 VISIBLE_CREEP = {"bulge": 0.02, "uniaxial": 2e-4}
-"""Creep, mm and strain, that an informative sample shows."""
+"""Creep, in mm of amplitude and as strain, that an informative sample shows."""

@@ -1,6 +1,8 @@
 """Acceptance criteria of samples: before simulation (rates, bounds, constraints of the law) and after it.
 
-Criteria 1 to 5 are those of the paper (Materials and Methods, "Data generation and preparation"). Criterion 4 of the paper asks for an apex displacement above 0.01 mm, meant to remove samples without creep. The elastic deflection alone is 0.01 to 0.2 mm, so criterion 4 is applied here to the growth of the amplitude by creep within each of the two holds.
+Criteria 1 to 5 are those of the paper (Materials and Methods, "Data generation and preparation"). Criterion 4 of the
+paper asks for an apex displacement above 0.01 mm, meant to remove samples without creep. The elastic deflection alone
+is 0.01 to 0.2 mm, so criterion 4 is applied here to the growth of the amplitude by creep within each of the two holds.
 """
 
 from __future__ import annotations
@@ -21,15 +23,18 @@ from creepkit.sampling.draws import Draws
 from creepkit.sampling.rates import RateArguments, log10_rate
 
 TIME_FRACTIONS = np.concatenate([np.zeros(1), np.geomspace(1e-3, 1.0, 60)])
-"""Times, as shares of a test's end, at which relations are looked at."""
+"""Times at which the constraints of a law are evaluated, as fractions of the end of a test."""
 
 
 CONSTRAINT_STRESS, CONSTRAINT_STRAIN = 100.0, 0.01
-"""MPa and strain at which they are, where they depend on these."""
+"""MPa and strain at which constraints are evaluated that depend on these."""
 
 
 def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:
-    """Which draws meet every relation at every time of their tests, (rows,); what is not a number does not."""
+    """Which draws meet every constraint at every time of their tests, (rows,); what is not a number does not.
+
+    end_times : (rows,) s.
+    """
     parameters = [column[:, None] for column in draws.parameters.T]
     stress, strain = np.full((len(draws), TIME_FRACTIONS.size), CONSTRAINT_STRESS), CONSTRAINT_STRAIN
     temperature = draws.condition("temperature", ROOM_TEMPERATURE)[:, None]
@@ -45,20 +50,22 @@ def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:
 
 
 FIRST_HOLD, BEFORE_JUMP, AFTER_JUMP, END = range(4)
-"""Rows of an outcome's marks: a hold is from the first to the second, and from the third to the fourth."""
+"""Rows of `hold_outputs`: a hold is from the first to the second, and from the third to the fourth."""
 
 
 BURST_TIME_FACTOR = 2.0
-"""How many times too early a stand-in must burst before it is believed; the dimple's is within 1.6 as a rule."""
+"""How many times too early the reduced-order model must burst before it is believed; that of a dimple is within 1.6 as
+a rule."""
 
 
 @dataclass(frozen=True, eq=False)
 class SimulationOutcome:
-    """One simulated sample, or what a stand-in predicts of it.
+    """One simulated sample, or what the reduced-order model predicts of it.
 
-    times : (frames,) s. outputs : (frames, outputs), first the one that grows with creep; NaN after the end.
-    marks : (4, outputs) at the end of the first ramp, just before the jump, at the end of the second ramp, at the end
-        of the test; NaN where the simulation did not get. end_time : s, up to which it got.
+    times : (frames,) s. outputs : (frames, outputs) mm or strain, first the one that grows with creep; NaN after the
+        end.
+    hold_outputs : (4, outputs) at the end of the first ramp, just before the jump, at the end of the second ramp and
+        at the end of the test; NaN where the simulation ended before. end_time : s, up to which it went.
     """
 
     times: Floats
@@ -87,9 +94,9 @@ class SimulationOutcome:
 
 @dataclass(frozen=True)
 class RateLimit:
-    """The law's rate at one point lies within limits, both None where there is none: criteria 1 and 2.
+    """The law's rate at one point lies within limits, None where there is none: criteria 1 and 2.
 
-    stress : MPa. least, most : log10 of the rate, 1/s: as logarithms rates do not underflow.
+    stress : MPa. lower, upper : log10 of the rate in 1/s: as logarithms rates do not underflow. time : s.
     """
 
     name: str
@@ -129,7 +136,7 @@ class WithinBounds:
 
 @dataclass(frozen=True)
 class ConstraintsHold:
-    """The relations that the law declares hold throughout the test; end : s, of tests whose end is not drawn."""
+    """The constraints that the law declares hold throughout the test; end : s, of tests whose end is not drawn."""
 
     name: str
     text: str
@@ -161,14 +168,14 @@ class SurvivesTime:
         return self.seconds is not None and outcome.status == Status.RUPTURED and outcome.end_time >= self.seconds
 
     def rejects_early(self, screening_outcome: SimulationOutcome) -> bool:
-        """Whether a stand-in's prediction leaves no hope: it bursts far too early."""
+        """Whether the reduced-order model bursts so early that the simulation is bound to fail the criterion."""
         burst = screening_outcome.status == Status.RUPTURED
         return burst and self.seconds is not None and BURST_TIME_FACTOR * screening_outcome.end_time < self.seconds
 
 
 @dataclass(frozen=True)
 class CreepInEachHold:
-    """Creep above `least` in either hold, elastic jumps left out: criterion 4.
+    """Creep above `threshold` in either hold, elastic jumps left out: criterion 4.
 
     A hold that a burst cut short counts up to its last frame; a second hold that was never reached is no growth.
     """
@@ -183,10 +190,10 @@ class CreepInEachHold:
         return all(growth > self.threshold for growth in outcome.creep_in_holds)
 
     def rejects_early(self, screening_outcome: SimulationOutcome) -> bool:
-        """Whether a stand-in's prediction leaves no hope: it bursts long before the second hold begins.
+        """Whether the reduced-order model bursts long before the second hold begins.
 
-        Little growth is no reason. Under a nearly plastic law a dimple creeps at its clamped edge, where the stress is
-        high: the stand-in, which knows one stress, has called a growth of .02 mm one of 1e-5.
+        Little creep is no reason. Under a nearly plastic law a dimple creeps at its clamped edge, where the stress is
+        high: the reduced-order model, which knows one stress, predicted 1e-5 mm where the simulation had 0.02 mm.
         """
         return (
             screening_outcome.status == Status.RUPTURED
@@ -196,7 +203,7 @@ class CreepInEachHold:
 
 @dataclass(frozen=True)
 class TotalCreepAbove:
-    """Creep of `least` or more in both holds together, elastic jumps left out."""
+    """Creep of `threshold` or more in both holds together, elastic jumps left out."""
 
     name: str
     text: str
@@ -210,7 +217,7 @@ class TotalCreepAbove:
 
 @dataclass(frozen=True)
 class FinalOutputAbove:
-    """The first output is above `least` at the end: criterion 5. After a burst, in the last frame before it."""
+    """The first output is above `threshold` at the end: criterion 5. After a burst, in the last frame before it."""
 
     name: str
     text: str
@@ -240,8 +247,8 @@ def paper_criteria(kind: str) -> tuple[Criterion, ...]:
     least = _with_unit(kind, PAPER_LEAST_CREEP[kind])
     output = "amplitude" if kind == BULGE else "strain"
     return (
-        RateLimit("1", "rate of 1e-20 1/s or more at 600 MPa, strain .01, 10,000 s", 600.0, lower=-20.0),
-        RateLimit("2", "rate of 1 1/s or less at 50 MPa, strain .01, 10,000 s", 50.0, upper=0.0),
+        RateLimit("1", "rate of 1e-20 1/s or more at 600 MPa, strain 0.01, 10,000 s", 600.0, lower=-20.0),
+        RateLimit("2", "rate of 1 1/s or less at 50 MPa, strain 0.01, 10,000 s", 50.0, upper=0.0),
         SurvivesTime("3", "simulation converged and lasted 1 h", 3600.0),
         CreepInEachHold("4", f"creep of more than {least} in each hold", PAPER_LEAST_CREEP[kind]),
         FinalOutputAbove("5", f"{output} of more than {least} at the end", PAPER_LEAST_CREEP[kind]),
@@ -249,7 +256,7 @@ def paper_criteria(kind: str) -> tuple[Criterion, ...]:
 
 
 def conditioned_criteria(law: CreepLaw, kind: str, end: float) -> tuple[Criterion, ...]:
-    """What the conditioned box asks: a law as its author means it, a full history, and visible creep."""
+    """Criteria of the conditioned domain: a law as its author means it, a full history, and visible creep."""
     label = ("constraints", "what the law declares of its parameters holds throughout the test")
     constraint_criteria = (ConstraintsHold(*label, end),) if law.constraints else ()
     return (

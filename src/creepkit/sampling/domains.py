@@ -1,6 +1,8 @@
 """Sampling domains: what is drawn of the parameters of a law and of its tests, and the share of draws that is accepted.
 
-The paper domain is uniform in the bounds of the law (Materials and Methods and Table 1 of the paper). The conditioned domain is uniform in the logarithm of the mean rate at the reference stress, so that most samples creep visibly and survive the test.
+The paper domain is uniform in the bounds of the law (Materials and Methods and Table 1 of the paper). The conditioned
+domain is uniform in the logarithm of the mean rate at the reference stress, so that most samples creep visibly and
+survive the test.
 """
 
 from __future__ import annotations
@@ -65,7 +67,7 @@ if TYPE_CHECKING:
 class SamplingDomain:
     """A design that draws a law's parameters and the conditions of its tests from ranges.
 
-    reference : what stands for a test where the rate of its material is wanted, and which rates are useful.
+    reference_stress : the stress that represents a test, and which rates are useful there.
     """
 
     law: CreepLaw
@@ -92,7 +94,7 @@ class SamplingDomain:
         raise NotImplementedError
 
     def document(self) -> dict[str, Any]:
-        """Everything that decides the draws, as JSON-able data; boxes add what is theirs."""
+        """Everything that decides the draws, as JSON-able data; each kind of domain adds what is theirs."""
         return {
             "domain": self.name,
             "version": 1,
@@ -104,7 +106,7 @@ class SamplingDomain:
 
 
 def uniform_in_bounds(law: CreepLaw, unit_coordinates: Floats) -> Floats:
-    """Internal parameters at coordinates (rows, parameters) from 0 to 1, each uniform on its own scale."""
+    """Internal values, (rows, parameters), at coordinates of that shape from 0 to 1, each uniform on its own scale."""
     low, high = np.array([[p.to_internal(b) for b in p.bounds] for p in law.params.values()]).reshape(-1, 2).T
     return np.asarray(low + unit_coordinates * (high - low))
 
@@ -118,7 +120,7 @@ def default_grid(interval: float, ranges: Mapping[str, Any]) -> TimeGrid:
 class PaperDomain(SamplingDomain):
     """Uniform in the bounds of a law and the ranges of conditions.
 
-    screened : leave out simulations that are hopeless by the specimen's stand-in; see dataset.sketching.
+    screened : leave out simulations that the specimen's reduced-order model rejects; see dataset.simulation.
     """
 
     screened: bool = True
@@ -138,13 +140,19 @@ class PaperDomain(SamplingDomain):
 
 
 def paper_domain(
-    law: CreepLaw, specimen: Specimen, *, every: float = PAPER_INTERVAL, grid: TimeGrid | None = None,
-    screened: bool = True, **ranges: Any,
-) -> PaperDomain:  # fmt: skip
-    """Return the paper's box of any law: its bounds, E 50 to 300 GPa, Tj 2 to 10 h of 12 h, P1 <= P2 from 3 to 25 MPa.
+    law: CreepLaw,
+    specimen: Specimen,
+    *,
+    every: float = PAPER_INTERVAL,
+    grid: TimeGrid | None = None,
+    screened: bool = True,
+    **ranges: Any,
+) -> PaperDomain:
+    """Return the paper's sampling domain of any law: its bounds, E 50 to 300 GPa, Tj 2 to 10 h of 12 h, P1 <= P2 from 3
+    to 25 MPa.
 
-    every : s between frames. grid : in its place, other times. screened : see PaperBox. given : other ranges of
-    conditions, see design_of.
+    every : s between frames. grid : in its place, other times. screened : see PaperDomain. ranges : other ranges of
+        conditions, as sampling_design() takes them.
     """
     kind = test_kind(specimen)
     grid = grid or default_grid(every, ranges)
@@ -153,19 +161,22 @@ def paper_domain(
 
 
 MOST_TRIALS = 32
-"""Places at which the parameters of a row are looked for."""
+"""Points at which parameters within the bounds are sought for a row."""
 
 
 @dataclass(frozen=True)
 class ConditionedDomain(SamplingDomain):
-    """Uniform in the log of the mean rate at the reference stress; how_many : shares of rows with 1, 2, 3 parts."""
+    """Uniform in the log of the mean rate at the reference stress.
+
+    term_count_probabilities : fractions of rows with one, two and three groups of terms.
+    """
 
     term_count_probabilities: tuple[float, ...] = TERM_COUNT_PROBABILITIES
 
     name: ClassVar[str] = "conditioned"
 
     def draw(self, first: int, count: int, seed: int) -> Draws:
-        """Return rows of the sequence: total rate, choice of parts, their shares, parameters, then conditions."""
+        """Return rows of the sequence: total rate, choice of groups, their fractions, parameters, then conditions."""
         group_count = len(term_groups(self.law))
         sizes = (1, SELECTION_DIMENSIONS, group_count, len(self.law.params), len(self.condition_names))
         unit_coordinates = np.split(sobol_rows(sum(sizes), first, count, seed), np.cumsum(sizes)[:-1], axis=1)
@@ -222,7 +233,10 @@ class ConditionedDomain(SamplingDomain):
         return np.asarray(np.all(met, axis=0))
 
     def shape_parameters(self, unit_coordinates: Floats, active: Bools, points: RateEvaluationPoints) -> Floats:
-        """Internal parameters within their bounds, before coefficients and stress scales; there : which parts are."""
+        """Internal values, (rows, parameters), within their bounds, before coefficients and stress scales.
+
+        unit_coordinates : (rows, parameters) from 0 to 1. active : (rows, groups) which groups are not switched off.
+        """
         return uniform_in_bounds(self.law, unit_coordinates)
 
     def document(self) -> dict[str, Any]:
@@ -237,9 +251,10 @@ class ConditionedDomain(SamplingDomain):
 def conditioned_domain(
     law: CreepLaw, specimen: Specimen, *, every: float = PAPER_INTERVAL, grid: TimeGrid | None = None, **ranges: Any
 ) -> ConditionedDomain:
-    """Return the conditioned box for any law whose terms have rate coefficients (else DatasetError).
+    """Return the conditioned sampling domain for any law whose terms have rate coefficients (else DatasetError).
 
-    every : s between frames. grid : in its place, other times. given : other ranges of conditions, see design_of.
+    every : s between frames. grid : in its place, other times. ranges : other ranges of conditions, as
+        sampling_design() takes them.
     """
     kind = test_kind(specimen)
     term_groups(law)
@@ -259,9 +274,9 @@ DEFAULT_DRAWS = 4096
 class Acceptance(Presentable):
     """What is known of a design without simulating it.
 
-    draws : rows of the design. met : {criterion before simulation: (rows,) whether it is met on its own}.
-    strains : (rows,) log10 of the mean rate at the reference stress times the duration of the test.
-    window : (rows, 2) log10 of the strains between which creep is visible and the test lasts, as a rule.
+    draws : rows of the design. criteria_met : {criterion before simulation: (rows,) whether it is met on its own}.
+    log10_strains : (rows,) log10 of the mean rate at the reference stress times the duration of the test.
+    useful_strains : (rows, 2) log10 of the strains between which creep is visible and the test lasts, as a rule.
     """
 
     design: SamplingDomain
@@ -280,8 +295,8 @@ class Acceptance(Presentable):
     def useful(self) -> Bools:
         """Which of them have a useful rate, (rows,); of the others some may be useful, too.
 
-        Of Eq. (2) in the paper's box 8 % have, and 16 % of 600 simulated draws crept visibly and lasted: a dimple
-        relieves itself of stress as it deflects, and so outlasts rates above the window.
+        Of Eq. (2) in the paper's sampling domain 8 % have, and 16 % of 600 simulated draws crept visibly and lasted: a
+        dimple relieves itself of stress as it deflects, and so outlasts rates above the window.
         """
         in_range = (self.log10_strains >= self.useful_strains[:, 0]) & (self.log10_strains <= self.useful_strains[:, 1])
         return np.asarray(self.kept & in_range)
@@ -294,7 +309,7 @@ class Acceptance(Presentable):
 def acceptance(design: SamplingDomain, draws: int = DEFAULT_DRAWS, seed: int = 0) -> Acceptance:
     """Return what a design's criteria reject before simulation, and how its rates lie; nothing is simulated.
 
-    draws : how many rows; a rejection counts for the first criterion that is not met.
+    draws : number of rows; a rejection counts for the first criterion that is not met.
     """
     rows = design.draw(0, draws, seed)
     criteria_met = {c.name: c.passes(design.law, rows) for c in design.criteria if c.stage == "before"}
@@ -352,13 +367,13 @@ class SamplingDesign(Protocol):
 
 
 def sampling_design(law: CreepLaw, specimen: Specimen, domain: str = "conditioned", **changes: Any) -> SamplingDesign:
-    """Return a design for a law and a specimen; see paper_box.paper_box and conditioned_box.conditioned_box.
+    """Return a design for a law and a specimen; see paper_domain() and conditioned_domain().
 
-    box : "conditioned", whose samples creep visibly, or "paper", uniform in the law's bounds.
-    changes : ranges of conditions, (low, high) or a number: P1=(5, 20), apex_thickness=(.44, .6), end_time=3600;
+    domain : "conditioned", whose samples creep visibly, or "paper", uniform in the law's bounds.
+    changes : ranges of conditions, (low, high) or a number: P1=(5, 20), apex_thickness=(0.44, 0.6), end_time=3600;
         `every`, s between frames, or `grid`, a TimeGrid.
     """
     domains: dict[str, Callable[..., SamplingDesign]] = {"conditioned": conditioned_domain, "paper": paper_domain}
     if domain not in domains:
-        raise DatasetError(f"there is no box '{domain}': {nearest(domain, domains)}")
+        raise DatasetError(f"there is no sampling domain '{domain}': {nearest(domain, domains)}")
     return domains[domain](law, specimen, **changes)

@@ -1,23 +1,19 @@
 """Draws of a sampling design: the scrambled Sobol sequence, drawn rows, and which terms of a law a row contains.
 
-Rows of the sequence do not depend on the block in which they are drawn. Sobol (1967), USSR Comput. Math. Math. Phys. 7, 86; Owen scrambling as in scipy.stats.qmc.
+Rows of the sequence do not depend on the block in which they are drawn. Sobol (1967), USSR Comput. Math. Math. Phys. 7,
+86; Owen scrambling as in scipy.stats.qmc.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import gammaincinv
 
 from creepkit.arrays import Bools, Floats, frozen
 from creepkit.errors import DatasetError, nearest
-
-if TYPE_CHECKING:
-    pass
-
 
 MOST_ROWS = 2**30
 """Rows of one sequence, which has 30 bits."""
@@ -59,7 +55,7 @@ class Draws:
     """Rows of a design.
 
     parameters : (rows, parameters) in the author's units, columns as law.names; 0 of a coefficient is off.
-    conditions : (rows, conditions), columns as condition_names.
+    conditions : (rows, conditions) in MPa, s, mm and K, columns as condition_names.
     """
 
     parameters: Floats
@@ -79,7 +75,7 @@ class Draws:
         return len(self.parameters)
 
     def condition(self, name: str, default: float | None = None) -> Floats:
-        """One condition of every row, (rows,); `default` where the design does not vary it."""
+        """(rows,) in MPa, s, mm or K, one condition of every row; `default` where the design does not vary it."""
         if name in self.condition_names:
             return np.asarray(self.conditions[:, self.condition_names.index(name)])
         if default is None:
@@ -92,21 +88,24 @@ class Draws:
 
 
 CONCENTRATION = 0.7
-"""Of the Dirichlet distribution of shares: below 1 one part tends to lead."""
+"""Parameter of the Dirichlet distribution of rate fractions: below 1 one group tends to dominate."""
 
 
 TERM_COUNT_PROBABILITIES = (0.6, 0.3, 0.1)
-"""Shares of samples with one, two and three parts, unless a design says otherwise."""
+"""Fractions of samples with one, two and three groups of terms, unless a design says otherwise."""
 
 
 SELECTION_DIMENSIONS = 2
-"""Coordinates that the choice of parts takes; shares take one a part."""
+"""Coordinates that the choice of groups takes; their fractions take one for each group."""
 
 
 def active_terms(
     unit_coordinates: Floats, group_count: int, count_probabilities: tuple[float, ...] = TERM_COUNT_PROBABILITIES
 ) -> Bools:
-    """Which parts are there, (rows, parts), from coordinates (rows, 2): how many, then which of the ways to choose."""
+    """Which groups of terms are active, (rows, groups): how many, then which of the ways to choose them.
+
+    unit_coordinates : (rows, 2) from 0 to 1.
+    """
     weights = np.array(count_probabilities[:group_count]) / sum(count_probabilities[:group_count])
     subsets = (members for k in range(1, len(weights) + 1) for members in combinations(range(group_count), k))
     masks = [np.eye(group_count, dtype=bool)[list(chosen)].any(axis=0) for chosen in subsets]
@@ -119,7 +118,10 @@ def active_terms(
 
 
 def ln_term_fractions(unit_coordinates: Floats, active: Bools) -> Floats:
-    """ln of the share of each part, (rows, parts), -inf where it is not there; Dirichlet by gamma quantiles."""
+    """ln of the fraction of the rate of each group, (rows, groups), -inf where it is off; Dirichlet by gamma quantiles.
+
+    unit_coordinates : (rows, groups) from 0 to 1. active : (rows, groups).
+    """
     sizes = np.where(active, gammaincinv(CONCENTRATION, np.clip(unit_coordinates, 1e-9, 1 - 1e-9)), 0.0)
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(sizes / sizes.sum(axis=1, keepdims=True)))

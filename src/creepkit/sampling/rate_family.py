@@ -1,6 +1,7 @@
 """The rate family: a sampling domain of diverse rate functions, to train surrogates that take creep rates as input.
 
-One to three terms A stress^n strain^m time^k exp(-q time). It contains neither sinh nor n(t), so that the named laws remain unseen in training.
+One to three terms A stress^n strain^m time^k exp(-q time). It contains neither sinh nor n(t), so that the named laws
+remain unseen in training.
 """
 
 from __future__ import annotations
@@ -29,31 +30,31 @@ from creepkit.sampling.rates import RateEvaluationPoints, reference_stress_of
 from creepkit.specimens.bulge.specimen import Bulge
 
 LARGEST_STRESS_EXPONENTS = (14.0, 14.0, 8.0)
-"""Largest stress exponent of each term: two slopes and a milder one."""
+"""Largest stress exponent of each term: two steep ones and a milder one."""
 
 
 FAMILY_TERM_COUNT_PROBABILITIES = (0.25, 0.45, 0.3)
-"""Shares of rows with one, two and three terms: a rate with one slope in stress teaches a network little."""
+"""Fractions of rows with one, two and three terms: from one term a network learns little."""
 
 
 STRAIN_EXPONENTS, TIME_EXPONENTS = (-0.7, 0.5), (-0.7, 2.0)
-"""Their ends: decay and rise."""
+"""Bounds of the exponents: decay and rise."""
 
 
 STRAIN_EXPONENT_FRACTIONS, TIME_EXPONENT_FRACTIONS = (0.5, 0.4), (0.4, 0.3)
-"""Shares of the exponents that are 0, and below it; the rest are above."""
+"""Fractions of the exponents that are 0, and below it; the rest are above."""
 
 
 DECAYING_FRACTION, DECAY_TIME_FRACTIONS = 0.35, (0.03, 1.0)
-"""Share of the terms that fade, and on which time scales, as shares of the end of the test, uniform in the log."""
+"""Fraction of the terms that decay, and their time scales as fractions of the end of the test, uniform in the log."""
 
 
 THICKNESS_FACTORS = (0.88, 1.2)
-"""Of the specimen's own apex thickness: .44 to .60 mm of the paper's dimple."""
+"""Of the specimen's own apex thickness: 0.44 to 0.60 mm of the paper's dimple."""
 
 
 END_TIME_RANGE, JUMP_FRACTIONS = (1200.0, 86400.0), (0.15, 0.85)
-"""s, from 20 min to 24 h; shares of the end at which the load jumps."""
+"""s, from 20 min to 24 h; fractions of the end at which the load jumps."""
 
 
 def _law() -> CreepLaw:
@@ -82,7 +83,7 @@ class RateFamilyDomain(ConditionedDomain):
     name: ClassVar[str] = "rate-family"
 
     def shape_parameters(self, unit_coordinates: Floats, active: Bools, points: RateEvaluationPoints) -> Floats:
-        """Internal parameters before coefficients: n uniform; m and k off, decaying or rising; q off or fading.
+        """Internal values, (rows, parameters), before coefficients: n uniform; m, k and q may be off.
 
         A term that is alone does not rise with strain: it would have no strain to begin with.
         """
@@ -100,7 +101,8 @@ class RateFamilyDomain(ConditionedDomain):
 def rate_family(specimen: Specimen | None = None, *, grid: TimeGrid | None = None, **ranges: Any) -> RateFamilyDomain:
     """Return the rate family for a specimen, by default the paper's dimple, whose apex thickness is drawn too.
 
-    grid : other times than shares of the end (see time_grid.SHARES). given : other ranges of conditions, see design_of.
+    grid : other times than fractions of the end (see conditions.RELATIVE_TIMES). ranges : other ranges of conditions,
+        as sampling_design() takes them.
     """
     specimen = specimen or Bulge()
     kind = test_kind(specimen)
@@ -143,7 +145,7 @@ def _exponents_of_either_sign(
 
 
 def _decay_rates(unit_coordinates: Floats, end_times: Floats) -> Floats:
-    """Rates of fading, 1/s, of tests that end then, s."""
+    """(rows,) 1/s, rates of decay of tests with these ends, (rows,) s."""
     low, high = DECAY_TIME_FRACTIONS
     time_fraction = low * (high / low) ** np.clip(unit_coordinates / DECAYING_FRACTION, 0.0, 1.0)
     return np.asarray(np.where(unit_coordinates < DECAYING_FRACTION, 1.0 / (time_fraction * end_times), 0.0))

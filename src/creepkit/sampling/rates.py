@@ -1,6 +1,9 @@
 """Creep rates of many parameter rows at once, and the mean rate of a test at its reference stress.
 
-Bulge test: reference stress k P with k = 14.69 (h/0.5 mm)^-1.17 for a cavity radius of 7.5 mm and apex thickness h, P the geometric mean of both pressures. The amplitude grows by 42.3 (h/0.5 mm)^-0.486 mm per unit of reference strain. Both were fitted to simulations with the Norton law, n from 1 to 8, h from 0.44 to 0.60 mm. A tensile bar has the stresses of its two holds.
+Bulge test: reference stress k P with k = 14.69 (h/0.5 mm)^-1.17 for a cavity radius of 7.5 mm and apex thickness h, P
+the geometric mean of both pressures. The amplitude grows by 42.3 (h/0.5 mm)^-0.486 mm per unit of reference strain.
+Both were fitted to simulations with the Norton law, n from 1 to 8, h from 0.44 to 0.60 mm. A tensile bar has the
+stresses of its two holds.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ from creepkit.specimens.bulge.specimen import Bulge
 
 @dataclass(frozen=True, eq=False)
 class RateArguments:
-    """Where rates are stated: stress MPa, strain, time s, temperature K; numbers, or arrays that fit the rows."""
+    """Where rates are evaluated: stress MPa, strain, time s, temperature K; each a number or (rows, ...)."""
 
     stress: ArrayLike
     strain: ArrayLike
@@ -32,14 +35,21 @@ class RateArguments:
 
 
 def log10_rate(law: CreepLaw, parameters: Floats, arguments: RateArguments) -> Floats:
-    """Return log10 of the rate, 1/s, of rows of the author's parameters, (rows,)."""
+    """Return log10 of the rate in 1/s, (rows,).
+
+    parameters : (rows, parameters) in the author's units.
+    """
     return np.asarray(ln_rate(law, law.to_internal(parameters), arguments) / np.log(10.0))
 
 
 def ln_rate(
     law: CreepLaw, theta: Floats, arguments: RateArguments, states: Sequence[ArrayLike] | None = None
 ) -> Floats:
-    """Return ln of the rate of rows of internal parameters, (rows,): simple tension; states : by default virgin."""
+    """Return ln of the rate in 1/s, (rows, ...), in simple tension.
+
+    theta : (rows, ..., parameters) internal values. states : internal variables, each (rows, ...), by default their
+        initial values.
+    """
     stress = np.asarray(arguments.stress, float)
     states = [state.initial for state in law.states.values()] if states is None else states
     variables: list[Any] = [
@@ -65,7 +75,7 @@ POINT_COUNT = 12
 
 
 POINT_FRACTIONS = (np.arange(POINT_COUNT) + 0.5) / POINT_COUNT
-"""Of the end of the test."""
+"""Times of the points as fractions of the end of the test."""
 
 
 REFERENCE_STRAIN = 0.01
@@ -74,30 +84,36 @@ REFERENCE_STRAIN = 0.01
 
 @dataclass(frozen=True, eq=False)
 class RateEvaluationPoints:
-    """stress : (rows, looks) MPa, or (rows, 1) where it stays. times : (rows, looks) s. temperature : (rows,) K."""
+    """Points in time at which the rates of tests are evaluated.
+
+    stress : (rows, points) MPa, or (rows, 1) where it stays. times : (rows, points) s. temperature : (rows,) K.
+    """
 
     stress: Floats
     times: Floats
     temperature: Floats
 
     def arguments(self, axes: int = 0, *, one_time: bool = False, factor: float = 1.0) -> RateArguments:
-        """The point with `axes` more axes between rows and looks; timeless : one look will do where stress stays."""
+        """The points with `axes` more axes between rows and points.
+
+        one_time : one point will do where the stress stays. factor : multiplies the stresses.
+        """
         times = self.times[:, :1] if one_time else self.times
         columns = (factor * self.stress, times, self.temperature[:, None])
         stress, seconds, temperature = (v.reshape(v.shape[0], *[1] * axes, v.shape[1]) for v in columns)
         return RateArguments(stress, REFERENCE_STRAIN, seconds, temperature)
 
     def rows(self, rows: Ints) -> RateEvaluationPoints:
-        """Some of the rows."""
+        """Some of the rows, by their numbers (k,)."""
         return RateEvaluationPoints(self.stress[rows], self.times[rows], self.temperature[rows])
 
     @property
     def end_times(self) -> Floats:
-        """When the tests end, (rows,) s."""
+        """(rows,) s, when the tests end."""
         return np.asarray(self.times[:, -1] / POINT_FRACTIONS[-1])
 
     def midpoint_arguments(self, axes: int = 0) -> RateArguments:
-        """The point at the middle stress, half way in time, with `axes` axes after the rows."""
+        """The point at the mean stress and half the duration, with `axes` axes after the rows."""
         shape = (len(self.times), *[1] * axes)
         stress, seconds, temperature = (
             v.reshape(shape) for v in (self.mean_stress, 0.5 * self.end_times, self.temperature)
@@ -106,14 +122,14 @@ class RateEvaluationPoints:
 
     @property
     def mean_stress(self) -> Floats:
-        """The geometric mean of the stresses, (rows,) MPa."""
+        """(rows,) MPa, geometric mean of the stresses."""
         return np.asarray(np.exp(np.log(self.stress).mean(axis=1)))
 
 
 def mean_ln_rate(law: CreepLaw, theta: Floats, points: RateEvaluationPoints, stress_factor: float = 1.0) -> Floats:
-    """ln of the mean rate over a test, 1/s, (rows, ...).
+    """ln of the mean rate over a test, (rows, ...), the rate in 1/s.
 
-    theta : (rows, ..., parameters) internal. factor : on the stresses.
+    theta : (rows, ..., parameters) internal values. stress_factor : multiplies the stresses.
     """
     arguments = points.arguments(theta.ndim - 2, one_time=not law.uses(time), factor=stress_factor)
     ln_rates = ln_rate(law, theta[..., None, :], arguments)
@@ -126,11 +142,11 @@ LARGEST_REFERENCE_STRAIN = 0.2
 
 @dataclass(frozen=True)
 class ReferenceStress:
-    """How loads become rates.
+    """How loads become stresses and rates.
 
-    kind : of specimen. visible : creep, mm or strain, that every sample should show. per_load : reference stress over
-        load at the specimen's own thickness (mm; 0: it has none). growth : creep per unit of reference strain there.
-        powers : of thickness in both.
+    kind : of specimen. visible_creep : mm or strain, that every sample should show. stress_per_load : reference stress
+        over load at the specimen's own `thickness` (mm; 0: it has none). creep_per_strain : mm or strain, creep per
+        unit of reference strain there. thickness_exponents : of both.
     """
 
     kind: str
@@ -141,7 +157,7 @@ class ReferenceStress:
     thickness_exponents: tuple[float, float] = (0.0, 0.0)
 
     def evaluation_points(self, draws: Draws, end: float) -> RateEvaluationPoints:
-        """Stresses and times of each row; end : s, where it is not drawn."""
+        """Stresses and times of each row of draws; end : s, where it is not drawn."""
         first, second = (draws.condition(name)[:, None] for name in LOAD_LEVELS[self.kind])
         times = POINT_FRACTIONS * draws.condition("end_time", end)[:, None]
         if self.kind == BULGE:
@@ -155,7 +171,7 @@ class ReferenceStress:
         return RateEvaluationPoints(stress, times, draws.condition("temperature", ROOM_TEMPERATURE))
 
     def useful_rates(self, draws: Draws, end: float) -> tuple[Floats, Floats]:
-        """log10 of the lowest and highest useful mean rate, 1/s: half the visible creep, and the largest strain.
+        """log10 of the lowest and highest useful mean rate in 1/s, (rows,) each: half the visible creep, most strain.
 
         Half, because the higher of both pressures gives more creep than their geometric mean.
         """
@@ -168,7 +184,7 @@ class ReferenceStress:
         return np.log10(least_strain / end_times), np.log10(LARGEST_REFERENCE_STRAIN / end_times)
 
     def _relative_thickness(self, draws: Draws) -> Floats:
-        """Thickness of each row over the specimen's own."""
+        """(rows,) thickness of each row over the specimen's own."""
         if not self.thickness:
             return np.ones(len(draws))
         return draws.condition("apex_thickness", self.thickness) / self.thickness

@@ -50,14 +50,14 @@ def check_tests(alloy: Alloy, predictor: Predictor) -> None:
     for test, output in creep_outputs:
         if output not in test.outputs or not np.isfinite(test.outputs[output][test.used]).any():
             raise FitError(
-                f"alloy '{alloy.name}': test '{test.name}' has no {output}, without which creep cannot be told; it has "
+                f"alloy '{alloy.name}': test '{test.name}' has no {output}, without which creep cannot be seen; it has "
                 f"{', '.join(test.outputs) or 'no output'}"
             )
     _check_creep(alloy, creep_outputs)
 
 
 def limitations(alloy: Alloy, predictor: Predictor) -> tuple[str, ...]:
-    """What the tests of an alloy leave open, whatever is identified from them."""
+    """What cannot be known from the tests of an alloy, whatever law is identified from them."""
     notes, tests = [], alloy.tests
     if len(tests) == 1:
         notes.append("one test: how dimples or bars of this alloy differ cannot be known from it")
@@ -98,8 +98,9 @@ def _check_creep(alloy: Alloy, creep_outputs: Sequence[tuple[History, str]]) -> 
         return
     output, largest = max(detections, key=lambda pair: pair[1].increase)
     raise FitError(
-        f"alloy '{alloy.name}': elastic only, there is no creep to identify: its {output} grows by {largest.increase:.2g} "
-        f"while the load is held, within its noise of {largest.noise:.2g}; test it longer, hotter or at a higher load"
+        f"alloy '{alloy.name}': elastic only, there is no creep to identify: its {output} grows by "
+        f"{largest.increase:.2g} while the load is held, within its noise of {largest.noise:.2g}; "
+        "test it longer, hotter or at a higher load"
     )
 
 
@@ -155,8 +156,9 @@ class Compositions:
         return tuple(
             f"{self.source or 'the compositions'}: no alloy '{name}', whose class stays unknown; "
             f"{nearest(name, self.atomic)}"
-            for name in alloys if name not in self.atomic
-        )  # fmt: skip
+            for name in alloys
+            if name not in self.atomic
+        )
 
 
 def atomic_percent(weights: Mapping[str, float]) -> dict[str, float]:

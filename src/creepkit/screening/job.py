@@ -1,4 +1,4 @@
-"""ScreeningJob: what is asked of each alloy, as it is sent to worker processes, and how one alloy is screened.
+"""ScreeningJob: how each alloy is identified, as it is sent to worker processes, and the screening of one alloy.
 
 Laws are ranked, compared with the law without sparsity, and the best one is simulated by the specimen where that is
 asked for or in doubt.
@@ -46,7 +46,7 @@ def single_threaded(predictor: Predictor) -> Predictor:
     if isinstance(untyped, CompositePredictor):
         return CompositePredictor({name: single_threaded(p) for name, p in untyped.predictors.items()})
     if _is_surrogate(untyped):
-        metadata = replace(untyped.told, specimen=single_threaded(untyped.told.specimen))
+        metadata = replace(untyped.metadata, specimen=single_threaded(untyped.metadata.specimen))
         return untyped.recipe.surrogate(untyped.module, metadata)  # type: ignore[no-any-return]
     if getattr(untyped, "threads", 1) == 1:
         return predictor
@@ -54,7 +54,7 @@ def single_threaded(predictor: Predictor) -> Predictor:
 
 
 def underlying_specimen(predictor: Predictor) -> Predictor:
-    """What a surrogate or a stand-in says that it stands for; anything else is taken for the specimen itself."""
+    """The specimen of a surrogate or a reduced-order model; anything else is taken for the specimen itself."""
     untyped: Any = predictor
     if isinstance(untyped, CompositePredictor):
         return CompositePredictor({name: underlying_specimen(p) for name, p in untyped.predictors.items()})
@@ -62,7 +62,7 @@ def underlying_specimen(predictor: Predictor) -> Predictor:
 
 
 def predictor_fingerprint(predictor: Predictor) -> str:
-    """The same for predictors that predict the same, as far as their records tell, on however many threads."""
+    """SHA-256, shortened, of what decides the predictions of a predictor; the number of threads does not."""
     return hashlib.sha256(_serialised_predictor(single_threaded(predictor))).hexdigest()[:16]
 
 
@@ -72,7 +72,7 @@ def _serialised_predictor(predictor: Predictor) -> bytes:
         return b"".join(name.encode() + _serialised_predictor(p) for name, p in sorted(untyped.predictors.items()))
     if _is_surrogate(untyped):
         weights = b"".join(tensor.detach().numpy().tobytes() for tensor in untyped.module.state_dict().values())
-        return canonical_json(untyped.header) + weights
+        return canonical_json(untyped.file_header) + weights
     try:
         return canonical_json(specimen_to_json(untyped))
     except (DatasetError, AttributeError):  # a mesh of its own, or no record at all
@@ -85,7 +85,7 @@ def _is_surrogate(predictor: Any) -> bool:
 
 
 def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
-    """The answer for one alloy; what is wrong with it is an answer too."""
+    """The result for one alloy; that it cannot be identified is a result too."""
     start = time.process_time()
     try:
         check_tests(alloy, job.predictor)
@@ -162,19 +162,20 @@ def _predict_tests(best: Identification, tests: Sequence[History], predictor: Pr
 
 
 FITS_FOLDER = "fits"
-"""The folder of the best identifications, inside that of the answers."""
+"""The folder of the best identifications, inside that of the results."""
 
 
 METADATA_FIELDS = ("source", "labels")
-"""Fields of a history that no identification looks at."""
+"""Fields of a history that no identification uses."""
 
 
 @dataclass(frozen=True)
 class ScreeningJob:
-    """What is asked of each alloy, and the folder that answers are kept in.
+    """How each alloy is identified, and the folder in which results are kept.
 
-    using, through : predictors, as identify() takes them. dense : the law that is set against the reduced one, or None;
-    penalty : what reduces it, else the best of `laws` is taken. confirm : True, False or "when in doubt".
+    predictor, surrogate : `using` and `through` of identify(). dense_law : the law that is compared with the reduced
+        one, or None; penalty : what reduces it, else the best of `laws` is taken.
+    confirm : True, False or "when in doubt".
     """
 
     alloys: tuple[Alloy, ...]
@@ -189,7 +190,7 @@ class ScreeningJob:
     task_name: ClassVar[str] = "alloy"
 
     def path(self, number: int) -> Path:
-        """The file of an alloy's answer: its name where that can be one, and its fingerprint's beginning elsewhere."""
+        """The file of an alloy's result: its name where that can be a file name, else with the beginning of a hash."""
         name = self.alloys[number].name
         file_name = re.sub(r"[^A-Za-z0-9.=+-]+", "-", name).strip("-.")
         is_valid_name = file_name == name and [a.name.lower() for a in self.alloys].count(name.lower()) == 1
@@ -198,7 +199,7 @@ class ScreeningJob:
         )
 
     def fingerprint(self, number: int) -> str:
-        """Of the tests of an alloy and of all that is asked."""
+        """SHA-256, shortened, of the tests of an alloy and of how they are identified."""
         return _short_hash("\n".join([self._settings_text, *map(_history_text, self.alloys[number].tests)]).encode())
 
     def on_one_thread(self) -> ScreeningJob:
@@ -207,7 +208,7 @@ class ScreeningJob:
         return replace(self, predictor=single_threaded(self.predictor), surrogate=surrogate)
 
     def run(self, number: int) -> TaskResult:
-        """Screen an alloy and write its answer, and its best identification beside it, which other commands take."""
+        """Screen an alloy and write its result, and its best identification beside it, which other commands take."""
         result = replace(screen_alloy(self, self.alloys[number]), fingerprint=self.fingerprint(number))
         if result.identified:
             result.best.save(self.path(number).parent / FITS_FOLDER / self.path(number).name)
@@ -236,7 +237,7 @@ def _history_text(history: History) -> str:
 
 
 def _plain_value(value: Any) -> Any:
-    """A value whose repr tells all of it."""
+    """A value whose repr says all of it."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, Program):

@@ -58,7 +58,7 @@ PARAMETER_SD = {"n": 0.3, "m": 0.05, "B": 8.0}
 
 
 RATE_FACTOR_RANGE = (0.16, 1.0)
-"""Factor on the rate at 100 MPa and a strain of .01, drawn on a logarithmic scale."""
+"""Factor on the rate at 100 MPa and a strain of 0.01, drawn on a logarithmic scale."""
 
 
 LAW_PROBABILITIES = {"Fe-rich": (0.8, 0.1, 0.1), "Co-rich": (0.0, 0.5, 0.5)}
@@ -110,8 +110,10 @@ class PlantedPlate:
         composition_file = folder / "compositions.csv"
         contents = [{"alloy": a, **{e: f"{x:.4f}" for e, x in c.items()}} for a, c in self.compositions.atomic.items()]
         write_text("# unit: at.%\n" + _csv_text(contents), composition_file, SolveError)
-        rows = [{"alloy": a, "law": t.law, **t.values, "thickness_mm": t.thickness, **t.base_fractions}
-                for a, t in self.truth.items()]  # fmt: skip
+        rows = [
+            {"alloy": a, "law": t.law, **t.values, "thickness_mm": t.thickness, **t.base_fractions}
+            for a, t in self.truth.items()
+        ]
         write_text(_csv_text(rows), folder / "truth.csv", SolveError)
         return tests, composition_file
 
@@ -153,8 +155,9 @@ def _simulate_test(
     for _ in range(MAX_DRAWS):
         thickness = round(max(rng.normal(*THICKNESS_MEAN_SD), MIN_THICKNESS), 3)
         values = _draw_values(law, rng)
-        planned_test = History(name, TIMES, {}, LOADING, TEMPERATURE, "bulge", ELASTIC, alloy=name,
-                       geometry={"apex_thickness": thickness})  # fmt: skip
+        planned_test = History(
+            name, TIMES, {}, LOADING, TEMPERATURE, "bulge", ELASTIC, alloy=name, geometry={"apex_thickness": thickness}
+        )
         specimen = coarse_specimen.replace(refinement=2.0, tolerance=1e-3)
         creep_law = registry.default_registry().law(law)
         prediction = specimen.predict(creep_law, creep_law.to_internal(values), [planned_test])
@@ -180,7 +183,7 @@ def _draw_values(law: str, rng: np.random.Generator) -> dict[str, float]:
 
 
 def _rate_at_100_MPa(law: str, values: Mapping[str, float]) -> float:
-    """Creep rate at 100 MPa and a strain of .01, 1/s."""
+    """Creep rate in 1/s at 100 MPa and a strain of 0.01."""
     kernel = kernels.lower(registry.default_registry().law(law), "numpy")
     return float(kernel.rate(values, stress=100.0, strain=0.01, time=3600.0, temperature=TEMPERATURE))
 

@@ -20,12 +20,12 @@ from creepkit.records import History, Predictor
 from creepkit.screening.alloys import UNKNOWN_CLASS, Alloy, Compositions
 
 PredictedOutputs: TypeAlias = Mapping[str, Floats]
-"""{output: (frames,)} of one test."""
+"""{output: (frames,) mm or strain} of one test."""
 
 
 @dataclass(frozen=True, eq=False)
 class WeightedLaw:
-    """An identified law of an alloy: BIC less the best, and its share of belief."""
+    """An identified law of an alloy: its BIC less that of the best law, and its weight."""
 
     fit: Identification
     bic_difference: float
@@ -34,15 +34,15 @@ class WeightedLaw:
 
 @dataclass(frozen=True, eq=False)
 class AlloyResult:
-    """What was found of one alloy.
+    """The laws of one alloy.
 
-    fingerprint : of its tests and of all that was asked; an answer with the same one is not worked out again.
-    laws : identified laws, best first; failed : {law: why it could not be identified}.
+    fingerprint : of its tests and settings; a result with the same one is not computed again.
+    laws : identified laws, best first; failed_laws : {law: why it could not be identified}.
     verdict : one sentence on which law it is; equivalents : on each pair of laws that the tests cannot separate.
-    reason : why there is none; empty otherwise.
-    dense, sparse : the law without sparsity and what a penalty made of it, where they were asked for.
-    predicted : {test: {output: (frames,)}} of the best law with the test's own nuisances and offsets, by the specimen
-        where it was confirmed. seconds : of CPU that it took.
+    failure : why there is no law; empty otherwise.
+    dense_fit, sparse_fit : the law without sparsity and what a penalty made of it, where they were requested.
+    predicted : {test: {output: (frames,) mm or strain}} of the best law with the test's own nuisances and offsets, by
+        the specimen where it was confirmed. cpu_seconds : CPU time of the identification.
     """
 
     alloy: str
@@ -73,7 +73,7 @@ class AlloyResult:
 
     @property
     def decisive(self) -> bool:
-        """Whether the best law has nearly all of the belief, in a choice of several."""
+        """Whether the best law has nearly all of the weight, in a choice of several."""
         return len(self.laws) > 1 and self.laws[0].weight > DECISIVE_WEIGHT
 
     @property
@@ -83,7 +83,7 @@ class AlloyResult:
 
     @property
     def reduced_fit(self) -> Identification:
-        """What is set against the dense law: the one a penalty left, else the best of all."""
+        """The law that is compared with the dense one: what a penalty left of it, else the best of all."""
         return self.best if self.sparse_fit is None else self.sparse_fit
 
     def with_tests(self, tests: tuple[History, ...], predictor: Predictor) -> AlloyResult:
@@ -107,10 +107,10 @@ def mean_chi_square(fit: Identification) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Plate(Presentable):
-    """The answer of screen().
+    """The result of screen().
 
-    answers : one for each alloy, in the order of their first tests. histories : {alloy: its tests}.
-    compositions : what they are made of; None where nobody said. folder : where the answers are kept, or None.
+    results : one for each alloy, in the order of their first tests. histories : {alloy: its tests}.
+    compositions : of the alloys, None where they are not known. folder : where the results are kept, or None.
     notes : what is odd about the plate as a whole.
     """
 
@@ -122,9 +122,13 @@ class Plate(Presentable):
 
     @classmethod
     def from_results(
-        cls, alloys: Sequence[Alloy], results: Sequence[AlloyResult], predictor: Predictor,
-        compositions: Compositions | None, folder: Path | None,
-    ) -> Plate:  # fmt: skip
+        cls,
+        alloys: Sequence[Alloy],
+        results: Sequence[AlloyResult],
+        predictor: Predictor,
+        compositions: Compositions | None,
+        folder: Path | None,
+    ) -> Plate:
         """The plate of these alloys, with tests and predictor attached to their identifications."""
         notes = () if compositions is None else compositions.missing([a.name for a in alloys])
         attached = tuple(
@@ -135,12 +139,12 @@ class Plate(Presentable):
     @property
     def identified(self) -> tuple[AlloyResult, ...]:
         """The alloys that have a law."""
-        return tuple(answer for answer in self.results if answer.identified)
+        return tuple(result for result in self.results if result.identified)
 
     @property
     def failures(self) -> dict[str, str]:
         """{alloy: why it has no law}."""
-        return {answer.alloy: answer.failure for answer in self.results if not answer.identified}
+        return {result.alloy: result.failure for result in self.results if not result.identified}
 
     def __getitem__(self, alloy: str) -> AlloyResult:
         for result in self.results:
@@ -163,7 +167,7 @@ class Plate(Presentable):
         return {name: tuple(members[name]) for name in ordered_classes}
 
     def law_fractions(self) -> dict[str, dict[str, float]]:
-        """{class: {law: mean weight over the alloys of the class}} (Fig. 7c, with the undecided ones shared out)."""
+        """{class: {law: mean weight over the alloys of the class}} (Fig. 7c, undecided alloys counted by weight)."""
         fractions = {}
         for name, members in self.by_class().items():
             weights: dict[str, float] = defaultdict(float)

@@ -25,9 +25,10 @@ from creepkit.testing.sample_points import LawSamples
 
 @dataclass(frozen=True)
 class KernelTable:
-    """rows : (samples, 1 + S, 1 + 6 + S + P) value and derivatives of the rate and of each state rate.
+    """Rates of a kernel at sampled points.
 
-    logs : (samples,) ln rate.
+    rows : (samples, 1 + S, 1 + 6 + S + P) value and derivatives of the rate and of each state rate, in 1/s.
+    log_rates : (samples,) ln rate.
     """
 
     rows: Floats
@@ -155,7 +156,7 @@ def largest_differences(
 ) -> tuple[RelativeDifference, RelativeDifference]:
     """Return the largest relative difference of values (ln rate among them) and of derivatives.
 
-    forgive : leave out results that cancel, whose error is no more than the last bits of the inputs make.
+    allow_cancellation : leave out results that cancel, whose error is no more than the last bits of the inputs make.
     """
     values = derivatives = RelativeDifference()
     for k, (rows, computed, log) in enumerate(zip(reference.rows, table.rows, table.log_rates, strict=True)):
@@ -177,7 +178,7 @@ def largest_differences(
 def _recheck_difference(
     reference: MultiprecisionReference, table: KernelTable, difference: RelativeDifference, allow_cancellation: bool
 ) -> RelativeDifference:
-    """A difference beyond the tolerance, looked at again with more digits and, if so wished, for cancellation."""
+    """A difference beyond the tolerance, checked again with more digits and, if wanted, for cancellation."""
     k, row, column = difference.sample, difference.row, difference.column
     exact, computed = reference.rows_at_high_precision(k)[row][column], float(table.rows[k, row, column])
     if (

@@ -23,7 +23,11 @@ _MOST_BATCHES = 64
 
 @dataclass(frozen=True)
 class LawSamples:
-    """points : (samples, 6 + states); theta : (samples, parameters), internal; the constraints hold at all of them."""
+    """Points at which the constraints of a law hold.
+
+    points : (samples, 6 + states) stress, strain, time, temperature, largest principal and mean stress, then states, in
+        MPa, s and K. theta : (samples, parameters) internal values.
+    """
 
     points: Floats
     theta: Floats
@@ -32,7 +36,7 @@ class LawSamples:
         return len(self.points)
 
     def arguments(self) -> list[Floats]:
-        """The columns of points and theta, as the internal methods of kernels take them."""
+        """The columns of points and theta, each (samples,), as the internal methods of kernels take them."""
         return [*self.points.T, *self.theta.T]
 
     def at(self, **columns: float) -> LawSamples:

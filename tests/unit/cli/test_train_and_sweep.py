@@ -7,6 +7,7 @@ import pytest
 
 import creepkit as ck
 from creepkit.dataset.storage import write_dataset
+from creepkit.report.surrogate import size_study_rows
 from creepkit.surrogates import training as sweeping
 from creepkit.surrogates.evaluation import evaluate
 from creepkit.surrogates.training_loop import training_split
@@ -54,7 +55,7 @@ def test_a_sweep_is_a_table_and_a_picture_and_is_not_redone(file: Path, tmp_path
     assert sizes == {(c, h, 1, n) for c in ("gru", "lstm") for h in (4, 6) for n in (20, 48)}
     gru = next(e for e in found if (e["cell"], e["hidden"]) == ("gru", 4))
     # 3 gates of (4 + 4 + 2) x 4 numbers for log10 A, n, off and the load, and a head of 4 + 1
-    assert gru["weights"] == 3 * 4 * (4 + 4 + 2) + 5
+    assert gru["weight_count"] == 3 * 4 * (4 + 4 + 2) + 5
     assert (tmp_path / "sweep.png").read_bytes().startswith(PNG)
     stamps = {p: p.stat().st_mtime_ns for p in tmp_path.glob("*.safetensors")}
     assert len(stamps) == 8
@@ -79,7 +80,7 @@ def test_a_sweep_judges_every_number_of_samples_by_the_same_rows(tmp_path: Path)
 def test_the_best_of_a_sweep_stands_on_top(file: Path, tmp_path: Path) -> None:
     recipe = ck.ParameterGru(4, 1, training=ck.Training(epochs=2))
     entries = sweeping.size_study(bars(60), recipe, sweeping.NetworkSizes(hidden=(2, 8)), to=tmp_path)
-    _, rows = sweeping.size_study_rows(entries)
+    _, rows = size_study_rows(entries)
     losses = [float(row[5]) for row in rows]
     assert losses == sorted(losses)
 

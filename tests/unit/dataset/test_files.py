@@ -15,7 +15,7 @@ import creepkit
 import creepkit as ck
 from creepkit.dataset import storage
 from creepkit.dataset.dataset import COLUMNS
-from creepkit.dataset.shards import Campaign
+from creepkit.dataset.shards import GenerationJob
 from creepkit.dataset.simulation import rounded_outputs, simulate_rows
 from creepkit.errors import DatasetError
 from creepkit.files.writing import replace_on_success
@@ -23,8 +23,8 @@ from helpers.planted_sampling import BAR, GRID, Planted, Raising, strain, stress
 
 
 def simulated(tmp_path, design=None, first=0, rows=32, seed=0, specimen=BAR):
-    campaign = Campaign(design or Planted(), specimen, seed, tmp_path / "parts", rows)
-    return simulate_rows(campaign.design, campaign.header, seed, first, rows, lambda row: None)
+    job = GenerationJob(design or Planted(), specimen, seed, tmp_path / "parts", rows)
+    return simulate_rows(job.design, job.header, seed, first, rows, lambda row: None)
 
 
 @pytest.fixture

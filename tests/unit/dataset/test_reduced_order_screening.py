@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.dataset.shards import Campaign
+from creepkit.dataset.shards import GenerationJob
 from creepkit.dataset.simulation import empty_dataset, simulate_rows
 from creepkit.records import Status, SupportsReducedOrderModel
 from creepkit.sampling.criteria import BURST_TIME_FACTOR, SimulationOutcome, conditioned_criteria, paper_criteria
@@ -55,7 +55,7 @@ def test_without_a_number_of_seconds_a_burst_rules_nothing_out():
 
 
 def few(screened, rows=24):
-    """Few rows of the paper's box of Norton's law, at three times, its stresses high."""
+    """Few rows of the paper's sampling domain of Norton's law, at three times, its stresses high."""
     design = sampling_design(NORTON, DIMPLE, "paper", every=21600.0, screened=screened)
     return simulate_rows(design, empty_dataset(design, DIMPLE, {}), 1, 0, rows, lambda row: None)
 
@@ -95,10 +95,10 @@ def test_the_description_says_how_many_were_not_simulated(some_simulated):
     assert told in str(some_simulated)
 
 
-def test_whether_samples_are_screened_decides_what_a_campaign_is(tmp_path):
+def test_whether_samples_are_screened_decides_what_a_generation_is(tmp_path):
     both = [sampling_design(NORTON, DIMPLE, "paper", screened=screened) for screened in (True, False)]
     assert [design.document()["screened"] for design in both] == [True, False]
-    prints = {Campaign(design, DIMPLE, 1, tmp_path).fingerprint for design in both}
+    prints = {GenerationJob(design, DIMPLE, 1, tmp_path).fingerprint for design in both}
     assert len(prints) == 2
 
 

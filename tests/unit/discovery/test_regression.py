@@ -7,8 +7,8 @@ from creepkit import registry
 from creepkit.discovery.combinations import CHI_SQUARE_95, rank_combinations, squared_mahalanobis
 from creepkit.discovery.forms import candidate_form, candidate_forms, evaluate_forms
 from creepkit.discovery.regression import regress, solve_with_pysindy
-from creepkit.discovery.temperature_law import mixture_interval
 from creepkit.errors import FitError
+from creepkit.inverse.uncertainty.model_averaging import MixtureDistribution
 from creepkit.language import TemperatureForm, arrhenius
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
@@ -116,9 +116,8 @@ def test_planted_forms_remain_and_q_lies_in_its_interval():
         weights = np.array([one.weight for one in alike])
         value = np.array([one.regression.values["Q"] for one in alike])
         sd = np.array([np.sqrt(o.regression.covariance[(k := list(o.regression.values).index("Q")), k]) for o in alike])
-        low, high = mixture_interval(
-            value, sd * np.sqrt(found.overdispersion), weights / weights.sum(), [1e9] * len(alike)
-        )
+        scale = sd * np.sqrt(found.overdispersion)
+        _, low, high = MixtureDistribution(weights / weights.sum(), np.full(len(alike), 1e9), value, scale).interval()
         inside += low <= Q <= high
     assert kept >= 16
     assert inside >= 16

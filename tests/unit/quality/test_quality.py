@@ -41,9 +41,14 @@ def bulge(rng, *, celsius=770.0, P2=8.0, amplitude=None, noise=NOISE, name="plan
     growth = growth * (1 + (P2 / 8 - 1) * 3 * later / (4 * HOUR))
     clean = 0.055 * np.where(TIMES > 2 * HOUR, P2 / 8, 1.0) + offset + growth if amplitude is None else amplitude
     return History(
-        name, TIMES, {"amplitude": clean + noise * rng.normal(size=TIMES.size)}, PressureJump(8.0, P2, 2 * HOUR), T,
-        specimen="bulge", elastic=Elastic(180e3 - 100 * celsius),
-    )  # fmt: skip
+        name,
+        TIMES,
+        {"amplitude": clean + noise * rng.normal(size=TIMES.size)},
+        PressureJump(8.0, P2, 2 * HOUR),
+        T,
+        specimen="bulge",
+        elastic=Elastic(180e3 - 100 * celsius),
+    )
 
 
 def bar(rng, *, times=None, noise=2e-5, amount=0.02, steps=((0.0, 100.0),)):
@@ -71,11 +76,12 @@ def test_verdict_on_the_nine_bulges(measured):
     found = check_data_quality(measured, ElasticDimple())
     unloaded = {(h.name, "unloading") for h in measured}
     high = {(f"test_{k:02d}", "first frame") for k in (1, 2, 6, 9)}
-    assert kinds(found) == unloaded | high | {("test_11", "falling"), ("test_12", "twin"), ("test_12", "first frame")}
+    others = {("test_11", "falling"), ("test_12", "replicate"), ("test_12", "first frame")}
+    assert kinds(found) == unloaded | high | others
     told = {(s.history, s.kind): str(s) for s in found}
     assert "above the elastic one" in told["test_01", "first frame"]
     assert "below the elastic one" in told["test_12", "first frame"]
-    assert "grows 0.55 times as much as its twin test_08" in told["test_12", "twin"]
+    assert "grows 0.55 times as much as its replicate test_08" in told["test_12", "replicate"]
     assert "though the pressure was raised to 10 MPa" in told["test_11", "falling"]
 
 
@@ -212,10 +218,10 @@ def test_a_twin_far_from_the_other():
     rng = np.random.default_rng(10)
     assert check_data_quality(campaign(rng)) == ()
     found = check_data_quality(campaign(rng, twin={"rate": 0.5}))
-    assert ("twin", "twin") in kinds(found)
+    assert ("twin", "replicate") in kinds(found)
     assert {s.history for s in found} == {"twin"}
     pair = campaign(rng, twin={"rate": 0.5})[-2:]
-    assert kinds(check_data_quality(pair)) == {("t7", "twin"), ("twin", "twin")}  # two alone cannot tell
+    assert kinds(check_data_quality(pair)) == {("t7", "replicate"), ("twin", "replicate")}  # two alone cannot tell
 
 
 def test_twins_have_one_alloy_and_one_load():
@@ -267,9 +273,9 @@ def test_the_door():
 
 def test_kinds_that_cannot_be_marked():
     with pytest.raises(
-        HistoryError, match="'twin'; that kind questions a whole test; the kinds of frames are unloading"
+        HistoryError, match="'replicate'; that kind questions a whole test; the kinds of frames are unloading"
     ):
-        exclude_suspect_frames([], kinds=["twin"])
+        exclude_suspect_frames([], kinds=["replicate"])
     with pytest.raises(HistoryError, match="frames cannot be marked for 'colour'; the kinds of frames are"):
         exclude_suspect_frames([], kinds=["colour"])
 

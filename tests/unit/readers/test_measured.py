@@ -45,8 +45,10 @@ def test_alloy_617_spot_values(alloy617):
 def test_how_the_tests_of_alloy_617_ended(alloy617):
     """Its index says of 71 that they ruptured, of one that it was discontinued, nothing of the first laboratory's."""
     assert Counter((h.rupture_time is not None, h.unruptured) for h in alloy617.values()) == {
-        (True, False): 71, (False, True): 1, (False, False): 22,
-    }  # fmt: skip
+        (True, False): 71,
+        (False, True): 1,
+        (False, False): 22,
+    }
     assert {h.name.split("/")[0] for h in alloy617.values() if not h.end_known} == {"inl_1"}
     broken = alloy617["kaeri_1/AirBase_900_25_a"]
     assert broken.rupture_time == broken.times[-1]

@@ -28,7 +28,7 @@ def test_what_criteria_1_and_2_reject_of_nortons_law():
 def test_the_table_says_what_is_known_before_simulation():
     text = str(acceptance(sampling_design(ck.law("combined"), DIMPLE, "paper"), draws=1024, seed=1))
     lines = text.splitlines()
-    assert lines[0] == "law 'combined', paper domain, bulge test of 289 frames: 1024 draws, seed 1"
+    assert lines[0] == "law 'combined', paper sampling domain, bulge test of 289 frames: 1024 draws, seed 1"
     assert [line.split()[0] for line in lines[2:7]] == ["1", "2", "3", "4", "5"]
     assert all("after simulation" in line for line in lines[4:7])
     assert "would be simulated" in lines[-1]

@@ -1,4 +1,4 @@
-"""Designs of experiments: the sequence, the times, the tests that conditions describe, the paper's box."""
+"""Designs of experiments: the sequence, the times, the tests that conditions describe, the paper's sampling domain."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_a_specimen_that_no_design_loads():
         planned_test(ck.specimen("relaxation"), TEST, GRID)
 
 
-# ---- the paper's box ------------------------------------------------------------------------------------------------
+# ---- the paper's sampling domain -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("name", "inputs"), [("combined", 13), ("drifting-exponent", 11)])
@@ -166,21 +166,21 @@ def test_a_bar_has_two_stresses_and_no_modulus():
     assert design.condition_names == ("stress_1", "stress_2", "Tj")
 
 
-@pytest.mark.parametrize("box", ["paper", "conditioned"])
-def test_a_design_travels_and_says_what_decides_it(box):
-    design = sampling_design(ck.law("combined"), DIMPLE, box)
+@pytest.mark.parametrize("domain", ["paper", "conditioned"])
+def test_a_design_travels_and_says_what_decides_it(domain):
+    design = sampling_design(ck.law("combined"), DIMPLE, domain)
     assert isinstance(design, SamplingDesign)
     again = pickle.loads(pickle.dumps(design))
     assert again == design
     text = json.dumps(design.document(), allow_nan=False)
     assert text == json.dumps(again.document(), allow_nan=False)
-    other = sampling_design(ck.law("combined"), DIMPLE, box, P1=(3, 20))
+    other = sampling_design(ck.law("combined"), DIMPLE, domain, P1=(3, 20))
     assert text != json.dumps(other.document(), allow_nan=False)
 
 
-@pytest.mark.parametrize("box", ["paper", "conditioned"])
-def test_a_row_is_the_same_in_every_block(box):
-    design = sampling_design(ck.law("combined"), DIMPLE, box)
+@pytest.mark.parametrize("domain", ["paper", "conditioned"])
+def test_a_row_is_the_same_in_every_block(domain):
+    design = sampling_design(ck.law("combined"), DIMPLE, domain)
     whole = design.draw(0, 64, seed=5)
     for first, count in ((0, 1), (1, 7), (60, 4)):
         part = design.draw(first, count, seed=5)
@@ -191,7 +191,7 @@ def test_a_row_is_the_same_in_every_block(box):
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"box": "Paper box"}, "there is no box 'Paper box'"),
+        ({"domain": "Paper domain"}, "there is no sampling domain 'Paper domain'"),
         ({"P3": (1, 2)}, "a bulge test has no condition 'P3'"),
         ({"P1": (20, 3)}, r"the range \(20, 3\) is reversed; write \(3, 20\)"),
         ({"P1": "low"}, "condition 'P1' is 'low'"),

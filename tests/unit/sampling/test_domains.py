@@ -1,4 +1,4 @@
-"""The conditioned box and the rate family: rates in closed form, shares, stress scales, every registered law."""
+"""The conditioned domain and the rate family: rates in closed form, fractions, stress scales, every registered law."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_every_registered_law_has_a_box_or_says_why_not(name):
     law = ck.law(name)
     warm = {"temperature": (1000.0, 1100.0)} if law.uses(temperature) else {}
     if name == "norton-bailey-strain":
-        with pytest.raises(DatasetError, match="no linear rate coefficient .* use the paper's box"):
+        with pytest.raises(DatasetError, match="no linear rate coefficient .* use the paper's sampling domain"):
             sampling_design(law, DIMPLE, **warm)
         return
     design = sampling_design(law, DIMPLE, **warm)

@@ -59,7 +59,7 @@ def test_tests_of_another_specimen_need_a_predictor_of_their_own():
 
 
 def test_without_the_leading_output_creep_cannot_be_told():
-    with pytest.raises(FitError, match="test 'a' has no amplitude, without which creep cannot be told; it has width"):
+    with pytest.raises(FitError, match="test 'a' has no amplitude, without which creep cannot be seen; it has width"):
         check_tests(Alloy("X", (bulge("a", "X", outputs=("width",)),)), BULGE)
 
 

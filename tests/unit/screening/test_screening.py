@@ -7,14 +7,14 @@ import h5py
 import numpy as np
 import pytest
 
-from creepkit.api.simulation import specimen
+from creepkit.api.objects import specimen
 from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import Sqrt
 from creepkit.readers.history_csv import write_history
 from creepkit.screening import files
 from creepkit.screening.alloys import Compositions
-from creepkit.screening.screen import screen
+from creepkit.screening.screen import ScreeningOptions, screen
 from helpers.planted_alloys import NORTON, Deadly, Doubting, bars, bulge
 
 QUICK = IdentificationSettings(starts=2, sobol_points=16)
@@ -23,7 +23,11 @@ TWO = [*bars("X"), *bars("Y", values={"A": 4e-14, "n": 3.5}, seed=2)]
 
 
 def screened(histories, **how):
-    return screen(histories, **{"laws": ["norton"], "dense": None, "workers": 1, "settings": QUICK, **how})
+    how = {"laws": ["norton"], "dense": None, "workers": 1, "settings": QUICK, **how}
+    options = ScreeningOptions(
+        **{f.name: how.pop(f.name) for f in dataclasses.fields(ScreeningOptions) if f.name in how}
+    )
+    return screen(histories, options=options, **how)
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,78 @@
+"""Laws, specimens, surrogates, plugins, example data and saved identifications, by name or file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from creepkit import registry
+from creepkit.errors import HistoryError, PluginError, nearest
+
+if TYPE_CHECKING:
+    from creepkit.inverse.identification import Identification
+    from creepkit.language import CreepLaw
+    from creepkit.records import Specimen
+    from creepkit.registry import Plugin
+    from creepkit.surrogates.surrogate import Surrogate
+
+EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
+
+
+def law(name: str) -> CreepLaw:
+    """Return the law called `name`: one of `available("laws")`."""
+    return registry.default_registry().law(name)
+
+
+def specimen(name: str) -> Specimen:
+    """Return the specimen called `name`: one of `available("specimens")`."""
+    return registry.default_registry().specimen(name)
+
+
+def available(kind: str) -> dict[str, Any]:
+    """Return all that is registered of a kind, {name: value}: "laws", "specimens", "exporters" or "readers"."""
+    kinds = ("laws", "specimens", "exporters", "readers")
+    if kind not in kinds:
+        raise PluginError(f"'{kind}' is no kind of plugin; choose one of {', '.join(kinds)}")
+    return {name: entry.value for name, entry in getattr(registry.default_registry(), kind)().items()}
+
+
+def load_plugin(path: str | Path) -> Plugin:
+    """Load a plugin from a `.py` file; what it offers is available by name from then on.
+
+    The file is run as a program: load only what you trust.
+    """
+    return registry.default_registry().load_file(path)
+
+
+def surrogate(name_or_path: str | Path) -> Surrogate:
+    """Return the surrogate of this name that comes with creepkit, such as "dimple", or the one in a file."""
+    from creepkit.surrogates.loading import surrogate_by_name
+
+    return surrogate_by_name(name_or_path)
+
+
+def load(path: str | Path) -> Identification:
+    """Return the identification saved in a JSON file.
+
+    Attach its histories again with `.with_histories(histories, using)`.
+    """
+    from creepkit.inverse.identification_document import read_identification as run
+
+    return run(path)
+
+
+def example_data(name: str) -> Path:
+    """Return the folder of example data that come with creepkit, such as "planted creep curves".
+
+    name : of the data in words; case, spaces and hyphens do not matter. Measured data say in the heads of their files
+        where they come from and under which licence; planted data have their true values in `truth.json`.
+    """
+    folders = {_plain_name(path.name): path for path in EXAMPLE_DATA.iterdir() if path.is_dir()}
+    if _plain_name(name) not in folders:
+        known = sorted(path.name.replace("_", " ") for path in folders.values())
+        raise HistoryError(f"there are no example data '{name}'; {nearest(name, known)}")
+    return folders[_plain_name(name)]
+
+
+def _plain_name(name: str) -> str:
+    return "".join(character for character in name.lower() if character.isalnum())

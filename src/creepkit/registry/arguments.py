@@ -1,0 +1,68 @@
+"""Arguments of the public functions: laws, predictors and histories, given themselves or by the name of a plugin's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from creepkit.errors import FitError, LawError, SolveError
+from creepkit.readers import reading
+from creepkit.records import History, Predictor
+from creepkit.registry.plugin_registry import default_registry
+
+if TYPE_CHECKING:
+    from creepkit.language.law import CreepLaw
+
+
+def resolve_law(law: CreepLaw | str) -> CreepLaw:
+    """The law itself, or the one of that name."""
+    if isinstance(law, str):
+        return default_registry().law(law)
+    if not hasattr(law, "terms"):
+        raise LawError(f"a creep law or its name is needed, found {type(law).__name__}")
+    return law
+
+
+def resolve_predictor(predictor: Predictor | str) -> Predictor:
+    """The predictor itself, or the specimen of that name."""
+    if isinstance(predictor, str):
+        return default_registry().specimen(predictor)
+    if not hasattr(predictor, "predict"):
+        raise SolveError(f"a specimen, its name or another predictor is needed, found {type(predictor).__name__}")
+    return predictor
+
+
+def resolve_predictors(
+    predictors: Predictor | str | Mapping[str, Predictor | str] | None, histories: Sequence[History]
+) -> Predictor | dict[str, Predictor]:
+    """One predictor, or {specimen: predictor}; None stands for the specimens that the histories name."""
+    if predictors is None:
+        names = sorted({h.specimen for h in histories})
+        if not names:
+            raise FitError("there are no histories to identify a law from")
+        specimens = {name: default_registry().specimen(name) for name in names}
+        return specimens[names[0]] if len(names) == 1 else dict(specimens)
+    if isinstance(predictors, Mapping):
+        return {name: resolve_predictor(predictor) for name, predictor in predictors.items()}
+    return resolve_predictor(predictors)
+
+
+def check_histories(values: Sequence[History]) -> list[History]:
+    """The histories as a list; FitError for anything else."""
+    if isinstance(values, (str, Path, History)):
+        raise FitError("histories must be a list of them: read_histories(path) returns one, [history] makes one")
+    histories = list(values)
+    wrong_types = [type(h).__name__ for h in histories if not isinstance(h, History)]
+    if wrong_types:
+        raise FitError(f"histories must be a list of them, found {wrong_types[0]} in it; use read_histories(path)")
+    return histories
+
+
+def read_histories(paths: reading.PathsLike, reader: str | None = None) -> list[History]:
+    """Read measured histories from a file, a folder, a pattern such as "in625/*.csv", or several of these.
+
+    reader : name of the reader; by default the one that accepts the file.
+    """
+    readers = [entry.value for entry in default_registry().readers().values()]
+    return reading.read_histories(paths, readers, reader)
