@@ -32,17 +32,17 @@ class Known:
 
     @property
     def objective(self):
-        return SimpleNamespace(law=self.law, coordinates=SimpleNamespace(rates=self.rates))
+        return SimpleNamespace(law=self.law, coordinates=SimpleNamespace(term_rates=self.rates))
 
     def cost(self, u):
         self.calls.append(len(u))
         self.seen.append(u)
         return self.of(u)
 
-    def refine(self, u: np.ndarray, held: Mapping[int, float] | None = None) -> Minimum:
-        free = np.setdiff1d(np.arange(u.size), list(held or {}))
+    def refine(self, u: np.ndarray, fixed: Mapping[int, float] | None = None) -> Minimum:
+        free = np.setdiff1d(np.arange(u.size), list(fixed or {}))
         whole = np.array(u, float)
-        whole[list(held or {})] = list((held or {}).values())
+        whole[list(fixed or {})] = list((fixed or {}).values())
 
         def cost(part):
             moved = whole.copy()

@@ -76,9 +76,9 @@ def test_each_thickness_and_offset_is_found(fit):
 def test_what_is_left_is_the_noise(fit):
     """The planted noise is 1.5 um; chi-square counts it in units of what third differences say, here within a third."""
     for m in fit.tests:
-        assert m["amplitude"].errors.mse ** 0.5 < 2 * 1.5e-3
-        assert m["width"].errors.mse ** 0.5 == pytest.approx(0.02, rel=0.5)
-    assert fit.errors["amplitude"].rse < 1e-3
+        assert m["amplitude"].errors.mean_squared_error ** 0.5 < 2 * 1.5e-3
+        assert m["width"].errors.mean_squared_error ** 0.5 == pytest.approx(0.02, rel=0.5)
+    assert fit.errors["amplitude"].relative_squared_error < 1e-3
 
 
 def test_without_thickness_the_answer_is_worse_and_says_so(fit, tests):
@@ -93,9 +93,9 @@ def test_predictions_of_fitted_tests_have_their_own_nuisances(fit, tests):
     for k, test in enumerate(tests):
         np.testing.assert_allclose(found.of(k)[:, 0], test.outputs["amplitude"], atol=6 * 1.5e-3)
     stranger = fit.predict([tests[0].replace(name="another")])
-    alike = fit.predict([tests[0]], own=False)
+    alike = fit.predict([tests[0]], own_nuisances=False)
     np.testing.assert_array_equal(stranger.values, alike.values)
-    assert fit.nuisances([tests[0].replace(name="another")])["thickness"] == MEAN
+    assert fit.nuisance_values([tests[0].replace(name="another")])["thickness"] == MEAN
 
 
 def test_an_unknown_spread_is_estimated():
@@ -258,7 +258,7 @@ def test_a_test_that_was_left_out_is_predicted(fit, tests):
     assert [one.name for one in held] == [h.name for h in tests[:3]]
     assert all(len(one.fit.tests) == 2 for one in held)
     assert all(np.isfinite(one.errors["amplitude"].relative_squared_error) for one in held)
-    assert pooled_relative_squared_error(held, tests, "amplitude") > fit.errors["amplitude"].rse
+    assert pooled_relative_squared_error(held, tests, "amplitude") > fit.errors["amplitude"].relative_squared_error
 
 
 def test_the_plot_has_amplitudes_residuals_and_rates(fit, tmp_path):

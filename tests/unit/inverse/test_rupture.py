@@ -85,7 +85,7 @@ def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
     time, less, more = fit.rupture_time(stresses, 1000.0)
     assert ((less < truth) & (truth < more)).all()
     np.testing.assert_allclose(time, truth, rtol=0.35)
-    _, low, high = fit.rupture_time(stresses, 1000.0, scatter=False)
+    _, low, high = fit.rupture_time(stresses, 1000.0, test_scatter=False)
     assert ((less < low) & (high < more)).all()  # a single test has its own rate on top
     again = fit.rupture_times(plans)[0]
     np.testing.assert_allclose(again, time, rtol=1e-3)
@@ -94,7 +94,7 @@ def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
 def test_the_answer_says_how_tests_ended(planted, tmp_path):
     _, _, tests, fit = planted
     ends = [m.rupture for m in fit.tests]
-    assert [r.stopped for r in ends] == [k in (0, 6) for k in range(8)]
+    assert [r.censored for r in ends] == [k in (0, 6) for k in range(8)]
     assert [r.measured for r in ends] == [h.rupture_time or h.times[-1] for h in tests]
     assert "rupture: 6 of 8 tests broke; time predicted over measured" in str(fit)
     assert "2 stopped before, of which none should have broken" in str(fit)
@@ -218,7 +218,7 @@ def test_bars_are_followed_to_rupture_beside_tests_that_are_not():
     found = predict_to_rupture(both, law, given, [bars[0], held, bars[1]], jacobian=True).times_to_strain
     alone = BAR.predict_to_rupture(law, given, bars, jacobian=True).times_to_strain
     np.testing.assert_array_equal(found.rupture_times[0, [0, 2]], alone.rupture_times[0])
-    for name in ("arrivals", "slopes", "arrival_jacobian"):
+    for name in ("times", "log_time_derivatives", "time_jacobian"):
         joined, own = (getattr(life, name)[0] for life in (found, alone))
         np.testing.assert_array_equal(joined[[0, 2], : own.shape[1]], own)
     assert np.isnan(found.rupture_times[0, 1])

@@ -39,8 +39,8 @@ def test_candidates_stay_in_the_box_and_an_optimum_beyond_a_wall_is_found_on_it(
     landscape = Known(quadratic, Bounds(np.array([2.0, -5.0]), np.array([5.0, 5.0])))
     found = CmaEs().minima(landscape).minima[0]
     everything = np.concatenate(landscape.seen)
-    assert (everything >= landscape.box.lower).all()
-    assert (everything <= landscape.box.upper).all()
+    assert (everything >= landscape.bounds.lower).all()
+    assert (everything <= landscape.bounds.upper).all()
     np.testing.assert_allclose(found.u, [2.0, 2.0], atol=1e-4)
 
 

@@ -45,7 +45,7 @@ def test_of_a_linear_problem_they_are_normal(samples, tests):
     draws = np.stack([np.log(samples.values["A"]), samples.values["n"]])
     sd = np.sqrt(np.diag(covariance))
     assert samples.converged
-    assert samples.effective > 1000
+    assert samples.effective_sample_size > 1000
     assert np.abs(draws.mean(axis=1) - best) == pytest.approx(0.0 * sd, abs=0.15 * sd.max())
     assert np.cov(draws) == pytest.approx(covariance, rel=0.15)
     assert np.corrcoef(draws)[0, 1] == pytest.approx(covariance[0, 1] / sd.prod(), abs=0.005)
