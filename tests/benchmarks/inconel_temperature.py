@@ -41,7 +41,7 @@ from creepkit.inverse.cross_validation import (
     prediction_errors,
 )
 from creepkit.inverse.identification import Identification, IdentificationSettings
-from creepkit.inverse.identify import identify
+from creepkit.inverse.identify import StartingEstimate, identify
 
 LAW = ck.law("drifting-exponent").fix(m=0)
 THICKNESS = ck.Nuisance("thickness", mean=0.4935, sd=0.027)
@@ -129,9 +129,9 @@ def one_at_a_time(
         factor = next(o for o in trend.combinations.with_form("A", "arrhenius").libraries if o.parameter == "A")
         law = law_with_forms(LAW, [factor, library])
         theta = law_theta(law, base)
-        start = Coordinates(law, base.reference).u(theta)
+        start = StartingEstimate(Coordinates(law, base.reference).u(theta), reference=base.reference)
         name = f"Arrhenius, {library.parameter}: {library.name}"
-        found[name] = identify(law, tests, using, settings=settings, start=start, reference=base.reference)
+        found[name] = identify(law, tests, using, settings=settings, start=start)
     return found
 
 
@@ -143,8 +143,8 @@ def law_theta(law: ck.CreepLaw, base: Identification) -> np.ndarray:
 
 def again(fit: Identification, tests: list[ck.History], using: object) -> Identification:
     """The same law through another predictor, beginning where the first ended."""
-    return identify(fit.law, tests, using, settings=fit.settings, start=fit.u, known_nuisances=fit.nuisances,
-                    reference=fit.reference)  # fmt: skip
+    start = StartingEstimate.from_identification(fit)
+    return identify(fit.law, tests, using, settings=fit.settings, start=start)
 
 
 def held_out(fit: Identification, tests: list[ck.History]) -> tuple[HeldOutTest, ...]:

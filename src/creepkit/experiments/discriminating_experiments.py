@@ -18,22 +18,23 @@ from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import CandidateTest
 from creepkit.experiments.candidate_tests import candidate_tests as variations
-from creepkit.inverse.bound_penalties import BoundPenalties
+from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.composite_predictor import compared_outputs, predict, predictor_for, reduced_order_model_of
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
 from creepkit.inverse.iterative_estimation import starting_point
 from creepkit.inverse.noise_model import NoiseModel, cholesky_factors
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history, usable_frames
+from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
 from creepkit.inverse.reference_conditions import median_log_inverse_duration, median_log_strain_rate
-from creepkit.inverse.residuals import ResidualFunction
-from creepkit.inverse.search.local_refinement import Bounds, bounded_least_squares
+from creepkit.inverse.residuals import residuals_at_measured_values
+from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE
-from creepkit.inverse.selection.ranking import CREDIBLE_WEIGHT
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
 from creepkit.records import History, Predictor
 
-REFIT_STEPS = 8
+REFIT_TOLERANCES = Tolerances(max_steps=8, tolerance=1e-5)
 """Of a full refit."""
 
 
@@ -49,56 +50,35 @@ EXTRAPOLATION_LIMIT = 2.0
 """A planned test is followed until its growing output is so many times what was seen: beyond, other things happen."""
 
 
-OBSERVATION_FIELDS = (
-    "output_index",
-    "frame_index",
-    "present",
-    "leading_output",
-    "values",
-    "times",
-    "relative_noise",
-    "followed_to_rupture",
-    "censored",
-)
-"""Fields of entries with a row for each test."""
-
-
 @dataclass(frozen=True, eq=False)
 class ModelDiscrimination:
-    """Law b against law a.
+    """The alternative law b against what the reference law a predicts, without noise.
 
-    made : how many tests were; plans : those that could be. histories : of both, in this order, with a's predictions
-    for outputs. fit : of b. entries, scatter : by which they are compared, the scatter being that of a's fit.
+    problem : of law b, the tests that were made first and the candidates behind them. measured_count : how many were
+    made. alternative : the identification of law b. noise_model : that of law a, by which they are compared.
     """
 
+    problem: LeastSquaresProblem
     measured_count: int
     candidates: tuple[CandidateTest, ...]
-    histories: tuple[History, ...]
-    predictor: Predictor
     alternative: Identification
-    observations: ObservationVector
     noise_model: NoiseModel
 
     @classmethod
     def from_identifications(
         cls, reference: Identification, alternative: Identification, candidates: Sequence[CandidateTest]
     ) -> ModelDiscrimination:
-        """Law b against what law a predicts; plans that burst at once are left out."""
+        """Law b against what law a predicts; candidates that rupture at once are left out."""
         assert reference.predictor is not None
-        predictor, measured_histories = (
-            reduced_order_model_of(reference.predictor) or reference.predictor,
-            [_without_rupture(h) for h in reference.histories],
-        )
+        predictor = reduced_order_model_of(reference.predictor) or reference.predictor
+        measured_histories = [_without_rupture(h) for h in reference.histories]
         measured = [thinned_history(h, reference.settings.frames) for h in measured_histories]
         base_observations = ObservationVector.from_histories(measured, predictor, measured_histories)
-        all_histories = [
-            *measured,
-            *(_with_placeholder_outputs(d.history, predictor, base_observations) for d in candidates),
-        ]
-        predicted = _with_predictions(reference, predictor, all_histories, len(measured), base_observations)
+        planned = [_with_placeholder_outputs(d.history, predictor, base_observations) for d in candidates]
+        predicted = _with_predictions(reference, predictor, [*measured, *planned], len(measured), base_observations)
         output_limits = {name: _output_limit(measured, name) for name in base_observations.outputs}
-        usable = [(d, h) for d, h in zip(candidates, (_with_usable_frames(h, predictor, output_limits) for h in predicted[len(measured) :]), strict=True)
-                if h.used.sum() >= MIN_FRAMES]  # fmt: skip
+        limited = [_with_usable_frames(h, predictor, output_limits) for h in predicted[len(measured) :]]
+        usable = [(d, h) for d, h in zip(candidates, limited, strict=True) if h.used.sum() >= MIN_FRAMES]
         histories = (*predicted[: len(measured)], *(h for _, h in usable))
         observations = replace(
             ObservationVector.from_histories(histories, predictor),
@@ -108,58 +88,56 @@ class ModelDiscrimination:
         noise_model = NoiseModel(
             {name: reference.noise_model[name] for name in base_observations.outputs}, reference.noise_model.rate
         )
-        return cls(
-            len(measured), tuple(d for d, _ in usable), histories, predictor, alternative, observations, noise_model
+        made = histories[: len(measured)]
+        nuisances = _nuisances(alternative, histories, len(measured), predictor)
+        problem = LeastSquaresProblem(
+            histories=histories,
+            predictor=predictor,
+            coordinates=alternative.coordinates,
+            observations=observations,
+            nuisance_parameters=nuisances,
+            bounds=Bounds.from_law(
+                alternative.law,
+                alternative.coordinates,
+                median_log_strain_rate(made, predictor),
+                median_log_inverse_duration(made),
+            ).with_nuisances(nuisances),
+            settings=alternative.settings,
+            covariance_factor=cholesky_factors(residuals_at_measured_values(observations), noise_model),
         )
+        return cls(problem, len(measured), tuple(d for d, _ in usable), alternative, noise_model)
 
     def linearised_chi_square(self, candidate_indices: Sequence[int]) -> float:
-        """The chi-square left after one Gauss-Newton step, with the chosen plans."""
-        objective, x, bounds, covariance_factor = self._problem(candidate_indices)
-        residuals, bound_penalties = objective.evaluate(x), BoundPenalties(objective)
-        assert residuals.jacobian is not None
-        residuals_and_jacobian = np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1)
-        whitened = np.linalg.solve(covariance_factor, residuals_and_jacobian)[residuals.present]
-        jacobian_rows = np.concatenate([whitened[:, 1:], bound_penalties.jacobian(x)])
-        whitened_residuals = np.concatenate([whitened[:, 0], bound_penalties.residuals(x)])
-        weak_prior = np.diag(WEAK_PRIOR / bounds.width)
+        """The chi-square left after one Gauss-Newton step, with some of the candidates."""
+        problem, x = self._problem_of(candidate_indices)
+        residuals, jacobian = problem.whitened(x), problem.jacobian(x)
+        weak_prior = np.diag(WEAK_PRIOR / problem.bounds.width)
         step = np.linalg.lstsq(
-            np.concatenate([jacobian_rows, weak_prior]),
-            np.concatenate([-whitened_residuals, np.zeros(x.size)]),
-            rcond=None,
+            np.concatenate([jacobian, weak_prior]), np.concatenate([-residuals, np.zeros(x.size)]), rcond=None
         )[0]
-        return float(((whitened_residuals + jacobian_rows @ step) ** 2).sum())
+        return float(((residuals + jacobian @ step) ** 2).sum())
 
     def refitted_chi_square(self, candidate_indices: Sequence[int]) -> float:
-        """The chi-square left after a full refit."""
-        objective, x, bounds, covariance_factor = self._problem(candidate_indices)
-        return (
-            2.0
-            * bounded_least_squares(objective, bounds, covariance_factor, x, max_steps=REFIT_STEPS, tolerance=1e-5).cost
-        )
+        """The chi-square left after a full refit, with some of the candidates."""
+        problem, x = self._problem_of(candidate_indices)
+        return 2.0 * problem.minimise(x, tolerances=REFIT_TOLERANCES).cost
 
-    def _problem(self, candidate_indices: Sequence[int]) -> tuple[ResidualFunction, Floats, Bounds, Floats]:
-        """The problem of law b with the chosen plans: objective, where to begin, bounds, and covariance factors."""
-        indices, alternative = (
-            [*range(self.measured_count), *(self.measured_count + k for k in candidate_indices)],
-            self.alternative,
-        )
-        histories, measured = [self.histories[k] for k in indices], self.histories[: self.measured_count]
-        fields = {name: getattr(self.observations, name)[indices] for name in OBSERVATION_FIELDS}
-        nuisances = _nuisances(alternative, histories, self.measured_count, self.predictor)
-        observations = replace(self.observations, **fields)
-        objective = ResidualFunction(
-            alternative.law, histories, self.predictor, alternative.coordinates, observations, nuisances
-        )
-        initial_values = {(nuisance.kind, nuisance.owner): nuisance.value for nuisance in alternative.nuisances}
-        log_rate = median_log_strain_rate(measured, self.predictor)
-        bounds = Bounds.from_law(
-            alternative.law, alternative.coordinates, log_rate, median_log_inverse_duration(measured)
+    def _problem_of(self, candidate_indices: Sequence[int]) -> tuple[LeastSquaresProblem, Floats]:
+        """The problem of law b with some of the candidates, and where to begin, (unknowns,)."""
+        tests = [*range(self.measured_count), *(self.measured_count + k for k in candidate_indices)]
+        whole, alternative = self.problem, self.alternative
+        histories = [whole.histories[k] for k in tests]
+        nuisances = _nuisances(alternative, histories, self.measured_count, whole.predictor)
+        problem = replace(
+            whole,
+            histories=tuple(histories),
+            observations=whole.observations.of_tests(tests),
+            evaluations=EvaluationCache(),
         ).with_nuisances(nuisances)
-        x = bounds.clip(starting_point(nuisances, alternative.u, initial_values))
-        covariance_factor = cholesky_factors(
-            replace(objective.evaluate(x), present=objective.observations.present), self.noise_model
-        )
-        return objective, x, bounds, covariance_factor
+        initial_values = {(nuisance.kind, nuisance.owner): nuisance.value for nuisance in alternative.nuisances}
+        x = problem.bounds.clip(starting_point(nuisances, alternative.u, initial_values))
+        residuals = replace(problem.residuals(x), present=problem.observations.present)
+        return problem.with_covariance(cholesky_factors(residuals, self.noise_model)), x
 
 
 def _without_rupture(history: History) -> History:
@@ -291,7 +269,9 @@ def discriminating_experiments(
     designs : planned tests (histories need no outputs); by default variations of the tests that were made.
     """
     if reference.predictor is None or not reference.histories:
-        raise FitError("this identification was loaded from a file: attach its histories and specimen with fit.on()")
+        raise FitError(
+            "this identification was loaded from a file: attach its histories and specimen with fit.with_histories()"
+        )
     if reference.provenance.get("data") != alternative.provenance.get("data"):
         raise FitError(
             "the two identifications were made from different histories, frames or nuisances; make them alike"

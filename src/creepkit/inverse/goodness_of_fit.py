@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -19,11 +19,8 @@ from creepkit.inverse.observation_vector import (
     noise_standard_deviation,
     usable_frames,
 )
-from creepkit.inverse.residuals import ResidualFunction
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.records import History, Prediction, Predictor, constant_stress
-
-if TYPE_CHECKING:
-    pass
 
 
 def relative_squared_error(
@@ -162,7 +159,7 @@ class TestFit:
 
 
 def goodness_of_tests(
-    residual_function: ResidualFunction, residuals: Residuals, random_effects: tuple[Floats, Floats], histories: Sequence[History],
+    problem: LeastSquaresProblem, residuals: Residuals, random_effects: tuple[Floats, Floats], histories: Sequence[History],
     prediction: Prediction, ruptures: Sequence[RuptureComparison | None],
 ) -> tuple[TestFit, ...]:  # fmt: skip
     """One TestMisfit for each test.
@@ -171,8 +168,8 @@ def goodness_of_tests(
     ruptures : how each of them ended.
     """
     offsets, log_factors = random_effects
-    observations = residual_function.observations
-    ratios = _log_ratios(residual_function, residuals, np.take_along_axis(offsets, observations.output_index, axis=1))
+    observations = problem.observations
+    ratios = _log_ratios(problem, residuals, np.take_along_axis(offsets, observations.output_index, axis=1))
     logarithmic = (
         observations.per_observation([float(name in LOGARITHMIC_OUTPUTS) for name in observations.outputs]) > 0
     )
@@ -188,7 +185,7 @@ def goodness_of_tests(
         offset_by_output = {name: float(v) for name, v in zip(observations.outputs, offsets[k], strict=True)}
         outputs = tuple(
             _output_fit(history, name, prediction.of(k)[:, prediction.outputs.index(name)], offset_by_output[name])
-            for name in compared_outputs(residual_function.predictor, history) if name in offset_by_output and usable_frames(history, name).any()
+            for name in compared_outputs(problem.predictor, history) if name in offset_by_output and usable_frames(history, name).any()
         )  # fmt: skip
         rate_factor, weight = float(np.exp(log_factors[k])), float(residuals.test_weights[k])
         test_fits.append(
@@ -213,16 +210,16 @@ def _output_fit(history: History, name: str, predicted: Floats, offset: float) -
     return OutputFit(name, errors_of_output, offset, float(np.median(noise[frames])))
 
 
-def _log_ratios(residual_function: ResidualFunction, residuals: Residuals, offset: Floats) -> Floats:
+def _log_ratios(problem: LeastSquaresProblem, residuals: Residuals, offset: Floats) -> Floats:
     """ln((predicted + the test's offset) / measured) where the measured strain is above twice the floor, else NaN.
 
     For tests compared over their whole life, the distance instead.
     """
-    observations = residual_function.observations
+    observations = problem.observations
     floor = observations.per_observation([s.floor if n in LOGARITHMIC_OUTPUTS else np.inf for n, s in zip(observations.outputs, observations.transforms,
                                                                                   strict=True)])  # fmt: skip
     vertical = np.where(observations.followed_to_rupture[:, None], 0.0, residuals.values)
-    predicted = observations.inverse(vertical + residual_function.observed) + offset
+    predicted = observations.inverse(vertical + problem.observations.transformed_values) + offset
     above_floor = observations.present & (observations.values > 2 * floor)
     measured = np.where(above_floor, observations.values, 1.0)
     predicted_strain = np.where(above_floor, np.maximum(predicted, floor), 1.0)

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from functools import cached_property
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
 from creepkit.inverse.composite_predictor import compared_outputs, predicts_rupture
+from creepkit.inverse.output_transforms import LinearTransform, LogTimeTransform, LogTransform, OutputTransform
 from creepkit.records import History, Prediction, Predictor
 
 LOGARITHMIC_OUTPUTS = ("strain",)
@@ -22,109 +23,6 @@ LOGARITHMIC_OUTPUTS = ("strain",)
 
 RUPTURE_OUTPUT = "rupture"
 """The output of tests that were followed to their end: the time of rupture, s. It has no frames of its own."""
-
-
-class OutputTransform(Protocol):
-    """A monotone map g from an output to the quantity in which it is compared."""
-
-    @property
-    def floor(self) -> float:
-        """The size, in the output's unit, below which a difference is nothing."""
-        ...
-
-    @property
-    def ceiling(self) -> float:
-        """The compared quantity at which a test that burst goes on."""
-        ...
-
-    def forward(self, y: Floats) -> Floats:
-        """The compared quantity."""
-        ...
-
-    def inverse(self, g: Floats) -> Floats:
-        """The output whose compared quantity is g."""
-        ...
-
-    def derivative(self, y: Floats) -> Floats:
-        """dg/dy."""
-        ...
-
-
-@dataclass(frozen=True)
-class LogTransform:
-    """g(y) = asinh(y / 2 floor): ln(y / floor) well above the floor, linear below it, finite for y <= 0."""
-
-    floor: float
-
-    @property
-    def ceiling(self) -> float:
-        """That of a strain of one."""
-        return float(np.arcsinh(1.0 / (2.0 * self.floor)))
-
-    def forward(self, y: Floats) -> Floats:
-        """The compared quantity."""
-        return np.arcsinh(y / (2.0 * self.floor))
-
-    def inverse(self, g: Floats) -> Floats:
-        """The output whose compared quantity is g."""
-        return 2.0 * self.floor * np.sinh(g)
-
-    def derivative(self, y: Floats) -> Floats:
-        """dg/dy; 1/y well above the floor."""
-        return 1.0 / np.hypot(y, 2.0 * self.floor)
-
-
-@dataclass(frozen=True)
-class LinearTransform:
-    """g(y) = y / size: with size the spread of what was measured, one means as wrong as the mean of all frames is.
-
-    largest : largest value measured.
-    """
-
-    scale: float
-    largest: float
-
-    @property
-    def floor(self) -> float:
-        """One per cent of the size."""
-        return 0.01 * self.scale
-
-    @property
-    def ceiling(self) -> float:
-        """That of the largest value measured."""
-        return self.largest / self.scale
-
-    def forward(self, y: Floats) -> Floats:
-        """The compared quantity."""
-        return y / self.scale
-
-    def inverse(self, g: Floats) -> Floats:
-        """The output whose compared quantity is g."""
-        return g * self.scale
-
-    def derivative(self, y: Floats) -> Floats:
-        """dg/dy."""
-        return np.full(np.shape(y), 1.0 / self.scale)
-
-
-@dataclass(frozen=True)
-class LogTimeTransform:
-    """g(t) = -ln t of a rupture time t in s: larger where a test breaks earlier, as strains are where it is faster."""
-
-    floor: float = 0.0
-    ceiling: float = 0.0
-
-    def forward(self, y: Floats) -> Floats:
-        """The compared quantity."""
-        return -np.log(y)
-
-    def inverse(self, g: Floats) -> Floats:
-        """The rupture time whose compared quantity is g."""
-        return np.exp(-g)
-
-    def derivative(self, y: Floats) -> Floats:
-        """dg/dy."""
-        return -1.0 / y
 
 
 def transform_for(histories: Sequence[History], output: str) -> OutputTransform:
@@ -307,6 +205,26 @@ class ObservationVector:
                     np.where(noise > 0, noise, typical_noise) / typical_noise if typical_noise > 0 else 1.0
                 )
             start += frames.size
+
+    @cached_property
+    def transformed_values(self) -> Floats:
+        """(tests, observations) -, the measured values as they are compared."""
+        return self.forward(self.values)
+
+    @property
+    def count(self) -> int:
+        """Number of measured values."""
+        return int(self.present.sum())
+
+    def of_tests(self, tests: Sequence[int]) -> ObservationVector:
+        """The observations of some of the tests, by position."""
+        index = list(tests)
+        rows = {
+            name: getattr(self, name)[index]
+            for name, value in vars(self).items()
+            if isinstance(value, np.ndarray) and name not in ("noise", "transformed_values")
+        }
+        return replace(self, **rows)
 
     @property
     def log_times(self) -> Floats:

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from creepkit.inverse.iterative_estimation import WorkingNoise
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
-from creepkit.inverse.observation_vector import LinearTransform
+from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import restricted_covariance
 from creepkit.inverse.variance_components import (
@@ -18,6 +17,7 @@ from creepkit.inverse.variance_components import (
     inverse_covariances,
     restricted_log_likelihood,
 )
+from creepkit.inverse.working_noise import WorkingNoise
 
 
 def linear_model(values, design, clock=None, outputs=1):

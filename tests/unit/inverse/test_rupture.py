@@ -10,10 +10,9 @@ from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.composite_predictor import CompositePredictor, predict_to_rupture
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.cross_validation import leave_one_condition_out, times_to_rupture
-from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
-from creepkit.inverse.residuals import ResidualFunction
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
@@ -144,38 +143,35 @@ def test_a_condition_left_out_is_predicted():
 # ---- the objective ------------------------------------------------------------------------------------------------
 
 
-def objective(law, tests):
-    reference = ReferencePoint.from_histories(tests, BAR)
-    entries = ObservationVector.from_histories(tests, BAR)
-    unknowns = NuisanceParameters.from_histories(IdentificationSettings().nuisances, tests, BAR)
-    return ResidualFunction(law, tests, BAR, Coordinates(law, reference), entries, unknowns)
+def problem(law, tests):
+    return LeastSquaresProblem.from_histories(law, tests, BAR, IdentificationSettings(frames=100))
 
 
 @pytest.mark.parametrize(("A", "B"), [(1.0, 1.0), (1.0, 5.0), (0.01, 0.02), (1.0, 1e-4), (30.0, 1e-4), (20.0, 0.5)])
 def test_derivatives_of_candidates_that_break_early_late_or_never(A, B):
     law, values = PLANTED["Kachanov-Rabotnov"]
-    found = objective(law, campaign(law, values, [60, 80, 110], 1, stopped=(1,)))
+    found = problem(law, campaign(law, values, [60, 80, 110], 1, stopped=(1,)))
     theta = np.array([np.log(A * 1e-16), 4.0, np.log(B * 1e-15), 3.5, 4.0])
     u = found.coordinates.u(theta)
-    exact, step = found.evaluate(u).jacobian, 1e-5
+    exact, step = found.residuals(u).jacobian, 1e-5
     for k in range(u.size):
         h = step * np.eye(u.size)[k]
-        slope = (found.evaluate(u + h).values - found.evaluate(u - h).values) / (2 * step)
+        slope = (found.residuals(u + h).values - found.residuals(u - h).values) / (2 * step)
         assert np.isfinite(slope).all()
         np.testing.assert_allclose(exact[..., k], slope, rtol=0.01, atol=0.01 * max(1.0, np.abs(slope).max()))
-    np.testing.assert_allclose(found.batch_residuals(u[None])[0], found.evaluate(u).values, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(found.candidate_residuals(u[None])[0], found.residuals(u).values, rtol=1e-3, atol=1e-3)
 
 
 def test_ruptures_count_in_ln_time_and_stopped_tests_only_where_they_outlasted():
     law, values = PLANTED["Kachanov-Rabotnov"]
     tests = campaign(law, values, [60, 80], 1, stopped=(1,))
-    found = objective(law, tests)
+    found = problem(law, tests)
     last = found.observations.rupture_mask
     assert last.sum() == 2
     theta = np.array([np.log(1e-20), 4.0, np.log(1e-15), 3.5, 4.0])  # little creep: constant load hardly thins the bar
     for faster in (0.3, 20.0):
         theta[2] = np.log(faster * 1e-15)
-        residuals = found.evaluate(found.coordinates.u(theta))
+        residuals = found.residuals(found.coordinates.u(theta))
         life = {s: (1 - 0.01**5) / (5 * faster * 1e-15 * s**3.5) for s in (60.0, 80.0)}
         assert residuals.values[0, last[0]] == pytest.approx(np.log(tests[0].rupture_time / life[60.0]), abs=0.01)
         outlasted = np.log(tests[1].times[-1] / life[80.0])
@@ -189,8 +185,8 @@ def test_histories_that_say_nothing_of_their_end_are_compared_as_ever():
     tests = campaign(law, values, [60, 80], 1)
     cut = [h.up_to("strain", 0.01) for h in tests]
     assert not any(h.end_known for h in cut)
-    assert RUPTURE_OUTPUT not in objective(law, cut).observations.outputs
-    assert RUPTURE_OUTPUT in objective(law, tests).observations.outputs
+    assert RUPTURE_OUTPUT not in problem(law, cut).observations.outputs
+    assert RUPTURE_OUTPUT in problem(law, tests).observations.outputs
 
 
 def test_a_coordinate_is_the_log_of_the_rate_of_damage():

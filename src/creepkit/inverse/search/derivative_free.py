@@ -23,7 +23,9 @@ from scipy.stats import qmc
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import FitError
-from creepkit.inverse.search.cost_function import SearchTrace
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.search.cost_function import SearchResult, SearchTrace
+from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.term_mask import (
     CONVERGED_DECREASE,
     SearchCandidates,
@@ -34,14 +36,6 @@ from creepkit.inverse.search.term_mask import (
 
 if TYPE_CHECKING:
     from cmaes import CMA
-
-    from creepkit.inverse.search.cost_function import CostFunction, SearchResult
-    from creepkit.inverse.search.local_refinement import IterationCallback
-
-
-if TYPE_CHECKING:
-    from creepkit.inverse.search.cost_function import CostFunction, SearchResult
-    from creepkit.inverse.search.local_refinement import IterationCallback
 
 
 STALL_GENERATIONS = 10
@@ -72,9 +66,9 @@ class CmaEs:
         if not 0 < self.initial_step_size <= 1:
             raise FitError(f"CMA-ES: step is {self.initial_step_size:g} of the box; allowed are 0 (not itself) to 1")
 
-    def minima(self, cost_function: CostFunction, progress: IterationCallback | None = None) -> SearchResult:
+    def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
         """The refined best, best first, and the trace."""
-        runs = _CmaEsRuns(self, cost_function)
+        runs = _CmaEsRuns(self, problem)
         for k in range(self.iterations):
             runs.generation()
             if progress is not None:
@@ -82,7 +76,7 @@ class CmaEs:
             if runs.has_converged() and not runs.restart():
                 break
         trace = SearchTrace.from_costs("CMA-ES", runs.costs, runs.restarts)
-        return refine_candidates(cost_function, runs.candidates(), self.refined_candidates, trace, progress)
+        return refine_candidates(problem, runs.candidates(), self.refined_candidates, trace, progress)
 
     def initial_population(self, size: int) -> int:
         """How many candidates the first run has in a generation, for so many parameters."""
@@ -92,19 +86,19 @@ class CmaEs:
 class _CmaEsRuns:
     """One run after another, and the best candidate of each generation."""
 
-    def __init__(self, rules: CmaEs, cost_function: CostFunction) -> None:
-        self.rules, self.cost_function = rules, cost_function
-        self.rng = np.random.default_rng(cost_function.settings.seed)
+    def __init__(self, rules: CmaEs, problem: LeastSquaresProblem) -> None:
+        self.rules, self.problem = rules, problem
+        self.rng = np.random.default_rng(problem.settings.seed)
         self.costs: list[Floats] = []
         self.best_points: list[Floats] = []
         self.restarts: list[int] = []
-        self.optimiser = self._new_optimiser(np.full(cost_function.bounds.lower.size, 0.5))
+        self.optimiser = self._new_optimiser(np.full(problem.bounds.lower.size, 0.5))
 
     def generation(self) -> None:
         """Ask, evaluate all at once, and tell."""
-        bounds = self.cost_function.bounds
+        bounds = self.problem.bounds
         points = np.array([self.optimiser.ask() for _ in range(self.optimiser.population_size)])
-        cost = self.cost_function.cost(bounds.lower + points * bounds.width)
+        cost = self.problem.cost(bounds.lower + points * bounds.width)
         self.optimiser.tell([(x, float(c)) for x, c in zip(points, cost, strict=True)])
         self.costs.append(cost)
         self.best_points.append(points[cost.argmin()])
@@ -122,12 +116,12 @@ class _CmaEsRuns:
         if len(self.restarts) == self.rules.restarts:
             return False
         self.restarts.append(len(self.costs))
-        self.optimiser = self._new_optimiser(self.rng.random(self.cost_function.bounds.lower.size))
+        self.optimiser = self._new_optimiser(self.rng.random(self.problem.bounds.lower.size))
         return True
 
     def candidates(self) -> SearchCandidates:
         """The best of each generation."""
-        bounds = self.cost_function.bounds
+        bounds = self.problem.bounds
         return SearchCandidates(
             bounds.lower + np.array(self.best_points) * bounds.width, np.array([cost.min() for cost in self.costs])
         )
@@ -193,9 +187,9 @@ class ParticleSwarm:
                 "zero and, with form='constriction', must be more than 4 together"
             )
 
-    def minima(self, cost_function: CostFunction, progress: IterationCallback | None = None) -> SearchResult:
+    def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
         """The refined best, best first, and the trace."""
-        swarm, costs = _Swarm(self, cost_function), []
+        swarm, costs = _Swarm(self, problem), []
         for k in range(self.iterations):
             costs.append(swarm.evaluate())
             if progress is not None:
@@ -204,7 +198,7 @@ class ParticleSwarm:
                 break
             swarm.move(k)
         trace = SearchTrace.from_costs(f"particle swarm of {self.particles}, {self.form} form", costs)
-        return refine_candidates(cost_function, swarm.candidates(), self.refined_candidates, trace, progress)
+        return refine_candidates(problem, swarm.candidates(), self.refined_candidates, trace, progress)
 
     def next_velocity(self, velocity: Floats, attraction: Floats, iteration: int) -> Floats:
         """The velocity after iteration k, from the one before and the pull of the best places, within its limit."""
@@ -229,13 +223,13 @@ class ParticleSwarm:
 class _Swarm:
     """Where all particles are, in the unit cube, and the best that each has seen."""
 
-    def __init__(self, rules: ParticleSwarm, cost_function: CostFunction) -> None:
-        self.rules, self.cost_function, seed = rules, cost_function, cost_function.settings.seed
+    def __init__(self, rules: ParticleSwarm, problem: LeastSquaresProblem) -> None:
+        self.rules, self.problem, seed = rules, problem, problem.settings.seed
         self.rng, self.term_mask = (
             np.random.default_rng(seed),
-            TermMask.from_cost_function(cost_function, rules.maskable_terms),
+            TermMask.from_problem(problem, rules.maskable_terms),
         )
-        count, size = rules.particles, cost_function.bounds.lower.size
+        count, size = rules.particles, problem.bounds.lower.size
         self.x, self.velocity = _sobol_points(count, size, seed), np.zeros((count, size))
         self.masks = self.term_mask.initial_masks(count, self.rng)
         self.best_position, self.best_masks, self.best_cost = self.x.copy(), self.masks.copy(), np.full(count, np.inf)
@@ -244,7 +238,7 @@ class _Swarm:
 
     def evaluate(self) -> Floats:
         """(particles,) costs where they are, in one prediction; the best are remembered."""
-        cost = self.cost_function.cost(self._coordinates(self.x, self.masks))
+        cost = self.problem.cost(self._coordinates(self.x, self.masks))
         better = cost < self.best_cost
         self.best_position[better], self.best_masks[better], self.best_cost[better] = (
             self.x[better],
@@ -295,7 +289,7 @@ class _Swarm:
         return SearchCandidates(self._coordinates(self.best_position, self.best_masks), self.best_cost)
 
     def _coordinates(self, positions: Floats, masks: Bools) -> Floats:
-        bounds = self.cost_function.bounds
+        bounds = self.problem.bounds
         return self.term_mask.applied(bounds.lower + positions * bounds.width, masks)
 
     def _apply_boundary(self, x: Floats) -> None:

@@ -8,24 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, nearest
-from creepkit.inverse.search.cost_function import SearchTrace
-from creepkit.inverse.search.local_refinement import Minimum
-
-if TYPE_CHECKING:
-    from creepkit.inverse.search.cost_function import CostFunction
-    from creepkit.language import CreepLaw
-
-
-if TYPE_CHECKING:
-    from creepkit.inverse.search.cost_function import CostFunction, SearchResult
-    from creepkit.inverse.search.local_refinement import IterationCallback
-
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.search.cost_function import SearchResult, SearchTrace
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
+from creepkit.language import CreepLaw
 
 ANY_TERM = "any"
 """In place of names: every term may be switched off."""
@@ -56,18 +47,18 @@ class TermMask:
     has_permanent_term: bool
 
     @classmethod
-    def from_cost_function(cls, cost_function: CostFunction, maskable: str | Sequence[str]) -> TermMask:
+    def from_problem(cls, problem: LeastSquaresProblem, maskable: str | Sequence[str]) -> TermMask:
         """Those of a landscape; off : names of terms, or "any"."""
-        law, rates = cost_function.objective.law, cost_function.objective.coordinates.term_rates
+        law, rates = problem.law, problem.coordinates.term_rates
         positions = {label: [law.names.index(n) for n in law.only(label).names] for label in law.terms}
         rate_positions = {label: [k for k in owned if k in rates] for label, owned in positions.items()}
         terms = _maskable_terms(law, rate_positions, maskable)
-        own = np.zeros((len(terms), cost_function.bounds.lower.size), bool)
+        own = np.zeros((len(terms), problem.bounds.lower.size), bool)
         for row, label in zip(own, terms, strict=True):
             shared = {k for other, other_positions in positions.items() if other != label for k in other_positions}
             row[[k for k in positions[label] if k not in shared]] = True
-        resting = cost_function.bounds.centre
-        resting[list(rates)] = cost_function.bounds.lower[list(rates)]
+        resting = problem.bounds.centre
+        resting[list(rates)] = problem.bounds.lower[list(rates)]
         first_rates = np.array([rate_positions[label][0] for label in terms], np.int64)
         return cls(terms, first_rates, own, resting, len(terms) < len(law.terms))
 
@@ -170,16 +161,14 @@ class SearchCandidates:
 
 
 def refine_candidates(
-    cost_function: CostFunction,
+    problem: LeastSquaresProblem,
     candidates: SearchCandidates,
     max_count: int,
     trace: SearchTrace,
     progress: IterationCallback | None = None,
 ) -> SearchResult:
     """The best different candidates refined, best first; with most=0 the best one as it is."""
-    from creepkit.inverse.search.cost_function import SearchResult
-
-    selected = candidates.most_different(cost_function.bounds.width, max(max_count, 1))
+    selected = candidates.most_different(problem.bounds.width, max(max_count, 1))
     if max_count == 0:
         k = selected[0]
         best, cost = candidates.u[k], float(candidates.cost[k])
@@ -188,7 +177,7 @@ def refine_candidates(
         )
     minima = []
     for done, k in enumerate(selected):
-        minimum = cost_function.refine(candidates.u[k], fixed=candidates.fixed_values(k))
+        minimum = problem.minimise(candidates.u[k], fixed=candidates.fixed_values(k))
         minima.append(replace(minimum, terms_off=candidates.terms_off(minimum.u)))
         if progress is not None:
             progress("refinement", done + 1, len(selected))

@@ -24,8 +24,8 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import LawError
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.information_criteria import bic_penalty
 from creepkit.inverse.noise_model import NEGLIGIBLE_DRIFT, Residuals, effective_sample_size
-from creepkit.inverse.problem import least_squares_problem
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
 from creepkit.inverse.uncertainty.quantities import local_exponent
 from creepkit.inverse.variance_components import LinearisedProblem, inverse_covariances
@@ -101,9 +101,7 @@ def _score_under_own_covariance(fit: Identification, linearised: LinearisedProbl
         1 + 2 * (components.drift > NEGLIGIBLE_DRIFT) for components in fit.noise_model.outputs.values()
     )
     return (
-        log_det
-        + _optimum_under(linearised, inverses, len(fit.u))[0]
-        + parameter_count * float(np.log(independent_frames))
+        log_det + _optimum_under(linearised, inverses, len(fit.u))[0] + bic_penalty(parameter_count, independent_frames)
     )
 
 
@@ -201,12 +199,8 @@ def _whitened_residuals(fits: Sequence[Identification]) -> Floats:
     """
     if all(fit.linearised is not None for fit in fits):
         return under_common_covariance(fits).whitened
-    problems = [least_squares_problem(fit) for fit in fits]
-    present = problems[0].residual_function.observations.present
-    whitened = [
-        np.linalg.solve(problems[0].covariance_factor, p.residuals.values[..., None])[..., 0][present] for p in problems
-    ]
-    return np.array(whitened)
+    common = fits[0].least_squares_problem
+    return np.array([common.whiten(fit.residuals_of(fit.least_squares_problem).values) for fit in fits])
 
 
 def _reduction_between(first: Identification, second: Identification) -> tuple[str, str]:

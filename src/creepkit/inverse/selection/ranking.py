@@ -18,18 +18,19 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.information_criteria import (
+    CREDIBLE_WEIGHT,
+    DECISIVE_WEIGHT,
+    aicc_penalty,
+    bic_penalty,
+    criterion_weights,
+)
 from creepkit.inverse.selection.discrimination import under_common_covariance
 
 if TYPE_CHECKING:
     from creepkit.experiments.discriminating_experiments import DiscriminationDesign
     from creepkit.inverse.selection.discrimination import EquivalentLaws
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-
-
-DECISIVE_WEIGHT = 0.95
-
-
-CREDIBLE_WEIGHT = 0.05
 
 
 CRITERIA = ("bic", "aicc", "hold-out")
@@ -131,9 +132,8 @@ def rank(
     else:
         independent_frames = max(fits, key=lambda fit: fit.log_likelihood).effective_frames
         score = np.array([_effective_deviance(fit, independent_frames) for fit in fits])
-    score = score + [
-        _complexity_penalty(determined_parameter_count(fit), independent_frames, criterion) for fit in fits
-    ]
+    penalty = bic_penalty if criterion == "bic" else aicc_penalty
+    score = score + [penalty(determined_parameter_count(fit), independent_frames) for fit in fits]
     return ranking_from_scores(
         fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed
     )
@@ -144,9 +144,7 @@ def ranking_from_scores(
     failed: Mapping[str, str] | None = None,
 ) -> Ranking:  # fmt: skip
     """The ranking of identifications with these scores, -2 ln of their evidence."""
-    excess = scores - scores.min()
-    weight = np.exp(-0.5 * excess)
-    weight /= weight.sum()
+    excess, weight = criterion_weights(scores)
     chi_squares = np.full(len(fits), np.nan) if chi_square is None else chi_square
     order = np.argsort(excess, kind="stable")
     laws = tuple(RankedLaw(fits[k], float(excess[k]), float(weight[k]), float(chi_squares[k])) for k in order)
@@ -166,13 +164,4 @@ def determined_parameter_count(fit: Identification) -> int:
     is_uncorrelated = (fit.covariance != 0).sum(axis=1) == 1
     return int(
         (~(is_uncorrelated & np.isclose(variances, np.ptp(internal_bounds, axis=1) ** 2 / 12.0, rtol=1e-6))).sum()
-    )
-
-
-def _complexity_penalty(parameter_count: int, independent_frames: float, criterion: Criterion) -> float:
-    """What a criterion takes for `count` parameters."""
-    if criterion == "bic":
-        return parameter_count * float(np.log(independent_frames))
-    return 2.0 * parameter_count + 2.0 * parameter_count * (parameter_count + 1) / max(
-        independent_frames - parameter_count - 1.0, 1.0
     )

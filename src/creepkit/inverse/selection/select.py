@@ -19,9 +19,8 @@ import numpy as np
 
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import identify, refit
+from creepkit.inverse.identify import StartingEstimate, identify, refit
 from creepkit.inverse.noise_model import NoiseModel, Residuals
-from creepkit.inverse.problem import IdentificationProblem
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, rank, ranking_from_scores
@@ -80,15 +79,9 @@ def hold_out_scores(fits: Sequence[Identification], fitted_fraction: float = FIT
     for fit in fits:
         histories = list(fit.histories)
         partial = refit(fit, [_first_part(h, fitted_fraction) for h in histories])
-        problem = IdentificationProblem.from_histories(
-            fit.law, histories, _required_predictor(fit.predictor), fit.settings, fit.reference
-        )
-        residuals = problem.residual_function.evaluate(
-            np.concatenate([partial.u, [n.value for n in partial.nuisances]])
-        )
-        is_early = problem.residual_function.observations.times <= fitted_fraction * np.array(
-            [[h.times[-1]] for h in histories]
-        )
+        problem = fit.least_squares_problem
+        residuals = problem.residuals(partial.x)
+        is_early = problem.observations.times <= fitted_fraction * np.array([[h.times[-1]] for h in histories])
         beginning = replace(
             residuals, present=residuals.present & is_early, values=np.where(is_early, residuals.values, 0.0)
         )
@@ -108,11 +101,6 @@ def _first_part(history: History, fitted_fraction: float) -> History:
     """The first part of a history, which does not know how the test will end."""
     used = history.used & (history.times <= fitted_fraction * float(history.times[-1]))
     return history.replace(used=used, rupture_time=None, unruptured=False)
-
-
-def _required_predictor(using: Predictor | None) -> Predictor:
-    assert using is not None
-    return using
 
 
 SELECTION_FRAMES = 60
@@ -194,13 +182,9 @@ def _try_to_identify(
     failed: dict[str, str], previous_fit: Identification | None = None,
 ) -> Identification | None:  # fmt: skip
     """Identify one law, from where a cheaper predictor ended if it did; what goes wrong with it is told in `failed`."""
-    initial = (
-        {}
-        if previous_fit is None
-        else {"start": previous_fit.u, "known": previous_fit.nuisances, "reference": previous_fit.reference}
-    )
+    start = None if previous_fit is None else StartingEstimate.from_identification(previous_fit)
     try:
-        return identify(law, histories, using, settings=settings, **initial)  # type: ignore[arg-type]
+        return identify(law, histories, using, settings=settings, start=start)
     except CreepkitError as error:
         failed[law.name] = str(error)
         return None

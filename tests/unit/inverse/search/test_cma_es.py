@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
+from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.search.cost_function import SearchTrace
 from creepkit.inverse.search.derivative_free import CmaEs
-from creepkit.inverse.search.local_refinement import Bounds
 from creepkit.inverse.settings import IdentificationSettings
 from helpers.cost_functions import Known, cube, quadratic, rastrigin, rosenbrock
 

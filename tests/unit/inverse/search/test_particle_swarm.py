@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
+from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.search.derivative_free import ParticleSwarm
-from creepkit.inverse.search.local_refinement import Bounds
 from creepkit.inverse.search.term_mask import TermMask
 from creepkit.inverse.settings import IdentificationSettings
 from helpers.cost_functions import SUM, TRIPLE, Known, cube, quadratic, rastrigin, rosenbrock
@@ -219,7 +219,7 @@ def test_only_what_may_be_off_is():
 
 def test_masks_of_three_terms_are_never_empty_and_reach_every_subset():
     landscape = Known(quadratic, cube(len(TRIPLE.names)), law=TRIPLE, rates=(0, 2, 5))
-    switches, rng = TermMask.from_cost_function(landscape, "any"), np.random.default_rng(0)
+    switches, rng = TermMask.from_problem(landscape, "any"), np.random.default_rng(0)
     masks = switches.initial_masks(2000, rng)
     assert masks.any(axis=1).all()
     assert len(np.unique(masks, axis=0)) == 7
@@ -233,7 +233,7 @@ def test_a_parameter_shared_with_another_term_does_not_rest():
 
     law = SUM.times(arrhenius(T_ref=1000.0))
     landscape = Known(quadratic, cube(len(law.names)), law=law, rates=(0, 2))
-    switches = TermMask.from_cost_function(landscape, "any")
+    switches = TermMask.from_problem(landscape, "any")
     live = dict(zip(law.names, switches.active_parameters(np.array([True, False])), strict=True))
     assert live.pop("Q")
     assert [name for name, is_live in live.items() if not is_live] == ["A_2", "n_2", "m"]
