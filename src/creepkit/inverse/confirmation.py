@@ -10,7 +10,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import CompositePredictor
-from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, output_errors
+from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, errors_of_output
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
 from creepkit.records import History, Prediction, Predictor, Status
@@ -174,12 +174,12 @@ def _output_column(prediction: Prediction, k: int, name: str) -> Floats:
 def _confirmed_output(
     history: History, name: str, simulated: Floats, fitted: Floats | None, reported: OutputFit | None
 ) -> ConfirmedOutput:
-    used, noise = usable_frames(history, name), noise_standard_deviation(history, name)
-    measured, sd = history.outputs[name][used], noise[used]
-    simulation_errors = output_errors(measured, simulated[used], sd)
+    used = usable_frames(history, name)
+    sd = noise_standard_deviation(history, name)[used]
+    simulation_errors = errors_of_output(history, name, simulated)
     if fitted is None:
         return ConfirmedOutput(name, simulation_errors, None if reported is None else reported.errors, float("nan"))
     known = sd > 0
     difference = ((simulated - fitted)[used] / np.where(known, sd, np.nan))[known]
     rms = float(np.sqrt(np.mean(difference**2))) if difference.size else float("nan")
-    return ConfirmedOutput(name, simulation_errors, output_errors(measured, fitted[used], sd), rms)
+    return ConfirmedOutput(name, simulation_errors, errors_of_output(history, name, fitted), rms)

@@ -204,10 +204,15 @@ def goodness_of_tests(
     return tuple(test_fits)
 
 
+def errors_of_output(history: History, name: str, predicted: Floats) -> OutputErrors:
+    """Errors of one output of one test over its usable frames; predicted : (frames,) in the output's unit."""
+    used = usable_frames(history, name)
+    return output_errors(history.outputs[name][used], predicted[used], noise_standard_deviation(history, name)[used])
+
+
 def _output_fit(history: History, name: str, predicted: Floats, offset: float) -> OutputFit:
-    frames, noise = usable_frames(history, name), noise_standard_deviation(history, name)
-    errors_of_output = output_errors(history.outputs[name][frames], predicted[frames] + offset, noise[frames])
-    return OutputFit(name, errors_of_output, offset, float(np.median(noise[frames])))
+    noise = noise_standard_deviation(history, name)[usable_frames(history, name)]
+    return OutputFit(name, errors_of_output(history, name, predicted + offset), offset, float(np.median(noise)))
 
 
 def _log_ratios(problem: LeastSquaresProblem, residuals: Residuals, offset: Floats) -> Floats:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError, SolveError
-from creepkit.inverse.cross_validation import leave_one_test_out, pooled_relative_squared_error
+from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.goodness_of_fit import relative_squared_error
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identification_document import identification_to_json, load_identification
@@ -254,11 +254,11 @@ def test_files_of_the_first_version_are_refused(fit, tmp_path):
 
 def test_a_test_that_was_left_out_is_predicted(fit, tests):
     """Thicknesses of unseen tests are only known to 4 %, which is a quarter of the rate: errors far above the noise."""
-    held = leave_one_test_out(fit, tests[:3])
-    assert [one.name for one in held] == [h.name for h in tests[:3]]
-    assert all(len(one.fit.tests) == 2 for one in held)
-    assert all(np.isfinite(one.errors["amplitude"].relative_squared_error) for one in held)
-    assert pooled_relative_squared_error(held, tests, "amplitude") > fit.errors["amplitude"].relative_squared_error
+    held = cross_validate(fit, tests[:3], by="test")
+    assert list(held.errors) == [h.name for h in tests[:3]]
+    assert all(len(fold.fit.tests) == 2 for fold in held.folds)
+    assert all(np.isfinite(errors["amplitude"].relative_squared_error) for errors in held.errors.values())
+    assert held.pooled_error("amplitude") > fit.errors["amplitude"].relative_squared_error
 
 
 def test_the_plot_has_amplitudes_residuals_and_rates(fit, tmp_path):

@@ -9,7 +9,7 @@ import creepkit as ck
 from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.composite_predictor import CompositePredictor, predict_to_rupture
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.cross_validation import leave_one_condition_out, times_to_rupture
+from creepkit.inverse.cross_validation import cross_validate, times_to_rupture
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
@@ -133,8 +133,9 @@ def test_what_tension_cannot_tell_costs_the_other_parameters_nothing(planted):
 def test_a_condition_left_out_is_predicted():
     tests = campaign(OMEGA, {"A": 1e-16, "n": 4.0, "m": 20.0}, [60, 80, 100, 120], 3)
     fit = ck.identify(OMEGA, tests, using=BAR, starts=3, frames=16)
-    held, fits = leave_one_condition_out(fit, tests, None)
-    assert len(fits) == 4
+    folds = cross_validate(fit, by="condition")
+    held = folds.times_to_rupture()
+    assert len(folds.folds) == 4
     assert sorted(held.names) == ["t0", "t1", "t2", "t3"]
     assert held.z_factor < 3.0
     np.testing.assert_array_equal(sorted(held.measured), sorted(h.rupture_time for h in tests))

@@ -1,12 +1,7 @@
 """select: several laws are identified from the same histories and ranked.
 
 Candidates are the reductions of a law and sums of two laws. Criteria are BIC, AICc and the predictive likelihood of the
-end of every history, given a fit to its beginning: with C the covariance of all observations, that of the best law, and
-C_1 its part of the beginning,
-
-    -2 ln p(end | beginning) = (r' C^-1 r + ln|C|) - (r_1' C_1^-1 r_1 + ln|C_1|)
-
-but for a constant, r the residuals at the values that the beginning alone gave.
+end of every history, given a fit to its beginning, under the covariance of the best law (see inverse.cross_validation).
 """
 
 from __future__ import annotations
@@ -18,14 +13,13 @@ from itertools import combinations
 import numpy as np
 
 from creepkit.errors import CreepkitError, FitError
+from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import StartingEstimate, identify, refit
-from creepkit.inverse.noise_model import NoiseModel, Residuals
+from creepkit.inverse.identify import StartingEstimate, identify
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, rank, ranking_from_scores
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.variance_components import inverse_covariances
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
@@ -66,41 +60,6 @@ def _distinct_laws(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
     for law in laws:
         by_fingerprint.setdefault(law.fingerprint, law)
     return list(by_fingerprint.values())
-
-
-FITTED_FRACTION = 0.7
-"""Share of each history's duration that the fit sees."""
-
-
-def hold_out_scores(fits: Sequence[Identification], fitted_fraction: float = FITTED_FRACTION) -> list[float]:
-    """-2 ln of the predictive likelihood of what comes after `kept` of each history, for each law."""
-    noise_model = fits[under_common_covariance(fits).reference_law].noise_model
-    scores = []
-    for fit in fits:
-        histories = list(fit.histories)
-        partial = refit(fit, [_first_part(h, fitted_fraction) for h in histories])
-        problem = fit.least_squares_problem
-        residuals = problem.residuals(partial.x)
-        is_early = problem.observations.times <= fitted_fraction * np.array([[h.times[-1]] for h in histories])
-        beginning = replace(
-            residuals, present=residuals.present & is_early, values=np.where(is_early, residuals.values, 0.0)
-        )
-        scores.append(
-            _negative_log_likelihood(residuals, noise_model) - _negative_log_likelihood(beginning, noise_model)
-        )
-    return scores
-
-
-def _negative_log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:
-    """r' C^-1 r + ln|C|."""
-    inverses, log_det = inverse_covariances(residuals, noise_model)
-    return float(np.einsum("te,tef,tf->", residuals.values, inverses, residuals.values) + log_det)
-
-
-def _first_part(history: History, fitted_fraction: float) -> History:
-    """The first part of a history, which does not know how the test will end."""
-    used = history.used & (history.times <= fitted_fraction * float(history.times[-1]))
-    return history.replace(used=used, rupture_time=None, unruptured=False)
 
 
 SELECTION_FRAMES = 60
@@ -147,7 +106,8 @@ def select(
         name, reason = next(iter(failed.items()))
         raise FitError(f"none of the {len(failed)} laws could be identified; {name}: {reason}")
     if by == "hold-out":
-        scores = hold_out_scores(fits)
+        noise_model = fits[under_common_covariance(fits).reference_law].noise_model
+        scores = [cross_validate(fit, by="time").predictive_deviance(noise_model) for fit in fits]
         return ranking_from_scores(fits, np.array(scores), by, independent_frames=float("nan"), failed=failed)
     return rank(fits, by, failed)
 
