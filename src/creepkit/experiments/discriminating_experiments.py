@@ -39,7 +39,7 @@ REFIT_TOLERANCES = Tolerances(max_steps=8, tolerance=1e-5)
 
 
 MIN_FRAMES = 5
-"""A planned test with fewer frames before it bursts says nothing."""
+"""A planned test with fewer frames before it ruptures is left out."""
 
 
 WEAK_PRIOR = 0.03
@@ -47,7 +47,7 @@ WEAK_PRIOR = 0.03
 
 
 EXTRAPOLATION_LIMIT = 2.0
-"""A planned test is followed until its growing output is so many times what was seen: beyond, other things happen."""
+"""A planned test is predicted until its leading output is so many times what was measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,10 +148,13 @@ def _without_rupture(history: History) -> History:
 def _with_placeholder_outputs(
     candidate: History, predictor: Predictor, base_observations: ObservationVector
 ) -> History:
-    """A planned history with room for the outputs of those that were made, at their noise."""
+    """A planned history with the outputs of those that were made, zero as yet, at their noise."""
     outputs = getattr(predictor_for(predictor, candidate), "outputs", base_observations.outputs)
-    noise = {name: np.full(candidate.times.size, base_observations.noise[base_observations.outputs.index(name)]) for name in outputs
-             if name in base_observations.outputs}  # fmt: skip
+    noise = {
+        name: np.full(candidate.times.size, base_observations.noise[base_observations.outputs.index(name)])
+        for name in outputs
+        if name in base_observations.outputs
+    }
     return replace(
         _without_rupture(candidate), outputs={name: 0.0 * sd for name, sd in noise.items()}, standard_deviation=noise
     )
@@ -184,14 +187,14 @@ def _with_predictions(
 
 
 def _output_limit(measured: Sequence[History], name: str) -> float:
-    """How far the growing output of a planned test is followed: as far again as the tests that were made."""
+    """The largest output of a planned test that is compared, in its unit: as far again as the tests that were made."""
     used_values = [h.outputs[name][usable_frames(h, name)] for h in measured if name in h.outputs]
     values = np.concatenate([*used_values, np.zeros(1)])
     return float(values.min() + EXTRAPOLATION_LIMIT * np.ptp(values))
 
 
 def _with_usable_frames(candidate: History, predictor: Predictor, output_limits: dict[str, float]) -> History:
-    """A planned history with its frames before it bursts, and within reach, marked used."""
+    """A planned history with its frames before rupture and below the output limits marked used."""
     first_output, *_ = compared_outputs(predictor, candidate)
     is_finite = np.isfinite(np.stack([*candidate.outputs.values()])).all(axis=0)
     is_within_limit = np.nan_to_num(candidate.outputs[first_output]) <= output_limits[first_output]
@@ -200,14 +203,17 @@ def _with_usable_frames(candidate: History, predictor: Predictor, output_limits:
 
 def _stated_thicknesses(histories: Sequence[History], measured_count: int) -> list[tuple[int, float]]:
     """(position, mm) of the planned tests whose apex thickness is stated: it is what they are about."""
-    return [(k, h.geometry["apex_thickness"]) for k, h in enumerate(histories)
-            if k >= measured_count and "apex_thickness" in h.geometry]  # fmt: skip
+    return [
+        (k, h.geometry["apex_thickness"])
+        for k, h in enumerate(histories)
+        if k >= measured_count and "apex_thickness" in h.geometry
+    ]
 
 
 def _nuisances(
     fit: Identification, histories: Sequence[History], measured_count: int, predictor: Predictor
 ) -> NuisanceParameters:
-    """Those of the fit's nuisances, with the spreads that it found; planned thicknesses are known as well as others."""
+    """The nuisance parameters of the tests, with prior standard deviations that the fit found."""
     nuisances = NuisanceParameters.from_histories(fit.settings.nuisances, histories, predictor)
     if not nuisances.mean.size:
         return nuisances
@@ -220,7 +226,7 @@ def _nuisances(
 
 
 FULL_REFITS = 3
-"""Designs that are refitted in full."""
+"""Candidates that are refitted in full."""
 
 
 @dataclass(frozen=True)
@@ -234,9 +240,9 @@ class DiscriminatingExperiment:
 
 @dataclass(frozen=True)
 class DiscriminationDesign:
-    """Further tests, the most telling first, if law `true` holds and law `other` is fitted.
+    """Further tests by decreasing chi-square, if the reference law holds and the alternative law is fitted.
 
-    now : expected chi-square by the tests that were made. left_out : designs that burst at once.
+    current_chi_square : expected by the tests that were made. excluded : candidates that rupture at once.
     """
 
     reference_law: str
@@ -247,10 +253,16 @@ class DiscriminationDesign:
 
     @property
     def sentence(self) -> str:
-        """The most telling test, or that none is."""
-        premise = f"if {self.reference_law} holds, {self.alternative_law} is worse by an expected chi-square of {self.current_chi_square:.2g} in these tests"
+        """The test of largest expected chi-square, or that none is large enough."""
+        premise = (
+            f"if {self.reference_law} holds, {self.alternative_law} is worse by an expected chi-square of "
+            f"{self.current_chi_square:.2g} in these tests"
+        )
         if not self.experiments or self.experiments[0].chi_square < DISTINGUISHABLE_CHI_SQUARE:
-            return f"{premise}; none of the {len(self.experiments)} further tests considered brings it above {DISTINGUISHABLE_CHI_SQUARE:.2g}"
+            return (
+                f"{premise}; none of the {len(self.experiments)} further tests considered brings it above "
+                f"{DISTINGUISHABLE_CHI_SQUARE:.2g}"
+            )
         best = self.experiments[0]
         return f"{premise}; one more test, {best.description}, would bring it to {best.chi_square:.2g}"
 
@@ -264,9 +276,9 @@ def discriminating_experiments(
     alternative: Identification,
     candidates_or_histories: Sequence[CandidateTest | History] | None = None,
 ) -> DiscriminationDesign:
-    """Further tests by how well they would separate law b from law a, if a is true.
+    """Further tests by how well they would separate the alternative law from the reference law, if that is true.
 
-    designs : planned tests (histories need no outputs); by default variations of the tests that were made.
+    candidates_or_histories : planned tests (without outputs); by default variations of the tests that were made.
     """
     if reference.predictor is None or not reference.histories:
         raise FitError(
@@ -294,7 +306,7 @@ def further_tests(ranking: WeightedLaws) -> tuple[DiscriminationDesign, ...]:
 def _candidates_given(
     fit: Identification, candidates_or_histories: Sequence[CandidateTest | History] | None
 ) -> tuple[CandidateTest, ...]:
-    """The designs given, named so that they are no test that was made; else variations of those."""
+    """The candidates given, with names of their own; else variations of the tests that were made."""
     if candidates_or_histories is None:
         return variations(fit.histories, float(fit.local_exponent(fit.reference.stress)[0]), fit.predictor)
     candidates = (
@@ -307,7 +319,7 @@ def _candidates_given(
 def _expected_chi_squares(
     discrimination: ModelDiscrimination, current_chi_square: float
 ) -> tuple[DiscriminatingExperiment, ...]:
-    """Every plan with its chi-square, by one step or, of the most promising, in full; never below that of now."""
+    """Every candidate with its chi-square, by one step or, of the most promising, in full; never below the current one."""
     chi_squares = [discrimination.linearised_chi_square([k]) for k in range(len(discrimination.candidates))]
     for k in np.argsort(chi_squares)[::-1][:FULL_REFITS]:
         chi_squares[k] = discrimination.refitted_chi_square([int(k)])

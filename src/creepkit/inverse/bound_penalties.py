@@ -15,6 +15,7 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.kernels.internal_values import author_values, internal_bounds
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
@@ -22,9 +23,9 @@ from creepkit.records import History, Predictor
 class BoundPenalties:
     """Residuals of x = (u, e) beside those of the data.
 
-    Bounds of coefficients, and of exponents whose place a local exponent takes, and the constraints of the law give zero
-    inside and grow linearly outside: they do not bound single conditioned coordinates. Nuisance parameters give their
-    distance from the prior mean over its standard deviation.
+    Bounds of coefficients, and of exponents whose place a local exponent takes, and the constraints of the law give
+    zero inside and grow linearly outside: they do not bound single conditioned coordinates. Nuisance parameters give
+    their distance from the prior mean over its standard deviation.
     """
 
     WEIGHT = 100.0
@@ -34,9 +35,7 @@ class BoundPenalties:
     ) -> None:
         """points : the six variables of a law, (points,) each, at which its constraints must hold."""
         self.coordinates, self.nuisance_parameters, law = coordinates, nuisance_parameters, coordinates.law
-        internal_bounds = [(p.to_internal(p.bounds[0]), p.to_internal(p.bounds[1])) for p in law.params.values()]
-        self.low = np.array([internal_bounds[k][0] for k in coordinates.penalised])
-        self.high = np.array([internal_bounds[k][1] for k in coordinates.penalised])
+        self.low, self.high = internal_bounds(law)[:, list(coordinates.penalised)]
         self._constraints = _constraint_margins(law, points)
 
     def residuals(self, x: Floats) -> Floats:
@@ -105,10 +104,9 @@ def _constraint_margins(law: CreepLaw, point: Sequence[Floats]) -> Callable[[Flo
     initial_states = [state.initial for state in law.states.values()]
 
     def margins(theta: Floats) -> Floats:
-        columns = zip(law.params.values(), np.moveaxis(theta, -1, 0)[..., None], strict=True)
         shape = (*theta.shape[:-1], point[0].size)
         with np.errstate(all="ignore"):
-            values = [np.exp(t) if p.scale == "log" else t for p, t in columns]
+            values = [value[..., None] for value in author_values(law, theta).values()]
             margins_by_constraint = [
                 np.broadcast_to(f(*point, *initial_states, *values), shape).min(axis=-1) for f in functions
             ]

@@ -11,6 +11,7 @@ from scipy.stats import qmc
 from creepkit.arrays import Floats
 from creepkit.inverse.coordinates import LARGEST_EXPONENT, Coordinates
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
+from creepkit.kernels.internal_values import internal_bounds
 from creepkit.language import CreepLaw
 
 LOG_RATE_BOUNDS = (-12.0, 6.0)
@@ -39,9 +40,7 @@ class Bounds:
         log_rate : ln of the measured strain rate in 1/s; log_internal_rate : ln of one over the duration of a test in
             1/s, about which the rates of internal variables lie.
         """
-        lower, upper = (
-            np.array([p.to_internal(p.bounds[index]) for p in law.params.values()], float) for index in (0, 1)
-        )
+        lower, upper = internal_bounds(law)
         for local_exponent in coordinates.exponents:
             sampled = lower + qmc.Sobol(lower.size, seed=0).random(EXPONENT_SAMPLES) * (upper - lower)
             exponents = coordinates.u(sampled)[:, local_exponent.position]

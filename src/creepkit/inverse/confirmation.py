@@ -30,10 +30,10 @@ INCOMPLETE_STATUS = {Status.RUPTURED: "the specimen bursts", Status.NOT_CONVERGE
 class ConfirmedOutput:
     """One output of one test.
 
-    simulated : errors of the simulation against the measurement; fitted : the fit's own, or None of a test it has not
-        seen and cannot predict.
-    difference : rms of simulated less fitted frames over their noise; NaN where the fit's own prediction is not at hand
-        or no noise is known.
+    simulation_errors : of the simulation against the measurement; fit_errors : those of the fit, or None of a test that
+        it cannot predict.
+    rms_difference : rms of simulated less fitted frames over their noise; NaN where the fit cannot predict or no noise
+        is known.
     """
 
     output: str
@@ -61,7 +61,7 @@ class ConfirmedTest:
 
 @dataclass(frozen=True)
 class Confirmation:
-    """The answer of confirm(). law, using : names of what was simulated, and by what."""
+    """The result of confirm(). law, predictor_name : what was simulated, and by what."""
 
     law: str
     predictor_name: str
@@ -88,8 +88,8 @@ class Confirmation:
         if not self.confirmed:
             test_name, output = self._largest(lambda o: o.noise_ratio)
             return (
-                f"not confirmed: {self.predictor_name} differs from the fit by {self.noise_ratio:.2g} times the noise ({output} of "
-                f"'{test_name}'); identify again with using= this specimen"
+                f"not confirmed: {self.predictor_name} differs from the fit by {self.noise_ratio:.2g} times the noise "
+                f"({output} of '{test_name}'); identify again with using= this specimen"
             )
         test_name, output = self._largest(lambda o: o.simulation_errors.chi_square)
         worst = self[test_name, output].simulation_errors.chi_square

@@ -245,9 +245,13 @@ def loading_strains(histories: Sequence[History], output: str = "strain") -> lis
 
 
 def times_to_strain(
-    law: CreepLaw, values: Mapping[str, float], histories: Sequence[History], predictor: Predictor, strain: float,
+    law: CreepLaw,
+    values: Mapping[str, float],
+    histories: Sequence[History],
+    predictor: Predictor,
+    strain: float,
     offsets: Sequence[float] | None = None,
-) -> TimeComparison:  # fmt: skip
+) -> TimeComparison:
     """Compare the times to a creep strain of every history that reached it.
 
     offsets : loading strain of each history, taken off what was measured; predictions carry none.

@@ -125,9 +125,13 @@ class Identification:
         return problem.residuals(self.x).with_test_weights(np.array([m.weight for m in self.tests]))
 
     def rate(
-        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats, Floats]:
         """Creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape.
 
         stress MPa, temperature K; strain and time default to those of the reference point.
@@ -140,9 +144,13 @@ class Identification:
         return np.exp(log_rate_value), np.exp(log_rate_value - half_width), np.exp(log_rate_value + half_width)
 
     def local_exponent(
-        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats, Floats]:
         """Local stress exponent d ln rate / d ln stress with its 95 % interval."""
         from creepkit.inverse.uncertainty.quantities import local_exponent
 
@@ -152,9 +160,14 @@ class Identification:
         return exponent, exponent - half_width, exponent + half_width
 
     def rupture_time(
-        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, control: Literal["load", "stress"] = "load",
-        test_scatter: bool = True, using: Predictor | None = None,
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        control: Literal["load", "stress"] = "load",
+        test_scatter: bool = True,
+        using: Predictor | None = None,
+    ) -> tuple[Floats, Floats, Floats]:
         """When a bar will break, s, with its 95 % interval: (time, low, high), each of the broadcast shape.
 
         stress MPa (nominal, held as `control` says); temperature K, by default that of the reference point.
@@ -170,7 +183,7 @@ class Identification:
 
     def rupture_times(
         self, histories: Sequence[History] | None = None, *, test_scatter: bool = True, using: Predictor | None = None
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats, Floats]:
         """The same for histories (by default those that were fitted), whatever their loading: (tests,) each."""
         from creepkit.inverse.goodness_of_fit import predict_rupture_times
 

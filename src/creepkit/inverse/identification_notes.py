@@ -98,9 +98,8 @@ def identification_notes(
     if len(histories) < MINIMUM_TESTS and any(n.kind == "rate" and n.sd is None for n in settings.nuisances):
         assumption_note = f"their rates are assumed to scatter by {100 * ASSUMED_RATE_SD:.0f} %"
         likelihood_note = "how their rates scatter cannot be seen, and intervals are those of these tests alone"
-        sentences.append(
-            f"fewer than {MINIMUM_TESTS} tests: {likelihood_note if settings.weights == 'likelihood' else assumption_note}"
-        )
+        note = likelihood_note if settings.weights == "likelihood" else assumption_note
+        sentences.append(f"fewer than {MINIMUM_TESTS} tests: {note}")
     sentences += _large_strain_notes(histories)
     if (problem.bound_penalties.constraint_violations(estimation.minimum.u[: problem.parameter_count]) > 1e-3).any():
         sentences.append("a constraint of the law does not hold over the tests at these values")

@@ -124,7 +124,7 @@ def _covariance_factor(
 
 
 def _expected_gain(linear: LinearisedProblem, working_noise: NoiseModel) -> float:
-    """By how much the log-likelihood would grow, to first order, if the values moved to the optimum under this noise."""
+    """Growth of the log-likelihood, to first order, if the values moved to the optimum under this noise."""
     residuals = linear.residuals
     inverses, _ = inverse_covariances(residuals, working_noise)
     chi_square = np.einsum("te,tef,tf->", residuals.values, inverses, residuals.values)
@@ -175,7 +175,7 @@ def _with_estimated_priors(
 def _with_prior_sd(nuisance_parameters: NuisanceParameters, normal_matrix: Floats, x: Floats) -> NuisanceParameters:
     """Expectation and maximisation in turn, on the problem made linear at its optimum x.
 
-    At the optimum the pull of the data is that of the prior, P (x - mean); with another P the linear problem moves x
+    At the optimum the gradient of the data is that of the prior, P (x - mean); with another P the linear problem moves x
     to where both agree again.
     """
     count = nuisance_parameters.size

@@ -15,7 +15,7 @@ from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.records import Prediction, TimesToStrain
 
 _SMALL_DISTANCE = 1e-7
-"""Below this distance the ratio of a to b is the slope of the curve."""
+"""Below this distance the ratio of the errors is the slope of the curve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +59,7 @@ class OrthogonalResiduals:
 
     values : (candidates, tests, observations) -, the residuals.
     strain_derivative : (candidates, tests, observations) -, to the transformed strain at the time of the frame.
-    time_derivative : (candidates, tests, observations) -, to -ln of the time at which the measured strain is reached, or
-        of the rupture time.
+    time_derivative : (candidates, tests, observations) -, to -ln of the time to the measured strain, or to rupture.
     informative : (candidates, tests, observations), false for tests that were stopped before a candidate ruptures.
     """
 
@@ -106,7 +105,7 @@ def orthogonal_residuals(
 def _with_rupture_times(
     observations: ObservationVector, life: TimesToStrain, frame_residuals: OrthogonalResiduals
 ) -> OrthogonalResiduals:
-    """The same with ln of measured over predicted rupture time; a stopped test counts where it lasted longer than that."""
+    """With ln of measured over predicted rupture time; a stopped test counts where it lasted longer than that."""
     ruptured = np.isfinite(life.rupture_times)
     log_end_times = np.log(np.where(ruptured, life.rupture_times, life.horizon))
     log_time_ratio = np.where(observations.rupture_mask, observations.log_times - log_end_times[..., None], 0.0)
@@ -134,7 +133,7 @@ def time_jacobian(observations: ObservationVector, life: TimesToStrain) -> Float
 
 
 def offset_time_derivative(observations: ObservationVector, life: TimesToStrain) -> Floats:
-    """(candidates, tests, observations) 1 / unit of the output, derivative of -ln(time to strain) to an added offset."""
+    """(candidates, tests, observations) 1 / unit, derivative of -ln(time to strain) to an added offset."""
     curve_slope = observations.select_frames(life.log_time_derivatives)
     positive_slope = np.where(np.isfinite(curve_slope) & (curve_slope > 0), curve_slope, np.inf)
     return np.where(observations.rupture_mask, 0.0, 1.0 / positive_slope)

@@ -62,7 +62,7 @@ class LogTransform:
 
 @dataclass(frozen=True)
 class LinearTransform:
-    """g(y) = y / scale: with the standard deviation of what was measured as scale, the mean of all frames is wrong by one.
+    """g(y) = y / scale, the scale being the standard deviation of what was measured.
 
     scale, largest : in the output's unit; the largest measured value.
     """

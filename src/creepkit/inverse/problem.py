@@ -1,4 +1,4 @@
-"""The least-squares problem that a law and histories pose: what is minimised, by which values, and under which covariance.
+"""The least-squares problem that a law and histories pose, under a covariance of the observations.
 
 With r(x) the transformed predictions less the transformed observations, L the Cholesky factors of their covariance and
 p(x) the penalties of bounds and priors,
@@ -23,7 +23,6 @@ from creepkit.inverse.bound_penalties import BoundPenalties, constraint_points
 from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.composite_predictor import (
     CompositePredictor,
-    author_values,
     predict,
     predict_to_rupture,
     predict_with_sensitivities,
@@ -55,6 +54,7 @@ from creepkit.inverse.search.local_refinement import (
 )
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.working_noise import WorkingNoise, with_rupture_weight
+from creepkit.kernels.internal_values import author_values
 from creepkit.language import CreepLaw
 from creepkit.records import History, Prediction, Predictor
 
@@ -168,7 +168,7 @@ class LeastSquaresProblem:
         return replace(self, nuisance_parameters=nuisance_parameters, bounds=bounds)
 
     def with_fixed_nuisances(self, e: Floats | None = None) -> LeastSquaresProblem:
-        """The same with x = u alone; e : (nuisances,) values of the nuisance parameters, by default their prior means."""
+        """The same with x = u alone; e : (nuisances,) their values, by default the prior means."""
         nuisances = self.nuisance_parameters
         return self.with_nuisances(replace(nuisances, mean=nuisances.mean if e is None else np.array(e), fixed=True))
 

@@ -1,7 +1,7 @@
-"""Residuals: transformed predictions less transformed observations of all tests, with derivatives to internal parameters.
+"""Residuals: transformed predictions less transformed observations of all tests, with their derivatives.
 
-After a predicted rupture the transformed output goes on growing with ln of time over rupture time, so that residuals are
-finite and point back to values at which the specimen lasts.
+After a predicted rupture the transformed output grows on with ln of time over rupture time, so that residuals are finite
+and their derivatives lead back to values at which the specimen lasts.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def residuals_at_measured_values(observations: ObservationVector) -> Residuals:
 
 
 def candidate_residuals(observations: ObservationVector, prediction: Prediction) -> Floats:
-    """(candidates, tests, observations) -, residuals of all candidates of a prediction; zero where there are no data."""
+    """(candidates, tests, observations) - residuals of all candidates; zero where there are no data."""
     values = _orthogonal_residuals(observations, _predicted_values(observations, prediction), prediction).values
     return np.where(observations.present, values, 0.0)
 

@@ -289,7 +289,7 @@ def test_what_means_nothing_is_refused_in_one_sentence(tests):
     with pytest.raises(FitError, match="weights name 'depth', which is not among the outputs amplitude, width, shape"):
         identify(LAW, tests, EXACT, settings=replace(QUICK, weights={"depth": 1.0}))
     shared = Nuisance("temperature", scope="all")
-    with pytest.raises(FitError, match="a spread cannot be estimated from a single unknown"):
+    with pytest.raises(FitError, match="a standard deviation cannot be estimated from a single value"):
         identify(LAW, tests, EXACT, settings=replace(QUICK, nuisances=(shared,)))
 
 

@@ -19,24 +19,28 @@ MAX_STEPS = 40
 
 
 TOLERANCE = 1e-5
-"""Relative fall of the cost below which a start has arrived, twice in turn."""
+"""Relative decrease of the cost below which a start has converged, twice in turn."""
 
 
 CONTINUED = 4
-"""Of the best ends, how many go on where they have not arrived."""
+"""Of the best minima, how many are refined further where they have not converged."""
 
 
 DAMPING_RANGE = (1e-3, 1e8)
-"""First damping, relative to the diagonal of J'J over the box, and the one at which a start has nowhere to go."""
+"""First damping, relative to the diagonal of J'J over the bounds, and the one at which a start is given up."""
 
 
 def batched_levenberg_marquardt(
-    problem: LeastSquaresProblem, starts: Sequence[Floats], *, max_steps: int = MAX_STEPS, progress: IterationCallback | None = None,
+    problem: LeastSquaresProblem,
+    starts: Sequence[Floats],
+    *,
+    max_steps: int = MAX_STEPS,
+    progress: IterationCallback | None = None,
     costs: list[Floats] | None = None,
-) -> list[Minimum]:  # fmt: skip
-    """The minima that the starts lead to, best first; costs : is given the costs of all starts after each step.
+) -> list[Minimum]:
+    """The minima that the starts lead to, best first; starts : (parameters,) each; costs : receives (starts,) costs after each step.
 
-    Damage that runs away makes a cost with kinks, at which projected steps come to rest: laws with internal variables,
+    The cost of laws with damage has kinks, at which projected steps come to rest: laws with internal variables,
     and tests that are followed to rupture, are refined one by one in a trust region.
     """
     if problem.observations.followed_to_rupture.any() or problem.law.states:
@@ -53,7 +57,7 @@ def batched_levenberg_marquardt(
 
 
 def _continued(problem: LeastSquaresProblem, minima: Sequence[Minimum]) -> list[Minimum]:
-    """Minima that have not arrived go on by themselves, in a trust region that follows bent valleys better."""
+    """Minima that have not converged are refined one by one, in a trust region that follows bent valleys better."""
     finished = []
     for minimum in minima:
         if not minimum.converged:
@@ -68,7 +72,7 @@ def _continued(problem: LeastSquaresProblem, minima: Sequence[Minimum]) -> list[
 
 
 class _BatchedLevenbergMarquardt:
-    """The state of all starts: where they are, their residuals and Jacobians, and how damped they step."""
+    """The state of all starts: positions, residuals, gradients and Hessians, and damping."""
 
     def __init__(self, problem: LeastSquaresProblem, starts: Floats) -> None:
         self.problem, self.bounds = problem, problem.bounds
@@ -82,7 +86,7 @@ class _BatchedLevenbergMarquardt:
         self._evaluate(np.arange(count), self.u)
 
     def run(self, max_steps: int, progress: IterationCallback | None, costs: list[Floats]) -> list[Minimum]:
-        """Step until all have arrived."""
+        """Step until all have converged."""
         for _ in range(max_steps):
             costs.append(self.cost.copy())
             active = np.flatnonzero((self.stalled_steps < 2) & (self.damping < DAMPING_RANGE[1]))
@@ -104,7 +108,7 @@ class _BatchedLevenbergMarquardt:
         return sorted(minima, key=lambda minimum: minimum.cost)
 
     def _trial_point(self, k: int) -> Floats:
-        """Where a start tries to go next."""
+        """(parameters,) the next trial point of a start."""
         scale = self.bounds.width
         gradient, hessian = self.gradient[k] * scale, self.hessian[k] * np.outer(scale, scale)
         blocked = ((self.u[k] <= self.bounds.lower) & (gradient > 0)) | (
@@ -122,7 +126,7 @@ class _BatchedLevenbergMarquardt:
         return np.asarray(self.bounds.clip(self.u[k] + np.clip(step, -0.3, 0.3) * scale))
 
     def _evaluate(self, indices: Ints, points: Floats) -> None:
-        """Look at points, and move there the starts whose cost falls."""
+        """Evaluate points (starts, parameters), and move the starts whose cost decreases."""
         residuals, jacobians = self.problem.candidate_jacobian(points)
         for k, u, residual, jacobian in zip(indices, points, residuals, jacobians, strict=True):
             self.evaluations[k] += 1

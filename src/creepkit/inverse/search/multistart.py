@@ -1,4 +1,4 @@
-"""Multi-start least squares: many Sobol draws are evaluated, the best and the centre of the bounds are refined in a batch.
+"""Multi-start least squares: of many Sobol draws the best, and the centre of the bounds, are refined in a batch.
 
 Measured on creep problems: a few selected starts with exact Jacobians find the least cost at a hundredth of the
 evaluations of a particle swarm.
@@ -22,7 +22,7 @@ from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marqua
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 
 INTERNAL_RATE_RANGE = (-4.0, 0.0)
-"""Where the rate of an internal variable is drawn: ln of its rate times the life of a test."""
+"""Range of draws for an internal variable: ln of its rate times the duration of a test."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ class MultiStart:
 
 
 def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
-    """For a sum of terms, one start for each: its own optimum, the others at a 20th of its rate; best first.
+    """For a sum of terms, one start (parameters,) for each: its optimum, the others at a 20th of its rate; best first.
 
-    A sum is never worse than its terms, but a search from the whole box rarely finds that.
+    A sum is never worse than its terms, but a search of the whole bounds rarely finds that.
     """
     law, bounds = problem.law, problem.bounds
     starts_by_cost: list[tuple[float, Floats]] = []
@@ -73,7 +73,7 @@ def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int)
 
 
 def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
-    """The centre, and the best draws after a shift of all rates to the level of the data."""
+    """The centre, and the best draws after a shift of all rates to that of the data: (parameters,) each."""
     observations, bounds, seed = problem.observations, problem.bounds, problem.settings.seed
     sobol = qmc.Sobol(bounds.lower.size, seed=seed).random(draws)
     points = bounds.lower + sobol * bounds.width
@@ -127,11 +127,11 @@ def _with_sampled_exponents(problem: LeastSquaresProblem, points: Floats, sobol:
 
 EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS = 1e-5, 5e-3
 """Root mean square difference of predictions, over the spread of what was measured, below which two minima are one. A
-stand-in is not better than the latter, and along a valley one start is enough for the predictor behind it."""
+reduced-order model is not better than the latter, and along a valley one start is enough for its predictor."""
 
 
 WORKING_ERROR = 0.3
-"""How wrong frames are in a search, over that spread (see inverse.scatter.working_guess)."""
+"""Misfit that is assumed in a search, over that spread (see inverse.noise_model.initial_working_noise)."""
 
 
 def distinct(
@@ -142,7 +142,7 @@ def distinct(
     max_count: int = 2,
     tolerance: float = 0.02,
 ) -> list[Minimum]:
-    """The best minima that differ by more than 2 % of the box in some coordinate, and in what they predict."""
+    """The best minima that differ by more than 2 % of the bounds in some coordinate, and in what they predict."""
     selected: list[Minimum] = []
     for minimum in minima:
         if not any(_same(minimum, other, bounds, equal_predictions, tolerance) for other in selected):
@@ -159,6 +159,6 @@ def _same(a: Minimum, b: Minimum, bounds: Bounds, equal_predictions: float, tole
 
 
 def unequal_fractions(count: int) -> Floats:
-    """Shares .7, .2, .1 and so on: equal shares are a stationary point from which no search escapes."""
+    """(count,) - fractions 0.7, 0.2, 0.1 and so on: equal ones are a stationary point from which no search escapes."""
     fractions = np.array([0.7, *(0.3 * 0.67**k for k in range(1, count))])
     return np.asarray(fractions / fractions.sum())

@@ -23,21 +23,20 @@ ANY_TERM = "any"
 
 
 EXPECTED_FLIPS = 0.5
-"""Switches that a candidate flips by chance in each draw, on average: enough to leave a wrong subset, not to drift."""
+"""Mask elements that mutate in each draw of a candidate, on average: enough to leave a wrong subset, not to drift."""
 
 
 OFF_MARGIN = 0.5
-"""In ln of a rate: so near the bottom of the box it is at it."""
+"""In ln of a rate: a rate nearer to its lower bound than this counts as at it."""
 
 
 @dataclass(frozen=True)
 class TermMask:
-    """Which terms may be off, and what that means for u.
+    """The terms that may be off, and what that means for u. Masks are (..., terms), true where a term is on.
 
-    terms : names of those that may; rates : (terms,) positions of their rates; own : (terms, parameters) which
-    coordinates mean nothing while a term is off; rest : (parameters,) where those then are; always : whether some term
-    stays on anyhow.
-    Masks are (..., terms), true where a term is on.
+    terms : names of those that may; rate_positions : (terms,) positions of their rates; owned_parameters : (terms,
+    parameters) coordinates without effect while a term is off; resting_values : (parameters,) their values then;
+    has_permanent_term : whether some term is always on.
     """
 
     terms: tuple[str, ...]
@@ -48,7 +47,7 @@ class TermMask:
 
     @classmethod
     def from_problem(cls, problem: LeastSquaresProblem, maskable: str | Sequence[str]) -> TermMask:
-        """Those of a landscape; off : names of terms, or "any"."""
+        """The mask of a problem; maskable : names of terms, or "any"."""
         law, rates = problem.law, problem.coordinates.term_rates
         positions = {label: [law.names.index(n) for n in law.only(label).names] for label in law.terms}
         rate_positions = {label: [k for k in owned if k in rates] for label, owned in positions.items()}
@@ -63,11 +62,11 @@ class TermMask:
         return cls(terms, first_rates, own, resting, len(terms) < len(law.terms))
 
     def applied(self, u: Floats, masks: Bools) -> Floats:
-        """u (..., parameters) with the coordinates of terms that are off at rest."""
+        """(..., parameters) u with the coordinates of terms that are off at their resting values; masks : (..., terms)."""
         return np.where(self.active_parameters(masks), u, self.resting_values)
 
     def active_parameters(self, masks: Bools) -> Bools:
-        """(..., parameters) which coordinates mean something; on : (..., terms)."""
+        """(..., parameters) which coordinates have an effect; masks : (..., terms)."""
         return np.asarray(~(~masks[..., None] & self.owned_parameters).any(axis=-2))
 
     def fixed_values(self, mask: Bools) -> dict[int, float]:
@@ -75,7 +74,7 @@ class TermMask:
         return {int(k): float(self.resting_values[k]) for k in np.flatnonzero(~self.active_parameters(mask))}
 
     def terms_off(self, u: Floats) -> tuple[str, ...]:
-        """The terms that are off at u (parameters,): switched off, or driven to the bottom, which is the same."""
+        """The terms that are off at u (parameters,): switched off, or at the lower bound of their rate, which is the same."""
         is_at_lower_bound = u[self.rate_positions] <= self.resting_values[self.rate_positions] + OFF_MARGIN
         return tuple(term for term, is_off in zip(self.terms, is_at_lower_bound, strict=True) if is_off)
 
@@ -86,8 +85,8 @@ class TermMask:
         return self._never_empty(masks, rng)
 
     def recombined(self, personal_best: Bools, global_best: Bools, rng: np.random.Generator) -> Bools:
-        """(candidates, terms) masks of the next draw: each switch from a candidate's own best mask (candidates, terms)
-        or from the common one (terms,), as a coin falls; and now and then it flips.
+        """(candidates, terms) masks of the next draw: each element at random from a candidate's own best mask
+        (candidates, terms) or from the global best one (terms,), with mutations.
         """
         if not self.terms:
             return personal_best
@@ -96,7 +95,7 @@ class TermMask:
         return self._never_empty(inherited ^ flipped, rng)
 
     def _never_empty(self, masks: Bools, rng: np.random.Generator) -> Bools:
-        """A sum of nothing is no law: a mask without any term gets one, at random."""
+        """A mask without any term gets one, at random: a law has at least one term."""
         empty = np.flatnonzero(~masks.any(axis=1)) if self.terms and not self.has_permanent_term else np.zeros(0, int)
         masks[empty, rng.integers(max(len(self.terms), 1), size=empty.size)] = True
         return masks
@@ -105,7 +104,7 @@ class TermMask:
 def _maskable_terms(
     law: CreepLaw, rate_positions: dict[str, list[int]], maskable: str | Sequence[str]
 ) -> tuple[str, ...]:
-    """The names meant by `off`, checked."""
+    """The names of maskable terms, checked."""
     if maskable == ANY_TERM:
         return (
             tuple(label for label, positions in rate_positions.items() if positions) if len(rate_positions) > 1 else ()
@@ -122,18 +121,18 @@ def _maskable_terms(
 
 
 SAME_BASIN = 0.1
-"""Of the width of the box: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
+"""Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
 
 
 CONVERGED_DECREASE = 1e-3
-"""A fall of the cost, half of chi-square, below which a search has arrived."""
+"""A decrease of the cost, half of chi-square, below which a search has converged."""
 
 
 @dataclass(frozen=True)
 class SearchCandidates:
-    """What a search has seen and holds worth keeping: u (candidates, parameters), cost (candidates,).
+    """Candidates of a search that may be refined.
 
-    on : (candidates, terms) masks of the terms that `switches` may switch off, or None.
+    u : (candidates, parameters); cost : (candidates,) -; masks : (candidates, terms) of the terms of `term_mask`.
     """
 
     u: Floats
@@ -167,7 +166,7 @@ def refine_candidates(
     trace: SearchTrace,
     progress: IterationCallback | None = None,
 ) -> SearchResult:
-    """The best different candidates refined, best first; with most=0 the best one as it is."""
+    """The best different candidates refined, best first; with max_count=0 the best one as it is."""
     selected = candidates.most_different(problem.bounds.width, max(max_count, 1))
     if max_count == 0:
         k = selected[0]
@@ -191,7 +190,7 @@ def refine_candidates(
 
 
 def _one_per_mask(minima: list[Minimum]) -> list[Minimum]:
-    """One of each subset, for some end as another one; of those that are as good as the best, the simplest first."""
+    """One minimum of each subset; of those that are as good as the best, the simplest first."""
     different = [m for k, m in enumerate(minima) if m.terms_off not in [other.terms_off for other in minima[:k]]]
     best = different[0].cost + CONVERGED_DECREASE
     return sorted(different, key=lambda m: (m.cost > best, -len(m.terms_off) if m.cost <= best else 0, m.cost))

@@ -1,4 +1,4 @@
-"""Model selection: candidate laws, their ranking under a common covariance, and pairs that the tests cannot separate."""
+"""Model selection: candidate laws, their ranking, and pairs that the tests cannot separate."""
 
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
 from creepkit.inverse.selection.ranking import CRITERIA, RankedLaw, Ranking, rank

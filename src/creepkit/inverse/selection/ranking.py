@@ -26,6 +26,7 @@ from creepkit.inverse.information_criteria import (
     criterion_weights,
 )
 from creepkit.inverse.selection.discrimination import under_common_covariance
+from creepkit.kernels.internal_values import internal_bounds
 
 if TYPE_CHECKING:
     from creepkit.experiments.discriminating_experiments import DiscriminationDesign
@@ -41,7 +42,7 @@ Criterion = Literal["bic", "aicc", "hold-out"]
 
 @dataclass(frozen=True)
 class RankedLaw:
-    """One law in a ranking: criterion less the best, its share of belief, and its chi-square under the covariance
+    """One law in a ranking: criterion less the best, its weight, and its chi-square under the covariance
     of the best (NaN for identifications that were not made by likelihood).
     """
 
@@ -55,7 +56,7 @@ class RankedLaw:
 class Ranking:
     """Identified laws, best first.
 
-    by : the criterion; size : independent frames; failed : {law: why it could not be identified}.
+    criterion : by which; independent_frames : their number; failed : {law: why it could not be identified}.
     """
 
     laws: tuple[RankedLaw, ...]
@@ -140,9 +141,14 @@ def rank(
 
 
 def ranking_from_scores(
-    fits: Sequence[Identification], scores: Floats, criterion: Criterion, *, independent_frames: float, chi_square: Floats | None = None,
+    fits: Sequence[Identification],
+    scores: Floats,
+    criterion: Criterion,
+    *,
+    independent_frames: float,
+    chi_square: Floats | None = None,
     failed: Mapping[str, str] | None = None,
-) -> Ranking:  # fmt: skip
+) -> Ranking:
     """The ranking of identifications with these scores, -2 ln of their evidence."""
     excess, weight = criterion_weights(scores)
     chi_squares = np.full(len(fits), np.nan) if chi_square is None else chi_square
@@ -158,10 +164,11 @@ def _effective_deviance(fit: Identification, independent_frames: float) -> float
 
 
 def determined_parameter_count(fit: Identification) -> int:
-    """How many parameters the data touch: the others have the variance of their bounds, by themselves."""
-    internal_bounds = [[p.to_internal(b) for b in p.bounds] for p in fit.law.params.values()]
+    """How many parameters the data determine: the others have the variance of their bounds, uncorrelated."""
     variances = np.diag(fit.covariance)
     is_uncorrelated = (fit.covariance != 0).sum(axis=1) == 1
     return int(
-        (~(is_uncorrelated & np.isclose(variances, np.ptp(internal_bounds, axis=1) ** 2 / 12.0, rtol=1e-6))).sum()
+        (
+            ~(is_uncorrelated & np.isclose(variances, np.ptp(internal_bounds(fit.law), axis=0) ** 2 / 12.0, rtol=1e-6))
+        ).sum()
     )

@@ -63,7 +63,7 @@ def _distinct_laws(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
 
 
 SELECTION_FRAMES = 60
-"""Frames of a history that are looked at, unless settings say otherwise."""
+"""Frames of a history that are compared, unless settings say otherwise."""
 
 
 RULED_OUT_EXCESS = 40.0
@@ -72,7 +72,7 @@ of a surrogate, some noise in chi-square, do not make up for."""
 
 
 DRIFT_LIMIT = 2.0
-"""Drift that the best single law leaves in its first output, in units of the noise there, from which sums are tried."""
+"""Drift of the first output under the best single law, in units of its noise, above which sums are tried."""
 
 
 def select(
@@ -113,9 +113,14 @@ def select(
 
 
 def _identify_all(
-    laws: Sequence[CreepLaw], histories: Sequence[History], using: Predictor | Mapping[str, Predictor],
-    settings: IdentificationSettings, through: Predictor | None, progress: IterationCallback | None, failed: dict[str, str],
-) -> list[Identification]:  # fmt: skip
+    laws: Sequence[CreepLaw],
+    histories: Sequence[History],
+    using: Predictor | Mapping[str, Predictor],
+    settings: IdentificationSettings,
+    through: Predictor | None,
+    progress: IterationCallback | None,
+    failed: dict[str, str],
+) -> list[Identification]:
     """The laws that can be identified; the others go to `failed`.
 
     through : all laws are identified with it first, and those far behind go no further: they stay as it sees them.
@@ -138,10 +143,14 @@ def _identify_all(
 
 
 def _try_to_identify(
-    law: CreepLaw, histories: Sequence[History], using: Predictor | Mapping[str, Predictor], settings: IdentificationSettings,
-    failed: dict[str, str], previous_fit: Identification | None = None,
-) -> Identification | None:  # fmt: skip
-    """Identify one law, from where a cheaper predictor ended if it did; what goes wrong with it is told in `failed`."""
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: Predictor | Mapping[str, Predictor],
+    settings: IdentificationSettings,
+    failed: dict[str, str],
+    previous_fit: Identification | None = None,
+) -> Identification | None:
+    """Identify one law, from where a cheaper predictor ended if it did; errors are recorded in `failed`."""
     start = None if previous_fit is None else StartingEstimate.from_identification(previous_fit)
     try:
         return identify(law, histories, using, settings=settings, start=start)
@@ -156,7 +165,7 @@ def _ruled_out(fit: Identification) -> Identification:
 
 
 def _has_systematic_residuals(fit: Identification) -> bool:
-    """Whether the law leaves something in its first output that wanders by more than the noise."""
+    """Whether the residuals of the first output drift by more than the noise."""
     assert fit.linearised is not None
     name = next(iter(fit.noise_model.outputs))
     components, residuals = fit.noise_model[name], fit.linearised.residuals

@@ -67,9 +67,15 @@ def binomial_interval(count: int, trials: int, significance: float = 0.05) -> tu
 
 
 def selection_frequencies(
-    reductions: ReducedLaws, penalty: ContributionPenalty | Subsets, strength: float | None, optimum: Floats, *,
-    resamples: int = 20, seed: int = 0, progress: IterationCallback | None = None,
-) -> SelectionFrequencies:  # fmt: skip
+    reductions: ReducedLaws,
+    penalty: ContributionPenalty | Subsets,
+    strength: float | None,
+    optimum: Floats,
+    *,
+    resamples: int = 20,
+    seed: int = 0,
+    progress: IterationCallback | None = None,
+) -> SelectionFrequencies:
     """Choose again for each draw, from the optima on all data; strength : that of all data, which stays.
 
     optimum : x of the penalised fit on all data.
@@ -134,9 +140,16 @@ def _terms_kept(
 
 
 def bootstrap_terms(
-    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, penalty: ContributionPenalty | Subsets, *, resamples: int = 20,
-    seed: int = 0, settings: IdentificationSettings | None = None, progress: IterationCallback | None = None,
-) -> SelectionFrequencies:  # fmt: skip
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: PredictorOrMapping,
+    penalty: ContributionPenalty | Subsets,
+    *,
+    resamples: int = 20,
+    seed: int = 0,
+    settings: IdentificationSettings | None = None,
+    progress: IterationCallback | None = None,
+) -> SelectionFrequencies:
     """How often each term is kept when the tests (or the frames of the only one) are drawn again."""
     _, reductions = identify_full(law, histories, using, None, settings, progress)
     choice = choose_terms(reductions, penalty, None, progress)

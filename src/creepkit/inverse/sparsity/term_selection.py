@@ -162,10 +162,16 @@ PredictorOrMapping = Predictor | Mapping[str, Predictor]
 
 
 def identify_sparse(
-    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, *, penalty: ContributionPenalty | Subsets,
-    search: GlobalSearch | None = None, through: Predictor | None = None, settings: IdentificationSettings | None = None,
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: PredictorOrMapping,
+    *,
+    penalty: ContributionPenalty | Subsets,
+    search: GlobalSearch | None = None,
+    through: Predictor | None = None,
+    settings: IdentificationSettings | None = None,
     progress: IterationCallback | None = None,
-) -> Identification:  # fmt: skip
+) -> Identification:
     """Identify the law of those terms of a sum that the histories need; what was dropped stands in `sparsity`.
 
     The whole sum is identified without penalty first: it gives the covariance on which everything is compared. Then
@@ -180,9 +186,12 @@ def identify_sparse(
 
 
 def identify_reduced(
-    penalty: ContributionPenalty | Subsets, full: Identification, reductions: ReducedLaws, search: GlobalSearch | None = None,
+    penalty: ContributionPenalty | Subsets,
+    full: Identification,
+    reductions: ReducedLaws,
+    search: GlobalSearch | None = None,
     progress: IterationCallback | None = None,
-) -> Identification:  # fmt: skip
+) -> Identification:
     """The same from the whole sum, identified and opened before."""
     choice = choose_terms(reductions, penalty, search, progress)
     reduced = confirmed_law(reductions, choice)
@@ -199,18 +208,28 @@ def identify_reduced(
 
 
 def penalty_path(
-    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, penalty: ContributionPenalty, *,
-    strengths: Sequence[float] = PATH_STRENGTHS, settings: IdentificationSettings | None = None, progress: IterationCallback | None = None,
-) -> PenaltyPath:  # fmt: skip
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: PredictorOrMapping,
+    penalty: ContributionPenalty,
+    *,
+    strengths: Sequence[float] = PATH_STRENGTHS,
+    settings: IdentificationSettings | None = None,
+    progress: IterationCallback | None = None,
+) -> PenaltyPath:
     """The path of a penalty over its strength, from none to all, with the automatic choice."""
     _, reductions = identify_full(law, histories, using, None, settings, progress)
     return trace_path(reductions, penalty, strengths, progress)
 
 
 def identify_full(
-    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, through: Predictor | None, settings: IdentificationSettings | None,
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: PredictorOrMapping,
+    through: Predictor | None,
+    settings: IdentificationSettings | None,
     progress: IterationCallback | None,
-) -> tuple[Identification, ReducedLaws]:  # fmt: skip
+) -> tuple[Identification, ReducedLaws]:
     """The whole sum identified without penalty, and its terms ready to be dropped."""
     if len(law.terms) < 2:
         raise FitError(
@@ -233,9 +252,13 @@ def confirmed_law(reductions: ReducedLaws, choice: TermChoice) -> ReducedLaw:
 
 
 def _sparsity_record(
-    full_fit: Identification, fit: Identification, reductions: ReducedLaws, reduced: ReducedLaw, choice: TermChoice,
+    full_fit: Identification,
+    fit: Identification,
+    reductions: ReducedLaws,
+    reduced: ReducedLaw,
+    choice: TermChoice,
     penalty: ContributionPenalty | Subsets,
-) -> Sparsity:  # fmt: skip
+) -> Sparsity:
     problem, full = reductions.problem, reductions.full(reduced)
     return Sparsity(
         law=problem.law.name,

@@ -17,6 +17,7 @@ import numpy as np
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
+from creepkit.kernels.internal_values import internal_bounds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -116,7 +117,7 @@ def _parameter_names(fit: Identification, coordinate_system: CoordinateSystem) -
 
 def _bound_widths(fit: Identification) -> Floats:
     """(parameters,) of the bounds, on the internal scale."""
-    return np.array([np.ptp([p.to_internal(b) for b in p.bounds]) for p in fit.law.params.values()], float)
+    return np.asarray(np.ptp(internal_bounds(fit.law), axis=0))
 
 
 def _relative_widths(fit: Identification) -> Floats:

@@ -32,6 +32,7 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
 from creepkit.inverse.uncertainty.model_averaging import INTERVAL_PROBABILITIES
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity, local_exponent, log_rate, quantity_of
+from creepkit.kernels.internal_values import author_values, internal_bounds
 from creepkit.records import Predictor
 
 if TYPE_CHECKING:
@@ -89,7 +90,6 @@ class Posterior:
         residuals, nuisances, count = fit.residuals_of(problem), problem.nuisance_parameters, fit.u.size
         assert residuals.jacobian is not None
         e = fit.x[count:]
-        parameter_bounds = np.array([[p.to_internal(b) for b in p.bounds] for p in fit.law.params.values()]).T
         whitening = np.asarray(np.linalg.inv(cholesky_factors(residuals, replace(noise_model, rate=0.0))), float)
         rate_effect = residuals.log_rate_sensitivity * noise_model.rate / np.sqrt(residuals.test_weights)[:, None]
         root_precision = np.diag(np.sqrt(nuisances.precision))
@@ -102,7 +102,7 @@ class Posterior:
             test_weights=residuals.test_weights,
             whitening=whitening,
             rate_effect=rate_effect,
-            parameter_bounds=parameter_bounds,
+            parameter_bounds=internal_bounds(fit.law),
             nuisance_basis=np.linalg.qr(np.concatenate([nuisance_rows, root_precision]))[0],
             prior_residuals=root_precision @ (e - nuisances.mean[: nuisances.size]),
             degrees_of_freedom=max(fit.freedom, 1.0),
@@ -215,9 +215,7 @@ class PosteriorSamples:
     @property
     def values(self) -> dict[str, Floats]:
         """{parameter: (draws,)} in the author's units."""
-        theta = self.coordinates.theta(self.u)
-        table = self.coordinates.law.table.items()
-        return {n: np.exp(theta[:, k]) if p.scale == "log" else theta[:, k] for k, (n, p) in enumerate(table)}
+        return author_values(self.coordinates.law, self.coordinates.theta(self.u))
 
     @property
     def converged(self) -> bool:
@@ -236,18 +234,26 @@ class PosteriorSamples:
         return float(quantiles[0]), float(quantiles[1]), float(quantiles[2])
 
     def rate(
-        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats, Floats]:
         """Median creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape."""
         draws = log_rate(self.coordinates, stress, temperature, strain, time)(self.u)
         median, low, high = np.exp(np.quantile(draws, INTERVAL_PROBABILITIES, axis=0))
         return median, low, high
 
     def local_exponent(
-        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats, Floats]:
         """Median local stress exponent with its 95 % interval."""
         draws = local_exponent(self.coordinates, stress, temperature, strain, time)(self.u)
         median, low, high = np.quantile(draws, INTERVAL_PROBABILITIES, axis=0)
@@ -274,9 +280,14 @@ class PosteriorSamples:
 
 
 def sample_posterior(
-    fit: Identification, *, walkers: int = 32, steps: int = 1000, seed: int = 0, using: Predictor | None = None,
+    fit: Identification,
+    *,
+    walkers: int = 32,
+    steps: int = 1000,
+    seed: int = 0,
+    using: Predictor | None = None,
     progress: IterationCallback | None = None,
-) -> PosteriorSamples:  # fmt: skip
+) -> PosteriorSamples:
     """Sample the posterior of an identification's values; needs emcee.
 
     walkers : an even number of at least twice the parameters. using : another predictor of the same tests than the

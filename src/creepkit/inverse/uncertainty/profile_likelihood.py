@@ -225,9 +225,18 @@ def _profile(
     low, high = (None if end is None else float(quantity.to_unit(end)) for end in ends)
     laplace = [float(quantity.to_unit(walk.start.value + s * walk.root * walk.sd)) for s in (-1, 1)]
     return ProfileLikelihood(
-        quantity.name, quantity.unit, quantity.to_unit(values), rise, float(quantity.to_unit(values[best])), low, high,
-        walk.root**2, level, (laplace[0], laplace[1]), _notes(quantity, points, rise, is_closed, walk),
-    )  # fmt: skip
+        quantity.name,
+        quantity.unit,
+        quantity.to_unit(values),
+        rise,
+        float(quantity.to_unit(values[best])),
+        low,
+        high,
+        walk.root**2,
+        level,
+        (laplace[0], laplace[1]),
+        _notes(quantity, points, rise, is_closed, walk),
+    )
 
 
 def _interval_end(values: Floats, roots: Floats, limit: float, best: int, sign: int) -> float:

@@ -67,7 +67,7 @@ def test_progress_is_told():
         (dict(iterations=0), "CMA-ES: iterations is 0; it must be a whole number of at least 1"),
         (dict(population=2), "population is 2"),
         (dict(restarts=-1), "restarts is -1"),
-        (dict(initial_step_size=0), "step is 0 of the box"),
+        (dict(initial_step_size=0), "initial_step_size is 0 of the width"),
     ],
 )
 def test_settings_that_cannot_be(options, words):

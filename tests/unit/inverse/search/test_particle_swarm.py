@@ -251,7 +251,7 @@ def test_a_parameter_shared_with_another_term_does_not_rest():
         (dict(form="best"), "form is 'best'; allowed are constriction and inertia"),
         (dict(boundary="none"), "boundary is 'none'; allowed are absorb and reflect"),
         (dict(inertia=(1.2, 0.4)), r"inertia is \(1.2, 0.4\); both are from 0 to 1"),
-        (dict(max_velocity=0), "velocity is 0 of the box"),
+        (dict(max_velocity=0), "max_velocity is 0 of the width"),
         (dict(cognitive=2.0, social=2.0), "must be more than 4 together"),
     ],
 )
