@@ -21,7 +21,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import creepkit as ck
-from creepkit.inverse.cross_validation import leave_one_test_out, pooled_relative_squared_error, prediction_errors
+from creepkit.inverse.cross_validation import cross_validate, prediction_errors
 from creepkit.inverse.goodness_of_fit import relative_squared_error
 
 T_REF = 1050.0
@@ -139,13 +139,14 @@ for label, fit in fits.items():
     found = fit.predict()
     print(line(label, [found.of(k)[h.used, 0] for k, h in enumerate(tests)]))
 if folder is not None:
-    held_out = leave_one_test_out(fits["robust"])
-    pooled = pooled_relative_squared_error(held_out, tests, "amplitude")
+    held_out = cross_validate(fits["robust"])
+    pooled = held_out.pooled_error("amplitude")
     print(f"\nleft out in turn, predicted at nominal thickness: pooled loss {pooled:.3g}")
     print(
         "  "
         + ", ".join(
-            f"{h.name.removeprefix('test_')} {h.errors['amplitude'].relative_squared_error:.2g}" for h in held_out
+            f"{name.removeprefix('test_')} {errors['amplitude'].relative_squared_error:.2g}"
+            for name, errors in held_out.errors.items()
         )
     )
 

@@ -35,13 +35,12 @@ from creepkit.discovery.refitting import refit
 from creepkit.errors import CreepkitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.cross_validation import (
-    HeldOutTest,
-    leave_one_test_out,
-    pooled_relative_squared_error,
+    CrossValidation,
+    cross_validate,
     prediction_errors,
 )
 from creepkit.inverse.identification import Identification, IdentificationSettings
-from creepkit.inverse.identify import identify
+from creepkit.inverse.identify import StartingEstimate, identify
 
 LAW = ck.law("drifting-exponent").fix(m=0)
 THICKNESS = ck.Nuisance("thickness", mean=0.4935, sd=0.027)
@@ -129,9 +128,9 @@ def one_at_a_time(
         factor = next(o for o in trend.combinations.with_form("A", "arrhenius").libraries if o.parameter == "A")
         law = law_with_forms(LAW, [factor, library])
         theta = law_theta(law, base)
-        start = Coordinates(law, base.reference).u(theta)
+        start = StartingEstimate(Coordinates(law, base.reference).u(theta), reference=base.reference)
         name = f"Arrhenius, {library.parameter}: {library.name}"
-        found[name] = identify(law, tests, using, settings=settings, start=start, reference=base.reference)
+        found[name] = identify(law, tests, using, settings=settings, start=start)
     return found
 
 
@@ -143,37 +142,36 @@ def law_theta(law: ck.CreepLaw, base: Identification) -> np.ndarray:
 
 def again(fit: Identification, tests: list[ck.History], using: object) -> Identification:
     """The same law through another predictor, beginning where the first ended."""
-    return identify(fit.law, tests, using, settings=fit.settings, start=fit.u, known_nuisances=fit.nuisances,
-                    reference=fit.reference)  # fmt: skip
+    start = StartingEstimate.from_identification(fit)
+    return identify(fit.law, tests, using, settings=fit.settings, start=start)
 
 
-def held_out(fit: Identification, tests: list[ck.History]) -> tuple[HeldOutTest, ...]:
-    return leave_one_test_out(fit, tests)
+def held_out(fit: Identification, tests: list[ck.History]) -> CrossValidation:
+    return cross_validate(fit, tests)
 
 
-def table(how: str, found: dict[str, tuple[Identification, tuple[HeldOutTest, ...]]], tests: list[ck.History]) -> None:
+def table(how: str, found: dict[str, tuple[Identification, CrossValidation]], tests: list[ck.History]) -> None:
     """Misfit, BIC's ingredients, and the errors of amplitude of held-out tests."""
     names = [h.name.removeprefix("test_") for h in tests]
     print(f"\n{how}: relative squared error of the amplitude; fitted, then held out (pooled, without test 12, each)")
     print("| law | numbers | -2 ln L | fitted | held out | without 12 | median | " + " | ".join(names) + " |")
     print("|" + "-|" * (7 + len(names)))
     for name, (fit, held) in found.items():
-        kept = [one for one in held if not one.name.endswith("12")]
-        few = [h for h in tests if not h.name.endswith("12")]
-        own = [one.errors["amplitude"].relative_squared_error for one in held]
+        kept = replace(held, folds=tuple(f for f in held.folds if not f.held_out[0].name.endswith("12")))
+        own = [errors["amplitude"].relative_squared_error for errors in held.errors.values()]
         print(
             f"| {name} | {len(fit.law.params)} | {-2 * fit.log_likelihood:.1f} | {fit.errors['amplitude'].relative_squared_error:.2g} | "
-            f"{pooled_relative_squared_error(held, tests, 'amplitude'):.3g} | {pooled_relative_squared_error(kept, few, 'amplitude'):.3g} | "
+            f"{held.pooled_error('amplitude'):.3g} | {kept.pooled_error('amplitude'):.3g} | "
             f"{np.median(own):.2g} | " + " | ".join(f"{v:.2g}" for v in own) + " |",
             flush=True,
         )
     verdict(found)
 
 
-def verdict(found: dict[str, tuple[Identification, tuple[HeldOutTest, ...]]]) -> None:
+def verdict(found: dict[str, tuple[Identification, CrossValidation]]) -> None:
     """Whether the discovered forms predict better than plain Arrhenius, test by test."""
     one, other = (
-        np.array([h.errors["amplitude"].relative_squared_error for h in found[n][1]])
+        np.array([e["amplitude"].relative_squared_error for e in found[n][1].errors.values()])
         for n in ("plain Arrhenius", "discovered")
     )
     better, gain = int((other < one).sum()), np.log(other / one)

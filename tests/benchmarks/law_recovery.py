@@ -33,7 +33,6 @@ import creepkit as ck
 from creepkit import kernels
 from creepkit.cli import set_numba_cache
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
-from creepkit.inverse.problem import least_squares_problem
 from creepkit.inverse.selection.discrimination import equivalent_laws
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.variance_components import scaled_inverse
@@ -107,22 +106,22 @@ def coverage(one, design, fit):
 
 def fisher(fit, u, design):
     """Covariance of u under the true scatter, from the exact Jacobian at the true values."""
-    opened = least_squares_problem(fit)
-    x = np.concatenate([u, opened.x[len(u) :]])
-    residuals = opened.residual_function.evaluate(x)
+    problem = fit.least_squares_problem
+    x = np.concatenate([u, fit.x[len(u) :]])
+    residuals = problem.residuals(x)
     noise = dict(planted.NOISE)
     sizes = {name: OutputNoise(sd) for name, sd in noise.items()}
     if design.correlated:
         coefficient, sd = design.correlated
-        scale = opened.residual_function.observations.transforms[0].size
+        scale = problem.observations.transforms[0].scale
         reach = -5.0 / 48 / np.log(coefficient)
         sizes["amplitude"] = OutputNoise(1e-6, drift=sd / scale, correlation_length=reach)
     weights = np.linalg.inv(
-        covariance(replace(residuals, loudness=np.ones_like(residuals.relative_noise)), NoiseModel(sizes))
+        covariance(replace(residuals, relative_noise=np.ones_like(residuals.relative_noise)), NoiseModel(sizes))
     )
     own = np.einsum("tep,tef,tfq->pq", residuals.jacobian, weights, residuals.jacobian, optimize=True)
-    wide = opened.bounds.width[: len(u)]
-    prior = np.concatenate([12.0 / wide**2, opened.residual_function.nuisance_parameters.precision])
+    wide = problem.bounds.width[: len(u)]
+    prior = np.concatenate([12.0 / wide**2, problem.nuisance_parameters.precision])
     return scaled_inverse(own + np.diag(prior))[: len(u), : len(u)]
 
 

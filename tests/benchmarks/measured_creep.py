@@ -17,7 +17,7 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.inverse.cross_validation import (
-    leave_one_condition_out,
+    cross_validate,
     loading_strains,
     measured_time_to_strain,
     times_to_strain,
@@ -97,7 +97,9 @@ def spread_of_repeats(histories):
 def row(name, fit, histories, cpu, largest):
     """One line of the table, without BIC."""
     fitted = times_to_strain(fit.law, fit.values, histories, fit.predictor, LEVEL, loading_strains(histories))
-    held = "-" if len(fit.law.params) > largest else f"{leave_one_condition_out(fit, histories, LEVEL)[0].z_factor:.2f}"
+    held = "-"
+    if len(fit.law.params) <= largest:
+        held = f"{cross_validate(fit, histories, by='condition').times_to_strain(LEVEL).z_factor:.2f}"
     ends = [e.name for e in fit.estimates if e.verdict != "determined"]
     scatter = f"{100 * fit.noise_model.rate:.0f} %"
     first = [name, str(len(fit.law.params)), f"{fit.rms:.3f}", f"{fitted.z_factor:.2f}", held, scatter]

@@ -25,7 +25,7 @@ from scipy.stats import binomtest
 import creepkit as ck
 from creepkit.cli import set_numba_cache
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.identify import identify
+from creepkit.inverse.identify import StartingEstimate, identify
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 from creepkit.inverse.search.multistart import MultiStart, distinct
@@ -114,7 +114,8 @@ def compared(name, using, searches, rng, seed):
     best = [identify(law, [test], using, settings=settings, search=kept)]
 
     def continued(u):
-        return identify(law, [test], using, settings=settings, start=u, reference=best[0].reference)
+        start = StartingEstimate(u, reference=best[0].reference)
+        return identify(law, [test], using, settings=settings, start=start)
 
     best += [continued(u) for u in kept.starts]
     lowest = -2 * max([fit.log_likelihood for fit in best] + [row[0] for row in rows.values()])

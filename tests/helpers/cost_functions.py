@@ -1,4 +1,4 @@
-"""Landscapes with known minima, for searches: a cost function of u on a box, refined by scipy."""
+"""Cost functions with known minima, for searches: functions of u within bounds, refined by scipy."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.optimize import minimize
 
-from creepkit.inverse.search.local_refinement import Bounds, Minimum
+from creepkit.inverse.bounds import Bounds
+from creepkit.inverse.search.local_refinement import Minimum
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
@@ -20,7 +21,7 @@ TRIPLE = SUM + HYPERBOLIC_SINE
 
 @dataclass
 class Known:
-    """A landscape whose cost is a function of u, (candidates, parameters) to (candidates,); calls counts candidates."""
+    """A problem whose cost is a function of u, (candidates, parameters) to (candidates,); calls counts candidates."""
 
     of: Callable[[np.ndarray], np.ndarray]
     bounds: Bounds
@@ -31,18 +32,18 @@ class Known:
     seen: list[np.ndarray] = field(default_factory=list)
 
     @property
-    def objective(self):
-        return SimpleNamespace(law=self.law, coordinates=SimpleNamespace(rates=self.rates))
+    def coordinates(self):
+        return SimpleNamespace(term_rates=self.rates)
 
     def cost(self, u):
         self.calls.append(len(u))
         self.seen.append(u)
         return self.of(u)
 
-    def refine(self, u: np.ndarray, held: Mapping[int, float] | None = None) -> Minimum:
-        free = np.setdiff1d(np.arange(u.size), list(held or {}))
+    def minimise(self, u: np.ndarray, fixed: Mapping[int, float] | None = None) -> Minimum:
+        free = np.setdiff1d(np.arange(u.size), list(fixed or {}))
         whole = np.array(u, float)
-        whole[list(held or {})] = list((held or {}).values())
+        whole[list(fixed or {})] = list((fixed or {}).values())
 
         def cost(part):
             moved = whole.copy()

@@ -29,7 +29,7 @@ from creepkit.discovery.temperature_law import CandidateLaw, TemperatureLaw, ave
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import identify
+from creepkit.inverse.identify import StartingEstimate, identify
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection import rank
 from creepkit.inverse.settings import IdentificationSettings
@@ -218,9 +218,8 @@ class _RefitCache:
         return {best_form.parameter: best_form for best_form in self.best.forms} if self.fitted else dict(current)
 
     def _identify(self, law: CreepLaw, start: Floats | None) -> Identification:
-        return identify(
-            law, self.histories, self.predictor, settings=self.settings, start=start, reference=self.estimates.reference
-        )
+        estimate = StartingEstimate(start, reference=self.estimates.reference)
+        return identify(law, self.histories, self.predictor, settings=self.settings, start=estimate)
 
     def _starts(self, law: CreepLaw, regression: Regression) -> list[Floats | None]:
         """Where the regression ended; where points leave parameters open also the best so far, with idle forms.

@@ -1,4 +1,4 @@
-"""Candidates for further tests: variations of the tests that were made, within the range of the same rig."""
+"""Candidates for further tests: variations of the tests that were made, within what the same equipment can do."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def candidate_tests(
 
     Each is made on the longest test of its kind of loading. A bar at another stress is tested for a time that goes
     with stress^-exponent, so that it strains as much, but never for more than twice as long. The thickness that is
-    varied is that of the history, else that of the specimen `using`.
+    varied is that of the history, else that of the specimen `predictor`.
     """
     candidates: list[CandidateTest] = []
     for quantity in dict.fromkeys(h.loading.quantity for h in histories):
@@ -76,7 +76,7 @@ def _with_apex_thickness(history: History, predictor: Predictor | None) -> Histo
 def candidate_test(
     base_history: History, description: str, loading: Loading, end_time: float, **changes: object
 ) -> CandidateTest:
-    """A test like `base` under another loading, to the time `end`, s; without outputs."""
+    """A test like `base_history` under another loading, to `end_time`, s; without outputs."""
     first_time = float(base_history.times[base_history.times > 0][0]) * end_time / float(base_history.times[-1])
     times = np.unique(
         np.concatenate(
@@ -103,7 +103,8 @@ def _stress_variations(base_history: History, levels: Floats, exponent: float) -
         )
     for factor in (HIGHER_LEVEL, LOWER_LEVEL):
         change = StressSteps(((0.0, middle), (0.5 * end_time, factor * middle)), control)
-        description = f"{middle:.3g} MPa, from {_hours_text(0.5 * end_time)} on {factor * middle:.3g} MPa, for {_hours_text(end_time)}"
+        hold, end = _hours_text(0.5 * end_time), _hours_text(end_time)
+        description = f"{middle:.3g} MPa, from {hold} on {factor * middle:.3g} MPa, for {end}"
         yield candidate_test(base_history, description, change, end_time)
     yield candidate_test(
         base_history,

@@ -18,28 +18,29 @@ from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.experiments.candidate_tests import CandidateTest
 from creepkit.experiments.candidate_tests import candidate_tests as variations
-from creepkit.inverse.bound_penalties import BoundPenalties
+from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.composite_predictor import compared_outputs, predict, predictor_for, reduced_order_model_of
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
 from creepkit.inverse.iterative_estimation import starting_point
 from creepkit.inverse.noise_model import NoiseModel, cholesky_factors
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history, usable_frames
+from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
 from creepkit.inverse.reference_conditions import median_log_inverse_duration, median_log_strain_rate
-from creepkit.inverse.residuals import ResidualFunction
-from creepkit.inverse.search.local_refinement import Bounds, bounded_least_squares
+from creepkit.inverse.residuals import residuals_at_measured_values
+from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.selection.discrimination import DISTINGUISHABLE_CHI_SQUARE
-from creepkit.inverse.selection.ranking import CREDIBLE_WEIGHT
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
 from creepkit.presentation import Presentable
 from creepkit.records import History, Predictor
 
-REFIT_STEPS = 8
+REFIT_TOLERANCES = Tolerances(max_steps=8, tolerance=1e-5)
 """Of a full refit."""
 
 
 MIN_FRAMES = 5
-"""A planned test with fewer frames before it bursts says nothing."""
+"""A planned test with fewer frames before it ruptures is left out."""
 
 
 WEAK_PRIOR = 0.03
@@ -47,59 +48,38 @@ WEAK_PRIOR = 0.03
 
 
 EXTRAPOLATION_LIMIT = 2.0
-"""A planned test is followed until its growing output is so many times what was seen: beyond, other things happen."""
-
-
-OBSERVATION_FIELDS = (
-    "output_index",
-    "frame_index",
-    "present",
-    "leading_output",
-    "values",
-    "times",
-    "relative_noise",
-    "followed_to_rupture",
-    "censored",
-)
-"""Fields of entries with a row for each test."""
+"""A planned test is predicted until its leading output is so many times what was measured."""
 
 
 @dataclass(frozen=True, eq=False)
 class ModelDiscrimination:
-    """Law b against law a.
+    """The alternative law b against what the reference law a predicts, without noise.
 
-    made : how many tests were; plans : those that could be. histories : of both, in this order, with a's predictions
-    for outputs. fit : of b. entries, scatter : by which they are compared, the scatter being that of a's fit.
+    problem : of law b, the tests that were made first and the candidates behind them. measured_count : how many were
+    made. alternative : the identification of law b. noise_model : that of law a, by which they are compared.
     """
 
+    problem: LeastSquaresProblem
     measured_count: int
     candidates: tuple[CandidateTest, ...]
-    histories: tuple[History, ...]
-    predictor: Predictor
     alternative: Identification
-    observations: ObservationVector
     noise_model: NoiseModel
 
     @classmethod
     def from_identifications(
         cls, reference: Identification, alternative: Identification, candidates: Sequence[CandidateTest]
     ) -> ModelDiscrimination:
-        """Law b against what law a predicts; plans that burst at once are left out."""
+        """Law b against what law a predicts; candidates that rupture at once are left out."""
         assert reference.predictor is not None
-        predictor, measured_histories = (
-            reduced_order_model_of(reference.predictor) or reference.predictor,
-            [_without_rupture(h) for h in reference.histories],
-        )
+        predictor = reduced_order_model_of(reference.predictor) or reference.predictor
+        measured_histories = [_without_rupture(h) for h in reference.histories]
         measured = [thinned_history(h, reference.settings.frames) for h in measured_histories]
         base_observations = ObservationVector.from_histories(measured, predictor, measured_histories)
-        all_histories = [
-            *measured,
-            *(_with_placeholder_outputs(d.history, predictor, base_observations) for d in candidates),
-        ]
-        predicted = _with_predictions(reference, predictor, all_histories, len(measured), base_observations)
+        planned = [_with_placeholder_outputs(d.history, predictor, base_observations) for d in candidates]
+        predicted = _with_predictions(reference, predictor, [*measured, *planned], len(measured), base_observations)
         output_limits = {name: _output_limit(measured, name) for name in base_observations.outputs}
-        usable = [(d, h) for d, h in zip(candidates, (_with_usable_frames(h, predictor, output_limits) for h in predicted[len(measured) :]), strict=True)
-                if h.used.sum() >= MIN_FRAMES]  # fmt: skip
+        limited = [_with_usable_frames(h, predictor, output_limits) for h in predicted[len(measured) :]]
+        usable = [(d, h) for d, h in zip(candidates, limited, strict=True) if h.used.sum() >= MIN_FRAMES]
         histories = (*predicted[: len(measured)], *(h for _, h in usable))
         observations = replace(
             ObservationVector.from_histories(histories, predictor),
@@ -109,58 +89,56 @@ class ModelDiscrimination:
         noise_model = NoiseModel(
             {name: reference.noise_model[name] for name in base_observations.outputs}, reference.noise_model.rate
         )
-        return cls(
-            len(measured), tuple(d for d, _ in usable), histories, predictor, alternative, observations, noise_model
+        made = histories[: len(measured)]
+        nuisances = _nuisances(alternative, histories, len(measured), predictor)
+        problem = LeastSquaresProblem(
+            histories=histories,
+            predictor=predictor,
+            coordinates=alternative.coordinates,
+            observations=observations,
+            nuisance_parameters=nuisances,
+            bounds=Bounds.from_law(
+                alternative.law,
+                alternative.coordinates,
+                median_log_strain_rate(made, predictor),
+                median_log_inverse_duration(made),
+            ).with_nuisances(nuisances),
+            settings=alternative.settings,
+            covariance_factor=cholesky_factors(residuals_at_measured_values(observations), noise_model),
         )
+        return cls(problem, len(measured), tuple(d for d, _ in usable), alternative, noise_model)
 
     def linearised_chi_square(self, candidate_indices: Sequence[int]) -> float:
-        """The chi-square left after one Gauss-Newton step, with the chosen plans."""
-        objective, x, bounds, covariance_factor = self._problem(candidate_indices)
-        residuals, bound_penalties = objective.evaluate(x), BoundPenalties(objective)
-        assert residuals.jacobian is not None
-        residuals_and_jacobian = np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1)
-        whitened = np.linalg.solve(covariance_factor, residuals_and_jacobian)[residuals.present]
-        jacobian_rows = np.concatenate([whitened[:, 1:], bound_penalties.jacobian(x)])
-        whitened_residuals = np.concatenate([whitened[:, 0], bound_penalties.residuals(x)])
-        weak_prior = np.diag(WEAK_PRIOR / bounds.width)
+        """The chi-square left after one Gauss-Newton step, with some of the candidates."""
+        problem, x = self._problem_of(candidate_indices)
+        residuals, jacobian = problem.whitened(x), problem.jacobian(x)
+        weak_prior = np.diag(WEAK_PRIOR / problem.bounds.width)
         step = np.linalg.lstsq(
-            np.concatenate([jacobian_rows, weak_prior]),
-            np.concatenate([-whitened_residuals, np.zeros(x.size)]),
-            rcond=None,
+            np.concatenate([jacobian, weak_prior]), np.concatenate([-residuals, np.zeros(x.size)]), rcond=None
         )[0]
-        return float(((whitened_residuals + jacobian_rows @ step) ** 2).sum())
+        return float(((residuals + jacobian @ step) ** 2).sum())
 
     def refitted_chi_square(self, candidate_indices: Sequence[int]) -> float:
-        """The chi-square left after a full refit."""
-        objective, x, bounds, covariance_factor = self._problem(candidate_indices)
-        return (
-            2.0
-            * bounded_least_squares(objective, bounds, covariance_factor, x, max_steps=REFIT_STEPS, tolerance=1e-5).cost
-        )
+        """The chi-square left after a full refit, with some of the candidates."""
+        problem, x = self._problem_of(candidate_indices)
+        return 2.0 * problem.minimise(x, tolerances=REFIT_TOLERANCES).cost
 
-    def _problem(self, candidate_indices: Sequence[int]) -> tuple[ResidualFunction, Floats, Bounds, Floats]:
-        """The problem of law b with the chosen plans: objective, where to begin, bounds, and covariance factors."""
-        indices, alternative = (
-            [*range(self.measured_count), *(self.measured_count + k for k in candidate_indices)],
-            self.alternative,
-        )
-        histories, measured = [self.histories[k] for k in indices], self.histories[: self.measured_count]
-        fields = {name: getattr(self.observations, name)[indices] for name in OBSERVATION_FIELDS}
-        nuisances = _nuisances(alternative, histories, self.measured_count, self.predictor)
-        observations = replace(self.observations, **fields)
-        objective = ResidualFunction(
-            alternative.law, histories, self.predictor, alternative.coordinates, observations, nuisances
-        )
-        initial_values = {(nuisance.kind, nuisance.owner): nuisance.value for nuisance in alternative.nuisances}
-        log_rate = median_log_strain_rate(measured, self.predictor)
-        bounds = Bounds.from_law(
-            alternative.law, alternative.coordinates, log_rate, median_log_inverse_duration(measured)
+    def _problem_of(self, candidate_indices: Sequence[int]) -> tuple[LeastSquaresProblem, Floats]:
+        """The problem of law b with some of the candidates, and where to begin, (unknowns,)."""
+        tests = [*range(self.measured_count), *(self.measured_count + k for k in candidate_indices)]
+        whole, alternative = self.problem, self.alternative
+        histories = [whole.histories[k] for k in tests]
+        nuisances = _nuisances(alternative, histories, self.measured_count, whole.predictor)
+        problem = replace(
+            whole,
+            histories=tuple(histories),
+            observations=whole.observations.of_tests(tests),
+            evaluations=EvaluationCache(),
         ).with_nuisances(nuisances)
-        x = bounds.clip(starting_point(nuisances, alternative.u, initial_values))
-        covariance_factor = cholesky_factors(
-            replace(objective.evaluate(x), present=objective.observations.present), self.noise_model
-        )
-        return objective, x, bounds, covariance_factor
+        initial_values = {(nuisance.kind, nuisance.owner): nuisance.value for nuisance in alternative.nuisances}
+        x = problem.bounds.clip(starting_point(nuisances, alternative.u, initial_values))
+        residuals = replace(problem.residuals(x), present=problem.observations.present)
+        return problem.with_covariance(cholesky_factors(residuals, self.noise_model)), x
 
 
 def _without_rupture(history: History) -> History:
@@ -171,10 +149,13 @@ def _without_rupture(history: History) -> History:
 def _with_placeholder_outputs(
     candidate: History, predictor: Predictor, base_observations: ObservationVector
 ) -> History:
-    """A planned history with room for the outputs of those that were made, at their noise."""
+    """A planned history with the outputs of those that were made, zero as yet, at their noise."""
     outputs = getattr(predictor_for(predictor, candidate), "outputs", base_observations.outputs)
-    noise = {name: np.full(candidate.times.size, base_observations.noise[base_observations.outputs.index(name)]) for name in outputs
-             if name in base_observations.outputs}  # fmt: skip
+    noise = {
+        name: np.full(candidate.times.size, base_observations.noise[base_observations.outputs.index(name)])
+        for name in outputs
+        if name in base_observations.outputs
+    }
     return replace(
         _without_rupture(candidate), outputs={name: 0.0 * sd for name, sd in noise.items()}, standard_deviation=noise
     )
@@ -208,14 +189,14 @@ def _with_predictions(
 
 
 def _output_limit(measured: Sequence[History], name: str) -> float:
-    """How far the growing output of a planned test is followed: as far again as the tests that were made."""
+    """The largest output of a planned test that is compared, in its unit: as far again as the tests that were made."""
     used_values = [h.outputs[name][usable_frames(h, name)] for h in measured if name in h.outputs]
     values = np.concatenate([*used_values, np.zeros(1)])
     return float(values.min() + EXTRAPOLATION_LIMIT * np.ptp(values))
 
 
 def _with_usable_frames(candidate: History, predictor: Predictor, output_limits: dict[str, float]) -> History:
-    """A planned history with its frames before it bursts, and within reach, marked used."""
+    """A planned history with its frames before rupture and below the output limits marked used."""
     first_output, *_ = compared_outputs(predictor, candidate)
     is_finite = np.isfinite(np.stack([*candidate.outputs.values()])).all(axis=0)
     is_within_limit = np.nan_to_num(candidate.outputs[first_output]) <= output_limits[first_output]
@@ -224,14 +205,17 @@ def _with_usable_frames(candidate: History, predictor: Predictor, output_limits:
 
 def _stated_thicknesses(histories: Sequence[History], measured_count: int) -> list[tuple[int, float]]:
     """(position, mm) of the planned tests whose apex thickness is stated: it is what they are about."""
-    return [(k, h.geometry["apex_thickness"]) for k, h in enumerate(histories)
-            if k >= measured_count and "apex_thickness" in h.geometry]  # fmt: skip
+    return [
+        (k, h.geometry["apex_thickness"])
+        for k, h in enumerate(histories)
+        if k >= measured_count and "apex_thickness" in h.geometry
+    ]
 
 
 def _nuisances(
     fit: Identification, histories: Sequence[History], measured_count: int, predictor: Predictor
 ) -> NuisanceParameters:
-    """Those of the fit's nuisances, with the spreads that it found; planned thicknesses are known as well as others."""
+    """The nuisance parameters of the tests, with prior standard deviations that the fit found."""
     nuisances = NuisanceParameters.from_histories(fit.settings.nuisances, histories, predictor)
     if not nuisances.mean.size:
         return nuisances
@@ -244,7 +228,7 @@ def _nuisances(
 
 
 FULL_REFITS = 3
-"""Designs that are refitted in full."""
+"""Candidates that are refitted in full."""
 
 
 @dataclass(frozen=True)
@@ -260,7 +244,7 @@ class DiscriminatingExperiment:
 class DiscriminationDesign(Presentable):
     """Further tests, the most telling first, if law `true` holds and law `other` is fitted.
 
-    now : expected chi-square by the tests that were made. left_out : designs that burst at once.
+    current_chi_square : expected by the tests that were made. excluded : candidates that rupture at once.
     """
 
     reference_law: str
@@ -271,10 +255,16 @@ class DiscriminationDesign(Presentable):
 
     @property
     def sentence(self) -> str:
-        """The most telling test, or that none is."""
-        premise = f"if {self.reference_law} holds, {self.alternative_law} is worse by an expected chi-square of {self.current_chi_square:.2g} in these tests"
+        """The test of largest expected chi-square, or that none is large enough."""
+        premise = (
+            f"if {self.reference_law} holds, {self.alternative_law} is worse by an expected chi-square of "
+            f"{self.current_chi_square:.2g} in these tests"
+        )
         if not self.experiments or self.experiments[0].chi_square < DISTINGUISHABLE_CHI_SQUARE:
-            return f"{premise}; none of the {len(self.experiments)} further tests considered brings it above {DISTINGUISHABLE_CHI_SQUARE:.2g}"
+            return (
+                f"{premise}; none of the {len(self.experiments)} further tests considered brings it above "
+                f"{DISTINGUISHABLE_CHI_SQUARE:.2g}"
+            )
         best = self.experiments[0]
         return f"{premise}; one more test, {best.description}, would bring it to {best.chi_square:.2g}"
 
@@ -284,12 +274,14 @@ def discriminating_experiments(
     alternative: Identification,
     candidates_or_histories: Sequence[CandidateTest | History] | None = None,
 ) -> DiscriminationDesign:
-    """Further tests by how well they would separate law b from law a, if a is true.
+    """Further tests by how well they would separate the alternative law from the reference law, if that is true.
 
-    designs : planned tests (histories need no outputs); by default variations of the tests that were made.
+    candidates_or_histories : planned tests (without outputs); by default variations of the tests that were made.
     """
     if reference.predictor is None or not reference.histories:
-        raise FitError("this identification was loaded from a file: attach its histories and specimen with fit.on()")
+        raise FitError(
+            "this identification was loaded from a file: attach its histories and specimen with fit.with_histories()"
+        )
     if reference.provenance.get("data") != alternative.provenance.get("data"):
         raise FitError(
             "the two identifications were made from different histories, frames or nuisances; make them alike"
@@ -312,7 +304,7 @@ def further_tests(ranking: WeightedLaws) -> tuple[DiscriminationDesign, ...]:
 def _candidates_given(
     fit: Identification, candidates_or_histories: Sequence[CandidateTest | History] | None
 ) -> tuple[CandidateTest, ...]:
-    """The designs given, named so that they are no test that was made; else variations of those."""
+    """The candidates given, with names of their own; else variations of the tests that were made."""
     if candidates_or_histories is None:
         return variations(fit.histories, float(fit.local_exponent(fit.reference.stress)[0]), fit.predictor)
     candidates = (
@@ -325,7 +317,7 @@ def _candidates_given(
 def _expected_chi_squares(
     discrimination: ModelDiscrimination, current_chi_square: float
 ) -> tuple[DiscriminatingExperiment, ...]:
-    """Every plan with its chi-square, by one step or, of the most promising, in full; never below that of now."""
+    """Every candidate with its chi-square, by one step or, of the most promising, in full; never below the current one."""
     chi_squares = [discrimination.linearised_chi_square([k]) for k in range(len(discrimination.candidates))]
     for k in np.argsort(chi_squares)[::-1][:FULL_REFITS]:
         chi_squares[k] = discrimination.refitted_chi_square([int(k)])

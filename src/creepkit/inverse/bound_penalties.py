@@ -1,41 +1,44 @@
-"""Penalty residuals for parameter bounds, constraints of the law and priors of nuisance parameters; a check that the data do not push against the bounds."""
+"""Bound and prior penalties as residuals: parameter bounds, constraints of the law, priors of nuisance parameters.
+
+A check finds coefficients whose bounds exclude the data.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.nuisance_parameters import NuisanceParameters
+from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.reference_conditions import reference_stresses
-from creepkit.inverse.residuals import ResidualFunction
 from creepkit.language import CreepLaw
+from creepkit.records import History, Predictor
 
 
 class BoundPenalties:
-    """Extra residuals of x = (u, e).
+    """Residuals of x = (u, e) beside those of the data.
 
-    Bounds of coefficients, and of exponents whose place a local exponent takes, and the law's constraints give zero
-    inside and grow linearly outside: these are not box variables in conditioned coordinates. Unknowns of tests give
-    their distance from the prior mean, over its sd.
+    Bounds of coefficients, and of exponents whose place a local exponent takes, and the constraints of the law give
+    zero inside and grow linearly outside: they do not bound single conditioned coordinates. Nuisance parameters give
+    their distance from the prior mean over its standard deviation.
     """
 
     WEIGHT = 100.0
 
-    def __init__(self, residual_function: ResidualFunction) -> None:
-        self.coordinates, self.nuisance_parameters, law = (
-            residual_function.coordinates,
-            residual_function.nuisance_parameters,
-            residual_function.law,
-        )
-        internal_bounds = [(p.to_internal(p.bounds[0]), p.to_internal(p.bounds[1])) for p in law.params.values()]
-        self.low = np.array([internal_bounds[k][0] for k in self.coordinates.penalised])
-        self.high = np.array([internal_bounds[k][1] for k in self.coordinates.penalised])
-        self._constraints = _constraint_margins(law, residual_function)
+    def __init__(
+        self, coordinates: Coordinates, nuisance_parameters: NuisanceParameters, points: Sequence[Floats]
+    ) -> None:
+        """points : the six variables of a law, (points,) each, at which its constraints must hold."""
+        self.coordinates, self.nuisance_parameters, law = coordinates, nuisance_parameters, coordinates.law
+        self.low, self.high = law.internal_bounds[:, list(coordinates.penalised)]
+        self._constraints = _constraint_margins(law, points)
 
     def residuals(self, x: Floats) -> Floats:
-        """(..., fences) residuals at x (..., unknowns)."""
+        """(..., penalties) - residuals at x (..., unknowns)."""
         u, e = self._split(x)
         theta = self.coordinates.theta(u)
         margins = self._constraints(theta)
@@ -46,11 +49,11 @@ class BoundPenalties:
         return np.concatenate([penalties, prior_residuals], axis=-1)
 
     def constraint_violations(self, u: Floats) -> Floats:
-        """How far each constraint is violated at u; 0 where it holds."""
+        """(constraints,) how far each constraint is violated at u (parameters,); 0 where it holds."""
         return np.maximum(-self._constraints(self.coordinates.theta(u)), 0.0)
 
     def jacobian(self, x: Floats) -> Floats:
-        """(fences, unknowns); constraints by central differences."""
+        """(penalties, unknowns) their derivatives at x (unknowns,); those of constraints by central differences."""
         u, e = self._split(x)
         theta = self.coordinates.theta(u)
         penalised = list(self.coordinates.penalised)
@@ -73,15 +76,18 @@ class BoundPenalties:
         return x[..., :size], x[..., size:]
 
     def bound_excess(self, theta: Floats) -> Floats:
-        """How far each walled parameter lies beyond its bounds (coefficients in ln): above positive, below negative."""
+        """(..., penalised) distance of parameters beyond their bounds, positive above and negative below.
+
+        theta : (..., parameters) internal parameters.
+        """
         penalised = theta[..., list(self.coordinates.penalised)]
         return np.asarray(np.maximum(penalised - self.high, 0.0) + np.minimum(penalised - self.low, 0.0))
 
 
-def _constraint_margins(law: CreepLaw, residual_function: ResidualFunction) -> Callable[[Floats], Floats]:
+def _constraint_margins(law: CreepLaw, point: Sequence[Floats]) -> Callable[[Floats], Floats]:
     """How far each constraint is from being violated, the worst over the stresses, temperatures and times of the tests.
 
-    The function found takes theta (..., parameters) to (..., constraints). A margin that is not a number counts as
+    The result takes theta (..., parameters) to (..., constraints). A margin that is not a number counts as
     violated.
     """
     import sympy
@@ -94,14 +100,12 @@ def _constraint_margins(law: CreepLaw, residual_function: ResidualFunction) -> C
     functions = [
         sympy.lambdify((*POINT_VARIABLES, *law.states, *law.params), side, "numpy") for side in margin_expressions
     ]
-    point = _test_points(residual_function)
     initial_states = [state.initial for state in law.states.values()]
 
     def margins(theta: Floats) -> Floats:
-        columns = zip(law.params.values(), np.moveaxis(theta, -1, 0)[..., None], strict=True)
         shape = (*theta.shape[:-1], point[0].size)
         with np.errstate(all="ignore"):
-            values = [np.exp(t) if p.scale == "log" else t for p, t in columns]
+            values = [value[..., None] for value in law.from_internal(theta).values()]
             margins_by_constraint = [
                 np.broadcast_to(f(*point, *initial_states, *values), shape).min(axis=-1) for f in functions
             ]
@@ -111,19 +115,20 @@ def _constraint_margins(law: CreepLaw, residual_function: ResidualFunction) -> C
     return margins
 
 
-def _test_points(residual_function: ResidualFunction) -> list[Floats]:
-    """The six variables of the point over every test's stresses and temperatures, and times from first to last."""
+def constraint_points(
+    histories: Sequence[History], predictor: Predictor, observations: ObservationVector, strain: float
+) -> list[Floats]:
+    """The six variables of a law, (points,) each, over the stresses and temperatures of tests, at times to the last."""
     pairs = {
         (float(s), float(T))
-        for h in residual_function.histories
-        for s in reference_stresses(h, residual_function.predictor)
+        for h in histories
+        for s in reference_stresses(h, predictor)
         for T in h.temperature_program().values
     }
-    last_time = float(residual_function.observations.times[residual_function.observations.present].max())
+    last_time = float(observations.times[observations.present].max())
     times = np.concatenate([np.zeros(1), np.geomspace(1e-3 * last_time, last_time, 60)])
     stress, temperature = (np.repeat([pair[k] for pair in sorted(pairs)], times.size) for k in (0, 1))
-    strain = np.full(stress.size, residual_function.coordinates.reference.strain)
-    return [stress, strain, np.tile(times, len(pairs)), temperature, stress, stress / 3]
+    return [stress, np.full(stress.size, strain), np.tile(times, len(pairs)), temperature, stress, stress / 3]
 
 
 FORCE_LIMIT = 1.0
@@ -131,21 +136,17 @@ FORCE_LIMIT = 1.0
 
 
 EXCESS_LIMIT = 0.1
-"""In ln beyond the bounds of a coefficient: no wall gives way so far unless the search never came back inside."""
+"""In ln beyond the bounds of a coefficient: further than a penalty of the law's bounds ever lets a minimum lie."""
 
 
-def check_bounds(residual_function: ResidualFunction, u: Floats, gradient: Floats) -> None:
-    """A coefficient that the data push hard against its bounds is an error: the answer would be the bound's.
+def check_bounds(bound_penalties: BoundPenalties, u: Floats, gradient: Floats, data: int) -> None:
+    """A coefficient that the data force against its bounds is an error: the estimate would be the bound.
 
-    force : (parameters,) derivative of half the chi-square of the data to u.
+    u, gradient : (parameters,) estimate, and derivative of half the chi-square of the data to it; data : their number.
     """
-    law, coordinates, bound_penalties = (
-        residual_function.law,
-        residual_function.coordinates,
-        BoundPenalties(residual_function),
-    )
+    coordinates, law = bound_penalties.coordinates, bound_penalties.coordinates.law
     theta = coordinates.theta(u)
-    force_limit = FORCE_LIMIT * int(residual_function.observations.present.sum())
+    force_limit = FORCE_LIMIT * data
     for k, excess in zip(coordinates.penalised, bound_penalties.bound_excess(theta), strict=True):
         name, param = law.names[k], law.table[law.names[k]]
         excluded = bound_penalties.WEIGHT**2 * abs(excess) > force_limit and (

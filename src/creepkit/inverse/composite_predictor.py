@@ -1,4 +1,7 @@
-"""Predictors of several specimens as one, what a predictor offers, and finite-difference sensitivities of predictors that have none."""
+"""Predictors of several specimens as one, what a predictor offers, and sensitivities by finite differences.
+
+Finite differences replace the derivatives that a predictor does not give.
+"""
 
 from __future__ import annotations
 
@@ -136,9 +139,13 @@ def _concatenated_life(groups: Sequence[tuple[list[int], Prediction]], shape: tu
     for tests, life in life_predictions:
         horizon[tests] = life.horizon
     return TimesToStrain(
-        gathered("times", 3, np.nan), gathered("log_time_derivatives", 3, np.inf), gathered("rupture_times", 2, np.nan), horizon,
-        gathered("time_jacobian", 3, np.nan), gathered("rupture_jacobian", 2, np.nan),
-    )  # fmt: skip
+        gathered("times", 3, np.nan),
+        gathered("log_time_derivatives", 3, np.inf),
+        gathered("rupture_times", 2, np.nan),
+        horizon,
+        gathered("time_jacobian", 3, np.nan),
+        gathered("rupture_jacobian", 2, np.nan),
+    )
 
 
 def predict(
@@ -187,7 +194,7 @@ def compared_outputs(predictor: Predictor, history: History) -> tuple[str, ...]:
 
 
 def reduced_order_model_of(predictor: Predictor) -> Predictor | None:
-    """The cheap stand-in of a predictor, or None where it needs none."""
+    """The reduced-order model of a predictor, or None where it has none."""
     if isinstance(predictor, CompositePredictor):
         reduced = {name: reduced_order_model_of(p) or p for name, p in predictor.predictors.items()}
         changed = any(reduced[name] is not p for name, p in predictor.predictors.items())
@@ -235,7 +242,7 @@ def predict_with_sensitivities(
 def _difference_points(
     theta: Floats, steps: Floats, nuisances: NuisanceValues, kinds: Sequence[str], nuisance_steps: Sequence[float]
 ) -> tuple[Floats, dict[str, Floats]]:
-    """Candidates one step up, then one step down, in each parameter and then in each effect of all tests at once."""
+    """Candidates one step up, then one step down, in each parameter and then in each nuisance of all tests at once."""
     count = steps.size + len(kinds)
     points = np.tile(theta, (2 * count, 1))
     for sign, offset in ((1.0, 0), (-1.0, count)):

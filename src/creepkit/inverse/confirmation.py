@@ -10,7 +10,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import CompositePredictor
-from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, output_errors
+from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, errors_of_output
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
 from creepkit.presentation import Presentable
@@ -31,10 +31,10 @@ INCOMPLETE_STATUS = {Status.RUPTURED: "the specimen bursts", Status.NOT_CONVERGE
 class ConfirmedOutput:
     """One output of one test.
 
-    simulated : errors of the simulation against the measurement; fitted : the fit's own, or None of a test it has not
-        seen and cannot predict.
-    difference : rms of simulated less fitted frames over their noise; NaN where the fit's own prediction is not at hand
-        or no noise is known.
+    simulation_errors : of the simulation against the measurement; fit_errors : those of the fit, or None of a test that
+        it cannot predict.
+    rms_difference : rms of simulated less fitted frames over their noise; NaN where the fit cannot predict or no noise
+        is known.
     """
 
     output: str
@@ -62,7 +62,7 @@ class ConfirmedTest:
 
 @dataclass(frozen=True)
 class Confirmation(Presentable):
-    """The answer of confirm(). law, using : names of what was simulated, and by what."""
+    """The result of confirm(). law, predictor_name : what was simulated, and by what."""
 
     law: str
     predictor_name: str
@@ -89,8 +89,8 @@ class Confirmation(Presentable):
         if not self.confirmed:
             test_name, output = self._largest(lambda o: o.noise_ratio)
             return (
-                f"not confirmed: {self.predictor_name} differs from the fit by {self.noise_ratio:.2g} times the noise ({output} of "
-                f"'{test_name}'); identify again with using= this specimen"
+                f"not confirmed: {self.predictor_name} differs from the fit by {self.noise_ratio:.2g} times the noise "
+                f"({output} of '{test_name}'); identify again with using= this specimen"
             )
         test_name, output = self._largest(lambda o: o.simulation_errors.chi_square)
         worst = self[test_name, output].simulation_errors.chi_square
@@ -164,12 +164,12 @@ def _output_column(prediction: Prediction, k: int, name: str) -> Floats:
 def _confirmed_output(
     history: History, name: str, simulated: Floats, fitted: Floats | None, reported: OutputFit | None
 ) -> ConfirmedOutput:
-    used, noise = usable_frames(history, name), noise_standard_deviation(history, name)
-    measured, sd = history.outputs[name][used], noise[used]
-    simulation_errors = output_errors(measured, simulated[used], sd)
+    used = usable_frames(history, name)
+    sd = noise_standard_deviation(history, name)[used]
+    simulation_errors = errors_of_output(history, name, simulated)
     if fitted is None:
         return ConfirmedOutput(name, simulation_errors, None if reported is None else reported.errors, float("nan"))
     known = sd > 0
     difference = ((simulated - fitted)[used] / np.where(known, sd, np.nan))[known]
     rms = float(np.sqrt(np.mean(difference**2))) if difference.size else float("nan")
-    return ConfirmedOutput(name, simulation_errors, output_errors(measured, fitted[used], sd), rms)
+    return ConfirmedOutput(name, simulation_errors, errors_of_output(history, name, fitted), rms)

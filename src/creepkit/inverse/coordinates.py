@@ -1,4 +1,4 @@
-"""Conditioned coordinates: the log rate of each term at a reference point and local stress exponents, in the place of raw parameters."""
+"""Conditioned coordinates: log rates of the terms at a reference point, and local stress exponents, as unknowns."""
 
 from __future__ import annotations
 
@@ -17,22 +17,23 @@ from creepkit.language import CreepLaw, stress, temperature
 from creepkit.language.symbols import POINT_VARIABLES
 
 SAMPLE_POINTS = 64
-"""Points of the bounds at which a candidate parameter is looked at."""
+"""Points within the bounds at which the derivative to a candidate parameter is evaluated."""
 
 
 MINIMUM_DERIVATIVE = 0.2
-"""Of dh/dp over the bounds: a parameter that the local exponent hardly feels cannot stand for it."""
+"""Of dh/dp over the bounds: a parameter that the local exponent hardly depends on cannot replace it."""
 
 
 LARGEST_EXPONENT = 30.0
-"""Local exponents above this are not looked for."""
+"""Upper bound of local exponents."""
 
 
 @dataclass(frozen=True)
 class LocalExponent:
-    """h = a + b p of one term: p : the parameter's position; others : positions that a and b depend on.
+    """The local stress exponent of one term, h = a + b p, as an unknown in the place of parameter p.
 
-    parts : point and internal parameters of `others` to (a, b, da, db), the latter with one entry for each of them.
+    position : of p; others : positions of the parameters on which a and b depend.
+    coefficients : point and internal parameters `others` to (a, b, da, db), the latter with one value for each of them.
     """
 
     position: int
@@ -103,7 +104,7 @@ def _compiled(law: CreepLaw, exponent: sympy.Expr, p: sympy.Symbol, others: list
 
 
 def _smallest_derivative(law: CreepLaw, exponent: sympy.Expr, p: sympy.Symbol) -> float:
-    """The smallest |dh/dp| over the bounds, at 100 MPa, strain .01, 2e4 s, 1000 K."""
+    """The smallest |dh/dp| over the bounds, at 100 MPa, strain 0.01, 2e4 s, 1000 K."""
     derivative = sympy.diff(exponent, p)
     symbols = [s for s in law.params if s in derivative.free_symbols]
     function = sympy.lambdify((*POINT_VARIABLES, *symbols), derivative, "numpy")
@@ -145,16 +146,16 @@ class Coordinates:
 
     @property
     def penalised(self) -> tuple[int, ...]:
-        """Positions of the parameters that are no coordinates themselves, so that walls must hold their bounds."""
+        """Positions of the parameters that are no coordinates themselves, so that penalties must hold their bounds."""
         return (*self.coefficients, *(local.position for local in self.exponents))
 
     @property
     def coefficients(self) -> tuple[int, ...]:
-        """Positions of all of them."""
+        """Positions of the coordinates that are log rates of terms and of internal variables."""
         return self.term_rates + self.state_rates
 
     def theta(self, u: Floats) -> Floats:
-        """Internal parameters of conditioned coordinates."""
+        """(..., parameters) internal parameters of conditioned coordinates u (..., parameters)."""
         theta = np.array(u, float)
         for local in self.exponents:
             a, b, _, _ = local.evaluate(self._point(self.law), theta)
@@ -171,7 +172,7 @@ class Coordinates:
         return {name: float(value) for name, value in self.law.from_internal(self.theta(u)).items()}
 
     def u(self, theta: Floats) -> Floats:
-        """Conditioned coordinates of internal parameters."""
+        """(..., parameters) conditioned coordinates of internal parameters theta (..., parameters)."""
         u = np.array(theta, float)
         for local in self.exponents:
             a, b, _, _ = local.evaluate(self._point(self.law), u)
@@ -216,10 +217,8 @@ class Coordinates:
 
     def _has_finite_rate(self, kernel: ArrayKernel, rate_law: CreepLaw) -> bool:
         """Whether a virgin internal variable grows at all in the middle of the bounds."""
-        central_theta = [
-            0.5 * (p.to_internal(p.bounds[0]) + p.to_internal(p.bounds[1])) for p in rate_law.params.values()
-        ]
-        return bool(np.isfinite(self._log_rate(kernel, np.array(central_theta))))
+        central_theta = rate_law.internal_bounds.mean(axis=0)
+        return bool(np.isfinite(self._log_rate(kernel, central_theta)))
 
     def _log_rate(self, kernel: ArrayKernel, theta: Floats) -> Floats:
         return np.asarray(kernel.internal_log_rate(*self._point(kernel.law), *np.moveaxis(theta, -1, 0)), float)

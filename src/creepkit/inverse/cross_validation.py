@@ -1,92 +1,206 @@
-"""Cross-validation by test and by condition: errors of held-out tests, times to a strain or to rupture, and their Z factor."""
+"""Cross-validation: tests, conditions or the end of every history are predicted from a fit to the rest.
+
+The predictive likelihood of the end of a history, given its beginning, is with C the covariance of all observations and
+C_1 its part of the beginning
+
+    -2 ln p(end | beginning) = (r' C^-1 r + ln|C|) - (r_1' C_1^-1 r_1 + ln|C_1|)
+
+but for a constant, r the residuals at the values that the beginning alone gave.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs, predict_to_rupture
-from creepkit.inverse.goodness_of_fit import OutputErrors, output_errors
+from creepkit.inverse.goodness_of_fit import OutputErrors, errors_of_output, relative_squared_error
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
-from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
+from creepkit.inverse.noise_model import NoiseModel, Residuals
+from creepkit.inverse.observation_vector import usable_frames
 from creepkit.inverse.search.local_refinement import IterationCallback
+from creepkit.inverse.variance_components import inverse_covariances
 from creepkit.language import CreepLaw
 from creepkit.records import History, Prediction, Predictor, Status
 
+FITTED_FRACTION = 0.7
+"""Of the duration of each history: the part that is fitted in cross-validation by time."""
 
-@dataclass(frozen=True)
-class HeldOutTest:
-    """One test that the fit did not see, as any new test: nuisances at their prior means and no offset.
 
-    errors : {output: Errors}, relative squared errors about the test's own mean.
+FoldBy = Literal["test", "condition", "time"]
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """One fold: the tests that are predicted, and the fit to the rest.
+
+    held_out : whole histories; in cross-validation by time all of them, of which the fit knows the beginning.
     """
 
-    name: str
-    condition: str
+    held_out: tuple[History, ...]
     fit: Identification = field(repr=False)
-    errors: Mapping[str, OutputErrors]
+
+    @cached_property
+    def prediction(self) -> Prediction:
+        """The held-out tests as new ones: prior means of nuisance parameters, and no offset."""
+        return self.fit.predict(self.held_out, own_nuisances=False)
+
+    def errors(self, k: int) -> dict[str, OutputErrors]:
+        """{output: errors} of one of its tests."""
+        history, prediction = self.held_out[k], self.prediction
+        assert self.fit.predictor is not None
+        return {
+            name: errors_of_output(history, name, prediction.of(k)[:, prediction.outputs.index(name)])
+            for name in compared_outputs(self.fit.predictor, history)
+            if usable_frames(history, name).any()
+        }
 
 
-def leave_one_test_out(
-    fit: Identification, histories: Sequence[History] | None = None, progress: IterationCallback | None = None
-) -> tuple[HeldOutTest, ...]:
-    """Predict each test from a refit to all the others, which starts where `fit` ended."""
+@dataclass(frozen=True, eq=False)
+class CrossValidation:
+    """The result of cross_validate(): the fit to all histories, and its folds."""
+
+    fit: Identification = field(repr=False)
+    by: FoldBy
+    folds: tuple[Fold, ...]
+
+    @property
+    def errors(self) -> dict[str, dict[str, OutputErrors]]:
+        """{test: {output: errors}} of the held-out tests, about the mean of the test."""
+        return {h.name: fold.errors(k) for fold in self.folds for k, h in enumerate(fold.held_out)}
+
+    def pooled_error(self, output: str) -> float:
+        """Relative squared error of one output over all held-out tests, about the mean of all their frames."""
+        measured, predicted = [], []
+        for fold in self.folds:
+            column = fold.prediction.outputs.index(output)
+            for k, history in enumerate(fold.held_out):
+                if output in history.outputs:
+                    used = usable_frames(history, output)
+                    measured.append(history.outputs[output][used])
+                    predicted.append(fold.prediction.of(k)[used, column])
+        return relative_squared_error(measured, predicted)
+
+    def times_to_strain(self, strain: float, full: Sequence[History] | None = None) -> TimeComparison:
+        """Measured and predicted times to a creep strain of the held-out tests.
+
+        full : the same tests with all frames, to read measured times from. Loading strains are taken off them.
+        """
+        by_name = {h.name: h for h in full or ()}
+        comparisons = []
+        for fold in self.folds:
+            tests = [by_name.get(h.name, h) for h in fold.held_out]
+            comparisons.append(
+                times_to_strain(
+                    fold.fit.law, fold.fit.values, tests, self._predictor, strain, offsets=loading_strains(tests)
+                )
+            )
+        return _joined(strain, comparisons)
+
+    def times_to_rupture(self) -> TimeComparison:
+        """Measured and predicted rupture times of the held-out tests."""
+        comparisons = [
+            times_to_rupture(fold.fit.law, fold.fit.values, fold.held_out, self._predictor) for fold in self.folds
+        ]
+        return _joined(float("nan"), comparisons)
+
+    def predictive_deviance(self, noise_model: NoiseModel, fitted_fraction: float = FITTED_FRACTION) -> float:
+        """-2 ln of the predictive likelihood of what comes after the fitted part; of cross-validation by time."""
+        if self.by != "time":
+            raise FitError(f"the predictive likelihood is that of cross-validation by time, and this is by {self.by}")
+        (fold,) = self.folds
+        problem = self.fit.least_squares_problem
+        residuals = problem.residuals(fold.fit.x)
+        ends = np.array([[h.times[-1]] for h in self.fit.histories])
+        is_early = problem.observations.times <= fitted_fraction * ends
+        beginning = replace(
+            residuals, present=residuals.present & is_early, values=np.where(is_early, residuals.values, 0.0)
+        )
+        return _deviance(residuals, noise_model) - _deviance(beginning, noise_model)
+
+    @property
+    def _predictor(self) -> Predictor:
+        assert self.fit.predictor is not None
+        return self.fit.predictor
+
+
+def cross_validate(
+    fit: Identification,
+    histories: Sequence[History] | None = None,
+    *,
+    by: FoldBy = "test",
+    fitted_fraction: float = FITTED_FRACTION,
+    progress: IterationCallback | None = None,
+) -> CrossValidation:
+    """Predict held-out data from refits to the rest, each of which starts where `fit` ended.
+
+    histories : by default those of the fit.
+    by : "test" leaves out one test after the other, "condition" all tests of one temperature and stress, "time" what
+        comes after `fitted_fraction` of the duration of every history.
+    """
     tests = list(fit.histories if histories is None else histories)
-    if len(tests) < 2:
-        raise FitError("a test can only be held out of several, found one")
-    results = []
-    for k, test in enumerate(tests):
-        training_fit = refit(fit, [h for h in tests if h is not test])
-        results.append(HeldOutTest(test.name, test.condition, training_fit, prediction_errors(training_fit, test)))
+    folds, results = list(_folds(tests, by, fitted_fraction)), []
+    for held_out, training in folds:
+        results.append(Fold(tuple(held_out), refit(fit, training)))
         if progress is not None:
-            progress("test", k + 1, len(tests))
-    return tuple(results)
+            progress(by, len(results), len(folds))
+    return CrossValidation(fit, by, tuple(results))
+
+
+def _folds(
+    tests: Sequence[History], by: FoldBy, fitted_fraction: float
+) -> Iterator[tuple[list[History], list[History]]]:
+    """(held out, fitted) histories of each fold."""
+    if by == "time":
+        yield list(tests), [_first_part(h, fitted_fraction) for h in tests]
+        return
+    if by not in ("test", "condition"):
+        raise FitError(f"cross-validation by '{by}' is not known; allowed are test, condition and time")
+    groups = [[h] for h in tests]
+    if by == "condition":
+        groups = [[h for h in tests if h.condition == c] for c in sorted({h.condition for h in tests})]
+    if len(groups) < 2:
+        raise FitError(f"a {by} can only be held out of several, found one")
+    for group in groups:
+        yield group, [h for h in tests if not any(h is one for one in group)]
+
+
+def _first_part(history: History, fitted_fraction: float) -> History:
+    """The first part of a history, which does not know how the test will end."""
+    used = history.used & (history.times <= fitted_fraction * float(history.times[-1]))
+    return history.replace(used=used, rupture_time=None, unruptured=False)
+
+
+def _deviance(residuals: Residuals, noise_model: NoiseModel) -> float:
+    """r' C^-1 r + ln|C|."""
+    inverses, log_det = inverse_covariances(residuals, noise_model)
+    return float(np.einsum("te,tef,tf->", residuals.values, inverses, residuals.values) + log_det)
 
 
 def prediction_errors(fit: Identification, history: History) -> dict[str, OutputErrors]:
-    """{output: Errors} of one history that the fit predicts as a new test."""
-    assert fit.predictor is not None
-    prediction = fit.predict([history], own_nuisances=False)
-    return {
-        name: output_errors(*_used_values(history, prediction, name))
-        for name in compared_outputs(fit.predictor, history)
-        if usable_frames(history, name).any()
-    }
+    """{output: errors} of one history that the fit predicts as a new test: prior means of nuisances, and no offset."""
+    return Fold((history,), fit).errors(0)
 
 
-def pooled_relative_squared_error(held_out: Sequence[HeldOutTest], histories: Sequence[History], output: str) -> float:
-    """Relative squared error of one output over all held-out tests, about the mean of all their frames."""
-    by_name = {h.name: h for h in histories}
-    errors_and_values = [
-        (
-            held_out_test.errors[output],
-            by_name[held_out_test.name].outputs[output][usable_frames(by_name[held_out_test.name], output)],
-        )
-        for held_out_test in held_out
-    ]
-    sum_of_squares = sum(e.mean_squared_error * e.frames for e, _ in errors_and_values)
-    measured = np.concatenate([m for _, m in errors_and_values])
-    return float(sum_of_squares / ((measured - measured.mean()) ** 2).sum())
-
-
-def _used_values(history: History, prediction: Prediction, name: str) -> tuple[Floats, Floats, Floats]:
-    used = usable_frames(history, name)
-    predicted = prediction.of(0)[used, prediction.outputs.index(name)]
-    return history.outputs[name][used], predicted, noise_standard_deviation(history, name)[used]
+def _joined(strain: float, comparisons: Sequence[TimeComparison]) -> TimeComparison:
+    names = tuple(name for one in comparisons for name in one.names)
+    measured = np.concatenate([one.measured for one in comparisons])
+    return TimeComparison(strain, names, measured, np.concatenate([one.predicted for one in comparisons]))
 
 
 @dataclass(frozen=True)
 class TimeComparison:
-    """Measured and predicted times to one strain, or to rupture, s, for the tests that reached it.
+    """Measured and predicted times to one strain, or to rupture, for the tests that reached it.
 
-    level : the strain; NaN for rupture. A time that is predicted never to come is infinite.
-    spread : standard deviation of log10(measured / predicted); z_factor : 10^(2.5 spread) about the mean ratio;
-    bias : mean of log10(measured / predicted).
+    strain : the creep strain; NaN for rupture. measured, predicted : (tests,) s; infinite where the prediction never
+    reaches it.
     """
 
     strain: float
@@ -96,27 +210,27 @@ class TimeComparison:
 
     @property
     def log_ratios(self) -> Floats:
-        """log10(measured / predicted), (tests,)."""
+        """(tests,) - log10(measured / predicted)."""
         return np.log10(self.measured / self.predicted)
 
     @property
     def spread(self) -> float:
-        """Standard deviation of the logs."""
+        """Standard deviation of log10(measured / predicted)."""
         return float(np.std(self.log_ratios, ddof=1)) if self.log_ratios.size > 1 else float("nan")
 
     @property
     def bias(self) -> float:
-        """Mean of the logs."""
+        """Mean of log10(measured / predicted)."""
         return float(np.mean(self.log_ratios))
 
     @property
     def z_factor(self) -> float:
-        """10^(2.5 spread)."""
+        """10^(2.5 spread), the factor Z about the mean ratio."""
         return float(10 ** (2.5 * self.spread))
 
 
 def measured_time_to_strain(history: History, strain: float, output: str = "strain") -> float | None:
-    """First time at which the measured output crosses `level`, s, linear between frames; None if it never does."""
+    """First time at which the measured output reaches `strain`, s, linear between frames; None if it never does."""
     values, times = history.outputs[output], history.times
     crossed = np.flatnonzero(values >= strain)
     if crossed.size == 0 or crossed[0] == 0:
@@ -131,10 +245,14 @@ def loading_strains(histories: Sequence[History], output: str = "strain") -> lis
 
 
 def times_to_strain(
-    law: CreepLaw, values: Mapping[str, float], histories: Sequence[History], predictor: Predictor, strain: float,
+    law: CreepLaw,
+    values: Mapping[str, float],
+    histories: Sequence[History],
+    predictor: Predictor,
+    strain: float,
     offsets: Sequence[float] | None = None,
-) -> TimeComparison:  # fmt: skip
-    """Compare the times to `level` of creep strain of every history that reached it.
+) -> TimeComparison:
+    """Compare the times to a creep strain of every history that reached it.
 
     offsets : loading strain of each history, taken off what was measured; predictions carry none.
     """
@@ -170,45 +288,6 @@ def times_to_rupture(
     assert life_prediction is not None
     predicted = np.where(np.isfinite(life_prediction.rupture_times[0]), life_prediction.rupture_times[0], np.inf)
     return TimeComparison(float("nan"), tuple(h.name for h in ruptured), measured, predicted)
-
-
-def leave_one_condition_out(
-    fit: Identification, histories: Sequence[History], strain: float | None, full: Sequence[History] | None = None,
-    progress: IterationCallback | None = None,
-) -> tuple[TimeComparison, list[Identification]]:  # fmt: skip
-    """Predict each condition (temperature and stress) from a fit to all the others: times to `level` of creep strain.
-
-    level : creep strain, or None for the times to rupture.
-    histories : what the fits see; full : the same tests with all frames, to read measured times from.
-    """
-    assert fit.predictor is not None
-    full_histories = {h.name: h for h in (full or histories)}
-    comparisons: list[TimeComparison] = []
-    fits: list[Identification] = []
-    folds = list(_condition_folds(histories))
-    for held_out, training in folds:
-        training_fit = refit(fit, training)
-        fits.append(training_fit)
-        tests = [full_histories[h.name] for h in held_out]
-        if strain is None:
-            comparisons.append(times_to_rupture(training_fit.law, training_fit.values, tests, fit.predictor))
-        else:
-            comparisons.append(
-                times_to_strain(
-                    training_fit.law, training_fit.values, tests, fit.predictor, strain, loading_strains(tests)
-                )
-            )
-        if progress is not None:
-            progress("condition", len(fits), len(folds))
-    names = tuple(n for p in comparisons for n in p.names)
-    times = [np.concatenate([getattr(p, f) for p in comparisons]) for f in ("measured", "predicted")]
-    return TimeComparison(float("nan") if strain is None else strain, names, *times), fits
-
-
-def _condition_folds(histories: Sequence[History]) -> Iterator[tuple[list[History], list[History]]]:
-    """(held out, rest), one fold for each condition."""
-    for condition in sorted({h.condition for h in histories}):
-        yield [h for h in histories if h.condition == condition], [h for h in histories if h.condition != condition]
 
 
 def _crossing_time(strain: Floats, times: Floats, target: float, prediction: Prediction, test: int) -> float:

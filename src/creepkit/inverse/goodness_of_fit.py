@@ -1,10 +1,10 @@
-"""Goodness of fit: error measures of every output, of every test and of all tests, and predicted against measured rupture times."""
+"""Goodness of fit: errors of every output, of every test and of all tests, and predicted rupture times beside measured."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -19,11 +19,8 @@ from creepkit.inverse.observation_vector import (
     noise_standard_deviation,
     usable_frames,
 )
-from creepkit.inverse.residuals import ResidualFunction
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.records import History, Prediction, Predictor, constant_stress
-
-if TYPE_CHECKING:
-    pass
 
 
 def relative_squared_error(
@@ -58,9 +55,10 @@ def total_sum_of_squares(tests: Sequence[Floats], about: Literal["all", "test", 
 class OutputErrors:
     """Errors of one output, of one test or of all.
 
-    frames : how many were compared. rse : relative squared error (about the mean of just these frames).
-    mse, mae : mean squared and mean absolute error, in the output's unit. relative : rms error over the rms of what was
-    measured. chi_square : mean of (error / noise)^2; one would be noise alone. NaN where a frame was not predicted.
+    frames : how many were compared. relative_squared_error : about the mean of just these frames.
+    mean_squared_error, mean_absolute_error : in the output's unit (squared). relative_rms_error : rms error over the rms
+    of what was measured. chi_square : mean of (error / noise)^2, the reduced chi-square; one would be noise alone.
+    NaN where a frame was not predicted.
     """
 
     frames: int
@@ -82,9 +80,13 @@ def output_errors(measured: Floats, predicted: Floats, noise: Floats) -> OutputE
     known = noise > 0
     chi_square = float(np.mean((deviation[known] / noise[known]) ** 2)) if known.any() else nan
     return OutputErrors(
-        measured.size, relative_squared_error([measured], [predicted]), mse, float(np.mean(np.abs(deviation))),
-        float(np.sqrt(mse / mean_square)) if mean_square > 0 else nan, chi_square,
-    )  # fmt: skip
+        measured.size,
+        relative_squared_error([measured], [predicted]),
+        mse,
+        float(np.mean(np.abs(deviation))),
+        float(np.sqrt(mse / mean_square)) if mean_square > 0 else nan,
+        chi_square,
+    )
 
 
 @dataclass(frozen=True)
@@ -106,8 +108,8 @@ class OutputFit:
 class RuptureComparison:
     """The end of one test.
 
-    measured : s, when it ruptured, or how long it lasted where it was `stopped` before.
-    predicted : s, by the law alone; infinite where the law never breaks it.
+    measured : s, when it ruptured, or how long it lasted where it was stopped before (`censored`).
+    predicted : s, by the law alone; infinite where the law predicts no rupture.
     low, high : 95 % interval for a single test, from the parameters and the scatter between tests.
     """
 
@@ -127,9 +129,9 @@ class RuptureComparison:
 class TestFit:
     """One test in the fit.
 
-    frames : how many entries count (strains above twice the floor of their scale, all frames of other outputs).
-    rms, bias : root mean square and mean of ln((predicted + offset) / measured) over its fitted strains, else NaN.
-        For a test compared over its whole life, of its distance in ln strain and ln time (see inverse.distance).
+    frames : how many values count (strains above twice the floor of their transform, all frames of other outputs).
+    log_strain_rms, log_strain_bias : root mean square and mean of ln((predicted + offset) / measured) over its fitted
+        strains, else NaN. For a test followed to rupture, of its orthogonal residual (see inverse.orthogonal_residual).
     rate_factor : estimated factor of this test's creep rate on the law's (heat-to-heat scatter).
     weight : of the test in the fit; below one where test_loss="student" found it far from the others.
     rupture : its end, where that is known and predicted.
@@ -162,17 +164,21 @@ class TestFit:
 
 
 def goodness_of_tests(
-    residual_function: ResidualFunction, residuals: Residuals, random_effects: tuple[Floats, Floats], histories: Sequence[History],
-    prediction: Prediction, ruptures: Sequence[RuptureComparison | None],
-) -> tuple[TestFit, ...]:  # fmt: skip
-    """One TestMisfit for each test.
+    problem: LeastSquaresProblem,
+    residuals: Residuals,
+    random_effects: tuple[Floats, Floats],
+    histories: Sequence[History],
+    prediction: Prediction,
+    ruptures: Sequence[RuptureComparison | None],
+) -> tuple[TestFit, ...]:
+    """One TestFit for each test.
 
-    nuisances : offsets (tests, outputs) and ln rate factors (tests,); found : the prediction of the `full` histories;
-    ruptures : how each of them ended.
+    random_effects : offsets (tests, outputs) in the output's unit, and ln rate factors (tests,).
+    histories, prediction : with all frames; ruptures : how each of them ended.
     """
     offsets, log_factors = random_effects
-    observations = residual_function.observations
-    ratios = _log_ratios(residual_function, residuals, np.take_along_axis(offsets, observations.output_index, axis=1))
+    observations = problem.observations
+    ratios = _log_ratios(problem, residuals, np.take_along_axis(offsets, observations.output_index, axis=1))
     logarithmic = (
         observations.per_observation([float(name in LOGARITHMIC_OUTPUTS) for name in observations.outputs]) > 0
     )
@@ -188,8 +194,9 @@ def goodness_of_tests(
         offset_by_output = {name: float(v) for name, v in zip(observations.outputs, offsets[k], strict=True)}
         outputs = tuple(
             _output_fit(history, name, prediction.of(k)[:, prediction.outputs.index(name)], offset_by_output[name])
-            for name in compared_outputs(residual_function.predictor, history) if name in offset_by_output and usable_frames(history, name).any()
-        )  # fmt: skip
+            for name in compared_outputs(problem.predictor, history)
+            if name in offset_by_output and usable_frames(history, name).any()
+        )
         rate_factor, weight = float(np.exp(log_factors[k])), float(residuals.test_weights[k])
         test_fits.append(
             TestFit(
@@ -207,22 +214,31 @@ def goodness_of_tests(
     return tuple(test_fits)
 
 
+def errors_of_output(history: History, name: str, predicted: Floats) -> OutputErrors:
+    """Errors of one output of one test over its usable frames; predicted : (frames,) in the output's unit."""
+    used = usable_frames(history, name)
+    return output_errors(history.outputs[name][used], predicted[used], noise_standard_deviation(history, name)[used])
+
+
 def _output_fit(history: History, name: str, predicted: Floats, offset: float) -> OutputFit:
-    frames, noise = usable_frames(history, name), noise_standard_deviation(history, name)
-    errors_of_output = output_errors(history.outputs[name][frames], predicted[frames] + offset, noise[frames])
-    return OutputFit(name, errors_of_output, offset, float(np.median(noise[frames])))
+    noise = noise_standard_deviation(history, name)[usable_frames(history, name)]
+    return OutputFit(name, errors_of_output(history, name, predicted + offset), offset, float(np.median(noise)))
 
 
-def _log_ratios(residual_function: ResidualFunction, residuals: Residuals, offset: Floats) -> Floats:
+def _log_ratios(problem: LeastSquaresProblem, residuals: Residuals, offset: Floats) -> Floats:
     """ln((predicted + the test's offset) / measured) where the measured strain is above twice the floor, else NaN.
 
-    For tests compared over their whole life, the distance instead.
+    For tests followed to rupture, the orthogonal residual instead.
     """
-    observations = residual_function.observations
-    floor = observations.per_observation([s.floor if n in LOGARITHMIC_OUTPUTS else np.inf for n, s in zip(observations.outputs, observations.transforms,
-                                                                                  strict=True)])  # fmt: skip
+    observations = problem.observations
+    floor = observations.per_observation(
+        [
+            s.floor if n in LOGARITHMIC_OUTPUTS else np.inf
+            for n, s in zip(observations.outputs, observations.transforms, strict=True)
+        ]
+    )
     vertical = np.where(observations.followed_to_rupture[:, None], 0.0, residuals.values)
-    predicted = observations.inverse(vertical + residual_function.observed) + offset
+    predicted = observations.inverse(vertical + problem.observations.transformed_values) + offset
     above_floor = observations.present & (observations.values > 2 * floor)
     measured = np.where(above_floor, observations.values, 1.0)
     predicted_strain = np.where(above_floor, np.maximum(predicted, floor), 1.0)
@@ -267,12 +283,18 @@ own horizon comes on top."""
 
 
 def predict_rupture_times(
-    coordinates: Coordinates, u: Floats, covariance: Floats, noise_model: NoiseModel | None, quantile: float,
-    histories: Sequence[History], predictor: Predictor,
-) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    coordinates: Coordinates,
+    u: Floats,
+    covariance: Floats,
+    noise_model: NoiseModel | None,
+    quantile: float,
+    histories: Sequence[History],
+    predictor: Predictor,
+) -> tuple[Floats, Floats, Floats]:
     """Rupture times of histories, s, with intervals: (time, low, high), (tests,) each; infinite where none comes.
 
-    By the delta method on ln t, from the covariance of u; with `scatter` that of a single test's life comes on top.
+    By the delta method on ln t, from the covariance of u (parameters, parameters); with `noise_model` the scatter of
+    single tests is added.
     """
     for history in histories:
         if not predicts_rupture(predictor, history):
@@ -300,7 +322,7 @@ def predict_rupture_times(
 
 
 def _extended_to_rupture(history: History) -> History:
-    """What is asked of a test is when it breaks, however long after its last frame that may be."""
+    """The history with one frame, far beyond its last one, so that it is followed to rupture."""
     last_time = max(float(history.times[-1]), history.rupture_time or 0.0)
     return history.replace(times=np.array([EXTRAPOLATION_FACTOR * last_time]), outputs={}, standard_deviation={})
 
@@ -322,9 +344,14 @@ def constant_stress_tests(
 
 
 def compare_rupture_times(
-    coordinates: Coordinates, u: Floats, covariance: Floats, noise_model: NoiseModel, quantile: float,
-    histories: Sequence[History], predictor: Predictor,
-) -> list[RuptureComparison | None]:  # fmt: skip
+    coordinates: Coordinates,
+    u: Floats,
+    covariance: Floats,
+    noise_model: NoiseModel,
+    quantile: float,
+    histories: Sequence[History],
+    predictor: Predictor,
+) -> list[RuptureComparison | None]:
     """Measured against predicted, for every history; None where its end is not known or not predicted."""
     followed = [k for k, h in enumerate(histories) if h.end_known and predicts_rupture(predictor, h)]
     comparisons: list[RuptureComparison | None] = [None] * len(histories)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,8 +15,9 @@ from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import predict
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
-from creepkit.inverse.noise_model import NoiseModel
+from creepkit.inverse.noise_model import NoiseModel, Residuals, cholesky_factors
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate, owner_of, prior_mean
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate, delta_method, interval_quantile
@@ -39,21 +41,22 @@ __all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "Outp
 class Identification(Presentable):
     """The answer of identify().
 
-    estimates : one Estimate for each parameter, in the law's order.
-    u, covariance : conditioned coordinates at the optimum and their posterior covariance (see inverse.coordinates).
-    scatter : standard deviations of the sources of scatter, found from the data.
+    estimates : one Estimate for each parameter, in the order of the law.
+    u : (parameters,) conditioned coordinates at the optimum; covariance : (parameters, parameters) their posterior
+        covariance (see inverse.coordinates).
+    noise_model : standard deviations of the sources of scatter, estimated from the data.
     rms : root mean square of ln((predicted + offset) / measured) over the fitted strains of all tests; each test has
         its own offset (loading strain), none its own rate. NaN without strains.
-    errors : {output: Errors} over all used frames of all tests, whatever was minimised.
-    nuisances : what was found of explicit nuisances.
-    ranges : {"stress", "temperature", "strain", "time": (low, high)} that the fitted frames cover; MPa, K, s.
-    log_likelihood : of the fitted frames as if they were independent (working scatter), with explicit nuisances
+    errors : {output: OutputErrors} over all used frames of all tests, whatever was minimised.
+    nuisances : estimates of explicit nuisances.
+    ranges : {"stress", "temperature", "strain", "time": (low, high)} of the fitted frames; MPa, K, -, s.
+    log_likelihood : of the fitted frames as if they were independent (working noise), with explicit nuisances
         integrated out; of identifications by likelihood the restricted one, but for a constant of the law.
+    effective_frames : number of independent frames (about one a test when tests differ from one another).
     freedom : degrees of freedom of the intervals (see inverse.uncertainty).
-    trace : how its global search went; linear : the problem about its optimum, of identifications by likelihood
-        (neither is saved).
+    search_trace : how its global search went; linearised : the problem made linear at the optimum, of identifications
+        by likelihood; problem : what was minimised, under the covariance that was found (none of them is saved).
     sparsity : how a penalty reduced the sum that this law was part of, if one did.
-    size : number of effectively independent frames (about one a test when tests differ from one another).
     """
 
     law: CreepLaw
@@ -79,6 +82,7 @@ class Identification(Presentable):
     search_trace: SearchTrace | None = field(default=None, repr=False)
     linearised: LinearisedProblem | None = field(default=None, repr=False)
     sparsity: Sparsity | None = field(default=None, repr=False)
+    problem: LeastSquaresProblem | None = field(default=None, repr=False)
 
     @property
     def values(self) -> dict[str, float]:
@@ -90,10 +94,42 @@ class Identification(Presentable):
         """The map between conditioned coordinates and parameters."""
         return Coordinates(self.law, self.reference)
 
+    @property
+    def x(self) -> Floats:
+        """(unknowns,) the unknowns at the optimum: conditioned coordinates u, then explicit nuisances."""
+        return np.concatenate([self.u, [n.value for n in self.nuisances]])
+
+    @cached_property
+    def least_squares_problem(self) -> LeastSquaresProblem:
+        """The problem that was solved, under the covariance found; built anew for an identification from a file."""
+        if self.problem is not None:
+            return self.problem
+        if self.predictor is None or not self.histories:
+            raise FitError(
+                "this identification was loaded from a file: attach its histories and specimen with "
+                "fit.with_histories()"
+            )
+        problem = LeastSquaresProblem.from_histories(
+            self.law, self.histories, self.predictor, self.settings, self.reference
+        )
+        nuisances = problem.nuisance_parameters
+        if self.nuisances:
+            prior_sd = np.array([n.prior_sd for n in self.nuisances], float)
+            problem = problem.with_nuisances(replace(nuisances, sd=prior_sd))
+        return problem.with_covariance(cholesky_factors(self.residuals_of(problem), self.noise_model))
+
+    def residuals_of(self, problem: LeastSquaresProblem) -> Residuals:
+        """Residuals of a problem of these tests at the optimum, with the weights of tests."""
+        return problem.residuals(self.x).with_test_weights(np.array([m.weight for m in self.tests]))
+
     def rate(
-        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats, Floats]:
         """Creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape.
 
         stress MPa, temperature K; strain and time default to those of the reference point.
@@ -106,9 +142,13 @@ class Identification(Presentable):
         return np.exp(log_rate_value), np.exp(log_rate_value - half_width), np.exp(log_rate_value + half_width)
 
     def local_exponent(
-        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats, Floats]:
         """Local stress exponent d ln rate / d ln stress with its 95 % interval."""
         from creepkit.inverse.uncertainty.quantities import local_exponent
 
@@ -118,9 +158,14 @@ class Identification(Presentable):
         return exponent, exponent - half_width, exponent + half_width
 
     def rupture_time(
-        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, control: Literal["load", "stress"] = "load",
-        test_scatter: bool = True, using: Predictor | None = None,
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        control: Literal["load", "stress"] = "load",
+        test_scatter: bool = True,
+        using: Predictor | None = None,
+    ) -> tuple[Floats, Floats, Floats]:
         """When a bar will break, s, with its 95 % interval: (time, low, high), each of the broadcast shape.
 
         stress MPa (nominal, held as `control` says); temperature K, by default that of the reference point.
@@ -136,7 +181,7 @@ class Identification(Presentable):
 
     def rupture_times(
         self, histories: Sequence[History] | None = None, *, test_scatter: bool = True, using: Predictor | None = None
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats, Floats]:
         """The same for histories (by default those that were fitted), whatever their loading: (tests,) each."""
         from creepkit.inverse.goodness_of_fit import predict_rupture_times
 
@@ -191,12 +236,12 @@ class Identification(Presentable):
         }
 
     def with_histories(self, histories: Sequence[History], using: Predictor) -> Identification:
-        """The same answer with its histories (found by name) and specimen attached, as after load(), for plots."""
+        """The same with its histories (found by name) and predictor attached, as after load()."""
         by_name = {h.name: h for h in histories}
         missing = [m.name for m in self.tests if m.name not in by_name]
         if missing:
             raise FitError(f"this identification was made from '{missing[0]}', which is not among the histories given")
-        return replace(self, histories=tuple(by_name[m.name] for m in self.tests), predictor=using)
+        return replace(self, histories=tuple(by_name[m.name] for m in self.tests), predictor=using, problem=None)
 
     def profile(self, quantity: str | DerivedQuantity, *, level: float = 0.95) -> Any:
         """The ProfileLikelihood of a parameter, by name, or of another quantity (see uncertainty.quantities)."""

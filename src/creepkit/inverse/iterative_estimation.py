@@ -1,4 +1,4 @@
-"""Iterative estimation: parameters given the noise model, noise model given the residuals, in turn; working covariance and robust weights of tests."""
+"""Iterative estimation: parameters given the noise model, and the noise model given the residuals, in turn."""
 
 from __future__ import annotations
 
@@ -6,256 +6,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from creepkit.arrays import Floats
-from creepkit.errors import FitError
-from creepkit.inverse.goodness_of_fit import total_sum_of_squares
-from creepkit.inverse.noise_model import (
-    ASSUMED_RATE_SD,
-    MINIMUM_TESTS,
-    NEGLIGIBLE_DRIFT,
-    NoiseModel,
-    OutputNoise,
-    Residuals,
-    cholesky_factors,
-    initial_sd,
-    initial_working_noise,
-    log_likelihood,
-    predicted_random_effects,
-)
+from creepkit.inverse.noise_model import NoiseModel, Residuals, cholesky_factors, log_likelihood
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
-from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT, LinearTransform, ObservationVector
-from creepkit.inverse.residuals import ResidualFunction
-from creepkit.inverse.search.local_refinement import Bounds, IterationCallback, Minimum, bounded_least_squares
-from creepkit.inverse.settings import PAPER_WEIGHTS, IdentificationSettings
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, Tolerances
 from creepkit.inverse.uncertainty.laplace_approximation import marginal_log_likelihood, normal_matrix
 from creepkit.inverse.variance_components import (
     BOUND_TOLERANCE,
     LinearisedProblem,
-    estimate_variance_components,
     inverse_covariances,
     restricted_log_likelihood,
     scaled_inverse,
 )
-
-STUDENT_FREEDOM = 4.0
-"""Degrees of freedom of Student's t for whole tests; the usual choice where tails are unknown (Lange et al. 1989)."""
-
-
-SMALLEST_NOISE = 1e-2
-"""Noise of a likelihood at least, over the floor of the output's scale: simulated histories have none of their own."""
-
-
-DRIFT_CONFIDENCE = 0.95
-"""Residuals are autocorrelated where the likelihood gains more by it than by chance in so many cases; each output that
-drifts has two sizes more, how far and for how long."""
-
-
-INITIAL_RUPTURE_SD = 0.3
-"""Scatter of ln of rupture times to begin from: one of each test, which has no noise, and cannot drift."""
-
-
-SMALLEST_WEIGHT = 1e-6
-"""Share of the pull that an output keeps which the weights do not name."""
-
-
-class WorkingNoise:
-    """How the working scatter follows from settings: by likelihood, or by the weights of outputs."""
-
-    def __init__(
-        self,
-        settings: IdentificationSettings,
-        observations: ObservationVector,
-        errors: Mapping[str, float] | None = None,
-    ) -> None:
-        """errors : {output: standard deviation of what the predictor itself is wrong by}, in the output's unit."""
-        self.settings, self.observations, self.predictor_errors = settings, observations, errors or {}
-        self.by_likelihood = settings.weights == "likelihood"
-        self.relative_sd: Mapping[str, float] | None = None
-        if settings.weights == "equal":
-            self.relative_sd = _relative_standard_deviations(dict.fromkeys(observations.outputs, 1.0), observations)
-        elif settings.weights == "paper":
-            self.relative_sd = _relative_standard_deviations(PAPER_WEIGHTS, observations)
-        elif not isinstance(settings.weights, str):
-            self.relative_sd = _relative_standard_deviations(settings.weights, observations)
-
-    def initial(self) -> NoiseModel:
-        """The working scatter before anything was fitted."""
-        start = initial_working_noise(self.observations, self.settings.nuisances)
-        return (
-            start
-            if self.relative_sd is None
-            else self._in_ratio_of_weights(start, 0.3 / min(self.relative_sd.values()))
-        )
-
-    def estimate(
-        self, residuals: Residuals, previous: NoiseModel, linearised: LinearisedProblem | None = None
-    ) -> NoiseModel:
-        """The working scatter, given residuals; for a likelihood also made linear."""
-        nuisances = self.settings.nuisances
-        if self.by_likelihood:
-            assert linearised is not None
-            return self._by_restricted_likelihood(linearised, previous)
-        if self.relative_sd is None:
-            return estimate_variance_components(residuals, previous, nuisances)
-        offsets = predicted_random_effects(residuals, previous)[0]
-        remaining = residuals.values + residuals.transform_derivatives * np.take_along_axis(
-            offsets, residuals.output_index, axis=1
-        )
-        relative_sd = self.observations.per_observation([self.relative_sd[name] for name in self.observations.outputs])
-        whitened = (remaining / relative_sd)[residuals.present] ** 2 * _weight_per_observation(residuals)[
-            residuals.present
-        ]
-        scaled = self._in_ratio_of_weights(previous, float(np.sqrt(np.mean(whitened))))
-        return estimate_variance_components(residuals, scaled, nuisances, fixed=("misfit",))
-
-    def starting_noise(self, tests: int) -> NoiseModel:
-        """Where the alternation begins: the guess, or for a likelihood all sources of scatter at a tenth."""
-        if not self.by_likelihood:
-            return self.initial()
-        nuisances, by_output = self.settings.nuisances, {}
-        for name, scale, noise in zip(
-            self.observations.outputs, self.observations.transforms, self.observations.noise, strict=True
-        ):
-            offset = initial_sd(nuisances, "offset", scale.floor, name)
-            misfit = INITIAL_RUPTURE_SD if name == RUPTURE_OUTPUT else 0.03 if name in LOGARITHMIC_OUTPUTS else 0.0
-            drift = 0.0 if name == RUPTURE_OUTPUT else 0.1
-            by_output[name] = OutputNoise(max(float(noise), SMALLEST_NOISE * scale.floor), misfit, offset, drift)
-        rate_nuisances = [n for n in nuisances if n.kind == "rate" and (n.sd is not None or tests >= MINIMUM_TESTS)]
-        return NoiseModel(by_output, initial_sd(rate_nuisances, "rate", ASSUMED_RATE_SD))
-
-    def _by_restricted_likelihood(self, linearised: LinearisedProblem, previous: NoiseModel) -> NoiseModel:
-        """The scatter of largest restricted likelihood; drift only where the residuals ask for it.
-
-        A drift is a variance at the edge of what it may be: estimated always, it is above zero half of the time where
-        there is none, and widens every interval.
-        """
-        nuisances, residuals = self.settings.nuisances, linearised.residuals
-        without_drift = estimate_variance_components(
-            residuals, self._with_initial_drift(previous, 0.0), nuisances, fixed=(), linearised=linearised
-        )
-        with_drift = estimate_variance_components(
-            residuals, self._with_initial_drift(previous, 0.01), nuisances, fixed=(), linearised=linearised
-        )
-        gain = 2.0 * (
-            restricted_log_likelihood(linearised, with_drift) - restricted_log_likelihood(linearised, without_drift)
-        )
-        drifting_outputs = sum(sizes.drift > NEGLIGIBLE_DRIFT for sizes in with_drift.outputs.values())
-        return self._with_predictor_error(
-            with_drift
-            if drifting_outputs and gain > chi2.ppf(DRIFT_CONFIDENCE, 2 * drifting_outputs)
-            else without_drift
-        )
-
-    def _with_predictor_error(self, noise_model: NoiseModel) -> NoiseModel:
-        """The same with the errors of the predictor as drift: they follow the curve, and do not average out."""
-        for name, error in self._transformed_predictor_errors().items():
-            noise_model = noise_model.with_output(name, drift=float(np.hypot(noise_model[name].drift, error)))
-        return noise_model
-
-    def fixed_components(self, noise_model: NoiseModel) -> set[tuple[str, str]]:
-        """Those (output, source) that were not asked of the data: drifts that are the predictor's error and no more."""
-        outputs = [
-            n
-            for n, error in self._transformed_predictor_errors().items()
-            if noise_model[n].drift <= float(np.hypot(error, NEGLIGIBLE_DRIFT))
-        ]
-        return {(name, source) for name in outputs for source in ("drift", "correlation_length")}
-
-    def _transformed_predictor_errors(self) -> dict[str, float]:
-        """{output: standard deviation} of what the predictor is wrong by, on the output's scale."""
-        scales = zip(self.observations.outputs, self.observations.transforms, strict=True)
-        linearised = {name: scale.scale for name, scale in scales if isinstance(scale, LinearTransform)}
-        return {
-            n: self.predictor_errors[n] / size
-            for n, size in linearised.items()
-            if self.predictor_errors.get(n, 0.0) > 0
-        }
-
-    def _with_initial_drift(self, noise_model: NoiseModel, drift: float) -> NoiseModel:
-        """The same with a drift to begin from, or none, and the noise that was measured."""
-        for name, noise, scale in zip(
-            self.observations.outputs, self.observations.noise, self.observations.transforms, strict=True
-        ):
-            initial_drift = max(noise_model[name].drift, drift) if drift > 0 and name != RUPTURE_OUTPUT else 0.0
-            initial_noise = max(float(noise), SMALLEST_NOISE * scale.floor)
-            noise_model = noise_model.with_output(
-                name, noise=initial_noise, drift=initial_drift, correlation_length=1.0
-            )
-        return noise_model
-
-    def _in_ratio_of_weights(self, noise_model: NoiseModel, scale: float) -> NoiseModel:
-        """Misfits in the ratio that the weights ask for, without noise of their own."""
-        assert self.relative_sd is not None
-        for name, relative in self.relative_sd.items():
-            noise_model = noise_model.with_output(name, noise=0.0, misfit=max(scale, 1e-6) * relative)
-        return noise_model
-
-    def with_measured_noise(self, working: NoiseModel) -> NoiseModel:
-        """The scatter from which the whole covariance is estimated: with the noise that was measured."""
-        initial = initial_working_noise(self.observations, self.settings.nuisances)
-        for name, sizes in initial.outputs.items():
-            working = working.with_output(name, noise=sizes.noise)
-            if self.relative_sd is not None:
-                working = working.with_output(name, misfit=sizes.misfit)
-        return working
-
-
-def with_rupture_weight(working: NoiseModel, observations: ObservationVector) -> NoiseModel:
-    """The working scatter with which values are found: a test's one rupture pulls as hard as its whole curve.
-
-    Frames that follow one another say the same thing many times; a rupture time says it once.
-    """
-    if RUPTURE_OUTPUT not in working.outputs:
-        return working
-    frames = int((observations.present & ~observations.rupture_mask)[observations.followed_to_rupture].sum()) / int(
-        observations.followed_to_rupture.sum()
-    )
-    return working.with_output(RUPTURE_OUTPUT, misfit=working[RUPTURE_OUTPUT].misfit / float(np.sqrt(frames)))
-
-
-def _relative_standard_deviations(weights: Mapping[str, float], observations: ObservationVector) -> dict[str, float]:
-    """{output: standard deviation} of independent entries, whose weighted squares are then weight x relative error."""
-    unknown = [name for name in weights if name not in observations.outputs]
-    if unknown:
-        raise FitError(f"weights name '{unknown[0]}', which is not among the outputs {', '.join(observations.outputs)}")
-    transformed, standard_deviations = observations.forward(observations.values), {}
-    largest = max(weights.values())
-    for position, name in enumerate(observations.outputs):
-        mask = observations.present & (observations.output_index == position)
-        sum_of_squares = total_sum_of_squares([transformed[mask]])
-        standard_deviations[name] = float(
-            np.sqrt(sum_of_squares / max(weights.get(name, 0.0), SMALLEST_WEIGHT * largest))
-        )
-    return standard_deviations
-
-
-def _weight_per_observation(residuals: Residuals) -> Floats:
-    return np.broadcast_to(residuals.test_weights[:, None], residuals.values.shape)
-
-
-def robust_test_weights(residuals: Residuals, working: NoiseModel) -> Floats:
-    """(tests,) weights (nu + 1) / (nu + m / s): m the mean squared white residual of a test, s its median over tests.
-
-    Each output is judged on its own, and the worst one counts, if it is worse than the median: amplitudes far from
-    those of the twins are not hidden among good widths. Iterated with the fit this is the likelihood of tests that
-    scatter as Student's t does: one like the others weighs one, one of ten times their error a twentieth.
-    """
-    unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
-    whitened = np.linalg.solve(cholesky_factors(unweighted, working), unweighted.values[..., None])[..., 0]
-    largest_ratio = np.zeros(len(whitened))
-    for position in range(len(working.outputs)):
-        mask = unweighted.present & (unweighted.output_index == position)
-        observed_tests = mask.any(axis=1)
-        mean_squares = (np.where(mask, whitened, 0.0) ** 2).sum(axis=1) / np.maximum(mask.sum(axis=1), 1)
-        median_mean_square = max(float(np.median(mean_squares[observed_tests])), 1e-300)
-        largest_ratio = np.maximum(largest_ratio, mean_squares / median_mean_square)
-    return np.asarray((STUDENT_FREEDOM + 1) / (STUDENT_FREEDOM + np.maximum(largest_ratio, 1.0)))
-
+from creepkit.inverse.working_noise import WorkingNoise, robust_test_weights, with_rupture_weight
 
 PRIOR_STEPS = 30
-"""Steps of the estimate of unknown spreads in each round; they cost no simulation."""
+"""Steps of the estimate of prior standard deviations in each round; they cost no simulation."""
 
 
 LIKELIHOOD_TOLERANCE = 1e-5
@@ -281,68 +49,59 @@ APPROXIMATE_LIMITS = IterationLimits(rounds=3, steps=15, tolerance=1e-4)
 
 
 SIMULATION_LIMITS = IterationLimits(rounds=5, steps=25, tolerance=1e-6)
-"""For predictors with a stand-in: solvers are smooth to about that."""
+"""For predictors with a reduced-order model: solvers are smooth to about that."""
 
 
 @dataclass(frozen=True)
 class EstimationResult:
-    """Where values and working scatter agree: the optimum, its residuals, spreads of unknowns, and the likelihood."""
+    """The end of an iterative estimation: values and working noise that agree, and their log-likelihood.
 
+    problem : with the priors of nuisance parameters as they were estimated; minimum : its optimum; residuals : there,
+    with the weights of tests; linearised : the problem made linear there, of estimates by likelihood.
+    """
+
+    problem: LeastSquaresProblem
     minimum: Minimum
     residuals: Residuals
     working_noise: NoiseModel
-    nuisance_parameters: NuisanceParameters
     log_likelihood: float
     linearised: LinearisedProblem | None = None
 
 
 def estimate_iteratively(
-    residual_function: ResidualFunction, bounds: Bounds, x: Floats, working_estimator: WorkingNoise, limits: IterationLimits, progress: IterationCallback | None,
+    problem: LeastSquaresProblem,
+    x: Floats,
+    working_estimator: WorkingNoise,
+    limits: IterationLimits,
+    progress: IterationCallback | None,
     working_noise: NoiseModel | None = None,
-) -> EstimationResult:  # fmt: skip
-    """Refine from x = (u, e); the best round. working : where the scatter begins, if it is known already."""
+) -> EstimationResult:
+    """Values and working noise in turn from x (unknowns,), (u, e); the best round.
+
+    working_noise : from which to begin, if it is known already.
+    """
     robust, best = working_estimator.settings.test_loss == "student", None
-    residuals, working_noise = (
-        residual_function.evaluate(x),
-        working_noise or working_estimator.starting_noise(len(residual_function.histories)),
-    )
+    residuals = problem.residuals(x)
+    working_noise = working_noise or working_estimator.starting_noise(len(problem.histories))
     for round_index in range(limits.rounds):
         previous_weights = residuals.test_weights
         test_weights = robust_test_weights(residuals, working_noise) if robust else previous_weights
         residuals = residuals.with_test_weights(test_weights)
-        working_noise = working_estimator.estimate(
-            residuals, working_noise, linearised(residual_function, bounds, x, residuals)
-        )
-        # A stopped test that says nothing here may say something a step further.
-        all_observations = replace(residuals, present=residual_function.observations.present)
+        linear = linearised(problem, x, residuals)
+        working_noise = working_estimator.estimate(residuals, working_noise, linear)
         if (
             best is not None
             and working_estimator.by_likelihood
-            and _expected_gain(residual_function, bounds, x, residuals, working_noise) < CONVERGED_GAIN
+            and _expected_gain(linear, working_noise) < CONVERGED_GAIN
         ):
             break
-        fitting_noise = (
-            working_noise
-            if working_estimator.by_likelihood
-            else with_rupture_weight(working_noise, residual_function.observations)
-        )
-        covariance_factor = cholesky_factors(all_observations, fitting_noise)
+        problem = problem.with_covariance(_covariance_factor(problem, residuals, working_noise, working_estimator))
         tolerance = max(limits.tolerance, LIKELIHOOD_TOLERANCE) if working_estimator.by_likelihood else limits.tolerance
-        minimum = bounded_least_squares(
-            residual_function,
-            bounds,
-            covariance_factor,
-            x,
-            loss=working_estimator.settings.loss,
-            max_steps=limits.steps,
-            tolerance=tolerance,
-        )
+        minimum = problem.minimise(x, tolerances=Tolerances(limits.steps, tolerance))
         x = minimum.u
-        residuals = residual_function.evaluate(x).with_test_weights(test_weights)
-        current = _round_result(
-            residual_function, bounds, minimum, residuals, working_noise, working_estimator.by_likelihood
-        )
-        residual_function.nuisance_parameters = current.nuisance_parameters
+        residuals = problem.residuals(x).with_test_weights(test_weights)
+        current = _round_result(problem, minimum, residuals, working_noise, working_estimator.by_likelihood)
+        problem = current.problem
         if progress is not None:
             progress("round", round_index + 1, limits.rounds)
         gain = np.inf if best is None else current.log_likelihood - best.log_likelihood
@@ -350,77 +109,64 @@ def estimate_iteratively(
         if abs(gain) < CONVERGED_GAIN and np.abs(test_weights - previous_weights).max() < CONVERGED_GAIN:
             break
     assert best is not None
-    residual_function.nuisance_parameters = best.nuisance_parameters
     return best
 
 
-def _expected_gain(
-    residual_function: ResidualFunction, bounds: Bounds, x: Floats, residuals: Residuals, working_noise: NoiseModel
-) -> float:
-    """By how much the log-likelihood of values would grow, to first order, if they moved to where the scatter asks."""
-    linear = linearised(residual_function, bounds, x, residuals)
+def _covariance_factor(
+    problem: LeastSquaresProblem, residuals: Residuals, working_noise: NoiseModel, working_estimator: WorkingNoise
+) -> Floats:
+    """(tests, observations, observations) Cholesky factors under which the values of a round are found."""
+    fitting_noise = (
+        working_noise if working_estimator.by_likelihood else with_rupture_weight(working_noise, problem.observations)
+    )
+    # A stopped test that says nothing here may say something a step further.
+    return cholesky_factors(replace(residuals, present=problem.observations.present), fitting_noise)
+
+
+def _expected_gain(linear: LinearisedProblem, working_noise: NoiseModel) -> float:
+    """Growth of the log-likelihood, to first order, if the values moved to the optimum under this noise."""
+    residuals = linear.residuals
     inverses, _ = inverse_covariances(residuals, working_noise)
     chi_square = np.einsum("te,tef,tf->", residuals.values, inverses, residuals.values)
     chi_square += (linear.precision * linear.prior_residual**2).sum()
     return 0.5 * float(chi_square - linear.solve(inverses).chi_square)
 
 
-def linearised(
-    residual_function: ResidualFunction, bounds: Bounds, x: Floats, residuals: Residuals
-) -> LinearisedProblem:
-    """The problem made linear at x = (u, e): weak priors of the bounds on u, their own on e."""
-    law_parameters = x.size - residual_function.nuisance_parameters.size
-    precision = np.concatenate(
-        [12.0 / bounds.width[:law_parameters] ** 2, residual_function.nuisance_parameters.precision]
-    )
-    prior_residual = np.concatenate(
-        [
-            np.zeros(law_parameters),
-            x[law_parameters:] - residual_function.nuisance_parameters.mean[: x.size - law_parameters],
-        ]
-    )
+def linearised(problem: LeastSquaresProblem, x: Floats, residuals: Residuals) -> LinearisedProblem:
+    """The problem made linear at x (unknowns,), (u, e): weak priors of the bounds on u, their own on e."""
+    nuisances, bounds, count = problem.nuisance_parameters, problem.bounds, problem.parameter_count
+    precision = np.concatenate([12.0 / bounds.width[:count] ** 2, nuisances.precision])
+    prior_residual = np.concatenate([np.zeros(count), x[count:] - nuisances.mean[: x.size - count]])
     tolerance = BOUND_TOLERANCE * bounds.width
     free = (x > bounds.lower + tolerance) & (x < bounds.upper - tolerance)
     return LinearisedProblem(residuals, precision, prior_residual, free, np.stack([bounds.lower - x, bounds.upper - x]))
 
 
 def _round_result(
-    residual_function: ResidualFunction,
-    bounds: Bounds,
-    minimum: Minimum,
-    residuals: Residuals,
-    working_noise: NoiseModel,
-    restricted: bool,
+    problem: LeastSquaresProblem, minimum: Minimum, residuals: Residuals, working_noise: NoiseModel, restricted: bool
 ) -> EstimationResult:
-    """The round's end, with the spreads of unknowns that its residuals show."""
+    """The end of a round, with the prior standard deviations that its residuals show."""
+    nuisances = problem.nuisance_parameters
     if restricted:
-        residual_function.nuisance_parameters = _with_estimated_priors(
-            residual_function.nuisance_parameters, residuals, working_noise, minimum.u
-        )
-        linear = linearised(residual_function, bounds, minimum.u, residuals)
+        nuisances = _with_estimated_priors(nuisances, residuals, working_noise, minimum.u)
+        problem = problem.with_nuisances(nuisances)
+        linear = linearised(problem, minimum.u, residuals)
         likelihood = restricted_log_likelihood(linear, working_noise)
-        return EstimationResult(
-            minimum, residuals, working_noise, residual_function.nuisance_parameters, likelihood, linear
-        )
-    nuisance_parameters, likelihood = residual_function.nuisance_parameters, log_likelihood(residuals, working_noise)
-    if not nuisance_parameters.size:
-        return EstimationResult(minimum, residuals, working_noise, nuisance_parameters, likelihood)
+        return EstimationResult(problem, minimum, residuals, working_noise, likelihood, linear)
+    likelihood = log_likelihood(residuals, working_noise)
+    if not nuisances.size:
+        return EstimationResult(problem, minimum, residuals, working_noise, likelihood)
     information = normal_matrix(residuals, working_noise)
-    nuisance_parameters = _with_estimated_priors(nuisance_parameters, residuals, working_noise, minimum.u)
-    e = minimum.u[-nuisance_parameters.size :]
-    return EstimationResult(
-        minimum,
-        residuals,
-        working_noise,
-        nuisance_parameters,
-        marginal_log_likelihood(likelihood, information, e, nuisance_parameters),
-    )
+    nuisances = _with_estimated_priors(nuisances, residuals, working_noise, minimum.u)
+    e = minimum.u[-nuisances.size :]
+    likelihood = marginal_log_likelihood(likelihood, information, e, nuisances)
+    return EstimationResult(problem.with_nuisances(nuisances), minimum, residuals, working_noise, likelihood)
 
 
 def _with_estimated_priors(
     nuisance_parameters: NuisanceParameters, residuals: Residuals, working_noise: NoiseModel, x: Floats
 ) -> NuisanceParameters:
-    """The unknowns with those of their spreads estimated that are to be."""
+    """The nuisance parameters, with those prior standard deviations estimated that were not given."""
     if all(n.sd is not None for n in nuisance_parameters.nuisances):
         return nuisance_parameters
     return _with_prior_sd(nuisance_parameters, normal_matrix(residuals, working_noise), x)
@@ -429,7 +175,7 @@ def _with_estimated_priors(
 def _with_prior_sd(nuisance_parameters: NuisanceParameters, normal_matrix: Floats, x: Floats) -> NuisanceParameters:
     """Expectation and maximisation in turn, on the problem made linear at its optimum x.
 
-    At the optimum the pull of the data is that of the prior, P (x - mean); with another P the linear problem moves x
+    At the optimum the gradient of the data is that of the prior, P (x - mean); with another P the linear problem moves x
     to where both agree again.
     """
     count = nuisance_parameters.size
@@ -449,6 +195,6 @@ def _with_prior_sd(nuisance_parameters: NuisanceParameters, normal_matrix: Float
 def starting_point(
     nuisance_parameters: NuisanceParameters, u: Floats, known_values: Mapping[tuple[str, str], float]
 ) -> Floats:
-    """x = (u, e) with the unknowns of tests where they are known, {(kind, member): value}, else at their means."""
+    """(unknowns,) x = (u, e): nuisance parameters as known, {(kind, owner): value}, or at their prior means."""
     parameters = zip(nuisance_parameters.nuisances, nuisance_parameters.owners, nuisance_parameters.mean, strict=True)
     return np.concatenate([u, [known_values.get((n.kind, member), float(mean)) for n, member, mean in parameters]])

@@ -172,10 +172,21 @@ def cholesky_factors(residuals: Residuals, noise_model: NoiseModel) -> Floats:
     return np.asarray(np.linalg.cholesky(covariance(residuals, noise_model)))
 
 
+def whiten(covariance_factor: Floats, values: Floats) -> Floats:
+    """L^-1 v, whose covariance is the identity where that of v is L L'.
+
+    covariance_factor : (tests, observations, observations) Cholesky factors L.
+    values : (tests, observations) or (tests, observations, columns) residuals, derivatives, or both.
+    """
+    if values.ndim == 2:
+        return np.asarray(np.linalg.solve(covariance_factor, values[..., None])[..., 0])
+    return np.asarray(np.linalg.solve(covariance_factor, values))
+
+
 def log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:
     """Gaussian log-likelihood of the residuals given the scatter."""
     covariance_factor = cholesky_factors(residuals, noise_model)
-    whitened = np.linalg.solve(covariance_factor, residuals.values[..., None])[..., 0]
+    whitened = whiten(covariance_factor, residuals.values)
     k = np.arange(covariance_factor.shape[1])
     log_det = 2.0 * np.log(covariance_factor[:, k, k]).sum()
     count = int(residuals.present.sum())

@@ -1,4 +1,7 @@
-"""Explicit nuisance parameters: thickness, window, modulus and temperature of a test, estimated beside the parameters of the law under Gaussian priors."""
+"""Explicit nuisance parameters of tests, estimated beside the parameters of the law under Gaussian priors.
+
+Each is of one test, of one alloy or of all tests: thickness, window, modulus, temperature.
+"""
 
 from __future__ import annotations
 
@@ -14,25 +17,25 @@ from creepkit.inverse.noise_model import Residuals
 from creepkit.records import LENGTH_NUISANCES, SIMULATED_NUISANCES, History, Nuisance, Predictor
 
 INITIAL_PRIOR_SD = {"thickness": 0.03, "window": 0.3, "modulus": 0.05, "temperature": 5.0}
-"""Where the estimate of an unknown spread begins: mm, mm, relative, K."""
+"""Where the estimate of a prior standard deviation begins: mm, mm, relative, K."""
 
 
 LIMITS = {"thickness": (0.3, 3.0), "window": (0.3, 3.0), "modulus": (-0.7, 2.0), "temperature": (-150.0, 150.0)}
-"""Where an unknown may go at most; thickness and window as multiples of their mean."""
+"""Limits of nuisance parameters; thickness and window as multiples of their mean."""
 
 
 SMALLEST_PRIOR_SD = 1e-3
-"""Of the first spread: below this an estimated spread is zero."""
+"""Of the initial prior standard deviation: an estimated one is never less."""
 
 
 @dataclass(frozen=True, eq=False)
 class NuisanceParameters:
-    """The unknowns e of explicit nuisances.
+    """The nuisance parameters e of tests.
 
-    nuisances, members : of each unknown, its nuisance and whose it is (a test, an alloy, or "all").
-    place : {kind: (tests,)} which unknown is a test's own, -1 where its predictor does not know the kind.
-    mean, sd, low, high : (unknowns,) prior and limits; sd may be infinite.
-    held : whether they stay at their means, as in a global search.
+    nuisances, owners : of each, its nuisance and whose it is (a test, an alloy, or "all").
+    test_index : {kind: (tests,)} which one a test has, -1 where its predictor does not know the kind.
+    mean, sd, low, high : (nuisances,) prior and limits, in the unit of the kind; sd may be infinite.
+    fixed : whether they stay at their means, as in a global search.
     """
 
     nuisances: tuple[Nuisance, ...]
@@ -48,7 +51,7 @@ class NuisanceParameters:
     def from_histories(
         cls, nuisances: Sequence[Nuisance], histories: Sequence[History], predictor: Predictor
     ) -> NuisanceParameters:
-        """One unknown for each test, alloy or all tests that a kind is known to matter for."""
+        """One for each test, alloy or all tests whose predictor knows the kind."""
         parameters: list[tuple[Nuisance, str]] = []
         test_index: dict[str, Ints] = {}
         for nuisance in (n for n in nuisances if n.kind in SIMULATED_NUISANCES):
@@ -66,35 +69,39 @@ class NuisanceParameters:
             )
             if nuisance.sd is None and len(distinct_owners) < 2:
                 raise FitError(
-                    f"nuisance '{nuisance.kind}': a spread cannot be estimated from a single unknown; give its sd="
+                    f"nuisance '{nuisance.kind}': a standard deviation cannot be estimated from a single value; give its sd="
                 )
             parameters += [(nuisance, member) for member in distinct_owners]
         nuisance_of_parameter, by_name = [n for n, _ in parameters], {h.name: h for h in histories}
         means = [prior_mean(n, by_name.get(member), predictor) for n, member in parameters]
         limits = [_bounds_of(n, mean) for n, mean in zip(nuisance_of_parameter, means, strict=True)]
         return cls(
-            tuple(nuisance_of_parameter), tuple(m for _, m in parameters), test_index, np.array(means, float),
+            tuple(nuisance_of_parameter),
+            tuple(m for _, m in parameters),
+            test_index,
+            np.array(means, float),
             np.array([INITIAL_PRIOR_SD[n.kind] if n.sd is None else n.sd for n in nuisance_of_parameter], float),
-            np.array([low for low, _ in limits], float), np.array([high for _, high in limits], float),
-        )  # fmt: skip
+            np.array([low for low, _ in limits], float),
+            np.array([high for _, high in limits], float),
+        )
 
     @property
     def size(self) -> int:
-        """How many a fit looks for."""
+        """Number of those that are estimated."""
         return 0 if self.fixed else self.mean.size
 
     @property
     def precision(self) -> Floats:
-        """(unknowns,) of the priors."""
+        """(nuisances,) 1 / unit^2, of the priors."""
         return 1.0 / self.sd[: self.size] ** 2
 
     def predictor_values(self, e: Floats) -> dict[str, Floats]:
-        """{kind: (1, tests)} as predictors take them."""
+        """{kind: (1, tests)} as predictors take them, from e (nuisances,), in the unit of the kind."""
         values = self.mean if self.fixed else e
         return {kind: values[np.maximum(index, 0)][None] for kind, index in self.test_index.items()}
 
     def jacobian(self, sensitivities: Mapping[str, Floats]) -> Floats:
-        """Derivatives to each unknown, (tests, entries, unknowns), from those to each test's own nuisances."""
+        """(tests, observations, nuisances) derivatives, from {kind: (tests, observations)} those to each test's own."""
         jacobian_matrix = np.zeros((*next(iter(sensitivities.values())).shape, self.size))
         for kind, index in self.test_index.items():
             for test, position in enumerate(index):
@@ -103,10 +110,10 @@ class NuisanceParameters:
         return jacobian_matrix
 
     def integrate_out(self, residuals: Residuals, e: Floats) -> Residuals:
-        """The residuals that tests would leave at their prior means, with the priors as part of the scatter.
+        """The residuals of tests at their prior means, with the priors as part of the covariance; e : (nuisances,).
 
-        To first order. At its estimate an unknown has taken up what scatter between tests it can, so that the size of
-        that scatter cannot be read off the residuals there. Unknowns that tests share stay as estimated.
+        To first order. At its estimate a nuisance parameter has taken up what scatter between tests it can, so that the
+        residuals there do not show that scatter. Nuisance parameters that tests share stay as estimated.
         """
         test_parameters = [k for k, n in enumerate(self.nuisances) if n.scope == "test" and np.isfinite(self.sd[k])]
         if not test_parameters or residuals.jacobian is None:
@@ -116,7 +123,7 @@ class NuisanceParameters:
         return replace(residuals, values=values, random_effect_sensitivities=sensitivities * self.sd[test_parameters])
 
     def with_prior_sd(self, e: Floats, variance: Floats) -> NuisanceParameters:
-        """The spreads to be estimated, as the unknowns show them: mean of (e - mean)^2 and their own variance."""
+        """With standard deviations estimated where none is given: mean of (e - mean)^2 and variance, (nuisances,) each."""
         sd = self.sd.copy()
         for nuisance in dict.fromkeys(self.nuisances):
             if nuisance.sd is None:
@@ -127,12 +134,12 @@ class NuisanceParameters:
 
 
 def owner_of(nuisance: Nuisance, history: History) -> str:
-    """Whose unknown it is that a history has."""
+    """Whose nuisance parameter a history has: the test, its alloy, or "all"."""
     return {"test": history.name, "alloy": history.alloy, "all": "all"}[nuisance.scope]
 
 
 def prior_mean(nuisance: Nuisance, history: History | None, using: Predictor) -> float:
-    """The prior mean of a test's unknown; a thickness without one of its own is about what the test is stated to have.
+    """The prior mean of a test's nuisance parameter; of a thickness, by default, that which the test states.
 
     mm for lengths; the geometry of the history takes precedence over that of the specimen.
     """
@@ -156,10 +163,10 @@ def _bounds_of(nuisance: Nuisance, mean: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class NuisanceEstimate:
-    """What was found of one explicit nuisance of one test, alloy or all tests.
+    """The estimate of one explicit nuisance of one test, alloy or all tests.
 
-    member : name of the test or alloy, or "all". value, sd : estimate and its standard deviation, in the kind's unit.
-    mean, spread : of the prior; a spread that was to be estimated, as it was.
+    owner : name of the test or alloy, or "all". value, sd : estimate and its standard deviation, in the kind's unit.
+    prior_mean, prior_sd : of the prior, the latter as it was given or estimated.
     """
 
     kind: str

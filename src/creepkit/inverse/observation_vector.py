@@ -1,19 +1,21 @@
-"""Observation vector of an identification: usable and thinned frames, frame noise, output transforms, and the measured values of all tests end to end.
+"""Observation vector: the measured values of all tests, usable and thinned frames, and the noise of a frame.
 
-Each test is one row: the frames of all its outputs, then its rupture time where that is known, padded to the longest test.
+Each test is one row: the frames of all its outputs, then its rupture time where that is known, padded to the longest
+test.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from functools import cached_property
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
 from creepkit.inverse.composite_predictor import compared_outputs, predicts_rupture
+from creepkit.inverse.output_transforms import LinearTransform, LogTimeTransform, LogTransform, OutputTransform
 from creepkit.records import History, Prediction, Predictor
 
 LOGARITHMIC_OUTPUTS = ("strain",)
@@ -21,114 +23,11 @@ LOGARITHMIC_OUTPUTS = ("strain",)
 
 
 RUPTURE_OUTPUT = "rupture"
-"""The output of tests that were followed to their end: the time of rupture, s. It has no frames of its own."""
-
-
-class OutputTransform(Protocol):
-    """A monotone map g from an output to the quantity in which it is compared."""
-
-    @property
-    def floor(self) -> float:
-        """The size, in the output's unit, below which a difference is nothing."""
-        ...
-
-    @property
-    def ceiling(self) -> float:
-        """The compared quantity at which a test that burst goes on."""
-        ...
-
-    def forward(self, y: Floats) -> Floats:
-        """The compared quantity."""
-        ...
-
-    def inverse(self, g: Floats) -> Floats:
-        """The output whose compared quantity is g."""
-        ...
-
-    def derivative(self, y: Floats) -> Floats:
-        """dg/dy."""
-        ...
-
-
-@dataclass(frozen=True)
-class LogTransform:
-    """g(y) = asinh(y / 2 floor): ln(y / floor) well above the floor, linear below it, finite for y <= 0."""
-
-    floor: float
-
-    @property
-    def ceiling(self) -> float:
-        """That of a strain of one."""
-        return float(np.arcsinh(1.0 / (2.0 * self.floor)))
-
-    def forward(self, y: Floats) -> Floats:
-        """The compared quantity."""
-        return np.arcsinh(y / (2.0 * self.floor))
-
-    def inverse(self, g: Floats) -> Floats:
-        """The output whose compared quantity is g."""
-        return 2.0 * self.floor * np.sinh(g)
-
-    def derivative(self, y: Floats) -> Floats:
-        """dg/dy; 1/y well above the floor."""
-        return 1.0 / np.hypot(y, 2.0 * self.floor)
-
-
-@dataclass(frozen=True)
-class LinearTransform:
-    """g(y) = y / size: with size the spread of what was measured, one means as wrong as the mean of all frames is.
-
-    largest : largest value measured.
-    """
-
-    scale: float
-    largest: float
-
-    @property
-    def floor(self) -> float:
-        """One per cent of the size."""
-        return 0.01 * self.scale
-
-    @property
-    def ceiling(self) -> float:
-        """That of the largest value measured."""
-        return self.largest / self.scale
-
-    def forward(self, y: Floats) -> Floats:
-        """The compared quantity."""
-        return y / self.scale
-
-    def inverse(self, g: Floats) -> Floats:
-        """The output whose compared quantity is g."""
-        return g * self.scale
-
-    def derivative(self, y: Floats) -> Floats:
-        """dg/dy."""
-        return np.full(np.shape(y), 1.0 / self.scale)
-
-
-@dataclass(frozen=True)
-class LogTimeTransform:
-    """g(t) = -ln t of a rupture time t in s: larger where a test breaks earlier, as strains are where it is faster."""
-
-    floor: float = 0.0
-    ceiling: float = 0.0
-
-    def forward(self, y: Floats) -> Floats:
-        """The compared quantity."""
-        return -np.log(y)
-
-    def inverse(self, g: Floats) -> Floats:
-        """The rupture time whose compared quantity is g."""
-        return np.exp(-g)
-
-    def derivative(self, y: Floats) -> Floats:
-        """dg/dy."""
-        return -1.0 / y
+"""The output of tests that were followed to rupture: the rupture time, s. It has no frames of its own."""
 
 
 def transform_for(histories: Sequence[History], output: str) -> OutputTransform:
-    """The scale of one output of these histories, all of which have it."""
+    """The transform of one output of these histories, all of which have it."""
     if output == RUPTURE_OUTPUT:
         return LogTimeTransform()
     return (
@@ -160,7 +59,7 @@ def usable_frames(history: History, output: str) -> Bools:
 
 
 def frame_noise(history: History, output: str) -> float:
-    """Standard deviation of one output from frame to frame; 0 for under 6 frames.
+    """Standard deviation of one output from frame to frame, in its unit; 0 for under 6 frames.
 
     From third differences, robustly, in time or in its logarithm, whichever calls less of the curve noise.
     """
@@ -172,7 +71,10 @@ def frame_noise(history: History, output: str) -> float:
 
 
 def _noise_from_third_differences(x: Floats, y: Floats) -> float:
-    """Spread of what is left of four neighbours once a parabola is taken off, in units of one frame's error."""
+    """Standard deviation of one frame, in the unit of y, from residuals of parabolas through four neighbours.
+
+    x, y : (frames,).
+    """
     windows = np.lib.stride_tricks.sliding_window_view(x, 4)
     differences = windows[:, :, None] - windows[:, None, :] + np.eye(4)
     weights = 1.0 / differences.prod(axis=2)
@@ -181,7 +83,7 @@ def _noise_from_third_differences(x: Floats, y: Floats) -> float:
 
 
 def noise_standard_deviation(history: History, output: str) -> Floats:
-    """(frames,) standard deviation of one output's error: as the history states it, else from frame to frame."""
+    """(frames,) standard deviation of one output, in its unit: as the history states it, else from frame to frame."""
     stated = history.standard_deviation.get(output)
     estimated = np.full(history.times.size, frame_noise(history, output))
     if stated is None:
@@ -190,7 +92,7 @@ def noise_standard_deviation(history: History, output: str) -> Floats:
 
 
 def selected_frames(history: History, count: int) -> Ints:
-    """Indices of at most `count` used frames after time zero, half spread in ln t and half in t."""
+    """(selected,) indices of at most `count` used frames after time zero, half spread in ln t and half in t."""
     candidates = np.flatnonzero(history.used & (history.times > 0) & frames_with_data(history))
     if candidates.size <= count:
         return candidates
@@ -209,7 +111,7 @@ def frames_with_data(history: History) -> Bools:
 
 
 def thinned_history(history: History, count: int) -> History:
-    """The history at its chosen frames only, all outputs of a frame together."""
+    """The history at its selected frames only, all outputs of a frame together."""
     selected = selected_frames(history, count)
     return replace(
         history,
@@ -221,21 +123,21 @@ def thinned_history(history: History, count: int) -> History:
 
 
 LINEAR_TEST_DURATION = 5.0
-"""Length of a test on the clock of outputs that are compared as they are, about that of a decade and a half of ln t."""
+"""Correlation time of a whole test where outputs have a linear transform: about a decade and a half in ln t."""
 
 
 @dataclass(frozen=True, eq=False)
 class ObservationVector:
-    """Measured values of all tests, (tests, entries) each.
+    """Measured values of all tests.
 
-    outputs, scales : names of what is compared, and on which scale.
-    output, frame : of each entry, positions in `outputs` and among the frames of its history.
-    present : which entries are data; the others pad, with zeros (times with ones).
-    leading : which belong to the output that grows with creep, the first that the predictor names.
-    measured, times : in the output's unit, and s.
-    noise : typical standard deviation of a frame of each output, (outputs,), in its unit.
-    loudness : noise of each entry over that.
-    whole : (tests,) which tests are compared over their whole life.
+    outputs, transforms : names of what is compared, and the transform of each.
+    output_index, frame_index : (tests, observations) positions in `outputs` and among the frames of the history.
+    present : (tests, observations) which are data; the others pad, with zeros (times with ones).
+    leading_output : (tests, observations) which are of the output that grows with creep, the predictor's first.
+    values, times : (tests, observations) in the output's unit, and s.
+    noise : (outputs,) typical standard deviation of a frame, in the output's unit.
+    relative_noise : (tests, observations) -, noise of each observation over that.
+    followed_to_rupture : (tests,) which tests are compared up to rupture.
     censored : (tests,) which of them were stopped before rupture.
     """
 
@@ -256,7 +158,7 @@ class ObservationVector:
     def from_histories(
         cls, histories: Sequence[History], predictor: Predictor, full: Sequence[History] | None = None
     ) -> ObservationVector:
-        """The entries of histories; their noise is read off `full`, the same histories before frames were left out."""
+        """The observations of histories; noise is estimated from `full`, the same before frames were left out."""
         full = histories if full is None else full
         followed_to_rupture = np.array([h.end_known and predicts_rupture(predictor, h) for h in histories])
         outputs_by_test = [
@@ -276,10 +178,19 @@ class ObservationVector:
         ]
         shape = len(histories), max(sum(f.size for _, f in row) for row in rows)
         observations = cls(
-            outputs, transforms, np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros(shape, bool),
-            np.zeros(shape, bool), np.zeros(shape), np.ones(shape), noise, np.ones(shape),
-            followed_to_rupture, followed_to_rupture & np.array([h.unruptured for h in histories]),
-        )  # fmt: skip
+            outputs,
+            transforms,
+            np.zeros(shape, np.int64),
+            np.zeros(shape, np.int64),
+            np.zeros(shape, bool),
+            np.zeros(shape, bool),
+            np.zeros(shape),
+            np.ones(shape),
+            noise,
+            np.ones(shape),
+            followed_to_rupture,
+            followed_to_rupture & np.array([h.unruptured for h in histories]),
+        )
         for k, (history, row) in enumerate(zip(histories, rows, strict=True)):
             observations._fill_test(k, history, row, noise_levels)
         return observations
@@ -308,14 +219,34 @@ class ObservationVector:
                 )
             start += frames.size
 
+    @cached_property
+    def transformed_values(self) -> Floats:
+        """(tests, observations) -, the measured values as they are compared."""
+        return self.forward(self.values)
+
+    @property
+    def count(self) -> int:
+        """Number of measured values."""
+        return int(self.present.sum())
+
+    def of_tests(self, tests: Sequence[int]) -> ObservationVector:
+        """The observations of some of the tests, by position."""
+        index = list(tests)
+        rows = {
+            name: getattr(self, name)[index]
+            for name, value in vars(self).items()
+            if isinstance(value, np.ndarray) and name not in ("noise", "transformed_values")
+        }
+        return replace(self, **rows)
+
     @property
     def log_times(self) -> Floats:
-        """(tests, entries) ln of time."""
+        """(tests, observations) ln of time in s."""
         return np.log(self.times)
 
     @property
     def correlation_time(self) -> Floats:
-        """(tests, entries) ln of time where an output is compared by its logarithm, else WHOLE t / its last time."""
+        """(tests, observations) -, ln t where the transform is logarithmic, else 5 t / last time: drifts decay in it."""
         last_times = np.where(self.present, self.times, 0.0).max(axis=1, keepdims=True)
         logarithmic = (
             self.per_observation([float(name in (*LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT)) for name in self.outputs]) > 0
@@ -323,32 +254,32 @@ class ObservationVector:
         return np.where(logarithmic, self.log_times, LINEAR_TEST_DURATION * self.times / np.maximum(last_times, 1e-300))
 
     def forward(self, y: Floats) -> Floats:
-        """What is compared, of outputs (..., tests, entries)."""
+        """(..., tests, observations) - transformed outputs y (..., tests, observations)."""
         return self._transformed(y, lambda scale: scale.forward)
 
     def inverse(self, g: Floats) -> Floats:
-        """Outputs, of what is compared (..., tests, entries)."""
+        """(..., tests, observations) outputs of transformed g (..., tests, observations)."""
         return self._transformed(g, lambda scale: scale.inverse)
 
     def derivative(self, y: Floats) -> Floats:
-        """Derivative of what is compared to the output, (..., tests, entries)."""
+        """(..., tests, observations) 1 / unit, derivative of the transform at outputs y."""
         return self._transformed(y, lambda scale: scale.derivative)
 
     def per_observation(self, values: Sequence[float] | Floats) -> Floats:
-        """(outputs,) numbers at each entry, (tests, entries)."""
+        """(tests, observations) numbers of the output of each observation, from values (outputs,)."""
         return np.asarray(values, float)[self.output_index]
 
     @property
     def rupture_mask(self) -> Bools:
-        """(tests, entries) which entries are rupture times, or times lasted."""
+        """(tests, observations) which are rupture times, or times without rupture."""
         return np.asarray(
             self.present & self.per_observation([float(n == RUPTURE_OUTPUT) for n in self.outputs]).astype(bool)
         )
 
     def select_outputs(self, array: Floats, prediction: Prediction) -> Floats:
-        """The entries out of an array like found.values: (candidates, tests, times, outputs, ...).
+        """(candidates, tests, observations, ...) of an array (candidates, tests, times, outputs, ...).
 
-        Those of ruptures hold what stands first in the test: they are not among the outputs.
+        Rupture times are not among the outputs: at their places stands the first value of the test.
         """
         observed = [name for name in self.outputs if name != RUPTURE_OUTPUT]
         missing = [name for name in observed if name not in prediction.outputs]
@@ -362,7 +293,7 @@ class ObservationVector:
         return np.asarray(array[:, np.arange(len(columns))[:, None], self.frame_index, columns])
 
     def select_frames(self, array: Floats) -> Floats:
-        """The entries out of an array (candidates, tests, times, ...) that knows no outputs."""
+        """(candidates, tests, observations, ...) of an array (candidates, tests, times, ...) without outputs."""
         return np.asarray(array[:, np.arange(len(self.frame_index))[:, None], self.frame_index])
 
     def _transformed(self, y: Floats, method: Callable[[OutputTransform], Callable[[Floats], Floats]]) -> Floats:
@@ -387,6 +318,6 @@ def _observed_frames(history: History, name: str) -> Ints:
 
 
 def _noise_at_frames(full: History, thinned: History, name: str) -> Floats:
-    """(frames of `seen`,) noise as the whole history shows it."""
+    """(frames of `thinned`,) noise as the full history shows it, in the output's unit."""
     noise = noise_standard_deviation(full, name)
     return noise[np.searchsorted(full.times, thinned.times)]

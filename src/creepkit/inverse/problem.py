@@ -1,276 +1,336 @@
-"""The least-squares problem that a law and histories pose, checked: observations, coordinates, bounds, nuisance parameters and covariance."""
+"""The least-squares problem that a law and histories pose, under a covariance of the observations.
+
+With r(x) the transformed predictions less the transformed observations, L the Cholesky factors of their covariance and
+p(x) the penalties of bounds and priors,
+
+    chi2(x) = |L^-1 r(x)|^2 + |p(x)|^2,    x = (u, e),
+
+u the conditioned coordinates of the law and e the explicit nuisance parameters of the tests. Search, local refinement,
+ranking, intervals, profiles, posterior samples, term selection and the design of experiments share this one record.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.bound_penalties import BoundPenalties
+from creepkit.inverse.bound_penalties import BoundPenalties, constraint_points
+from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.composite_predictor import (
     CompositePredictor,
-    compared_outputs,
+    predict,
+    predict_to_rupture,
+    predict_with_sensitivities,
     prediction_errors_of,
-    predictor_for,
 )
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.iterative_estimation import WorkingNoise, with_rupture_weight
-from creepkit.inverse.noise_model import NoiseModel, Residuals, cholesky_factors
+from creepkit.inverse.history_checks import check_creep, check_explicit_nuisances, check_histories
+from creepkit.inverse.noise_model import Residuals, cholesky_factors, whiten
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
-from creepkit.inverse.observation_vector import (
-    LOGARITHMIC_OUTPUTS,
-    ObservationVector,
-    frames_with_data,
-    thinned_history,
-)
+from creepkit.inverse.observation_vector import ObservationVector, thinned_history
 from creepkit.inverse.reference_conditions import (
     ReferencePoint,
-    detect_creep,
     median_log_inverse_duration,
     median_log_strain_rate,
 )
-from creepkit.inverse.residuals import ResidualFunction
-from creepkit.inverse.search.cost_function import CostFunction
-from creepkit.inverse.search.local_refinement import AdditionalResiduals, Bounds, Minimum, bounded_least_squares
+from creepkit.inverse.residuals import (
+    candidate_residuals,
+    candidate_residuals_and_jacobian,
+    residuals_at_measured_values,
+    residuals_of_prediction,
+)
+from creepkit.inverse.search.local_refinement import (
+    AdditionalResiduals,
+    Minimum,
+    Penalty,
+    Tolerances,
+    bounded_least_squares,
+    robust_loss,
+)
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.working_noise import WorkingNoise, with_rupture_weight
 from creepkit.language import CreepLaw
-from creepkit.records import History, Predictor
+from creepkit.records import History, Prediction, Predictor
 
-if TYPE_CHECKING:
-    from creepkit.inverse.identification import Identification
-
-
-SIGNIFICANT_GROWTH = 5.0
-"""Growth of an output, in units of its noise, that is creep."""
+CACHED_EVALUATIONS = 4
+"""Points whose residuals are remembered: a search ends at one that it has evaluated, and the next begins there."""
 
 
-def check_creep(residual_function: ResidualFunction) -> None:
-    """Some strain must rise above the floor of its scale, or some other output grow beyond its noise."""
-    observations = residual_function.observations
-    for position, (name, transform) in enumerate(zip(observations.outputs, observations.transforms, strict=True)):
-        mask = observations.leading_output & (observations.output_index == position)
-        if name in LOGARITHMIC_OUTPUTS:
-            if (mask & (observations.values > 2 * transform.floor)).any():
-                return
-            continue
-        for k, history in enumerate(residual_function.histories):
-            values = observations.values[k, mask[k]]
-            if (
-                values.size
-                and np.ptp(values) > SIGNIFICANT_GROWTH * observations.noise[position]
-                and _creeps_under_load(history, name)
-            ):
-                return
-    output_names = dict.fromkeys(
-        observations.outputs[k] for k in observations.output_index[observations.leading_output]
-    )
-    raise FitError(
-        f"no {' or '.join(output_names)} of these histories rises above its noise while the load is held; there is no creep "
-        "to identify a law from"
-    )
+FAILED_COST = 1e12
+"""Cost of a candidate that cannot be predicted at all."""
 
 
-def _creeps_under_load(history: History, output: str) -> bool:
-    """Whether a bulge test grows while its pressure is held: a jump of pressure alone moves it elastically."""
-    return history.loading.quantity != "pressure" or detect_creep(history, output).shows_creep
+PRIOR_STRENGTH = 1e-4
+"""Weak prior of each unknown about the middle of its bounds, in standard deviations of data per width of the bounds.
+
+Far too weak to bias a value. Without it one unknown that changes nothing, as the share of the largest principal stress
+in tension, leaves the Jacobian short of its rank, and scipy's steps are then always as long as the trust region.
+"""
 
 
-def check_histories(law: CreepLaw, histories: Sequence[History], predictor: Predictor) -> None:
-    """There must be parameters, and named histories with enough finite outputs to find them from."""
-    if not histories:
-        raise FitError(f"law '{law.name}': there are no histories to identify it from")
-    if not law.params:
-        raise FitError(f"law '{law.name}' has no parameter left to identify")
-    names = [h.name for h in histories]
-    for history in histories:
-        if names.count(history.name) > 1:
-            raise FitError(f"two histories are called '{history.name}'; give each its own name")
-        _check_outputs(history, predictor)
-    frames = sum(int(h.used.sum()) for h in histories)
-    if frames <= len(law.params):
-        raise FitError(f"law '{law.name}' has {len(law.params)} parameters and the histories only {frames} frames")
+class EvaluationCache:
+    """The residuals of the last few points, and how many candidates were evaluated; one candidate is all tests once."""
 
+    def __init__(self) -> None:
+        self.count = 0
+        self._residuals: dict[bytes, Residuals] = {}
 
-def _check_outputs(history: History, predictor: Predictor) -> None:
-    """Frames without a number are left out, output by output; an infinite one is a mistake."""
-    outputs = compared_outputs(predictor, history)
-    if not outputs:
-        known = ", ".join(getattr(predictor_for(predictor, history), "outputs", ())) or "nothing"
-        raise FitError(
-            f"history '{history.name}' has none of the outputs that are predicted ({known}); "
-            f"it has {', '.join(history.outputs) or 'none'}"
-        )
-    used = history.used & (history.times > 0)
-    if int((used & frames_with_data(history)).sum()) < 2:
-        raise FitError(f"history '{history.name}' has fewer than two usable frames after time zero")
-    for name in outputs:
-        if np.isinf(history.outputs[name][used]).any():
-            raise FitError(f"history '{history.name}' has an infinite {name}; mark the frame unused")
-
-
-@dataclass(frozen=True, eq=False)
-class IdentificationProblem:
-    """A law against histories.
-
-    thin : the histories at the frames that are looked at; box : bounds of u; wide : of x = (u, e).
-    """
-
-    histories: tuple[History, ...]
-    thinned: tuple[History, ...]
-    settings: IdentificationSettings
-    residual_function: ResidualFunction
-    bounds: Bounds
-    working_noise: WorkingNoise
-
-    @classmethod
-    def from_histories(
-        cls, law: CreepLaw, histories: Sequence[History], predictor: Predictor | Mapping[str, Predictor],
-        settings: IdentificationSettings, reference: ReferencePoint | None = None,
-    ) -> IdentificationProblem:  # fmt: skip
-        """The checked problem; `reference` where the coordinates of another identification are to be kept."""
-        predictor = CompositePredictor(dict(predictor)) if isinstance(predictor, Mapping) else predictor
-        check_histories(law, histories, predictor)
-        thinned_histories = [thinned_history(h, settings.frames) for h in histories]
-        coordinates = Coordinates(law, reference or ReferencePoint.from_histories(thinned_histories, predictor))
-        observations, nuisance_parameters = (
-            ObservationVector.from_histories(thinned_histories, predictor, histories),
-            NuisanceParameters.from_histories(settings.nuisances, thinned_histories, predictor),
-        )
-        residual_function = ResidualFunction(
-            law, thinned_histories, predictor, coordinates, observations, nuisance_parameters
-        )
-        check_creep(residual_function)
-        check_explicit_nuisances(
-            [n.kind for n in nuisance_parameters.nuisances], observations, thinned_histories, predictor
-        )
-        bounds = Bounds.from_law(
-            law,
-            coordinates,
-            median_log_strain_rate(thinned_histories, predictor),
-            median_log_inverse_duration(thinned_histories),
-        )
-        return cls(
-            tuple(histories),
-            tuple(thinned_histories),
-            settings,
-            residual_function,
-            bounds,
-            WorkingNoise(settings, observations, prediction_errors_of(predictor)),
-        )
-
-    @property
-    def full_bounds(self) -> Bounds:
-        """The box of x = (u, e)."""
-        return self.bounds.with_nuisances(self.residual_function.nuisance_parameters)
-
-    def with_predictor(self, predictor: Predictor) -> ResidualFunction:
-        """The same comparison of another predictor, with the unknowns of tests."""
-        residual_function = self.residual_function
-        return ResidualFunction(
-            residual_function.law,
-            residual_function.histories,
-            predictor,
-            residual_function.coordinates,
-            residual_function.observations,
-            residual_function.nuisance_parameters,
-        )
-
-    def cost_function(self, predictor: Predictor) -> CostFunction:
-        """What a global search sees: a covariance that is broad and fixed, and a loss that no single curve can capture.
-
-        The likelihoods decide between minima, since the covariance is not yet known here.
-        """
-        residual_function, settings = self.residual_function, self.settings
-        initial_noise = with_rupture_weight(self.working_noise.initial(), residual_function.observations)
-        covariance_factor = cholesky_factors(residual_function.at_measured_values(), initial_noise)
-        loss = "soft_l1" if settings.loss == "linear" else settings.loss
-        return CostFunction(
-            residual_function.with_predictor(predictor, residual_function.law, residual_function.coordinates),
-            self.bounds,
-            covariance_factor,
-            settings,
-            loss=loss,
-        )
+    def residuals(self, key: bytes, evaluate: Callable[[], Residuals]) -> Residuals:
+        """The residuals of a point, evaluated unless they are remembered."""
+        if key not in self._residuals:
+            self._residuals = dict([*self._residuals.items()][1 - CACHED_EVALUATIONS :])
+            self._residuals[key] = evaluate()
+            self.count += 1
+        return self._residuals[key]
 
 
 @dataclass(frozen=True, eq=False)
 class LeastSquaresProblem:
-    """An identification as a problem about its optimum.
+    """A law against histories under a covariance; the unknowns are x = (u, e).
 
-    x : (u, e) at the optimum; box : its bounds; scatter, factor : of the covariance by which chi-squares are taken.
-    residuals : at the optimum, with their Jacobian to x.
+    histories : the tests at the frames that are compared. coordinates : of the law, u to its internal parameters.
+    bounds : (unknowns,) of x. covariance_factor : (tests, observations, observations) Cholesky factors, in transformed
+        outputs. loss : of the whitened residuals, as scipy names it. penalty : what is added to half the chi-square.
+    evaluations : the last residuals, shared by the problems that differ in covariance, priors or penalty alone.
     """
 
-    residual_function: ResidualFunction
+    histories: tuple[History, ...]
+    predictor: Predictor
+    coordinates: Coordinates
+    observations: ObservationVector
+    nuisance_parameters: NuisanceParameters
     bounds: Bounds
-    x: Floats
-    noise_model: NoiseModel
+    settings: IdentificationSettings
     covariance_factor: Floats
-    residuals: Residuals
+    loss: str = "linear"
+    penalty: Penalty | None = None
+    evaluations: EvaluationCache = field(default_factory=EvaluationCache, repr=False)
+
+    @classmethod
+    def from_histories(
+        cls,
+        law: CreepLaw,
+        histories: Sequence[History],
+        predictor: Predictor | Mapping[str, Predictor],
+        settings: IdentificationSettings,
+        reference: ReferencePoint | None = None,
+    ) -> LeastSquaresProblem:
+        """The checked problem of a law and histories, under a broad covariance that needs no prediction.
+
+        reference : the reference point of the coordinates, where those of another identification are to be kept.
+        """
+        predictor = CompositePredictor(dict(predictor)) if isinstance(predictor, Mapping) else predictor
+        check_histories(law, histories, predictor)
+        tests = [thinned_history(h, settings.frames) for h in histories]
+        coordinates = Coordinates(law, reference or ReferencePoint.from_histories(tests, predictor))
+        observations = ObservationVector.from_histories(tests, predictor, histories)
+        nuisances = NuisanceParameters.from_histories(settings.nuisances, tests, predictor)
+        check_creep(observations, tests)
+        check_explicit_nuisances([n.kind for n in nuisances.nuisances], observations, tests, predictor)
+        log_rate, log_internal_rate = median_log_strain_rate(tests, predictor), median_log_inverse_duration(tests)
+        bounds = Bounds.from_law(law, coordinates, log_rate, log_internal_rate).with_nuisances(nuisances)
+        noise = WorkingNoise(settings, observations, prediction_errors_of(predictor)).initial()
+        covariance_factor = cholesky_factors(
+            residuals_at_measured_values(observations), with_rupture_weight(noise, observations)
+        )
+        return cls(tuple(tests), predictor, coordinates, observations, nuisances, bounds, settings, covariance_factor)
+
+    # ---- variants ------------------------------------------------------------------------------------------------
+
+    def with_law(self, law: CreepLaw) -> LeastSquaresProblem:
+        """A law of some of this one's parameters, by name, on the same data and covariance, without penalty."""
+        positions = [self.law.names.index(name) for name in law.names]
+        return replace(
+            self,
+            coordinates=Coordinates(law, self.coordinates.reference),
+            bounds=self.bounds.of([*positions, *range(self.parameter_count, self.bounds.width.size)]),
+            penalty=None,
+            evaluations=EvaluationCache(),
+        )
+
+    def with_predictor(self, predictor: Predictor) -> LeastSquaresProblem:
+        """The same with another predictor of the same outputs."""
+        return replace(self, predictor=predictor, evaluations=EvaluationCache())
+
+    def with_covariance(self, covariance_factor: Floats) -> LeastSquaresProblem:
+        """The same under another covariance: (tests, observations, observations) Cholesky factors."""
+        return replace(self, covariance_factor=covariance_factor)
+
+    def with_nuisances(self, nuisance_parameters: NuisanceParameters) -> LeastSquaresProblem:
+        """The same with other priors of the nuisance parameters, or with nuisance parameters that are fixed."""
+        bounds = self.bounds.of(range(self.parameter_count)).with_nuisances(nuisance_parameters)
+        return replace(self, nuisance_parameters=nuisance_parameters, bounds=bounds)
+
+    def with_fixed_nuisances(self, e: Floats | None = None) -> LeastSquaresProblem:
+        """The same with x = u alone; e : (nuisances,) their values, by default the prior means."""
+        nuisances = self.nuisance_parameters
+        return self.with_nuisances(replace(nuisances, mean=nuisances.mean if e is None else np.array(e), fixed=True))
+
+    # ---- sizes -----------------------------------------------------------------------------------------------------
 
     @property
+    def law(self) -> CreepLaw:
+        """The law."""
+        return self.coordinates.law
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of parameters of the law; x continues with the nuisance parameters."""
+        return len(self.law.params)
+
+    @cached_property
     def bound_penalties(self) -> BoundPenalties:
-        """Walls and priors."""
-        return BoundPenalties(self.residual_function)
+        """Penalties of bounds, constraints and priors."""
+        points = (
+            constraint_points(self.histories, self.predictor, self.observations, self.coordinates.reference.strain)
+            if self.law.constraints
+            else []
+        )
+        return BoundPenalties(self.coordinates, self.nuisance_parameters, points)
+
+    # ---- residuals ---------------------------------------------------------------------------------------------------
+
+    def residuals(self, x: Floats) -> Residuals:
+        """Residuals of one x (unknowns,), with exact derivatives to x; the last few are remembered."""
+        fixed_values = self.nuisance_parameters.mean.tobytes() if self.nuisance_parameters.fixed else b""
+        return self.evaluations.residuals(x.tobytes() + fixed_values, lambda: self._evaluated(x))
+
+    def candidate_residuals(self, u: Floats) -> Floats:
+        """(candidates, tests, observations) - of u (candidates, parameters), nuisance parameters at their means."""
+        self.evaluations.count += len(u)
+        return candidate_residuals(self.observations, self._prediction(u, jacobian=False))
+
+    def candidate_jacobian(self, u: Floats) -> tuple[Floats, Floats]:
+        """Residuals (candidates, tests, observations) of u (candidates, parameters), and their derivatives to u.
+
+        The nuisance parameters stay at their means; it is one prediction where the predictor differentiates itself.
+        """
+        if self.observations.followed_to_rupture.any():
+            return self._jacobian_one_by_one(u)
+        prediction = self._prediction(u, jacobian=True)
+        if prediction.jacobian is None:
+            return self._jacobian_one_by_one(u)
+        self.evaluations.count += len(u)
+        values, internal_jacobian = candidate_residuals_and_jacobian(self.observations, prediction)
+        jacobian = np.einsum("ctep,cpq->cteq", internal_jacobian, self.coordinates.jacobian(u))
+        return values, np.where(self.observations.present[..., None], jacobian, 0.0)
+
+    def _jacobian_one_by_one(self, u: Floats) -> tuple[Floats, Floats]:
+        single = self.with_fixed_nuisances()
+        evaluated = [single.residuals(one) for one in u]
+        jacobians = [r.jacobian for r in evaluated if r.jacobian is not None]
+        return np.stack([r.values for r in evaluated]), np.stack(jacobians)
+
+    def _prediction(self, u: Floats, *, jacobian: bool) -> Prediction:
+        theta, histories = self.coordinates.theta(u), self.histories
+        if self.observations.followed_to_rupture.any():
+            return predict_to_rupture(self.predictor, self.law, theta, histories, sensitivities=jacobian)
+        nuisances = replace(self.nuisance_parameters, fixed=True).predictor_values(np.zeros(0))
+        return predict(self.predictor, self.law, theta, histories, nuisances=nuisances, sensitivities=jacobian)
+
+    def _evaluated(self, x: Floats) -> Residuals:
+        u, e = x[: self.parameter_count], x[self.parameter_count :]
+        theta = self.coordinates.theta(u)
+        if self.observations.followed_to_rupture.any():
+            prediction = predict_to_rupture(self.predictor, self.law, theta[None], self.histories, sensitivities=True)
+        else:
+            prediction = predict_with_sensitivities(
+                self.predictor, self.law, theta, self.histories, self.nuisance_parameters.predictor_values(e)
+            )
+        coefficients = self.coordinates.coefficients
+        every_rate_has_one = len(coefficients) == len(self.law.terms) + len(self.law.states)
+        residuals = residuals_of_prediction(
+            self.observations, prediction, self.nuisance_parameters, coefficients if every_rate_has_one else None
+        )
+        assert residuals.jacobian is not None
+        internal, nuisance_jacobian = np.split(residuals.jacobian, [u.size], axis=-1)
+        jacobian = np.concatenate([internal @ self.coordinates.jacobian(u), nuisance_jacobian], axis=-1)
+        return replace(residuals, jacobian=jacobian)
+
+    # ---- chi-square ------------------------------------------------------------------------------------------------
+
+    def whiten(self, values: Floats) -> Floats:
+        """(data,) or (data, columns) whitened rows of the data: values (tests, observations[, columns])."""
+        return np.asarray(whiten(self.covariance_factor, values)[self.observations.present])
 
     def whitened(self, x: Floats) -> Floats:
-        """Residuals of the data over their scatter, then those of walls and priors, at x."""
-        values = np.linalg.solve(self.covariance_factor, self.residual_function.evaluate(x).values[..., None])[..., 0]
-        return np.concatenate([values[self.residual_function.observations.present], self.bound_penalties.residuals(x)])
+        """(data + penalties,) - whitened residuals of the data, then those of bound and prior penalties."""
+        return np.concatenate([self.whiten(self.residuals(x).values), self.bound_penalties.residuals(x)])
+
+    def jacobian(self, x: Floats) -> Floats:
+        """(data + penalties, unknowns) derivatives of the whitened residuals at x (unknowns,)."""
+        jacobian = self.residuals(x).jacobian
+        assert jacobian is not None
+        return np.concatenate([self.whiten(jacobian), self.bound_penalties.jacobian(x)])
 
     def chi_square(self, x: Floats) -> float:
-        """Chi-square of data and priors at x."""
+        """Sum of squares of the whitened residuals at x (unknowns,), penalties included."""
         return float((self.whitened(x) ** 2).sum())
+
+    def cost(self, u: Floats) -> Floats:
+        """(candidates,) half the loss of the data, penalties included, of u (candidates, parameters).
+
+        Nuisance parameters are at their means; all candidates are one prediction. Always finite.
+        """
+        inside = self.bounds.of(range(self.parameter_count)).clip(u)
+        whitened = self.whiten(np.moveaxis(self.candidate_residuals(inside), 0, -1)).T
+        total = 0.5 * robust_loss(whitened**2, self.loss).sum(axis=1)
+        total += 0.5 * (self.bound_penalties.residuals(inside) ** 2).sum(axis=1)
+        if self.penalty is not None:
+            total += self.penalty.values(inside)
+        return np.where(np.isfinite(total), total, FAILED_COST)
+
+    # ---- minima ------------------------------------------------------------------------------------------------------
 
     def minimise(
         self,
-        start: Floats | None = None,
+        start: Floats,
+        *,
         fixed: Mapping[int, float] | None = None,
         additional: AdditionalResiduals | None = None,
+        tolerances: Tolerances | None = None,
     ) -> Minimum:
-        """Least squares from `start` (the optimum) with {position: value} of x held, and further residuals."""
-        return bounded_least_squares(
-            self.residual_function, self.bounds, self.covariance_factor, self.x if start is None else start, max_steps=25, tolerance=1e-7,
-            fixed=fixed, additional=additional,
-        )  # fmt: skip
+        """Bounded least squares from `start` (unknowns,).
 
+        fixed : {position: value} of unknowns that keep their values; additional : further residuals.
+        """
+        fixed, margin = dict(fixed or {}), 1e-9 * self.bounds.width
+        initial = np.array(start, float)
+        initial[list(fixed)] = list(fixed.values())
+        inside = np.clip(initial, self.bounds.lower + margin, self.bounds.upper - margin)
+        inside[list(fixed)] = list(fixed.values())
 
-def least_squares_problem(fit: Identification) -> LeastSquaresProblem:
-    """The problem of an identification, about its optimum, under the covariance that it found."""
-    if fit.predictor is None or not fit.histories:
-        raise FitError("this identification was loaded from a file: attach its histories and specimen with fit.on()")
-    problem = IdentificationProblem.from_histories(fit.law, fit.histories, fit.predictor, fit.settings, fit.reference)
-    estimates_by_owner = {(n.kind, n.owner): n for n in fit.nuisances}
-    nuisance_parameters = problem.residual_function.nuisance_parameters
-    estimates = [
-        estimates_by_owner[n.kind, m]
-        for n, m in zip(nuisance_parameters.nuisances, nuisance_parameters.owners, strict=True)
-    ]
-    prior_sd = np.array([n.prior_sd for n in estimates], float)
-    problem.residual_function.nuisance_parameters = (
-        replace(nuisance_parameters, sd=prior_sd) if estimates else nuisance_parameters
-    )
-    x = np.concatenate([fit.u, [n.value for n in estimates]])
-    residuals = problem.residual_function.evaluate(x).with_test_weights(np.array([m.weight for m in fit.tests]))
-    covariance_factor = cholesky_factors(residuals, fit.noise_model)
-    return LeastSquaresProblem(
-        problem.residual_function, problem.full_bounds, x, fit.noise_model, covariance_factor, residuals
-    )
+        def system(x: Floats) -> tuple[Floats, Floats]:
+            return self._system(x, additional)
 
+        if not all(np.isfinite(part).all() for part in system(inside)):
+            raise FitError(
+                f"law '{self.law.name}': its prediction is no number where a refinement begins; narrow the bounds of "
+                "its parameters, or give more starts"
+            )
+        scale, nuisances = 0.1 * self.bounds.width, self.nuisance_parameters
+        if nuisances.size:
+            scale[-nuisances.size :] = np.minimum(nuisances.sd, self.bounds.width[-nuisances.size :])
+        minimum = bounded_least_squares(
+            system, inside, self.bounds, scale, tolerances or Tolerances(), fixed=fixed, loss=self.loss
+        )
+        assert minimum.whitened_residuals is not None
+        return replace(minimum, whitened_residuals=minimum.whitened_residuals[: self.observations.count])
 
-def check_explicit_nuisances(
-    kinds: Sequence[str], observations: ObservationVector, histories: Sequence[History], predictor: Predictor
-) -> None:
-    """Explicit nuisances have no place yet where tests are followed to rupture."""
-    if not kinds or not observations.followed_to_rupture.any():
-        return
-    history = histories[int(np.argmax(observations.followed_to_rupture))]
-    name = getattr(predictor_for(predictor, history), "name", "predictor")
-    raise FitError(
-        f"nuisance '{kinds[0]}' cannot be fitted beside tests that are followed to their end ('{history.name}', "
-        f"{name}); leave it out, or forget how they ended: history.replace(rupture_time=None, unruptured=False)"
-    )
+    def _system(self, x: Floats, additional: AdditionalResiduals | None) -> tuple[Floats, Floats]:
+        """All residuals at x, (rows,), and their derivatives, (rows, unknowns)."""
+        residuals, prior_weight = self.residuals(x), PRIOR_STRENGTH / self.bounds.width
+        assert residuals.jacobian is not None
+        data = self.whiten(np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1))
+        values = [data[:, 0], self.bound_penalties.residuals(x), prior_weight * (x - self.bounds.centre)]
+        jacobians = [data[:, 1:], self.bound_penalties.jacobian(x), np.diag(prior_weight)]
+        for extra in (self.penalty, additional):
+            if extra is not None:
+                values.append(extra.residuals(x))
+                jacobians.append(extra.jacobian(x))
+        return np.concatenate(values), np.concatenate(jacobians)

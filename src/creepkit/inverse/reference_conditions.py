@@ -1,4 +1,4 @@
-"""Reference conditions of the tests: stress, strain and temperature that stand for a test, and whether a test shows creep."""
+"""Reference conditions: stress, strain and temperature that characterise a test, and whether it shows creep."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ LOAD_TOLERANCE = 0.02
 
 
 MINIMUM_FRAMES = 6
-"""Frames of a hold that say something of growth."""
+"""Frames of a hold from which an increase can be estimated."""
 
 
 SIGNIFICANT_ERRORS = 5.0
-"""Standard errors that a growth must exceed; and it must exceed the noise of one frame."""
+"""Standard errors that an increase must exceed; and it must exceed the noise of one frame."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ AMPLITUDE_PER_STRAIN = 30.0
 
 
 def reference_stresses(history: History, predictor: Predictor | None = None) -> Floats:
-    """The reference stresses that a test visits, MPa."""
+    """(stresses,) MPa, the reference stresses of a test."""
     reference_stress = (
         None if predictor is None else getattr(predictor_for(predictor, history), "reference_stress", None)
     )
@@ -101,7 +101,7 @@ def reference_stresses(history: History, predictor: Predictor | None = None) -> 
 
 
 def reference_end_strain(history: History, predictor: Predictor | None = None) -> float:
-    """The largest strain that a test reached, as far as its outputs tell; `using` may know what they mean."""
+    """The largest strain that a test reached, estimated from its outputs; the predictor may state it."""
     reference_strain = (
         None if predictor is None else getattr(predictor_for(predictor, history), "reference_strain", None)
     )
@@ -113,7 +113,7 @@ def reference_end_strain(history: History, predictor: Predictor | None = None) -
 
 
 def median_log_strain_rate(histories: Sequence[History], predictor: Predictor | None = None) -> float:
-    """Median over tests of the log of strain over time: the scale of rates that the data speak of."""
+    """Median over tests of ln(strain / time), in 1/s."""
     log_rates = []
     for history in histories:
         if predictor is not None and hasattr(predictor_for(predictor, history), "reference_strain"):
@@ -129,12 +129,12 @@ def median_log_strain_rate(histories: Sequence[History], predictor: Predictor | 
 
 
 def median_log_inverse_duration(histories: Sequence[History]) -> float:
-    """Median over tests of -ln of how long they lasted, s: the pace of whatever ends them."""
+    """Median over tests of ln of one over their duration, in 1/s."""
     return float(-np.median([np.log(h.rupture_time or h.times[-1]) for h in histories]))
 
 
 def _output_increase(history: History) -> tuple[float, float]:
-    """How much the output that grows with creep did so between the first and last usable frame, and in which time."""
+    """Increase of the leading output between the first and last usable frame, in its unit, and the time, s."""
     output = "amplitude" if "amplitude" in history.outputs else next(iter(history.outputs))
     used = np.flatnonzero(usable_frames(history, output))
     values, times = history.outputs[output][used], history.times[used]
@@ -179,7 +179,7 @@ class ReferencePoint:
     def from_histories(cls, histories: Sequence[History], predictor: Predictor | None = None) -> ReferencePoint:
         """The middle of what was measured: geometric means of stress and time, of half the end strain; median T.
 
-        using : where it states reference stresses, they count (see inverse.nominal).
+        predictor : where it states reference stresses, they are taken.
         """
         mean_stresses = [
             float(np.exp(np.mean(np.log(np.maximum(reference_stresses(h, predictor), 1e-6))))) for h in histories

@@ -1,397 +1,239 @@
-"""The residual function: predicted minus observed values of all tests with their Jacobian; orthogonal residuals for tests followed to rupture."""
+"""Residuals: transformed predictions less transformed observations of all tests, with their derivatives.
+
+After a predicted rupture the transformed output grows on with ln of time over rupture time, so that residuals are finite
+and their derivatives lead back to values at which the specimen lasts.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
-from creepkit.inverse.composite_predictor import (
-    predict,
-    predict_to_rupture,
-    predict_with_sensitivities,
-)
-from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
-from creepkit.inverse.observation_vector import LinearTransform, ObservationVector
-from creepkit.language import CreepLaw
-from creepkit.records import History, Prediction, Predictor, TimesToStrain
+from creepkit.inverse.observation_vector import ObservationVector
+from creepkit.inverse.orthogonal_residual import (
+    OrthogonalResiduals,
+    offset_time_derivative,
+    orthogonal_residuals,
+    time_jacobian,
+)
+from creepkit.inverse.output_transforms import LinearTransform
+from creepkit.records import Prediction
 
-_SMALL_DISTANCE = 1e-7
-"""Below this distance the ratio of a to b is the slope of the curve."""
-
-
-@dataclass(frozen=True, eq=False)
-class OrthogonalDistance:
-    """values : (...,) r; by_strain, by_time : (...,) its derivatives to a and to b."""
-
-    values: Floats
-    strain_derivative: Floats
-    time_derivative: Floats
+SLOPE_AFTER_RUPTURE = 3.0
+"""Growth of the transformed output per unit of ln(t / t_rupture) after a predicted rupture."""
 
 
-def orthogonal_distance(strain_residual: Floats, time_residual: Floats, curve_slope: Floats) -> OrthogonalDistance:
-    """The distance of points whose errors are a (`strain`) and b (`time`).
+SMALLEST_INCREASE = 0.01
+"""Of a transformed output since the first frame: smaller increases say nothing about the creep rate."""
 
-    Either may be infinite, and not both. slope : (...,) of the predicted curve, d(compared strain)/d(ln time), infinite
-    at rupture.
-    """
-    a, b = np.abs(strain_residual), np.abs(time_residual)
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        ratio = np.where(np.maximum(np.minimum(a, b), 0.0) > _SMALL_DISTANCE, a / b, np.maximum(curve_slope, 0.0))
-        ratio = np.where(np.isinf(b), 0.0, np.where(np.isinf(a), np.inf, ratio))
-        strain_weight, time_weight = 1.0 / np.hypot(1.0, ratio), 1.0 / np.hypot(1.0, 1.0 / ratio)
-    sign = np.where(np.isinf(a), np.sign(time_residual), np.sign(strain_residual))
-    magnitude = np.where(
-        strain_weight >= time_weight,
-        np.where(np.isinf(a), 0.0, a) * strain_weight,
-        np.where(np.isinf(b), 0.0, b) * time_weight,
-    )
-    return OrthogonalDistance(
-        np.sqrt(2.0) * sign * magnitude, np.sqrt(2.0) * strain_weight**3, np.sqrt(2.0) * time_weight**3
+
+def residuals_at_measured_values(observations: ObservationVector) -> Residuals:
+    """Residuals of zero with the derivatives at the measured values: a covariance exists before any prediction."""
+    observed = observations.values
+    derivatives = np.where(observations.present, observations.derivative(observed), 0.0)
+    return _masked_residuals(
+        observations,
+        np.zeros_like(derivatives),
+        derivatives,
+        None,
+        derivatives * np.maximum(observed, 0.0),
+        observations.present,
     )
 
 
-@dataclass(frozen=True, eq=False)
-class OrthogonalResiduals:
-    """Residuals of candidates x tests x entries, and how they change with strain and with time.
+def candidate_residuals(observations: ObservationVector, prediction: Prediction) -> Floats:
+    """(candidates, tests, observations) - residuals of all candidates; zero where there are no data."""
+    values = _orthogonal_residuals(observations, _predicted_values(observations, prediction), prediction).values
+    return np.where(observations.present, values, 0.0)
 
-    values : residuals. by_strain, by_time : derivatives to the compared strain at the frame's time, and to -ln of the
-        time at which the measured strain is arrived at, or the specimen breaks.
-    heard : which entries say anything: that a test was stopped says nothing of a candidate that lasts longer.
+
+def candidate_residuals_and_jacobian(observations: ObservationVector, prediction: Prediction) -> tuple[Floats, Floats]:
+    """Residuals of all candidates, with derivatives to internal parameters, for tests that are not followed to rupture.
+
+    Returns residuals (candidates, tests, observations) and derivatives (candidates, tests, observations, parameters).
     """
+    assert prediction.jacobian is not None
+    predicted = _predicted_values(observations, prediction)
+    alive = np.isfinite(predicted)
+    derivatives = observations.derivative(np.where(alive, predicted, 1.0))
+    with np.errstate(invalid="ignore"):
+        jacobian = derivatives[..., None] * observations.select_outputs(prediction.jacobian, prediction)
+    jacobian = np.where(np.isfinite(jacobian), jacobian, np.nan)
+    filled = np.stack(
+        [
+            _jacobian_of_lost_frames(one, alive_rows, observations.output_index)
+            for one, alive_rows in zip(jacobian, alive & observations.present, strict=True)
+        ]
+    )
+    values = np.where(observations.present, _orthogonal_residuals(observations, predicted, prediction).values, 0.0)
+    return values, filled
 
-    values: Floats
-    strain_derivative: Floats
-    time_derivative: Floats
-    informative: Bools
+
+def residuals_of_prediction(
+    observations: ObservationVector,
+    prediction: Prediction,
+    nuisance_parameters: NuisanceParameters,
+    coefficients: Sequence[int] | None,
+) -> Residuals:
+    """Residuals of one candidate, with derivatives to internal parameters and nuisance parameters.
+
+    coefficients : positions of the rate coefficients of all terms and internal variables, whose sum is the effect of a
+        factor on all rates; None where one has none of its own, and the derivative to ln t takes its place.
+    """
+    assert prediction.jacobian is not None
+    predicted = _predicted_values(observations, prediction)
+    orthogonal, alive = _orthogonal_residuals(observations, predicted, prediction), np.isfinite(predicted[0])
+    derivatives = observations.derivative(np.where(alive, predicted[0], 1.0))
+    jacobian = _transformed_jacobian(observations, prediction, nuisance_parameters, derivatives, alive)
+    jacobian = orthogonal.strain_derivative[0, ..., None] * jacobian
+    derivatives = orthogonal.strain_derivative[0] * np.where(alive, derivatives, 0.0)
+    times = prediction.times_to_strain
+    if times is not None:
+        jacobian += orthogonal.time_derivative[0, ..., None] * time_jacobian(observations, times)[0]
+        derivatives += orthogonal.time_derivative[0] * offset_time_derivative(observations, times)[0]
+    if coefficients is None:
+        log_rate_sensitivity = _time_derivative(observations, predicted[0], orthogonal)
+    else:
+        log_rate_sensitivity = np.asarray(jacobian[..., list(coefficients)].sum(axis=-1))
+    return _masked_residuals(
+        observations,
+        orthogonal.values[0],
+        derivatives,
+        jacobian,
+        log_rate_sensitivity,
+        observations.present & orthogonal.informative[0],
+    )
 
 
-def orthogonal_residuals(
-    observations: ObservationVector, vertical: Floats, alive: Bools, prediction: Prediction
+def median_log_rate_excess(observations: ObservationVector, residuals: Floats) -> Floats:
+    """(candidates,) -, ln of predicted over measured creep rates: the median over the leading outputs.
+
+    residuals : (candidates, tests, observations) -. With a logarithmic transform they are that logarithm themselves;
+    with a linear one it is taken of the increase since the first frame, and grows after a rupture.
+    """
+    predicted = residuals + observations.transformed_values
+    log_ratios = np.where(observations.leading_output, residuals, np.nan)
+    for position, transform in enumerate(observations.transforms):
+        mask = observations.leading_output & (observations.output_index == position) & observations.present
+        if not isinstance(transform, LinearTransform) or not mask.any():
+            continue
+        first_index = mask.argmax(axis=1)[:, None]
+        predicted_growth = predicted - np.take_along_axis(
+            predicted, np.broadcast_to(first_index, (*predicted.shape[:2], 1)), axis=2
+        )
+        measured_growth = observations.transformed_values - np.take_along_axis(
+            observations.transformed_values, first_index, axis=1
+        )
+        after_rupture = np.maximum(predicted - transform.ceiling, 0.0)
+        # The stress of a relaxation test decreases both in the prediction and in the measurement.
+        signed_growth = np.maximum(predicted_growth * np.sign(measured_growth), 1e-12)
+        ratio = np.log(signed_growth / np.maximum(np.abs(measured_growth), SMALLEST_INCREASE)) + after_rupture
+        log_ratios = np.where(mask, np.where(np.abs(measured_growth) > SMALLEST_INCREASE, ratio, np.nan), log_ratios)
+    return np.array(
+        [np.nanmedian(each) if np.isfinite(each).any() else 0.0 for each in log_ratios[:, observations.present]]
+    )
+
+
+def median_log_rupture_excess(observations: ObservationVector, residuals: Floats) -> Floats:
+    """(candidates,) -, ln of measured over predicted rupture times: the median; 0 where no test ruptured.
+
+    residuals : (candidates, tests, observations) -.
+    """
+    ruptured = observations.rupture_mask & ~observations.censored[:, None]
+    return np.median(residuals[:, ruptured], axis=1) if ruptured.any() else np.zeros(len(residuals))
+
+
+def _predicted_values(observations: ObservationVector, prediction: Prediction) -> Floats:
+    """(candidates, tests, observations) predicted outputs; rupture times are compared separately."""
+    return np.where(
+        observations.rupture_mask, observations.values, observations.select_outputs(prediction.values, prediction)
+    )
+
+
+def _orthogonal_residuals(
+    observations: ObservationVector, predicted: Floats, prediction: Prediction
 ) -> OrthogonalResiduals:
-    """Residuals, given those in strain alone (`vertical`), and which frames the prediction lives to see."""
-    unit, zeros = np.ones_like(vertical), np.zeros_like(vertical)
-    if prediction.times_to_strain is None:
-        return OrthogonalResiduals(vertical, unit, zeros, np.broadcast_to(observations.present, vertical.shape))
-    life, frames = (
-        prediction.times_to_strain,
-        observations.followed_to_rupture[:, None] & observations.present & ~observations.rupture_mask,
-    )
-    log_time_ratio = observations.log_times - _log_times(observations.select_frames(life.times))
-    not_converged = ~alive & np.isneginf(log_time_ratio)  # it neither lives nor broke: the solver gave up
-    curve_slope = observations.derivative(np.where(frames, observations.values, 1.0)) * observations.select_frames(
-        life.log_time_derivatives
-    )
-    orthogonal = orthogonal_distance(
-        np.where(alive | not_converged, vertical, np.inf), np.where(not_converged, -np.inf, log_time_ratio), curve_slope
-    )
-    values = np.where(frames, orthogonal.values, vertical)
-    by_strain, by_time = (
-        np.where(frames, orthogonal.strain_derivative, unit),
-        np.where(frames, orthogonal.time_derivative, zeros),
-    )
-    return _with_rupture_times(
-        observations, life, OrthogonalResiduals(values, by_strain, by_time, np.broadcast_to(unit > 0, unit.shape))
-    )
+    vertical = _extended_after_rupture(observations, predicted, prediction.end_times) - observations.transformed_values
+    return orthogonal_residuals(observations, vertical, np.isfinite(predicted), prediction)
 
 
-def _with_rupture_times(
-    observations: ObservationVector, life: TimesToStrain, frame_residuals: OrthogonalResiduals
-) -> OrthogonalResiduals:
-    """The same with ln of measured over predicted rupture time; a stopped test counts where it outlasted that."""
-    ruptured = np.isfinite(life.rupture_times)
-    log_end_times = np.log(np.where(ruptured, life.rupture_times, life.horizon))
-    log_time_ratio = np.where(observations.rupture_mask, observations.log_times - log_end_times[..., None], 0.0)
-    uninformative = observations.rupture_mask & observations.censored[:, None] & (log_time_ratio <= 0.0)
-    values = np.where(observations.rupture_mask, np.where(uninformative, 0.0, log_time_ratio), frame_residuals.values)
-    rupture_derivative = np.where(ruptured[..., None] & ~uninformative, 1.0, 0.0)
-    return OrthogonalResiduals(
-        values,
-        np.where(observations.rupture_mask, 0.0, frame_residuals.strain_derivative),
-        np.where(observations.rupture_mask, rupture_derivative, frame_residuals.time_derivative),
-        observations.present & ~uninformative,
-    )
+def _extended_after_rupture(observations: ObservationVector, predicted: Floats, end_times: Floats) -> Floats:
+    """(candidates, tests, observations) transformed prediction, continued after a rupture."""
+    alive = np.isfinite(predicted)
+    transformed = observations.forward(np.where(alive, predicted, 0.0))
+    lost = observations.present & ~alive
+    if lost.any():
+        ceilings = observations.per_observation([transform.ceiling for transform in observations.transforms])
+        log_delay = np.log(np.maximum(observations.times / np.maximum(end_times[..., None], 1e-12), 1.0))
+        transformed = np.where(lost, ceilings + SLOPE_AFTER_RUPTURE * log_delay, transformed)
+    return transformed
 
 
-def time_jacobian(observations: ObservationVector, life: TimesToStrain) -> Floats:
-    """Derivatives of -ln(time) of arrivals and ruptures to internal parameters.
+def _transformed_jacobian(
+    observations: ObservationVector,
+    prediction: Prediction,
+    nuisance_parameters: NuisanceParameters,
+    derivatives: Floats,
+    alive: Bools,
+) -> Floats:
+    """(tests, observations, unknowns) derivatives of transformed outputs to internal and nuisance parameters."""
+    assert prediction.jacobian is not None
+    jacobian = observations.select_outputs(prediction.jacobian, prediction)[0]
+    if nuisance_parameters.size:
+        by_kind = {
+            kind: observations.select_outputs(s, prediction)[0] for kind, s in prediction.nuisance_jacobian.items()
+        }
+        jacobian = np.concatenate([jacobian, nuisance_parameters.jacobian(by_kind)], axis=-1)
+    with np.errstate(invalid="ignore"):
+        jacobian = derivatives[..., None] * jacobian
+    jacobian = np.where(np.isfinite(jacobian), jacobian, np.nan)
+    return _jacobian_of_lost_frames(jacobian, alive & observations.present, observations.output_index)
 
-    (candidates, tests, entries, parameters); zero where neither comes.
+
+def _time_derivative(observations: ObservationVector, predicted: Floats, orthogonal: OrthogonalResiduals) -> Floats:
+    """(tests, observations) derivative of the residual to ln t.
+
+    For a law without explicit time at constant stress it is that to ln of a factor on all rates: the strain depends on
+    factor x time alone.
     """
-    assert life.time_jacobian is not None
-    assert life.rupture_jacobian is not None
-    arrivals = observations.select_frames(life.time_jacobian)
-    jacobian = -np.where(observations.rupture_mask[..., None], life.rupture_jacobian[:, :, None], arrivals)
-    return np.where(np.isfinite(jacobian), jacobian, 0.0)
+    alive = np.isfinite(predicted)
+    transformed = observations.forward(np.where(alive, predicted, observations.values))
+    sensitivity = np.zeros_like(transformed)
+    for k, present in enumerate(observations.present):
+        for position in np.unique(observations.output_index[k, present]):
+            row = present & (observations.output_index[k] == position)
+            if row.sum() > 1:
+                sensitivity[k, row] = np.gradient(transformed[k, row], observations.log_times[k, row])
+    return np.asarray(orthogonal.strain_derivative[0] * sensitivity + orthogonal.time_derivative[0])
 
 
-def offset_time_derivative(observations: ObservationVector, life: TimesToStrain) -> Floats:
-    """Derivative of -ln(time of arrival) to an offset that is added to a prediction, (candidates, tests, entries)."""
-    curve_slope = observations.select_frames(life.log_time_derivatives)
-    positive_slope = np.where(np.isfinite(curve_slope) & (curve_slope > 0), curve_slope, np.inf)
-    return np.where(observations.rupture_mask, 0.0, 1.0 / positive_slope)
-
-
-def _log_times(times: Floats) -> Floats:
-    """ln of times; of what never comes infinity."""
-    with np.errstate(divide="ignore"):
-        return np.where(np.isnan(times), np.inf, np.log(np.where(np.isnan(times), 1.0, times)))
-
-
-BURST_SLOPE = 3.0
-"""Growth of the compared quantity per unit of ln(t / t_burst) after a burst; strains above it are not data."""
-
-
-CACHED_EVALUATIONS = 4
-"""Candidates whose residuals are kept: a search ends at one that it has seen, and the next begins there."""
-
-
-class ResidualFunction:
-    """Residuals of a law's candidates against histories."""
-
-    def __init__(
-        self, law: CreepLaw, histories: Sequence[History], predictor: Predictor, coordinates: Coordinates,
-        observations: ObservationVector, nuisance_parameters: NuisanceParameters,
-    ) -> None:  # fmt: skip
-        self.law, self.histories, self.predictor = law, list(histories), predictor
-        self.coordinates, self.observations, self.nuisance_parameters = coordinates, observations, nuisance_parameters
-        self.observed = observations.forward(observations.values)
-        self.evaluations = 0
-        self._cache: dict[bytes, Residuals] = {}
-
-    def with_predictor(self, predictor: Predictor, law: CreepLaw, coordinates: Coordinates) -> ResidualFunction:
-        """The same entries asked of another predictor or law, unknowns of tests held at their means."""
-        return ResidualFunction(
-            law,
-            self.histories,
-            predictor,
-            coordinates,
-            self.observations,
-            replace(self.nuisance_parameters, fixed=True),
-        )
-
-    def at_measured_values(self) -> Residuals:
-        """Slopes as the measured values have them, so that a covariance exists before anything was predicted."""
-        observed = self.observations.values
-        derivatives = np.where(self.observations.present, self.observations.derivative(observed), 0.0)
-        return self._masked_residuals(
-            np.zeros_like(derivatives), derivatives, None, derivatives * np.maximum(observed, 0.0)
-        )
-
-    def batch_residuals(self, u: Floats, e: Floats | None = None) -> Floats:
-        """Residuals without derivatives: (candidates, parameters) to entries; unknowns of tests at e or their means."""
-        theta = self.coordinates.theta(u)
-        if self.observations.followed_to_rupture.any():
-            prediction = predict_to_rupture(self.predictor, self.law, theta, self.histories)
-        else:
-            nuisances = replace(self.nuisance_parameters, fixed=e is None).predictor_values(
-                np.zeros(0) if e is None else e
-            )
-            prediction = predict(self.predictor, self.law, theta, self.histories, nuisances=nuisances)
-        self.evaluations += len(u)
-        return np.where(
-            self.observations.present,
-            self._residual_derivatives(self._predicted_outputs(prediction), prediction).values,
-            0.0,
-        )
-
-    def median_log_rate_excess(self, residuals: Floats) -> Floats:
-        """(candidates,) by how much rates are too high, in ln: the median over what grows with creep.
-
-        On a logarithmic scale the residual itself; on a linear one ln of predicted over measured growth, and more
-        after a burst.
-        """
-        observations, predicted = self.observations, residuals + self.observed
-        log_ratios = np.where(observations.leading_output, residuals, np.nan)
-        for position, transform in enumerate(observations.transforms):
-            mask = observations.leading_output & (observations.output_index == position) & observations.present
-            if not isinstance(transform, LinearTransform) or not mask.any():
-                continue
-            first_index = mask.argmax(axis=1)[:, None]
-            predicted_growth = predicted - np.take_along_axis(
-                predicted, np.broadcast_to(first_index, (*predicted.shape[:2], 1)), axis=2
-            )
-            measured_growth = self.observed - np.take_along_axis(self.observed, first_index, axis=1)
-            burst = np.maximum(predicted - transform.ceiling, 0.0)
-            signed_growth = np.maximum(
-                predicted_growth * np.sign(measured_growth), 1e-12
-            )  # a stress that relaxes falls in both
-            ratio = np.log(signed_growth / np.maximum(np.abs(measured_growth), 0.01)) + burst
-            log_ratios = np.where(mask, np.where(np.abs(measured_growth) > 0.01, ratio, np.nan), log_ratios)
-        return np.array(
-            [np.nanmedian(each) if np.isfinite(each).any() else 0.0 for each in log_ratios[:, observations.present]]
-        )
-
-    def median_log_rupture_excess(self, residuals: Floats) -> Floats:
-        """(candidates,) by how much ruptures come too early, in ln: the median; 0 where no test ruptured."""
-        ruptured = self.observations.rupture_mask & ~self.observations.censored[:, None]
-        return np.median(residuals[:, ruptured], axis=1) if ruptured.any() else np.zeros(len(residuals))
-
-    def evaluate(self, x: Floats) -> Residuals:
-        """Residuals of one candidate x = (u, e) with exact derivatives; the last few are remembered."""
-        key = x.tobytes()
-        if key not in self._cache:
-            self._cache = dict([*self._cache.items()][1 - CACHED_EVALUATIONS :])
-            self._cache[key] = self._evaluated(x)
-        return self._cache[key]
-
-    def batch_jacobian(self, u: Floats) -> tuple[Floats, Floats]:
-        """Residuals (candidates, tests, entries) of u (candidates, parameters), and their derivatives to u.
-
-        The unknowns of tests stay at their means; one prediction, where the predictor differentiates itself.
-        """
-        theta, nuisances = (
-            self.coordinates.theta(u),
-            replace(self.nuisance_parameters, fixed=True).predictor_values(np.zeros(0)),
-        )
-        prediction = predict(self.predictor, self.law, theta, self.histories, nuisances=nuisances, sensitivities=True)
-        if prediction.jacobian is None or self.observations.followed_to_rupture.any():
-            single = self.with_predictor(self.predictor, self.law, self.coordinates)
-            evaluated = [single.evaluate(one) for one in u]
-            self.evaluations += single.evaluations
-            return np.stack([r.values for r in evaluated]), np.stack([_require_jacobian(r.jacobian) for r in evaluated])
-        self.evaluations += len(u)
-        observations, predicted = self.observations, self._predicted_outputs(prediction)
-        alive = np.isfinite(predicted)
-        derivatives = observations.derivative(np.where(alive, predicted, 1.0))
-        with np.errstate(invalid="ignore"):
-            jacobian = derivatives[..., None] * observations.select_outputs(prediction.jacobian, prediction)
-        jacobian = np.where(np.isfinite(jacobian), jacobian, np.nan)
-        alive_observations = alive & observations.present
-        filled = np.stack(
-            [
-                _jacobian_of_lost_frames(one, alive_rows, observations.output_index)
-                for one, alive_rows in zip(jacobian, alive_observations, strict=True)
-            ]
-        )
-        jacobian_u = np.einsum("ctep,cpq->cteq", filled, self.coordinates.jacobian(u))
-        values = np.where(observations.present, self._residual_derivatives(predicted, prediction).values, 0.0)
-        return values, np.where(observations.present[..., None], jacobian_u, 0.0)
-
-    def _evaluated(self, x: Floats) -> Residuals:
-        parameters, observations = len(self.law.params), self.observations
-        u, e = x[:parameters], x[parameters:]
-        theta = self.coordinates.theta(u)
-        if observations.followed_to_rupture.any():
-            prediction = predict_to_rupture(self.predictor, self.law, theta[None], self.histories, sensitivities=True)
-        else:
-            prediction = predict_with_sensitivities(
-                self.predictor, self.law, theta, self.histories, self.nuisance_parameters.predictor_values(e)
-            )
-        self.evaluations += 1
-        assert prediction.jacobian is not None
-        predicted = self._predicted_outputs(prediction)
-        orthogonal, alive = self._residual_derivatives(predicted, prediction), np.isfinite(predicted[0])
-        derivatives = observations.derivative(np.where(alive, predicted[0], 1.0))
-        internal_jacobian = orthogonal.strain_derivative[0, ..., None] * self._internal_jacobian(
-            prediction, derivatives, alive
-        )
-        derivatives = orthogonal.strain_derivative[0] * np.where(alive, derivatives, 0.0)
-        if prediction.times_to_strain is not None:
-            internal_jacobian += (
-                orthogonal.time_derivative[0, ..., None] * time_jacobian(observations, prediction.times_to_strain)[0]
-            )
-            derivatives += (
-                orthogonal.time_derivative[0] * offset_time_derivative(observations, prediction.times_to_strain)[0]
-            )
-        log_rate_sensitivity = self._log_rate_sensitivity(internal_jacobian[..., :parameters], predicted[0], orthogonal)
-        jacobian = np.concatenate(
-            [internal_jacobian[..., :parameters] @ self.coordinates.jacobian(u), internal_jacobian[..., parameters:]],
-            axis=-1,
-        )
-        return self._masked_residuals(
-            orthogonal.values[0], derivatives, jacobian, log_rate_sensitivity, orthogonal.informative[0]
-        )
-
-    def _predicted_outputs(self, prediction: Prediction) -> Floats:
-        """What is predicted at the entries, (candidates, tests, entries); rupture times are compared on their own."""
-        return np.where(
-            self.observations.rupture_mask,
-            self.observations.values,
-            self.observations.select_outputs(prediction.values, prediction),
-        )
-
-    def _residual_derivatives(self, predicted: Floats, prediction: Prediction) -> OrthogonalResiduals:
-        vertical = self._extended_after_burst(predicted, prediction.end_times) - self.observed
-        return orthogonal_residuals(self.observations, vertical, np.isfinite(predicted), prediction)
-
-    def _internal_jacobian(self, prediction: Prediction, derivatives: Floats, alive: Bools) -> Floats:
-        """Derivatives of what is compared to internal parameters and unknowns of tests."""
-        assert prediction.jacobian is not None
-        jacobian = self.observations.select_outputs(prediction.jacobian, prediction)[0]
-        if self.nuisance_parameters.size:
-            by_kind = {
-                kind: self.observations.select_outputs(s, prediction)[0]
-                for kind, s in prediction.nuisance_jacobian.items()
-            }
-            jacobian = np.concatenate([jacobian, self.nuisance_parameters.jacobian(by_kind)], axis=-1)
-        with np.errstate(invalid="ignore"):
-            jacobian = derivatives[..., None] * jacobian
-        jacobian = np.where(np.isfinite(jacobian), jacobian, np.nan)
-        return _jacobian_of_lost_frames(jacobian, alive & self.observations.present, self.observations.output_index)
-
-    def _masked_residuals(
-        self,
-        values: Floats,
-        derivatives: Floats,
-        jacobian: Floats | None,
-        log_rate_sensitivity: Floats,
-        informative: Bools | None = None,
-    ) -> Residuals:
-        observations = self.observations
-        mask = observations.present if informative is None else observations.present & informative
-        return Residuals(
-            np.where(mask, values, 0.0), np.where(mask, derivatives, 0.0), mask, observations.correlation_time,
-            None if jacobian is None else np.where(mask[..., None], jacobian, 0.0), np.where(mask, log_rate_sensitivity, 0.0),
-            observations.output_index, observations.relative_noise, np.ones(len(mask)),
-        )  # fmt: skip
-
-    def _log_rate_sensitivity(self, jacobian: Floats, predicted: Floats, orthogonal: OrthogonalResiduals) -> Floats:
-        """Derivative of the compared quantity to ln of a factor on all rates of a test, (tests, entries).
-
-        The sum over the coefficients of terms and of internal variables; where one has none of its own, the slope in
-        ln t, which is the same for a law without explicit time at constant stress (strain depends on factor x time
-        alone).
-        """
-        coordinates = self.coordinates
-        if len(coordinates.coefficients) == len(self.law.terms) + len(self.law.states):
-            return np.asarray(jacobian[..., list(coordinates.coefficients)].sum(axis=-1))
-        alive = np.isfinite(predicted)
-        transformed, observations = (
-            self.observations.forward(np.where(alive, predicted, self.observations.values)),
-            self.observations,
-        )
-        sensitivity = np.zeros_like(transformed)
-        for k, present in enumerate(observations.present):
-            for position in np.unique(observations.output_index[k, present]):
-                row = present & (observations.output_index[k] == position)
-                if row.sum() > 1:
-                    sensitivity[k, row] = np.gradient(transformed[k, row], observations.log_times[k, row])
-        return np.asarray(orthogonal.strain_derivative[0] * sensitivity + orthogonal.time_derivative[0])
-
-    def _extended_after_burst(self, predicted: Floats, end_times: Floats) -> Floats:
-        """g of the prediction, carried on after a burst; (candidates, tests, entries)."""
-        alive = np.isfinite(predicted)
-        transformed = self.observations.forward(np.where(alive, predicted, 0.0))
-        lost = self.observations.present & ~alive
-        if lost.any():
-            ceilings = self.observations.per_observation([scale.ceiling for scale in self.observations.transforms])
-            log_delay = np.log(np.maximum(self.observations.times / np.maximum(end_times[..., None], 1e-12), 1.0))
-            transformed = np.where(lost, ceilings + BURST_SLOPE * log_delay, transformed)
-        return transformed
-
-
-def _require_jacobian(jacobian: Floats | None) -> Floats:
-    assert jacobian is not None
-    return jacobian
+def _masked_residuals(
+    observations: ObservationVector,
+    values: Floats,
+    derivatives: Floats,
+    jacobian: Floats | None,
+    log_rate_sensitivity: Floats,
+    mask: Bools,
+) -> Residuals:
+    return Residuals(
+        values=np.where(mask, values, 0.0),
+        transform_derivatives=np.where(mask, derivatives, 0.0),
+        present=mask,
+        correlation_time=observations.correlation_time,
+        jacobian=None if jacobian is None else np.where(mask[..., None], jacobian, 0.0),
+        log_rate_sensitivity=np.where(mask, log_rate_sensitivity, 0.0),
+        output_index=observations.output_index,
+        relative_noise=observations.relative_noise,
+        test_weights=np.ones(len(mask)),
+    )
 
 
 def _jacobian_of_lost_frames(jacobian: Floats, alive: Bools, output: Ints) -> Floats:
-    """Derivatives of lost frames: those of the output's last frame alive in the test, a direction back to life."""
+    """Derivatives at frames after a rupture: those of the last frame of the output that the prediction reaches."""
     if alive.all():
         return jacobian
     frames = np.broadcast_to(np.arange(alive.shape[1]), alive.shape)

@@ -25,25 +25,25 @@ OutputWeights = Literal["noise", "likelihood", "equal", "paper"] | Mapping[str, 
 
 
 PAPER_WEIGHTS = MappingProxyType({"amplitude": 0.99, "width": 0.005, "shape": 0.005})
-"""The paper's weighted loss for measured histories, Eq. (S3): .99 on D_amp; how the rest is split is not said."""
+"""The paper's weighted loss for measured histories, Eq. (S3): 0.99 on D_amp; how the rest is split is not said."""
 
 
 @dataclass(frozen=True)
 class IdentificationSettings:
     """What a run can be repeated from.
 
-    draws : Sobol points that are screened, a power of two is best; frames : looked at in each history, with all
-        their outputs.
-    loss : of frames, and of values only; intervals and scatter are Gaussian and see outliers as scatter. A likelihood
-        is one measure of all of these, and takes none.
-    test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its pull.
+    starts : of the multi-start search; sobol_points : that are screened for them, a power of two is best.
+    frames : that are compared in each history, with all their outputs. seed : of random draws.
+    loss : of frames, for values only; intervals and noise model are Gaussian, in which outliers are noise. An
+        identification by likelihood takes none.
+    nuisances : what differs between tests; by default an offset of each output and test-to-test scatter of the rate,
+        both estimated.
     weights : "noise": values by least squares of frames of equal weight, intervals from all the scatter that the data
-        show. "likelihood": values, intervals and ranking by one likelihood, white noise and autocorrelation of every
-        output estimated with it (see inverse.restricted). {output: weight}: the sum of weight times relative squared
-        error (see inverse.measures); "equal" weights are Eq. (4) of the paper, "paper" its Eq. (S3) for measured
-        histories, .99 on D_amp.
-    nuisances : what differs between tests; unless told otherwise an offset of each output and test-to-test scatter
-        of the rate, both estimated.
+        show. "likelihood": values, intervals and ranking by one likelihood, with white noise and autocorrelation of
+        every output (see inverse.variance_components). {output: weight}: the sum of weight times relative squared error
+        (see inverse.goodness_of_fit); "equal" weights are Eq. (4) of the paper, "paper" its Eq. (S3) for measured
+        histories, 0.99 on D_amp.
+    test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its weight.
     """
 
     starts: int = 8
@@ -67,7 +67,7 @@ class IdentificationSettings:
         _check_weights(self.weights)
         if self.weights == "likelihood" and self.loss != "linear":
             raise FitError(
-                f"loss '{self.loss}' does not go with weights 'likelihood', which judges values, scatter and laws; "
+                f"loss '{self.loss}' does not go with weights 'likelihood', which judges values, noise and laws; "
                 "leave one of them out, or set test_loss='student' against tests that are far off"
             )
         for nuisance in self.nuisances:
@@ -82,7 +82,8 @@ def _check_weights(weights: OutputWeights) -> None:
     if isinstance(weights, str):
         if weights not in WEIGHTINGS:
             raise FitError(
-                f'weights is "{weights}"; allowed are {", ".join(WEIGHTINGS)} and a mapping such as {{"amplitude": 0.99}}'
+                f'weights is "{weights}"; allowed are {", ".join(WEIGHTINGS)} and a mapping such as '
+                '{"amplitude": 0.99}'
             )
         return
     invalid = [f"{name}: {value!r}" for name, value in weights.items() if not (np.isfinite(value) and value > 0)]

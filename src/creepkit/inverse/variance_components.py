@@ -126,9 +126,13 @@ COMPONENTS = ("noise", "misfit", "offset", "drift", "correlation_length")
 
 
 def estimate_variance_components(
-    residuals: Residuals, start: NoiseModel, nuisances: Sequence[Nuisance], *, fixed: Sequence[str] = ("noise",),
+    residuals: Residuals,
+    start: NoiseModel,
+    nuisances: Sequence[Nuisance],
+    *,
+    fixed: Sequence[str] = ("noise",),
     linearised: LinearisedProblem | None = None,
-) -> NoiseModel:  # fmt: skip
+) -> NoiseModel:
     """The scatter of largest likelihood, beginning from `start`.
 
     Sources at zero, named in `fixed` or with a given prior stay; the noise, which was measured, unless told otherwise.
@@ -136,9 +140,14 @@ def estimate_variance_components(
     """
     fixed_by_prior = fixed_components(nuisances, list(start.outputs))
     free = [
-        (o, n) for n in COMPONENTS for o, components in start.outputs.items()
-        if getattr(components, n) > 0 and (o, n) not in fixed_by_prior and n not in fixed and (n != "correlation_length" or components.drift > 0)
-    ]  # fmt: skip
+        (o, n)
+        for n in COMPONENTS
+        for o, components in start.outputs.items()
+        if getattr(components, n) > 0
+        and (o, n) not in fixed_by_prior
+        and n not in fixed
+        and (n != "correlation_length" or components.drift > 0)
+    ]
     free += [("", "rate")] if start.rate > 0 and ("", "rate") not in fixed_by_prior else []
     if not free:
         return start

@@ -290,6 +290,12 @@ class LawRecord:
                 for k, (name, param) in enumerate(self.table.items())
             }
 
+    @property
+    def internal_bounds(self) -> Floats:
+        """(2, parameters) lower and upper bounds of the internal values."""
+        ends = [[param.to_internal(bound) for bound in param.bounds] for param in self.params.values()]
+        return np.array(ends, float).reshape(-1, 2).T
+
     def number(self, value: Any, what: str) -> float:
         """Return `value` as a float, or raise LawError saying that `what` is not a number."""
         try:

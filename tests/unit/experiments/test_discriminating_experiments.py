@@ -83,8 +83,8 @@ def test_what_bursts_at_once_is_left_out(hardening):
     far = constant_stress(4000.0, "stress")
     plan = hardening[0].histories[0].replace(loading=far, name="far too much")
     found = discriminating_experiments(*hardening, [plan])
-    assert found.tests == ()
-    assert found.left_out == ("far too much",)
+    assert found.experiments == ()
+    assert found.excluded == ("far too much",)
     assert "none of the 0 further tests" in found.sentence
 
 

@@ -46,7 +46,7 @@ def test_a_fit_by_the_specimen_itself_is_confirmed_with_its_own_misfit(fit):
     for test in fit.tests:
         assert told[test.name, "strain"].simulation_errors == told[test.name, "strain"].fit_errors
         assert told[test.name, "strain"].simulation_errors.mean_squared_error == pytest.approx(
-            test["strain"].errors.mse, rel=1e-9
+            test["strain"].errors.mean_squared_error, rel=1e-9
         )
 
 
@@ -114,6 +114,6 @@ def test_confirm_command(fit, tmp_path):
     assert told.exit_code == 0
     assert "norton by uniaxial" in told.stdout
     answer = json.loads(creepkit("confirm", str(path), str(tmp_path / "*.csv"), "--json").stdout)
-    assert answer["tests"][0]["outputs"][0]["difference"] is None
+    assert answer["tests"][0]["outputs"][0]["rms_difference"] is None
     assert {t["name"] for t in answer["tests"]} == {h.name for h in TESTS}
     assert "cannot be read" in one_line(creepkit("confirm", str(tmp_path / "none.json"), str(tmp_path / "*.csv")))

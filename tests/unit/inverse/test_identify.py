@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
-from creepkit.inverse.cross_validation import leave_one_condition_out, measured_time_to_strain, times_to_strain
+from creepkit.inverse.cross_validation import cross_validate, measured_time_to_strain, times_to_strain
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identification_document import (
     identification_from_json,
@@ -129,9 +129,10 @@ def test_z_factor_of_planted_scatter():
 
 
 def test_leaving_conditions_out_predicts_each_once(fit, tests):
-    found, fits = leave_one_condition_out(fit, tests, 0.01)
+    folds = cross_validate(fit, tests, by="condition")
+    found = folds.times_to_strain(0.01)
     assert sorted(found.names) == sorted(h.name for h in tests)
-    assert len(fits) == 9
+    assert len(folds.folds) == 9
     assert found.spread < 0.4
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError, SolveError
-from creepkit.inverse.cross_validation import leave_one_test_out, pooled_relative_squared_error
+from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.goodness_of_fit import relative_squared_error
 from creepkit.inverse.identification import IdentificationSettings
 from creepkit.inverse.identification_document import identification_to_json, read_identification
@@ -76,9 +76,9 @@ def test_each_thickness_and_offset_is_found(fit):
 def test_what_is_left_is_the_noise(fit):
     """The planted noise is 1.5 um; chi-square counts it in units of what third differences say, here within a third."""
     for m in fit.tests:
-        assert m["amplitude"].errors.mse ** 0.5 < 2 * 1.5e-3
-        assert m["width"].errors.mse ** 0.5 == pytest.approx(0.02, rel=0.5)
-    assert fit.errors["amplitude"].rse < 1e-3
+        assert m["amplitude"].errors.mean_squared_error ** 0.5 < 2 * 1.5e-3
+        assert m["width"].errors.mean_squared_error ** 0.5 == pytest.approx(0.02, rel=0.5)
+    assert fit.errors["amplitude"].relative_squared_error < 1e-3
 
 
 def test_without_thickness_the_answer_is_worse_and_says_so(fit, tests):
@@ -93,9 +93,9 @@ def test_predictions_of_fitted_tests_have_their_own_nuisances(fit, tests):
     for k, test in enumerate(tests):
         np.testing.assert_allclose(found.of(k)[:, 0], test.outputs["amplitude"], atol=6 * 1.5e-3)
     stranger = fit.predict([tests[0].replace(name="another")])
-    alike = fit.predict([tests[0]], own=False)
+    alike = fit.predict([tests[0]], own_nuisances=False)
     np.testing.assert_array_equal(stranger.values, alike.values)
-    assert fit.nuisances([tests[0].replace(name="another")])["thickness"] == MEAN
+    assert fit.nuisance_values([tests[0].replace(name="another")])["thickness"] == MEAN
 
 
 def test_an_unknown_spread_is_estimated():
@@ -254,11 +254,11 @@ def test_files_of_the_first_version_are_refused(fit, tmp_path):
 
 def test_a_test_that_was_left_out_is_predicted(fit, tests):
     """Thicknesses of unseen tests are only known to 4 %, which is a quarter of the rate: errors far above the noise."""
-    held = leave_one_test_out(fit, tests[:3])
-    assert [one.name for one in held] == [h.name for h in tests[:3]]
-    assert all(len(one.fit.tests) == 2 for one in held)
-    assert all(np.isfinite(one.errors["amplitude"].relative_squared_error) for one in held)
-    assert pooled_relative_squared_error(held, tests, "amplitude") > fit.errors["amplitude"].rse
+    held = cross_validate(fit, tests[:3], by="test")
+    assert list(held.errors) == [h.name for h in tests[:3]]
+    assert all(len(fold.fit.tests) == 2 for fold in held.folds)
+    assert all(np.isfinite(errors["amplitude"].relative_squared_error) for errors in held.errors.values())
+    assert held.pooled_error("amplitude") > fit.errors["amplitude"].relative_squared_error
 
 
 def test_the_plot_has_amplitudes_residuals_and_rates(fit, tmp_path):
@@ -289,7 +289,7 @@ def test_what_means_nothing_is_refused_in_one_sentence(tests):
     with pytest.raises(FitError, match="weights name 'depth', which is not among the outputs amplitude, width, shape"):
         identify(LAW, tests, EXACT, settings=replace(QUICK, weights={"depth": 1.0}))
     shared = Nuisance("temperature", scope="all")
-    with pytest.raises(FitError, match="a spread cannot be estimated from a single unknown"):
+    with pytest.raises(FitError, match="a standard deviation cannot be estimated from a single value"):
         identify(LAW, tests, EXACT, settings=replace(QUICK, nuisances=(shared,)))
 
 

@@ -125,16 +125,16 @@ def by_hand(residuals, scatter, test):
     r, c = residuals, np.zeros((10, 10))
     for i in range(10):
         for j in range(10):
-            a, b = (list(scatter.outputs.values())[r.output[test, k]] for k in (i, j))
+            a, b = (list(scatter.outputs.values())[r.output_index[test, k]] for k in (i, j))
             c[i, j] = scatter.rate**2 * r.log_rate_sensitivity[test, i] * r.log_rate_sensitivity[test, j]
             if a is b:
-                lag = abs(r.clock[test, i] - r.clock[test, j])
+                lag = abs(r.correlation_time[test, i] - r.correlation_time[test, j])
                 c[i, j] += (
                     a.drift**2 * np.exp(-lag / a.correlation_length)
-                    + a.offset**2 * r.slopes[test, i] * r.slopes[test, j]
+                    + a.offset**2 * r.transform_derivatives[test, i] * r.transform_derivatives[test, j]
                 )
             if i == j:
-                c[i, j] += (a.noise * r.slopes[test, i]) ** 2 + a.misfit**2
+                c[i, j] += (a.noise * r.transform_derivatives[test, i]) ** 2 + a.misfit**2
     return c
 
 

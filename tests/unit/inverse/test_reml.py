@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from creepkit.inverse.iterative_estimation import WorkingNoise
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
-from creepkit.inverse.observation_vector import LinearTransform
+from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import restricted_covariance
 from creepkit.inverse.variance_components import (
@@ -18,6 +17,7 @@ from creepkit.inverse.variance_components import (
     inverse_covariances,
     restricted_log_likelihood,
 )
+from creepkit.inverse.working_noise import WorkingNoise
 
 
 def linear_model(values, design, clock=None, outputs=1):
@@ -67,7 +67,7 @@ def test_intervals_of_white_noise_are_students():
 def test_what_a_predictor_states_of_its_error_is_not_asked_of_the_data():
     """An error of a thousandth, under noise of .3, leaves the noise its n - p = 22; asked of the data it takes most."""
     linear = linear_model(0.3 * np.random.default_rng(1).normal(size=(1, 25)), polynomial(25, 2))
-    entries = SimpleNamespace(outputs=("amplitude",), scales=(LinearTransform(2.0, 1.0),))
+    entries = SimpleNamespace(outputs=("amplitude",), transforms=(LinearTransform(2.0, 1.0),))
     weighting = WorkingNoise(IdentificationSettings(weights="likelihood"), entries, {"amplitude": 0.004})
     scatter = white(0.3, ("amplitude",), drift=0.002)
     assert weighting.fixed_components(scatter) == {("amplitude", "drift"), ("amplitude", "correlation_length")}
@@ -148,7 +148,7 @@ def test_outputs_inverted_one_by_one_are_the_whole_matrix_inverted():
     linear = linear_model(rng.normal(size=(2, 20)), polynomial(20, 1, tests=2), outputs=2)
     scatter = white(0.3, ("amplitude", "width"), drift=0.5, correlation_length=0.3)
     blocks, log_det = inverse_covariances(linear.residuals, scatter)
-    shared = replace(linear.residuals, known=np.zeros((2, 20, 1)))
+    shared = replace(linear.residuals, random_effect_sensitivities=np.zeros((2, 20, 1)))
     whole, same = inverse_covariances(shared, scatter)
     assert blocks == pytest.approx(whole, rel=1e-9, abs=1e-9)
     assert log_det == pytest.approx(same, rel=1e-12)

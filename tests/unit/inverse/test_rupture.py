@@ -9,11 +9,10 @@ import creepkit as ck
 from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.composite_predictor import CompositePredictor, predict_to_rupture
 from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.cross_validation import leave_one_condition_out, times_to_rupture
-from creepkit.inverse.nuisance_parameters import NuisanceParameters
+from creepkit.inverse.cross_validation import cross_validate, times_to_rupture
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
-from creepkit.inverse.residuals import ResidualFunction
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
@@ -85,7 +84,7 @@ def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
     time, less, more = fit.rupture_time(stresses, 1000.0)
     assert ((less < truth) & (truth < more)).all()
     np.testing.assert_allclose(time, truth, rtol=0.35)
-    _, low, high = fit.rupture_time(stresses, 1000.0, scatter=False)
+    _, low, high = fit.rupture_time(stresses, 1000.0, test_scatter=False)
     assert ((less < low) & (high < more)).all()  # a single test has its own rate on top
     again = fit.rupture_times(plans)[0]
     np.testing.assert_allclose(again, time, rtol=1e-3)
@@ -94,7 +93,7 @@ def test_rupture_at_new_conditions_is_predicted_with_its_interval(planted):
 def test_the_answer_says_how_tests_ended(planted, tmp_path):
     _, _, tests, fit = planted
     ends = [m.rupture for m in fit.tests]
-    assert [r.stopped for r in ends] == [k in (0, 6) for k in range(8)]
+    assert [r.censored for r in ends] == [k in (0, 6) for k in range(8)]
     assert [r.measured for r in ends] == [h.rupture_time or h.times[-1] for h in tests]
     assert "rupture: 6 of 8 tests broke; time predicted over measured" in str(fit)
     assert "2 stopped before, of which none should have broken" in str(fit)
@@ -134,8 +133,9 @@ def test_what_tension_cannot_tell_costs_the_other_parameters_nothing(planted):
 def test_a_condition_left_out_is_predicted():
     tests = campaign(OMEGA, {"A": 1e-16, "n": 4.0, "m": 20.0}, [60, 80, 100, 120], 3)
     fit = ck.identify(OMEGA, tests, using=BAR, starts=3, frames=16)
-    held, fits = leave_one_condition_out(fit, tests, None)
-    assert len(fits) == 4
+    folds = cross_validate(fit, by="condition")
+    held = folds.times_to_rupture()
+    assert len(folds.folds) == 4
     assert sorted(held.names) == ["t0", "t1", "t2", "t3"]
     assert held.z_factor < 3.0
     np.testing.assert_array_equal(sorted(held.measured), sorted(h.rupture_time for h in tests))
@@ -144,38 +144,35 @@ def test_a_condition_left_out_is_predicted():
 # ---- the objective ------------------------------------------------------------------------------------------------
 
 
-def objective(law, tests):
-    reference = ReferencePoint.from_histories(tests, BAR)
-    entries = ObservationVector.from_histories(tests, BAR)
-    unknowns = NuisanceParameters.from_histories(IdentificationSettings().nuisances, tests, BAR)
-    return ResidualFunction(law, tests, BAR, Coordinates(law, reference), entries, unknowns)
+def problem(law, tests):
+    return LeastSquaresProblem.from_histories(law, tests, BAR, IdentificationSettings(frames=100))
 
 
 @pytest.mark.parametrize(("A", "B"), [(1.0, 1.0), (1.0, 5.0), (0.01, 0.02), (1.0, 1e-4), (30.0, 1e-4), (20.0, 0.5)])
 def test_derivatives_of_candidates_that_break_early_late_or_never(A, B):
     law, values = PLANTED["Kachanov-Rabotnov"]
-    found = objective(law, campaign(law, values, [60, 80, 110], 1, stopped=(1,)))
+    found = problem(law, campaign(law, values, [60, 80, 110], 1, stopped=(1,)))
     theta = np.array([np.log(A * 1e-16), 4.0, np.log(B * 1e-15), 3.5, 4.0])
     u = found.coordinates.u(theta)
-    exact, step = found.evaluate(u).jacobian, 1e-5
+    exact, step = found.residuals(u).jacobian, 1e-5
     for k in range(u.size):
         h = step * np.eye(u.size)[k]
-        slope = (found.evaluate(u + h).values - found.evaluate(u - h).values) / (2 * step)
+        slope = (found.residuals(u + h).values - found.residuals(u - h).values) / (2 * step)
         assert np.isfinite(slope).all()
         np.testing.assert_allclose(exact[..., k], slope, rtol=0.01, atol=0.01 * max(1.0, np.abs(slope).max()))
-    np.testing.assert_allclose(found.batch_residuals(u[None])[0], found.evaluate(u).values, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(found.candidate_residuals(u[None])[0], found.residuals(u).values, rtol=1e-3, atol=1e-3)
 
 
 def test_ruptures_count_in_ln_time_and_stopped_tests_only_where_they_outlasted():
     law, values = PLANTED["Kachanov-Rabotnov"]
     tests = campaign(law, values, [60, 80], 1, stopped=(1,))
-    found = objective(law, tests)
+    found = problem(law, tests)
     last = found.observations.rupture_mask
     assert last.sum() == 2
     theta = np.array([np.log(1e-20), 4.0, np.log(1e-15), 3.5, 4.0])  # little creep: constant load hardly thins the bar
     for faster in (0.3, 20.0):
         theta[2] = np.log(faster * 1e-15)
-        residuals = found.evaluate(found.coordinates.u(theta))
+        residuals = found.residuals(found.coordinates.u(theta))
         life = {s: (1 - 0.01**5) / (5 * faster * 1e-15 * s**3.5) for s in (60.0, 80.0)}
         assert residuals.values[0, last[0]] == pytest.approx(np.log(tests[0].rupture_time / life[60.0]), abs=0.01)
         outlasted = np.log(tests[1].times[-1] / life[80.0])
@@ -189,8 +186,8 @@ def test_histories_that_say_nothing_of_their_end_are_compared_as_ever():
     tests = campaign(law, values, [60, 80], 1)
     cut = [h.up_to("strain", 0.01) for h in tests]
     assert not any(h.end_known for h in cut)
-    assert RUPTURE_OUTPUT not in objective(law, cut).observations.outputs
-    assert RUPTURE_OUTPUT in objective(law, tests).observations.outputs
+    assert RUPTURE_OUTPUT not in problem(law, cut).observations.outputs
+    assert RUPTURE_OUTPUT in problem(law, tests).observations.outputs
 
 
 def test_a_coordinate_is_the_log_of_the_rate_of_damage():
@@ -220,7 +217,7 @@ def test_bars_are_followed_to_rupture_beside_tests_that_are_not():
     ).times_to_strain
     alone = BAR.predict_to_rupture(law, law.to_internal(given), bars, sensitivities=True).times_to_strain
     np.testing.assert_array_equal(found.rupture_times[0, [0, 2]], alone.rupture_times[0])
-    for name in ("arrivals", "slopes", "arrival_jacobian"):
+    for name in ("times", "log_time_derivatives", "time_jacobian"):
         joined, own = (getattr(life, name)[0] for life in (found, alone))
         np.testing.assert_array_equal(joined[[0, 2], : own.shape[1]], own)
     assert np.isnan(found.rupture_times[0, 1])

@@ -1,4 +1,4 @@
-"""Derivative-free global searches: particle swarm, as in the paper, and CMA-ES; each iteration is one batched prediction.
+"""Derivative-free global searches: particle swarm, as in the paper, and CMA-ES; an iteration is one prediction.
 
 A particle at x (in the unit cube of the bounds) with velocity v is attracted by the best position that it has visited,
 p, and by the best that any particle has visited, g:
@@ -23,7 +23,9 @@ from scipy.stats import qmc
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import FitError
-from creepkit.inverse.search.cost_function import SearchTrace
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.search.cost_function import SearchResult, SearchTrace
+from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.term_mask import (
     CONVERGED_DECREASE,
     SearchCandidates,
@@ -35,27 +37,19 @@ from creepkit.inverse.search.term_mask import (
 if TYPE_CHECKING:
     from cmaes import CMA
 
-    from creepkit.inverse.search.cost_function import CostFunction, SearchResult
-    from creepkit.inverse.search.local_refinement import IterationCallback
-
-
-if TYPE_CHECKING:
-    from creepkit.inverse.search.cost_function import CostFunction, SearchResult
-    from creepkit.inverse.search.local_refinement import IterationCallback
-
 
 STALL_GENERATIONS = 10
-"""Generations whose lowest costs no longer differ when a run has arrived: least squares does the rest."""
+"""Generations without a lower cost after which a run has converged: least squares does the rest."""
 
 
 @dataclass(frozen=True)
 class CmaEs:
-    """CMA-ES in the unit cube of the box, with restarts.
+    """CMA-ES in the unit cube of the bounds, with restarts.
 
     iterations : generations of all runs together. population : of the first run, None for 8 + 6 ln(parameters), twice
-    the package's own, as landscapes of creep have valleys beside the right one. step : first standard deviation, in
-    widths of the box. restarts : further runs at most, each of twice the population. polish : how many of the best
-    candidates, different ones, are refined by least squares; 0 leaves the best as it is.
+    the default of the cmaes package, as cost functions of creep laws have several valleys. initial_step_size : first
+    standard deviation, in widths of the bounds. restarts : further runs at most, each of twice the population.
+    refined_candidates : how many of the best that differ are refined by least squares; 0 leaves the best as it is.
     """
 
     iterations: int = 200
@@ -70,11 +64,14 @@ class CmaEs:
         )
         check_whole_numbers("CMA-ES", {name: getattr(self, name) for name in minimum_values}, minimum_values)
         if not 0 < self.initial_step_size <= 1:
-            raise FitError(f"CMA-ES: step is {self.initial_step_size:g} of the box; allowed are 0 (not itself) to 1")
+            raise FitError(
+                f"CMA-ES: initial_step_size is {self.initial_step_size:g} of the width of the bounds; allowed are 0 (not "
+                "itself) to 1"
+            )
 
-    def minima(self, cost_function: CostFunction, progress: IterationCallback | None = None) -> SearchResult:
+    def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
         """The refined best, best first, and the trace."""
-        runs = _CmaEsRuns(self, cost_function)
+        runs = _CmaEsRuns(self, problem)
         for k in range(self.iterations):
             runs.generation()
             if progress is not None:
@@ -82,7 +79,7 @@ class CmaEs:
             if runs.has_converged() and not runs.restart():
                 break
         trace = SearchTrace.from_costs("CMA-ES", runs.costs, runs.restarts)
-        return refine_candidates(cost_function, runs.candidates(), self.refined_candidates, trace, progress)
+        return refine_candidates(problem, runs.candidates(), self.refined_candidates, trace, progress)
 
     def initial_population(self, size: int) -> int:
         """How many candidates the first run has in a generation, for so many parameters."""
@@ -92,19 +89,19 @@ class CmaEs:
 class _CmaEsRuns:
     """One run after another, and the best candidate of each generation."""
 
-    def __init__(self, rules: CmaEs, cost_function: CostFunction) -> None:
-        self.rules, self.cost_function = rules, cost_function
-        self.rng = np.random.default_rng(cost_function.settings.seed)
+    def __init__(self, rules: CmaEs, problem: LeastSquaresProblem) -> None:
+        self.rules, self.problem = rules, problem
+        self.rng = np.random.default_rng(problem.settings.seed)
         self.costs: list[Floats] = []
         self.best_points: list[Floats] = []
         self.restarts: list[int] = []
-        self.optimiser = self._new_optimiser(np.full(cost_function.bounds.lower.size, 0.5))
+        self.optimiser = self._new_optimiser(np.full(problem.bounds.lower.size, 0.5))
 
     def generation(self) -> None:
         """Ask, evaluate all at once, and tell."""
-        bounds = self.cost_function.bounds
+        bounds = self.problem.bounds
         points = np.array([self.optimiser.ask() for _ in range(self.optimiser.population_size)])
-        cost = self.cost_function.cost(bounds.lower + points * bounds.width)
+        cost = self.problem.cost(bounds.lower + points * bounds.width)
         self.optimiser.tell([(x, float(c)) for x, c in zip(points, cost, strict=True)])
         self.costs.append(cost)
         self.best_points.append(points[cost.argmin()])
@@ -122,12 +119,12 @@ class _CmaEsRuns:
         if len(self.restarts) == self.rules.restarts:
             return False
         self.restarts.append(len(self.costs))
-        self.optimiser = self._new_optimiser(self.rng.random(self.cost_function.bounds.lower.size))
+        self.optimiser = self._new_optimiser(self.rng.random(self.problem.bounds.lower.size))
         return True
 
     def candidates(self) -> SearchCandidates:
         """The best of each generation."""
-        bounds = self.cost_function.bounds
+        bounds = self.problem.bounds
         return SearchCandidates(
             bounds.lower + np.array(self.best_points) * bounds.width, np.array([cost.min() for cost in self.costs])
         )
@@ -142,21 +139,21 @@ class _CmaEsRuns:
 
 @dataclass(frozen=True)
 class ParticleSwarm:
-    """A swarm and its rules; numbers of particles and iterations are the paper's.
+    """A particle swarm; numbers of particles and iterations are the paper's.
 
-    own, common : c1, c2; velocity : the largest, in widths of the box. 2.05, 2.05, .15, form="constriction" and a start
-        at rest from a Sobol set are the settings of the authors' published code (NIMSI-NU/DABI-Property-Extraction).
-        That one is for finite elements in the loop: 70 particles, each told of a new best at once; here an iteration is
-        one prediction, so that all hear of it together. The table of the paper's 300 x 100 (S1) is not at hand, nor is
-        it said what happens at the bounds.
+    cognitive, social : c1, c2; max_velocity : the largest, in widths of the bounds. 2.05, 2.05, 0.15,
+        form="constriction" and a start at rest from a Sobol set are the settings of the authors' published code
+        (NIMSI-NU/DABI-Property-Extraction). That one is for finite elements in the loop, with 70 particles that learn
+        of a new best at once; here an iteration is one prediction, after which all do. The paper states neither its
+        settings for 300 x 100 (Table S1) nor what happens at the bounds.
     inertia : w of the first and of the last iteration, for form="inertia" (Shi & Eberhart 1999).
     boundary : "absorb" stops a particle there, which suits optima on bounds; "reflect" sends it back.
-    off : names of terms of a sum, or "any", that a particle may switch off: a coefficient in {0} U [bounds]. A particle
-        has a mask beside its position, inherited from its own best and the common best by the toss of a coin, with a
-        flip now and then, and follows the best of its subset. This makes zero possible, not preferred: more terms never
-        fit worse, so that it takes a penalty to choose among subsets. The minima are the best of each of the best
+    maskable_terms : names of terms of a sum, or "any", that a particle may switch off: a coefficient in {0} U [bounds].
+        A particle has a mask beside its position, inherited at random from its own best and the global best, with a
+        mutation now and then, and follows the best of its subset. This makes zero possible, not preferred: more terms
+        never fit worse, so that it takes a penalty to choose among subsets. The minima are the best of each of the best
         subsets, and say which terms are off.
-    polish : how many of the best particles, different ones, are refined; 0 leaves the best as it is.
+    refined_candidates : how many of the best particles that differ are refined; 0 leaves the best as it is.
     patience : end after so many iterations in which the best cost fell by less than 1e-3 (half of chi-square), or None.
     """
 
@@ -183,19 +180,20 @@ class ParticleSwarm:
                 raise FitError(f"particle swarm: {name} is {value!r}; allowed are {' and '.join(allowed)}")
         if not 0 < self.max_velocity <= 1:
             raise FitError(
-                f"particle swarm: velocity is {self.max_velocity:g} of the box; allowed are 0 (not itself) to 1"
+                f"particle swarm: max_velocity is {self.max_velocity:g} of the width of the bounds; allowed are 0 (not "
+                "itself) to 1"
             )
         if not all(0 <= w <= 1 for w in self.inertia):
             raise FitError(f"particle swarm: inertia is {self.inertia}; both are from 0 to 1")
         if min(self.cognitive, self.social) < 0 or (self.form == "constriction" and self.cognitive + self.social <= 4):
             raise FitError(
-                f"particle swarm: own and common pull with {self.cognitive:g} and {self.social:g}; they must not be below "
+                f"particle swarm: cognitive and social are {self.cognitive:g} and {self.social:g}; they must not be below "
                 "zero and, with form='constriction', must be more than 4 together"
             )
 
-    def minima(self, cost_function: CostFunction, progress: IterationCallback | None = None) -> SearchResult:
+    def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
         """The refined best, best first, and the trace."""
-        swarm, costs = _Swarm(self, cost_function), []
+        swarm, costs = _Swarm(self, problem), []
         for k in range(self.iterations):
             costs.append(swarm.evaluate())
             if progress is not None:
@@ -204,10 +202,10 @@ class ParticleSwarm:
                 break
             swarm.move(k)
         trace = SearchTrace.from_costs(f"particle swarm of {self.particles}, {self.form} form", costs)
-        return refine_candidates(cost_function, swarm.candidates(), self.refined_candidates, trace, progress)
+        return refine_candidates(problem, swarm.candidates(), self.refined_candidates, trace, progress)
 
     def next_velocity(self, velocity: Floats, attraction: Floats, iteration: int) -> Floats:
-        """The velocity after iteration k, from the one before and the pull of the best places, within its limit."""
+        """(particles, parameters) velocity after an iteration, from the one before and the attraction, within its limit."""
         if self.form == "constriction":
             acceleration = self.cognitive + self.social
             updated = (
@@ -227,15 +225,15 @@ class ParticleSwarm:
 
 
 class _Swarm:
-    """Where all particles are, in the unit cube, and the best that each has seen."""
+    """Positions of all particles in the unit cube, and the best that each has evaluated."""
 
-    def __init__(self, rules: ParticleSwarm, cost_function: CostFunction) -> None:
-        self.rules, self.cost_function, seed = rules, cost_function, cost_function.settings.seed
+    def __init__(self, rules: ParticleSwarm, problem: LeastSquaresProblem) -> None:
+        self.rules, self.problem, seed = rules, problem, problem.settings.seed
         self.rng, self.term_mask = (
             np.random.default_rng(seed),
-            TermMask.from_cost_function(cost_function, rules.maskable_terms),
+            TermMask.from_problem(problem, rules.maskable_terms),
         )
-        count, size = rules.particles, cost_function.bounds.lower.size
+        count, size = rules.particles, problem.bounds.lower.size
         self.x, self.velocity = _sobol_points(count, size, seed), np.zeros((count, size))
         self.masks = self.term_mask.initial_masks(count, self.rng)
         self.best_position, self.best_masks, self.best_cost = self.x.copy(), self.masks.copy(), np.full(count, np.inf)
@@ -243,8 +241,8 @@ class _Swarm:
         self.best_by_mask: dict[bytes, tuple[float, Floats, Bools]] = {}
 
     def evaluate(self) -> Floats:
-        """(particles,) costs where they are, in one prediction; the best are remembered."""
-        cost = self.cost_function.cost(self._coordinates(self.x, self.masks))
+        """(particles,) - costs at their positions, in one prediction; the best are remembered."""
+        cost = self.problem.cost(self._coordinates(self.x, self.masks))
         better = cost < self.best_cost
         self.best_position[better], self.best_masks[better], self.best_cost[better] = (
             self.x[better],
@@ -263,7 +261,7 @@ class _Swarm:
             self.best_by_mask[key] = cost, position.copy(), mask.copy()
 
     def move(self, iteration: int) -> None:
-        """One step of all; what a better one does not have, draws nobody."""
+        """One step of all; coordinates that are masked in the better ones attract nobody."""
         shape, rules = self.x.shape, self.rules
         self.masks = self.term_mask.recombined(self.best_masks, self.best_masks[self.best_cost.argmin()], self.rng)
         leaders, masks = self._leaders()
@@ -277,7 +275,7 @@ class _Swarm:
         self._apply_boundary(self.x + self.velocity)
 
     def _leaders(self) -> tuple[Floats, Bools]:
-        """Whom each particle follows, and with which terms: the best of its subset, or of all if it is the first."""
+        """Positions and masks that attract each particle: the best of its subset, or of all if it is the first there."""
         k = int(self.best_cost.argmin())
         if not self.term_mask.terms:
             return self.best_position[k], self.best_masks[k]
@@ -288,14 +286,14 @@ class _Swarm:
         return np.array(positions), np.array(masks)
 
     def candidates(self) -> SearchCandidates:
-        """The best that each particle has seen; where terms may be off, the best of each subset."""
+        """The best of each particle; where terms may be off, the best of each subset."""
         if self.term_mask.terms:
             costs, positions, masks = (np.array(each) for each in zip(*self.best_by_mask.values(), strict=True))
             return SearchCandidates(self._coordinates(positions, masks), costs, self.term_mask, masks)
         return SearchCandidates(self._coordinates(self.best_position, self.best_masks), self.best_cost)
 
     def _coordinates(self, positions: Floats, masks: Bools) -> Floats:
-        bounds = self.cost_function.bounds
+        bounds = self.problem.bounds
         return self.term_mask.applied(bounds.lower + positions * bounds.width, masks)
 
     def _apply_boundary(self, x: Floats) -> None:

@@ -12,53 +12,56 @@ from dataclasses import replace
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.inverse.bound_penalties import BoundPenalties
-from creepkit.inverse.search.cost_function import FAILED_COST, CostFunction, robust_loss, robust_weight
-from creepkit.inverse.search.local_refinement import PRIOR_STRENGTH, IterationCallback, Minimum
+from creepkit.inverse.problem import FAILED_COST, PRIOR_STRENGTH, LeastSquaresProblem
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, robust_loss, robust_weight
 
 MAX_STEPS = 40
 
 
 TOLERANCE = 1e-5
-"""Relative fall of the cost below which a start has arrived, twice in turn."""
+"""Relative decrease of the cost below which a start has converged, twice in turn."""
 
 
 CONTINUED = 4
-"""Of the best ends, how many go on where they have not arrived."""
+"""Of the best minima, how many are refined further where they have not converged."""
 
 
 DAMPING_RANGE = (1e-3, 1e8)
-"""First damping, relative to the diagonal of J'J over the box, and the one at which a start has nowhere to go."""
+"""First damping, relative to the diagonal of J'J over the bounds, and the one at which a start is given up."""
 
 
 def batched_levenberg_marquardt(
-    cost_function: CostFunction, starts: Sequence[Floats], *, max_steps: int = MAX_STEPS, progress: IterationCallback | None = None,
+    problem: LeastSquaresProblem,
+    starts: Sequence[Floats],
+    *,
+    max_steps: int = MAX_STEPS,
+    progress: IterationCallback | None = None,
     costs: list[Floats] | None = None,
-) -> list[Minimum]:  # fmt: skip
-    """The minima that the starts lead to, best first; costs : is given the costs of all starts after each step.
+) -> list[Minimum]:
+    """The minima that the starts lead to, best first; starts : (parameters,) each; costs : receives (starts,) costs after each step.
 
-    Damage that runs away makes a cost with kinks, at which projected steps come to rest: laws with internal variables,
+    The cost of laws with damage has kinks, at which projected steps come to rest: laws with internal variables,
     and tests that are followed to rupture, are refined one by one in a trust region.
     """
-    if cost_function.objective.observations.followed_to_rupture.any() or cost_function.objective.law.states:
+    if problem.observations.followed_to_rupture.any() or problem.law.states:
         minima = []
         for k, u in enumerate(starts):
-            minima.append(cost_function.refine(u, max_steps=30))
+            minima.append(problem.minimise(u))
             if progress is not None:
                 progress("start", k + 1, len(starts))
         return sorted(minima, key=lambda minimum: minimum.cost)
-    ends = _BatchedLevenbergMarquardt(cost_function, np.array(starts, float)).run(
+    ends = _BatchedLevenbergMarquardt(problem, np.array(starts, float)).run(
         max_steps, progress, [] if costs is None else costs
     )
-    return sorted([*_continued(cost_function, ends[:CONTINUED]), *ends[CONTINUED:]], key=lambda minimum: minimum.cost)
+    return sorted([*_continued(problem, ends[:CONTINUED]), *ends[CONTINUED:]], key=lambda minimum: minimum.cost)
 
 
-def _continued(cost_function: CostFunction, minima: Sequence[Minimum]) -> list[Minimum]:
-    """Minima that have not arrived go on by themselves, in a trust region that follows bent valleys better."""
+def _continued(problem: LeastSquaresProblem, minima: Sequence[Minimum]) -> list[Minimum]:
+    """Minima that have not converged are refined one by one, in a trust region that follows bent valleys better."""
     finished = []
     for minimum in minima:
         if not minimum.converged:
-            continued = cost_function.refine(minimum.u)
+            continued = problem.minimise(minimum.u)
             minimum = (
                 replace(continued, evaluations=continued.evaluations + minimum.evaluations)
                 if continued.cost < minimum.cost
@@ -69,11 +72,11 @@ def _continued(cost_function: CostFunction, minima: Sequence[Minimum]) -> list[M
 
 
 class _BatchedLevenbergMarquardt:
-    """The state of all starts: where they are, their residuals and Jacobians, and how damped they step."""
+    """The state of all starts: positions, residuals, gradients and Hessians, and damping."""
 
-    def __init__(self, cost_function: CostFunction, starts: Floats) -> None:
-        self.cost_function, self.bounds = cost_function, cost_function.bounds
-        self.bound_penalties = BoundPenalties(cost_function.objective)
+    def __init__(self, problem: LeastSquaresProblem, starts: Floats) -> None:
+        self.problem, self.bounds = problem, problem.bounds
+        self.bound_penalties = problem.bound_penalties
         self.u = self.bounds.clip(starts)
         count, size = self.u.shape
         self.cost, self.whitened = np.full(count, np.inf), [np.zeros(0)] * count
@@ -83,7 +86,7 @@ class _BatchedLevenbergMarquardt:
         self._evaluate(np.arange(count), self.u)
 
     def run(self, max_steps: int, progress: IterationCallback | None, costs: list[Floats]) -> list[Minimum]:
-        """Step until all have arrived."""
+        """Step until all have converged."""
         for _ in range(max_steps):
             costs.append(self.cost.copy())
             active = np.flatnonzero((self.stalled_steps < 2) & (self.damping < DAMPING_RANGE[1]))
@@ -105,7 +108,7 @@ class _BatchedLevenbergMarquardt:
         return sorted(minima, key=lambda minimum: minimum.cost)
 
     def _trial_point(self, k: int) -> Floats:
-        """Where a start tries to go next."""
+        """(parameters,) the next trial point of a start."""
         scale = self.bounds.width
         gradient, hessian = self.gradient[k] * scale, self.hessian[k] * np.outer(scale, scale)
         blocked = ((self.u[k] <= self.bounds.lower) & (gradient > 0)) | (
@@ -123,21 +126,18 @@ class _BatchedLevenbergMarquardt:
         return np.asarray(self.bounds.clip(self.u[k] + np.clip(step, -0.3, 0.3) * scale))
 
     def _evaluate(self, indices: Ints, points: Floats) -> None:
-        """Look at points, and move there the starts whose cost falls."""
-        residuals, jacobians = self.cost_function.objective.batch_jacobian(points)
-        present = self.cost_function.objective.observations.present
-        covariance_factor = self.cost_function.covariance_factor
+        """Evaluate points (starts, parameters), and move the starts whose cost decreases."""
+        residuals, jacobians = self.problem.candidate_jacobian(points)
         for k, u, residual, jacobian in zip(indices, points, residuals, jacobians, strict=True):
             self.evaluations[k] += 1
-            residuals_and_jacobian = np.concatenate([residual[..., None], jacobian], axis=-1)
-            whitened = np.linalg.solve(covariance_factor, residuals_and_jacobian)[present]
+            whitened = self.problem.whiten(np.concatenate([residual[..., None], jacobian], axis=-1))
             self._accept_or_reject(int(k), u, whitened[:, 0], whitened[:, 1:])
 
     def _accept_or_reject(self, k: int, u: Floats, whitened: Floats, jacobian: Floats) -> None:
         prior_weight = PRIOR_STRENGTH / self.bounds.width
         penalty_residuals = np.concatenate([self.bound_penalties.residuals(u), prior_weight * (u - self.bounds.centre)])
-        cost = 0.5 * float(robust_loss(whitened**2, self.cost_function.loss).sum() + (penalty_residuals**2).sum())
-        penalty = self.cost_function.penalty
+        cost = 0.5 * float(robust_loss(whitened**2, self.problem.loss).sum() + (penalty_residuals**2).sum())
+        penalty = self.problem.penalty
         cost += 0.0 if penalty is None else float(penalty.values(u[None])[0])
         finite = np.isfinite(cost) and np.isfinite(jacobian).all()
         cost = cost if finite else FAILED_COST
@@ -151,7 +151,7 @@ class _BatchedLevenbergMarquardt:
         self.u[k], self.cost[k], self.whitened[k] = u, cost, whitened
         if not finite:
             return  # without a direction it stays where it is
-        weight = robust_weight(whitened**2, self.cost_function.loss)
+        weight = robust_weight(whitened**2, self.problem.loss)
         penalty_jacobian = np.concatenate([self.bound_penalties.jacobian(u), np.diag(prior_weight)])
         self.gradient[k] = jacobian.T @ (weight * whitened) + penalty_jacobian.T @ penalty_residuals
         self.hessian[k] = (jacobian.T * weight) @ jacobian + penalty_jacobian.T @ penalty_jacobian

@@ -1,4 +1,4 @@
-"""Multi-start least squares: many Sobol draws are evaluated, the best and the centre of the bounds are refined in a batch.
+"""Multi-start least squares: of many Sobol draws the best, and the centre of the bounds, are refined in a batch.
 
 Measured on creep problems: a few selected starts with exact Jacobians find the least cost at a hundredth of the
 evaluations of a particle swarm.
@@ -7,20 +7,22 @@ evaluations of a particle swarm.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import qmc
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.coordinates import Coordinates
-from creepkit.inverse.search.cost_function import CostFunction, SearchResult, SearchTrace
+from creepkit.inverse.bounds import LOG_RATE_BOUNDS, Bounds
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.residuals import median_log_rate_excess, median_log_rupture_excess
+from creepkit.inverse.search.cost_function import SearchResult, SearchTrace
 from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
-from creepkit.inverse.search.local_refinement import LOG_RATE_BOUNDS, Bounds, IterationCallback, Minimum
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 
 INTERNAL_RATE_RANGE = (-4.0, 0.0)
-"""Where the rate of an internal variable is drawn: ln of its rate times the life of a test."""
+"""Range of draws for an internal variable: ln of its rate times the duration of a test."""
 
 
 @dataclass(frozen=True)
@@ -33,44 +35,36 @@ class MultiStart:
     starts: int | None = None
     draws: int | None = None
 
-    def minima(self, cost_function: CostFunction, progress: IterationCallback | None = None) -> SearchResult:
+    def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
         """The minima of all starts, best first; a sum's best single term stands behind the best."""
-        starts, draws = self.starts or cost_function.settings.starts, self.draws or cost_function.settings.sobol_points
-        singles = single_term_starts(cost_function, starts=max(2, starts // 3), draws=draws // 2)
-        initial_points = [*singles, *screened_starts(cost_function, starts=starts, draws=draws)]
+        starts, draws = self.starts or problem.settings.starts, self.draws or problem.settings.sobol_points
+        singles = single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2)
+        initial_points = [*singles, *screened_starts(problem, starts=starts, draws=draws)]
         costs: list[Floats] = []
-        minima = batched_levenberg_marquardt(cost_function, initial_points, progress=progress, costs=costs)
+        minima = batched_levenberg_marquardt(problem, initial_points, progress=progress, costs=costs)
         return SearchResult(tuple(minima), SearchTrace.from_costs("multi-start", costs) if costs else None)
 
 
-def single_term_starts(cost_function: CostFunction, *, starts: int, draws: int) -> list[Floats]:
-    """For a sum of terms, one start for each: its own optimum, the others at a 20th of its rate; best first.
+def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
+    """For a sum of terms, one start (parameters,) for each: its optimum, the others at a 20th of its rate; best first.
 
-    A sum is never worse than its terms, but a search from the whole box rarely finds that.
+    A sum is never worse than its terms, but a search of the whole bounds rarely finds that.
     """
-    objective, bounds = cost_function.objective, cost_function.bounds
-    law = objective.law
+    law, bounds = problem.law, problem.bounds
     starts_by_cost: list[tuple[float, Floats]] = []
     if len(law.terms) < 2:
         return []
+    rates = problem.coordinates.term_rates
     for label in law.terms:
-        single = law.only(label)
-        if not single.params:
+        single_law = law.only(label)
+        if not single_law.params:
             continue
-        coordinates = Coordinates(single, objective.coordinates.reference)
-        term_objective = objective.with_predictor(objective.predictor, single, coordinates)
-        positions = [law.names.index(name) for name in single.names]
-        term_cost = replace(
-            cost_function,
-            objective=term_objective,
-            bounds=Bounds(bounds.lower[positions], bounds.upper[positions]),
-            penalty=None,
-        )
-        minimum = batched_levenberg_marquardt(term_cost, screened_starts(term_cost, starts=starts, draws=draws))[0]
-        objective.evaluations += term_objective.evaluations
+        single = problem.with_law(single_law)
+        positions = [law.names.index(name) for name in single_law.names]
+        minimum = batched_levenberg_marquardt(single, screened_starts(single, starts=starts, draws=draws))[0]
+        problem.evaluations.count += single.evaluations.count
         u = bounds.centre
         u[positions] = minimum.u
-        rates = objective.coordinates.term_rates
         log_rates = [u[k] for k in rates if k in positions] or [bounds.centre[k] for k in rates]
         for k in rates:
             u[k] = u[k] if k in positions else max(log_rates) - np.log(20.0)
@@ -78,23 +72,21 @@ def single_term_starts(cost_function: CostFunction, *, starts: int, draws: int) 
     return [u for _, u in sorted(starts_by_cost, key=lambda pair: pair[0])]
 
 
-def screened_starts(cost_function: CostFunction, *, starts: int, draws: int) -> list[Floats]:
-    """The centre, and the best draws after a shift of all rates to the level of the data."""
-    objective, bounds, seed = cost_function.objective, cost_function.bounds, cost_function.settings.seed
+def screened_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:
+    """The centre, and the best draws after a shift of all rates to that of the data: (parameters,) each."""
+    observations, bounds, seed = problem.observations, problem.bounds, problem.settings.seed
     sobol = qmc.Sobol(bounds.lower.size, seed=seed).random(draws)
     points = bounds.lower + sobol * bounds.width
-    rates = list(objective.coordinates.term_rates)
+    rates = list(problem.coordinates.term_rates)
     points = np.concatenate([bounds.centre[None], points])
-    points = _with_sampled_exponents(
-        cost_function, points, np.concatenate([np.full((1, bounds.lower.size), 0.5), sobol])
-    )
+    points = _with_sampled_exponents(problem, points, np.concatenate([np.full((1, bounds.lower.size), 0.5), sobol]))
     if rates:
         log_rate = bounds.centre[rates[0]] - 0.5 * sum(LOG_RATE_BOUNDS)
         rng = np.random.default_rng(seed)
         fractions = rng.dirichlet(np.full(len(rates), 0.7), size=len(points))
         fractions[0] = unequal_fractions(len(rates))
         points[:, rates] = log_rate + np.log(np.maximum(fractions, 1e-4))
-        internal_rates = list(objective.coordinates.state_rates)
+        internal_rates = list(problem.coordinates.state_rates)
         log_internal_rate = (bounds.centre - 0.5 * sum(LOG_RATE_BOUNDS))[internal_rates]
         points[1:, internal_rates] = (
             log_internal_rate
@@ -103,26 +95,23 @@ def screened_starts(cost_function: CostFunction, *, starts: int, draws: int) -> 
         )
         points[0, internal_rates] = log_internal_rate + 0.5 * sum(INTERNAL_RATE_RANGE)
         for _ in range(3 + 2 * min(len(internal_rates), 1)):
-            residuals = objective.batch_residuals(bounds.clip(points))
-            points[:, rates] -= np.clip(objective.median_log_rate_excess(residuals), -6, 6)[:, None]
-            points[:, internal_rates] -= np.clip(objective.median_log_rupture_excess(residuals), -6, 6)[:, None]
+            residuals = problem.candidate_residuals(bounds.clip(points))
+            points[:, rates] -= np.clip(median_log_rate_excess(observations, residuals), -6, 6)[:, None]
+            points[:, internal_rates] -= np.clip(median_log_rupture_excess(observations, residuals), -6, 6)[:, None]
     points = bounds.clip(points)
-    residuals = objective.batch_residuals(points)
+    residuals = problem.candidate_residuals(points)
     score = np.array(
-        [
-            np.mean(np.arcsinh(candidate_residuals[objective.observations.present]) ** 2)
-            for candidate_residuals in residuals
-        ]
+        [np.mean(np.arcsinh(candidate_residuals[observations.present]) ** 2) for candidate_residuals in residuals]
     )
     if not np.isfinite(score).any():
-        raise FitError(f"law '{objective.law.name}': no point within its bounds can be simulated; widen the bounds")
+        raise FitError(f"law '{problem.law.name}': no point within its bounds can be simulated; widen the bounds")
     order = [int(k) for k in np.argsort(score) if k != 0][: max(starts - 1, 0)]
     return [points[0], *(points[k] for k in order)]
 
 
-def _with_sampled_exponents(cost_function: CostFunction, points: Floats, sobol: Floats) -> Floats:
+def _with_sampled_exponents(problem: LeastSquaresProblem, points: Floats, sobol: Floats) -> Floats:
     """Local exponents of parameters that are drawn within their bounds, and not beyond them."""
-    coordinates, law = cost_function.objective.coordinates, cost_function.objective.law
+    coordinates, law = problem.coordinates, problem.law
     if not coordinates.exponents:
         return points
     sampled = points.copy()
@@ -133,16 +122,16 @@ def _with_sampled_exponents(cost_function: CostFunction, points: Floats, sobol: 
     conditioned = coordinates.u(sampled)
     for local_exponent in coordinates.exponents:
         points[:, local_exponent.position] = conditioned[:, local_exponent.position]
-    return cost_function.bounds.clip(points)
+    return problem.bounds.clip(points)
 
 
 EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS = 1e-5, 5e-3
 """Root mean square difference of predictions, over the spread of what was measured, below which two minima are one. A
-stand-in is not better than the latter, and along a valley one start is enough for the predictor behind it."""
+reduced-order model is not better than the latter, and along a valley one start is enough for its predictor."""
 
 
 WORKING_ERROR = 0.3
-"""How wrong frames are in a search, over that spread (see inverse.scatter.working_guess)."""
+"""Misfit that is assumed in a search, over that spread (see inverse.noise_model.initial_working_noise)."""
 
 
 def distinct(
@@ -153,7 +142,7 @@ def distinct(
     max_count: int = 2,
     tolerance: float = 0.02,
 ) -> list[Minimum]:
-    """The best minima that differ by more than 2 % of the box in some coordinate, and in what they predict."""
+    """The best minima that differ by more than 2 % of the bounds in some coordinate, and in what they predict."""
     selected: list[Minimum] = []
     for minimum in minima:
         if not any(_same(minimum, other, bounds, equal_predictions, tolerance) for other in selected):
@@ -170,6 +159,6 @@ def _same(a: Minimum, b: Minimum, bounds: Bounds, equal_predictions: float, tole
 
 
 def unequal_fractions(count: int) -> Floats:
-    """Shares .7, .2, .1 and so on: equal shares are a stationary point from which no search escapes."""
+    """(count,) - fractions 0.7, 0.2, 0.1 and so on: equal ones are a stationary point from which no search escapes."""
     fractions = np.array([0.7, *(0.3 * 0.67**k for k in range(1, count))])
     return np.asarray(fractions / fractions.sum())

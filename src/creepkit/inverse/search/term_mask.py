@@ -8,45 +8,35 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, nearest
-from creepkit.inverse.search.cost_function import SearchTrace
-from creepkit.inverse.search.local_refinement import Minimum
-
-if TYPE_CHECKING:
-    from creepkit.inverse.search.cost_function import CostFunction
-    from creepkit.language import CreepLaw
-
-
-if TYPE_CHECKING:
-    from creepkit.inverse.search.cost_function import CostFunction, SearchResult
-    from creepkit.inverse.search.local_refinement import IterationCallback
-
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.search.cost_function import SearchResult, SearchTrace
+from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
+from creepkit.language import CreepLaw
 
 ANY_TERM = "any"
 """In place of names: every term may be switched off."""
 
 
 EXPECTED_FLIPS = 0.5
-"""Switches that a candidate flips by chance in each draw, on average: enough to leave a wrong subset, not to drift."""
+"""Mask elements that mutate in each draw of a candidate, on average: enough to leave a wrong subset, not to drift."""
 
 
 OFF_MARGIN = 0.5
-"""In ln of a rate: so near the bottom of the box it is at it."""
+"""In ln of a rate: a rate nearer to its lower bound than this counts as at it."""
 
 
 @dataclass(frozen=True)
 class TermMask:
-    """Which terms may be off, and what that means for u.
+    """The terms that may be off, and what that means for u. Masks are (..., terms), true where a term is on.
 
-    terms : names of those that may; rates : (terms,) positions of their rates; own : (terms, parameters) which
-    coordinates mean nothing while a term is off; rest : (parameters,) where those then are; always : whether some term
-    stays on anyhow.
-    Masks are (..., terms), true where a term is on.
+    terms : names of those that may; rate_positions : (terms,) positions of their rates; owned_parameters : (terms,
+    parameters) coordinates without effect while a term is off; resting_values : (parameters,) their values then;
+    has_permanent_term : whether some term is always on.
     """
 
     terms: tuple[str, ...]
@@ -56,27 +46,27 @@ class TermMask:
     has_permanent_term: bool
 
     @classmethod
-    def from_cost_function(cls, cost_function: CostFunction, maskable: str | Sequence[str]) -> TermMask:
-        """Those of a landscape; off : names of terms, or "any"."""
-        law, rates = cost_function.objective.law, cost_function.objective.coordinates.term_rates
+    def from_problem(cls, problem: LeastSquaresProblem, maskable: str | Sequence[str]) -> TermMask:
+        """The mask of a problem; maskable : names of terms, or "any"."""
+        law, rates = problem.law, problem.coordinates.term_rates
         positions = {label: [law.names.index(n) for n in law.only(label).names] for label in law.terms}
         rate_positions = {label: [k for k in owned if k in rates] for label, owned in positions.items()}
         terms = _maskable_terms(law, rate_positions, maskable)
-        own = np.zeros((len(terms), cost_function.bounds.lower.size), bool)
+        own = np.zeros((len(terms), problem.bounds.lower.size), bool)
         for row, label in zip(own, terms, strict=True):
             shared = {k for other, other_positions in positions.items() if other != label for k in other_positions}
             row[[k for k in positions[label] if k not in shared]] = True
-        resting = cost_function.bounds.centre
-        resting[list(rates)] = cost_function.bounds.lower[list(rates)]
+        resting = problem.bounds.centre
+        resting[list(rates)] = problem.bounds.lower[list(rates)]
         first_rates = np.array([rate_positions[label][0] for label in terms], np.int64)
         return cls(terms, first_rates, own, resting, len(terms) < len(law.terms))
 
     def applied(self, u: Floats, masks: Bools) -> Floats:
-        """u (..., parameters) with the coordinates of terms that are off at rest."""
+        """(..., parameters) u with the coordinates of terms that are off at their resting values; masks : (..., terms)."""
         return np.where(self.active_parameters(masks), u, self.resting_values)
 
     def active_parameters(self, masks: Bools) -> Bools:
-        """(..., parameters) which coordinates mean something; on : (..., terms)."""
+        """(..., parameters) which coordinates have an effect; masks : (..., terms)."""
         return np.asarray(~(~masks[..., None] & self.owned_parameters).any(axis=-2))
 
     def fixed_values(self, mask: Bools) -> dict[int, float]:
@@ -84,7 +74,7 @@ class TermMask:
         return {int(k): float(self.resting_values[k]) for k in np.flatnonzero(~self.active_parameters(mask))}
 
     def terms_off(self, u: Floats) -> tuple[str, ...]:
-        """The terms that are off at u (parameters,): switched off, or driven to the bottom, which is the same."""
+        """The terms that are off at u (parameters,): switched off, or at the lower bound of their rate, which is the same."""
         is_at_lower_bound = u[self.rate_positions] <= self.resting_values[self.rate_positions] + OFF_MARGIN
         return tuple(term for term, is_off in zip(self.terms, is_at_lower_bound, strict=True) if is_off)
 
@@ -95,8 +85,8 @@ class TermMask:
         return self._never_empty(masks, rng)
 
     def recombined(self, personal_best: Bools, global_best: Bools, rng: np.random.Generator) -> Bools:
-        """(candidates, terms) masks of the next draw: each switch from a candidate's own best mask (candidates, terms)
-        or from the common one (terms,), as a coin falls; and now and then it flips.
+        """(candidates, terms) masks of the next draw: each element at random from a candidate's own best mask
+        (candidates, terms) or from the global best one (terms,), with mutations.
         """
         if not self.terms:
             return personal_best
@@ -105,7 +95,7 @@ class TermMask:
         return self._never_empty(inherited ^ flipped, rng)
 
     def _never_empty(self, masks: Bools, rng: np.random.Generator) -> Bools:
-        """A sum of nothing is no law: a mask without any term gets one, at random."""
+        """A mask without any term gets one, at random: a law has at least one term."""
         empty = np.flatnonzero(~masks.any(axis=1)) if self.terms and not self.has_permanent_term else np.zeros(0, int)
         masks[empty, rng.integers(max(len(self.terms), 1), size=empty.size)] = True
         return masks
@@ -114,7 +104,7 @@ class TermMask:
 def _maskable_terms(
     law: CreepLaw, rate_positions: dict[str, list[int]], maskable: str | Sequence[str]
 ) -> tuple[str, ...]:
-    """The names meant by `off`, checked."""
+    """The names of maskable terms, checked."""
     if maskable == ANY_TERM:
         return (
             tuple(label for label, positions in rate_positions.items() if positions) if len(rate_positions) > 1 else ()
@@ -131,18 +121,18 @@ def _maskable_terms(
 
 
 SAME_BASIN = 0.1
-"""Of the width of the box: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
+"""Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
 
 
 CONVERGED_DECREASE = 1e-3
-"""A fall of the cost, half of chi-square, below which a search has arrived."""
+"""A decrease of the cost, half of chi-square, below which a search has converged."""
 
 
 @dataclass(frozen=True)
 class SearchCandidates:
-    """What a search has seen and holds worth keeping: u (candidates, parameters), cost (candidates,).
+    """Candidates of a search that may be refined.
 
-    on : (candidates, terms) masks of the terms that `switches` may switch off, or None.
+    u : (candidates, parameters); cost : (candidates,) -; masks : (candidates, terms) of the terms of `term_mask`.
     """
 
     u: Floats
@@ -170,16 +160,14 @@ class SearchCandidates:
 
 
 def refine_candidates(
-    cost_function: CostFunction,
+    problem: LeastSquaresProblem,
     candidates: SearchCandidates,
     max_count: int,
     trace: SearchTrace,
     progress: IterationCallback | None = None,
 ) -> SearchResult:
-    """The best different candidates refined, best first; with most=0 the best one as it is."""
-    from creepkit.inverse.search.cost_function import SearchResult
-
-    selected = candidates.most_different(cost_function.bounds.width, max(max_count, 1))
+    """The best different candidates refined, best first; with max_count=0 the best one as it is."""
+    selected = candidates.most_different(problem.bounds.width, max(max_count, 1))
     if max_count == 0:
         k = selected[0]
         best, cost = candidates.u[k], float(candidates.cost[k])
@@ -188,7 +176,7 @@ def refine_candidates(
         )
     minima = []
     for done, k in enumerate(selected):
-        minimum = cost_function.refine(candidates.u[k], fixed=candidates.fixed_values(k))
+        minimum = problem.minimise(candidates.u[k], fixed=candidates.fixed_values(k))
         minima.append(replace(minimum, terms_off=candidates.terms_off(minimum.u)))
         if progress is not None:
             progress("refinement", done + 1, len(selected))
@@ -202,7 +190,7 @@ def refine_candidates(
 
 
 def _one_per_mask(minima: list[Minimum]) -> list[Minimum]:
-    """One of each subset, for some end as another one; of those that are as good as the best, the simplest first."""
+    """One minimum of each subset; of those that are as good as the best, the simplest first."""
     different = [m for k, m in enumerate(minima) if m.terms_off not in [other.terms_off for other in minima[:k]]]
     best = different[0].cost + CONVERGED_DECREASE
     return sorted(different, key=lambda m: (m.cost > best, -len(m.terms_off) if m.cost <= best else 0, m.cost))

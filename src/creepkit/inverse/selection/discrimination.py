@@ -24,8 +24,8 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import LawError
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.information_criteria import bic_penalty
 from creepkit.inverse.noise_model import NEGLIGIBLE_DRIFT, Residuals, effective_sample_size
-from creepkit.inverse.problem import least_squares_problem
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
 from creepkit.inverse.uncertainty.quantities import local_exponent
 from creepkit.inverse.variance_components import LinearisedProblem, inverse_covariances
@@ -34,10 +34,12 @@ from creepkit.language import CreepLaw, strain, time
 
 @dataclass(frozen=True, eq=False)
 class CommonCovarianceFits:
-    """Chi-squares of laws under one covariance, (laws,), with priors; evidence of nuisances; independent frames.
+    """Laws under one covariance.
 
-    chosen : position of the law whose covariance it is; white : (laws, entries) residuals over that scatter, zero
-        where there are no data, or where a law has nothing to say of a test that was stopped.
+    chi_square : (laws,) - with priors; log_determinant : (laws,) - of the nuisance parameters that are integrated out.
+    independent_frames : number of independent frames; reference_law : position of the law whose covariance it is.
+    whitened : (laws, observations) - whitened residuals, zero where there are no data, or where a stopped test says
+        nothing of a law.
     """
 
     chi_square: Floats
@@ -69,7 +71,7 @@ def under_common_covariance(fits: Sequence[Identification]) -> CommonCovarianceF
 
 
 def _with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
-    """A law's residuals with what makes the covariance, but for which entries it speaks of, as the best law has it."""
+    """A law's residuals, with the derivatives that make the covariance, and the weights of tests, of the best law."""
     transform_derivatives, rate_effect = (
         np.where(reference.present, reference_values, own_values)
         for reference_values, own_values in (
@@ -91,9 +93,9 @@ def _linearised(fit: Identification) -> LinearisedProblem:
 
 
 def _score_under_own_covariance(fit: Identification, linearised: LinearisedProblem) -> float:
-    """-2 ln L with the law's own scatter, and BIC's price of its parameters and of the sizes of that scatter.
+    """-2 ln L with the law's own scatter, and the penalty of BIC on its parameters and variance components.
 
-    A law that needs a drift for what another follows must not set the measure.
+    A law that needs a drift for what another follows must not set the covariance.
     """
     inverses, log_det = inverse_covariances(linearised.residuals, fit.noise_model)
     independent_frames = effective_sample_size(linearised.residuals, fit.noise_model)
@@ -101,18 +103,16 @@ def _score_under_own_covariance(fit: Identification, linearised: LinearisedProbl
         1 + 2 * (components.drift > NEGLIGIBLE_DRIFT) for components in fit.noise_model.outputs.values()
     )
     return (
-        log_det
-        + _optimum_under(linearised, inverses, len(fit.u))[0]
-        + parameter_count * float(np.log(independent_frames))
+        log_det + _optimum_under(linearised, inverses, len(fit.u))[0] + bic_penalty(parameter_count, independent_frames)
     )
 
 
 def _optimum_under(
     linearised: LinearisedProblem, inverses: Floats, parameter_count: int
 ) -> tuple[float, float, Floats]:
-    """Chi-square with priors at the optimum within the bounds, ln of what nuisances cost, and white residuals.
+    """Chi-square with priors at the optimum within the bounds, log determinant of nuisances, whitened residuals.
 
-    Only unknowns of tests have priors here: the weak ones of a law's parameters must not favour the middle of bounds.
+    Only nuisance parameters have priors here: the weak ones of a law's parameters must not favour the middle of bounds.
     """
     precision = linearised.precision.copy()
     precision[:parameter_count] = 1e-9 * precision[:parameter_count]
@@ -142,7 +142,7 @@ def _chi_square(linearised: LinearisedProblem, inverses: Floats, step: Floats) -
 
 
 def _nuisance_log_determinant(linearised: LinearisedProblem, inverses: Floats, parameter_count: int) -> float:
-    """ln det(1 + S J'C^-1 J S) of the unknowns of tests, S their prior spreads: they are integrated out."""
+    """ln det(1 + S J'C^-1 J S) of the nuisance parameters, S their prior standard deviations."""
     assert linearised.residuals.jacobian is not None
     jacobian = linearised.residuals.jacobian[..., parameter_count:]
     if not jacobian.shape[-1]:
@@ -195,18 +195,14 @@ def equivalent_laws(ranking: WeightedLaws) -> tuple[EquivalentLaws, ...]:
 
 
 def _whitened_residuals(fits: Sequence[Identification]) -> Floats:
-    """(laws, data) residuals of all laws at their optima over one scatter.
+    """(laws, data) - whitened residuals of all laws at their optima under one covariance.
 
-    Identifications by likelihood keep what that takes; others are predicted again, under the covariance of the first.
+    Identifications by likelihood keep their linearised problem; others take the covariance of the first.
     """
     if all(fit.linearised is not None for fit in fits):
         return under_common_covariance(fits).whitened
-    problems = [least_squares_problem(fit) for fit in fits]
-    present = problems[0].residual_function.observations.present
-    whitened = [
-        np.linalg.solve(problems[0].covariance_factor, p.residuals.values[..., None])[..., 0][present] for p in problems
-    ]
-    return np.array(whitened)
+    common = fits[0].least_squares_problem
+    return np.array([common.whiten(fit.residuals_of(fit.least_squares_problem).values) for fit in fits])
 
 
 def _reduction_between(first: Identification, second: Identification) -> tuple[str, str]:
@@ -262,11 +258,15 @@ def _equivalence_sentence(
 def _exponent_sentence(a: Identification, b: Identification, lowest: float, highest: float) -> str:
     grid = np.geomspace(lowest, highest, STRESS_POINTS)
     first_exponents, second_exponents = (local_exponent(fit.coordinates, grid)(fit.u) for fit in (a, b))
-    ranges = [f"{float(exponents.min()):.2f} to {float(exponents.max()):.2f}" if np.ptp(exponents) > 0.005 else f"{float(exponents[0]):.2f}"
-              for exponents in (first_exponents, second_exponents)]  # fmt: skip
+    ranges = [
+        f"{float(exponents.min()):.2f} to {float(exponents.max()):.2f}"
+        if np.ptp(exponents) > 0.005
+        else f"{float(exponents[0]):.2f}"
+        for exponents in (first_exponents, second_exponents)
+    ]
     return (
-        f"over {lowest:.4g} to {highest:.4g} MPa their local exponents are {ranges[0]} and {ranges[1]}, never more than "
-        f"{float(np.abs(first_exponents - second_exponents).max()):.2g} apart"
+        f"over {lowest:.4g} to {highest:.4g} MPa their local exponents are {ranges[0]} and {ranges[1]}, never more "
+        f"than {float(np.abs(first_exponents - second_exponents).max()):.2g} apart"
     )
 
 

@@ -18,18 +18,19 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
+from creepkit.inverse.information_criteria import (
+    CREDIBLE_WEIGHT,
+    DECISIVE_WEIGHT,
+    aicc_penalty,
+    bic_penalty,
+    criterion_weights,
+)
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
     from creepkit.inverse.selection.discrimination import EquivalentLaws
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
-
-
-DECISIVE_WEIGHT = 0.95
-
-
-CREDIBLE_WEIGHT = 0.05
 
 
 CRITERIA = ("bic", "aicc", "hold-out")
@@ -40,7 +41,7 @@ Criterion = Literal["bic", "aicc", "hold-out"]
 
 @dataclass(frozen=True)
 class RankedLaw:
-    """One law in a ranking: criterion less the best, its share of belief, and its chi-square under the covariance
+    """One law in a ranking: criterion less the best, its weight, and its chi-square under the covariance
     of the best (NaN for identifications that were not made by likelihood).
     """
 
@@ -54,7 +55,7 @@ class RankedLaw:
 class Ranking(Presentable):
     """Identified laws, best first.
 
-    by : the criterion; size : independent frames; failed : {law: why it could not be identified}.
+    criterion : by which; independent_frames : their number; failed : {law: why it could not be identified}.
     """
 
     laws: tuple[RankedLaw, ...]
@@ -124,22 +125,24 @@ def rank(
     else:
         independent_frames = max(fits, key=lambda fit: fit.log_likelihood).effective_frames
         score = np.array([_effective_deviance(fit, independent_frames) for fit in fits])
-    score = score + [
-        _complexity_penalty(determined_parameter_count(fit), independent_frames, criterion) for fit in fits
-    ]
+    penalty = bic_penalty if criterion == "bic" else aicc_penalty
+    score = score + [penalty(determined_parameter_count(fit), independent_frames) for fit in fits]
     return ranking_from_scores(
         fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed
     )
 
 
 def ranking_from_scores(
-    fits: Sequence[Identification], scores: Floats, criterion: Criterion, *, independent_frames: float, chi_square: Floats | None = None,
+    fits: Sequence[Identification],
+    scores: Floats,
+    criterion: Criterion,
+    *,
+    independent_frames: float,
+    chi_square: Floats | None = None,
     failed: Mapping[str, str] | None = None,
-) -> Ranking:  # fmt: skip
+) -> Ranking:
     """The ranking of identifications with these scores, -2 ln of their evidence."""
-    excess = scores - scores.min()
-    weight = np.exp(-0.5 * excess)
-    weight /= weight.sum()
+    excess, weight = criterion_weights(scores)
     chi_squares = np.full(len(fits), np.nan) if chi_square is None else chi_square
     order = np.argsort(excess, kind="stable")
     laws = tuple(RankedLaw(fits[k], float(excess[k]), float(weight[k]), float(chi_squares[k])) for k in order)
@@ -153,19 +156,11 @@ def _effective_deviance(fit: Identification, independent_frames: float) -> float
 
 
 def determined_parameter_count(fit: Identification) -> int:
-    """How many parameters the data touch: the others have the variance of their bounds, by themselves."""
-    internal_bounds = [[p.to_internal(b) for b in p.bounds] for p in fit.law.params.values()]
+    """How many parameters the data determine: the others have the variance of their bounds, uncorrelated."""
     variances = np.diag(fit.covariance)
     is_uncorrelated = (fit.covariance != 0).sum(axis=1) == 1
     return int(
-        (~(is_uncorrelated & np.isclose(variances, np.ptp(internal_bounds, axis=1) ** 2 / 12.0, rtol=1e-6))).sum()
-    )
-
-
-def _complexity_penalty(parameter_count: int, independent_frames: float, criterion: Criterion) -> float:
-    """What a criterion takes for `count` parameters."""
-    if criterion == "bic":
-        return parameter_count * float(np.log(independent_frames))
-    return 2.0 * parameter_count + 2.0 * parameter_count * (parameter_count + 1) / max(
-        independent_frames - parameter_count - 1.0, 1.0
+        (
+            ~(is_uncorrelated & np.isclose(variances, np.ptp(fit.law.internal_bounds, axis=0) ** 2 / 12.0, rtol=1e-6))
+        ).sum()
     )

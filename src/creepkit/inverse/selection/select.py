@@ -1,12 +1,7 @@
 """select: several laws are identified from the same histories and ranked.
 
 Candidates are the reductions of a law and sums of two laws. Criteria are BIC, AICc and the predictive likelihood of the
-end of every history, given a fit to its beginning: with C the covariance of all observations, that of the best law, and
-C_1 its part of the beginning,
-
-    -2 ln p(end | beginning) = (r' C^-1 r + ln|C|) - (r_1' C_1^-1 r_1 + ln|C_1|)
-
-but for a constant, r the residuals at the values that the beginning alone gave.
+end of every history, given a fit to its beginning, under the covariance of the best law (see inverse.cross_validation).
 """
 
 from __future__ import annotations
@@ -18,15 +13,13 @@ from itertools import combinations
 import numpy as np
 
 from creepkit.errors import CreepkitError, FitError
+from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import identify, refit
-from creepkit.inverse.noise_model import NoiseModel, Residuals
-from creepkit.inverse.problem import IdentificationProblem
+from creepkit.inverse.identify import StartingEstimate, identify
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, rank, ranking_from_scores
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.variance_components import inverse_covariances
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
@@ -69,54 +62,8 @@ def _distinct_laws(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
     return list(by_fingerprint.values())
 
 
-FITTED_FRACTION = 0.7
-"""Share of each history's duration that the fit sees."""
-
-
-def hold_out_scores(fits: Sequence[Identification], fitted_fraction: float = FITTED_FRACTION) -> list[float]:
-    """-2 ln of the predictive likelihood of what comes after `kept` of each history, for each law."""
-    noise_model = fits[under_common_covariance(fits).reference_law].noise_model
-    scores = []
-    for fit in fits:
-        histories = list(fit.histories)
-        partial = refit(fit, [_first_part(h, fitted_fraction) for h in histories])
-        problem = IdentificationProblem.from_histories(
-            fit.law, histories, _required_predictor(fit.predictor), fit.settings, fit.reference
-        )
-        residuals = problem.residual_function.evaluate(
-            np.concatenate([partial.u, [n.value for n in partial.nuisances]])
-        )
-        is_early = problem.residual_function.observations.times <= fitted_fraction * np.array(
-            [[h.times[-1]] for h in histories]
-        )
-        beginning = replace(
-            residuals, present=residuals.present & is_early, values=np.where(is_early, residuals.values, 0.0)
-        )
-        scores.append(
-            _negative_log_likelihood(residuals, noise_model) - _negative_log_likelihood(beginning, noise_model)
-        )
-    return scores
-
-
-def _negative_log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:
-    """r' C^-1 r + ln|C|."""
-    inverses, log_det = inverse_covariances(residuals, noise_model)
-    return float(np.einsum("te,tef,tf->", residuals.values, inverses, residuals.values) + log_det)
-
-
-def _first_part(history: History, fitted_fraction: float) -> History:
-    """The first part of a history, which does not know how the test will end."""
-    used = history.used & (history.times <= fitted_fraction * float(history.times[-1]))
-    return history.replace(used=used, rupture_time=None, unruptured=False)
-
-
-def _required_predictor(using: Predictor | None) -> Predictor:
-    assert using is not None
-    return using
-
-
 SELECTION_FRAMES = 60
-"""Frames of a history that are looked at, unless settings say otherwise."""
+"""Frames of a history that are compared, unless settings say otherwise."""
 
 
 RULED_OUT_EXCESS = 40.0
@@ -125,7 +72,7 @@ of a surrogate, some noise in chi-square, do not make up for."""
 
 
 DRIFT_LIMIT = 2.0
-"""Drift that the best single law leaves in its first output, in units of the noise there, from which sums are tried."""
+"""Drift of the first output under the best single law, in units of its noise, above which sums are tried."""
 
 
 def select(
@@ -159,15 +106,21 @@ def select(
         name, reason = next(iter(failed.items()))
         raise FitError(f"none of the {len(failed)} laws could be identified; {name}: {reason}")
     if by == "hold-out":
-        scores = hold_out_scores(fits)
+        noise_model = fits[under_common_covariance(fits).reference_law].noise_model
+        scores = [cross_validate(fit, by="time").predictive_deviance(noise_model) for fit in fits]
         return ranking_from_scores(fits, np.array(scores), by, independent_frames=float("nan"), failed=failed)
     return rank(fits, by, failed)
 
 
 def _identify_all(
-    laws: Sequence[CreepLaw], histories: Sequence[History], using: Predictor | Mapping[str, Predictor],
-    settings: IdentificationSettings, through: Predictor | None, progress: IterationCallback | None, failed: dict[str, str],
-) -> list[Identification]:  # fmt: skip
+    laws: Sequence[CreepLaw],
+    histories: Sequence[History],
+    using: Predictor | Mapping[str, Predictor],
+    settings: IdentificationSettings,
+    through: Predictor | None,
+    progress: IterationCallback | None,
+    failed: dict[str, str],
+) -> list[Identification]:
     """The laws that can be identified; the others go to `failed`.
 
     through : all laws are identified with it first, and those far behind go no further: they stay as it sees them.
@@ -190,17 +143,17 @@ def _identify_all(
 
 
 def _try_to_identify(
-    law: CreepLaw, histories: Sequence[History], using: Predictor | Mapping[str, Predictor], settings: IdentificationSettings,
-    failed: dict[str, str], previous_fit: Identification | None = None,
-) -> Identification | None:  # fmt: skip
-    """Identify one law, from where a cheaper predictor ended if it did; what goes wrong with it is told in `failed`."""
-    initial = (
-        {}
-        if previous_fit is None
-        else {"start": previous_fit.u, "known": previous_fit.nuisances, "reference": previous_fit.reference}
-    )
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: Predictor | Mapping[str, Predictor],
+    settings: IdentificationSettings,
+    failed: dict[str, str],
+    previous_fit: Identification | None = None,
+) -> Identification | None:
+    """Identify one law, from where a cheaper predictor ended if it did; errors are recorded in `failed`."""
+    start = None if previous_fit is None else StartingEstimate.from_identification(previous_fit)
     try:
-        return identify(law, histories, using, settings=settings, **initial)  # type: ignore[arg-type]
+        return identify(law, histories, using, settings=settings, start=start)
     except CreepkitError as error:
         failed[law.name] = str(error)
         return None
@@ -212,7 +165,7 @@ def _ruled_out(fit: Identification) -> Identification:
 
 
 def _has_systematic_residuals(fit: Identification) -> bool:
-    """Whether the law leaves something in its first output that wanders by more than the noise."""
+    """Whether the residuals of the first output drift by more than the noise."""
     assert fit.linearised is not None
     name = next(iter(fit.noise_model.outputs))
     components, residuals = fit.noise_model[name], fit.linearised.residuals

@@ -14,6 +14,7 @@ from scipy.stats import beta
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import ContributionPenalty, PenalisedTerms, Subsets
@@ -58,9 +59,15 @@ def binomial_interval(count: int, trials: int, significance: float = 0.05) -> tu
 
 
 def selection_frequencies(
-    reductions: ReducedLaws, penalty: ContributionPenalty | Subsets, strength: float | None, optimum: Floats, *,
-    resamples: int = 20, seed: int = 0, progress: IterationCallback | None = None,
-) -> SelectionFrequencies:  # fmt: skip
+    reductions: ReducedLaws,
+    penalty: ContributionPenalty | Subsets,
+    strength: float | None,
+    optimum: Floats,
+    *,
+    resamples: int = 20,
+    seed: int = 0,
+    progress: IterationCallback | None = None,
+) -> SelectionFrequencies:
     """Choose again for each draw, from the optima on all data; strength : that of all data, which stays.
 
     optimum : x of the penalised fit on all data.
@@ -68,28 +75,29 @@ def selection_frequencies(
     if resamples < 1:
         raise FitError(f"repeats is {resamples}; at least one draw is needed")
     problem, selections = reductions.problem, []
-    for k, weights in enumerate(bootstrap_weights(problem, resamples, np.random.default_rng(seed))):
+    for k, weights in enumerate(
+        bootstrap_weights(problem.problem.observations, resamples, np.random.default_rng(seed))
+    ):
         selections.append(_terms_kept(reductions, with_weights(problem, weights), penalty, strength, optimum))
         if progress is not None:
             progress("draw", k + 1, resamples)
     sets = {terms: selections.count(terms) for terms in sorted(set(selections), key=selections.count, reverse=True)}
     counts = {label: sum(label in terms for terms in selections) for label in reductions.terms}
     return SelectionFrequencies(
-        "tests" if len(problem.covariance_factor) > 1 else "blocks of frames", resamples, counts, sets
+        "tests" if len(problem.problem.histories) > 1 else "blocks of frames", resamples, counts, sets
     )
 
 
 def with_weights(problem: TermProblem, weights: Floats) -> TermProblem:
-    """The stage with the squares of white residuals counted `weights` (tests, entries) times."""
-    return replace(
-        problem, covariance_factor=problem.covariance_factor / np.sqrt(np.maximum(weights, ZERO_WEIGHT))[:, None, :]
-    )
+    """The problem with squares of whitened residuals counted `weights` (tests, observations) times."""
+    covariance_factor = problem.problem.covariance_factor / np.sqrt(np.maximum(weights, ZERO_WEIGHT))[:, None, :]
+    return replace(problem, problem=problem.problem.with_covariance(covariance_factor))
 
 
-def bootstrap_weights(problem: TermProblem, resamples: int, rng: np.random.Generator) -> Iterator[Floats]:
-    """(tests, entries) how often each entry was drawn: whole tests, or blocks of frames of the only one."""
-    tests, entries = problem.objective.observations.present.shape
-    frame = problem.objective.observations.frame_index
+def bootstrap_weights(observations: ObservationVector, resamples: int, rng: np.random.Generator) -> Iterator[Floats]:
+    """(tests, observations) how often each was drawn: whole tests, or blocks of frames of the only one."""
+    tests, entries = observations.present.shape
+    frame = observations.frame_index
     for _ in range(resamples):
         if tests > 1:
             yield np.repeat(rng.multinomial(tests, np.full(tests, 1.0 / tests))[:, None], entries, axis=1).astype(float)
@@ -115,7 +123,7 @@ def _terms_kept(
 ) -> TermNames:
     if isinstance(penalty, Subsets):
         return ReducedLaws(problem, reductions).lowest_bic(penalty.EXHAUSTIVE_LIMIT).kept_terms
-    penalised_terms = PenalisedTerms.from_objective(problem.objective, penalty, strength)
+    penalised_terms = PenalisedTerms.from_problem(problem.problem, penalty, strength)
     single_term_optima: Sequence[Floats] = [
         problem.embedded(single.law, single.x) for single in reductions.single_terms()
     ]
@@ -124,9 +132,16 @@ def _terms_kept(
 
 
 def bootstrap_terms(
-    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, penalty: ContributionPenalty | Subsets, *, resamples: int = 20,
-    seed: int = 0, settings: IdentificationSettings | None = None, progress: IterationCallback | None = None,
-) -> SelectionFrequencies:  # fmt: skip
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: PredictorOrMapping,
+    penalty: ContributionPenalty | Subsets,
+    *,
+    resamples: int = 20,
+    seed: int = 0,
+    settings: IdentificationSettings | None = None,
+    progress: IterationCallback | None = None,
+) -> SelectionFrequencies:
     """How often each term is kept when the tests (or the frames of the only one) are drawn again."""
     _, reductions = identify_full(law, histories, using, None, settings, progress)
     choice = choose_terms(reductions, penalty, None, progress)

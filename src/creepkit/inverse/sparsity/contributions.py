@@ -18,8 +18,8 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.observation_vector import selected_frames, usable_frames
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import AMPLITUDE_PER_STRAIN, reference_end_strain, reference_stresses
-from creepkit.inverse.residuals import ResidualFunction
 from creepkit.kernels import lower
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
@@ -125,10 +125,10 @@ class TermContributions:
         self._terms = [([law.names.index(name) for name in single.names], lower(single, "numpy")) for single in singles]
 
     @classmethod
-    def from_objective(cls, objective: ResidualFunction) -> TermContributions:
-        """Those of the law of an objective, over its histories."""
-        points = EvaluationPoints.from_histories(objective.histories, objective.predictor)
-        return cls(objective.law, objective.coordinates, points)
+    def from_problem(cls, problem: LeastSquaresProblem) -> TermContributions:
+        """Those of the law of a problem, over its histories."""
+        points = EvaluationPoints.from_histories(problem.histories, problem.predictor)
+        return cls(problem.law, problem.coordinates, points)
 
     def log_rates(self, u: Floats) -> Floats:
         """ln of the rate of each term at each point, (candidates, points, terms), of u (candidates, parameters)."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.residuals import ResidualFunction
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.sparsity.contributions import TermContributions
 from creepkit.language import CreepLaw
 
@@ -187,13 +187,13 @@ class PenalisedTerms:
     frozen_at: Floats | None = None
 
     @classmethod
-    def from_objective(
-        cls, objective: ResidualFunction, penalty: ContributionPenalty, strength: float | None = None
+    def from_problem(
+        cls, problem: LeastSquaresProblem, penalty: ContributionPenalty, strength: float | None = None
     ) -> PenalisedTerms:
-        """The penalty on the law of an objective; strength : for one that says "auto", else the usual."""
+        """The penalty on the law of a problem; strength : for one that says "auto", else the usual."""
         given_strength = penalty.strength if strength is None else strength
         return cls(
-            TermContributions.from_objective(objective),
+            TermContributions.from_problem(problem),
             penalty,
             DEFAULT_STRENGTH if isinstance(given_strength, str) else float(given_strength),
         )

@@ -15,168 +15,112 @@ from itertools import combinations
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.bound_penalties import BoundPenalties
-from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.problem import least_squares_problem
-from creepkit.inverse.residuals import ResidualFunction
-from creepkit.inverse.search.cost_function import CostFunction
-from creepkit.inverse.search.local_refinement import AdditionalResiduals, Bounds, Minimum, bounded_least_squares
+from creepkit.inverse.information_criteria import bic_penalty, determined_parameters
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.search.local_refinement import Minimum, Penalty, Tolerances
 from creepkit.inverse.search.multistart import unequal_fractions
-from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.contributions import TermContributions
-from creepkit.inverse.sparsity.penalties import PenalisedTerms, switchable_exponents
+from creepkit.inverse.sparsity.penalties import switchable_exponents
 from creepkit.inverse.sparsity.result import LEAST_CONTRIBUTION, TermNames
 from creepkit.language import CreepLaw
 from creepkit.records import Predictor
 
-MAX_STEPS = 40
-
-
-COST_TOLERANCE = 1e-7
+TOLERANCES = Tolerances(max_steps=40, tolerance=1e-7)
+"""Of the fits of reduced laws."""
 
 
 IDLE_SAMPLES = 64
-"""Of what a term that is to be absent depends on, besides its rate."""
+"""Draws of the parameters of a term that is to be absent, besides its rate."""
 
 
 @dataclass(frozen=True, eq=False)
 class TermProblem:
-    """A law, its data and their covariance; unknowns are x = (u, e), e those of the tests.
+    """The least-squares problem of a sum, or of some of its terms, and a point from which it is known to fit well.
 
-    factor : (tests, entries, entries) Cholesky factors of the covariance.
-    start : x from which it is known to fit well.
+    start : (unknowns,) x = (u, e).
     """
 
-    objective: ResidualFunction
-    bounds: Bounds
-    covariance_factor: Floats
+    problem: LeastSquaresProblem
     start: Floats
-    settings: IdentificationSettings
 
     @classmethod
     def from_identification(cls, fit: Identification, screening_predictor: Predictor | None = None) -> TermProblem:
-        """The problem of an identification, opened again with the covariance that it found.
+        """The problem of an identification, under the covariance that it found.
 
-        through : a cheaper predictor by which terms are chosen.
+        screening_predictor : a cheaper predictor by which terms are chosen.
         """
-        problem = least_squares_problem(fit)
-        original = problem.residual_function
-        objective = ResidualFunction(
-            original.law,
-            original.histories,
-            screening_predictor or original.predictor,
-            original.coordinates,
-            original.observations,
-            original.nuisance_parameters,
-        )
-        return cls(objective, problem.bounds, problem.covariance_factor, problem.x, fit.settings)
-
-    # ---- what it is ----------------------------------------------------------------------------------------------
+        problem = fit.least_squares_problem
+        return cls(problem if screening_predictor is None else problem.with_predictor(screening_predictor), fit.x)
 
     @property
     def law(self) -> CreepLaw:
-        """The law of the objective."""
-        return self.objective.law
+        """The law of the problem."""
+        return self.problem.law
 
     @property
     def parameter_count(self) -> int:
-        """Number of parameters of the law; x goes on with the unknowns of tests."""
-        return len(self.law.params)
-
-    @property
-    def observation_count(self) -> int:
-        """Number of measured values."""
-        return int(self.objective.observations.present.sum())
+        """Number of parameters of the law; x continues with the nuisance parameters."""
+        return self.problem.parameter_count
 
     @cached_property
     def contributions(self) -> TermContributions:
-        """Of the terms, over what the tests visit."""
-        return TermContributions.from_objective(self.objective)
+        """Contributions of the terms over the evaluation points of the tests."""
+        return TermContributions.from_problem(self.problem)
 
     def contributions_at(self, x: Floats) -> dict[str, float]:
-        """{term: contribution} at x."""
+        """{term: contribution} at x (unknowns,)."""
         return self.contributions.by_term(x[: self.parameter_count])
 
     # ---- fits -------------------------------------------------------------------------------------------------------
 
-    def minimise(
-        self, start: Floats, penalty: AdditionalResiduals | None = None, max_steps: int = MAX_STEPS
-    ) -> Minimum:
-        """Least squares from x, penalty included."""
-        return bounded_least_squares(
-            self.objective,
-            self.bounds,
-            self.covariance_factor,
-            start,
-            max_steps=max_steps,
-            tolerance=COST_TOLERANCE,
-            additional=penalty,
-        )
+    def minimise(self, start: Floats, penalty: Penalty | None = None, max_steps: int | None = None) -> Minimum:
+        """Least squares from `start` (unknowns,), penalty included."""
+        tolerances = TOLERANCES if max_steps is None else replace(TOLERANCES, max_steps=max_steps)
+        return replace(self.problem, penalty=penalty).minimise(start, tolerances=tolerances)
 
     def lowest_minimum(self, starts: Sequence[Floats]) -> Minimum:
-        """The lowest of the minima from several x, without penalty."""
+        """The lowest of the minima from several x (unknowns,), without penalty."""
         return min((self.minimise(x) for x in starts), key=lambda minimum: minimum.cost)
 
-    def half_chi_square(self, x: Floats) -> float:
-        """Half the chi-square at x, priors and walls included."""
-        whitened = np.linalg.solve(self.covariance_factor, self.objective.evaluate(x).values[..., None])[..., 0]
-        penalty_residuals = BoundPenalties(self.objective).residuals(x)
-        return 0.5 * float((whitened[self.objective.observations.present] ** 2).sum() + (penalty_residuals**2).sum())
-
     def bic(self, minimum: Minimum) -> float:
-        """BIC of a fit without penalty: chi-square, priors included, + K ln N."""
-        return 2.0 * minimum.cost + self.determined_parameter_count(minimum.u) * float(np.log(self.observation_count))
+        """BIC of a fit without penalty; its deviance is the chi-square, priors included."""
+        parameters = self.determined_parameter_count(minimum.u)
+        return 2.0 * minimum.cost + bic_penalty(parameters, self.problem.observations.count)
 
     def determined_parameter_count(self, x: Floats) -> int:
-        """How many parameters of the law move anything that was measured."""
-        jacobian = self.objective.evaluate(x).jacobian
-        assert jacobian is not None
-        return int((jacobian[self.objective.observations.present][:, : self.parameter_count] != 0).any(axis=0).sum())
+        """How many parameters of the law change anything that was measured, at x (unknowns,)."""
+        return determined_parameters(self.problem.residuals(x), self.parameter_count)
 
-    # ---- other laws on the same stage --------------------------------------------------------------------------------
+    # ---- other laws of the same sum --------------------------------------------------------------------------------
 
     def with_law(self, law: CreepLaw) -> TermProblem:
         """A law of some of this one's parameters, by name, on the same data and covariance."""
-        o, positions = self.objective, self._positions(law)
-        objective = ResidualFunction(
-            law,
-            o.histories,
-            o.predictor,
-            Coordinates(law, o.coordinates.reference),
-            o.observations,
-            o.nuisance_parameters,
-        )
-        bounds = Bounds(self.bounds.lower[positions], self.bounds.upper[positions])
-        problem = replace(self, objective=objective, bounds=bounds, start=self.start[positions])
-        return replace(problem, start=problem.with_log_total_rate(problem.start, self.log_total_rate(self.start)))
-
-    def with_start(self, x: Floats) -> TermProblem:
-        """The same, known to fit well at x."""
-        return replace(self, start=x)
+        reduced = TermProblem(self.problem.with_law(law), self.start[self._positions(law)])
+        return replace(reduced, start=reduced.with_log_total_rate(reduced.start, self.log_total_rate(self.start)))
 
     def embedded(self, law: CreepLaw, x: Floats) -> Floats:
-        """x of a law of some of the terms as one of this law: the other terms as slow as the box allows.
+        """(unknowns,) x of a law of some of the terms as one of this law: the other rates at their lower bounds.
 
-        Their exponents that can be off are; all else of theirs is drawn so that they matter least, within the fences.
+        Exponents of the other terms that can be off are; the rest of their parameters is drawn so that they contribute
+        least, within the bound penalties. x : (unknowns of that law,).
         """
-        rates, positions = list(self.objective.coordinates.term_rates), self._positions(law)
+        rates, positions, bounds = list(self.problem.coordinates.term_rates), self._positions(law), self.problem.bounds
         exponents_off = dict(switchable_exponents(self.law))
         unused = [k for k in range(self.parameter_count) if k not in (*positions, *rates, *exponents_off)]
         candidates = np.tile(
-            np.concatenate([self.bounds.centre[: self.parameter_count], self.start[self.parameter_count :]]),
+            np.concatenate([bounds.centre[: self.parameter_count], self.start[self.parameter_count :]]),
             (IDLE_SAMPLES, 1),
         )
         random = np.random.default_rng(0).random((IDLE_SAMPLES - 1, len(unused)))
-        candidates[1:, unused] = self.bounds.lower[unused] + random * self.bounds.width[unused]
+        candidates[1:, unused] = bounds.lower[unused] + random * bounds.width[unused]
         candidates[:, list(exponents_off)] = list(exponents_off.values())
-        candidates[:, rates] = self.bounds.lower[rates]
+        candidates[:, rates] = bounds.lower[rates]
         candidates[:, positions] = x
         other_terms = [k for k, label in enumerate(self.law.terms) if label not in law.terms]
         contribution = self.contributions.values(candidates[:, : self.parameter_count])[:, other_terms].sum(axis=1)
-        bound_penalties = BoundPenalties(self.objective)
-        penalty_costs = np.array([(bound_penalties.residuals(one) ** 2).sum() for one in candidates])
-        return np.asarray(candidates[(contribution + penalty_costs).argmin()])
+        penalties = [(self.problem.bound_penalties.residuals(one) ** 2).sum() for one in candidates]
+        return np.asarray(candidates[(contribution + np.array(penalties)).argmin()])
 
     def _positions(self, law: CreepLaw) -> list[int]:
         positions = [self.law.names.index(name) for name in law.names]
@@ -185,40 +129,36 @@ class TermProblem:
     # ---- starts ------------------------------------------------------------------------------------------------------
 
     def log_total_rate(self, x: Floats) -> float:
-        """ln of the rate of all terms at the reference point."""
-        rates = list(self.objective.coordinates.term_rates)
+        """ln of the rate of all terms at the reference point, in 1/s; x : (unknowns,)."""
+        rates = list(self.problem.coordinates.term_rates)
         return float(np.logaddexp.reduce(x[rates])) if rates else 0.0
 
     def with_log_total_rate(self, x: Floats, log_total: float) -> Floats:
-        """x with all rates moved by one factor, so that they add up to exp(level)."""
-        shifted, rates = np.array(x), list(self.objective.coordinates.term_rates)
+        """(unknowns,) x with all rates multiplied by one factor, so that they add up to exp(log_total) 1/s."""
+        shifted, rates = np.array(x), list(self.problem.coordinates.term_rates)
         shifted[rates] += log_total - self.log_total_rate(x)
-        return self.bounds.clip(shifted)
+        return self.problem.bounds.clip(shifted)
 
     def with_fractions(self, x: Floats, fractions: Sequence[float] | Floats) -> Floats:
-        """x with these shares of its rate at the reference point, in the order of coordinates.rates."""
-        shifted, rates = np.array(x), list(self.objective.coordinates.term_rates)
+        """(unknowns,) x with these fractions (terms,) of its rate, in the order of coordinates.term_rates."""
+        shifted, rates = np.array(x), list(self.problem.coordinates.term_rates)
         shifted[rates] = self.log_total_rate(x) + np.log(fractions)
-        return self.bounds.clip(shifted)
+        return self.problem.bounds.clip(shifted)
 
     def fraction_permutations(self, x: Floats) -> list[Floats]:
-        """x with shares .7, .2, .1 and so on, each term leading once: equal shares are a stationary point."""
-        count = len(self.objective.coordinates.term_rates)
+        """x (unknowns,) with unequal fractions, each term leading once: equal fractions are a stationary point."""
+        count = len(self.problem.coordinates.term_rates)
         if count < 2:
             return []
         return [self.with_fractions(x, np.roll(unequal_fractions(count), k)) for k in range(count)]
 
     def with_nuisances(self, u: Floats) -> Floats:
-        """x of conditioned coordinates, unknowns of tests as at the start."""
+        """(unknowns,) x of conditioned coordinates u (parameters,), nuisance parameters as at the start."""
         return np.concatenate([u, self.start[self.parameter_count :]])
 
-    def cost_function(self, penalty: PenalisedTerms | None = None) -> CostFunction:
-        """What a global search sees: the same covariance, unknowns of tests as they are at the start."""
-        o = self.objective
-        fixed_nuisances = replace(o.nuisance_parameters, mean=self.start[self.parameter_count :], fixed=True)
-        objective = ResidualFunction(self.law, o.histories, o.predictor, o.coordinates, o.observations, fixed_nuisances)
-        bounds = Bounds(self.bounds.lower[: self.parameter_count], self.bounds.upper[: self.parameter_count])
-        return CostFunction(objective, bounds, self.covariance_factor, self.settings, penalty)
+    def search_problem(self, penalty: Penalty | None = None) -> LeastSquaresProblem:
+        """What a global search minimises: the same covariance, nuisance parameters fixed as they are at the start."""
+        return replace(self.problem.with_fixed_nuisances(self.start[self.parameter_count :]), penalty=penalty)
 
 
 INITIAL_FRACTION = 0.05
@@ -260,9 +200,9 @@ class ReducedLaw:
 
 
 class ReducedLaws:
-    """The laws of some of the terms of a stage's law, each fitted once.
+    """The laws of some of the terms of a sum, each fitted once.
 
-    before : the same laws fitted on another stage of the same law, whose optima are then the only starts.
+    previous : the same laws fitted on other weights of the same data, whose optima are then the only starts.
     """
 
     def __init__(self, problem: TermProblem, previous: ReducedLaws | None = None) -> None:
@@ -317,15 +257,14 @@ class ReducedLaws:
     def _bic_lower_bound(self, terms: TermNames, least_chi_square: float) -> float:
         """What BIC a set of terms has at least: no part of a sum fits better than the sum."""
         law = self.problem.law.only(*terms)
-        return least_chi_square + (len(law.params) - len(switchable_exponents(law))) * float(
-            np.log(self.problem.observation_count)
-        )
+        parameters = len(law.params) - len(switchable_exponents(law))
+        return least_chi_square + bic_penalty(parameters, self.problem.problem.observations.count)
 
     def _fitted_problem(self, terms: TermNames) -> TermProblem:
-        """The stage of these terms, which starts at their optimum."""
+        """The problem of these terms, which starts at their optimum."""
         law = self.problem.law if terms == self.terms else self.problem.law.only(*terms)
         problem = self.problem.with_law(law)
-        return problem.with_start(problem.lowest_minimum(self._starts(problem, terms)).u)
+        return replace(problem, start=problem.lowest_minimum(self._starts(problem, terms)).u)
 
     def _starts(self, problem: TermProblem, terms: TermNames) -> list[Floats]:
         """What the whole law says of these terms; for one term the middle of its bounds, for more their own optima."""
@@ -334,7 +273,7 @@ class ReducedLaws:
             return [problem.embedded(fitted.law, fitted.x)]
         if len(terms) > 1:
             return [problem.start, *(_start_in_larger_law(problem, self.with_terms((label,))) for label in terms)]
-        centre = problem.bounds.centre
+        centre = problem.problem.bounds.centre
         centre[problem.parameter_count :] = problem.start[problem.parameter_count :]
         return [problem.start, problem.with_log_total_rate(centre, self.problem.log_total_rate(self.problem.start))]
 
@@ -342,10 +281,10 @@ class ReducedLaws:
 def _start_in_larger_law(problem: TermProblem, reduced: ReducedLaw) -> Floats:
     """x of a wider law at a reduced one, its other terms with a small share."""
     x = problem.embedded(reduced.law, reduced.x)
-    for k in problem.objective.coordinates.term_rates:
+    for k in problem.problem.coordinates.term_rates:
         if problem.law.names[k] not in reduced.law.names:
             x[k] = problem.log_total_rate(x) + np.log(INITIAL_FRACTION)
-    return problem.bounds.clip(x)
+    return problem.problem.bounds.clip(x)
 
 
 def with_exponents_off(problem: TermProblem, terms: TermNames) -> ReducedLaw:
@@ -361,7 +300,7 @@ def with_exponents_off(problem: TermProblem, terms: TermNames) -> ReducedLaw:
 
 
 def _without_exponent(reduced: ReducedLaw, exponent: str, off: float) -> ReducedLaw:
-    problem = reduced.problem.with_start(reduced.x).with_law(reduced.law.fix(**{exponent: off}))
+    problem = replace(reduced.problem, start=reduced.x).with_law(reduced.law.fix(**{exponent: off}))
     minimum = problem.minimise(problem.start)
     return ReducedLaw(problem, minimum, reduced.kept_terms, (*reduced.exponents_off, exponent), problem.bic(minimum))
 

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import identify
+from creepkit.inverse.identify import StartingEstimate, identify
 from creepkit.inverse.search.cost_function import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 from creepkit.inverse.search.multistart import distinct
@@ -26,10 +25,6 @@ from creepkit.inverse.sparsity.reduced_laws import ReducedLaw, ReducedLaws, Term
 from creepkit.inverse.sparsity.result import FitStatistics, PenaltyPath, Sparsity, TermNames
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
-
-if TYPE_CHECKING:
-    pass
-
 
 CONTINUED_STARTS, COMPLETED_STARTS = 5, 2
 """Starts that are followed for some steps, and how many of them to the end."""
@@ -48,7 +43,7 @@ def penalised_starts(reductions: ReducedLaws) -> list[Floats]:
 
 def penalised_fit(problem: TermProblem, penalty: PenalisedTerms, starts: Sequence[Floats]) -> Minimum:
     """The lowest minimum of misfit and penalty: the best starts are followed some steps, the best ends polished."""
-    costs = [problem.half_chi_square(x) + float(penalty.values(x[None])[0]) for x in starts]
+    costs = [0.5 * problem.problem.chi_square(x) + float(penalty.values(x[None])[0]) for x in starts]
     order = sorted(range(len(starts)), key=lambda k: costs[k])[:CONTINUED_STARTS]
     preliminary = sorted((problem.minimise(starts[k], penalty, PRELIMINARY_STEPS) for k in order), key=lambda m: m.cost)
     completed = [m if m.converged else problem.minimise(m.u, penalty) for m in preliminary[:COMPLETED_STARTS]]
@@ -69,20 +64,20 @@ def trace_path(
 
     It ends when one term is left.
     """
-    stage, labels = reductions.problem, reductions.terms
-    penalised, full = PenalisedTerms.from_objective(stage.objective, penalty, 0.0), reductions.full()
+    problem, labels = reductions.problem, reductions.terms
+    penalised, full = PenalisedTerms.from_problem(problem.problem, penalty, 0.0), reductions.full()
     corners = penalised_starts(reductions)[-len(labels) :]
     optima = [full.x]
     for k, strength in enumerate(sorted(strengths)):
         optima.append(_next_fit(reductions, penalised.with_strength(strength), optima[-1], corners).u)
         if progress is not None:
             progress("strength", k + 1, len(strengths))
-        if len(terms_above(stage.contributions_at(optima[-1]))) == 1:
+        if len(terms_above(problem.contributions_at(optima[-1]))) == 1:
             break
-    contributions = np.array([list(stage.contributions_at(x).values()) for x in optima])
+    contributions = np.array([list(problem.contributions_at(x).values()) for x in optima])
     kept_terms = tuple(terms_above(dict(zip(labels, row, strict=True))) for row in contributions)
     bic = np.array([reductions.with_terms(terms).bic for terms in kept_terms])
-    chi_square = np.array([2.0 * stage.half_chi_square(x) for x in optima])
+    chi_square = np.array([problem.problem.chi_square(x) for x in optima])
     path_strengths = np.array([0.0, *sorted(strengths)])[: len(optima)]
     excess = bic - bic.min()
     return PenaltyPath(
@@ -102,13 +97,13 @@ def _next_fit(
     reductions: ReducedLaws, penalised: PenalisedTerms, previous: Floats, corners: Sequence[Floats]
 ) -> Minimum:
     """The penalised fit from the last one, and from the corners that cost less there."""
-    stage = reductions.problem
+    problem = reductions.problem
 
     def cost(x: Floats) -> float:
-        return stage.half_chi_square(x) + float(penalised.values(x[None])[0])
+        return 0.5 * problem.problem.chi_square(x) + float(penalised.values(x[None])[0])
 
     previous_cost = cost(previous)
-    return penalised_fit(stage, penalised, [previous, *(x for x in corners if cost(x) < previous_cost)])
+    return penalised_fit(problem, penalised, [previous, *(x for x in corners if cost(x) < previous_cost)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,12 +146,12 @@ def choose_terms(
             float(path.strengths[path.chosen]),
             path,
         )
-    penalised_terms = PenalisedTerms.from_objective(problem.objective, penalty)
+    penalised_terms = PenalisedTerms.from_problem(problem.problem, penalty)
     starts, trace = penalised_starts(reductions), None
     if search is not None:
-        cost_function = problem.cost_function(penalised_terms)
-        result = search.minima(cost_function, progress)
-        starts += [problem.with_nuisances(minimum.u) for minimum in distinct(result.minima, cost_function.bounds)]
+        searched = problem.search_problem(penalised_terms)
+        result = search.minima(searched, progress)
+        starts += [problem.with_nuisances(minimum.u) for minimum in distinct(result.minima, searched.bounds)]
         trace = result.trace
     x = penalised_fit(problem, penalised_terms, starts).u
     contributions = problem.contributions_at(x)
@@ -167,10 +162,16 @@ PredictorOrMapping = Predictor | Mapping[str, Predictor]
 
 
 def identify_sparse(
-    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, *, penalty: ContributionPenalty | Subsets,
-    search: GlobalSearch | None = None, through: Predictor | None = None, settings: IdentificationSettings | None = None,
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: PredictorOrMapping,
+    *,
+    penalty: ContributionPenalty | Subsets,
+    search: GlobalSearch | None = None,
+    through: Predictor | None = None,
+    settings: IdentificationSettings | None = None,
     progress: IterationCallback | None = None,
-) -> Identification:  # fmt: skip
+) -> Identification:
     """Identify the law of those terms of a sum that the histories need; what was dropped stands in `sparsity`.
 
     The whole sum is identified without penalty first: it gives the covariance on which everything is compared. Then
@@ -185,9 +186,12 @@ def identify_sparse(
 
 
 def identify_reduced(
-    penalty: ContributionPenalty | Subsets, full: Identification, reductions: ReducedLaws, search: GlobalSearch | None = None,
+    penalty: ContributionPenalty | Subsets,
+    full: Identification,
+    reductions: ReducedLaws,
+    search: GlobalSearch | None = None,
     progress: IterationCallback | None = None,
-) -> Identification:  # fmt: skip
+) -> Identification:
     """The same from the whole sum, identified and opened before."""
     choice = choose_terms(reductions, penalty, search, progress)
     reduced = confirmed_law(reductions, choice)
@@ -197,27 +201,35 @@ def identify_reduced(
         for nuisance, nuisance_value in zip(full.nuisances, reduced.x[parameter_count:], strict=True)
     ]
     assert full.predictor is not None
-    fit = identify(
-        reduced.law, full.histories, full.predictor, settings=full.settings, start=reduced.x[:parameter_count], known_nuisances=initial_nuisances,
-        reference=full.reference, progress=progress,
-    )  # fmt: skip
+    start = StartingEstimate(reduced.x[:parameter_count], initial_nuisances, full.reference)
+    fit = identify(reduced.law, full.histories, full.predictor, settings=full.settings, start=start, progress=progress)
     record = _sparsity_record(full, fit, reductions, reduced, choice, penalty)
     return replace(fit, search_trace=choice.trace or full.search_trace, sparsity=record)
 
 
 def penalty_path(
-    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, penalty: ContributionPenalty, *,
-    strengths: Sequence[float] = PATH_STRENGTHS, settings: IdentificationSettings | None = None, progress: IterationCallback | None = None,
-) -> PenaltyPath:  # fmt: skip
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: PredictorOrMapping,
+    penalty: ContributionPenalty,
+    *,
+    strengths: Sequence[float] = PATH_STRENGTHS,
+    settings: IdentificationSettings | None = None,
+    progress: IterationCallback | None = None,
+) -> PenaltyPath:
     """The path of a penalty over its strength, from none to all, with the automatic choice."""
     _, reductions = identify_full(law, histories, using, None, settings, progress)
     return trace_path(reductions, penalty, strengths, progress)
 
 
 def identify_full(
-    law: CreepLaw, histories: Sequence[History], using: PredictorOrMapping, through: Predictor | None, settings: IdentificationSettings | None,
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: PredictorOrMapping,
+    through: Predictor | None,
+    settings: IdentificationSettings | None,
     progress: IterationCallback | None,
-) -> tuple[Identification, ReducedLaws]:  # fmt: skip
+) -> tuple[Identification, ReducedLaws]:
     """The whole sum identified without penalty, and its terms ready to be dropped."""
     if len(law.terms) < 2:
         raise FitError(
@@ -240,9 +252,13 @@ def confirmed_law(reductions: ReducedLaws, choice: TermChoice) -> ReducedLaw:
 
 
 def _sparsity_record(
-    full_fit: Identification, fit: Identification, reductions: ReducedLaws, reduced: ReducedLaw, choice: TermChoice,
+    full_fit: Identification,
+    fit: Identification,
+    reductions: ReducedLaws,
+    reduced: ReducedLaw,
+    choice: TermChoice,
     penalty: ContributionPenalty | Subsets,
-) -> Sparsity:  # fmt: skip
+) -> Sparsity:
     problem, full = reductions.problem, reductions.full(reduced)
     return Sparsity(
         law=problem.law.name,
@@ -257,6 +273,6 @@ def _sparsity_record(
         contributions_after_refit=reduced.problem.contributions_at(reduced.x),
         full=FitStatistics(full.chi_square, full.parameter_count, full.bic, full_fit.errors),
         reduced=FitStatistics(reduced.chi_square, reduced.parameter_count, reduced.bic, fit.errors),
-        observations=problem.observation_count,
+        observations=problem.problem.observations.count,
         path=choice.path,
     )

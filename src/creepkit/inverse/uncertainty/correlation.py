@@ -105,7 +105,7 @@ def _parameter_names(fit: Identification, coordinate_system: CoordinateSystem) -
 
 def _bound_widths(fit: Identification) -> Floats:
     """(parameters,) of the bounds, on the internal scale."""
-    return np.array([np.ptp([p.to_internal(b) for b in p.bounds]) for p in fit.law.params.values()], float)
+    return np.asarray(np.ptp(fit.law.internal_bounds, axis=0))
 
 
 def _relative_widths(fit: Identification) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from creepkit.arrays import Floats
+from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.noise_model import (
     NEGLIGIBLE_DRIFT,
@@ -18,9 +19,9 @@ from creepkit.inverse.noise_model import (
     covariance,
     effective_sample_size,
     fixed_components,
+    whiten,
 )
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
-from creepkit.inverse.search.local_refinement import Bounds
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, inverse_covariances, scaled_inverse
 from creepkit.language import CreepLaw
 from creepkit.records import Nuisance
@@ -148,7 +149,7 @@ def laplace_covariance(
     assert residuals.jacobian is not None
     count, tests = bounds.width.size - nuisance_parameters.size, len(residuals.values)
     covariance_factor = cholesky_factors(residuals, working_noise)
-    whitened = np.linalg.solve(covariance_factor, residuals.jacobian)
+    whitened = whiten(covariance_factor, residuals.jacobian)
     weighted = np.linalg.solve(np.swapaxes(covariance_factor, 1, 2), whitened)
     prior = np.diag(np.concatenate([12.0 / bounds.width[:count] ** 2, nuisance_parameters.precision]))
     inverse_normal_matrix = scaled_inverse(np.einsum("tfp,tfq->pq", whitened, whitened) + prior)
@@ -176,7 +177,7 @@ def laplace_covariance(
 def normal_matrix(residuals: Residuals, working_noise: NoiseModel) -> Floats:
     """J' W J of x = (u, e), (unknowns, unknowns)."""
     assert residuals.jacobian is not None
-    whitened = np.linalg.solve(cholesky_factors(residuals, working_noise), residuals.jacobian)
+    whitened = whiten(cholesky_factors(residuals, working_noise), residuals.jacobian)
     return np.asarray(np.einsum("tfp,tfq->pq", whitened, whitened))
 
 

@@ -129,9 +129,13 @@ class ModelAverage(Presentable):
         return cls(tuple(r.fit for r in weighted), tuple(r.weight for r in weighted))
 
     def rate(
-        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats, Floats]:
         """Median creep rate over the laws, 1/s, with its 95 % interval: (rate, low, high).
 
         stress MPa, temperature K; what is not given is that of the best law's reference point.
@@ -141,16 +145,24 @@ class ModelAverage(Presentable):
         return median, low, high
 
     def local_exponent(
-        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats, Floats]:
         """Median local stress exponent over the laws, with its 95 % interval."""
         return self.distribution(local_exponent, stress, temperature, strain, time).interval()
 
     def distribution(
-        self, quantity: Callable[..., CoordinateFunction], stress: ArrayLike, temperature: ArrayLike | None,
-        strain: ArrayLike | None, time: ArrayLike | None,
-    ) -> MixtureDistribution:  # fmt: skip
+        self,
+        quantity: Callable[..., CoordinateFunction],
+        stress: ArrayLike,
+        temperature: ArrayLike | None,
+        strain: ArrayLike | None,
+        time: ArrayLike | None,
+    ) -> MixtureDistribution:
         """The distribution under each law of what(coordinates, stress, temperature, strain, time), at one point."""
         reference = self.fits[0].reference
         point = [
@@ -209,9 +221,15 @@ class RateBand(Presentable):
 
 
 def rate_band(
-    source: Identification | WeightedLaws | ModelAverage, stresses: ArrayLike, temperature: float, *, temperature_uncertainty: float = 10.0,
-    temperature_distribution: Literal["uniform", "normal"] = "uniform", strain: float | None = None, time: float | None = None,
-) -> RateBand:  # fmt: skip
+    source: Identification | WeightedLaws | ModelAverage,
+    stresses: ArrayLike,
+    temperature: float,
+    *,
+    temperature_uncertainty: float = 10.0,
+    temperature_distribution: Literal["uniform", "normal"] = "uniform",
+    strain: float | None = None,
+    time: float | None = None,
+) -> RateBand:
     """Creep rates at `stresses` (MPa) and temperature +- plus_minus (K), over one law or the laws of a ranking.
 
     A law without temperature cannot know how the temperature moves its rate: its part of the band is not widened, and
@@ -241,10 +259,16 @@ def rate_band(
     distribution_by_temperature = mixture.distribution(log_rate, levels, temperatures[:, None], strain, time)
     median, low, high = _flattened(distribution_by_temperature).interval()
     return RateBand(
-        levels, np.exp(median), np.exp(low), np.exp(high), (np.exp(inner_low), np.exp(inner_high)), float(temperature),
-        float(temperature_uncertainty), " or ".join(fit.law.title or fit.law.name for fit in mixture.fits),
+        levels,
+        np.exp(median),
+        np.exp(low),
+        np.exp(high),
+        (np.exp(inner_low), np.exp(inner_high)),
+        float(temperature),
+        float(temperature_uncertainty),
+        " or ".join(fit.law.title or fit.law.name for fit in mixture.fits),
         _band_notes(mixture, temperature, temperature_uncertainty),
-    )  # fmt: skip
+    )
 
 
 def _standard_temperatures(temperature_distribution: str) -> Floats:

@@ -26,10 +26,10 @@ from creepkit.arrays import ArrayLike, Bools, Floats, single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.noise_model import MINIMUM_TESTS, cholesky_factors
-from creepkit.inverse.problem import LeastSquaresProblem, least_squares_problem
-from creepkit.inverse.residuals import ResidualFunction
-from creepkit.inverse.search.local_refinement import IterationCallback
+from creepkit.inverse.information_criteria import determined_parameters
+from creepkit.inverse.noise_model import MINIMUM_TESTS, NoiseModel, cholesky_factors
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
 from creepkit.inverse.uncertainty.model_averaging import INTERVAL_PROBABILITIES
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity, local_exponent, log_rate, quantity_of
 from creepkit.presentation import Presentable, present
@@ -39,92 +39,85 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def interval_problem(fit: Identification) -> LeastSquaresProblem:
-    """The problem of a fit about its optimum, with the scatter of the rate as its Laplace intervals have it.
+REFIT_TOLERANCES = Tolerances(max_steps=25, tolerance=1e-7)
+"""Of minima about an optimum that is known."""
+
+
+def interval_noise_model(fit: Identification) -> NoiseModel:
+    """The noise model of a fit, with the scatter of the rate as its Laplace intervals have it.
 
     That scatter, found by maximum likelihood from T tests beside K parameters, is too small by a factor of
     T / (T - K) in variance (see inverse.uncertainty); restricted likelihood, and a given scatter, are not.
     """
-    problem, test_count = least_squares_problem(fit), len(fit.histories)
+    test_count = len(fit.histories)
     is_rate_given = test_count < MINIMUM_TESTS or any(
         n.kind == "rate" and n.sd is not None for n in fit.settings.nuisances
     )
     if is_rate_given or fit.settings.weights == "likelihood" or fit.noise_model.rate == 0:
-        return problem
-    jacobian = problem.residuals.jacobian
-    assert jacobian is not None
-    determined_count = int((jacobian[..., : fit.u.size] != 0).any(axis=(0, 1)).sum())
+        return fit.noise_model
+    determined_count = determined_parameters(fit.residuals_of(fit.least_squares_problem), fit.u.size)
     rate_scatter = fit.noise_model.rate * float(np.sqrt(test_count / max(test_count - max(determined_count, 1), 1)))
-    noise_model = replace(fit.noise_model, rate=rate_scatter)
-    return replace(problem, noise_model=noise_model, covariance_factor=cholesky_factors(problem.residuals, noise_model))
+    return replace(fit.noise_model, rate=rate_scatter)
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """ln p, but for a constant, of candidates u (candidates, parameters).
+    """ln p, but for a constant, of candidates u.
 
-    objective : with the unknowns of tests held at their estimates. whitening : (tests, entries, entries), inverses of
-    the Cholesky factors of the covariance without the scatter of rates. effect : (tests, entries), at the optimum,
-    what one standard deviation of a test's own rate does. floor, ceiling : (parameters,) of the internal parameters.
-    taken : (data + unknowns, unknowns) Q. prior : (unknowns,) white residuals of the priors at the estimates.
-    freedom : nu; least : the least chi-square.
+    problem : with nuisance parameters fixed at their estimates. rate_sd : standard deviation of ln rate between tests.
+    test_weights : (tests,) -. whitening : (tests, observations, observations) inverses of the Cholesky factors of the
+    covariance without the scatter of rates. rate_effect : (tests, observations) -, at the optimum, what one standard
+    deviation of a test's own rate does. parameter_bounds : (2, parameters) of the internal parameters.
+    nuisance_basis : (data + nuisances, nuisances) Q. prior_residuals : (nuisances,) - of the priors, at the estimates.
+    degrees_of_freedom : nu; least_chi_square : at the optimum.
     """
 
     problem: LeastSquaresProblem
-    objective: ResidualFunction
+    rate_sd: float
+    test_weights: Floats
     whitening: Floats
     rate_effect: Floats
-    parameter_lower: Floats
-    parameter_upper: Floats
+    parameter_bounds: Floats
     nuisance_basis: Floats
     prior_residuals: Floats
     degrees_of_freedom: float
     least_chi_square: float
 
     @classmethod
-    def from_problem(cls, problem: LeastSquaresProblem, degrees_of_freedom: float) -> Posterior:
-        """That of a reopened identification."""
-        objective, residuals, parameter_count = (
-            problem.residual_function,
-            problem.residuals,
-            len(problem.residual_function.law.params),
-        )
-        fixed, nuisances, nuisance_values = (
-            objective.with_predictor(objective.predictor, objective.law, objective.coordinates),
-            objective.nuisance_parameters,
-            problem.x[parameter_count:],
-        )
-        fixed.nuisance_parameters = replace(nuisances, mean=np.array(nuisance_values), fixed=True)
-        parameter_bounds = np.array([[p.to_internal(b) for b in p.bounds] for p in objective.law.params.values()])
-        whitening = np.asarray(
-            np.linalg.inv(cholesky_factors(residuals, replace(problem.noise_model, rate=0.0))), float
-        )
-        rate_effect = (
-            residuals.log_rate_sensitivity * problem.noise_model.rate / np.sqrt(residuals.test_weights)[:, None]
-        )
-        root_precision = np.diag(np.sqrt(nuisances.precision))
+    def from_identification(cls, fit: Identification) -> Posterior:
+        """The posterior of an identification, about its optimum."""
+        problem, noise_model = fit.least_squares_problem, interval_noise_model(fit)
+        residuals, nuisances, count = fit.residuals_of(problem), problem.nuisance_parameters, fit.u.size
         assert residuals.jacobian is not None
-        nuisance_jacobian = _whitened(
-            whitening, rate_effect, np.moveaxis(residuals.jacobian[..., parameter_count:], -1, 0)
-        )[:, objective.observations.present].T
-        nuisance_basis, prior_residuals = (
-            np.linalg.qr(np.concatenate([nuisance_jacobian, root_precision]))[0],
-            root_precision @ (nuisance_values - nuisances.mean[: nuisances.size]),
-        )
-        least_chi_square = problem.chi_square(problem.minimise().u)
+        e = fit.x[count:]
+        whitening = np.asarray(np.linalg.inv(cholesky_factors(residuals, replace(noise_model, rate=0.0))), float)
+        rate_effect = residuals.log_rate_sensitivity * noise_model.rate / np.sqrt(residuals.test_weights)[:, None]
+        root_precision = np.diag(np.sqrt(nuisances.precision))
+        nuisance_jacobian = _whitened(whitening, rate_effect, np.moveaxis(residuals.jacobian[..., count:], -1, 0))
+        nuisance_rows = nuisance_jacobian[:, problem.observations.present].T
+        whole = problem.with_covariance(cholesky_factors(residuals, noise_model))
         return cls(
-            problem, fixed, whitening, rate_effect, parameter_bounds[:, 0], parameter_bounds[:, 1], nuisance_basis, prior_residuals, max(degrees_of_freedom, 1.0), least_chi_square
-        )  # fmt: skip
+            problem=problem.with_fixed_nuisances(e),
+            rate_sd=noise_model.rate,
+            test_weights=residuals.test_weights,
+            whitening=whitening,
+            rate_effect=rate_effect,
+            parameter_bounds=fit.law.internal_bounds,
+            nuisance_basis=np.linalg.qr(np.concatenate([nuisance_rows, root_precision]))[0],
+            prior_residuals=root_precision @ (e - nuisances.mean[: nuisances.size]),
+            degrees_of_freedom=max(fit.freedom, 1.0),
+            least_chi_square=whole.chi_square(whole.minimise(fit.x, tolerances=REFIT_TOLERANCES).u),
+        )
 
     @property
     def lower(self) -> Floats:
         """(parameters,) the lower bounds of u."""
-        return self.problem.bounds.lower[: self.parameter_lower.size]
+        return self.problem.bounds.lower
 
     @property
     def upper(self) -> Floats:
         """(parameters,) the upper bounds of u."""
-        return self.problem.bounds.upper[: self.parameter_lower.size]
+        return self.problem.bounds.upper
 
     def __call__(self, u: Floats) -> Floats:
         """(candidates,) ln p; -inf outside the bounds. All candidates are one prediction."""
@@ -139,7 +132,7 @@ class Posterior:
     def chi_square(self, u: Floats) -> Floats:
         """(candidates,) least sum of squares that any values of the nuisances leave."""
         residuals, rate_effect = self._residuals(u)
-        whitened = _whitened(self.whitening, rate_effect, residuals)[:, self.objective.observations.present]
+        whitened = _whitened(self.whitening, rate_effect, residuals)[:, self.problem.observations.present]
         rows = np.concatenate(
             [whitened, np.broadcast_to(self.prior_residuals, (len(u), self.prior_residuals.size))], axis=1
         )
@@ -151,29 +144,24 @@ class Posterior:
         A factor on all rates moves every coefficient, each of which is a coordinate's own. Where a term has none, and
         for tests compared over their whole life, whose derivatives are dear, it does what it does at the optimum.
         """
-        objective, law = self.objective, self.objective.law
-        coefficients = list(objective.coordinates.coefficients)
+        problem, law = self.problem, self.problem.law
+        coefficients = list(problem.coordinates.coefficients)
         is_separable = (
-            len(coefficients) == len(law.terms) + len(law.states)
-            and not objective.observations.followed_to_rupture.any()
+            len(coefficients) == len(law.terms) + len(law.states) and not problem.observations.followed_to_rupture.any()
         )
-        if not (is_separable and self.problem.noise_model.rate > 0):
-            return objective.batch_residuals(u), self.rate_effect
-        residuals, jacobian = objective.batch_jacobian(u)
-        rate_scatter = self.problem.noise_model.rate / np.sqrt(self.problem.residuals.test_weights)[:, None]
+        if not (is_separable and self.rate_sd > 0):
+            return problem.candidate_residuals(u), self.rate_effect
+        residuals, jacobian = problem.candidate_jacobian(u)
+        rate_scatter = self.rate_sd / np.sqrt(self.test_weights)[:, None]
         return residuals, 0.5 * (self.rate_effect + jacobian[..., coefficients].sum(axis=-1) * rate_scatter)
 
     def inside(self, u: Floats) -> Bools:
         """(candidates,) whether the bounds of u and of the law's parameters, and its constraints, hold."""
         is_inside = np.asarray(((u >= self.lower) & (u <= self.upper)).all(axis=1))
-        theta, tolerance = (
-            self.problem.residual_function.coordinates.theta(u),
-            1e-9 * (self.parameter_upper - self.parameter_lower),
-        )
-        is_inside &= ((theta >= self.parameter_lower - tolerance) & (theta <= self.parameter_upper + tolerance)).all(
-            axis=1
-        )
-        if self.problem.residual_function.law.constraints:
+        theta, (lower, upper) = self.problem.coordinates.theta(u), self.parameter_bounds
+        tolerance = 1e-9 * (upper - lower)
+        is_inside &= ((theta >= lower - tolerance) & (theta <= upper + tolerance)).all(axis=1)
+        if self.problem.law.constraints:
             bound_penalties = self.problem.bound_penalties
             is_inside &= np.array([not (bound_penalties.constraint_violations(candidate) > 0).any() for candidate in u])
         return np.asarray(is_inside)
@@ -227,9 +215,7 @@ class PosteriorSamples(Presentable):
     @property
     def values(self) -> dict[str, Floats]:
         """{parameter: (draws,)} in the author's units."""
-        theta = self.coordinates.theta(self.u)
-        table = self.coordinates.law.table.items()
-        return {n: np.exp(theta[:, k]) if p.scale == "log" else theta[:, k] for k, (n, p) in enumerate(table)}
+        return self.coordinates.law.from_internal(self.coordinates.theta(self.u))
 
     @property
     def converged(self) -> bool:
@@ -248,18 +234,26 @@ class PosteriorSamples(Presentable):
         return float(quantiles[0]), float(quantiles[1]), float(quantiles[2])
 
     def rate(
-        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats, Floats]:
         """Median creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape."""
         draws = log_rate(self.coordinates, stress, temperature, strain, time)(self.u)
         median, low, high = np.exp(np.quantile(draws, INTERVAL_PROBABILITIES, axis=0))
         return median, low, high
 
     def local_exponent(
-        self, stress: ArrayLike, temperature: ArrayLike | None = None, *, strain: ArrayLike | None = None,
+        self,
+        stress: ArrayLike,
+        temperature: ArrayLike | None = None,
+        *,
+        strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
-    ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats, Floats]:
         """Median local stress exponent with its 95 % interval."""
         draws = local_exponent(self.coordinates, stress, temperature, strain, time)(self.u)
         median, low, high = np.quantile(draws, INTERVAL_PROBABILITIES, axis=0)
@@ -271,9 +265,14 @@ class PosteriorSamples(Presentable):
 
 
 def sample_posterior(
-    fit: Identification, *, walkers: int = 32, steps: int = 1000, seed: int = 0, using: Predictor | None = None,
+    fit: Identification,
+    *,
+    walkers: int = 32,
+    steps: int = 1000,
+    seed: int = 0,
+    using: Predictor | None = None,
     progress: IterationCallback | None = None,
-) -> PosteriorSamples:  # fmt: skip
+) -> PosteriorSamples:
     """Sample the posterior of an identification's values; needs emcee.
 
     walkers : an even number of at least twice the parameters. using : another predictor of the same tests than the
@@ -285,9 +284,7 @@ def sample_posterior(
             f"{walkers} walkers and {steps} steps were asked for; a law of {size} parameters needs an even number of "
             f"at least {2 * size + 2} walkers, and at least 10 steps"
         )
-    posterior = Posterior.from_problem(
-        interval_problem(fit if using is None else replace(fit, predictor=using)), fit.freedom
-    )
+    posterior = Posterior.from_identification(fit if using is None else fit.with_histories(fit.histories, using))
     rng = np.random.default_rng(seed)
     moves = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)]
     sampler = emcee.EnsembleSampler(walkers, size, posterior, vectorize=True, moves=moves)

@@ -29,7 +29,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import cholesky_factors
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.uncertainty.posterior import interval_problem
+from creepkit.inverse.uncertainty.posterior import REFIT_TOLERANCES, interval_noise_model
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity, gradient, quantity_of
 from creepkit.presentation import Presentable, present
 
@@ -114,10 +114,11 @@ class _ProfilePoint:
 class _ProfileWalk:
     """Points of a profile, one after the other outwards from the optimum."""
 
-    def __init__(
-        self, fit: Identification, problem: LeastSquaresProblem, quantity: DerivedQuantity, root: float
-    ) -> None:
-        self.problem, self.root, self.size = problem, root, fit.u.size
+    def __init__(self, fit: Identification, quantity: DerivedQuantity, root: float) -> None:
+        self.root, self.size, self.noise_model = root, fit.u.size, interval_noise_model(fit)
+        self.residuals = fit.residuals_of(fit.least_squares_problem)
+        covariance_factor = cholesky_factors(self.residuals, self.noise_model)
+        self.problem = fit.least_squares_problem.with_covariance(covariance_factor)
         self.function, self.covariance = quantity.function(fit.coordinates), fit.covariance
         quantity_gradient = gradient(self.function, fit.u, np.sqrt(np.diag(fit.covariance)))
         self.sd = float(np.sqrt(quantity_gradient @ fit.covariance @ quantity_gradient))
@@ -125,7 +126,7 @@ class _ProfileWalk:
             raise FitError(
                 f"{quantity.name} does not depend on any parameter of law '{fit.law.name}': no profile of it"
             )
-        self.start = self._constrained_minimum(problem.x, None)
+        self.start = self._constrained_minimum(fit.x, None)
 
     def one_side(self, sign: float) -> tuple[list[_ProfilePoint], bool]:
         """Points to one side, and whether chi-square rose as far as wanted there."""
@@ -161,8 +162,9 @@ class _ProfileWalk:
         constraint = (
             None if value is None else _QuantityConstraint(self.function, self.size, value, CONSTRAINT_WIDTH * self.sd)
         )
-        x = self.problem.minimise(start, additional=constraint).u
-        x = self._problem_at(x).minimise(x, additional=constraint).u if self.problem.noise_model.rate > 0 else x
+        x = self.problem.minimise(start, additional=constraint, tolerances=REFIT_TOLERANCES).u
+        if self.noise_model.rate > 0:
+            x = self._problem_at(x).minimise(x, additional=constraint, tolerances=REFIT_TOLERANCES).u
         value_reached = float(self.function(x[: self.size]))
         return _ProfilePoint(
             x, 0.0 if abs(value_reached) < ZERO_TOLERANCE * self.sd else value_reached, self._chi_square(x)
@@ -170,22 +172,15 @@ class _ProfileWalk:
 
     def _problem_at(self, x: Floats) -> LeastSquaresProblem:
         """The problem with what a test's own rate does taken half way between the optimum and x."""
-        problem = self.problem
-        rate_effect = 0.5 * (
-            problem.residuals.log_rate_sensitivity + problem.residual_function.evaluate(x).log_rate_sensitivity
-        )
-        return replace(
-            problem,
-            covariance_factor=cholesky_factors(
-                replace(problem.residuals, log_rate_sensitivity=rate_effect), problem.noise_model
-            ),
-        )
+        rate_effect = 0.5 * (self.residuals.log_rate_sensitivity + self.problem.residuals(x).log_rate_sensitivity)
+        residuals = replace(self.residuals, log_rate_sensitivity=rate_effect)
+        return self.problem.with_covariance(cholesky_factors(residuals, self.noise_model))
 
     def _chi_square(self, x: Floats) -> float:
         """Of the data and the priors: the walls stand for bounds, at which a value is possible still."""
-        problem = self._problem_at(x) if self.problem.noise_model.rate > 0 else self.problem
+        problem = self._problem_at(x) if self.noise_model.rate > 0 else self.problem
         whitened, nuisance_count = problem.whitened(x), x.size - self.size
-        observation_count = int(problem.residual_function.observations.present.sum())
+        observation_count = problem.observations.count
         return float(
             (whitened[:observation_count] ** 2).sum() + (whitened[whitened.size - nuisance_count :] ** 2).sum()
         )
@@ -201,7 +196,7 @@ def profile(fit: Identification, quantity_or_name: str | DerivedQuantity, *, lev
     quantity = quantity_of(fit.coordinates, quantity_or_name)
     root = float(student.ppf(0.5 + 0.5 * level, max(fit.freedom, 1.0)))
     with single_threaded_blas():
-        walk = _ProfileWalk(fit, interval_problem(fit), quantity, root)
+        walk = _ProfileWalk(fit, quantity, root)
         (below, low), (above, high) = walk.one_side(-1.0), walk.one_side(1.0)
     return _profile(quantity, walk, [*below[:0:-1], *above], (low, high), level)
 
@@ -223,9 +218,18 @@ def _profile(
     low, high = (None if end is None else float(quantity.to_unit(end)) for end in ends)
     laplace = [float(quantity.to_unit(walk.start.value + s * walk.root * walk.sd)) for s in (-1, 1)]
     return ProfileLikelihood(
-        quantity.name, quantity.unit, quantity.to_unit(values), rise, float(quantity.to_unit(values[best])), low, high,
-        walk.root**2, level, (laplace[0], laplace[1]), _notes(quantity, points, rise, is_closed, walk),
-    )  # fmt: skip
+        quantity.name,
+        quantity.unit,
+        quantity.to_unit(values),
+        rise,
+        float(quantity.to_unit(values[best])),
+        low,
+        high,
+        walk.root**2,
+        level,
+        (laplace[0], laplace[1]),
+        _notes(quantity, points, rise, is_closed, walk),
+    )
 
 
 def _interval_end(values: Floats, roots: Floats, limit: float, best: int, sign: int) -> float:

@@ -71,9 +71,12 @@ def _point_text(stress: float, temperature: float | None) -> str:
 
 
 def log_rate(
-    coordinates: Coordinates, stress: ArrayLike, temperature: ArrayLike | None = None, strain: ArrayLike | None = None,
+    coordinates: Coordinates,
+    stress: ArrayLike,
+    temperature: ArrayLike | None = None,
+    strain: ArrayLike | None = None,
     time: ArrayLike | None = None,
-) -> CoordinateFunction:  # fmt: skip
+) -> CoordinateFunction:
     """ln of the creep rate (1/s) of virgin material at points, as a function of u: (..., parameters) to (..., points).
 
     What is not given is that of the reference point.
@@ -103,9 +106,12 @@ def log_rate(
 
 
 def local_exponent(
-    coordinates: Coordinates, stress: ArrayLike, temperature: ArrayLike | None = None, strain: ArrayLike | None = None,
+    coordinates: Coordinates,
+    stress: ArrayLike,
+    temperature: ArrayLike | None = None,
+    strain: ArrayLike | None = None,
     time: ArrayLike | None = None,
-) -> CoordinateFunction:  # fmt: skip
+) -> CoordinateFunction:
     """The local stress exponent at points, likewise."""
     level = np.asarray(stress, float)
     above, below = (

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.identify import identify
-from creepkit.inverse.problem import IdentificationProblem
+from creepkit.inverse.identify import identify, search_problem
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 from creepkit.inverse.settings import IdentificationSettings
 
@@ -63,15 +63,15 @@ def test_of_a_sum_the_swarm_keeps_the_best_of_each_subset(stand_in, test):
 
     Half of a chi-square of three, 99 %: 5.7 (the landscape's scatter is wider than the planted one, so less here).
     """
-    problem = IdentificationProblem.from_histories(SUM, [test], stand_in, IdentificationSettings(), None)
+    problem = LeastSquaresProblem.from_histories(SUM, [test], stand_in, IdentificationSettings(), None)
     swarm = ParticleSwarm(particles=80, iterations=25, maskable_terms="any")
-    found = {m.terms_off: m for m in swarm.minima(problem.cost_function(stand_in)).minima}
+    found = {m.terms_off: m for m in swarm.minima(search_problem(problem, stand_in)).minima}
     _, hardening = SUM.terms
-    single = IdentificationProblem.from_histories(
-        NORTON, [test], stand_in, IdentificationSettings(), problem.residual_function.coordinates.reference
+    single = LeastSquaresProblem.from_histories(
+        NORTON, [test], stand_in, IdentificationSettings(), problem.coordinates.reference
     )
     alone = found[(hardening,)]
-    (expected,) = ParticleSwarm(40, 15, refined_candidates=1).minima(single.cost_function(stand_in)).minima
+    (expected,) = ParticleSwarm(40, 15, refined_candidates=1).minima(search_problem(single, stand_in)).minima
     assert alone.cost == pytest.approx(expected.cost, abs=0.01)
     np.testing.assert_allclose(alone.u[:2], expected.u, atol=0.02)
     assert alone.cost - min(m.cost for m in found.values()) < 5.7

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
+from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.search.cost_function import SearchTrace
 from creepkit.inverse.search.derivative_free import CmaEs
-from creepkit.inverse.search.local_refinement import Bounds
 from creepkit.inverse.settings import IdentificationSettings
 from helpers.cost_functions import Known, cube, quadratic, rastrigin, rosenbrock
 
@@ -39,8 +39,8 @@ def test_candidates_stay_in_the_box_and_an_optimum_beyond_a_wall_is_found_on_it(
     landscape = Known(quadratic, Bounds(np.array([2.0, -5.0]), np.array([5.0, 5.0])))
     found = CmaEs().minima(landscape).minima[0]
     everything = np.concatenate(landscape.seen)
-    assert (everything >= landscape.box.lower).all()
-    assert (everything <= landscape.box.upper).all()
+    assert (everything >= landscape.bounds.lower).all()
+    assert (everything <= landscape.bounds.upper).all()
     np.testing.assert_allclose(found.u, [2.0, 2.0], atol=1e-4)
 
 
@@ -67,7 +67,7 @@ def test_progress_is_told():
         (dict(iterations=0), "CMA-ES: iterations is 0; it must be a whole number of at least 1"),
         (dict(population=2), "population is 2"),
         (dict(restarts=-1), "restarts is -1"),
-        (dict(initial_step_size=0), "step is 0 of the box"),
+        (dict(initial_step_size=0), "initial_step_size is 0 of the width"),
     ],
 )
 def test_settings_that_cannot_be(options, words):

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import creepkit as ck
-from creepkit.inverse.problem import IdentificationProblem
-from creepkit.inverse.search.cost_function import robust_loss, robust_weight
+from creepkit.inverse.identify import search_problem
+from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
+from creepkit.inverse.search.local_refinement import robust_loss, robust_weight
 from creepkit.inverse.search.multistart import MultiStart, distinct, screened_starts
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.records import History
@@ -22,7 +23,7 @@ def landscape(law, values, stresses=(60.0, 90.0, 130.0)):
         run = ck.simulate(law, bar, values, loading=ck.constant_stress(stress), times=TIMES)
         tests.append(History(name=f"{stress:g}", times=TIMES, outputs=run.outputs, loading=run.loading,
                              temperature=293.15))  # fmt: skip
-    return IdentificationProblem.from_histories(law, tests, bar, IdentificationSettings()).cost_function(bar)
+    return search_problem(LeastSquaresProblem.from_histories(law, tests, bar, IdentificationSettings()), bar)
 
 
 @pytest.mark.parametrize(
@@ -34,7 +35,7 @@ def test_planted_values_are_found_from_many_starts(name, values):
     law = ck.law(name)
     view = landscape(law, values)
     ends = batched_levenberg_marquardt(view, screened_starts(view, starts=6, draws=32))
-    found = view.objective.coordinates.values(ends[0].u)
+    found = view.coordinates.values(ends[0].u)
     assert {n: found[n] for n in values} == pytest.approx(values, rel=1e-3)
     assert sum(end.cost < ends[0].cost + 1e-4 for end in ends) >= 4
     assert all((view.bounds.lower <= end.u).all() and (end.u <= view.bounds.upper).all() for end in ends)
@@ -44,9 +45,9 @@ def test_one_prediction_for_all_starts_is_as_good_as_one_each():
     law = ck.law("strain-hardening")
     view = landscape(law, {"A": 3e-16, "n": 4.0, "m": -0.4})
     starts = np.array(screened_starts(view, starts=4, draws=16))
-    values, jacobian = view.objective.batch_jacobian(starts)
+    values, jacobian = view.candidate_jacobian(starts)
     for k, u in enumerate(starts):
-        alone = view.objective.evaluate(u)
+        alone = view.residuals(u)
         assert values[k] == pytest.approx(alone.values, rel=1e-6, abs=1e-9)
         assert jacobian[k] == pytest.approx(alone.jacobian, rel=1e-4, abs=1e-6)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from creepkit.errors import FitError
+from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.search.derivative_free import ParticleSwarm
-from creepkit.inverse.search.local_refinement import Bounds
 from creepkit.inverse.search.term_mask import TermMask
 from creepkit.inverse.settings import IdentificationSettings
 from helpers.cost_functions import SUM, TRIPLE, Known, cube, quadratic, rastrigin, rosenbrock
@@ -18,7 +18,7 @@ SMALL = ParticleSwarm(particles=40, iterations=30)
 
 def paths(landscape):
     """(iterations, particles, parameters) where the particles were, in widths of the box."""
-    return (np.array(landscape.seen) - landscape.box.low) / landscape.box.width
+    return (np.array(landscape.seen) - landscape.bounds.lower) / landscape.bounds.width
 
 
 # ---- known minima --------------------------------------------------------------------------------------------------
@@ -180,7 +180,7 @@ CAREFUL = ParticleSwarm(particles=100, iterations=60, maskable_terms="any")
 @pytest.mark.parametrize("terms", [(POWER,), (HARDENING,), (POWER, HARDENING)])
 @pytest.mark.parametrize("off", ["any", (POWER, HARDENING)])
 def test_an_absent_term_is_switched_off_and_a_present_one_is_not(terms, off):
-    found = replace(CAREFUL, off=off).minima(planted(*terms)).minima[0]
+    found = replace(CAREFUL, maskable_terms=off).minima(planted(*terms)).minima[0]
     assert {POWER, HARDENING} - set(found.terms_off) == set(terms)
     assert found.cost < 5 * len(terms) + 10  # half of the chi-square of the planted waves is 5
 
@@ -219,7 +219,7 @@ def test_only_what_may_be_off_is():
 
 def test_masks_of_three_terms_are_never_empty_and_reach_every_subset():
     landscape = Known(quadratic, cube(len(TRIPLE.names)), law=TRIPLE, rates=(0, 2, 5))
-    switches, rng = TermMask.from_cost_function(landscape, "any"), np.random.default_rng(0)
+    switches, rng = TermMask.from_problem(landscape, "any"), np.random.default_rng(0)
     masks = switches.initial_masks(2000, rng)
     assert masks.any(axis=1).all()
     assert len(np.unique(masks, axis=0)) == 7
@@ -233,7 +233,7 @@ def test_a_parameter_shared_with_another_term_does_not_rest():
 
     law = SUM.times(arrhenius(T_ref=1000.0))
     landscape = Known(quadratic, cube(len(law.names)), law=law, rates=(0, 2))
-    switches = TermMask.from_cost_function(landscape, "any")
+    switches = TermMask.from_problem(landscape, "any")
     live = dict(zip(law.names, switches.active_parameters(np.array([True, False])), strict=True))
     assert live.pop("Q")
     assert [name for name, is_live in live.items() if not is_live] == ["A_2", "n_2", "m"]
@@ -251,8 +251,8 @@ def test_a_parameter_shared_with_another_term_does_not_rest():
         (dict(form="best"), "form is 'best'; allowed are constriction and inertia"),
         (dict(boundary="none"), "boundary is 'none'; allowed are absorb and reflect"),
         (dict(inertia=(1.2, 0.4)), r"inertia is \(1.2, 0.4\); both are from 0 to 1"),
-        (dict(velocity=0), "velocity is 0 of the box"),
-        (dict(own=2.0, common=2.0), "must be more than 4 together"),
+        (dict(max_velocity=0), "max_velocity is 0 of the width"),
+        (dict(cognitive=2.0, social=2.0), "must be more than 4 together"),
     ],
 )
 def test_settings_that_cannot_be(options, words):

@@ -51,12 +51,12 @@ def test_the_criteria_are_their_formulas(ranking):
     """BIC and AICc of the same chi-squares, by hand."""
     chi2 = np.array([r.chi_square for r in ranking.laws])
     count = np.array([len(r.fit.u) for r in ranking.laws])
-    bic = chi2 + count * np.log(ranking.size)
+    bic = chi2 + count * np.log(ranking.independent_frames)
     assert [r.excess for r in ranking.laws] == pytest.approx(bic - bic[0], abs=1e-6)
     weights = np.exp(-0.5 * (bic - bic.min()))
     assert [r.weight for r in ranking.laws] == pytest.approx(weights / weights.sum(), rel=1e-9)
     fits = [r.fit for r in ranking.laws]
-    n = ranking.size
+    n = ranking.independent_frames
     aicc = chi2 + 2 * count + 2 * count * (count + 1) / (n - count - 1)
     assert [r.excess for r in rank(fits, "aicc").laws] == pytest.approx(np.sort(aicc - aicc.min()), abs=1e-6)
 

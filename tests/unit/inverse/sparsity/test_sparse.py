@@ -54,12 +54,12 @@ def reduced(hardening):
 
 
 def test_a_planted_single_law_is_found(reduced):
-    assert reduced.sparsity.kept == (STRAIN,)
+    assert reduced.sparsity.kept_terms == (STRAIN,)
     assert set(reduced.law.terms) == {STRAIN}
     for name, truth in (("n_2", 3.5), ("m_1", -0.4)):
         estimate = next(e for e in reduced.estimates if e.name == name)
         assert estimate.value == pytest.approx(truth, abs=4 * (estimate.high - estimate.low) / 3.92)
-    assert reduced.sparsity.excess < 0
+    assert reduced.sparsity.bic_difference < 0
     assert reduced.sparsity.p_value > 0.01
 
 
@@ -72,11 +72,11 @@ def test_subsets_find_it_too(hardening):
 def test_a_swarm_searches_the_penalised_landscape(hardening):
     """Its cost at the optimum is what least squares has there, penalty included."""
     _, reductions = hardening
-    stage = reductions.stage
-    penalised = PenalisedTerms.from_objective(stage.objective, Sqrt())
-    landscape, u = stage.landscape(penalised), stage.start[: stage.size]
-    wanted = stage.misfit(stage.start) + penalised.values(u[None])[0]
-    assert landscape.cost(u[None])[0] == pytest.approx(wanted, rel=1e-9)
+    stage = reductions.problem
+    penalised = PenalisedTerms.from_problem(stage.problem, Sqrt())
+    searched, u = stage.search_problem(penalised), stage.start[: stage.parameter_count]
+    wanted = 0.5 * stage.problem.chi_square(stage.start) + penalised.values(u[None])[0]
+    assert searched.cost(u[None])[0] == pytest.approx(wanted, rel=1e-9)
     choice = choose_terms(reductions, Sqrt(), ParticleSwarm(particles=8, iterations=2, refined_candidates=1))
     assert choice.kept_terms == (STRAIN,)
     assert len(choice.trace) == 2
@@ -84,11 +84,11 @@ def test_a_swarm_searches_the_penalised_landscape(hardening):
 
 def test_squared_l2_shares_the_rate_out(hardening):
     """What one term gives alone is given by several: the penalty is smallest at equal shares."""
-    stage = hardening[1].stage
-    x = stage.minimise(stage.start, PenalisedTerms.from_objective(stage.objective, L2(240.0))).u
-    shares = stage.shares(x)
-    assert max(shares.values()) < max(stage.shares(stage.start).values())
-    assert len(terms_above(shares)) > 1
+    stage = hardening[1].problem
+    x = stage.minimise(stage.start, PenalisedTerms.from_problem(stage.problem, L2(240.0))).u
+    contributions = stage.contributions_at(x)
+    assert max(contributions.values()) < max(stage.contributions_at(stage.start).values())
+    assert len(terms_above(contributions)) > 1
 
 
 def test_memory_that_is_not_there_is_switched_off():
@@ -121,10 +121,10 @@ def path(hardening):
 
 def test_along_the_path_terms_go_and_misfit_grows(path):
     assert path.strengths[0] == 0
-    assert path.kept[-1] == (STRAIN,)
+    assert path.kept_terms[-1] == (STRAIN,)
     assert (np.diff(path.chi_square) > -0.1).all()
-    assert path.kept[path.chosen] == (STRAIN,)
-    assert path.criterion[path.chosen] == 0
+    assert path.kept_terms[path.chosen] == (STRAIN,)
+    assert path.bic_excess[path.chosen] == 0
     assert "<- chosen" in str(path)
 
 
@@ -137,7 +137,7 @@ def test_the_path_is_drawn(path, tmp_path):
 
 def test_draws_of_frames_keep_what_the_whole_test_keeps(hardening):
     _, reductions = hardening
-    optimum = reductions.stage.placed(reductions.of([STRAIN]).law, reductions.of([STRAIN]).x)
+    optimum = reductions.problem.embedded(reductions.with_terms([STRAIN]).law, reductions.with_terms([STRAIN]).x)
     found = selection_frequencies(reductions, Sqrt(), 24.0, optimum, resamples=2, seed=1)
     assert found.unit == "blocks of frames"
     assert found.term_counts == {SINE: 0, STRAIN: 2, TIME: 0}
@@ -147,26 +147,25 @@ def test_draws_of_frames_keep_what_the_whole_test_keeps(hardening):
 
 def test_draws_weigh_all_frames_alike(hardening):
     """Blocks that go round the end: each frame is drawn once on average."""
-    stage = hardening[1].stage
-    weights = np.mean(list(bootstrap_weights(stage, 2000, np.random.default_rng(0))), axis=0)
-    present = stage.objective.entries.present
+    stage = hardening[1].problem
+    weights = np.mean(list(bootstrap_weights(stage.problem.observations, 2000, np.random.default_rng(0))), axis=0)
+    present = stage.problem.observations.present
     np.testing.assert_allclose(weights[present], 1.0, atol=0.1)
 
 
 def test_of_several_tests_whole_ones_are_drawn():
     """As many as there are, each as likely as another; all entries of a test together."""
-    entries = SimpleNamespace(present=np.ones((5, 7), bool), frame=np.tile(np.arange(7), (5, 1)))
-    stage = SimpleNamespace(objective=SimpleNamespace(entries=entries))
-    drawn = np.array(list(bootstrap_weights(stage, 2000, np.random.default_rng(0))))
+    observations = SimpleNamespace(present=np.ones((5, 7), bool), frame_index=np.tile(np.arange(7), (5, 1)))
+    drawn = np.array(list(bootstrap_weights(observations, 2000, np.random.default_rng(0))))
     assert (drawn == drawn[:, :, :1]).all()
     np.testing.assert_array_equal(drawn[:, :, 0].sum(axis=1), 5)
     np.testing.assert_allclose(drawn.mean(axis=0), 1.0, atol=0.1)
 
 
 def test_frames_drawn_twice_count_twice(hardening):
-    stage = hardening[1].stage
-    twice = with_weights(stage, np.full(stage.objective.entries.present.shape, 2.0))
-    assert twice.half_chi_square(stage.start) == pytest.approx(2 * stage.misfit(stage.start))
+    stage = hardening[1].problem
+    twice = with_weights(stage, np.full(stage.problem.observations.present.shape, 2.0))
+    assert twice.problem.chi_square(stage.start) == pytest.approx(2 * stage.problem.chi_square(stage.start))
 
 
 def test_intervals_of_frequencies_are_exact():
@@ -182,7 +181,7 @@ def test_intervals_of_frequencies_are_exact():
 
 def test_a_term_that_is_needed_comes_back(hardening):
     _, reductions = hardening
-    wrong = TermChoice((SINE,), {SINE: 0.6, STRAIN: 0.3, TIME: 0.1}, reductions.stage.start)
+    wrong = TermChoice((SINE,), {SINE: 0.6, STRAIN: 0.3, TIME: 0.1}, reductions.problem.start)
     assert STRAIN in confirmed_law(reductions, wrong).kept_terms
 
 

@@ -10,7 +10,6 @@ from scipy.stats import t as student
 
 from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
-from creepkit.inverse.problem import least_squares_problem
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.posterior import Posterior, sample_posterior
 from creepkit.inverse.uncertainty.quantities import exponent_at, rate_at
@@ -45,7 +44,7 @@ def test_of_a_linear_problem_they_are_normal(samples, tests):
     draws = np.stack([np.log(samples.values["A"]), samples.values["n"]])
     sd = np.sqrt(np.diag(covariance))
     assert samples.converged
-    assert samples.effective > 1000
+    assert samples.effective_sample_size > 1000
     assert np.abs(draws.mean(axis=1) - best) == pytest.approx(0.0 * sd, abs=0.15 * sd.max())
     assert np.cov(draws) == pytest.approx(covariance, rel=0.15)
     assert np.corrcoef(draws)[0, 1] == pytest.approx(covariance[0, 1] / sd.prod(), abs=0.005)
@@ -107,7 +106,7 @@ def test_nuisances_are_integrated_out(tests):
     using = LogRates(by=3.0)
     own = (Nuisance("thickness", mean=0.5, sd=0.05),)
     fit = known_scatter(NORTON, tests, SD, using=using, nuisances=own)
-    posterior = Posterior.from_problem(least_squares_problem(fit), fit.freedom)
+    posterior = Posterior.from_identification(fit)
     rows = np.array(
         [(1.0, np.log(h.loading.program().values[0] / fit.reference.stress)) for h in tests for _ in h.times]
     )

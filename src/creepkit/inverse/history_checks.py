@@ -1,0 +1,94 @@
+"""Checks of histories before an identification: enough finite outputs, and creep beyond their noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from creepkit.errors import FitError
+from creepkit.inverse.composite_predictor import compared_outputs, predictor_for
+from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, ObservationVector, frames_with_data
+from creepkit.inverse.reference_conditions import detect_creep
+from creepkit.language import CreepLaw
+from creepkit.records import History, Predictor
+
+SIGNIFICANT_GROWTH = 5.0
+"""Increase of an output, in units of its noise, that is creep."""
+
+
+def check_creep(observations: ObservationVector, histories: Sequence[History]) -> None:
+    """Some strain must rise above the floor of its transform, or some other output grow beyond its noise."""
+    for position, (name, transform) in enumerate(zip(observations.outputs, observations.transforms, strict=True)):
+        mask = observations.leading_output & (observations.output_index == position)
+        if name in LOGARITHMIC_OUTPUTS:
+            if (mask & (observations.values > 2 * transform.floor)).any():
+                return
+            continue
+        for k, history in enumerate(histories):
+            values = observations.values[k, mask[k]]
+            if (
+                values.size
+                and np.ptp(values) > SIGNIFICANT_GROWTH * observations.noise[position]
+                and _creeps_under_load(history, name)
+            ):
+                return
+    output_names = dict.fromkeys(
+        observations.outputs[k] for k in observations.output_index[observations.leading_output]
+    )
+    raise FitError(
+        f"no {' or '.join(output_names)} of these histories rises above its noise while the load is held; there is no "
+        "creep to identify a law from"
+    )
+
+
+def _creeps_under_load(history: History, output: str) -> bool:
+    """Whether a bulge test grows while its pressure is held: a jump of pressure alone moves it elastically."""
+    return history.loading.quantity != "pressure" or detect_creep(history, output).shows_creep
+
+
+def check_histories(law: CreepLaw, histories: Sequence[History], predictor: Predictor) -> None:
+    """There must be parameters, and named histories with enough finite outputs to find them from."""
+    if not histories:
+        raise FitError(f"law '{law.name}': there are no histories to identify it from")
+    if not law.params:
+        raise FitError(f"law '{law.name}' has no parameter left to identify")
+    names = [h.name for h in histories]
+    for history in histories:
+        if names.count(history.name) > 1:
+            raise FitError(f"two histories are called '{history.name}'; give each its own name")
+        _check_outputs(history, predictor)
+    frames = sum(int(h.used.sum()) for h in histories)
+    if frames <= len(law.params):
+        raise FitError(f"law '{law.name}' has {len(law.params)} parameters and the histories only {frames} frames")
+
+
+def _check_outputs(history: History, predictor: Predictor) -> None:
+    """Frames without a number are left out, output by output; an infinite one is a mistake."""
+    outputs = compared_outputs(predictor, history)
+    if not outputs:
+        known = ", ".join(getattr(predictor_for(predictor, history), "outputs", ())) or "nothing"
+        raise FitError(
+            f"history '{history.name}' has none of the outputs that are predicted ({known}); "
+            f"it has {', '.join(history.outputs) or 'none'}"
+        )
+    used = history.used & (history.times > 0)
+    if int((used & frames_with_data(history)).sum()) < 2:
+        raise FitError(f"history '{history.name}' has fewer than two usable frames after time zero")
+    for name in outputs:
+        if np.isinf(history.outputs[name][used]).any():
+            raise FitError(f"history '{history.name}' has an infinite {name}; mark the frame unused")
+
+
+def check_explicit_nuisances(
+    kinds: Sequence[str], observations: ObservationVector, histories: Sequence[History], predictor: Predictor
+) -> None:
+    """Explicit nuisances have no place yet where tests are followed to rupture."""
+    if not kinds or not observations.followed_to_rupture.any():
+        return
+    history = histories[int(np.argmax(observations.followed_to_rupture))]
+    name = getattr(predictor_for(predictor, history), "name", "predictor")
+    raise FitError(
+        f"nuisance '{kinds[0]}' cannot be fitted beside tests that are followed to their end ('{history.name}', "
+        f"{name}); leave it out, or forget how they ended: history.replace(rupture_time=None, unruptured=False)"
+    )

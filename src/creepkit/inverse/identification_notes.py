@@ -1,0 +1,140 @@
+"""Provenance and notes of an identification: versions and fingerprints, ranges of the tests, and what to be wary of."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+
+import numpy as np
+
+from creepkit import registry
+from creepkit.inverse.goodness_of_fit import TestFit
+from creepkit.inverse.iterative_estimation import EstimationResult
+from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS
+from creepkit.inverse.nuisance_parameters import NuisanceEstimate
+from creepkit.inverse.observation_vector import usable_frames
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.reference_conditions import reference_end_strain, reference_stresses
+from creepkit.language import temperature
+from creepkit.records import History, Prediction, Status
+
+LOW_TEST_WEIGHT = 0.5
+"""Weight below which a test is named."""
+
+
+LARGE_STRAIN, LARGE_RUPTURE_STRAIN = 0.5, 2.0
+"""Strains above these are worth a word: of a test whose end is not known, and of one that was followed to it."""
+
+
+def fitted_ranges(problem: LeastSquaresProblem) -> dict[str, tuple[float, float]]:
+    """{"stress", "temperature", "strain", "time": (low, high)} of the fitted frames; MPa, K, s."""
+    tests = problem.histories
+    values_by_name = {
+        "stress": [v for h in tests for v in reference_stresses(h, problem.predictor)],
+        "temperature": [v for h in tests for v in h.temperature_program().values],
+        "strain": [0.0, *(reference_end_strain(h, problem.predictor) for h in tests)],
+        "time": [v for h in tests for v in (float(h.times[0]), float(h.times[-1]))],
+    }
+    return {name: (float(min(values)), float(max(values))) for name, values in values_by_name.items()}
+
+
+def provenance_of(problem: LeastSquaresProblem, search_evaluations: int) -> dict[str, str | int]:
+    """Versions, fingerprints and counts; one evaluation is one candidate on all tests.
+
+    search_evaluations : of the global search, by the reduced-order model where the predictor has one.
+    """
+    law = problem.law
+    return {
+        "creepkit": version("creepkit"),
+        "law": law.name,
+        "origin": registry.default_registry().distributions_of(law),
+        "fingerprint": law.fingerprint,
+        "specimen": getattr(problem.predictor, "name", type(problem.predictor).__name__),
+        "evaluations": problem.evaluations.count,
+        "search_evaluations": search_evaluations,
+        "data": _data_digest(problem),
+        "when": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _data_digest(problem: LeastSquaresProblem) -> str:
+    """What was compared, and how: identifications that share it can be ranked against one another."""
+    digest, observations, settings = hashlib.sha256(), problem.observations, problem.settings
+    for array in (observations.values, observations.times, observations.present, observations.output_index):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    names = [h.name for h in problem.histories]
+    weights = settings.weights if isinstance(settings.weights, str) else sorted(settings.weights.items())
+    method = (
+        names,
+        observations.outputs,
+        observations.transforms,
+        settings.loss,
+        settings.test_loss,
+        weights,
+        settings.nuisances,
+    )
+    digest.update(repr(method).encode())
+    return digest.hexdigest()[:16]
+
+
+def identification_notes(
+    estimation: EstimationResult, tests: Sequence[TestFit], nuisances: Sequence[NuisanceEstimate]
+) -> tuple[str, ...]:
+    """What limits the trust in an identification, one sentence each."""
+    problem = estimation.problem
+    sentences, law, histories, settings = [], problem.law, problem.histories, problem.settings
+    if not estimation.minimum.converged:
+        sentences.append("the last refinement stopped at its largest number of steps: raise starts or look at the plot")
+    temperatures = {round(float(v), 1) for h in histories for v in h.temperature_program().values}
+    if max(temperatures) - min(temperatures) > 5 and not law.uses(temperature):
+        sentences.append(
+            f"the tests span {min(temperatures):.0f} to {max(temperatures):.0f} K and this law knows no temperature"
+        )
+    stress_levels = {round(float(v), 3) for h in histories for v in reference_stresses(h, problem.predictor)}
+    if len(stress_levels) == 1 and all(h.loading.quantity == "stress" for h in histories):
+        sentences.append("all tests have one stress: the stress dependence is not determined by them")
+    if len(histories) < MINIMUM_TESTS and any(n.kind == "rate" and n.sd is None for n in settings.nuisances):
+        assumption_note = f"their rates are assumed to scatter by {100 * ASSUMED_RATE_SD:.0f} %"
+        likelihood_note = "how their rates scatter cannot be seen, and intervals are those of these tests alone"
+        note = likelihood_note if settings.weights == "likelihood" else assumption_note
+        sentences.append(f"fewer than {MINIMUM_TESTS} tests: {note}")
+    sentences += _large_strain_notes(histories)
+    if (problem.bound_penalties.constraint_violations(estimation.minimum.u[: problem.parameter_count]) > 1e-3).any():
+        sentences.append("a constraint of the law does not hold over the tests at these values")
+    return (*sentences, *_test_notes(problem, tests, nuisances))
+
+
+def domain_notes(prediction: Prediction, histories: Sequence[History]) -> tuple[str, ...]:
+    """The tests for which a surrogate speaks of what it was not trained on, in one sentence."""
+    outside = [h.name for h, s in zip(histories, prediction.status[0], strict=True) if s == Status.OUTSIDE_DOMAIN]
+    if not outside:
+        return ()
+    named_tests = f"'{outside[0]}'" + (f" and {len(outside) - 1} more" if len(outside) > 1 else "")
+    problem = "the answer lies outside the domain that the surrogate was trained in"
+    return (f"{problem}, in test {named_tests}: simulate it with the specimen itself",)
+
+
+def _large_strain_notes(histories: Sequence[History]) -> list[str]:
+    """A column in percent that was taken for plain strain shows in its size."""
+    for end_is_known, limit in ((False, LARGE_STRAIN), (True, LARGE_RUPTURE_STRAIN)):
+        tests = [h for h in histories if "strain" in h.outputs and h.end_known == end_is_known]
+        if any(h.outputs["strain"][usable_frames(h, "strain")].max(initial=0.0) > limit for h in tests):
+            return [f"strains above {limit:g} were fitted: a column in percent must say so, as strain_pct"]
+    return []
+
+
+def _test_notes(
+    problem: LeastSquaresProblem, tests: Sequence[TestFit], nuisances: Sequence[NuisanceEstimate]
+) -> list[str]:
+    sentences = [
+        f"test '{m.name}' is far from the others and weighs {m.weight:.2g} of one"
+        for m in tests
+        if m.weight < LOW_TEST_WEIGHT
+    ]
+    nuisance_parameters = problem.nuisance_parameters
+    for n, low, high in zip(nuisances, nuisance_parameters.low, nuisance_parameters.high, strict=True):
+        if min(n.value - low, high - n.value) < 1e-4 * (high - low):
+            sentences.append(f"the {n.kind} of '{n.owner}' lies at its bound, {n.value:.4g}")
+    return sentences

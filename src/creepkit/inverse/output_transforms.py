@@ -1,0 +1,113 @@
+"""Output transforms: the quantities in which outputs are compared, logarithmic for strains and linear for others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from creepkit.arrays import Floats
+
+
+class OutputTransform(Protocol):
+    """A monotone map g from an output to the quantity in which it is compared; arrays keep their shape, (...,)."""
+
+    @property
+    def floor(self) -> float:
+        """The size, in the output's unit, below which a difference is nothing."""
+        ...
+
+    @property
+    def ceiling(self) -> float:
+        """The compared quantity from which a prediction is continued after rupture."""
+        ...
+
+    def forward(self, y: Floats) -> Floats:
+        """The compared quantity."""
+        ...
+
+    def inverse(self, g: Floats) -> Floats:
+        """The output whose compared quantity is g."""
+        ...
+
+    def derivative(self, y: Floats) -> Floats:
+        """dg/dy."""
+        ...
+
+
+@dataclass(frozen=True)
+class LogTransform:
+    """g(y) = asinh(y / 2 floor): ln(y / floor) well above the floor, linear below it, finite for y <= 0."""
+
+    floor: float
+
+    @property
+    def ceiling(self) -> float:
+        """The transformed strain of one."""
+        return float(np.arcsinh(1.0 / (2.0 * self.floor)))
+
+    def forward(self, y: Floats) -> Floats:
+        """The compared quantity."""
+        return np.arcsinh(y / (2.0 * self.floor))
+
+    def inverse(self, g: Floats) -> Floats:
+        """The output whose compared quantity is g."""
+        return 2.0 * self.floor * np.sinh(g)
+
+    def derivative(self, y: Floats) -> Floats:
+        """dg/dy; 1/y well above the floor."""
+        return 1.0 / np.hypot(y, 2.0 * self.floor)
+
+
+@dataclass(frozen=True)
+class LinearTransform:
+    """g(y) = y / scale, the scale being the standard deviation of what was measured.
+
+    scale, largest : in the output's unit; the largest measured value.
+    """
+
+    scale: float
+    largest: float
+
+    @property
+    def floor(self) -> float:
+        """One per cent of the scale."""
+        return 0.01 * self.scale
+
+    @property
+    def ceiling(self) -> float:
+        """The transformed largest measured value."""
+        return self.largest / self.scale
+
+    def forward(self, y: Floats) -> Floats:
+        """The compared quantity."""
+        return y / self.scale
+
+    def inverse(self, g: Floats) -> Floats:
+        """The output whose compared quantity is g."""
+        return g * self.scale
+
+    def derivative(self, y: Floats) -> Floats:
+        """dg/dy."""
+        return np.full(np.shape(y), 1.0 / self.scale)
+
+
+@dataclass(frozen=True)
+class LogTimeTransform:
+    """g(t) = -ln t of a rupture time t in s: larger where a test breaks earlier, as strains are where it is faster."""
+
+    floor: float = 0.0
+    ceiling: float = 0.0
+
+    def forward(self, y: Floats) -> Floats:
+        """The compared quantity."""
+        return -np.log(y)
+
+    def inverse(self, g: Floats) -> Floats:
+        """The rupture time whose compared quantity is g."""
+        return np.exp(-g)
+
+    def derivative(self, y: Floats) -> Floats:
+        """dg/dy."""
+        return -1.0 / y
