@@ -124,11 +124,11 @@ def _planted_bulge_test(folder: Path) -> list[Path]:
     from creepkit.records import Nuisance
 
     (test,) = ck.read_histories(PLANTED_BULGE)
-    pressures = dict.fromkeys(f"{value:g}" for value in test.loading.program().values if value > 0)
+    pressures = " then ".join(dict.fromkeys(f"{value:g}" for value in test.loading.program().values if value > 0))
+    hours, height = test.times[-1] / 3600, test.outputs["amplitude"][-1]
     typer.echo(
-        f"\nSIMULATED: a bulge test with the noise of cameras, {' then '.join(pressures)} MPa, {test.times.size} frames "
-        f"to {test.times[-1] / 3600:.0f} h,\ntop raised by {test.outputs['amplitude'][-1]:.2f} mm; every law is simulated "
-        "by finite elements"
+        f"\nSIMULATED: a bulge test with the noise of cameras, {pressures} MPa, {test.times.size} frames to {hours:.0f} h,\n"
+        f"top raised by {height:.2f} mm; every law is simulated by finite elements"
     )
     laws = [ck.law(name) for name in BULGE_LAWS]
     ranking = _identify("bulge test", laws, [test], starts=1, nuisances=[Nuisance("offset")])
