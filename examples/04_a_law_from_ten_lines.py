@@ -154,8 +154,10 @@ fit.save("brittle-steel.json")
 fit.plot("brittle-steel.png")
 
 # %%
-# What was never fitted is predicted: how long the tube of step 5 lives, and what is left of a held stress.
-# ---------------------------------------------------------------------------------------------------------
+# Prediction of other tests
+# -------------------------
+# The tube and the relaxation test, which were never fitted, compared with the truth.
+
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
 left.plot(tube.times / HOUR, 100 * tube.outputs["strain_11"], "k-", label="truth, along")
 left.plot(tube.times / HOUR, 100 * tube.outputs["strain_12"], "k--", label="truth, shear")
@@ -181,13 +183,17 @@ for axes in (left, right):
 figure.savefig("brittle-steel-elsewhere.png", dpi=120)
 
 # %%
-# A package that colleagues install; it holds the ten lines until yours replace them.
-# -----------------------------------------------------------------------------------
+# A package
+# ---------
+# What colleagues install; it holds a law of ten lines until yours replaces it.
+
 command = Path(sys.executable).with_name("creepkit")
 if not Path("new-steel").exists():
     print(subprocess.run([command, "new-law", "new-steel"], check=True, capture_output=True, text=True).stdout)
 
 # %%
-# Text for other people's programs; intervals and range of validity stand in the head.
-# ------------------------------------------------------------------------------------
+# Text for other programs
+# -----------------------
+# Intervals and the range of validity are given as comments.
+
 print(ck.export(fit, "python")[:700])
