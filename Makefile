@@ -1,8 +1,9 @@
 # make test   set up .venv, then check style, types, floors and run all tests, those of plugins/ included
 # make verify-export   exported laws in a CalculiX built from Debian's source, beside our solver: a table
 # make surrogate   remake the surrogate that ships: 8,000 simulations, 300 epochs; some 20 minutes of CPU
-# make demo   set up .venv, then identify a law from a virtual bulge test and leave plots in demo/
+# make demo   set up .venv, then identify laws from measured creep curves and a simulated bulge test; plots in demo/
 #
+# Both need make and Python alone; tests that need a compiler are skipped without it. PYTEST_OPTIONS goes to pytest.
 # TORCH chooses another build of torch: make test TORCH='torch==2.13.0' on a machine with a GPU.
 
 SHELL := /bin/bash
@@ -31,7 +32,7 @@ test: .venv/.ok
 	$(BIN)/lint-imports --no-logo
 	@export NUMBA_CACHE_DIR=$$($(BIN)/python -c '$(COMPILED)'); \
 	    for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q); done
-	$(BIN)/pytest -q -n 2
+	$(BIN)/pytest -q -n 2 $(PYTEST_OPTIONS)
 
 demo: .venv/.ok
 	$(BIN)/creepkit demo --to demo

@@ -1,5 +1,4 @@
-r"""
-Thin measured creep curves
+r"""Thin measured creep curves
 ==========================
 
 How the creep curves of CMSX-6 that ship with this package were made from the measured ones.
@@ -21,8 +20,9 @@ import creepkit as ck
 
 FRAMES, EARLY_FRAMES = 60, 20
 
-folder = Path(sys.argv[1]) if len(sys.argv) > 1 and not sys.argv[1].startswith("-") else ck.example_data("cmsx6")
-out = Path(sys.argv[2]) if len(sys.argv) > 2 else Path("cmsx6_thinned")
+paths = [Path(word) for word in sys.argv[1:] if word != "--quick"]
+folder = paths[0] if paths else ck.example_data("cmsx6")
+out = paths[1] if len(paths) > 1 else Path("cmsx6_thinned")
 
 # %%
 # Which frames are kept

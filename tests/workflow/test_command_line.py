@@ -176,14 +176,24 @@ def test_bounds_that_exclude_the_data_are_said(tmp_path):
     assert not (tmp_path / "o").exists()
 
 
-def test_demo_finds_the_law_of_a_virtual_bulge_test(tmp_path):
+def test_demo_identifies_measured_curves_then_the_law_of_a_virtual_bulge_test(tmp_path):
     result = creepkit("demo", "--to", tmp_path / "demo")
     assert result.exit_code == 0, result.output
-    assert "decisive: strain-hardening" in result.stdout
-    told = result.stdout.split("the truth: strain-hardening")[1]
-    assert len(re.findall(r"│ yes +│", told)) == 3
-    for name in ("strain-hardening.png", "strain-hardening-section.png"):
-        assert (tmp_path / "demo" / name).stat().st_size > 20_000
+    measured, simulated = result.stdout.split("SIMULATED")
+    rupture = re.findall(r"980 C, (\d+) MPa +(\S.*?)  +(\d+) +(\d+) to (\d+)", measured)
+    assert [int(row[0]) for row in rupture] == [230, 200, 170, 140]
+    for _, times, predicted, low, high in rupture:
+        for time in times.split(", "):
+            broke = time.removeprefix("> ")
+            assert float(low) < float(broke) < float(high) if broke == time else float(broke) < float(predicted)
+    assert "decisive: strain-hardening" in simulated
+    assert len(re.findall(r" yes$", simulated.split("the truth: strain-hardening")[1], re.MULTILINE)) == 3
+    assert re.search(r"time: \d+ s, of which \d+ s compilation", simulated)
+    assert len(result.stdout.splitlines()) <= 40
+    last = result.stdout.splitlines()[-1]
+    assert last.startswith("plots: ")
+    for path in last.removeprefix("plots: ").split():
+        assert Path(path).stat().st_size > 20_000
 
 
 def test_the_virtual_bulge_test_is_what_its_script_makes(tmp_path):
@@ -201,7 +211,7 @@ def test_demo_of_bars_prints_the_truth_beside_the_answer(tmp_path):
     assert result.exit_code == 0, result.output
     assert "the truth: strain-hardening" in result.stdout
     assert (tmp_path / "demo" / "strain-hardening-arrhenius.png").stat().st_size > 20_000
-    assert "start" in result.stderr or sys.stderr.isatty()
+    assert "creep curves: 4 of 4" in result.stderr or sys.stderr.isatty()
 
 
 def test_a_cut_forgets_how_every_test_ended():

@@ -1,5 +1,6 @@
 """Every example and every Python block of the README runs as it stands."""
 
+import ast
 import re
 import runpy
 import sys
@@ -12,10 +13,31 @@ EXAMPLES = sorted(p for p in (ROOT / "examples").glob("[0-9]*.py"))
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
+QUICK_IN_ITSELF = {"02_a_law_of_your_own"}
+
+
+@pytest.mark.parametrize("script", EXAMPLES, ids=lambda p: p.stem)
+def test_example_uses_the_public_interface_alone(script):
+    source = script.read_text(encoding="utf-8")
+    ours = {line for line in source.splitlines() if re.match(r"\s*(import|from)\s+creepkit", line)}
+    assert ours == {"import creepkit as ck"}
+    assert not re.search(r"\bck(\.[a-z_]+)*\._", source), "a private name"
+
+
+@pytest.mark.parametrize("script", EXAMPLES, ids=lambda p: p.stem)
+def test_example_is_a_page_of_the_gallery(script):
+    source = script.read_text(encoding="utf-8")
+    title, underline = (ast.get_docstring(ast.parse(source)) or "").splitlines()[:2]
+    assert underline == len(title) * "="
+    for heading, rule in re.findall(r"^# %%\n# (.+)\n# (-+)$", source, flags=re.MULTILINE):
+        assert len(rule) == len(heading)
+    assert "--quick" in source or script.stem in QUICK_IN_ITSELF
+
+
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda p: p.stem)
 def test_example_runs(script, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", [str(script)])
+    monkeypatch.setattr(sys, "argv", [str(script), "--quick"])
     runpy.run_path(str(script), run_name="__main__")
 
 
