@@ -1,6 +1,7 @@
 # make test   set up .venv, then check style, types, floors and run all tests, those of plugins/ included
 # make verify-export   exported laws in a CalculiX built from Debian's source, beside our solver: a table
 # make surrogate   remake the surrogate that ships: 8,000 simulations, 300 epochs; some 20 minutes of CPU
+# make docs   build the documentation into build/docs; needs no network once .venv is set up
 # make demo   set up .venv, then identify a law from a virtual bulge test and leave plots in demo/
 #
 # TORCH chooses another build of torch: make test TORCH='torch==2.13.0' on a machine with a GPU.
@@ -9,7 +10,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := test
-.PHONY: test demo verify-export surrogate clean
+.PHONY: test demo docs verify-export surrogate clean
 
 PYTHONS := python3.11 python3.12 python3.13
 BIN := .venv/bin
@@ -35,6 +36,11 @@ test: .venv/.ok
 
 demo: .venv/.ok
 	$(BIN)/creepkit demo --to demo
+
+docs: .venv/.ok
+	@export NUMBA_CACHE_DIR=$$($(BIN)/python -c '$(COMPILED)'); \
+	    $(BIN)/sphinx-build --fail-on-warning --keep-going --quiet --jobs 2 docs build/docs
+	@echo "the documentation: build/docs/index.html"
 
 verify-export: .venv/.ok
 	$(BIN)/python -u tests/benchmarks/verify_export.py
