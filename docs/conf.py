@@ -35,6 +35,7 @@ myst_heading_anchors = 3
 
 # Signatures keep the annotations of the source; nothing is evaluated, so no type has to be imported.
 autodoc_typehints = "signature"
+python_maximum_signature_line_length = 100
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 autodoc_default_options = {"members": True, "ignore-module-all": True}

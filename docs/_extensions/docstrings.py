@@ -1,4 +1,4 @@
-"""Docstrings as they are written in creepkit, turned into reStructuredText.
+"""Docstrings as they are written in creepkit, turned into reStructuredText; signatures with short names of types.
 
 A docstring is paragraphs of plain text, lines of the form ``name : shape unit, meaning``, lists with hyphens, indented
 blocks, and examples after ``>>>``. Nothing in it is markup except backticks, so that a formula such as A*s**n stands as
@@ -97,7 +97,24 @@ def _process(app: Sphinx, what: str, name: str, item: Any, options: Any, lines: 
     lines[:] = as_restructured_text(lines)
 
 
+def _process_signature(
+    app: Sphinx, what: str, name: str, item: Any, options: Any, signature: str | None, returns: str | None
+) -> tuple[str | None, str | None]:
+    """Types without the names of their modules, arrays by their aliases."""
+    return _short(signature), _short(returns)
+
+
+def _short(text: str | None) -> str | None:
+    if text is None:
+        return None
+    text = re.sub(r"~?\b(?:[a-z_]\w*\.)+([A-Za-z_]\w*)", r"\1", text.replace("~", ""))
+    for kind, alias in (("float64", "Floats"), ("int64", "Ints"), ("bool", "Bools")):
+        text = text.replace(f"ndarray[tuple[Any, ...], dtype[{kind}]]", alias)
+    return text.replace("<factory>", "...")
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Connect to autodoc."""
     app.connect("autodoc-process-docstring", _process)
+    app.connect("autodoc-process-signature", _process_signature)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

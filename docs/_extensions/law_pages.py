@@ -21,6 +21,7 @@ PAGES = Path(__file__).parents[1] / "laws" / "pages"
 STRESSES = (100.0, 200.0, 300.0, 400.0)
 TEMPERATURE = 1100.0
 LARGEST_STRAIN = 0.05
+LARGEST_STRAIN_TO_RUPTURE = 0.3
 
 
 def write_pages(app: Sphinx) -> None:
@@ -112,16 +113,18 @@ def _states(law: ck.CreepLaw, printer: LatexLawPrinter) -> str:
 def _draw_creep_curve(law: ck.CreepLaw, path: Path) -> str:
     """Draw creep under a constant load with every parameter in the middle of its bounds; return the caption.
 
-    The time axis ends where the strain reaches LARGEST_STRAIN, where the bar breaks, or after 1e20 s.
+    The time axis ends at LARGEST_STRAIN (LARGEST_STRAIN_TO_RUPTURE for laws with a limit), at rupture, or after 1e20 s.
     """
+    has_limit = any(state.limit is not None for state in law.states.values())
+    largest = LARGEST_STRAIN_TO_RUPTURE if has_limit else LARGEST_STRAIN
     for stress in STRESSES:
-        coarse = _simulated(law, stress, np.geomspace(1e-3, 1e20, 500))
-        reached = np.flatnonzero(coarse.outputs["strain"] < LARGEST_STRAIN)
+        coarse = _simulated(law, stress, np.geomspace(1e-3, 1e20, 2000))
+        reached = np.flatnonzero(coarse.outputs["strain"] < largest)
         if coarse.outputs["strain"].max(initial=0.0) > 0 and reached.size:
             break
     end = coarse.times[min(reached[-1] + 1, coarse.times.size - 1)]
-    run = _simulated(law, stress, np.linspace(0.0, end, 300)[1:])
-    shown = run.outputs["strain"] <= 1.2 * LARGEST_STRAIN
+    run = _simulated(law, stress, np.linspace(0.0, end, 500)[1:])
+    shown = run.outputs["strain"] <= 1.2 * largest
     figure, axes = plt.subplots(figsize=(5, 3), layout="constrained")
     axes.plot(run.times[shown], 100 * run.outputs["strain"][shown])
     axes.set(xlabel="time, s", ylabel="creep strain, %", xlim=(0, None), ylim=(0, None))
