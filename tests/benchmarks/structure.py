@@ -1,25 +1,25 @@
-"""Structure of the source: files, lines, import cycles, class names with two meanings, wide functions, docstrings.
+"""Structure of the source in numbers.
 
     python tests/benchmarks/structure.py [ROOT] [--verbose] [--write]
 
 Counted under ROOT/src, by default this project. A cycle is a set of modules that import each other, imports inside
-functions and for types included. A wide function has more than eight parameters, `self` not counted. With --verbose
-every case is named; with --write the counts go to docs/measured/structure.md.
+functions and for types included. Parameters are counted without `self`. Public functions and classes are those of
+modules whose names do not begin with an underscore, public methods included. The counts before the reorganisation
+are on the page "Structure in numbers" of the design. With --verbose every case is named.
 """
 
 from __future__ import annotations
 
-import argparse
 import ast
 import statistics
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 
+from measured import Page, arguments, progress
+
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "measured" / "structure.md"
 PACKAGE = "creepkit"
 MOST_PARAMETERS = 8
 MOST_LINES = 400
@@ -181,22 +181,19 @@ def _public(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.ClassDef]:
 
 def main() -> None:
     """Print the table, and write its page on request."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("root", nargs="?", type=Path, default=ROOT)
-    parser.add_argument("--verbose", action="store_true")
-    parser.add_argument("--write", action="store_true", help=f"write {PAGE.relative_to(ROOT)}")
-    arguments = parser.parse_args()
-    rows = counts(arguments.root)
-    table = ["| count, under src | number |", "| --- | --- |", *(f"| {row.what} | {row.number:,g} |" for row in rows)]
-    print("\n".join(table))
-    if arguments.verbose:
-        print("\n".join(f"{row.what}: {case}" for row in rows for case in row.cases))
-    if arguments.write:
-        heading = "# Structure of the source\n\nWhat is counted is explained on the page [structure in numbers]"
-        ending = f"Counted on {date.today()}. Repeat with `python tests/benchmarks/structure.py --write`."
-        PAGE.write_text(
-            f"{heading}(../design/structure.md).\n\n" + "\n".join(table) + f"\n\n{ending}\n", encoding="utf-8"
-        )
+    parser.add_argument("--verbose", action="store_true", help="name every case")
+    options = parser.parse_args()
+    page = Page("structure", __doc__)
+    page.table("count, under src", "number")
+    rows = counts(options.root)
+    for row in rows:
+        page.row(row.what, f"{row.number:,g}")
+    if options.verbose:
+        progress("\n".join(f"{row.what}: {case}" for row in rows for case in row.cases))
+    if options.write:
+        page.write()
 
 
 if __name__ == "__main__":

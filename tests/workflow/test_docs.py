@@ -66,7 +66,7 @@ def test_files_that_are_mentioned_exist(page):
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
 def test_no_path_outside_the_project_is_named(page):
     text = page.read_text(encoding="utf-8")
-    assert not re.search(r"(?<![\w.])/(home|tmp|work|root|usr|opt|mnt|Users)/|~/|shared/", text)
+    assert not re.search(r"(?<![\w.])/(home|tmp|work|root|usr|opt|mnt|Users)/|~/", text)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
@@ -103,9 +103,10 @@ def test_every_registered_law_stands_in_readme():
 
 
 def test_every_measured_page_has_its_program():
-    programs = {path.stem for path in (ROOT / "tests" / "benchmarks").glob("*.py")}
+    """A page has the name of its program, or begins with it where a program writes several."""
+    programs = tuple(path.stem for path in (ROOT / "tests" / "benchmarks").glob("*.py"))
     pages = {path.stem for path in (DOCS / "measured").glob("*.md")}
-    assert pages - MEASURED_BY_OTHERS <= programs
+    assert [page for page in pages - MEASURED_BY_OTHERS if not page.startswith(programs)] == []
 
 
 def test_every_page_is_reachable_from_the_index():
