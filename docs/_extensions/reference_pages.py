@@ -1,6 +1,7 @@
 """Reference pages: one of the public names of creepkit, and one for each package with all of its modules."""
 
 import importlib
+import inspect
 import pkgutil
 from pathlib import Path
 from types import ModuleType
@@ -30,17 +31,27 @@ def package_names() -> list[str]:
 
 
 def _public_names() -> str:
-    """Every name of creepkit/__init__.pyi under a heading of its own: verbs first, then records."""
-    values = {name: getattr(creepkit, name) for name in creepkit.__all__}
-    values = {name: value for name, value in values.items() if not isinstance(value, (ModuleType, str))}
-    verbs = [name for name, value in values.items() if not isinstance(value, type)]
-    records = [name for name, value in values.items() if isinstance(value, type)]
+    """Every name of creepkit/__init__.pyi under a heading of its own: functions, then records."""
+    public = {name: getattr(creepkit, name) for name in sorted(creepkit.__all__, key=str.lower)}
+    functions = [name for name, value in public.items() if inspect.isroutine(value)]
+    records = [name for name, value in public.items() if isinstance(value, type)]
+    values = {name: value for name, value in public.items() if name not in {*functions, *records}}
     parts = [_title("Public names", "="), "What ``import creepkit as ck`` offers.\n"]
-    for heading, names, directive in (("Functions", verbs, "autofunction"), ("Records", records, "autoclass")):
+    for heading, names, directive in (("Functions", functions, "autofunction"), ("Records", records, "autoclass")):
         parts.append(_title(heading, "-"))
-        for name in sorted(names, key=str.lower):
+        for name in names:
             parts += [_title(f"ck.{name}", "~"), f".. {directive}:: creepkit.{name}\n   :no-index:\n"]
+    parts.append(_title("Modules and values", "-"))
+    parts += [f"- ``ck.{name}`` : {_kind(value)}" for name, value in values.items()]
     return "\n".join(parts)
+
+
+def _kind(value: object) -> str:
+    if isinstance(value, ModuleType):
+        return f"module {value.__name__}"
+    if isinstance(value, (str, float)):
+        return f"``{value!r}``"
+    return f"of the class {type(value).__name__}"
 
 
 def _package(name: str) -> str:
