@@ -1,6 +1,7 @@
 # make test   set up .venv, then check style, types, floors and run all tests, those of plugins/ included
 # make verify-export   exported laws in a CalculiX built from Debian's source, beside our solver: a table
 # make surrogate   remake the surrogate that ships: 8,000 simulations, 300 epochs; some 20 minutes of CPU
+# make docs   build the documentation into build/docs; needs no network once .venv is set up
 # make demo   set up .venv, then identify laws from measured creep curves and a simulated bulge test; plots in demo/
 #
 # Both need make and Python alone; tests that need a compiler are skipped without it. PYTEST_OPTIONS goes to pytest.
@@ -10,7 +11,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := test
-.PHONY: test demo verify-export surrogate clean
+.PHONY: test demo docs verify-export surrogate clean
 
 PYTHONS := python3.11 python3.12 python3.13
 BIN := .venv/bin
@@ -36,6 +37,11 @@ test: .venv/.ok
 
 demo: .venv/.ok
 	$(BIN)/creepkit demo --to demo
+
+docs: .venv/.ok
+	@export NUMBA_CACHE_DIR=$$($(BIN)/python -c '$(COMPILED)'); \
+	    $(BIN)/sphinx-build --fail-on-warning --keep-going --quiet --jobs 2 docs build/docs
+	@echo "the documentation: build/docs/index.html"
 
 verify-export: .venv/.ok
 	$(BIN)/python -u tests/benchmarks/verify_export.py

@@ -1,12 +1,16 @@
-"""Every example and every Python block of the README runs as it stands."""
+"""Every example, and every Python block and command of the README, runs as it stands."""
 
 import ast
 import re
 import runpy
+import shlex
+import shutil
 import sys
 
 import pytest
 
+import creepkit as ck
+from helpers.command_line import creepkit
 from helpers.paths import ROOT
 
 EXAMPLES = sorted(p for p in (ROOT / "examples").glob("[0-9]*.py"))
@@ -49,13 +53,37 @@ def test_example_of_a_law_agrees_with_its_closed_form(tmp_path, monkeypatch, cap
     assert "fading: conforms" in told
 
 
+def readme_blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.S)
+
+
 def test_readme_blocks_run_in_order(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"```python\n(.*?)```", README, flags=re.S)
-    assert len(blocks) >= 3
     space: dict[str, object] = {}
-    for block in blocks:
+    for block in readme_blocks("python"):
         exec(compile(block, "README.md", "exec"), space)
+    assert str(space["plate"]).count("failed") == 0
+
+
+def test_readme_commands_run_in_order(tmp_path, monkeypatch, capsys):
+    """In a folder with the planted tests in `curves` and `bulge`, and what the first snippet writes."""
+    monkeypatch.chdir(tmp_path)
+    for name, folder in (("planted creep curves", "curves"), ("planted bulge test", "bulge")):
+        shutil.copytree(ck.example_data(name), folder)
+    exec(compile(readme_blocks("python")[0], "README.md", "exec"), {})
+    for line in "".join(readme_blocks("sh")).splitlines():
+        program, *words = shlex.split(line)
+        assert program == "creepkit"
+        result = creepkit(*words)
+        assert result.exit_code == 0, f"{line}\n{result.output}"
+
+
+@pytest.mark.parametrize("language", ["python", "sh"])
+def test_every_task_of_readme_has_a_command_and_a_snippet(language):
+    sections = re.split(r"^## ", README, flags=re.M)[1:]
+    tasks = [s for s in sections if s.partition("\n")[0] not in ("The laws", "Where things are")]
+    assert len(tasks) == 8
+    assert all(len(re.findall(rf"```{language}\n", task)) == 1 for task in tasks)
 
 
 def test_readme_opens_with_the_two_commands():

@@ -1,0 +1,148 @@
+"""A page for every registered law, made from its record: equation, parameters, references and a creep curve."""
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from sphinx.application import Sphinx
+
+import creepkit as ck
+from creepkit.language import temperature
+from creepkit.language.law import symbols_used
+from creepkit.language.printing import LatexLawPrinter, latex_equations
+from creepkit.registry import default_registry
+from creepkit.specimens.run import Run
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+PAGES = Path(__file__).parents[1] / "laws" / "pages"
+STRESSES = (100.0, 200.0, 300.0, 400.0)
+TEMPERATURE = 1100.0
+LARGEST_STRAIN = 0.05
+LARGEST_STRAIN_TO_RUPTURE = 0.3
+
+
+def write_pages(app: Sphinx) -> None:
+    """Write a page and a picture for each law, and the table of all of them."""
+    PAGES.mkdir(parents=True, exist_ok=True)
+    registered = default_registry().laws()
+    for name, entry in registered.items():
+        caption = _draw_creep_curve(entry.value, PAGES / f"{name}.png")
+        page = _page(entry.value, entry.provenance.origin, caption)
+        (PAGES / f"{name}.md").write_text(page, encoding="utf-8")
+    rows = [f"| [{law.title}]({name}.md) | `{name}` | {origin} |" for name, law, origin in _sorted(registered)]
+    names = "\n".join(name for name, *_ in _sorted(registered))
+    table = "| law | name | package |\n| --- | --- | --- |\n" + "\n".join(rows)
+    text = f"# All registered laws\n\n{table}\n\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"
+    (PAGES / "index.md").write_text(text, encoding="utf-8")
+
+
+def _sorted(registered: dict[str, Any]) -> list[tuple[str, str, ck.CreepLaw]]:
+    rows = [(entry.provenance.origin, name, entry.value) for name, entry in registered.items()]
+    return [(name, law, origin) for origin, name, law in sorted(rows, key=lambda row: row[:2])]
+
+
+def _page(law: ck.CreepLaw, origin: str, caption: str) -> str:
+    printer = LatexLawPrinter(law)
+    equations = [_aligned(left, summands) for left, summands in latex_equations(law, printer)]
+    parts = [
+        f"# {law.title}",
+        f"Name: `{law.name}`. Package: {origin}.",
+        "$$\n\\begin{aligned}\n" + " \\\\\n".join(equations) + "\n\\end{aligned}\n$$",
+        _words(law),
+        "## Parameters",
+        _parameters(law, printer),
+    ]
+    if law.states:
+        parts += ["## Internal variables", _states(law, printer)]
+    if law.constraints:
+        relations = ", ".join(f"${printer.doprint(relation)}$" for relation in law.constraints)
+        parts += [f"The law holds where {relations}."]
+    parts += ["## Creep curve", f"![creep curve of {law.name}]({law.name}.png)", caption]
+    parts += ["## References", "\n".join(f"- {reference}" for reference in law.references) or "None."]
+    return "\n\n".join(parts) + "\n"
+
+
+def _aligned(left: str, summands: list[str]) -> str:
+    return " \\\\\n&\\quad + ".join([f"{left} &= {summands[0]}", *summands[1:]])
+
+
+WORDS = {
+    "stress": r"$\sigma_e$ is the von Mises stress over 1 MPa",
+    "strain": r"$\varepsilon_{cr}$ the equivalent creep strain",
+    "time": "$t$ the time over 1 s",
+    "temperature": "$T$ the temperature in K",
+    "principal_stress": r"$\sigma_1$ the largest principal stress over 1 MPa",
+    "mean_stress": r"$\sigma_m$ the mean stress over 1 MPa",
+}
+"""What the symbols of a material point mean."""
+
+
+def _words(law: ck.CreepLaw) -> str:
+    """A sentence on the symbols of the material point that the law uses."""
+    used = {symbol.name for symbol in symbols_used(law)} | {"strain"}
+    words = [text for name, text in WORDS.items() if name in used]
+    return "Here " + ", ".join(words) + "."
+
+
+def _parameters(law: ck.CreepLaw, printer: LatexLawPrinter) -> str:
+    """Table of the parameters: symbol, meaning, unit, bounds, scale, and the value that switches it off."""
+    rows = ["| symbol | name | meaning | unit | lower bound | upper bound | scale | switched off at |"]
+    rows.append("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    for symbol, param in law.params.items():
+        low, high = param.bounds
+        off = "-" if param.off is None else f"{param.off:g}"
+        cells = (f"${printer.doprint(symbol)}$", f"`{symbol.name}`", param.meaning, param.unit)
+        rows.append(f"| {' | '.join(cells)} | {low:g} | {high:g} | {param.scale} | {off} |")
+    return "\n".join(rows)
+
+
+def _states(law: ck.CreepLaw, printer: LatexLawPrinter) -> str:
+    rows = ["| symbol | meaning | unit | initial value | material has failed at |", "| --- | --- | --- | --- | --- |"]
+    for symbol, state in law.states.items():
+        limit = "-" if state.limit is None else f"{state.limit:.10g}"
+        rows.append(f"| ${printer.doprint(symbol)}$ | {state.meaning} | {state.unit} | {state.initial:g} | {limit} |")
+    return "\n".join(rows)
+
+
+# ---- creep curve ---------------------------------------------------------------------------------------------------
+
+
+def _draw_creep_curve(law: ck.CreepLaw, path: Path) -> str:
+    """Draw creep under a constant load with every parameter in the middle of its bounds; return the caption.
+
+    The time axis ends at LARGEST_STRAIN (LARGEST_STRAIN_TO_RUPTURE for laws with a limit), at rupture, or after 1e20 s.
+    """
+    has_limit = any(state.limit is not None for state in law.states.values())
+    largest = LARGEST_STRAIN_TO_RUPTURE if has_limit else LARGEST_STRAIN
+    for stress in STRESSES:
+        coarse = _simulated(law, stress, np.geomspace(1e-3, 1e20, 2000))
+        reached = np.flatnonzero(coarse.outputs["strain"] < largest)
+        if coarse.outputs["strain"].max(initial=0.0) > 0 and reached.size:
+            break
+    end = coarse.times[min(reached[-1] + 1, coarse.times.size - 1)]
+    run = _simulated(law, stress, np.linspace(0.0, end, 500)[1:])
+    shown = run.outputs["strain"] <= 1.2 * largest
+    figure, axes = plt.subplots(figsize=(5, 3), layout="constrained")
+    axes.plot(run.times[shown], 100 * run.outputs["strain"][shown])
+    axes.set(xlabel="time, s", ylabel="creep strain, %", xlim=(0, None), ylim=(0, None))
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+    warm = f" and {TEMPERATURE:g} K" if temperature in symbols_used(law) else ""
+    return (
+        f"Creep under a constant load of initially {stress:g} MPa{warm}, every parameter in the middle of its bounds. "
+        "Bounds of rate coefficients span many powers of ten, so the time scale is that of no particular material."
+    )
+
+
+def _simulated(law: ck.CreepLaw, stress: float, times: np.ndarray) -> Run:
+    loading = ck.constant_stress(stress, "load")
+    return ck.simulate(law, "uniaxial", law.center(), loading=loading, times=times, temperature=TEMPERATURE)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Write the pages before Sphinx looks for sources."""
+    app.connect("builder-inited", write_pages, priority=600)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

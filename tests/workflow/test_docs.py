@@ -1,0 +1,122 @@
+"""The documentation as it stands in the tree: its links, its snippets, and the files and names that it mentions."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import creepkit as ck
+from creepkit.records import LawWithValues
+from helpers.paths import ROOT
+
+DOCS = ROOT / "docs"
+WRITTEN_AT_BUILD = ("gallery", "laws/pages", "reference/pages")
+"""Folders of docs/ that `make docs` fills."""
+
+PAGES = [
+    path
+    for path in sorted([ROOT / "README.md", *ROOT.glob("plugins/*/README.md"), *DOCS.rglob("*.md")])
+    if not any(path.is_relative_to(DOCS / folder) for folder in WRITTEN_AT_BUILD)
+]
+MEASURED_BY_OTHERS = {"index", "verification", "inconel_625"}
+"""Pages of docs/measured that no program of tests/benchmarks writes: tests and an example do."""
+
+
+def page_name(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def python_blocks(path: Path) -> list[str]:
+    return re.findall(r"```python\n(.*?)```", path.read_text(encoding="utf-8"), flags=re.S)
+
+
+def exists_after_build(path: Path) -> bool:
+    """Whether a link into a folder that `make docs` fills will lead somewhere."""
+    folder = next(DOCS / folder for folder in WRITTEN_AT_BUILD if path.is_relative_to(DOCS / folder))
+    if folder.name != "gallery":
+        return path.stem in {"index", "public_names"}
+    return path.stem == "index" or (ROOT / "examples" / f"{path.stem}.py").is_file()
+
+
+def test_readme_is_short():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 200
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_links_lead_somewhere_inside_the_project(page):
+    text = re.sub(r"```.*?```|`[^`]*`", "", page.read_text(encoding="utf-8"), flags=re.S)
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"https?://|#", link):
+            continue
+        target = (page.parent / link.partition("#")[0]).resolve()
+        assert target.is_relative_to(ROOT), f"{link} leaves the project"
+        if any(target.is_relative_to(DOCS / folder) for folder in WRITTEN_AT_BUILD):
+            assert exists_after_build(target), f"{link} will not be written by `make docs`"
+        else:
+            assert target.exists(), f"{link} does not exist"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_files_that_are_mentioned_exist(page):
+    text = page.read_text(encoding="utf-8")
+    for name in re.findall(r"`((?:src|tests|docs|plugins|examples)/[\w./-]+)", text):
+        assert (ROOT / name).exists(), f"{name} does not exist"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_no_path_outside_the_project_is_named(page):
+    text = page.read_text(encoding="utf-8")
+    assert not re.search(r"(?<![\w.])/(home|tmp|work|root|usr|opt|mnt|Users)/|~/", text)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_numbers_have_a_digit_before_the_point(page):
+    found = re.findall(r"(?<![\w.)\]}*/])\.\d+", page.read_text(encoding="utf-8"))
+    assert not found, f"write 0.05 in the place of .05: {found}"
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if python_blocks(page)], ids=page_name)
+def test_snippets_are_python_with_public_names(page):
+    public = {*ck.__all__, "__version__"}
+    for block in python_blocks(page):
+        compile(block, str(page), "exec")
+        unknown = set(re.findall(r"\bck\.(\w+)", block)) - public
+        assert not unknown, f"creepkit has no public {', '.join(sorted(unknown))}"
+
+
+@pytest.mark.parametrize("page", sorted((DOCS / "how-to").glob("write_*.md")), ids=page_name)
+def test_plugins_of_the_how_to_guides_work(page):
+    for block in python_blocks(page):
+        space: dict[str, object] = {}
+        exec(compile(block, str(page), "exec"), space)
+        (hook,) = (value for name, value in space.items() if name.startswith("creepkit_"))
+        (contribution,) = hook()
+        assert contribution.name
+        if hasattr(contribution, "text"):
+            text = contribution.text(LawWithValues(ck.law("norton"), {"A": 1e-16, "n": 5.0}, notes=("a note",)))
+            assert text.splitlines() == ["# a note", "name,value,unit", "A,1e-16,1/s", "n,5.0,1"]
+
+
+def test_every_registered_law_stands_in_readme():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert [name for name in ck.available("laws") if f"`{name}`" not in text] == []
+
+
+def test_every_measured_page_has_its_program():
+    """A page has the name of its program, or begins with it where a program writes several."""
+    programs = tuple(path.stem for path in (ROOT / "tests" / "benchmarks").glob("*.py"))
+    pages = {path.stem for path in (DOCS / "measured").glob("*.md")}
+    assert [page for page in pages - MEASURED_BY_OTHERS if not page.startswith(programs)] == []
+
+
+def test_every_page_is_reachable_from_the_index():
+    """Each folder of docs/ has an index whose table of contents names its pages, or takes all of them."""
+    for index in [DOCS / "index.md", *DOCS.glob("*/index.md")]:
+        text = index.read_text(encoding="utf-8")
+        trees = re.findall(r"```\{toctree\}\n(.*?)```", text, flags=re.S)
+        assert trees, f"{index} has no table of contents"
+        if any(":glob:" in tree for tree in trees):
+            continue
+        entries = {line.strip() for tree in trees for line in tree.splitlines()}
+        siblings = {path.stem for path in index.parent.glob("*.md")} - {"index"}
+        assert siblings <= entries, f"{index} does not name {siblings - entries}"
