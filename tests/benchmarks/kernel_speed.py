@@ -44,8 +44,14 @@ def main() -> None:
     torch.set_num_threads(1)
     page = Page("kernel_speed" if options.rows == 20_000 else f"kernel_speed_{options.rows}", __doc__)
     page.paragraph(f"{options.rows} points a call.")
-    page.table("law", "target", "rate: kernel over hand", "derivatives: kernel over hand",
-               "rate: ns a point", "derivatives: ns a point")
+    page.table(
+        "law",
+        "target",
+        "rate: kernel over hand",
+        "derivatives: kernel over hand",
+        "rate: ns a point",
+        "derivatives: ns a point",
+    )
     for name in options.laws:
         for target in TARGETS:
             (rate, rate_seconds), (all_, all_seconds) = compare_with_hand(ck.law(name), target, options.rows)

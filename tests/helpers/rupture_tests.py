@@ -24,7 +24,9 @@ def campaign(law, values, stresses, seed, stopped=()):
         life = float(BAR.predict_to_rupture(law, values, [plan]).times_to_strain.rupture_times[0, 0])
         life_factor, rate_factor = (np.exp(SCATTER[name] * rng.standard_normal()) for name in ("life", "rate"))
         fractions = LIFE_FRACTIONS
-        times = life * (fractions[fractions < 0.5] if k in stopped else fractions[life * fractions < life * life_factor])
+        times = life * (
+            fractions[fractions < 0.5] if k in stopped else fractions[life * fractions < life * life_factor]
+        )
         strain = BAR.predict(law, values, [plan.replace(times=times)]).of(0)[:, 0]
         strain = strain + SCATTER["noise"] * rng.standard_normal(times.size)
         end = {"unruptured": True} if k in stopped else {"rupture_time": life * life_factor / rate_factor}

@@ -19,7 +19,6 @@ from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Nuisance, constant_strain, constant_stress
 from creepkit.specimens.relaxation import Relaxation
-from creepkit.specimens.uniaxial import Uniaxial
 from helpers.literature_laws import EQUATIONS
 from helpers.rupture_tests import BAR, OMEGA, campaign
 
