@@ -197,7 +197,7 @@ def _try_to_identify(
     initial = (
         {}
         if previous_fit is None
-        else {"start": previous_fit.u, "known": previous_fit.nuisances, "reference": previous_fit.reference}
+        else {"start": previous_fit.u, "known_nuisances": previous_fit.nuisances, "reference": previous_fit.reference}
     )
     try:
         return identify(law, histories, using, settings=settings, **initial)  # type: ignore[arg-type]
