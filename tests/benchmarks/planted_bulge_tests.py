@@ -31,7 +31,8 @@ JUMP = ck.PressureJump(P1=8, P2=10, Tj=14400)
 class Design:
     """How specimens of a design are tested and fitted.
 
-    thicknesses : mm, of the dimples of a specimen; spread : relative sd of what they really are; loadings : one a dimple, or one for all. correlated : AR(1) noise (coefficient, sd in mm) of D_amp.
+    thicknesses : (dimples,) mm, nominal; spread : relative standard deviation of what they really are.
+    loadings : one a dimple, or one for all. correlated : AR(1) noise (coefficient, sd in mm) of D_amp.
     """
 
     title: str

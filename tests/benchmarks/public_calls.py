@@ -1,4 +1,4 @@
-"""Calls of creepkit that several benchmark programs make, in one place: predictions of given values, cross-validation."""
+"""Calls of creepkit that several benchmark programs make: predictions of given values, cross-validation."""
 
 from __future__ import annotations
 

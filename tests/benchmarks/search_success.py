@@ -3,10 +3,10 @@
     python tests/benchmarks/search_success.py [--specimens 40] [--laws norton ...] [--through reduced-order|surrogate]
                                               [--searches default swarm cma] [--seed 0] [--write]
 
-Each specimen is one 12 h test (8 to 10 MPa after 4 h, 48 frames, white noise of 1.5 um on D_amp, 0.02 mm on S_d, 0.02 on
-S_p) of a law drawn from PRIORS, simulated and identified through the same predictor, so that nothing but the search
-can fail. Rates are stated at 120 MPa, a strain of 0.01 and 1e4 s; tests that burst or creep by less than 20 um are drawn
-again.
+Each specimen is one 12 h test (8 to 10 MPa after 4 h, 48 frames, white noise of 1.5 um on D_amp, 0.02 mm on S_d, 0.02
+on S_p) of a law drawn from PRIORS, simulated and identified through the same predictor, so that nothing but the search
+can fail. Rates are stated at 120 MPa, a strain of 0.01 and 1e4 s; tests that burst or creep by less than 20 um are
+drawn again.
 
 An identification has succeeded if its -2 ln L lies within 2 of the lowest one found: by 30 starts from 256 draws, each
 of whose different minima is refined by itself, and by the searches of the table. Columns: share that succeeded with its

@@ -3,8 +3,8 @@
     python tests/benchmarks/verify_export.py [LAW ...] [--cetol 1e-4 1e-5] [--keep FOLDER] [--write]
 
 Each law is exported with `ck.export(law, "calculix")`, compiled by gfortran and preloaded before a CalculiX 2.20 built
-from Debian's source, which knows nothing of creepkit. One element in tension follows steps of stress for 12 h (compared:
-creep strain), and the dimple is bulged for 12 h (compared: apex displacement, mm). CalculiX is backward Euler: two
+from Debian's source, which knows nothing of creepkit. One element in tension follows steps of stress for 12 h
+(compared: creep strain), and the dimple is bulged for 12 h (compared: apex displacement, mm). CalculiX is backward Euler: two
 values of its tolerance cetol give its limit of small increments, on the same mesh. Differences are the largest from
 10 min on, in percent of the last value of that limit; increments of CalculiX stand in brackets.
 """
@@ -45,7 +45,7 @@ LAWS = {
     "norton x arrhenius": {"A": 1e-12, "n": 3.0, "Q": 3e5},
     "kachanov-rabotnov": {"A": 1e-12, "n": 3.0, "B": 6e-14, "chi": 4.0, "phi": 3.0},
 }  # fmt: skip
-"""Values of each law. The last three test more than built-in laws: two come from plugins, one is used 50 K above its T_ref."""
+"""Values of each law. Of the last three, two come from plugins, and one is used 50 K above its T_ref."""
 
 
 def law_of(name: str) -> CreepLaw:
