@@ -46,7 +46,7 @@ def single_threaded(predictor: Predictor) -> Predictor:
     if isinstance(untyped, CompositePredictor):
         return CompositePredictor({name: single_threaded(p) for name, p in untyped.predictors.items()})
     if _is_surrogate(untyped):
-        metadata = replace(untyped.told, specimen=single_threaded(untyped.told.specimen))
+        metadata = replace(untyped.metadata, specimen=single_threaded(untyped.metadata.specimen))
         return untyped.recipe.surrogate(untyped.module, metadata)  # type: ignore[no-any-return]
     if getattr(untyped, "threads", 1) == 1:
         return predictor
