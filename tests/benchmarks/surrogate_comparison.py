@@ -1,6 +1,7 @@
 """Networks of one law and of any law on the same held-out samples.
 
-    python tests/benchmarks/surrogate_comparison.py SAMPLES.h5 MODEL.safetensors ... [--samples 400] [--seed 0] [--write]
+    python tests/benchmarks/surrogate_comparison.py SAMPLES.h5 MODEL.safetensors ... [--samples 400] [--seed 0]
+                                                    [--write]
 
 SAMPLES.h5 is a data set of Eq. (1) in the paper's domain (`creepkit generate drifting-exponent --box paper --interval
 900`); the samples are validation rows of a training with that seed, so that a ParameterGru trained on it with the same
@@ -22,7 +23,6 @@ from surrogate_accuracy import predicted
 import creepkit as ck
 from creepkit.surrogates.evaluation import relative_squared_error
 from creepkit.surrogates.training_loop import trainable_samples, training_split
-
 
 HEADS = (
     "model",

@@ -8,8 +8,8 @@ pressure, 12 h, 49 frames), to which white noise is added: 1.5 um on D_amp, 0.02
 Its law is identified from it by finite elements, through the surrogate that ships and through any --models (a
 ParameterGru of that law), with the modulus as a nuisance of 10 %.
 
-Columns: shift of the worst parameter between both identifications, in posterior standard deviations of the one by finite
-elements, median and largest; distance of both from the truth in the same unit (median of the worst parameter); error of
+Columns: shift of the worst parameter between both identifications, in posterior standard deviations of the one by
+finite elements, median and largest; distance of both from the truth in the same unit (median of the worst parameter); error of
 the rate at the reference stress (median); CPU time of an identification (median).
 """
 
