@@ -3,11 +3,11 @@
     python tests/benchmarks/dimple_accuracy.py [--cases 200] [--seed 1] [--cache FILE] [--tolerance 0.01] [--write]
 
 Errors are the largest over the history: of apex displacement and D_amp in percent of their largest value, of S_d and
-S_p in percent of the value itself. Speed: simulations of 12 h with output every 150 s and the Gaussian fit, CPU time
-of one core. The references lie in files beside the project. Each new case has a converged reference of its own: two
-meshes and tolerances must agree within 0.03 %, or finer ones are taken. "Effective n" is d ln rate / d ln stress at
-the stress that stands for the larger pressure, at a strain of 0.01 and 1e4 s. References are kept in the cache, one
-line each, written as soon as it is known; a run that was stopped continues from there.
+S_p in percent of the value itself. Speed: simulations of 12 h with output every 150 s and the Gaussian fit, CPU time of
+one core. The references lie in files beside the project. Each new case has a converged reference of its own: two meshes
+and tolerances must agree within 0.03 %, or finer ones are taken. "Effective n" is d ln rate / d ln stress at the stress
+that stands for the larger pressure, at a strain of 0.01 and 1e4 s. References are kept in the cache, one line each,
+written as soon as it is known; a run that was stopped continues from there.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
     python tests/benchmarks/identification_speed.py [--specimens 4] [--write]
 
 Planted tests of planted_bulge_tests.py (one jump of pressure, 48 frames), after one that is not counted. Medians over
-the specimens of wall and CPU time: one law, the planted one; the four laws of Table 1 with intervals; Eq. (1) with
-m = 0. The last column is the ratio of CPU time to the first row of the same run.
+the specimens of wall and CPU time: one law, the planted one; the four laws of Table 1 with intervals; Eq. (1) with m =
+0. The last column is the ratio of CPU time to the first row of the same run.
 """
 
 import time

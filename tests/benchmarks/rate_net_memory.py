@@ -4,9 +4,9 @@
 
 RATES.h5 is a data set of the rate family (`creepkit generate rate-family --samples 2000 --seed 1 --to RATES.h5`). The
 recurrent network (a GRU of 64 units with a bypass, then two layers of 64) takes the inputs of each time alone; the
-direct one, that of the package, takes their means over the creep so far as well. Columns: weights; CPU time of
-training with its features; Eq. (4) of the validation rows, all outputs together and of each; largest error of D_amp in a history,
-median and 95 % quantile.
+direct one, that of the package, takes their means over the creep so far as well. Columns: weights; CPU time of training
+with its features; Eq. (4) of the validation rows, all outputs together and of each; largest error of D_amp in a
+history, median and 95 % quantile.
 """
 
 import time

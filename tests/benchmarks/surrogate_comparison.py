@@ -3,10 +3,10 @@
     python tests/benchmarks/surrogate_comparison.py SAMPLES.h5 MODEL.safetensors ... [--samples 400] [--seed 0]
                                                     [--write]
 
-SAMPLES.h5 is a data set of Eq. (1) in the paper's domain (`creepkit generate drifting-exponent --box paper --interval
-900`); the samples are validation rows of a training with that seed, so that a ParameterGru trained on it with the same
-seed was not trained on them, and no RateNet was. Beside the models stand the reduced-order model alone, the surrogate
-that ships, and the finite element model on a few candidates (for its time).
+SAMPLES.h5 is a data set of Eq. (1) in the paper's domain (`creepkit generate drifting-exponent --domain paper
+--interval 900`); the samples are validation rows of a training with that seed, so that a ParameterGru trained on it
+with the same seed was not trained on them, and no RateNet was. Beside the models stand the reduced-order model alone,
+the surrogate that ships, and the finite element model on a few candidates (for its time).
 
 Columns: Eq. (4) of all outputs together (each over its standard deviation in the training rows), of D_amp, S_d, S_p;
 largest error of D_amp in a history, median and 95 % quantile; samples outside the applicability domain; CPU time of a

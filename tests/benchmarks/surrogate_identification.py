@@ -9,8 +9,8 @@ Its law is identified from it by finite elements, through the surrogate that shi
 ParameterGru of that law), with the modulus as a nuisance of 10 %.
 
 Columns: shift of the worst parameter between both identifications, in posterior standard deviations of the one by
-finite elements, median and largest; distance of both from the truth in the same unit (median of the worst parameter); error of
-the rate at the reference stress (median); CPU time of an identification (median).
+finite elements, median and largest; distance of both from the truth in the same unit (median of the worst parameter);
+error of the rate at the reference stress (median); CPU time of an identification (median).
 """
 
 import time

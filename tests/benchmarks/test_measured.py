@@ -52,7 +52,8 @@ def test_every_program_is_listed_and_writes_a_page() -> None:
     assert with_main == set(programs.BENCHMARKS)
     for name in with_main:
         text = (FOLDER / f"{name}.py").read_text()
-        assert "arguments(__doc__)" in text and "page.write()" in text, name
+        assert "arguments(__doc__)" in text, name
+        assert "page.write()" in text, name
         assert ast.get_docstring(ast.parse(text)), name
 
 

@@ -32,19 +32,13 @@ E, NU = 150e3, 0.3
 KELVIN = 1073.15
 
 LAWS = {
-    "norton": {"A": 2e-12, "n": 3.0},
-    "drifting-exponent": {
-        "A": 5e-13, "n_0": 3.3, "n_inf": 3.1, "C": 0.6, "tau_d": 7800.0, "tau_r": 4700.0, "m": -0.1,
-    },
-    "combined": {
-        "A_1": 1e-8, "n_1": 2.0, "B": 60.0,
-        "A_2": 3e-13, "n_2": 3.0, "m_1": -0.2,
-        "A_3": 1e-11, "n_3": 3.0, "m_2": -0.4,
-    },
-    "logarithmic": {"A": 4e-12, "n": 3.0, "e_0": 0.1},
-    "norton x arrhenius": {"A": 1e-12, "n": 3.0, "Q": 3e5},
-    "kachanov-rabotnov": {"A": 1e-12, "n": 3.0, "B": 6e-14, "chi": 4.0, "phi": 3.0},
-}  # fmt: skip
+    "norton": dict(A=2e-12, n=3.0),
+    "drifting-exponent": dict(A=5e-13, n_0=3.3, n_inf=3.1, C=0.6, tau_d=7800.0, tau_r=4700.0, m=-0.1),
+    "combined": dict(A_1=1e-8, n_1=2.0, B=60.0, A_2=3e-13, n_2=3.0, m_1=-0.2, A_3=1e-11, n_3=3.0, m_2=-0.4),
+    "logarithmic": dict(A=4e-12, n=3.0, e_0=0.1),
+    "norton x arrhenius": dict(A=1e-12, n=3.0, Q=3e5),
+    "kachanov-rabotnov": dict(A=1e-12, n=3.0, B=6e-14, chi=4.0, phi=3.0),
+}
 """Values of each law. Of the last three, two come from plugins, and one is used 50 K above its T_ref."""
 
 
