@@ -127,7 +127,7 @@ def fisher_covariance(fit, u, design):
     outputs = {name: OutputNoise(sd) for name, sd in planted.NOISE.items()}
     if design.correlated:
         coefficient, sd = design.correlated
-        scale = problem.residual_function.observations.transforms[0].size
+        scale = problem.residual_function.observations.transforms[0].scale
         correlation_length = -5.0 / 48 / np.log(coefficient)
         outputs["amplitude"] = OutputNoise(1e-6, drift=sd / scale, correlation_length=correlation_length)
     known = replace(residuals, relative_noise=np.ones_like(residuals.relative_noise))
