@@ -37,7 +37,7 @@ class Benchmark:
 DATA = "measured data in ../shared/data"
 BENCHMARKS = {
     "import_time": Benchmark(0.1),
-    "kernel_speed": Benchmark(2, ((), ("1000",))),
+    "kernel_speed": Benchmark(1, ((), ("1000",))),
     "kernel_start": Benchmark(1),
     "uniaxial_speed": Benchmark(1),
     "dimple_accuracy": Benchmark(
@@ -61,11 +61,11 @@ BENCHMARKS = {
         (("build/rates.h5", "--samples", "1500", "--epochs", "50", "--seeds", "1"),),
         "build/rates.h5: creepkit generate rate-family --samples 2000 --seed 1 --to build/rates.h5",
     ),
-    "identification_speed": Benchmark(2),
+    "identification_speed": Benchmark(1),
     "search_success": Benchmark(15, (("--specimens", "6", "--through", "surrogate", "--searches", "default", "cma"),)),
     "swarm_speed": Benchmark(1),
     "law_recovery": Benchmark(
-        60,
+        30,
         (
             ("--design", "jump", "--specimens", "60"),
             ("--design", "thickness", "correlated", "--specimens", "60"),
@@ -75,9 +75,9 @@ BENCHMARKS = {
     "penalty_confusion": Benchmark(
         12, (("--specimens", "2", "--penalties", "L2", "GroupL2", "Sqrt", "Subsets", "paper"),)
     ),
-    "plate_of_alloys": Benchmark(15),
+    "plate_of_alloys": Benchmark(8),
     "temperature_forms": Benchmark(10, (("--through", "uniaxial", "--specimens", "2", "--max-forms", "2"),)),
-    "inconel_temperature": Benchmark(30, (("--no-finite-elements",),), DATA),
+    "inconel_temperature": Benchmark(4, needs=DATA),
     "measured_creep": Benchmark(90, needs=DATA),
     "whole_life": Benchmark(60, needs=DATA),
     "rupture_coverage": Benchmark(4),
