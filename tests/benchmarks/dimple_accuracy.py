@@ -162,8 +162,8 @@ def published_table(page: Page, title: str, cases: list[PublishedCase]) -> None:
     seconds = []
     for published in cases:
         seconds.append(seconds_of(published.case))
-        found = errors(published.case.outcome(published.times), published.outcome)
-        numbers = ("" if np.isnan(e) else f"{e:.3f}" for e in found)
+        case_errors = errors(published.case.outcome(published.times), published.outcome)
+        numbers = ("" if np.isnan(e) else f"{e:.3f}" for e in case_errors)
         page.row(published.case.name, *numbers, *_speed(seconds[-1]))
     page.row("mean", "", "", "", "", *_speed(float(np.mean(seconds))))
 
@@ -177,10 +177,10 @@ def new_rows(count: int, seed: int, cache: Path | None, tolerance: float) -> lis
     rows, start = [], time.monotonic()
     for n, (case, reference) in enumerate(references(count, seed, cache), start=1):
         expected = np.array(reference.outcome)
-        found = errors(case.outcome(TIMES, tolerance=tolerance), expected)
-        rows.append(Row(case, found, float(expected[-1, 0]), seconds_of(case)))
+        case_errors = errors(case.outcome(TIMES, tolerance=tolerance), expected)
+        rows.append(Row(case, case_errors, float(expected[-1, 0]), seconds_of(case)))
         flag = "" if reference.agreement <= AGREEMENT else f"  reference to {reference.agreement:.3f} % only"
-        progress(f"{n:4d}/{count} {time.monotonic() - start:6.0f} s  {case.name:24s} {found[0]:7.3f} %{flag}")
+        progress(f"{n:4d}/{count} {time.monotonic() - start:6.0f} s  {case.name:24s} {case_errors[0]:7.3f} %{flag}")
     return rows
 
 
@@ -215,11 +215,11 @@ _SUMMARY_HEADS = (
 )
 
 
-def _summary(page: Page, name: str, found: Floats) -> None:
-    if found.size:
-        numbers = (np.median(found), np.quantile(found, 0.95), found.max())
-        shares = (100 * np.mean(found <= limit) for limit in (0.2, 0.5))
-        page.row(name, found.size, *(f"{x:.3f}" for x in numbers), *(f"{x:.1f}" for x in shares))
+def _summary(page: Page, name: str, group_errors: Floats) -> None:
+    if group_errors.size:
+        numbers = (np.median(group_errors), np.quantile(group_errors, 0.95), group_errors.max())
+        shares = (100 * np.mean(group_errors <= limit) for limit in (0.2, 0.5))
+        page.row(name, group_errors.size, *(f"{x:.3f}" for x in numbers), *(f"{x:.1f}" for x in shares))
 
 
 def effective_exponent(case: Case) -> float:

@@ -124,8 +124,8 @@ def share_row(page, label, rows):
     """Shares of [(planted, answer, terms, cpu)] by one penalty."""
     merged = {"PL": "HS"}
     counts = (
-        sum(planted == found for planted, found, _, _ in rows),
-        sum(merged.get(planted, planted) == merged.get(found, found) for planted, found, _, _ in rows),
+        sum(planted == answered for planted, answered, _, _ in rows),
+        sum(merged.get(planted, planted) == merged.get(answered, answered) for planted, answered, _, _ in rows),
         sum(terms == 1 for _, _, terms, _ in rows),
     )
     cpu = np.median([cpu for *_, cpu in rows])
@@ -135,7 +135,7 @@ def share_row(page, label, rows):
 def confusion_rows(page, label, rows):
     """Answers of one penalty by planted law."""
     for name in LAWS:
-        answers = [found for planted, found, _, _ in rows if planted == name]
+        answers = [answered for planted, answered, _, _ in rows if planted == name]
         if answers:
             page.row(label, name, *(answers.count(other) for other in LAWS))
 
@@ -168,7 +168,7 @@ def main():
     page.table("penalty", "specimens", "strict", "HS and PL merged", "single term left", "CPU time, s")
     for label, rows in results.items():
         share_row(page, title_of(label), rows)
-    page.table("penalty", "planted law", *(f"found {name}" for name in LAWS))
+    page.table("penalty", "planted law", *(f"answer {name}" for name in LAWS))
     for label, rows in results.items():
         confusion_rows(page, title_of(label), rows)
     if options.write:
