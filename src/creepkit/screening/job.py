@@ -72,7 +72,7 @@ def _serialised_predictor(predictor: Predictor) -> bytes:
         return b"".join(name.encode() + _serialised_predictor(p) for name, p in sorted(untyped.predictors.items()))
     if _is_surrogate(untyped):
         weights = b"".join(tensor.detach().numpy().tobytes() for tensor in untyped.module.state_dict().values())
-        return json.dumps(untyped.header, sort_keys=True).encode() + weights
+        return json.dumps(untyped.file_header, sort_keys=True).encode() + weights
     try:
         return json.dumps(specimen_to_json(untyped), sort_keys=True).encode()
     except (DatasetError, AttributeError):  # a mesh of its own, or no record at all
