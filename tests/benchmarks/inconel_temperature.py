@@ -153,7 +153,7 @@ def verdict(results: CrossValidated) -> str:
         f"The discovered forms predict {better} of {log_ratio.size} held-out tests better than plain Arrhenius; the "
         f"mean of ln(ratio of errors) is {log_ratio.mean():+.2f} +- {error:.2f} (one standard error). "
     )
-    if abs(log_ratio.mean()) < 2 * error:
+    if abs(log_ratio.mean()) <= 2 * error:
         return text + "These nine tests do not show that forms predict better or worse than plain Arrhenius."
     return text + f"The forms predict {'better' if log_ratio.mean() < 0 else 'worse'} than plain Arrhenius."
 
