@@ -51,13 +51,15 @@ class Design:
 
 DESIGNS = {
     "jump": Design("pressure of 8, then 10 MPa; D_amp, S_d, S_p"),
-    "thickness": Design("the same, apex thickness unknown by 2 %", spread=0.02),
+    "thickness": Design("pressure of 8, then 10 MPa; D_amp, S_d, S_p; apex thickness unknown by 2 %", spread=0.02),
     "correlated": Design(
-        "the same, apex thickness unknown by 2 %, and AR(1) noise of D_amp, 0.9, 5 um",
+        "pressure of 8, then 10 MPa; D_amp, S_d, S_p; apex thickness unknown by 2 %; AR(1) noise of D_amp (0.9, 5 um)",
         spread=0.02,
         correlated=(0.9, 5e-3),
     ),
-    "noise": Design("pressure of 8, then 10 MPa, AR(1) noise of D_amp, 0.9, 5 um", correlated=(0.9, 5e-3)),
+    "noise": Design(
+        "pressure of 8, then 10 MPa; D_amp, S_d, S_p; AR(1) noise of D_amp (0.9, 5 um)", correlated=(0.9, 5e-3)
+    ),
     "dimples": Design(
         "dimples of 0.44, 0.50, 0.58 mm under 8, then 10 MPa, thickness unknown by 1 %",
         thicknesses=(0.44, 0.50, 0.58),
