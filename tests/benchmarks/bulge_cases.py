@@ -1,7 +1,7 @@
-"""Bulge tests to measure accuracy on: published reference cases, and fresh ones drawn over the paper's bounds.
+"""Bulge tests to measure accuracy on: published reference cases, and new ones drawn over the paper's bounds.
 
 Reference cases: five on the true dimple (pressure by 5 s ramps) and four on a plate with a fillet, clamped at its rim
-and loaded at once; their converged histories lie in files beside the project. Fresh cases: a Sobol sequence over the
+and loaded at once; their converged histories lie in files beside the project. New cases: a Sobol sequence over the
 bounds of Table 1, Eq. (1) and Eq. (2), E 50 to 300 GPa, Tj 2 to 10 h, 3 <= P1 <= P2 <= 25 MPa, one law after the other.
 """
 
@@ -33,9 +33,14 @@ TIMES = np.arange(1, 289) * 150.0
 
 FILLET = Bulge(geometry=DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",)), threads=1)
 TRUE = Bulge(threads=1)
-FRESH_LAWS = (
-    "norton", "strain-hardening", "time-hardening", "hyperbolic-sine", "drifting-exponent", "combined",
-)  # fmt: skip
+DRAWN_LAWS = (
+    "norton",
+    "strain-hardening",
+    "time-hardening",
+    "hyperbolic-sine",
+    "drifting-exponent",
+    "combined",
+)
 
 
 @dataclass(frozen=True)
@@ -57,28 +62,33 @@ class Case:
     def history(self, times: Floats) -> History:
         """The test, observed at `times`."""
         return History(
-            name=self.name, times=times, outputs={}, loading=self.loading, temperature=1000.0,
-            specimen="bulge", elastic=ck.Elastic(self.E),
-        )  # fmt: skip
+            name=self.name,
+            times=times,
+            outputs={},
+            loading=self.loading,
+            temperature=1000.0,
+            specimen="bulge",
+            elastic=ck.Elastic(self.E),
+        )
 
     def simulation(self, end: float, **changes: float) -> tuple[Simulation, BulgeSetup]:
         """A run until `end`, s, by the specimen with some settings changed."""
         specimen = self.specimen.replace(**changes)
-        made = set_up_test(specimen, self.history(np.array([end])), {})
+        setup = set_up_test(specimen, self.history(np.array([end])), {})
         kernel = kernels.lower(self.model, "numba")
         theta = kernel.to_internal(self.model.values(self.values))[0]
-        return simulate(kernel, theta, made.model, made.load_history, settings=solver_settings(specimen)), made
+        return simulate(kernel, theta, setup.model, setup.load_history, settings=solver_settings(specimen)), setup
 
     def outcome(self, times: Floats, **changes: float) -> Floats:
         """Apex in mm, D_amp in mm, S_d in mm and S_p at `times`, (times, 4)."""
-        run, made = self.simulation(float(times[-1]), **changes)
-        top = run.displacements[:, made.model.top, 1]
-        seen = made.observation.observe(made.radii, top)
-        return np.column_stack([run.at(top[:, 0], times), run.at(seen, times)])
+        run, setup = self.simulation(float(times[-1]), **changes)
+        top = run.displacements[:, setup.model.top, 1]
+        observed = setup.observation.observe(setup.radii, top)
+        return np.column_stack([run.at(top[:, 0], times), run.at(observed, times)])
 
 
 @dataclass(frozen=True)
-class Known:
+class PublishedCase:
     """A case whose outcome is published: (times, 4), NaN where the publication gives the apex alone."""
 
     case: Case
@@ -86,20 +96,20 @@ class Known:
     outcome: Floats
 
 
-def dimple_references() -> list[Known]:
+def dimple_references() -> list[PublishedCase]:
     """The five cases on the true dimple."""
     text = json.loads((BENCHMARKS / "dimple_reference.json").read_text())
-    return [_known_dimple(name, entry) for name, entry in text["cases"].items()]
+    return [_published_dimple(name, entry) for name, entry in text["cases"].items()]
 
 
-def _known_dimple(name: str, entry: dict) -> Known:
+def _published_dimple(name: str, entry: dict) -> PublishedCase:
     times = [0.0, 5.0] if entry["Tj"] is None else [0.0, 5.0, entry["Tj"], entry["Tj"] + 5.0]
     pressures = [0.0, entry["P1"], entry["P1"], entry["P2"]][: len(times)]
     law, values = _law_of(entry["law"])
     loading = RecordedLoading(Program(np.array(times), np.array(pressures)), "pressure")
     case = Case(name, law, values, entry["E"], loading)
     outcome = np.column_stack([entry[column] for column in ("apex", "D_amp", "S_d", "S_p")])
-    return Known(case, np.array(entry["times_s"], float), outcome)
+    return PublishedCase(case, np.array(entry["times_s"], float), outcome)
 
 
 def _law_of(entry: dict) -> tuple[str, dict[str, float]]:
@@ -111,8 +121,8 @@ def _law_of(entry: dict) -> tuple[str, dict[str, float]]:
     return "drifting-exponent", {"A": rate, **exponents}
 
 
-def fillet_references() -> list[Known]:
-    """The four cases on the plate with a fillet; the file says them in words, so they are written out here."""
+def fillet_references() -> list[PublishedCase]:
+    """The four cases on the plate with a fillet; the file describes them in prose, so they are written out here."""
     combined = dict(A_1=1e-8, n_1=3, B=60, A_2=1e-13, n_2=4, m_1=-0.3, A_3=1e-11, n_3=3, m_2=-0.4)
     cases = [
         Case("c1", "norton", dict(A=1e-13, n=4.3), 150e3, _at_once(8.0), FILLET),
@@ -122,7 +132,7 @@ def fillet_references() -> list[Known]:
     ]
     text = json.loads((BENCHMARKS / "fe_reference.json").read_text())
     times = np.array(text["times_s"], float)
-    return [Known(case, times, _apex_alone(text["cases"][case.name]["apex"])) for case in cases]
+    return [PublishedCase(case, times, _apex_alone(text["cases"][case.name]["apex"])) for case in cases]
 
 
 def _at_once(*pressures: float) -> Loading:
@@ -134,12 +144,12 @@ def _apex_alone(apex: list[float]) -> Floats:
     return np.column_stack([apex, *np.full((3, len(apex)), np.nan)])
 
 
-def fresh_cases(seed: int) -> Iterator[Case]:
-    """Fresh cases without end, those that the paper's first two criteria let pass."""
+def drawn_cases(seed: int) -> Iterator[Case]:
+    """New cases without end, those that the paper's first two criteria let pass."""
     sampler, number = qmc.Sobol(13, seed=seed), 0
     while True:
         for point in sampler.random(256):
-            case = _drawn(number, FRESH_LAWS[number % len(FRESH_LAWS)], point)
+            case = _drawn(number, DRAWN_LAWS[number % len(DRAWN_LAWS)], point)
             number += 1
             if _has_sensible_rates(case):
                 yield case
@@ -148,9 +158,9 @@ def fresh_cases(seed: int) -> Iterator[Case]:
 def _drawn(number: int, law: str, point: Floats) -> Case:
     table = ck.law(law).table
     values = {}
-    for share, (name, param) in zip(point[4:], table.items(), strict=False):
+    for fraction, (name, param) in zip(point[4:], table.items(), strict=False):
         low, high = param.bounds
-        values[name] = float(low * (high / low) ** share if param.scale == "log" else low + (high - low) * share)
+        values[name] = float(low * (high / low) ** fraction if param.scale == "log" else low + (high - low) * fraction)
     first = 3.0 + 22.0 * point[0]
     loading = PressureJump(first, first + (25.0 - first) * point[1], (2.0 + 8.0 * point[2]) * HOUR)
     return Case(f"{law} {number}", law, values, 50e3 + 250e3 * point[3], loading)

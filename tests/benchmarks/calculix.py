@@ -1,18 +1,16 @@
-"""CalculiX and creepkit on the same mesh: accuracy and CPU time, one row for each case and cetol.
+"""CalculiX and creepkit on the same mesh: accuracy and CPU time of bulge tests.
 
-Run it from the root of the project where `ccx` is on the PATH (Debian: calculix-ccx):
+    python tests/benchmarks/calculix.py [N3 N7 TH c1 c2 c3] [--cetol 1e-4 1e-5] [--refinement 1] [--alone] [--write]
 
-    python tests/benchmarks/calculix.py [N3 N7 TH c1 c2 c3] [--cetol 1e-4 1e-5] [--refinement 1] [--alone]
-
-CalculiX is backward Euler, so two values of cetol give the limit of small increments on this mesh, and with it the
-error in time of either code; differences are the largest from 10 min on, in percent of the apex at the end. CPU
-time is that of the processes, user and system; creepkit's is the mean of several runs after the compiler's work is
-done. --alone leaves creepkit out.
+Needs `ccx` on the PATH (Debian: calculix-ccx). N3, N7 and TH are on the dimple, loaded by ramps of 5 s; c1 to c3 on a
+plate with a fillet, its rim clamped, loaded at once. CalculiX is backward Euler, so two values of its tolerance cetol
+give its limit of small increments on this mesh, and with it the error in time of either code: the largest difference of
+the apex displacement from that limit, from 10 min on, in percent of the apex at the end. CPU time is that of the
+processes, user and system; creepkit's is the mean of 20 runs after compilation. --alone leaves creepkit out.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import shutil
@@ -24,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 from calculix_deck import Deck, Norton, displacements, extrapolated, increments
+from measured import Page, arguments
 
 import creepkit as ck
 from creepkit.arrays import Floats
@@ -33,13 +32,15 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import Loading, PressureJump, Program, RecordedLoading
 from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.specimens.bulge.run import BulgeRun
+from creepkit.specimens.bulge.specimen import Bulge
 
 TIMES = np.array([150, 600, 1800, 3600, 7200, 10800, 14400, 14550, 21600, 28800, 36000, 43200], dtype=float)
 LONGEST_WAIT = 3600.0
 """Seconds after which CalculiX is taken to be stuck."""
 
 _REPEATS = 20
-_SETTLED = 600.0
+_FIRST_COMPARED = 600.0
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ def run(deck: Deck, program: str | Path | None = None, preload: Path | None = No
     program = program or shutil.which("ccx")
     if program is None:
         raise SystemExit("CalculiX is not installed: no 'ccx' on the PATH; on Debian, apt install calculix-ccx")
-    more = {"OMP_NUM_THREADS": "1"} | ({"LD_PRELOAD": str(preload)} if preload else {})
+    variables = {"OMP_NUM_THREADS": "1"} | ({"LD_PRELOAD": str(preload)} if preload else {})
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "job.inp").write_text(deck.text())
@@ -118,7 +119,7 @@ def run(deck: Deck, program: str | Path | None = None, preload: Path | None = No
         done = subprocess.run(
             [program, "job"],
             cwd=folder,
-            env=os.environ | more,
+            env=os.environ | variables,
             capture_output=True,
             text=True,
             timeout=LONGEST_WAIT,
@@ -133,9 +134,9 @@ def run(deck: Deck, program: str | Path | None = None, preload: Path | None = No
 
 
 def _error(output: str) -> str:
-    """What CalculiX says went wrong."""
-    said = [line.strip() for line in output.splitlines() if "*ERROR" in line]
-    return said[-1] if said else "it says nothing"
+    """The last error message of CalculiX."""
+    messages = [line.strip() for line in output.splitlines() if "*ERROR" in line]
+    return messages[-1] if messages else "there is no error message"
 
 
 def _children() -> float:
@@ -143,24 +144,21 @@ def _children() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def theirs(case: Case, mesh: Mesh, cetols: list[float]) -> list[Result]:
+def calculix_runs(case: Case, mesh: Mesh, cetols: list[float]) -> list[Result]:
     """CalculiX's runs, the coarsest first; the apex is their only node."""
     deck = Deck(mesh, case.E, 0.3, case.creep, case.loading.program(), TIMES, mesh.top[:1], first=case.first)
     return [run(replace(deck, cetol=cetol)) for cetol in sorted(cetols, reverse=True)]
 
 
-def ours(case: Case, refinement: float) -> tuple[Floats, float]:
+def creepkit_run(case: Case, refinement: float) -> tuple[Floats, float]:
     """Apex displacement, (times,) mm, and CPU seconds a run."""
-    from creepkit.specimens.bulge.run import BulgeRun
-    from creepkit.specimens.bulge.specimen import Bulge
-
     law, values = case.law
     specimen = Bulge(geometry=case.geometry, refinement=refinement)
 
     def simulate() -> Floats:
-        found = ck.simulate(law, specimen, values, loading=case.loading, times=TIMES, elastic=Elastic(E=case.E))
-        assert isinstance(found, BulgeRun)
-        return found.displacement(radius=0.0)
+        result = ck.simulate(law, specimen, values, loading=case.loading, times=TIMES, elastic=Elastic(E=case.E))
+        assert isinstance(result, BulgeRun)
+        return result.displacement(radius=0.0)
 
     apex = simulate()
     start = time.process_time()
@@ -169,48 +167,59 @@ def ours(case: Case, refinement: float) -> tuple[Floats, float]:
     return apex, (time.process_time() - start) / _REPEATS
 
 
-def difference(found: Floats, reference: Floats) -> float:
+def difference(values: Floats, reference: Floats) -> float:
     """Largest difference from 10 min on, percent of the last value of the reference."""
-    late = TIMES >= _SETTLED
-    return float(100 * np.abs(found - reference)[late].max() / reference[-1])
+    compared = TIMES >= _FIRST_COMPARED
+    return float(100 * np.abs(values - reference)[compared].max() / reference[-1])
 
 
-def report(name: str, cetols: list[float], refinement: float, alone: bool) -> None:
-    """Run one case and print its rows."""
+def report(page: Page, name: str, cetols: list[float], refinement: float, alone: bool) -> None:
+    """The rows of one case."""
     case = CASES[name]
     mesh = case.geometry.mesh(refinement)
-    runs = theirs(case, mesh, cetols)
+    runs = calculix_runs(case, mesh, cetols)
     apexes = [r.displacements[:, 0, 1] for r in runs]
     limit = extrapolated(apexes[-2], apexes[-1], (runs[-2].increments, runs[-1].increments))
     converged = 100 * (limit[-1] / case.apex - 1)
-    print(f"{name}: {len(mesh.elements)} elements; limit {limit[-1]:.6f} mm at 12 h, {converged:+.3f} % of converged")
-    own, cpu = (None, np.nan) if alone else ours(case, refinement)
-    for cetol, result, apex in zip(sorted(cetols, reverse=True), runs, apexes, strict=True):
-        row = f"  ccx {cetol:7.0e} {result.increments:5d} increments {result.cpu:8.2f} s"
-        ratio = "" if alone else f"   {result.cpu / cpu:7.0f} times the CPU of creepkit"
-        print(f"{row} {difference(apex, limit):8.3f} %{ratio}")
-    if own is not None:
-        print(f"  creepkit {'':23s} {cpu:8.4f} s {difference(own, limit):8.3f} %", flush=True)
+    apex, cpu = (None, np.nan) if alone else creepkit_run(case, refinement)
+    whole = f"{limit[-1]:.6f} ({converged:+.3f})"
+    for cetol, result, theirs in zip(sorted(cetols, reverse=True), runs, apexes, strict=True):
+        ratio = "" if alone else f"{result.cpu / cpu:.0f}"
+        code = f"CalculiX, cetol {cetol:g}"
+        page.row(name, code, whole, result.increments, f"{result.cpu:.2f}", ratio, f"{difference(theirs, limit):.3f}")
+    if apex is not None:
+        page.row(name, "creepkit", whole, "", f"{cpu:.4f}", "1", f"{difference(apex, limit):.3f}")
 
 
 def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("cases", nargs="*", default=list(CASES), help="some of " + " ".join(CASES))
     parser.add_argument("--cetol", nargs="+", type=float, default=[1e-4, 1e-5])
     parser.add_argument("--refinement", type=float, default=1.0)
     parser.add_argument("--alone", action="store_true", help="leave creepkit out")
-    given = parser.parse_args()
-    unknown = [name for name in given.cases if name not in CASES]
+    options = parser.parse_args()
+    unknown = [name for name in options.cases if name not in CASES]
     if unknown:
         parser.error(f"no case is called {', '.join(unknown)}; there are {', '.join(CASES)}")
-    if len(set(given.cetol)) < 2:
+    if len(set(options.cetol)) < 2:
         parser.error("two values of cetol are needed, for the limit of small increments")
-    for name in given.cases:
+    page = Page("calculix", __doc__)
+    page.table(
+        "case",
+        "code",
+        "limit of the apex at 12 h, mm (from the converged apex, %)",
+        "increments",
+        "CPU time, s",
+        "CPU time over creepkit",
+        "difference from the limit, %",
+    )
+    for name in options.cases:
         try:
-            report(name, given.cetol, given.refinement, given.alone)
+            report(page, name, options.cetol, options.refinement, options.alone)
         except Stopped as stopped:
-            print(f"{name}: {stopped}", flush=True)
+            page.row(name, str(stopped), "", "", "", "", "")
+    if options.write:
+        page.write()
 
 
 if __name__ == "__main__":

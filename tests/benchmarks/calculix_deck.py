@@ -1,8 +1,9 @@
-"""Decks of CalculiX for an axisymmetric mesh under pressure, and the numbers in what it prints.
+"""Input decks of CalculiX for an axisymmetric mesh under pressure, and the numbers in its output files.
 
-What CalculiX 2.20 does silently is met here: its Norton law raises A to 1e-20, so a deck counts stress in a unit in
-which A is far larger; an amplitude's corners are stepped over, so they are made points of time; a jump within *VISCO
-ends in ever smaller increments, so it has a static step of its own; *NODE FILE suppresses *NODE PRINT.
+Four silent habits of CalculiX 2.20 are worked around: its Norton law raises A to at least 1e-20, so stress is written
+in a unit in which A is far larger; increments step over the corners of an amplitude, so these are made points of time;
+a jump of the load within *VISCO ends in ever smaller increments, so it has a static step of its own; *NODE FILE
+suppresses *NODE PRINT.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from creepkit.fem.mesh import Mesh
 from creepkit.records import Program
 
 SMALLEST_A = 1e-20
-"""The smallest rate coefficient that CalculiX takes as it is given."""
+"""The smallest rate coefficient that CalculiX does not change."""
 
 INSTANT = 1e-3
 """Length, s, of the static step in which a load jumps; it is part of the total time."""
@@ -39,7 +40,7 @@ class Norton:
 
 @dataclass(frozen=True)
 class UserLaw:
-    """A law of subroutine CREEP, which takes MPa and s. temperature : K, everywhere; CalculiX insists on one."""
+    """A law of subroutine CREEP, which takes MPa and s. temperature : K, uniform; CalculiX requires one."""
 
     temperature: float = 1000.0
 
@@ -121,7 +122,7 @@ class Deck:
             yield from self._step(procedure, length)
 
     def _phases(self) -> Iterator[tuple[str, float]]:
-        """Procedure and length, s, of each step: what jumps does so in a static step of its own."""
+        """Procedure and length, s, of each step: a load jumps in a static step of its own."""
         times, reached = self.pressure.times, 0.0
         jumps = times[1:][np.diff(times) <= 0.0]
         creeping = "*STATIC" if self.creep is None else f"*VISCO, CETOL={self.cetol:.9g}"
@@ -152,15 +153,15 @@ def without_jumps(program: Program) -> Program:
     after = np.append(False, np.diff(times) <= 0.0)
     times = times + INSTANT * after
     if (np.diff(times) <= 0.0).any():
-        raise ValueError("the pressure jumps twice within a millisecond, which an amplitude cannot say")
+        raise ValueError("the pressure jumps twice within a millisecond, which an amplitude cannot express")
     return Program(times, values)
 
 
 def pressed_sides(mesh: Mesh) -> list[tuple[int, int]]:
     """Element and side, from 1, of each pressed edge; side k joins corners k and k + 1, as CalculiX counts."""
     elements, sides = np.nonzero(np.isin(mesh.elements[:, 4:], mesh.pressed[:, 1]))
-    found = {int(mesh.elements[e, 4 + k]): (int(e) + 1, int(k) + 1) for e, k in zip(elements, sides, strict=True)}
-    return [found[int(middle)] for middle in mesh.pressed[:, 1]]
+    by_middle = {int(mesh.elements[e, 4 + k]): (int(e) + 1, int(k) + 1) for e, k in zip(elements, sides, strict=True)}
+    return [by_middle[int(middle)] for middle in mesh.pressed[:, 1]]
 
 
 def _lines(numbers: Ints) -> Iterator[str]:
@@ -188,26 +189,26 @@ def blocks(lines: Iterable[str]) -> Iterator[tuple[str, float, Floats]]:
 
 def displacements(lines: Iterable[str], deck: Deck) -> Floats:
     """u_r and u_z at the deck's times and nodes, (times, nodes, 2) mm; NaN where the file holds nothing."""
-    found = np.full((deck.times.size, deck.nodes.size, 2), np.nan)
+    result = np.full((deck.times.size, deck.nodes.size, 2), np.nan)
     for title, time, rows in blocks(lines):
         near = np.flatnonzero(np.abs(deck.times - time) <= 1e-6 * time)
         if title == "displacements" and near.size:
             where = {int(node) - 1: k for k, node in enumerate(rows[:, 0])}
-            found[near[0]] = rows[[where[int(node)] for node in deck.nodes], 1:3]
-    return found
+            result[near[0]] = rows[[where[int(node)] for node in deck.nodes], 1:3]
+    return result
 
 
 def stresses(lines: Iterable[str], deck: Deck) -> Floats:
     """Radial, axial, hoop and shear stress, (times, elements, points, 4) MPa; NaN where the file holds nothing."""
-    found: Floats | None = None
+    result: Floats | None = None
     for title, time, rows in blocks(lines):
         near = np.flatnonzero(np.abs(deck.times - time) <= 1e-6 * time)
         if title != "stresses" or not near.size:
             continue
         table = rows[:, 2:6].reshape(len(deck.mesh.elements), -1, 4)
-        found = np.full((deck.times.size, *table.shape), np.nan) if found is None else found
-        found[near[0]] = table * deck.stress_unit
-    return np.full((deck.times.size, len(deck.mesh.elements), 0, 4), np.nan) if found is None else found
+        result = np.full((deck.times.size, *table.shape), np.nan) if result is None else result
+        result[near[0]] = table * deck.stress_unit
+    return np.full((deck.times.size, len(deck.mesh.elements), 0, 4), np.nan) if result is None else result
 
 
 def increments(lines: Iterable[str]) -> tuple[int, int]:

@@ -1,7 +1,7 @@
-"""CalculiX 2.20 from Debian's source, its creep routine left open: a library in which a preloaded `creep_` comes first.
+"""CalculiX 2.20 built from Debian's source as a shared library, so that a preloaded `creep_` replaces its own routine.
 
-The ccx of Debian's package is one program whose routines cannot be replaced. Built once (some two minutes on two cores)
-into a folder and found again there. Needs gfortran, gcc, make and the libraries named in PACKAGES.
+The ccx of Debian's package is one program whose routines cannot be replaced. It is built once (some two minutes on two
+cores) into a folder and found again there. Needs gfortran, gcc, make and the libraries named in PACKAGES.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ def _require(*programs: str) -> None:
 def _unpack(folder: Path) -> None:
     archive = folder / "source.tar.bz2"
     try:
-        with urllib.request.urlopen(ADDRESS, timeout=60) as answer:
-            archive.write_bytes(answer.read())
+        with urllib.request.urlopen(ADDRESS, timeout=60) as response:
+            archive.write_bytes(response.read())
     except (urllib.error.URLError, TimeoutError) as error:
         raise SystemExit(f"CalculiX's source cannot be fetched from {ADDRESS}: {error}") from None
     if hashlib.sha256(archive.read_bytes()).hexdigest() != SHA256:

@@ -1,17 +1,17 @@
-"""How accurate and how fast bulge simulations are: two sets of published references, and fresh cases over the bounds.
+"""Accuracy and speed of bulge simulations: published references, and new cases over the bounds of the paper.
 
-Run as ``python tests/benchmarks/dimple_accuracy.py [--cases 200] [--seed 1] [--cache FILE] [--tolerance 0.01]``.
+    python tests/benchmarks/dimple_accuracy.py [--cases 200] [--seed 1] [--cache FILE] [--tolerance 0.01] [--write]
 
-Errors are the largest over the history: of the apex and D_amp in % of their largest value, of S_d and S_p in % of the
-value itself. Speed: simulations of 12 h with output every 150 s and the Gaussian fit, per CPU second of one core.
-Each fresh case has a reference of its own, converged: two meshes and tolerances must agree within .03 %, or finer ones
-are taken. References are kept in the cache, one line each, written as soon as it is known; a run that was stopped goes
-on from there.
+Errors are the largest over the history: of apex displacement and D_amp in percent of their largest value, of S_d and
+S_p in percent of the value itself. Speed: simulations of 12 h with output every 150 s and the Gaussian fit, CPU time of
+one core. The references lie in files beside the project. Each new case has a converged reference of its own: two meshes
+and tolerances must agree within 0.03 %, or finer ones are taken. "Effective n" is d ln rate / d ln stress at the stress
+that stands for the larger pressure, at a strain of 0.01 and 1e4 s. References are kept in the cache, one line each,
+written as soon as it is known; a run that was stopped continues from there.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from collections.abc import Callable, Iterator
@@ -21,7 +21,18 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from bulge_cases import FRESH_LAWS, TIMES, TRUE, Case, Known, dimple_references, fillet_references, fresh_cases
+from bulge_cases import (
+    DRAWN_LAWS,
+    TIMES,
+    TRUE,
+    Case,
+    PublishedCase,
+    dimple_references,
+    drawn_cases,
+    fillet_references,
+)
+from measured import Page, arguments, progress
+from public_calls import predict
 
 from creepkit import kernels
 from creepkit.arrays import Floats
@@ -38,7 +49,7 @@ REPEATS = 3
 
 @dataclass(frozen=True)
 class Reference:
-    """What is known of one fresh case: whether it is informative, and its outcome.
+    """Reference of one new case: whether it is informative, and its outcome.
 
     agreement : % between the two finest discretizations; outcome : (288, 4), empty when not informative.
     """
@@ -59,15 +70,15 @@ class Row:
     seconds: float
 
 
-def errors(found: Floats, expected: Floats) -> Floats:
-    """Largest error of apex, D_amp, S_d, S_p over a history, %; NaN for what is not known."""
+def errors(values: Floats, expected: Floats) -> Floats:
+    """Largest error of apex, D_amp, S_d, S_p over a history, %; NaN for what the reference lacks."""
     whole = np.array([expected[:, 0].max(), expected[:, 1].max(), 1.0, 1.0])
     scale = np.where([True, True, False, False], whole, expected)
-    return np.asarray(100 * np.max(np.abs(found - expected) / scale, axis=0))
+    return np.asarray(100 * np.max(np.abs(values - expected) / scale, axis=0))
 
 
 def cpu(work: Callable[[], object], repeats: int = REPEATS) -> float:
-    """CPU seconds of a call: the mean over repeats, after a first one that compiles and warms."""
+    """CPU seconds of a call: the mean over repeats, after a first one that compiles."""
     work()
     start = time.process_time()
     for _ in range(repeats):
@@ -78,13 +89,14 @@ def cpu(work: Callable[[], object], repeats: int = REPEATS) -> float:
 def seconds_of(case: Case) -> float:
     """CPU seconds of one simulation of 12 h with output every 150 s and the fit."""
     plan = [case.history(TIMES)]
-    return cpu(lambda: case.specimen.predict(case.model, case.model.to_internal(case.values), plan))
+    return cpu(lambda: predict(case.specimen, case.model, case.values, plan))
 
 
 def converged(case: Case) -> Reference:
     """The reference of one case."""
-    screened, made = case.simulation(TIMES[-1], tolerance=3e-2)
-    reason = _uninformative(screened.status, screened.at(screened.displacements[:, made.model.top[0], 1], _marks(case)))
+    coarse_run, setup = case.simulation(TIMES[-1], tolerance=3e-2)
+    apex = coarse_run.at(coarse_run.displacements[:, setup.model.top[0], 1], _screening_times(case))
+    reason = _uninformative(coarse_run.status, apex)
     if reason:
         return Reference(case.name, reason)
     outcomes = (case.outcome(TIMES, refinement=r, tolerance=t) for r, t in LEVELS)
@@ -95,28 +107,28 @@ def converged(case: Case) -> Reference:
     return Reference(case.name, "", gap, tuple(map(tuple, np.round(fine, 9).tolist())))
 
 
-def _marks(case: Case) -> Floats:
-    """Times at which a screened apex is looked at: after the first ramp, before the jump, after it, the end."""
+def _screening_times(case: Case) -> Floats:
+    """Times at which the apex is screened: after the first ramp, before the jump, after it, the end."""
     assert isinstance(case.loading, PressureJump)
     jump = case.loading.Tj
     return np.array([case.loading.ramp, jump, jump + case.loading.ramp, TIMES[-1]])
 
 
 def _uninformative(status: Status, apex: Floats) -> str:
-    """Why a case says nothing about creep, or an empty string."""
+    """Why a case is not informative about creep, or an empty string."""
     if status is not Status.COMPLETE:
         return "burst"
     if not 0.08 <= apex[3] <= 2.5:
-        return "apex outside .08 to 2.5 mm"
+        return "apex outside 0.08 to 2.5 mm"
     if apex[1] - apex[0] + apex[3] - apex[2] < 0.01:
-        return "creep below .01 mm"
+        return "creep below 0.01 mm"
     return ""
 
 
 def references(count: int, seed: int, cache: Path | None) -> Iterator[tuple[Case, Reference]]:
     """The first `count` informative cases with their references, from the cache as far as it goes."""
     known = _cached(cache)
-    for case in fresh_cases(seed):
+    for case in drawn_cases(seed):
         key = f"{seed}/{case.name}"
         if key not in known:
             known[key] = converged(case)
@@ -142,91 +154,107 @@ def _append(cache: Path | None, key: str, reference: Reference) -> None:
             file.write(json.dumps({"key": key, **asdict(reference)}) + "\n")
 
 
-def known_table(title: str, cases: list[Known]) -> None:
-    """Print the errors and the speed of published cases."""
-    names = ("apex %", "D_amp %", "S_d %", "S_p %", "CPU ms", "per s")
-    print(f"\n{title}\n{'case':8s}" + "".join(f" {name:>8s}" for name in names))
+def published_table(page: Page, title: str, cases: list[PublishedCase]) -> None:
+    """Errors and speed of published cases."""
+    page.heading(title)
+    heads = ("CPU time, ms", "simulations per core-second")
+    page.table("case", "apex, %", "D_amp, %", "S_d, %", "S_p, %", *heads)
     seconds = []
-    for known in cases:
-        seconds.append(seconds_of(known.case))
-        found = errors(known.case.outcome(known.times), known.outcome)
-        print(f"{known.case.name:8s} " + " ".join(f"{e:8.3f}" for e in found) + _speed(seconds[-1]))
-    print(f"{'mean':44s}" + _speed(float(np.mean(seconds))))
+    for published in cases:
+        seconds.append(seconds_of(published.case))
+        case_errors = errors(published.case.outcome(published.times), published.outcome)
+        numbers = ("" if np.isnan(e) else f"{e:.3f}" for e in case_errors)
+        page.row(published.case.name, *numbers, *_speed(seconds[-1]))
+    page.row("mean", "", "", "", "", *_speed(float(np.mean(seconds))))
 
 
-def _speed(seconds: float) -> str:
-    return f" {1e3 * seconds:8.1f} {1 / seconds:8.1f}"
+def _speed(seconds: float) -> tuple[str, str]:
+    return f"{1e3 * seconds:.1f}", f"{1 / seconds:.1f}"
 
 
-def fresh_rows(count: int, seed: int, cache: Path | None, tolerance: float) -> list[Row]:
-    """Errors of production runs of fresh cases."""
-    rows, begun = [], time.monotonic()
+def new_rows(count: int, seed: int, cache: Path | None, tolerance: float) -> list[Row]:
+    """Errors of production runs of new cases."""
+    rows, start = [], time.monotonic()
     for n, (case, reference) in enumerate(references(count, seed, cache), start=1):
         expected = np.array(reference.outcome)
-        found = errors(case.outcome(TIMES, tolerance=tolerance), expected)
-        rows.append(Row(case, found, float(expected[-1, 0]), seconds_of(case)))
+        case_errors = errors(case.outcome(TIMES, tolerance=tolerance), expected)
+        rows.append(Row(case, case_errors, float(expected[-1, 0]), seconds_of(case)))
         flag = "" if reference.agreement <= AGREEMENT else f"  reference to {reference.agreement:.3f} % only"
-        print(f"{n:4d}/{count} {time.monotonic() - begun:6.0f} s  {case.name:24s} {found[0]:7.3f} %{flag}", flush=True)
+        progress(f"{n:4d}/{count} {time.monotonic() - start:6.0f} s  {case.name:24s} {case_errors[0]:7.3f} %{flag}")
     return rows
 
 
-def fresh_table(rows: list[Row]) -> None:
-    """Print what the fresh cases say, as a whole and where their tail is."""
-    print(f"\n{len(rows)} fresh cases, error of the history, %")
-    print(f"{'':32s} {'cases':>5s} {'median':>8s} {'95 %':>8s} {'largest':>8s} {'<= .2 %':>8s} {'<= .5 %':>8s}")
+def new_tables(page: Page, rows: list[Row]) -> None:
+    """Errors of the new cases, as a whole and by groups, the worst ones, and their speed."""
+    page.heading(f"{len(rows)} new cases")
+    page.table("output", *_SUMMARY_HEADS)
     for k, name in enumerate(("apex", "D_amp", "S_d", "S_p")):
-        _summary(name, np.array([row.errors[k] for row in rows]))
-    print("the apex alone, by")
+        _summary(page, name, np.array([row.errors[k] for row in rows]))
+    page.table("apex, by group", *_SUMMARY_HEADS)
     for name, belongs in GROUPS.items():
-        _summary(name, np.array([row.errors[0] for row in rows if belongs(row)]))
-    print("the ten worst")
+        _summary(page, name, np.array([row.errors[0] for row in rows if belongs(row)]))
+    page.table("the ten worst", "error of the apex, %", "apex at 12 h, mm", "effective n", "values")
     for row in sorted(rows, key=lambda row: -row.errors[0])[:10]:
         values = ", ".join(f"{name} {value:.3g}" for name, value in row.case.values.items())
-        size = f"{row.errors[0]:.3f} % of {row.apex:.3f} mm"
-        print(f"  {size}  {row.case.name}: {values}, effective n {steepness(row.case):.1f}")
+        exponent = f"{effective_exponent(row.case):.1f}"
+        page.row(row.case.name, f"{row.errors[0]:.3f}", f"{row.apex:.3f}", exponent, values)
     seconds = np.array([row.seconds for row in rows])
-    print(f"CPU ms of a simulation: mean {1e3 * seconds.mean():.1f}, median {1e3 * np.median(seconds):.1f}; "
-          f"{1 / seconds.mean():.1f} per core-second")  # fmt: skip
+    page.paragraph(
+        f"CPU time of a simulation: mean {1e3 * seconds.mean():.1f} ms, median {1e3 * np.median(seconds):.1f} ms; "
+        f"{1 / seconds.mean():.1f} simulations per core-second."
+    )
 
 
-def _summary(name: str, found: Floats) -> None:
-    if found.size:
-        shares = [100 * np.mean(found <= limit) for limit in (0.2, 0.5)]
-        print(f"{name:32s} {found.size:5d} {np.median(found):8.3f} {np.quantile(found, 0.95):8.3f} {found.max():8.3f} "
-              f"{shares[0]:8.1f} {shares[1]:8.1f}")  # fmt: skip
+_SUMMARY_HEADS = (
+    "cases",
+    "median, %",
+    "95 % quantile, %",
+    "largest, %",
+    "within 0.2 %, % of cases",
+    "within 0.5 %, % of cases",
+)
 
 
-def steepness(case: Case) -> float:
-    """d ln rate / d ln stress at the stress that stands for the larger pressure, strain .01 and 1e4 s: effective n."""
+def _summary(page: Page, name: str, group_errors: Floats) -> None:
+    if group_errors.size:
+        numbers = (np.median(group_errors), np.quantile(group_errors, 0.95), group_errors.max())
+        shares = (100 * np.mean(group_errors <= limit) for limit in (0.2, 0.5))
+        page.row(name, group_errors.size, *(f"{x:.3f}" for x in numbers), *(f"{x:.1f}" for x in shares))
+
+
+def effective_exponent(case: Case) -> float:
+    """d ln rate / d ln stress at the stress that stands for the larger pressure, strain 0.01 and 1e4 s: effective n."""
     stress = case.specimen.reference_stress(case.history(TIMES))[-1] * np.array([0.99, 1.01])
     rate = kernels.lower(case.model, "numpy").log_rate(case.values, stress=stress, strain=0.01, time=1e4)
     return float(np.diff(rate)[0] / np.diff(np.log(stress))[0])
 
 
 GROUPS: dict[str, Callable[[Row], bool]] = {
-    **{law: partial(lambda row, law: row.case.law == law, law=law) for law in FRESH_LAWS},
-    "effective n below 4": lambda row: steepness(row.case) < 4,
-    "effective n 4 to 6.5": lambda row: 4 <= steepness(row.case) < 6.5,
-    "effective n above 6.5": lambda row: steepness(row.case) >= 6.5,
-    "strain hardening, m below -.5": lambda row: row.case.law == "strain-hardening" and row.case.values["m"] < -0.5,
-    "apex at 12 h below .3 mm": lambda row: row.apex < 0.3,
-    "apex at 12 h .3 to 1 mm": lambda row: 0.3 <= row.apex < 1,
+    **{law: partial(lambda row, law: row.case.law == law, law=law) for law in DRAWN_LAWS},
+    "effective n below 4": lambda row: effective_exponent(row.case) < 4,
+    "effective n 4 to 6.5": lambda row: 4 <= effective_exponent(row.case) < 6.5,
+    "effective n above 6.5": lambda row: effective_exponent(row.case) >= 6.5,
+    "strain hardening, m below -0.5": lambda row: row.case.law == "strain-hardening" and row.case.values["m"] < -0.5,
+    "apex at 12 h below 0.3 mm": lambda row: row.apex < 0.3,
+    "apex at 12 h 0.3 to 1 mm": lambda row: 0.3 <= row.apex < 1,
     "apex at 12 h above 1 mm": lambda row: row.apex >= 1,
 }
 
 
 def main() -> None:
-    """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=200, help="fresh cases; 0 for the published ones alone")
+    parser = arguments(__doc__)
+    parser.add_argument("--cases", type=int, default=200, help="new cases; 0 for the published ones alone")
     parser.add_argument("--seed", type=int, default=1, help="of the Sobol sequence")
     parser.add_argument("--cache", type=Path, help="file that keeps references")
-    parser.add_argument("--tolerance", type=float, default=TRUE.tolerance, help="of the fresh production runs")
-    chosen = parser.parse_args()
-    known_table("dimple_reference.json: the true dimple, pressure by ramps", dimple_references())
-    known_table("fe_reference.json: a plate with a fillet, loaded at once", fillet_references())
-    if chosen.cases:
-        fresh_table(fresh_rows(chosen.cases, chosen.seed, chosen.cache, chosen.tolerance))
+    parser.add_argument("--tolerance", type=float, default=TRUE.tolerance, help="of the production runs of new cases")
+    options = parser.parse_args()
+    page = Page("dimple_accuracy", __doc__)
+    published_table(page, "Five published cases: the dimple, pressure by ramps", dimple_references())
+    published_table(page, "Four published cases: a plate with a fillet, loaded at once", fillet_references())
+    if options.cases:
+        new_tables(page, new_rows(options.cases, options.seed, options.cache, options.tolerance))
+    if options.write:
+        page.write()
 
 
 if __name__ == "__main__":

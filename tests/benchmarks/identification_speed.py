@@ -1,52 +1,65 @@
-"""How long an identification of one dimple takes: the speed table of the README.
+"""Time of an identification of one dimple, through the surrogate that ships and by finite elements.
 
-    python tests/benchmarks/identification_speed.py [--specimens 4]
+    python tests/benchmarks/identification_speed.py [--specimens 4] [--write]
 
-Planted tests of tests/benchmarks/planted.py (jump of pressure, 48 frames), after one that is not counted. Medians over
-specimens of wall and CPU seconds: one law, the four laws of Table 1 with intervals, Eq. (1) with m = 0; through the
-surrogate that comes with creepkit, and with finite elements in the loop. Ratios to the first line are of one run.
+Planted tests of planted_bulge_tests.py (one jump of pressure, 48 frames), after one that is not counted. Medians over
+the specimens of wall and CPU time: one law, the planted one; the four laws of Table 1 with intervals; Eq. (1) with m =
+0. The last column is the ratio of CPU time to the first row of the same run.
 """
 
-import argparse
 import time
 
 import numpy as np
-import planted
+import planted_bulge_tests as planted
+from measured import Page, arguments
 
 import creepkit as ck
 from creepkit.cli import set_numba_cache
 
+DESIGN = planted.DESIGNS["jump"]
+SETTINGS = dict(nuisances=DESIGN.nuisances, weights="likelihood", frames=60)
 
-def timed(function):
+
+def one_law(specimen, using):
+    return ck.identify(specimen.law, specimen.tests, using, **SETTINGS)
+
+
+def four_laws(specimen, using):
+    return ck.select(planted.SINGLE, specimen.tests, using, nuisances=DESIGN.nuisances)
+
+
+def drifting_exponent(specimen, using):
+    return ck.identify(ck.law("drifting-exponent").fix(m=0), specimen.tests, using, **SETTINGS)
+
+
+TASKS = {"one law": one_law, "four laws with intervals": four_laws, "Eq. (1), m = 0": drifting_exponent}
+
+
+def timed(task, specimen, using):
     """Wall and CPU seconds of a call."""
     wall, cpu = time.perf_counter(), time.process_time()
-    function()
+    task(specimen, using)
     return time.perf_counter() - wall, time.process_time() - cpu
 
 
 def main():
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--specimens", type=int, default=4)
-    given = options.parse_args()
+    parser = arguments(__doc__)
+    parser.add_argument("--specimens", type=int, default=4)
+    options = parser.parse_args()
     set_numba_cache()
-    dimple, model = ck.specimen("bulge"), ck.surrogate("dimple")
-    design = planted.DESIGNS["jump"]
-    specimens = [planted.specimen(k, planted.SINGLE, design, dimple) for k in range(given.specimens + 1)]
-    drifting = ck.law("drifting-exponent").fix(m=0)
-    how = dict(nuisances=design.nuisances, weights="likelihood", frames=60)
-    print("| what | using | wall s | CPU s | CPU over the first |\n|-|-|-|-|-|")
+    dimple = ck.specimen("bulge")
+    specimens = [planted.specimen(k, planted.SINGLE, DESIGN, dimple) for k in range(options.specimens + 1)]
+    page = Page("identification_speed", __doc__)
+    page.table("identification", "through", "wall time, s", "CPU time, s", "CPU time over the first row")
     first = None
-    for using, name in ((model, "surrogate"), (dimple, "finite elements")):
-        for title, run in (
-            ("one law, its own", lambda s, u=using: ck.identify(s.law, s.tests, u, **how)),
-            ("four laws with intervals",
-             lambda s, u=using: ck.select(planted.SINGLE, s.tests, u, nuisances=design.nuisances)),
-            ("Eq. (1), m = 0", lambda s, u=using: ck.identify(drifting, s.tests, u, **how)),
-        ):  # fmt: skip
-            run(specimens[0])
-            seconds = np.median([timed(lambda s=s, r=run: r(s)) for s in specimens[1:]], axis=0)
-            first = first or seconds[1]
-            print(f"| {title} | {name} | {seconds[0]:.2f} | {seconds[1]:.2f} | {seconds[1] / first:.1f} |", flush=True)
+    for using, through in ((ck.surrogate("dimple"), "surrogate"), (dimple, "finite elements")):
+        for title, task in TASKS.items():
+            task(specimens[0], using)
+            wall, cpu = np.median([timed(task, specimen, using) for specimen in specimens[1:]], axis=0)
+            first = first or cpu
+            page.row(title, through, f"{wall:.2f}", f"{cpu:.2f}", f"{cpu / first:.1f}")
+    if options.write:
+        page.write()
 
 
 if __name__ == "__main__":

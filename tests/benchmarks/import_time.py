@@ -1,10 +1,18 @@
-"""CPU time of `import creepkit` and `creepkit --help`, beside that of an empty interpreter: python import_time.py."""
+"""CPU time of starting creepkit, in new interpreters.
+
+    python tests/benchmarks/import_time.py [--write]
+
+CPU time, user and system, of an empty interpreter, of `import creepkit` and of `creepkit --help`: the least of seven
+runs each, the start of the interpreter included. The limit is that of the tests.
+"""
 
 from __future__ import annotations
 
 import resource
 import subprocess
 import sys
+
+from measured import Page, arguments
 
 REPEATS = 7
 CASES = {
@@ -26,10 +34,13 @@ def cpu_seconds(code: str) -> float:
 
 
 def main() -> None:
-    """Print the table; the times include the start of the interpreter."""
-    print(f"{'':18} {'CPU s':>7} {'limit s':>8}")
+    options = arguments(__doc__).parse_args()
+    page = Page("import_time", __doc__)
+    page.table("what runs", "CPU time, s", "limit, s")
     for label, (code, limit) in CASES.items():
-        print(f"{label:18} {cpu_seconds(code):7.3f} {'' if limit is None else f'{limit:8.2f}'}")
+        page.row(f"`{label}`", f"{cpu_seconds(code):.3f}", "" if limit is None else f"{limit:.2f}")
+    if options.write:
+        page.write()
 
 
 if __name__ == "__main__":

@@ -1,9 +1,12 @@
-"""Speed of kernels beside the same formulas written by hand for the same target: python kernel_speed.py [rows].
+"""CPU time of kernels derived from a law, over that of the same formulas written by hand for the same target.
 
-Hand and kernel run alternately on the same points; a figure is the median over the repeats of the ratio of their CPU
-times (the issue allows 1.3). `rate` is the rate alone, `all` the rate with its derivatives to the point and to every
-parameter. Compiled entries are called for all rows at once, torch runs on one thread. A call of a kernel for arrays
-costs some 10 us more than its arithmetic, one for tensors some 50 us, which a few thousand rows make small.
+    python tests/benchmarks/kernel_speed.py [rows] [--laws norton ...] [--write]
+
+Kernel and hand-written code run alternately on the same points (20,000 rows by default); each ratio is the median over
+31 repeats of the ratio of their CPU times, and the time is that of the kernel. "Rate" is the creep rate alone,
+"derivatives" the rate with its derivatives to stress, strain, time and every parameter. Compiled functions (numba) are
+called for all rows at once, torch runs on one thread. A call of a kernel costs some 10 us more than its arithmetic in
+NumPy and some 50 us in torch, which a few thousand rows make small.
 """
 
 from __future__ import annotations
@@ -11,7 +14,6 @@ from __future__ import annotations
 import ctypes
 import math
 import statistics
-import sys
 import time
 from collections.abc import Callable
 from functools import partial
@@ -19,60 +21,73 @@ from typing import Any
 
 import numpy as np
 import torch
-from by_hand import LAWS
+from hand_written_laws import LAWS
+from measured import Page, arguments
 from numba import njit
 
-import creepkit
+import creepkit as ck
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.language import CreepLaw
 
-REPEATS, LEAST = 31, 0.01
+REPEATS = 31
+SHORTEST = 0.01
+"""s of CPU that one measurement takes at least."""
 TARGETS = ("numpy", "torch", "numba")
 Run = Callable[[], Any]
 
 
-def main(rows: int = 20_000) -> None:
-    """Print the table."""
+def main() -> None:
+    parser = arguments(__doc__)
+    parser.add_argument("rows", nargs="?", type=int, default=20_000, help="points that a call is made for")
+    parser.add_argument("--laws", nargs="*", default=list(LAWS), choices=list(LAWS))
+    options = parser.parse_args()
     torch.set_num_threads(1)
-    print(f"CPU time by kernel / by hand, {rows} points" + " " * 10 + "ns per point and call of the kernel")
-    heads = [f"{target} {what}" for target in TARGETS for what in ("rate", "all")]
-    print(" " * 18 + "".join(f"{head:>12}" for head in heads) + " |" + "".join(f"{head:>12}" for head in heads))
-    for name in LAWS:
-        figures = [figure for target in TARGETS for figure in measured(creepkit.law(name), target, rows)]
-        ratios = "".join(f"{ratio:12.2f}" for ratio, _ in figures)
-        print(f"{name:18}{ratios} |" + "".join(f"{seconds / rows * 1e9:12.1f}" for _, seconds in figures), flush=True)
+    page = Page("kernel_speed" if options.rows == 20_000 else f"kernel_speed_{options.rows}", __doc__)
+    page.paragraph(f"{options.rows} points a call.")
+    page.table(
+        "law",
+        "target",
+        "rate: kernel over hand",
+        "derivatives: kernel over hand",
+        "rate: ns a point",
+        "derivatives: ns a point",
+    )
+    for name in options.laws:
+        for target in TARGETS:
+            (rate, rate_seconds), (all_, all_seconds) = compare_with_hand(ck.law(name), target, options.rows)
+            times = (f"{1e9 * seconds / options.rows:.1f}" for seconds in (rate_seconds, all_seconds))
+            page.row(name, target, f"{rate:.2f}", f"{all_:.2f}", *times)
+    if options.write:
+        page.write()
 
 
-def measured(law: CreepLaw, target: str, rows: int) -> list[tuple[float, float]]:
+def compare_with_hand(law: CreepLaw, target: str, rows: int) -> list[tuple[float, float]]:
     """Return (ratio, seconds a call) for the rate and for the rate with derivatives."""
     points = np.random.default_rng(1).uniform([20.0, 1e-4, 1e2], [200.0, 1e-1, 1e5], (rows, 3))
     values = law.center()
     build = {"numpy": numpy_runs, "torch": torch_runs, "numba": numba_runs}[target]
-    return [compared(hand, kernel) for hand, kernel in build(law, points, values)]
+    return [ratio_of_times(hand, kernel) for hand, kernel in build(law, points, values)]
 
 
-def compared(hand: Run, kernel: Run) -> tuple[float, float]:
+def ratio_of_times(hand: Run, kernel: Run) -> tuple[float, float]:
     """Median ratio of CPU times and median CPU time of the kernel, s a call."""
-    loops = calls_for(LEAST, hand)
-    pairs = [(spent(hand, loops), spent(kernel, loops)) for _ in range(REPEATS)]
+    loops = calls_for(SHORTEST, hand)
+    pairs = [(cpu_seconds(hand, loops), cpu_seconds(kernel, loops)) for _ in range(REPEATS)]
     return statistics.median(b / a for a, b in pairs), statistics.median(b for _, b in pairs)
 
 
 def calls_for(seconds: float, run: Run) -> int:
-    """How many calls take about so long; the first, which may compile, does not count."""
+    """How many calls take about so many seconds; the first, which may compile, does not count."""
     run()
-    return max(1, round(seconds / max(spent(run, 3), 1e-7)))
+    return max(1, round(seconds / max(cpu_seconds(run, 3), 1e-7)))
 
 
-def spent(run: Run, loops: int) -> float:
+def cpu_seconds(run: Run, loops: int) -> float:
     """CPU seconds a call."""
     start = time.process_time()
     for _ in range(loops):
         run()
     return (time.process_time() - start) / loops
-
-
-# ---- what is compared ----------------------------------------------------------------------------------------------
 
 
 def numpy_runs(law: CreepLaw, points: Any, values: dict[str, float]) -> list[tuple[Run, Run]]:
@@ -89,9 +104,9 @@ def torch_runs(law: CreepLaw, points: Any, values: dict[str, float]) -> list[tup
 def array_runs(
     law: CreepLaw, target: Any, module: Any, point: list[Any], values: dict[str, Any]
 ) -> list[tuple[Run, Run]]:
-    """Hand and kernel for arrays or tensors; kernels get logarithms, as they do in a fit."""
+    """Hand-written code and kernel for arrays or tensors; kernels take logarithms, as they do in a fit."""
     rate, derivatives = LAWS[law.name](module)
-    kernel, given = creepkit.lower(law, target), list(values.values())
+    kernel, given = ck.lower(law, target), list(values.values())
     theta = [module.log(v) if p.scale == "log" else v for v, p in zip(given, law.params.values(), strict=True)]
     arguments = [*point, 1.0, point[0], point[0] / 3, *theta]
     return [
@@ -102,7 +117,7 @@ def array_runs(
 
 def numba_runs(law: CreepLaw, points: Any, values: dict[str, float]) -> list[tuple[Run, Run]]:
     """Compiled loops over rows."""
-    compiled = creepkit.lower(law, "numba")
+    compiled = ck.lower(law, "numba")
     x = np.column_stack([points, np.ones(len(points)), points[:, 0], points[:, 0] / 3])
     theta, given = compiled.to_internal(values)[0], tuple(values.values())
     rate, derivatives = (
@@ -127,9 +142,9 @@ def loop_by_hand(function: Callable[..., Any], several: bool) -> Callable[..., A
     @njit(error_model="numpy")
     def many(x, theta, out):
         for row in range(x.shape[0]):
-            found = inner(x[row, 0], x[row, 1], x[row, 2], *theta)
-            for k in range(len(found)):
-                out[row, k] = found[k]
+            results = inner(x[row, 0], x[row, 1], x[row, 2], *theta)
+            for k in range(len(results)):
+                out[row, k] = results[k]
 
     return many if several else one
 
@@ -145,4 +160,4 @@ def entry_call(compiled: CompiledLaw, entry: str, x: Any, theta: Any, out: Any) 
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main()

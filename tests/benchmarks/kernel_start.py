@@ -1,7 +1,10 @@
-"""Time until a law can be simulated, in new interpreters: python kernel_start.py.
+"""CPU time until a law can be simulated, in new interpreters.
 
-A law never seen before is lowered, compiled and called, with an empty cache folder; then the same in a second
-interpreter, which finds it on disk. CPU time, imports apart; median of a few runs. The issue allows 6 s and 0.5 s.
+    python tests/benchmarks/kernel_start.py [--laws norton ...] [--repeats 3] [--write]
+
+A law that was never used is lowered, compiled and called once, with an empty cache folder ("first use"); then the same
+in a second interpreter, which finds the compiled code on disk ("later use"). CPU time without imports, median of the
+repeats. Limits: 6 s and 0.5 s.
 """
 
 from __future__ import annotations
@@ -12,45 +15,54 @@ import subprocess
 import sys
 import tempfile
 
+from measured import Page, arguments
+
 LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine", "drifting-exponent", "combined")
-REPEATS = 3
 PROGRAM = """
 import sys, time
 import numpy, numba, sympy
 import creepkit
-from creepkit.kernels import calling, compiled, interface
 from creepkit.integration import integrate
+from creepkit.kernels import compilation
+from creepkit.kernels.interface import call_entry
 
 law = creepkit.law(sys.argv[1])
 if sys.argv[1] == "combined":
     law = law.times(creepkit.arrhenius()).with_temperature(n_2=creepkit.linear())
 start = time.process_time()
-ready = creepkit.lower(law, "numba")
-calling.call(ready, "update", numpy.array([[100.0, 0.01, 10.0, 1000.0, 100.0, 33.0]]), ready.internal(law.center())[0])
+kernel = creepkit.lower(law, "numba")
+point = numpy.array([[100.0, 0.01, 10.0, 1000.0, 100.0, 33.0]])
+call_entry(kernel, "update", point, kernel.to_internal(law.center())[0])
 print(time.process_time() - start)
 """
 
 
 def seconds(law: str, folder: str) -> float:
-    """CPU seconds until `law` answers, in a new interpreter that uses a cache folder."""
+    """CPU seconds until `law` was called, in a new interpreter that uses a cache folder."""
     environment = {**os.environ, "CREEPKIT_CACHE": folder}
-    found = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-c", PROGRAM, law], check=True, capture_output=True, text=True, env=environment
     )
-    return float(found.stdout)
+    return float(result.stdout)
 
 
 def main() -> None:
-    """Print the table."""
-    print(f"{'CPU s':36}{'new':>8}{'known':>8}")
-    for law in LAWS:
-        new, known = [], []
-        for _ in range(REPEATS):
+    parser = arguments(__doc__)
+    parser.add_argument("--laws", nargs="*", default=list(LAWS), choices=list(LAWS))
+    parser.add_argument("--repeats", type=int, default=3)
+    options = parser.parse_args()
+    page = Page("kernel_start", __doc__)
+    page.table("law", "first use: CPU s", "later use: CPU s")
+    for law in options.laws:
+        first, later = [], []
+        for _ in range(options.repeats):
             with tempfile.TemporaryDirectory() as folder:
-                new.append(seconds(law, folder))
-                known.append(seconds(law, folder))
+                first.append(seconds(law, folder))
+                later.append(seconds(law, folder))
         label = "combined x arrhenius, n_2(T)" if law == "combined" else law
-        print(f"{label:36}{statistics.median(new):8.2f}{statistics.median(known):8.2f}", flush=True)
+        page.row(label, f"{statistics.median(first):.2f}", f"{statistics.median(later):.2f}")
+    if options.write:
+        page.write()
 
 
 if __name__ == "__main__":

@@ -1,16 +1,15 @@
 """Planted bulge tests for the benchmarks of identification: laws, values and noise drawn by fixed seeds and priors.
 
-Priors of the single laws, at 120 MPa: log10 of the rate at strain .01 and 1e4 s uniform in -7.3 .. -5.7; exponent n of
-Norton's law 1.5 .. 7, of the hardening laws 2 .. 6; m -.7 .. -.2; local exponent of sinh 4 .. 8 with n 1 .. 4. Modulus
-150 GPa with 10 % (one value a specimen, fitted with that prior). Tests end at 12 h, 48 frames of 900 s. A draw whose
-dimple does not grow by 20 um, or bursts, is drawn again: it says nothing of a law.
+Priors of the single laws, at 120 MPa: log10 of the rate at a strain of 0.01 and 1e4 s uniform in -7.3 to -5.7; exponent
+n of Norton's law 1.5 to 7, of the hardening laws 2 to 6; m -0.7 to -0.2; local exponent of sinh 4 to 8 with n 1 to 4.
+Modulus 150 GPa with 10 % (one value a specimen, fitted with that prior). Tests end at 12 h, 48 frames of 900 s. A draw
+whose dimple does not grow by 20 um, or bursts, is drawn again: it is not informative.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import beta
 
 import creepkit as ck
 from creepkit.errors import CreepkitError
@@ -23,6 +22,8 @@ SINGLE = ("hyperbolic-sine", "norton", "strain-hardening", "time-hardening")
 NOMINAL = 0.5
 """mm, apex thickness."""
 MODULUS = ck.Nuisance("modulus", sd=0.1, scope="all")
+LEAST_GROWTH = 0.02
+"""mm, of the amplitude over a test."""
 JUMP = ck.PressureJump(P1=8, P2=10, Tj=14400)
 
 
@@ -30,8 +31,8 @@ JUMP = ck.PressureJump(P1=8, P2=10, Tj=14400)
 class Design:
     """How specimens of a design are tested and fitted.
 
-    thicknesses : mm, of the dimples of a specimen; spread : relative sd of what they really are; known : whether fits
-    know them. loadings : one a dimple, or one for all. correlated : AR(1) noise (coefficient, sd in mm) of D_amp.
+    thicknesses : (dimples,) mm, nominal; spread : relative standard deviation of what they really are.
+    loadings : one a dimple, or one for all. correlated : AR(1) noise (coefficient, sd in mm) of D_amp.
     """
 
     title: str
@@ -42,21 +43,30 @@ class Design:
 
     @property
     def nuisances(self):
-        """What a fit is told is unknown."""
+        """Nuisance parameters of a fit."""
         if not self.spread:
             return [MODULUS]
         return [MODULUS, ck.Nuisance("thickness", sd=self.spread * NOMINAL)]
 
 
 DESIGNS = {
-    "jump": Design("jump 8 to 10 MPa, D_amp, S_d, S_p"),
-    "thickness": Design("the same, apex thickness unknown by 2 %", spread=0.02),
-    "correlated": Design("the same, and AR(1) noise .9 of 5 um", spread=0.02, correlated=(0.9, 5e-3)),
-    "noise": Design("jump, AR(1) noise .9 of 5 um", correlated=(0.9, 5e-3)),
-    "dimples": Design("dimples of .44, .50, .58 mm under one jump, thickness unknown by 1 %",
-                      thicknesses=(0.44, 0.50, 0.58), spread=0.01),
-    "levels": Design("dimples of .44, .50, .58 mm under one jump", thicknesses=(0.44, 0.50, 0.58)),
-}  # fmt: skip
+    "jump": Design("pressure of 8, then 10 MPa; D_amp, S_d, S_p"),
+    "thickness": Design("pressure of 8, then 10 MPa; D_amp, S_d, S_p; apex thickness unknown by 2 %", spread=0.02),
+    "correlated": Design(
+        "pressure of 8, then 10 MPa; D_amp, S_d, S_p; apex thickness unknown by 2 %; AR(1) noise of D_amp (0.9, 5 um)",
+        spread=0.02,
+        correlated=(0.9, 5e-3),
+    ),
+    "noise": Design(
+        "pressure of 8, then 10 MPa; D_amp, S_d, S_p; AR(1) noise of D_amp (0.9, 5 um)", correlated=(0.9, 5e-3)
+    ),
+    "dimples": Design(
+        "dimples of 0.44, 0.50, 0.58 mm under 8, then 10 MPa, thickness unknown by 1 %",
+        thicknesses=(0.44, 0.50, 0.58),
+        spread=0.01,
+    ),
+    "levels": Design("dimples of 0.44, 0.50, 0.58 mm under 8, then 10 MPa", thicknesses=(0.44, 0.50, 0.58)),
+}
 
 
 @dataclass(frozen=True)
@@ -69,7 +79,7 @@ class Specimen:
     tests: list
 
 
-def drawn(name, rng):
+def drawn_values(name, rng):
     """Values of a single law from the priors above."""
     rate = 10.0 ** rng.uniform(-7.3, -5.7)
     if name == "norton":
@@ -85,15 +95,15 @@ def drawn(name, rng):
     return {"A": rate / (SIGMA**n * hardened), "n": n, "m": m}
 
 
-def of_sum(names, rng):
-    """A sum of two laws whose terms each carry 30 to 70 % of the rate at 120 MPa, strain .01 and 1e4 s."""
-    share = rng.uniform(0.3, 0.7)
+def drawn_sum(names, rng):
+    """A sum of two laws whose terms each carry 30 to 70 % of the rate at 120 MPa, a strain of 0.01 and 1e4 s."""
+    fraction = rng.uniform(0.3, 0.7)
     total = ck.law(names[0]) + ck.law(names[1])
-    parts = [drawn(name, rng) for name in names]
+    parts = [drawn_values(name, rng) for name in names]
     level = parts[0]["A"] * _rate(names[0], parts[0])
-    scales = share * level, (1.0 - share) * level
-    own = [{**p, "A": p["A"] * s / (p["A"] * _rate(n, p))} for n, p, s in zip(names, parts, scales, strict=True)]
-    flat = [value for part, name in zip(own, names, strict=True) for value in _ordered(name, part)]
+    rates = fraction * level, (1.0 - fraction) * level
+    scaled = [{**p, "A": rate / _rate(n, p)} for n, p, rate in zip(names, parts, rates, strict=True)]
+    flat = [value for part, name in zip(scaled, names, strict=True) for value in _ordered(name, part)]
     return total, dict(zip(total.names, flat, strict=True))
 
 
@@ -114,38 +124,46 @@ def specimen(k, names, design, using, seed=2026):
     name = names[k % len(names)]
     rng = np.random.default_rng([seed, k, len(design.thicknesses)])
     for _ in range(100):
-        law, values = of_sum(name, rng) if isinstance(name, tuple) else (ck.law(name), drawn(name, rng))
+        law, values = drawn_sum(name, rng) if isinstance(name, tuple) else (ck.law(name), drawn_values(name, rng))
         modulus = 150e3 * (1.0 + 0.1 * np.clip(rng.standard_normal(), -3, 3))
         try:
             law.values(values)
         except CreepkitError:
             continue
-        tests = [measured(law, values, modulus, nominal, j, design, using, rng) for j, nominal in enumerate(
-            design.thicknesses)]  # fmt: skip
+        alloy = law, values, ck.Elastic(E=modulus)
+        tests = [planted_test(alloy, j, design, using, rng) for j in range(len(design.thicknesses))]
         if all(t is not None for t in tests):
             return Specimen(f"{law.name} {k}", law, values, tests)
     raise SystemExit(f"no specimen of {name} in 100 draws")
 
 
-def measured(law, values, modulus, nominal, j, design, using, rng):
-    """One measured history, or None where the dimple hardly moves or bursts."""
-    true = nominal * (1.0 + design.spread * rng.standard_normal())
-    loading = design.loadings[j % len(design.loadings)]
-    run = ck.simulate(law, using.replace(apex_thickness=true), values, elastic=ck.Elastic(E=modulus), loading=loading,
-                      times=TIMES)  # fmt: skip
-    deep = run.outputs["amplitude"]
+def planted_test(alloy, number, design, using, rng):
+    """One noisy history, or None where the dimple hardly moves or bursts; alloy : law, values and elastic data."""
+    law, values, elastic = alloy
+    nominal = design.thicknesses[number]
+    dimple = using.replace(apex_thickness=nominal * (1.0 + design.spread * rng.standard_normal()))
+    loading = design.loadings[number % len(design.loadings)]
+    run = ck.simulate(law, dimple, values, elastic=elastic, loading=loading, times=TIMES)
+    amplitude = run.outputs["amplitude"]
     noises = {name: sd * rng.standard_normal(TIMES.size) for name, sd in NOISE.items()}
-    sizes = dict(NOISE)
+    standard_deviations = dict(NOISE)
     if design.correlated:
-        noises["amplitude"], sizes["amplitude"] = ar1(rng, *design.correlated), design.correlated[1]
-    if deep.size < TIMES.size or not np.isfinite(deep).all() or np.ptp(deep) < 0.02 or run.status != 0:
+        noises["amplitude"] = ar1(rng, *design.correlated)
+        standard_deviations["amplitude"] = design.correlated[1]
+    complete = amplitude.size == TIMES.size and np.isfinite(amplitude).all() and run.status == 0
+    if not complete or np.ptp(amplitude) < LEAST_GROWTH:
         return None
     return History(
-        name=f"dimple {j}", times=TIMES, outputs={name: run.outputs[name] + noises[name] for name in NOISE},
-        loading=loading, temperature=293.15, specimen="bulge", elastic=ck.Elastic(E=150e3),
+        name=f"dimple {number}",
+        times=TIMES,
+        outputs={name: run.outputs[name] + noises[name] for name in NOISE},
+        loading=loading,
+        temperature=293.15,
+        specimen="bulge",
+        elastic=ck.Elastic(E=150e3),
         geometry={"apex_thickness": nominal},
-        standard_deviation={name: np.full(TIMES.size, sd) for name, sd in sizes.items()},
-    )  # fmt: skip
+        standard_deviation={name: np.full(TIMES.size, sd) for name, sd in standard_deviations.items()},
+    )
 
 
 def ar1(rng, coefficient, sd):
@@ -155,10 +173,3 @@ def ar1(rng, coefficient, sd):
     for k in range(1, TIMES.size):
         white[k] += coefficient * white[k - 1]
     return white
-
-
-def interval(hits, of):
-    """Clopper-Pearson 95 % interval of a share."""
-    low = 0.0 if hits == 0 else beta.ppf(0.025, hits, of - hits + 1)
-    high = 1.0 if hits == of else beta.ppf(0.975, hits + 1, of - hits)
-    return f"{hits / max(of, 1):.3f} [{low:.3f}, {high:.3f}]"

@@ -1,20 +1,22 @@
-"""A planted plate of alloys on all cores: time, and how often its laws are found.
+"""A planted plate of alloys: time of the screening, and how often its laws are found.
 
-    python tests/benchmarks/plate.py [--alloys 47] [--seed 7] [--how through|surrogate|finite-elements] [--no-dense]
-                                     [--unknown-thickness] [--workers 2] [--to FOLDER]
+    python tests/benchmarks/plate_of_alloys.py [--alloys 47] [--seed 7] [--unknown-thickness] [--no-full-law]
+                                               [--how through|surrogate|finite-elements] [--workers 2] [--to FOLDER]
+                                               [--write]
 
-Each alloy is one dimple, 8 then 10 MPa, 4 h, a frame a minute, with white noise as measured (1.5 um, .02 mm, .02), its
-law and values drawn around the three of Fig. 7a of Chen et al. (creepkit.screening.planted). The four laws of Table 1 are
-identified with intervals, the best one is confirmed by finite elements, and Eq. (2) is fitted without sparsity unless
---no-dense. --how through searches in the surrogate that comes with creepkit and ends with finite elements; surrogate
-has nothing else; finite-elements does without it. Planting is not timed. Started again with the same --to, it goes on,
-and its time is not one.
+Each alloy is one dimple under 8, then 10 MPa for 4 h, a frame a minute, with white noise as measured (1.5 um on D_amp,
+0.02 mm on S_d, 0.02 on S_p), its law and values drawn around the three of Fig. 7a of Chen et al.
+(creepkit.screening.planted). The four laws of Table 1 are identified with intervals, the best one is confirmed by
+finite elements, and Eq. (2) is fitted without sparsity unless --no-full-law. `--how through` searches in the surrogate
+that ships and ends with finite elements; `surrogate` uses nothing else; `finite-elements` does without it. The
+simulation of the plate is not timed. Started again with the same --to, the screening continues, and its time means
+nothing.
 
-Shares are given with their 95 % intervals (Wilson). "covered" is the share of planted values, of those alloys whose
-law was found, that lie in their 95 % intervals.
+Shares have 95 % intervals by Wilson. "Set of laws" holds those that the tests cannot rule out; an answer is decisive
+above 95 % of the weight. "Covered" is the share of planted values, of the alloys whose law was found, inside their 95 %
+intervals.
 """
 
-import argparse
 import os
 import resource
 import tempfile
@@ -24,120 +26,130 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import binomtest
+from measured import Page, arguments, progress
+from proportions import share_with_interval
 
 import creepkit as ck
 from creepkit.cli import set_numba_cache
 from creepkit.screening.planted import THICKNESS_MEAN_SD, planted_plate
+from creepkit.screening.results import mean_relative_squared_error
 from creepkit.screening.screen import screen
 
 MERGED = {"hyperbolic-sine": "norton"}
 """Laws that differ by a curvature alone, which one dimple hardly shows."""
 
 
-def main():
-    set_numba_cache()
-    given = options().parse_args()
-    planted = planted_plate(given.alloys, given.seed, thickness_known=not given.unknown_thickness)
-    folder = nullcontext(given.to) if given.to else tempfile.TemporaryDirectory()
-    with folder as to:
-        began, before = time.perf_counter(), cpu()
-        plate = screen(planted.histories, compositions=planted.compositions, to=Path(to), **how(given))
-        wall, spent = time.perf_counter() - began, cpu() - before
-    workers = given.workers or len(os.sched_getaffinity(0))
-    print(f"{given.alloys} alloys, {given.how}: {wall / 60:.1f} min on {workers} workers, {spent / 60:.1f} CPU-min; "
-          f"of an alloy, CPU-s: {quantiles([a.cpu_seconds for a in plate.results])}")  # fmt: skip
-    recovered(plate, planted.truth)
-    confirmed(plate)
-    print(f"\n{plate}")
-
-
-def how(given):
-    """What screen() is told."""
-    model = None if given.how == "finite-elements" else ck.surrogate("dimple")
+def screening_options(options):
+    """Options of screen()."""
+    surrogate = None if options.how == "finite-elements" else ck.surrogate("dimple")
     nuisances = [ck.Nuisance("offset"), ck.Nuisance("rate")]
-    if given.unknown_thickness:
+    if options.unknown_thickness:
         nuisances.append(ck.Nuisance("thickness", mean=THICKNESS_MEAN_SD[0], sd=THICKNESS_MEAN_SD[1]))
     return {
-        "using": model if given.how == "surrogate" else None,
-        "through": model if given.how == "through" else None,
+        "using": surrogate if options.how == "surrogate" else None,
+        "through": surrogate if options.how == "through" else None,
         "nuisances": nuisances,
-        "dense": None if given.no_dense else "combined",
+        "dense": None if options.no_full_law else "combined",
         "confirm": True,
-        "workers": given.workers,
-        "progress": lambda task, done, total, note: print(f"{task}: {done} of {total} ({note})", flush=True),
+        "workers": options.workers,
+        "progress": lambda task, done, total, note: progress(f"{task}: {done} of {total} ({note})"),
     }
 
 
-def recovered(plate, truth):
+def cost_table(page, plate, wall, spent, workers):
+    """Time of the screening."""
+    page.table("alloys", "workers", "wall time, min", "CPU time, min", "CPU time of an alloy, s: median", "largest")
+    each = [result.cpu_seconds for result in plate.results]
+    times = (f"{wall / 60:.1f}", f"{spent / 60:.1f}", f"{np.median(each):.1f}", f"{np.max(each):.1f}")
+    page.row(len(plate.results), workers, *times)
+
+
+def recovery_tables(page, plate, truth):
     """Shares of alloys whose law was found, and of planted values inside their intervals."""
-    told = {a.alloy: (truth[a.alloy], a) for a in plate.identified}
-    best = [t.law == a.best.law.name for t, a in told.values()]
-    merged = [MERGED.get(t.law, t.law) == MERGED.get(a.best.law.name, a.best.law.name) for t, a in told.values()]
-    sure = [t.law == a.best.law.name for t, a in told.values() if a.decisive]
-    inside = [
-        e.low <= t.values[e.name] <= e.high
-        for t, a in told.values() if t.law == a.best.law.name for e in a.best.estimates
-    ]  # fmt: skip
-    print("\n| quantity | share | 95 % interval | of |\n|-|-|-|-|")
-    rows = {
-        "identified": [a.identified for a in plate.answers], "law right": best, "right, sinh and power merged": merged,
-        "truth in the set": [t.law in a.credible for t, a in told.values()],
-        "decisive": [a.decisive for _, a in told.values()], "right where decisive": sure, "covered": inside,
-    }  # fmt: skip
-    for name, hits in rows.items():
-        print(f"| {name} | {share(hits)} | {len(hits)} |")
-    print(f"mean size of the set {np.mean([len(a.credible) for _, a in told.values()]):.2f}")
-    confusion = Counter((t.law, a.best.law.name) for t, a in told.values())
-    for (planted, found), count in sorted(confusion.items()):
-        print(f"  {planted} found as {found}: {count}")
+    pairs = [(truth[result.alloy], result) for result in plate.identified]
+    right = [planted.law == result.best.law.name for planted, result in pairs]
+    shares = {
+        "identified": [result.identified for result in plate.results],
+        "law found": right,
+        "law found, hyperbolic sine and Norton merged": [
+            MERGED.get(planted.law, planted.law) == MERGED.get(result.best.law.name, result.best.law.name)
+            for planted, result in pairs
+        ],
+        "planted law in the set of laws": [planted.law in result.credible_laws for planted, result in pairs],
+        "decisive": [result.decisive for _, result in pairs],
+        "law found, of the decisive ones": [
+            planted.law == result.best.law.name for planted, result in pairs if result.decisive
+        ],
+        "covered (values)": [
+            e.low <= planted.values[e.name] <= e.high
+            for (planted, result), found in zip(pairs, right, strict=True)
+            if found
+            for e in result.best.estimates
+        ],
+    }
+    page.table("quantity", "share [95 % interval]", "of")
+    for name, hits in shares.items():
+        page.row(name, share_with_interval(hits, "wilson"), len(hits))
+    if not pairs:
+        return
+    page.paragraph(f"Mean size of the set of laws: {np.mean([len(r.credible_laws) for _, r in pairs]):.2f}.")
+    page.table("planted law", "found", "alloys")
+    for (planted, found), count in sorted(Counter((p.law, r.best.law.name) for p, r in pairs).items()):
+        page.row(planted, found, count)
 
 
-def confirmed(plate):
-    """How far finite elements are from what was identified, and what sparsity costs."""
-    told = [a.confirmation for a in plate.identified if a.confirmation is not None]
-    print(f"confirmed {sum(c.holds for c in told)} of {len(told)}; finite elements from the fit, times the noise: "
-          f"{quantiles([c.distance for c in told])}")  # fmt: skip
-    from creepkit.screening.results import mean_relative_squared_error
-
-    costs = [
-        mean_relative_squared_error(a.reduced) / mean_relative_squared_error(a.dense)
-        for a in plate.identified
-        if a.dense is not None
+def confirmation_table(page, plate):
+    """How far finite elements are from the identified laws, and what a single law loses against Eq. (2)."""
+    confirmations = [r.confirmation for r in plate.identified if r.confirmation is not None]
+    losses = [
+        mean_relative_squared_error(r.reduced_fit) / mean_relative_squared_error(r.dense_fit)
+        for r in plate.identified
+        if r.dense_fit is not None
     ]
-    if costs:
-        print(f"loss of the reduced law over that without sparsity: {quantiles(costs)}")
+    page.table("quantity", "alloys", "median", "largest")
+    distances = [c.noise_ratio for c in confirmations]
+    quantities = {
+        "finite elements from the fit, over the noise": distances,
+        "loss (Eq. 4) of the best law over that of Eq. (2)": losses,
+    }
+    for name, values in quantities.items():
+        if values:
+            page.row(name, len(values), f"{np.median(values):.3g}", f"{np.max(values):.3g}")
+    page.paragraph(f"Confirmed by finite elements: {sum(c.confirmed for c in confirmations)} of {len(confirmations)}.")
 
 
-def share(hits):
-    """A share with its Wilson interval."""
-    if not hits:
-        return "- | -"
-    ends = binomtest(int(sum(hits)), len(hits)).proportion_ci(method="wilson")
-    return f"{np.mean(hits):.3f} | {ends.low:.3f} to {ends.high:.3f}"
-
-
-def quantiles(values):
-    """Median and largest."""
-    return f"median {np.median(values):.3g}, largest {np.max(values):.3g}" if len(values) else "none"
-
-
-def cpu():
+def cpu_seconds():
     """CPU time of this process and its children that have ended, s."""
     both = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return sum(r.ru_utime + r.ru_stime for r in both)
+    return sum(usage.ru_utime + usage.ru_stime for usage in both)
 
 
-def options():
-    found = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    found.add_argument("--alloys", type=int, default=47)
-    found.add_argument("--seed", type=int, default=7)
-    found.add_argument("--how", choices=("through", "surrogate", "finite-elements"), default="through")
-    found.add_argument("--no-dense", action="store_true")
-    found.add_argument("--unknown-thickness", action="store_true")
-    found.add_argument("--workers", type=int)
-    found.add_argument("--to")
-    return found
+def main():
+    parser = arguments(__doc__)
+    parser.add_argument("--alloys", type=int, default=47)
+    parser.add_argument("--seed", type=int, default=7)
+    parser.add_argument("--how", choices=("through", "surrogate", "finite-elements"), default="through")
+    parser.add_argument("--no-full-law", action="store_true", help="without the fit of Eq. (2)")
+    parser.add_argument("--unknown-thickness", action="store_true")
+    parser.add_argument("--workers", type=int)
+    parser.add_argument("--to", help="folder in which results are kept")
+    options = parser.parse_args()
+    set_numba_cache()
+    planted = planted_plate(options.alloys, options.seed, thickness_known=not options.unknown_thickness)
+    folder = nullcontext(options.to) if options.to else tempfile.TemporaryDirectory()
+    with folder as to:
+        start, before = time.perf_counter(), cpu_seconds()
+        settings = screening_options(options)
+        plate = screen(planted.histories, compositions=planted.compositions, to=Path(to), **settings)
+        wall, spent = time.perf_counter() - start, cpu_seconds() - before
+    variant = "" if options.how == "through" else f"_{options.how.replace('-', '_')}"
+    page = Page(f"plate_of_alloys{variant}{'_unknown_thickness' if options.unknown_thickness else ''}", __doc__)
+    cost_table(page, plate, wall, spent, options.workers or len(os.sched_getaffinity(0)))
+    recovery_tables(page, plate, planted.truth)
+    confirmation_table(page, plate)
+    page.code(str(plate))
+    if options.write:
+        page.write()
 
 
 if __name__ == "__main__":

@@ -1,26 +1,26 @@
-"""How often a search ends where the best of many does: planted bulge tests, one law each.
+"""How often a search ends at the best optimum known: planted bulge tests, one law each.
 
-    python tests/benchmarks/search_success.py [--specimens 40] [--laws norton ...] [--through stand-in|surrogate]
-                                              [--searches default swarm cma] [--seed 0]
+    python tests/benchmarks/search_success.py [--specimens 40] [--laws norton ...] [--through reduced-order|surrogate]
+                                              [--searches default swarm cma] [--seed 0] [--write]
 
-Each specimen is one 12 h test (8 to 10 MPa after 4 h, 48 frames, white noise of 1.5 um on D_amp, .02 mm on S_d, .02 on
-S_p) of a law drawn from PRIORS, simulated and identified through the same predictor, so that nothing but the search
-can fail. Rates are stated at 120 MPa, a strain of .01 and 1e4 s; tests that burst or creep by less than 20 um are drawn
-again.
+Each specimen is one 12 h test (8 to 10 MPa after 4 h, 48 frames, white noise of 1.5 um on D_amp, 0.02 mm on S_d, 0.02
+on S_p) of a law drawn from PRIORS, simulated and identified through the same predictor, so that nothing but the search
+can fail. Rates are stated at 120 MPa, a strain of 0.01 and 1e4 s; tests that burst or creep by less than 20 um are
+drawn again.
 
-An identification has succeeded if its -2 ln L lies within 2 of the lowest found: by 30 starts from 256 draws, each of
-whose different minima goes on by itself, and by the searches of the table. Columns: share that succeeded with its 95 %
-interval (Wilson), the largest gap in -2 ln L, candidates asked for and CPU seconds of an identification (medians).
-Goal: .99 of the default's. The row "planted" says where least squares from the planted values themselves end: it counts
-specimens in which that is no more than 2 below the lowest, so that nothing was missed by all.
+An identification has succeeded if its -2 ln L lies within 2 of the lowest one found: by 30 starts from 256 draws, each
+of whose different minima is refined by itself, and by the searches of the table. Columns: share that succeeded with its
+95 % interval (Wilson), the largest difference in -2 ln L, predicted candidates and CPU time of an identification
+(medians). The goal is 0.99 for the default search. The row "planted" gives where least squares from the planted values
+end: it counts specimens in which that is no more than 2 below the lowest, so that no optimum was missed by all.
 """
 
-import argparse
 import time
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import binomtest
+from measured import Page, arguments
+from proportions import share_with_interval
 
 import creepkit as ck
 from creepkit.cli import set_numba_cache
@@ -33,7 +33,7 @@ from creepkit.inverse.settings import IdentificationSettings
 
 REFERENCE = ReferencePoint(stress=120.0, strain=0.01, time=1e4, temperature=1000.0)
 RATE = (-7.3, -5.7)
-"""log10 of the rate at the reference point, 1/s: some .1 to 1 mm of creep in 12 h."""
+"""log10 of the rate at the reference point, 1/s: some 0.1 to 1 mm of creep in 12 h."""
 PRIORS = {
     "norton": {"n": (1.5, 7)},
     "strain-hardening": {"n": (2, 6), "m": (-0.7, -0.2)},
@@ -46,24 +46,25 @@ THOROUGH = MultiStart(starts=30, draws=256)
 TIMES = np.arange(900.0, 43201.0, 900.0)
 LOADING, ELASTIC = ck.PressureJump(P1=8, P2=10, Tj=14400), ck.Elastic(E=150e3)
 SD = {"amplitude": 1.5e-3, "width": 0.02, "shape": 0.02}
-CREPT = 0.02
+LEAST_CREEP = 0.02
 """mm."""
-ENOUGH, GOAL = 2.0, 0.99
-OTHERS = 8
-"""Minima of the thorough search that go on by themselves, at most."""
+TOLERANCE = 2.0
+"""In -2 ln L."""
+REFINED_MINIMA = 8
+"""Minima of the thorough search that are refined by themselves, at most."""
 
 
 @dataclass
-class Kept:
-    """A search that keeps the different minima it found."""
+class RecordedMinima:
+    """A search that records the different minima it found."""
 
     search: object
     starts: list = field(default_factory=list)
 
-    def minima(self, landscape, progress=None):
-        found = self.search.minima(landscape, progress)
-        self.starts = [m.u for m in distinct(found.minima, landscape.box, max_count=OTHERS)]
-        return found
+    def minima(self, cost_function, progress=None):
+        result = self.search.minima(cost_function, progress)
+        self.starts = [m.u for m in distinct(result.minima, cost_function.bounds, max_count=REFINED_MINIMA)]
+        return result
 
 
 def law_of(name):
@@ -71,7 +72,7 @@ def law_of(name):
     return law.fix(m=0) if name == "drifting-exponent" else law
 
 
-def drawn(law, name, rng):
+def drawn_values(law, name, rng):
     """Values of a law from its prior, or None where they lie outside the law's bounds."""
     given = {key: rng.uniform(*ends) for key, ends in PRIORS[name].items()}
     if name == "hyperbolic-sine":
@@ -90,73 +91,76 @@ def specimen(name, using, rng):
     """(true values, noisy history)."""
     law = law_of(name)
     while True:
-        values = drawn(law, name, rng)
+        values = drawn_values(law, name, rng)
         if values is None:
             continue
         run = ck.simulate(law, using, values, elastic=ELASTIC, loading=LOADING, times=TIMES)
         amplitude = run.outputs["amplitude"]
-        if np.isfinite(amplitude).all() and amplitude[-1] - amplitude[0] > CREPT:
+        if np.isfinite(amplitude).all() and amplitude[-1] - amplitude[0] > LEAST_CREEP:
             break
     noisy = {output: run.outputs[output] + sd * rng.standard_normal(TIMES.size) for output, sd in SD.items()}
     test = ck.History(name, TIMES, noisy, LOADING, REFERENCE.temperature, specimen="bulge", elastic=ELASTIC)
     return values, test
 
 
-def compared(name, using, searches, rng, seed):
+def compare_searches(name, using, searches, rng, seed):
     """{search: (-2 ln L over the lowest, candidates, CPU seconds)} of one specimen."""
     law, (values, test), settings = law_of(name), specimen(name, using, rng), IdentificationSettings(seed=seed)
     rows = {}
     for which in searches:
-        began = time.process_time()
+        start = time.process_time()
         fit = identify(law, [test], using, settings=settings, search=SEARCHES[which])
-        rows[which] = fit.log_likelihood, fit.provenance["search_evaluations"], time.process_time() - began
-    kept = Kept(THOROUGH)
-    best = [identify(law, [test], using, settings=settings, search=kept)]
+        rows[which] = fit.log_likelihood, fit.provenance["search_evaluations"], time.process_time() - start
+    thorough = RecordedMinima(THOROUGH)
+    fits = [identify(law, [test], using, settings=settings, search=thorough)]
 
-    def continued(u):
-        start = StartingEstimate(u, reference=best[0].reference)
-        return identify(law, [test], using, settings=settings, start=start)
+    def refined(u):
+        return identify(law, [test], using, settings=settings, start=StartingEstimate(u, reference=fits[0].reference))
 
-    best += [continued(u) for u in kept.starts]
-    lowest = -2 * max([fit.log_likelihood for fit in best] + [row[0] for row in rows.values()])
+    fits += [refined(u) for u in thorough.starts]
+    lowest = -2 * max([fit.log_likelihood for fit in fits] + [row[0] for row in rows.values()])
     theta = np.array([p.to_internal(values[n]) for n, p in law.table.items()], float)
-    rows["planted"] = continued(best[0].coordinates.u(theta)).log_likelihood, 0, np.nan
+    rows["planted"] = refined(fits[0].coordinates.u(theta)).log_likelihood, 0, np.nan
     return {which: (-2 * likelihood - lowest, *rest) for which, (likelihood, *rest) in rows.items()}
 
 
-def shown(gaps):
-    """Share of successes, with its interval."""
-    good = int((np.asarray(gaps) <= ENOUGH).sum())
-    low, high = binomtest(good, len(gaps)).proportion_ci(method="wilson")
-    return f"{good / len(gaps):.3f} [{low:.3f}, {high:.3f}]"
+def successes(differences):
+    """Share of differences in -2 ln L that are within the tolerance."""
+    return share_with_interval([d <= TOLERANCE for d in differences], "wilson")
 
 
 def main():
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--specimens", type=int, default=40)
-    options.add_argument("--laws", nargs="*", default=list(PRIORS), choices=list(PRIORS))
-    options.add_argument("--searches", nargs="*", default=list(SEARCHES), choices=list(SEARCHES))
-    options.add_argument("--through", default="stand-in", choices=("stand-in", "surrogate"))
-    options.add_argument("--seed", type=int, default=0)
-    given = options.parse_args()
+    parser = arguments(__doc__)
+    parser.add_argument("--specimens", type=int, default=40, help="of each law")
+    parser.add_argument("--laws", nargs="*", default=list(PRIORS), choices=list(PRIORS))
+    parser.add_argument("--searches", nargs="*", default=list(SEARCHES), choices=list(SEARCHES))
+    parser.add_argument("--through", default="reduced-order", choices=("reduced-order", "surrogate"))
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
     set_numba_cache()
-    using = ck.specimen("bulge").reduced_order_model() if given.through == "stand-in" else ck.surrogate("dimple")
-    print(f"{given.specimens} specimens a law, through the {given.through}")
-    print("| law | search | within 2 of the best | largest gap | candidates | CPU s |\n" + "|-" * 6 + "|")
-    everything = {which: [] for which in given.searches}
-    for name in given.laws:
-        rng = np.random.default_rng([given.seed, list(PRIORS).index(name)])
-        rows = [compared(name, using, given.searches, rng, given.seed) for _ in range(given.specimens)]
+    reduced_order = options.through == "reduced-order"
+    using = ck.specimen("bulge").reduced_order_model() if reduced_order else ck.surrogate("dimple")
+    page = Page(f"search_success_{options.through.replace('-', '_')}", __doc__)
+    through = "reduced-order model" if reduced_order else "surrogate"
+    page.paragraph(f"{options.specimens} specimens of each law, through the {through}.")
+    page.table(
+        "law", "search", "within 2 of the best [95 % interval]", "largest difference", "candidates", "CPU time, s"
+    )
+    differences_of = {which: [] for which in options.searches}
+    for name in options.laws:
+        rng = np.random.default_rng([options.seed, list(PRIORS).index(name)])
+        rows = [compare_searches(name, using, options.searches, rng, options.seed) for _ in range(options.specimens)]
+        for which in options.searches:
+            differences, candidates, seconds = np.array([row[which] for row in rows]).T
+            differences_of[which].extend(differences)
+            medians = f"{np.median(candidates):.0f}", f"{np.median(seconds):.2f}"
+            page.row(name, which, successes(differences), f"{differences.max():.2f}", *medians)
         missed = -np.array([row["planted"][0] for row in rows])
-        for which in given.searches:
-            gaps, candidates, seconds = np.array([row[which] for row in rows]).T
-            everything[which].extend(gaps)
-            print(f"| {name} | {which} | {shown(gaps)} | {gaps.max():.2f} | {np.median(candidates):.0f} | "
-                  f"{np.median(seconds):.2f} |", flush=True)  # fmt: skip
-        print(f"| {name} | planted | {shown(missed)} | {missed.max():.2f} | | |", flush=True)
-    for which, gaps in everything.items():
-        goal = f"; goal {GOAL}" if which == "default" else ""
-        print(f"{which}: {shown(gaps)} of {len(gaps)}{goal}")
+        page.row(name, "planted", successes(missed), f"{missed.max():.2f}", "", "")
+    for which, differences in differences_of.items():
+        page.row("all", which, successes(differences), f"{max(differences):.2f}", "", "")
+    if options.write:
+        page.write()
 
 
 if __name__ == "__main__":

@@ -1,12 +1,12 @@
-"""What sensitivities of a bulge test cost, and what the solver costs to start: ratios of CPU time within one run.
+"""Cost of the sensitivities of a bulge test, and of the solver's first start.
 
-    python tests/benchmarks/sensitivity_cost.py [--cold]
+    python tests/benchmarks/sensitivity_cost.py [--repeats 12] [--cold] [--write]
 
-Ten columns: the nine parameters of the combined law and the modulus. `--cold` also measures the first simulation of a
-fresh machine, and a second one, each in a process of its own with an empty cache.
+CPU time of one simulation of 12 h by finite elements, without and with its sensitivities to all parameters of the law
+and to the modulus: the least of the repeats, on one thread, and the ratio of both. `--cold` also measures the first
+simulation on a machine and a second one, each in a process of its own with an empty cache; Python's start is included.
 """
 
-import argparse
 import os
 import resource
 import subprocess
@@ -15,6 +15,8 @@ import tempfile
 import time
 
 import numpy as np
+from measured import Page, arguments
+from public_calls import predict
 
 import creepkit as ck
 from creepkit.specimens.bulge.specimen import Bulge
@@ -39,8 +41,9 @@ ck.simulate(ck.law("norton"), ck.specimen("bulge"), dict(A=2e-12, n=3.0), loadin
 """
 
 
-def least(function, repeats: int = 12) -> float:
-    """Least CPU time of some calls, s."""
+def least_cpu(function, repeats: int) -> float:
+    """Least CPU time of some calls, s; the first, which may compile, does not count."""
+    function()
     best = np.inf
     for _ in range(repeats):
         start = time.process_time()
@@ -49,38 +52,52 @@ def least(function, repeats: int = 12) -> float:
     return best
 
 
-def main() -> None:
-    """Print the table."""
-    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    arguments.add_argument("--cold", action="store_true", help="measure the first simulation of a fresh machine too")
+def warm_table(page: Page, repeats: int) -> None:
+    """Cost of sensitivities, law by law."""
     dimple, times = Bulge(threads=1), np.arange(150.0, 43200.0 + 1, 150.0)
-    print("| law | forward, ms of CPU | with slopes to the law and E, ms | columns | ratio |\n|-|-|-|-|-|")
+    page.table("law", "simulation, CPU ms", "with sensitivities, CPU ms", "sensitivities", "ratio")
     for label, (name, values, loading) in CASES.items():
         law = ck.law(name)
         plan = ck.History(
-            name=label, times=times, outputs={}, loading=loading, temperature=1000.0, specimen="bulge",
+            name=label,
+            times=times,
+            outputs={},
+            loading=loading,
+            temperature=1000.0,
+            specimen="bulge",
             elastic=ck.Elastic(E=150e3),
-        )  # fmt: skip
-        numbers, modulus = law.values(values), {"modulus": np.zeros((1, 1))}
-        forward = least(
-            lambda law=law, plan=plan, numbers=numbers: dimple.predict(law, law.to_internal(numbers), [plan])
         )
-        both = least(
-            lambda law=law, plan=plan, numbers=numbers, modulus=modulus: dimple.predict(
-                law, law.to_internal(numbers), [plan], sensitivities=True, nuisances=modulus
-            )
-        )
-        columns = len(law.names) + 1
-        print(f"| {label} | {1e3 * forward:.1f} | {1e3 * both:.1f} | {columns} | {both / forward:.2f} |")
-    if arguments.parse_args().cold:
-        with tempfile.TemporaryDirectory() as folder:
-            for label in ("first simulation on a machine", "second one"):
-                before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-                places = {"NUMBA_CACHE_DIR": folder, "CREEPKIT_CACHE": folder}
-                subprocess.run([sys.executable, "-c", START], check=True, env={**os.environ, **places})
-                after = resource.getrusage(resource.RUSAGE_CHILDREN)
-                cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-                print(f"{label}, Python's start included: {cpu:.1f} s of CPU, {time.perf_counter() - start:.1f} s wall")
+        call = (dimple, law, law.values(values), [plan])
+        modulus = {"modulus": np.zeros((1, 1))}
+        alone = least_cpu(lambda a=call: predict(*a), repeats)
+        both = least_cpu(lambda a=call, m=modulus: predict(*a, nuisances=m, sensitivities=True), repeats)
+        page.row(label, f"{1e3 * alone:.1f}", f"{1e3 * both:.1f}", len(law.names) + 1, f"{both / alone:.2f}")
+
+
+def cold_table(page: Page) -> None:
+    """The first simulation on a machine, and a second one."""
+    page.table("simulation in a new process", "CPU time, s", "wall time, s")
+    with tempfile.TemporaryDirectory() as folder:
+        for label in ("first on a machine", "second"):
+            before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+            caches = {"NUMBA_CACHE_DIR": folder, "CREEPKIT_CACHE": folder}
+            subprocess.run([sys.executable, "-c", START], check=True, env={**os.environ, **caches})
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            page.row(label, f"{cpu:.1f}", f"{time.perf_counter() - start:.1f}")
+
+
+def main() -> None:
+    parser = arguments(__doc__)
+    parser.add_argument("--repeats", type=int, default=12)
+    parser.add_argument("--cold", action="store_true", help="measure the first simulation on a machine too")
+    options = parser.parse_args()
+    page = Page("sensitivity_cost", __doc__)
+    warm_table(page, options.repeats)
+    if options.cold:
+        cold_table(page)
+    if options.write:
+        page.write()
 
 
 if __name__ == "__main__":

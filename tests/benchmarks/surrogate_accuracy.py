@@ -1,22 +1,24 @@
-"""Surrogates of the dimple on held-out simulations, law by law: the table of the README.
+"""Accuracy of surrogates of the dimple on held-out simulations, law by law.
 
     python tests/benchmarks/surrogate_accuracy.py [--models FILE ...] [--samples 200] [--folder build/surrogates]
+                                                  [--sets NAME ...] [--write]
 
-Held-out sets come from the conditioned box of each law (seed 77, apex thickness .44 to .60 mm, 12 h, 900 s apart; 20 um
-of creep or more), so that no network has seen them; those of the hyperbolic sine are told apart by their local stress
-exponent at 1.5 times the reference stress, and mixtures are what is left of the combined law when two terms or more
-hold 5 % of the rate. They are simulated once and kept in the folder (some 8 CPU-s a hundred samples).
+Held-out sets are drawn from the conditioned domain of each law (seed 77, apex thickness 0.44 to 0.60 mm, 12 h, 900 s
+apart; 20 um of creep or more), so that no network was trained on them; those of the hyperbolic sine are separated by
+their local stress exponent at 1.5 times the reference stress, and mixtures are those samples of the combined law in
+which two terms or more hold 5 % of the rate. They are simulated once and kept in the folder (some 8 CPU s a hundred
+samples). Models: the reduced-order model alone, the surrogate that ships, and any --models.
 
-Models: the one-degree-of-freedom base alone, the surrogate that comes with creepkit, and any --models.
-Columns: median relative error of D_amp over all times, and at 12 h; RSE (Eq. 4) of D_amp, S_d, S_p; largest error of
-each history, median and 95th percentile, um; samples flagged as outside the domain. The last column is the share of
-samples whose largest error is below 5 um or 2 % of the largest deflection.
+Columns: relative error of D_amp over all times, and at 12 h (medians); relative squared error (Eq. 4) of D_amp, S_d and
+S_p; largest error of D_amp in a history, median and 95 % quantile; samples flagged as outside the applicability domain;
+share of samples whose largest error is below 5 um or 2 % of the largest deflection.
 """
 
-import argparse
 from pathlib import Path
 
 import numpy as np
+from measured import Page, arguments
+from public_calls import predict
 
 import creepkit as ck
 from creepkit.records import Status
@@ -34,7 +36,20 @@ SETS = {
     "graham-walles": "graham-walles",
 }
 FIRST_FRAME = 1
-"""Frames before it (the ramp itself) say nothing."""
+"""The first frame compared; the one before lies on the loading ramp."""
+HEADS = (
+    "held-out set",
+    "samples",
+    "error of D_amp, %",
+    "at 12 h, %",
+    "Eq. (4) of D_amp, 1e-4",
+    "of S_d, 1e-4",
+    "of S_p, 1e-4",
+    "largest error: median, um",
+    "95 % quantile, um",
+    "outside the domain",
+    "within 5 um or 2 %, %",
+)
 
 
 def held_out(name, samples, folder):
@@ -42,21 +57,21 @@ def held_out(name, samples, folder):
     law = SETS[name]
     file = folder / f"heldout_{law}_{samples}.h5"
     if not file.exists():
-        more = 2 if law in ("hyperbolic-sine", "combined") else 1
-        ck.generate(law, "bulge", more * samples, seed=SEED, to=file, apex_thickness=(0.44, 0.60), every=900)
+        factor = 2 if law in ("hyperbolic-sine", "combined") else 1
+        ck.generate(law, "bulge", factor * samples, seed=SEED, to=file, apex_thickness=(0.44, 0.60), every=900)
     data = ck.read_dataset(file, accepted_only=True)
     if "sinh" in name:
         steep = local_exponent(data) >= 8
         data = data.rows(steep if ">=" in name else ~steep)
     if "mixtures" in name:
-        data = data.rows((term_shares(data) > 0.05).sum(axis=1) >= 2)
+        data = data.rows((term_fractions(data) > 0.05).sum(axis=1) >= 2)
     return data.rows(slice(0, samples))
 
 
 def reference_stress(data):
     """(n,) MPa, of the geometric mean of both pressures."""
-    found = [data.specimen.reference_stress(data.plan(k)) for k in range(len(data))]
-    return np.array([np.exp(np.log(levels).mean()) for levels in found])
+    stresses = [data.specimen.reference_stress(data.planned_test(k)) for k in range(len(data))]
+    return np.array([np.exp(np.log(levels).mean()) for levels in stresses])
 
 
 def local_exponent(data):
@@ -66,8 +81,8 @@ def local_exponent(data):
     return n * x / np.tanh(x)
 
 
-def term_shares(data):
-    """(n, terms) of the rate at the reference stress, a strain of .01 and 1e4 s."""
+def term_fractions(data):
+    """(n, terms): fractions of the rate at the reference stress, a strain of 0.01 and 1e4 s."""
     s = reference_stress(data)
     p = {name: data.parameters[:, k] for k, name in enumerate(data.parameter_names)}
     with np.errstate(divide="ignore", over="ignore"):
@@ -83,53 +98,62 @@ def term_shares(data):
 
 
 def predicted(model, data):
-    """(n, frames, 3), NaN where the model stopped, and which rows are outside its domain."""
+    """(n, frames, 3), NaN where the prediction ended early, and which rows are outside the model's domain."""
     values, outside = np.full(data.values.shape, np.nan), np.zeros(len(data), bool)
     for k in range(len(data)):
-        found = model.predict(data.law, data.theta_of(k), [data.plan(k)])
-        own = found.of(0)
-        values[k, : len(own)] = own
-        outside[k] = found.status[0, 0] == Status.OUTSIDE_DOMAIN
+        prediction = predict(model, data.law, data.values_of(k), [data.planned_test(k)])
+        complete = prediction.of(0)
+        values[k, : len(complete)] = complete
+        outside[k] = prediction.status[0, 0] == Status.OUTSIDE_DOMAIN
     return values, outside
 
 
-def row(name, model, data):
-    """One line of the table."""
-    shown, outside = predicted(model, data)
-    true, shown = data.values[:, FIRST_FRAME:].astype(float), shown[:, FIRST_FRAME:]
-    mask = np.isfinite(true[..., 0]) & np.isfinite(shown[..., 0])
-    relative = np.abs(shown[..., 0] / true[..., 0] - 1)
-    errors = [relative_squared_error(true[..., [k]], np.nan_to_num(shown[..., [k]]), mask) for k in range(3)]
-    largest = 1e3 * np.where(mask, np.abs(shown[..., 0] - true[..., 0]), 0).max(axis=1)
+def cells(name, model, data):
+    """One row of the table."""
+    values, outside = predicted(model, data)
+    true, values = data.values[:, FIRST_FRAME:].astype(float), values[:, FIRST_FRAME:]
+    mask = np.isfinite(true[..., 0]) & np.isfinite(values[..., 0])
+    relative = np.abs(values[..., 0] / true[..., 0] - 1)
+    errors = [relative_squared_error(true[..., [k]], np.nan_to_num(values[..., [k]]), mask) for k in range(3)]
+    largest = 1e3 * np.where(mask, np.abs(values[..., 0] - true[..., 0]), 0).max(axis=1)
     deepest = np.where(mask, true[..., 0], 0).max(axis=1)
-    fine = (largest < 5) | (largest < 20 * deepest)
-    return (
-        f"| {name} | {len(data)} | {100 * np.median(relative[mask]):.2f} | "
-        f"{100 * np.median(relative[:, -1][mask[:, -1]]):.2f} | {1e4 * errors[0]:.2f} | {1e4 * errors[1]:.1f} | "
-        f"{1e4 * errors[2]:.1f} | {np.median(largest):.2f} | {np.quantile(largest, 0.95):.1f} | {outside.sum()} | "
-        f"{100 * fine.mean():.0f} |"
-    )
+    accurate = (largest < 5) | (largest < 20 * deepest)
+    return [
+        name,
+        len(data),
+        f"{100 * np.median(relative[mask]):.2f}",
+        f"{100 * np.median(relative[:, -1][mask[:, -1]]):.2f}",
+        f"{1e4 * errors[0]:.2f}",
+        *(f"{1e4 * error:.1f}" for error in errors[1:]),
+        f"{np.median(largest):.2f}",
+        f"{np.quantile(largest, 0.95):.1f}",
+        outside.sum(),
+        f"{100 * accurate.mean():.0f}",
+    ]
 
 
 def main():
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--models", nargs="*", default=[])
-    options.add_argument("--samples", type=int, default=200)
-    options.add_argument("--folder", type=Path, default=Path("build/surrogates"))
-    options.add_argument("--sets", nargs="*", default=list(SETS))
-    given = options.parse_args()
-    given.folder.mkdir(parents=True, exist_ok=True)
-    sets = {name: held_out(name, given.samples, given.folder) for name in given.sets}
-    models = {"one degree of freedom": ck.specimen("bulge").reduced_order_model(), "shipped": ck.surrogate("dimple")}
-    models |= {name: ck.surrogate(name) for name in given.models}
+    parser = arguments(__doc__)
+    parser.add_argument("--models", nargs="*", default=[])
+    parser.add_argument("--samples", type=int, default=200)
+    parser.add_argument("--folder", type=Path, default=Path("build/surrogates"))
+    parser.add_argument("--sets", nargs="*", default=list(SETS))
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    sets = {name: held_out(name, options.samples, options.folder) for name in options.sets}
+    models = {
+        "reduced-order model": ck.specimen("bulge").reduced_order_model(),
+        "surrogate that ships": ck.surrogate("dimple"),
+    }
+    models |= {name: ck.surrogate(name) for name in options.models}
+    page = Page("surrogate_accuracy", __doc__)
     for title, model in models.items():
-        print(f"\n{title}\n")
-        print(
-            "| held-out | samples | rel. % | 12 h % | RSE D 1e-4 | S_d | S_p | largest um | 95 % | outside | fine % |"
-        )
-        print("|" + "-|" * 11)
+        page.heading(title[0].upper() + title[1:])
+        page.table(*HEADS)
         for name, data in sets.items():
-            print(row(name, model, data), flush=True)
+            page.row(*cells(name, model, data))
+    if options.write:
+        page.write()
 
 
 if __name__ == "__main__":

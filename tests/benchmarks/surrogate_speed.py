@@ -1,17 +1,18 @@
 """Speed of surrogates of the dimple, beside the finite element model and the paper's network: one 12 h jump test.
 
-    python tests/benchmarks/surrogate_speed.py [--candidates 300] [--simulated 6] [--laws ...] [--surrogate FILE]
+    python tests/benchmarks/surrogate_speed.py [--candidates 300] [--simulated 6] [--laws norton ...]
+                                               [--surrogate FILE] [--write]
 
-CPU time of a candidate: of RateNet its base alone (the one-degree-of-freedom march), with the features, with the
-network, and with derivatives to all parameters and to the apex thickness; of the finite element model alike; of
-ParameterGru (128 x 3) the bare network. Then wall time of all candidates at 289 times on all cores. Networks are not
-trained, which costs the same, unless --surrogate says which. All is measured in one process, in turns; least of some.
-The first run also compiles.
+First table, CPU time of a candidate at 289 times: RateNet by its parts (the reduced-order model alone, with its
+features, with the network), RateNet with sensitivities to all parameters and to the apex thickness, the finite element
+model without and with the same sensitivities, and the ratios of finite elements to RateNet. Second table, wall time of
+all candidates on all cores, and that of the bare network of ParameterGru (128 x 3, the paper's) at 49 and 289 frames.
+Networks are not trained, which costs the same, unless --surrogate names one. All is measured in one process, in turns;
+the least of some repeats. The first run also compiles.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import time
 from collections.abc import Callable
@@ -20,6 +21,8 @@ from typing import Any
 
 import numpy as np
 import torch
+from measured import Page, arguments
+from public_calls import predict
 
 import creepkit as ck
 from creepkit import kernels
@@ -43,92 +46,105 @@ LAWS = {
     "norton": {"A": 3e-15, "n": 3.5},
     "strain-hardening": {"A": 3e-16, "n": 3.0, "m": -0.5},
     "hyperbolic-sine": {"A": 3e-9, "n": 3.0, "B": 90.0},
-    "combined": {
-        "A_1": 1e-9, "n_1": 3.0, "B": 60.0, "A_2": 1e-14, "n_2": 4.0, "m_1": -0.3, "A_3": 3e-12, "n_3": 3.0, "m_2": -0.4
-    },
-}  # fmt: skip
+    "combined": dict(A_1=1e-9, n_1=3.0, B=60.0, A_2=1e-14, n_2=4.0, m_1=-0.3, A_3=3e-12, n_3=3.0, m_2=-0.4),
+}
 END, EVERY = 43200.0, 150.0
 TEST = History(
-    "12 h jump", np.arange(0.0, END + 1, EVERY), {}, ck.PressureJump(8.0, 9.0, END / 2), 1000.0, specimen="bulge",
+    name="12 h jump",
+    times=np.arange(0.0, END + 1, EVERY),
+    outputs={},
+    loading=ck.PressureJump(8.0, 9.0, END / 2),
+    temperature=1000.0,
+    specimen="bulge",
     elastic=ck.Elastic(E=150e3),
-)  # fmt: skip
+)
 REPEATS = 7
 GRU_INPUTS = (8, 1, len(OBSERVED))
 """Constants (some law's parameters and conditions), series and outputs."""
 
 
+CPU_HEADS = (
+    "law",
+    "reduced-order model, ms",
+    "with features, ms",
+    "RateNet, ms",
+    "with sensitivities, ms",
+    "finite elements, ms",
+    "with sensitivities, ms",
+    "finite elements over RateNet",
+    "with sensitivities",
+)
+WALL_HEADS = ("law", "RateNet, ms", "reduced-order model and features, ms", "GRU, 49 frames, ms", "GRU, 289 frames, ms")
+
+
 def main() -> None:
-    """Print the tables."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--candidates", type=int, default=300)
-    options.add_argument("--simulated", type=int, default=6)
-    options.add_argument("--laws", nargs="*", default=list(LAWS))
-    options.add_argument("--surrogate")
-    asked = options.parse_args()
+    parser = arguments(__doc__)
+    parser.add_argument("--candidates", type=int, default=300)
+    parser.add_argument("--simulated", type=int, default=6, help="candidates of the finite element model")
+    parser.add_argument("--laws", nargs="*", default=list(LAWS))
+    parser.add_argument("--surrogate", help="file of a RateNet")
+    options = parser.parse_args()
     torch.set_num_threads(1)
-    print(f"one 12 h jump test, {TEST.times.size} times; CPU time of a candidate, ms")
-    heads = ("law", "base", "+ features", "+ network", "+ slopes", "finite elements", "with slopes", "over RateNet")
-    print("| " + " | ".join(heads) + " |\n|" + "-|" * len(heads))
-    for name in asked.laws:
-        print(row(name, asked.candidates, asked.simulated, asked.surrogate), flush=True)
-    print(f"\n{asked.candidates} candidates, wall time on {len(os.sched_getaffinity(0))} cores, ms")
-    print("| | features and network | base and features alone | GRU, 49 frames | GRU, 289 frames |\n|-|-|-|-|-|")
-    for name in asked.laws:
-        print(walls(name, asked.candidates, asked.surrogate), flush=True)
+    page = Page("surrogate_speed", __doc__)
+    page.heading("CPU time of a candidate")
+    page.table(*CPU_HEADS)
+    for name in options.laws:
+        page.row(name, *cpu_times(name, options.candidates, options.simulated, options.surrogate))
+    page.heading(f"Wall time of {options.candidates} candidates on {len(os.sched_getaffinity(0))} cores")
+    page.table(*WALL_HEADS)
+    for name in options.laws:
+        page.row(name, *wall_times(name, options.candidates, options.surrogate))
+    if options.write:
+        page.write()
 
 
-def row(name: str, count: int, simulated: int, file: str | None) -> str:
-    """CPU times of one law."""
+def cpu_times(name: str, count: int, simulated: int, file: str | None) -> list[str]:
+    """CPU times of one law, ms, and ratios."""
     law, surrogate, exact = ck.law(name), rate_surrogate(file, threads=1), Bulge(threads=1)
-    compiled, many, few = kernels.lower(law, "numba"), scattered(name, count), scattered(name, simulated)
-    theta, factors = compiled.to_internal(many), surrogate.recipe.factors
+    kernel, many, few = kernels.lower(law, "numba"), scattered(name, count), scattered(name, simulated)
+    theta, factors = kernel.to_internal(many), surrogate.recipe.factors
     thickness = {"thickness": np.full((1, 1), exact.geometry.apex_thickness)}
     some = {n: v[: max(1, count // 10)] for n, v in many.items()}
     spent = in_turns(
         (
             lambda: simulate_trajectories(
-                exact, compiled, theta, [TEST], options=TrajectoryOptions(factors=WITHOUT_FEATURES)
+                exact, kernel, theta, [TEST], options=TrajectoryOptions(factors=WITHOUT_FEATURES)
             ),
             count,
         ),
         (
-            lambda: simulate_trajectories(exact, compiled, theta, [TEST], options=TrajectoryOptions(factors=factors)),
+            lambda: simulate_trajectories(exact, kernel, theta, [TEST], options=TrajectoryOptions(factors=factors)),
             count,
         ),
-        (lambda: surrogate.predict(law, law.to_internal(many), [TEST]), count),
-        (
-            lambda: surrogate.predict(law, law.to_internal(some), [TEST], sensitivities=True, nuisances=thickness),
-            max(1, count // 10),
-        ),
+        (lambda: predict(surrogate, law, many, [TEST]), count),
+        (lambda: predict(surrogate, law, some, [TEST], thickness, sensitivities=True), max(1, count // 10)),
     )
-    slow = in_turns(
-        (lambda: exact.predict(law, law.to_internal(few), [TEST]), simulated),
-        (lambda: exact.predict(law, law.to_internal(few), [TEST], sensitivities=True, nuisances=thickness), simulated),
+    finite_elements = in_turns(
+        (lambda: predict(exact, law, few, [TEST]), simulated),
+        (lambda: predict(exact, law, few, [TEST], thickness, sensitivities=True), simulated),
         repeats=1,
     )
-    ratios = f"{slow[0] / spent[2]:.0f}, {slow[1] / spent[3]:.0f}"
-    cells = [*(f"{1e3 * s:.3f}" for s in spent), *(f"{1e3 * s:.1f}" for s in slow), ratios]
-    return f"| {name} | " + " | ".join(cells) + " |"
+    ratios = finite_elements[0] / spent[2], finite_elements[1] / spent[3]
+    return [
+        *(f"{1e3 * s:.3f}" for s in spent),
+        *(f"{1e3 * s:.1f}" for s in finite_elements),
+        *(f"{ratio:.0f}" for ratio in ratios),
+    ]
 
 
-def walls(name: str, count: int, file: str | None) -> str:
-    """Wall times of one law on all cores."""
+def wall_times(name: str, count: int, file: str | None) -> list[str]:
+    """Wall times of one law on all cores, ms."""
     law, surrogate, cores = ck.law(name), rate_surrogate(file), len(os.sched_getaffinity(0))
-    compiled, many = kernels.lower(law, "numba"), scattered(name, count)
-    theta, factors = compiled.to_internal(many), surrogate.recipe.factors
+    kernel, many = kernels.lower(law, "numba"), scattered(name, count)
+    theta, factors = kernel.to_internal(many), surrogate.recipe.factors
     spent = in_turns(
-        (lambda: surrogate.predict(law, law.to_internal(many), [TEST]), 1),
-        (
-            lambda: simulate_trajectories(
-                Bulge(), compiled, theta, [TEST], options=TrajectoryOptions(factors=factors, threads=cores)
-            ),
-            1,
-        ),
+        (lambda: predict(surrogate, law, many, [TEST]), 1),
+        (lambda: simulate_trajectories(Bulge(), kernel, theta, [TEST], factors=factors, threads=cores), 1),
         (gru(count, 49, cores), 1),
         (gru(count, TEST.times.size, cores), 1),
         clock=time.perf_counter,
     )
-    return f"| {name} | " + " | ".join(f"{1e3 * s:.0f}" for s in spent) + " |"
+    return [f"{1e3 * s:.0f}" for s in spent]
 
 
 def in_turns(
@@ -146,7 +162,7 @@ def in_turns(
 
 
 def scattered(name: str, count: int) -> dict[str, np.ndarray]:
-    """Values of candidates about those of the law: coefficients by a factor of e^.5, the rest by 3 %."""
+    """Values of candidates about those of LAWS: a standard deviation of 0.5 in ln of coefficients, 3 % in the rest."""
     rng, table = np.random.default_rng(1), ck.law(name).table
     return {
         n: v * np.exp(rng.normal(0.0, 0.5 if table[n].scale == "log" else 0.03, count)) for n, v in LAWS[name].items()
@@ -157,16 +173,17 @@ def rate_surrogate(file: str | None, threads: int | None = None) -> RateSurrogat
     """A RateNet with some domain, of random weights unless there is a file."""
     specimen = Bulge() if threads is None else Bulge(threads=threads)
     if file is not None:
-        found = load_surrogate(file)
-        if not isinstance(found, RateSurrogate):
-            raise SystemExit(f"{file} holds a {found.recipe.kind}; give a rate-net")
-        return found
+        surrogate = load_surrogate(file)
+        if not isinstance(surrogate, RateSurrogate):
+            raise SystemExit(f"{file} holds a {surrogate.recipe.kind}; give a rate-net")
+        return surrogate
     recipe = RateNet()
-    known = input_names(recipe.factors.stress.size * recipe.factors.strain.size)
-    own = [n for n in known if not n.startswith(("mean", "fading"))]
-    domain = ApplicabilityDomain.from_rows(own, np.random.default_rng(0).normal(size=(500, len(own))))
-    told = SurrogateMetadata(ck.law("norton"), specimen, OBSERVED, TimeGrid(TEST.times, False), (), (), domain=domain)
-    return RateSurrogate(recipe, RateModule(len(known), recipe.hidden, recipe.layers), told)
+    names = input_names(recipe.factors.stress.size * recipe.factors.strain.size)
+    local = [n for n in names if not n.startswith(("mean", "fading"))]
+    domain = ApplicabilityDomain.from_rows(local, np.random.default_rng(0).normal(size=(500, len(local))))
+    grid = TimeGrid(TEST.times, False)
+    metadata = SurrogateMetadata(ck.law("norton"), specimen, OBSERVED, grid, (), (), domain=domain)
+    return RateSurrogate(recipe, RateModule(len(names), recipe.hidden, recipe.layers), metadata)
 
 
 def gru(count: int, frames: int, cores: int) -> Callable[[], None]:

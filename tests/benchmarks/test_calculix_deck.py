@@ -98,12 +98,12 @@ def test_the_text_of_a_deck() -> None:
 def test_the_mesh_reads_back(tmp_path: Path) -> None:
     path = tmp_path / "block.inp"
     path.write_text(deck().text())
-    found = read_input_deck(path, top=None)
-    where = [int(np.argmin(np.linalg.norm(found.nodes - node, axis=1))) for node in NODES]
-    np.testing.assert_allclose(found.nodes[where], NODES)
-    np.testing.assert_array_equal(found.held[where], BLOCK.held)
-    np.testing.assert_array_equal(found.elements, [where])
-    np.testing.assert_array_equal(found.pressed, [[where[0], where[4], where[1]]])
+    mesh = read_input_deck(path, top=None)
+    where = [int(np.argmin(np.linalg.norm(mesh.nodes - node, axis=1))) for node in NODES]
+    np.testing.assert_allclose(mesh.nodes[where], NODES)
+    np.testing.assert_array_equal(mesh.held[where], BLOCK.held)
+    np.testing.assert_array_equal(mesh.elements, [where])
+    np.testing.assert_array_equal(mesh.pressed, [[where[0], where[4], where[1]]])
 
 
 @pytest.mark.parametrize(("edge", "side"), [((0, 4, 1), 1), ((1, 5, 2), 2), ((2, 6, 3), 3), ((3, 7, 0), 4)])
@@ -160,18 +160,18 @@ DAT = """
 
 def test_displacements_at_the_times_asked_for() -> None:
     """Points of time that only the amplitude needed are left out; a time that was never reached is NaN."""
-    found = calculix.displacements(DAT.splitlines(), deck(nodes=[6, 3]))
-    np.testing.assert_array_equal(found[0], [[2e-3, 0.04], [0.0, 0.03]])
-    assert np.isnan(found[1]).all()
+    result = calculix.displacements(DAT.splitlines(), deck(nodes=[6, 3]))
+    np.testing.assert_array_equal(result[0], [[2e-3, 0.04], [0.0, 0.03]])
+    assert np.isnan(result[1]).all()
 
 
 def test_stresses_in_mpa() -> None:
     rescaled = deck(creep=calculix.Norton(5e-21, 7.0))
-    found = calculix.stresses(DAT.splitlines(), rescaled)
-    assert found.shape == (2, 1, 2, 4)
+    result = calculix.stresses(DAT.splitlines(), rescaled)
+    assert result.shape == (2, 1, 2, 4)
     expected = np.array([-136.2684, -8.205476, -136.3831, 0.1506193]) * rescaled.stress_unit
-    np.testing.assert_allclose(found[0, 0, 0], expected)
-    assert np.isnan(found[1]).all()
+    np.testing.assert_allclose(result[0, 0, 0], expected)
+    assert np.isnan(result[1]).all()
 
 
 def test_increments_and_iterations_of_a_status_file() -> None:
@@ -185,5 +185,5 @@ def test_increments_and_iterations_of_a_status_file() -> None:
 
 def test_extrapolation_removes_an_error_that_falls_as_the_number_of_increments_grows() -> None:
     limit, slope = np.array([0.3, 0.7]), np.array([-0.2, -1.1])
-    found = calculix.extrapolated(limit + slope / 110, limit + slope / 289, (110, 289))
-    np.testing.assert_allclose(found, limit, rtol=1e-13)
+    result = calculix.extrapolated(limit + slope / 110, limit + slope / 289, (110, 289))
+    np.testing.assert_allclose(result, limit, rtol=1e-13)

@@ -1,17 +1,16 @@
-"""Exported creep laws run by CalculiX, beside creepkit's own solver: the table of the README (`make verify-export`).
+"""Exported creep laws run by CalculiX, beside creepkit's own solver.
 
-    python tests/benchmarks/verify_export.py [LAW ...] [--cetol 1e-4 1e-5] [--keep FOLDER]
+    python tests/benchmarks/verify_export.py [LAW ...] [--cetol 1e-4 1e-5] [--keep FOLDER] [--write]
 
-Each law is exported with `ck.export(law, "calculix")`, compiled by gfortran and preloaded in front of a CalculiX 2.20
-built from Debian's source, which knows nothing of creepkit. One element in tension follows steps of stress, and the
-true dimple is bulged for twelve hours. CalculiX is backward Euler: two values of cetol give its limit of small
-increments, on the same mesh. Differences are the largest from 10 min on, in percent of the last value (creep strain,
-apex displacement).
+Each law is exported with `ck.export(law, "calculix")`, compiled by gfortran and preloaded before a CalculiX 2.20 built
+from Debian's source, which knows nothing of creepkit. One element in tension follows steps of stress for 12 h
+(compared: creep strain), and the dimple is bulged for 12 h (compared: apex displacement, mm). CalculiX is backward
+Euler: two values of its tolerance cetol give its limit of small increments, on the same mesh. Differences are the
+largest from 10 min on, in percent of the last value of that limit; increments of CalculiX stand in brackets.
 """
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +19,7 @@ import numpy as np
 from calculix import TIMES, Result, Stopped, difference, run
 from calculix_deck import Deck, UserLaw, extrapolated
 from calculix_source import built, compiled
+from measured import Page, arguments
 
 import creepkit as ck
 from creepkit.arrays import Floats
@@ -32,29 +32,23 @@ E, NU = 150e3, 0.3
 KELVIN = 1073.15
 
 LAWS = {
-    "norton": {"A": 2e-12, "n": 3.0},
-    "drifting-exponent": {
-        "A": 5e-13, "n_0": 3.3, "n_inf": 3.1, "C": 0.6, "tau_d": 7800.0, "tau_r": 4700.0, "m": -0.1,
-    },
-    "combined": {
-        "A_1": 1e-8, "n_1": 2.0, "B": 60.0,
-        "A_2": 3e-13, "n_2": 3.0, "m_1": -0.2,
-        "A_3": 1e-11, "n_3": 3.0, "m_2": -0.4,
-    },
-    "logarithmic": {"A": 4e-12, "n": 3.0, "e_0": 0.1},
-    "norton x arrhenius": {"A": 1e-12, "n": 3.0, "Q": 3e5},
-    "kachanov-rabotnov": {"A": 1e-12, "n": 3.0, "B": 6e-14, "chi": 4.0, "phi": 3.0},
-}  # fmt: skip
-"""Values of each law. The last three are no laws of creepkit's own: two come from plugins, one is warmed by 50 K."""
+    "norton": dict(A=2e-12, n=3.0),
+    "drifting-exponent": dict(A=5e-13, n_0=3.3, n_inf=3.1, C=0.6, tau_d=7800.0, tau_r=4700.0, m=-0.1),
+    "combined": dict(A_1=1e-8, n_1=2.0, B=60.0, A_2=3e-13, n_2=3.0, m_1=-0.2, A_3=1e-11, n_3=3.0, m_2=-0.4),
+    "logarithmic": dict(A=4e-12, n=3.0, e_0=0.1),
+    "norton x arrhenius": dict(A=1e-12, n=3.0, Q=3e5),
+    "kachanov-rabotnov": dict(A=1e-12, n=3.0, B=6e-14, chi=4.0, phi=3.0),
+}
+"""Values of each law. Of the last three, two come from plugins, and one is used 50 K above its T_ref."""
 
 
 def law_of(name: str) -> CreepLaw:
     """The law of a name of LAWS; damage by the von Mises stress, for CREEP knows no other."""
-    plain, _, warm = name.partition(" x ")
-    law = ck.law(plain)
+    isothermal, _, temperature_form = name.partition(" x ")
+    law = ck.law(isothermal)
     if "alpha" in law.names:
         law = law.fix(alpha=0.0, m=0.0)
-    return law.times(ck.arrhenius(T_ref=1023.15)) if warm else law
+    return law.times(ck.arrhenius(T_ref=1023.15)) if temperature_form else law
 
 
 @dataclass(frozen=True)
@@ -67,14 +61,12 @@ class Case:
     library: Path
 
 
-def prepared(name: str, folder: Path) -> Case:
+def exported_case(name: str, folder: Path) -> Case:
     """Export and compile one law."""
     law = law_of(name)
     text = ck.export(law, "calculix", LAWS[name], notes=["for the verification against CalculiX"])
     return Case(name, law, LAWS[name], compiled(text, folder, name.replace(" ", "_").replace("-", "_")))
 
-
-# ---- the two specimens ---------------------------------------------------------------------------------------------
 
 STRESS = Program(
     np.array([0.0, 5.0, 14400.0, 14405.0, 28800.0, 28805.0, 43200.0]),
@@ -96,7 +88,7 @@ def bar() -> Mesh:
 
 
 def element(case: Case, cetols: list[float], program: Path) -> tuple[Floats, list[tuple[Floats, Result]]]:
-    """Creep strain of a bar, (times,): ours, and CalculiX's for each cetol."""
+    """Creep strain of a bar, (times,): creepkit's, and CalculiX's for each cetol."""
     pull = Program(STRESS.times, -STRESS.values)
     deck = Deck(bar(), E, NU, UserLaw(KELVIN), pull, TIMES, np.array([3]), first=1e-3, large=False)
     runs = [run(replace(deck, cetol=cetol), program, case.library) for cetol in cetols]
@@ -108,7 +100,7 @@ def element(case: Case, cetols: list[float], program: Path) -> tuple[Floats, lis
 
 
 def dimple(case: Case, cetols: list[float], program: Path) -> tuple[Floats, list[tuple[Floats, Result]]]:
-    """Apex displacement of the true dimple, (times,) mm: ours, and CalculiX's for each cetol."""
+    """Apex displacement of the true dimple, (times,) mm: creepkit's, and CalculiX's for each cetol."""
     specimen = Bulge()
     mesh = specimen.geometry.mesh(1.0)
     deck = Deck(mesh, E, NU, UserLaw(KELVIN), BULGE.program(), TIMES, mesh.top[:1])
@@ -122,52 +114,47 @@ def dimple(case: Case, cetols: list[float], program: Path) -> tuple[Floats, list
 SPECIMENS = {"one element": element, "dimple": dimple}
 
 
-def row(case: Case, specimen: str, cetols: list[float], program: Path) -> str:
-    """One line of the table."""
+def cells(case: Case, specimen: str, cetols: list[float], program: Path) -> list[str]:
+    """One row of the table."""
     own, theirs = SPECIMENS[specimen](case, cetols, program)
     (coarse, few), (fine, many) = theirs[-2:]
     limit = extrapolated(coarse, fine, (few.increments, many.increments))
-    cells = [
+    return [
         case.name,
         specimen,
         f"{own[-1]:.6g}",
         f"{limit[-1]:.6g}",
-        *(f"{difference(found, limit):.3f} ({result.increments})" for found, result in theirs),
+        *(f"{difference(values, limit):.3f} ({result.increments})" for values, result in theirs),
         f"{difference(own, limit):.3f}",
     ]
-    return f"| {' | '.join(cells)} |"
 
 
 def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = arguments(__doc__)
     parser.add_argument("laws", nargs="*", default=list(LAWS), help="some of: " + ", ".join(LAWS))
     parser.add_argument("--cetol", nargs="+", type=float, default=[1e-4, 1e-5])
     parser.add_argument("--keep", type=Path, help="keep the exported files and libraries in this folder")
-    given = parser.parse_args()
-    unknown = [name for name in given.laws if name not in LAWS]
-    if unknown or len(set(given.cetol)) < 2:
+    options = parser.parse_args()
+    unknown = [name for name in options.laws if name not in LAWS]
+    if unknown or len(set(options.cetol)) < 2:
         parser.error(f"no law is called {', '.join(unknown)}" if unknown else "two values of cetol are needed")
-    cetols = sorted(given.cetol, reverse=True)
+    cetols = sorted(options.cetol, reverse=True)
     program = built()
-    head = [
-        "law",
-        "specimen",
-        "creepkit at 12 h",
-        "CalculiX, limit",
-        *(f"cetol {c:.0e}: % (increments)" for c in cetols),
-    ]
-    print(f"| {' | '.join([*head, 'creepkit: %'])} |\n|{'-|' * (len(head) + 1)}", flush=True)
+    page = Page("verify_export", __doc__)
+    heads = [f"CalculiX, cetol {c:g}: difference, % (increments)" for c in cetols]
+    page.table("law", "specimen", "creepkit at 12 h", "CalculiX, limit at 12 h", *heads, "creepkit: difference, %")
     with tempfile.TemporaryDirectory() as scratch:
-        folder = given.keep or Path(scratch)
+        folder = options.keep or Path(scratch)
         folder.mkdir(parents=True, exist_ok=True)
-        for name in given.laws:
-            case = prepared(name, folder)
+        for name in options.laws:
+            case = exported_case(name, folder)
             for specimen in SPECIMENS:
                 try:
-                    print(row(case, specimen, cetols, program), flush=True)
+                    page.row(*cells(case, specimen, cetols, program))
                 except Stopped as stopped:
-                    print(f"| {name} | {specimen} | {stopped} |", flush=True)
+                    page.row(name, specimen, str(stopped), *[""] * (len(cetols) + 2))
+    if options.write:
+        page.write()
 
 
 if __name__ == "__main__":

@@ -18,33 +18,15 @@ from creepkit.language import Elastic
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, Nuisance, constant_strain, constant_stress
 from creepkit.specimens.relaxation import Relaxation
-from creepkit.specimens.uniaxial import Uniaxial
 from helpers.literature_laws import EQUATIONS
+from helpers.rupture_tests import BAR, OMEGA, campaign
 
-BAR = Uniaxial()
-KACHANOV, LIU, OMEGA = (EQUATIONS[name] for name in ("Kachanov-Rabotnov", "Liu-Murakami", "MPC Omega"))
+KACHANOV, LIU = (EQUATIONS[name] for name in ("Kachanov-Rabotnov", "Liu-Murakami"))
 LIU = LIU.fix(a=1)  # in tension the largest principal stress is the stress: its share cannot be seen
 PLANTED = {
     "Kachanov-Rabotnov": (KACHANOV, {"A": 1e-16, "n": 4.0, "B": 1e-15, "k": 3.5, "r": 4.0}),
     "Liu-Murakami": (LIU, {"A": 1e-16, "n": 4.0, "B": 2e-15, "k": 3.5, "r": 4.0}),
 }
-SHARES = np.concatenate([np.geomspace(3e-3, 0.3, 10), 1 - np.geomspace(0.6, 3e-3, 14)])
-SCATTER = {"rate": 0.15, "life": 0.08, "noise": 2e-5}
-
-
-def campaign(law, values, stresses, seed, stopped=()):
-    """Histories of tests with factors on their rate and, beside, on their life; `stopped` ones end at half of it."""
-    rng, tests = np.random.default_rng(seed), []
-    for k, stress in enumerate(stresses):
-        plan = History(f"t{k}", np.array([1e8]), {}, constant_stress(stress), 1000.0, strain_measure="engineering")
-        life = float(BAR.predict_to_rupture(law, law.to_internal(values), [plan]).times_to_strain.rupture_times[0, 0])
-        own, rate = (np.exp(SCATTER[name] * rng.standard_normal()) for name in ("life", "rate"))
-        times = life * (SHARES[SHARES < 0.5] if k in stopped else SHARES[life * SHARES < life * own])
-        strain = BAR.predict(law, law.to_internal(values), [plan.replace(times=times)]).of(0)[:, 0]
-        strain = strain + SCATTER["noise"] * rng.standard_normal(times.size)
-        end = {"unruptured": True} if k in stopped else {"rupture_time": life * own / rate}
-        tests.append(plan.replace(times=times / rate, outputs={"strain": strain}, **end))
-    return tests
 
 
 @pytest.fixture(scope="module", params=PLANTED)

@@ -1,0 +1,143 @@
+"""The benchmark programs: what each measures, what it costs, and the command of its published tables.
+
+    python tests/benchmarks/all.py                            list the programs
+    python tests/benchmarks/all.py NAME ... [--write]         run the commands of some, one after another
+    python tests/benchmarks/all.py everything [--write]       run all that need no further file or program
+
+With --write every program writes its tables to docs/measured. Commands run from the root of the project.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+FOLDER = Path(__file__).resolve().parent
+ROOT = FOLDER.parents[1]
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """A program with the options of its published tables.
+
+    minutes : of CPU, expected, of all its commands on an AMD EPYC core. commands : options, a list for each run.
+    needs : files and programs that are neither in the project nor among its dependencies, or "".
+    """
+
+    minutes: float
+    commands: tuple[tuple[str, ...], ...] = ((),)
+    needs: str = ""
+
+
+DATA = "measured data in ../shared/data"
+BENCHMARKS = {
+    "import_time": Benchmark(0.1),
+    "kernel_speed": Benchmark(1, ((), ("1000",))),
+    "kernel_start": Benchmark(1),
+    "uniaxial_speed": Benchmark(1),
+    "dimple_accuracy": Benchmark(
+        90, (("--cases", "145", "--cache", "build/dimple_references.jsonl"),), "reference cases in ../shared/data"
+    ),
+    "sensitivity_cost": Benchmark(3, (("--cold",),)),
+    "calculix": Benchmark(6, (("N3", "N7", "TH", "c1", "c2", "c3"),), "CalculiX (ccx)"),
+    "verify_export": Benchmark(20, needs="gcc, gfortran, make, the network for CalculiX's source; CalculiX is built"),
+    "neml2_model": Benchmark(1, needs="NEML2 3.1, see the program"),
+    "dataset_generation_speed": Benchmark(6, (("--samples", "256"),)),
+    "surrogate_accuracy": Benchmark(10, (("--samples", "150"),)),
+    "surrogate_speed": Benchmark(3),
+    "surrogate_identification": Benchmark(3, (("--tests", "3"),)),
+    "surrogate_comparison": Benchmark(
+        10,
+        (("build/case1.h5", "build/case1.safetensors", "--samples", "300"),),
+        "a data set and a network of Eq. (1), see the program",
+    ),
+    "rate_net_memory": Benchmark(
+        4,
+        (("build/rates.h5", "--samples", "1500", "--epochs", "50", "--seeds", "1"),),
+        "build/rates.h5: creepkit generate rate-family --samples 2000 --seed 1 --to build/rates.h5",
+    ),
+    "identification_speed": Benchmark(1),
+    "search_success": Benchmark(15, (("--specimens", "6", "--through", "surrogate", "--searches", "default", "cma"),)),
+    "swarm_speed": Benchmark(1),
+    "law_recovery": Benchmark(
+        30,
+        (
+            ("--design", "jump", "--specimens", "60"),
+            ("--design", "thickness", "correlated", "--specimens", "60"),
+            ("--design", "dimples", "--specimens", "28"),
+        ),
+    ),
+    "penalty_confusion": Benchmark(
+        12, (("--specimens", "2", "--penalties", "L2", "GroupL2", "Sqrt", "Subsets", "paper"),)
+    ),
+    "plate_of_alloys": Benchmark(8),
+    "temperature_forms": Benchmark(10, (("--through", "uniaxial", "--specimens", "2", "--max-forms", "2"),)),
+    "inconel_temperature": Benchmark(4, needs=DATA),
+    "measured_creep": Benchmark(90, needs=DATA),
+    "whole_life": Benchmark(60, needs=DATA),
+    "rupture_coverage": Benchmark(4),
+}
+"""{name of the program: what it costs and how it is run}."""
+
+
+def purpose(name: str) -> str:
+    """The first sentence of a program's docstring."""
+    documentation = ast.get_docstring(ast.parse((FOLDER / f"{name}.py").read_text(encoding="utf-8"))) or ""
+    return " ".join(documentation.split("\n\n")[0].split()).rstrip(".:")
+
+
+def command(name: str, options: tuple[str, ...]) -> list[str]:
+    """The command of one run, from the root of the project."""
+    return [f"tests/benchmarks/{name}.py", *options]
+
+
+def list_programs() -> None:
+    """Print what there is."""
+    for name, benchmark in BENCHMARKS.items():
+        print(f"{name}: {purpose(name)}")
+        print(f"    {benchmark.minutes:g} CPU minutes" + (f"; needs {benchmark.needs}" if benchmark.needs else ""))
+        for options in benchmark.commands:
+            print("    python " + " ".join(command(name, options)))
+
+
+def run(names: list[str], write: bool) -> list[str]:
+    """Run the commands of some programs in turn; those that failed."""
+    failed = []
+    for name in names:
+        for options in BENCHMARKS[name].commands:
+            arguments = command(name, options) + (["--write"] if write else [])
+            print(f"\n$ python {' '.join(arguments)}", flush=True)
+            start = time.monotonic()
+            code = subprocess.run([sys.executable, *arguments], cwd=ROOT).returncode
+            print(f"{name}: {time.monotonic() - start:.0f} s", file=sys.stderr, flush=True)
+            if code != 0:
+                failed.append(" ".join(arguments))
+    return failed
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", metavar="NAME", help="programs to run, or 'everything'; none: list them")
+    parser.add_argument("--write", action="store_true", help="write the tables to docs/measured")
+    options = parser.parse_args()
+    if not options.names:
+        list_programs()
+        return
+    names = options.names
+    if names == ["everything"]:
+        names = [name for name, benchmark in BENCHMARKS.items() if not benchmark.needs]
+    unknown = [name for name in names if name not in BENCHMARKS]
+    if unknown:
+        parser.error(f"there is no program {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
+    failed = run(names, options.write)
+    if failed:
+        raise SystemExit("failed: " + "; ".join(failed))
+
+
+if __name__ == "__main__":
+    main()
