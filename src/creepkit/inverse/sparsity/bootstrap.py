@@ -104,11 +104,11 @@ def with_weights(problem: TermProblem, weights: Floats) -> TermProblem:
 
 def bootstrap_weights(observations: ObservationVector, resamples: int, rng: np.random.Generator) -> Iterator[Floats]:
     """(tests, observations) how often each was drawn: whole tests, or blocks of frames of the only one."""
-    tests, entries = observations.present.shape
+    tests, columns = observations.present.shape
     frame = observations.frame_index
     for _ in range(resamples):
         if tests > 1:
-            yield np.repeat(rng.multinomial(tests, np.full(tests, 1.0 / tests))[:, None], entries, axis=1).astype(float)
+            yield np.repeat(rng.multinomial(tests, np.full(tests, 1.0 / tests))[:, None], columns, axis=1).astype(float)
         else:
             yield _block_counts(int(frame.max()) + 1, rng)[frame]
 
