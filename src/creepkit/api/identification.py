@@ -21,7 +21,7 @@ from creepkit.records import History, LawWithValues, Nuisance, Predictor, Units
 if TYPE_CHECKING:
     from creepkit.discovery.elastic_moduli import ModulusEstimates
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.search.cost_function import GlobalSearch
+    from creepkit.inverse.search.global_search import GlobalSearch
     from creepkit.inverse.selection import Ranking
     from creepkit.inverse.settings import OutputWeights
     from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets

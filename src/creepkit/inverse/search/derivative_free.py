@@ -24,7 +24,7 @@ from scipy.stats import qmc
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.cost_function import SearchResult, SearchTrace
+from creepkit.inverse.search.global_search import SearchResult, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.term_mask import (
     CONVERGED_DECREASE,

@@ -14,7 +14,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, nearest
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.cost_function import SearchResult, SearchTrace
+from creepkit.inverse.search.global_search import SearchResult, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 from creepkit.language import CreepLaw
 

@@ -16,7 +16,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import StartingEstimate, identify
-from creepkit.inverse.search.cost_function import GlobalSearch, SearchTrace
+from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 from creepkit.inverse.search.multistart import distinct
 from creepkit.inverse.settings import IdentificationSettings
