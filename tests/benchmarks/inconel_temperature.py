@@ -160,7 +160,8 @@ def table(how: str, found: dict[str, tuple[Identification, CrossValidation]], te
         kept = replace(held, folds=tuple(f for f in held.folds if not f.held_out[0].name.endswith("12")))
         own = [errors["amplitude"].relative_squared_error for errors in held.errors.values()]
         print(
-            f"| {name} | {len(fit.law.params)} | {-2 * fit.log_likelihood:.1f} | {fit.errors['amplitude'].relative_squared_error:.2g} | "
+            f"| {name} | {len(fit.law.params)} | {-2 * fit.log_likelihood:.1f} | "
+            f"{fit.errors['amplitude'].relative_squared_error:.2g} | "
             f"{held.pooled_error('amplitude'):.3g} | {kept.pooled_error('amplitude'):.3g} | "
             f"{np.median(own):.2g} | " + " | ".join(f"{v:.2g}" for v in own) + " |",
             flush=True,

@@ -29,15 +29,15 @@ BLOCK_FRAMES = 6
 
 
 ZERO_WEIGHT = 1e-12
-"""Weight of what was not drawn."""
+"""Weight of observations that were not drawn."""
 
 
 @dataclass(frozen=True)
 class SelectionFrequencies:
     """How often each term, and each set of terms, was kept.
 
-    drawn : "tests" or "blocks of frames"; repeats : number of draws; counts : {term: times kept}; sets : {terms: times
-    that they, and no others, were kept}, the most frequent first.
+    unit : "tests" or "blocks of frames"; resamples : number of draws; term_counts : {term: times kept};
+    set_counts : {terms: times that they, and no others, were kept}, the most frequent first.
     """
 
     unit: str
@@ -76,12 +76,12 @@ def selection_frequencies(
     seed: int = 0,
     progress: IterationCallback | None = None,
 ) -> SelectionFrequencies:
-    """Choose again for each draw, from the optima on all data; strength : that of all data, which stays.
+    """Term selection for each resample, from the optima on all data, with the strength of all data.
 
-    optimum : x of the penalised fit on all data.
+    optimum : (unknowns,) x of the penalised fit on all data.
     """
     if resamples < 1:
-        raise FitError(f"repeats is {resamples}; at least one draw is needed")
+        raise FitError(f"resamples is {resamples}; at least one draw is needed")
     problem, selections = reductions.problem, []
     for k, weights in enumerate(
         bootstrap_weights(problem.problem.observations, resamples, np.random.default_rng(seed))
@@ -114,7 +114,7 @@ def bootstrap_weights(observations: ObservationVector, resamples: int, rng: np.r
 
 
 def _block_counts(frames: int, rng: np.random.Generator) -> Floats:
-    """(frames,) how often each frame was drawn, in blocks that go round the end, so that all are alike."""
+    """(frames,) how often each frame was drawn, in blocks that wrap around the end."""
     length = min(BLOCK_FRAMES, max(frames // 2, 1))
     counts = np.zeros(frames)
     for start in rng.integers(frames, size=-(-frames // length)):
