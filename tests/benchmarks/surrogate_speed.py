@@ -139,7 +139,12 @@ def wall_times(name: str, count: int, file: str | None) -> list[str]:
     theta, factors = kernel.to_internal(many), surrogate.recipe.factors
     spent = in_turns(
         (lambda: predict(surrogate, law, many, [TEST]), 1),
-        (lambda: simulate_trajectories(Bulge(), kernel, theta, [TEST], factors=factors, threads=cores), 1),
+        (
+            lambda: simulate_trajectories(
+                Bulge(), kernel, theta, [TEST], options=TrajectoryOptions(factors=factors, threads=cores)
+            ),
+            1,
+        ),
         (gru(count, 49, cores), 1),
         (gru(count, TEST.times.size, cores), 1),
         clock=time.perf_counter,

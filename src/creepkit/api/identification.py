@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from creepkit.discovery.temperature_law import TemperatureLaw
     from creepkit.inverse.confirmation import Confirmation
     from creepkit.inverse.identification import Identification
-    from creepkit.inverse.search.cost_function import GlobalSearch
+    from creepkit.inverse.search.global_search import GlobalSearch
     from creepkit.inverse.selection import Ranking
     from creepkit.inverse.settings import IdentificationSettings, OutputWeights
     from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from creepkit.inverse.search.cost_function import GlobalSearch
+    from creepkit.inverse.search.global_search import GlobalSearch
     from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
 
 

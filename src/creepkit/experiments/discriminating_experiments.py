@@ -317,7 +317,7 @@ def _candidates_given(
 def _expected_chi_squares(
     discrimination: ModelDiscrimination, current_chi_square: float
 ) -> tuple[DiscriminatingExperiment, ...]:
-    """Every candidate with its chi-square, by one step or, of the most promising, in full; never below the current one."""
+    """Every candidate with its chi-square, by one step or, of the most promising, in full; at least the current one."""
     chi_squares = [discrimination.linearised_chi_square([k]) for k in range(len(discrimination.candidates))]
     for k in np.argsort(chi_squares)[::-1][:FULL_REFITS]:
         chi_squares[k] = discrimination.refitted_chi_square([int(k)])

@@ -1,4 +1,4 @@
-"""Goodness of fit: errors of every output, of every test and of all tests, and predicted rupture times beside measured."""
+"""Goodness of fit: errors of every output, of every test and of all tests, and of predicted rupture times."""
 
 from __future__ import annotations
 
@@ -56,8 +56,9 @@ class OutputErrors:
     """Errors of one output, of one test or of all.
 
     frames : how many were compared. relative_squared_error : about the mean of just these frames.
-    mean_squared_error, mean_absolute_error : in the output's unit (squared). relative_rms_error : rms error over the rms
-    of what was measured. chi_square : mean of (error / noise)^2, the reduced chi-square; one would be noise alone.
+    mean_squared_error, mean_absolute_error : in the output's unit (squared).
+    relative_rms_error : rms error over the rms of what was measured.
+    chi_square : mean of (error / noise)^2, the reduced chi-square; noise alone gives one.
     NaN where a frame was not predicted.
     """
 

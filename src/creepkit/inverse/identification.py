@@ -28,7 +28,7 @@ from creepkit.records import SIMULATED_NUISANCES, History, Nuisance, Prediction,
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from creepkit.inverse.search.cost_function import SearchTrace
+    from creepkit.inverse.search.global_search import SearchTrace
     from creepkit.inverse.sparsity.result import Sparsity
     from creepkit.inverse.uncertainty.quantities import DerivedQuantity
     from creepkit.inverse.variance_components import LinearisedProblem

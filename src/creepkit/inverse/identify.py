@@ -41,7 +41,7 @@ from creepkit.inverse.noise_model import (
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate, NuisanceParameters
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
-from creepkit.inverse.search.cost_function import GlobalSearch, SearchTrace
+from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.multistart import EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS, MultiStart, distinct
 from creepkit.inverse.settings import IdentificationSettings

@@ -175,8 +175,8 @@ def _with_estimated_priors(
 def _with_prior_sd(nuisance_parameters: NuisanceParameters, normal_matrix: Floats, x: Floats) -> NuisanceParameters:
     """Expectation and maximisation in turn, on the problem made linear at its optimum x.
 
-    At the optimum the gradient of the data is that of the prior, P (x - mean); with another P the linear problem moves x
-    to where both agree again.
+    At the optimum the gradient of the data is that of the prior, P (x - mean); with another P the linear problem moves
+    x to where both agree again.
     """
     count = nuisance_parameters.size
     prior_force = np.zeros(x.size)

@@ -14,16 +14,19 @@ from creepkit.records import Nuisance
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Predicted minus measured, for each test the entries of its outputs end to end (see inverse.entries).
+    """Residuals of the observation vector (see inverse.observation_vector), with what their covariance depends on.
 
-    values, slopes : (tests, entries) residual, and dg/dy at the prediction (what one unit of offset changes).
-    present : (tests, entries) which entries are data; the others are zero.
-    clock : (tests, entries) that in which what the law cannot follow wanders (see Entries.clock).
-    jacobian : (tests, entries, unknowns) with respect to x = (u, e), or None.
-    rate_effect : (tests, entries) derivative with respect to ln of a factor on this test's creep rate.
-    output : (tests, entries) position of the entry's output; loudness : its noise over that of its output.
-    trust : (tests,) weight of each test; the covariance of a test is divided by it.
-    known : (tests, entries, nuisances) what one standard deviation of further random effects does, or None.
+    values : (tests, observations) -, transformed prediction less transformed observation.
+    transform_derivatives : (tests, observations) 1 / unit, effect of one unit of offset.
+    present : (tests, observations) which are data; the others are zero.
+    correlation_time : (tests, observations) -, in which drifts decay (see ObservationVector.correlation_time).
+    jacobian : (tests, observations, unknowns) derivatives to x = (u, e), or None.
+    log_rate_sensitivity : (tests, observations) -, derivative to ln of a factor on the creep rate of the test.
+    output_index : (tests, observations) position of the output; relative_noise : (tests, observations) -, noise over
+        the typical noise of that output.
+    test_weights : (tests,) -; the covariance of a test is divided by it.
+    random_effect_sensitivities : (tests, observations, effects) -, effect of one standard deviation of further random
+        effects, or None.
     """
 
     values: Floats
@@ -43,7 +46,7 @@ class Residuals:
 
 
 MINIMUM_TESTS = 3
-"""Below this many tests the scatter between them cannot be seen."""
+"""Below this many tests the scatter between them cannot be estimated."""
 
 
 ASSUMED_RATE_SD = 0.3
@@ -54,8 +57,8 @@ ASSUMED_RATE_SD = 0.3
 class OutputNoise:
     """Standard deviations of one output.
 
-    noise, offset : in the output's unit; misfit, drift : on its scale (ln strain; for a linear scale the spread of
-    what was measured is one); reach : on the clock of the output (see Entries.clock).
+    noise : of one frame, and offset : of a test, in the output's unit. misfit : independent error of a frame, and
+    drift : autocorrelated error, in the transformed output. correlation_length : of the drift, in correlation time.
     """
 
     noise: float
@@ -67,9 +70,9 @@ class OutputNoise:
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Standard deviations of the sources of scatter: scatter["strain"].offset, scatter.rate.
+    """Standard deviations of the sources of scatter, such as noise_model["strain"].offset and noise_model.rate.
 
-    outputs : of each output, in the order of the entries; rate : of ln rate between tests.
+    outputs : of each output, in the order of the observations; rate : of ln rate between tests.
     """
 
     outputs: Mapping[str, OutputNoise]
@@ -79,16 +82,16 @@ class NoiseModel:
         return self.outputs[output]
 
     def per_observation(self, output_index: Ints, component: str) -> Floats:
-        """One size at each entry, (tests, entries), from the positions of the entries' outputs."""
+        """(tests, observations) one component at each observation; output_index : (tests, observations)."""
         return np.asarray(np.array([getattr(s, component) for s in self.outputs.values()])[output_index])
 
     def with_output(self, output: str, **components: float) -> NoiseModel:
-        """The same with other sizes of one output."""
+        """The same with other components of one output."""
         return replace(self, outputs={**self.outputs, output: replace(self.outputs[output], **components)})
 
 
 def initial_working_noise(observations: ObservationVector, nuisances: Sequence[Nuisance]) -> NoiseModel:
-    """Working scatter assumed before anything was fitted: frames wrong by a third, offsets of the scale's floor."""
+    """Working noise before anything was fitted: a misfit of 0.3, offsets of the floor of the transform."""
     by_output = {}
     for name, transform, noise in zip(observations.outputs, observations.transforms, observations.noise, strict=True):
         offset = initial_sd(nuisances, "offset", transform.floor, name)
@@ -97,7 +100,7 @@ def initial_working_noise(observations: ObservationVector, nuisances: Sequence[N
 
 
 def initial_noise_model(working: NoiseModel, nuisances: Sequence[Nuisance]) -> NoiseModel:
-    """Where the estimate of the whole scatter begins; a test's one rupture cannot drift."""
+    """The noise model from which its estimate begins; the one rupture time of a test cannot drift."""
     outputs = {
         name: s
         if name == RUPTURE_OUTPUT
@@ -108,7 +111,7 @@ def initial_noise_model(working: NoiseModel, nuisances: Sequence[Nuisance]) -> N
 
 
 def initial_sd(nuisances: Sequence[Nuisance], kind: str, default: float, output: str = "") -> float:
-    """Zero unless the nuisance is there for this output; its prior if it has one."""
+    """Initial standard deviation of a nuisance: its prior, by default `default`; 0 where there is no such nuisance."""
     standard_deviations = [
         default if n.sd is None else n.sd for n in nuisances if n.kind == kind and n.output in ("", output)
     ]
@@ -116,7 +119,7 @@ def initial_sd(nuisances: Sequence[Nuisance], kind: str, default: float, output:
 
 
 def fixed_components(nuisances: Sequence[Nuisance], outputs: Sequence[str]) -> set[tuple[str, str]]:
-    """Those (output, source) whose size a nuisance states; the rate belongs to the output ""."""
+    """Those (output, component) that a nuisance states; the rate belongs to the output ""."""
     fixed: set[tuple[str, str]] = {("", "rate") for n in nuisances if n.kind == "rate" and n.sd is not None}
     for output in outputs:
         offset_nuisances = [n for n in nuisances if n.kind == "offset" and n.output in ("", output)]
@@ -129,7 +132,7 @@ _JITTER = 1e-10
 
 
 def covariance(residuals: Residuals, noise_model: NoiseModel) -> Floats:
-    """(tests, entries, entries); absent entries have unit variance and no company."""
+    """(tests, observations, observations) -; absent observations have unit variance and no correlation."""
     s, d, present, output = (
         residuals.transform_derivatives,
         residuals.log_rate_sensitivity,
@@ -157,18 +160,18 @@ def covariance(residuals: Residuals, noise_model: NoiseModel) -> Floats:
 
 
 def time_lags(residuals: Residuals) -> Floats:
-    """(tests, entries, entries) distances on the clock."""
+    """(tests, observations, observations) differences of correlation time."""
     t = residuals.correlation_time
     return np.abs(t[:, :, None] - t[:, None, :])
 
 
 def same_output(residuals: Residuals) -> Bools:
-    """(tests, entries, entries) whether two entries are of one output."""
+    """(tests, observations, observations) whether two observations are of one output."""
     return np.asarray(residuals.output_index[:, :, None] == residuals.output_index[:, None, :])
 
 
 def cholesky_factors(residuals: Residuals, noise_model: NoiseModel) -> Floats:
-    """Lower Cholesky factors L of the covariance, (tests, entries, entries); L^-1 r is white."""
+    """Lower Cholesky factors L of the covariance, (tests, observations, observations); L^-1 r is white."""
     return np.asarray(np.linalg.cholesky(covariance(residuals, noise_model)))
 
 
@@ -184,7 +187,7 @@ def whiten(covariance_factor: Floats, values: Floats) -> Floats:
 
 
 def log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:
-    """Gaussian log-likelihood of the residuals given the scatter."""
+    """Gaussian log-likelihood of the residuals under a noise model."""
     covariance_factor = cholesky_factors(residuals, noise_model)
     whitened = whiten(covariance_factor, residuals.values)
     k = np.arange(covariance_factor.shape[1])
@@ -194,7 +197,7 @@ def log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:
 
 
 def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> tuple[Floats, Floats]:
-    """Best linear prediction of each test's own offsets, (tests, outputs), and ln rate factor, (tests,)."""
+    """Best linear prediction of each test's offsets, (tests, outputs) in their units, and ln rate factor, (tests,)."""
     unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
     weighted = np.linalg.solve(covariance(unweighted, noise_model), -residuals.values[..., None])[..., 0]
     weighted_sensitivity = residuals.transform_derivatives * weighted
@@ -220,4 +223,4 @@ def effective_sample_size(residuals: Residuals, noise_model: NoiseModel) -> floa
 
 
 NEGLIGIBLE_DRIFT = 1e-3
-"""A drift below this, on its scale, is none."""
+"""A drift below this, in transformed outputs, is none."""

@@ -69,7 +69,8 @@ class NuisanceParameters:
             )
             if nuisance.sd is None and len(distinct_owners) < 2:
                 raise FitError(
-                    f"nuisance '{nuisance.kind}': a standard deviation cannot be estimated from a single value; give its sd="
+                    f"nuisance '{nuisance.kind}': a standard deviation cannot be estimated from a single value; "
+                    "give its sd="
                 )
             parameters += [(nuisance, member) for member in distinct_owners]
         nuisance_of_parameter, by_name = [n for n, _ in parameters], {h.name: h for h in histories}
@@ -123,7 +124,7 @@ class NuisanceParameters:
         return replace(residuals, values=values, random_effect_sensitivities=sensitivities * self.sd[test_parameters])
 
     def with_prior_sd(self, e: Floats, variance: Floats) -> NuisanceParameters:
-        """With standard deviations estimated where none is given: mean of (e - mean)^2 and variance, (nuisances,) each."""
+        """With standard deviations estimated where none is given, from e and its variance, (nuisances,) each."""
         sd = self.sd.copy()
         for nuisance in dict.fromkeys(self.nuisances):
             if nuisance.sd is None:

@@ -246,7 +246,7 @@ class ObservationVector:
 
     @property
     def correlation_time(self) -> Floats:
-        """(tests, observations) -, ln t where the transform is logarithmic, else 5 t / last time: drifts decay in it."""
+        """(tests, observations) -, ln t where the transform is logarithmic, else 5 t / last time."""
         last_times = np.where(self.present, self.times, 0.0).max(axis=1, keepdims=True)
         logarithmic = (
             self.per_observation([float(name in (*LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT)) for name in self.outputs]) > 0

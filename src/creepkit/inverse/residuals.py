@@ -1,7 +1,7 @@
 """Residuals: transformed predictions less transformed observations of all tests, with their derivatives.
 
-After a predicted rupture the transformed output grows on with ln of time over rupture time, so that residuals are finite
-and their derivatives lead back to values at which the specimen lasts.
+After a predicted rupture the transformed output grows on with ln of time over rupture time, so that residuals are
+finite and their derivatives lead back to values at which the specimen lasts.
 """
 
 from __future__ import annotations

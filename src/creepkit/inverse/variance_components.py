@@ -13,15 +13,16 @@ from creepkit.inverse.noise_model import NoiseModel, Residuals, covariance, fixe
 from creepkit.records import Nuisance
 
 BOUND_TOLERANCE = 1e-6
-"""Of the width of the bounds: nearer than this an unknown stays where it is."""
+"""Of the width of the bounds: an unknown nearer to its bound than this is fixed there."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearisedProblem:
     """A problem made linear where its residuals were taken.
 
-    residuals : with their Jacobian to all unknowns; precision, distance : (unknowns,) of the priors, and from their
-        means; free : which unknowns may move (those at their bounds may not); room : (2, unknowns) how far, down, up.
+    residuals : with their derivatives to all unknowns. precision, prior_residual : (unknowns,) of the priors, and the
+    distance from their means. free : (unknowns,) which are not at their bounds. step_bounds : (2, unknowns) least and
+    largest step within the bounds.
     """
 
     residuals: Residuals
@@ -32,12 +33,12 @@ class LinearisedProblem:
 
     @property
     def jacobian(self) -> Floats:
-        """(tests, entries, free unknowns)."""
+        """(tests, observations, free unknowns) derivatives of the residuals."""
         assert self.residuals.jacobian is not None
         return self.residuals.jacobian[..., self.free]
 
     def solve(self, inverses: Floats) -> LinearSolution:
-        """The optimum under covariances of given inverses, (tests, entries, entries)."""
+        """The optimum under covariances of given inverses, (tests, observations, observations)."""
         J, p = self.jacobian, self.precision[self.free]
         weighted_jacobian = inverses @ J
         normal_matrix = np.einsum("tep,teq->pq", J, weighted_jacobian) + np.diag(p)
@@ -75,7 +76,7 @@ class LinearSolution:
 
 
 def inverse_covariances(residuals: Residuals, noise_model: NoiseModel) -> tuple[Floats, float]:
-    """C^-1 of every test, (tests, entries, entries), and ln|C| over all of them.
+    """C^-1 of every test, (tests, observations, observations), and ln|C| over all of them.
 
     Outputs that share nothing are inverted one by one.
     """
@@ -109,17 +110,16 @@ def scaled_inverse(matrix: Floats) -> Floats:
 
 
 LONGEST_CORRELATION = 3.0
-"""Longest reach of the drift on its clock, a factor 20 in time or .6 of a test: what lasts longer is scatter of the
-rate."""
+"""Longest correlation of the drift, a factor 20 in time or 0.6 of a test: what lasts longer is scatter of the rate."""
 
 
 SMALLEST_NOISE_RATIO, LARGEST_NOISE_RATIO = 0.1, 30.0
-"""Of the noise that was stated or read off neighbouring frames: where an estimate of it may go."""
+"""Of the noise that was stated or estimated from neighbouring frames: where an estimate of it may go."""
 
 
 OVERSHOOT = float(np.log(30.0))
-"""A source that falls by more than this may have been overshot, to where the likelihood no longer feels it: from half
-way the search is made again."""
+"""Decrease of the logarithm of a component that may have overshot to where the likelihood hardly depends on it: the
+search is repeated from half way."""
 
 
 COMPONENTS = ("noise", "misfit", "offset", "drift", "correlation_length")
@@ -133,10 +133,10 @@ def estimate_variance_components(
     fixed: Sequence[str] = ("noise",),
     linearised: LinearisedProblem | None = None,
 ) -> NoiseModel:
-    """The scatter of largest likelihood, beginning from `start`.
+    """The noise model of largest likelihood, beginning from `start`.
 
-    Sources at zero, named in `fixed` or with a given prior stay; the noise, which was measured, unless told otherwise.
-    linear : with it the likelihood is the restricted one, values of the law integrated out.
+    Components at zero, named in `fixed` or with a given prior stay; by default the noise, which was measured.
+    linearised : with it the likelihood is the restricted one, parameters of the law integrated out.
     """
     fixed_by_prior = fixed_components(nuisances, list(start.outputs))
     free = [
@@ -174,7 +174,7 @@ def _minimised(likelihood: _Likelihood, x0: Floats, bounds: Sequence[tuple[float
 
 
 class _Likelihood:
-    """-ln L, but for a constant, as a function of the logarithms of some sizes."""
+    """-ln L, but for a constant, as a function of the logarithms of some components."""
 
     def __init__(
         self,
@@ -189,7 +189,7 @@ class _Likelihood:
         self.same_output = same_output(residuals) & present
 
     def noise_model(self, x: Floats) -> NoiseModel:
-        """The scatter with these logarithms of the free sizes."""
+        """The noise model with these logarithms of the free components, (components,)."""
         noise_model = self.start
         for (output, name), value in zip(self.free, np.exp(x), strict=True):
             noise_model = (
@@ -205,7 +205,7 @@ class _Likelihood:
         return value, np.array([self._derivative(projected, noise_model, output, name) for output, name in self.free])
 
     def gradient(self, x: Floats) -> tuple[float, Floats, NoiseModel]:
-        """-ln L, G of every test, and the scatter."""
+        """-ln L, G of every test (tests, observations, observations), and the noise model."""
         r, noise_model = self.residuals, self.noise_model(x)
         inverse, log_det = inverse_covariances(r, noise_model)
         if self.linear is None:
@@ -252,7 +252,7 @@ def _component(noise_model: NoiseModel, output: str, name: str) -> float:
 
 
 def _bounds(residuals: Residuals, noise_model: NoiseModel, output: str, name: str) -> tuple[float, float]:
-    """Logarithms of what a size may be: an offset up to the typical output itself."""
+    """Bounds of the logarithm of a component: an offset up to the typical output itself."""
     if name == "correlation_length":
         return float(np.log(0.05)), float(np.log(LONGEST_CORRELATION))
     if name == "noise":

@@ -36,12 +36,12 @@ STUDENT_FREEDOM = 4.0
 
 
 SMALLEST_NOISE = 1e-2
-"""Noise of a likelihood at least, over the floor of the output's scale: simulated histories have none of their own."""
+"""Least noise of a likelihood, over the floor of the output's transform: simulated histories have none of their own."""
 
 
 DRIFT_CONFIDENCE = 0.95
 """Residuals are autocorrelated where the likelihood gains more by it than by chance in so many cases; each output that
-drifts has two sizes more, how far and for how long."""
+drifts has two components more, drift and correlation length."""
 
 
 INITIAL_RUPTURE_SD = 0.3
@@ -49,11 +49,11 @@ INITIAL_RUPTURE_SD = 0.3
 
 
 SMALLEST_WEIGHT = 1e-6
-"""Share of the pull that an output keeps which the weights do not name."""
+"""Relative weight of an output that the weights do not name."""
 
 
 class WorkingNoise:
-    """How the working scatter follows from settings: by likelihood, or by the weights of outputs."""
+    """How the working noise follows from the settings: by likelihood, or by the weights of outputs."""
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class WorkingNoise:
             self.relative_sd = _relative_standard_deviations(settings.weights, observations)
 
     def initial(self) -> NoiseModel:
-        """The working scatter before anything was fitted."""
+        """The working noise before anything was fitted."""
         start = initial_working_noise(self.observations, self.settings.nuisances)
         return (
             start
@@ -84,7 +84,7 @@ class WorkingNoise:
     def estimate(
         self, residuals: Residuals, previous: NoiseModel, linearised: LinearisedProblem | None = None
     ) -> NoiseModel:
-        """The working scatter, given residuals; for a likelihood also made linear."""
+        """The working noise, given residuals; for a likelihood also the problem made linear."""
         nuisances = self.settings.nuisances
         if self.by_likelihood:
             assert linearised is not None
@@ -103,7 +103,7 @@ class WorkingNoise:
         return estimate_variance_components(residuals, scaled, nuisances, fixed=("misfit",))
 
     def starting_noise(self, tests: int) -> NoiseModel:
-        """Where the alternation begins: the guess, or for a likelihood all sources of scatter at a tenth."""
+        """Where the iteration begins: the guess, or for a likelihood all sources of scatter at a tenth."""
         if not self.by_likelihood:
             return self.initial()
         nuisances, by_output = self.settings.nuisances, {}
@@ -118,7 +118,7 @@ class WorkingNoise:
         return NoiseModel(by_output, initial_sd(rate_nuisances, "rate", ASSUMED_RATE_SD))
 
     def _by_restricted_likelihood(self, linearised: LinearisedProblem, previous: NoiseModel) -> NoiseModel:
-        """The scatter of largest restricted likelihood; drift only where the residuals ask for it.
+        """The noise model of largest restricted likelihood; with drift only where that is significantly more likely.
 
         A drift is a variance at the edge of what it may be: estimated always, it is above zero half of the time where
         there is none, and widens every interval.
@@ -147,7 +147,7 @@ class WorkingNoise:
         return noise_model
 
     def fixed_components(self, noise_model: NoiseModel) -> set[tuple[str, str]]:
-        """Those (output, source) that were not asked of the data: drifts that are the predictor's error and no more."""
+        """Those (output, component) that were not estimated: drifts that are the predictor's error and no more."""
         outputs = [
             n
             for n, error in self._transformed_predictor_errors().items()
@@ -185,7 +185,7 @@ class WorkingNoise:
         return noise_model
 
     def with_measured_noise(self, working: NoiseModel) -> NoiseModel:
-        """The scatter from which the whole covariance is estimated: with the noise that was measured."""
+        """The noise model from which the whole covariance is estimated: with the noise that was measured."""
         initial = initial_working_noise(self.observations, self.settings.nuisances)
         for name, sizes in initial.outputs.items():
             working = working.with_output(name, noise=sizes.noise)
@@ -195,7 +195,7 @@ class WorkingNoise:
 
 
 def with_rupture_weight(working: NoiseModel, observations: ObservationVector) -> NoiseModel:
-    """The working scatter with which values are found: a test's one rupture pulls as hard as its whole curve.
+    """The working noise with which values are found: the one rupture time of a test weighs as much as its whole curve.
 
     Frames that follow one another say the same thing many times; a rupture time says it once.
     """
@@ -208,7 +208,7 @@ def with_rupture_weight(working: NoiseModel, observations: ObservationVector) ->
 
 
 def _relative_standard_deviations(weights: Mapping[str, float], observations: ObservationVector) -> dict[str, float]:
-    """{output: standard deviation} of independent entries, whose weighted squares are then weight x relative error."""
+    """{output: standard deviation} of independent residuals; squares add up to weight x relative squared error."""
     unknown = [name for name in weights if name not in observations.outputs]
     if unknown:
         raise FitError(f"weights name '{unknown[0]}', which is not among the outputs {', '.join(observations.outputs)}")

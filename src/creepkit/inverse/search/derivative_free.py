@@ -24,7 +24,7 @@ from scipy.stats import qmc
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.cost_function import SearchResult, SearchTrace
+from creepkit.inverse.search.global_search import SearchResult, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.term_mask import (
     CONVERGED_DECREASE,
@@ -65,8 +65,8 @@ class CmaEs:
         check_whole_numbers("CMA-ES", {name: getattr(self, name) for name in minimum_values}, minimum_values)
         if not 0 < self.initial_step_size <= 1:
             raise FitError(
-                f"CMA-ES: initial_step_size is {self.initial_step_size:g} of the width of the bounds; allowed are 0 (not "
-                "itself) to 1"
+                f"CMA-ES: initial_step_size is {self.initial_step_size:g} of the width of the bounds; allowed are "
+                "0 (not itself) to 1"
             )
 
     def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
@@ -187,8 +187,8 @@ class ParticleSwarm:
             raise FitError(f"particle swarm: inertia is {self.inertia}; both are from 0 to 1")
         if min(self.cognitive, self.social) < 0 or (self.form == "constriction" and self.cognitive + self.social <= 4):
             raise FitError(
-                f"particle swarm: cognitive and social are {self.cognitive:g} and {self.social:g}; they must not be below "
-                "zero and, with form='constriction', must be more than 4 together"
+                f"particle swarm: cognitive and social are {self.cognitive:g} and {self.social:g}; they must not be "
+                "below zero and, with form='constriction', must be more than 4 together"
             )
 
     def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
@@ -205,7 +205,7 @@ class ParticleSwarm:
         return refine_candidates(problem, swarm.candidates(), self.refined_candidates, trace, progress)
 
     def next_velocity(self, velocity: Floats, attraction: Floats, iteration: int) -> Floats:
-        """(particles, parameters) velocity after an iteration, from the one before and the attraction, within its limit."""
+        """(particles, parameters) velocity after an iteration, from the one before and the attraction."""
         if self.form == "constriction":
             acceleration = self.cognitive + self.social
             updated = (
@@ -275,7 +275,7 @@ class _Swarm:
         self._apply_boundary(self.x + self.velocity)
 
     def _leaders(self) -> tuple[Floats, Bools]:
-        """Positions and masks that attract each particle: the best of its subset, or of all if it is the first there."""
+        """Positions and masks that attract each particle: the best of its subset, or of all."""
         k = int(self.best_cost.argmin())
         if not self.term_mask.terms:
             return self.best_position[k], self.best_masks[k]

@@ -38,7 +38,9 @@ def batched_levenberg_marquardt(
     progress: IterationCallback | None = None,
     costs: list[Floats] | None = None,
 ) -> list[Minimum]:
-    """The minima that the starts lead to, best first; starts : (parameters,) each; costs : receives (starts,) costs after each step.
+    """The minima that the starts lead to, best first.
+
+    starts : (parameters,) each; costs : receives the costs of all starts, (starts,), after each step.
 
     The cost of laws with damage has kinks, at which projected steps come to rest: laws with internal variables,
     and tests that are followed to rupture, are refined one by one in a trust region.

@@ -17,7 +17,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.bounds import LOG_RATE_BOUNDS, Bounds
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.residuals import median_log_rate_excess, median_log_rupture_excess
-from creepkit.inverse.search.cost_function import SearchResult, SearchTrace
+from creepkit.inverse.search.global_search import SearchResult, SearchTrace
 from creepkit.inverse.search.levenberg_marquardt import batched_levenberg_marquardt
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 

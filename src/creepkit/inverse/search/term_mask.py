@@ -14,7 +14,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, nearest
 from creepkit.inverse.problem import LeastSquaresProblem
-from creepkit.inverse.search.cost_function import SearchResult, SearchTrace
+from creepkit.inverse.search.global_search import SearchResult, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 from creepkit.language import CreepLaw
 
@@ -62,7 +62,7 @@ class TermMask:
         return cls(terms, first_rates, own, resting, len(terms) < len(law.terms))
 
     def applied(self, u: Floats, masks: Bools) -> Floats:
-        """(..., parameters) u with the coordinates of terms that are off at their resting values; masks : (..., terms)."""
+        """(..., parameters) u with coordinates of terms that are off at their resting values."""
         return np.where(self.active_parameters(masks), u, self.resting_values)
 
     def active_parameters(self, masks: Bools) -> Bools:
@@ -74,7 +74,7 @@ class TermMask:
         return {int(k): float(self.resting_values[k]) for k in np.flatnonzero(~self.active_parameters(mask))}
 
     def terms_off(self, u: Floats) -> tuple[str, ...]:
-        """The terms that are off at u (parameters,): switched off, or at the lower bound of their rate, which is the same."""
+        """The terms that are off at u (parameters,): switched off, or at the lower bound of their rate."""
         is_at_lower_bound = u[self.rate_positions] <= self.resting_values[self.rate_positions] + OFF_MARGIN
         return tuple(term for term, is_off in zip(self.terms, is_at_lower_bound, strict=True) if is_off)
 

@@ -30,15 +30,15 @@ BLOCK_FRAMES = 6
 
 
 ZERO_WEIGHT = 1e-12
-"""Weight of what was not drawn."""
+"""Weight of observations that were not drawn."""
 
 
 @dataclass(frozen=True)
 class SelectionFrequencies(Presentable):
     """How often each term, and each set of terms, was kept.
 
-    drawn : "tests" or "blocks of frames"; repeats : number of draws; counts : {term: times kept}; sets : {terms: times
-    that they, and no others, were kept}, the most frequent first.
+    unit : "tests" or "blocks of frames"; resamples : number of draws; term_counts : {term: times kept};
+    set_counts : {terms: times that they, and no others, were kept}, the most frequent first.
     """
 
     unit: str
@@ -68,12 +68,12 @@ def selection_frequencies(
     seed: int = 0,
     progress: IterationCallback | None = None,
 ) -> SelectionFrequencies:
-    """Choose again for each draw, from the optima on all data; strength : that of all data, which stays.
+    """Term selection for each resample, from the optima on all data, with the strength of all data.
 
-    optimum : x of the penalised fit on all data.
+    optimum : (unknowns,) x of the penalised fit on all data.
     """
     if resamples < 1:
-        raise FitError(f"repeats is {resamples}; at least one draw is needed")
+        raise FitError(f"resamples is {resamples}; at least one draw is needed")
     problem, selections = reductions.problem, []
     for k, weights in enumerate(
         bootstrap_weights(problem.problem.observations, resamples, np.random.default_rng(seed))
@@ -96,17 +96,17 @@ def with_weights(problem: TermProblem, weights: Floats) -> TermProblem:
 
 def bootstrap_weights(observations: ObservationVector, resamples: int, rng: np.random.Generator) -> Iterator[Floats]:
     """(tests, observations) how often each was drawn: whole tests, or blocks of frames of the only one."""
-    tests, entries = observations.present.shape
+    tests, columns = observations.present.shape
     frame = observations.frame_index
     for _ in range(resamples):
         if tests > 1:
-            yield np.repeat(rng.multinomial(tests, np.full(tests, 1.0 / tests))[:, None], entries, axis=1).astype(float)
+            yield np.repeat(rng.multinomial(tests, np.full(tests, 1.0 / tests))[:, None], columns, axis=1).astype(float)
         else:
             yield _block_counts(int(frame.max()) + 1, rng)[frame]
 
 
 def _block_counts(frames: int, rng: np.random.Generator) -> Floats:
-    """(frames,) how often each frame was drawn, in blocks that go round the end, so that all are alike."""
+    """(frames,) how often each frame was drawn, in blocks that wrap around the end."""
     length = min(BLOCK_FRAMES, max(frames // 2, 1))
     counts = np.zeros(frames)
     for start in rng.integers(frames, size=-(-frames // length)):

@@ -28,11 +28,11 @@ STRESS_FACTORS = (0.5, 0.8, 1.0, 1.3)
 
 
 TIMES_PER_TEST = 16
-"""Times looked at in each test."""
+"""Times that are evaluated in each test."""
 
 
 MIN_STRAIN_FRACTION = 0.1
-"""Of steady growth to the end: below this a measured strain is noise, or was there before the first frame."""
+"""Of linear growth to the end strain: least strain at a time, as smaller ones are noise or loading strain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class EvaluationPoints:
 
     @classmethod
     def from_histories(cls, histories: Sequence[History], predictor: Predictor | None = None) -> EvaluationPoints:
-        """The points that histories visit; `using` may state reference stresses."""
+        """The evaluation points of histories; the predictor may state reference stresses."""
         points_by_test = [_points_of_test(h, predictor) for h in histories]
         loaded_tests = [p for p in points_by_test if p.shape[1]]
         if not loaded_tests:
@@ -89,7 +89,7 @@ def stress_history(history: History, predictor: Predictor | None, times: Floats)
 
 
 def strain_history(history: History, predictor: Predictor | None) -> Floats:
-    """(frames,) creep strain along the test, as far as its outputs tell; never falling, never zero."""
+    """(frames,) - creep strain of the test, estimated from its outputs; never decreasing, never zero."""
     times, final_strain = history.times, reference_end_strain(history, predictor)
     lower_limit = MIN_STRAIN_FRACTION * final_strain * times / times[-1]
     for output, scale in (("strain", 1.0), ("amplitude", AMPLITUDE_PER_STRAIN)):
@@ -109,13 +109,13 @@ DIFFERENCE_STEP = 1e-6
 
 
 LOG_ZERO_RATE = -1e30
-"""ln of a rate that is none."""
+"""ln of a rate of zero."""
 
 
 class TermContributions:
     """Contributions of terms as functions of conditioned coordinates u, for any sum of terms.
 
-    labels : names of the terms, in the order of the last axis of everything.
+    terms : names of the terms, in the order of the last axis of all arrays.
     """
 
     def __init__(self, law: CreepLaw, coordinates: Coordinates, points: EvaluationPoints) -> None:

@@ -1,8 +1,8 @@
 """Penalties on the contributions of terms, and a penalty as residuals for least squares.
 
-Contributions are fractions that add up to about one, whatever the law does. Therefore only a concave penalty is smallest
-where one term has it all. A penalty is added to half the chi-square, strength times its value: with strength s a change
-of its value by one costs as much as a chi-square that is 2 s worse.
+Contributions are fractions that add up to about one, whatever the law is. Therefore only a concave penalty is smallest
+where one term has them all. Strength times the penalty is added to half the chi-square: with strength s a change of its
+value by one costs as much as a chi-square that is larger by 2 s.
 
 Least squares sees a penalty through parabolas w c^2 + const that touch it (iteratively reweighted least squares). With
 weights updated at every point, half the sum of squares is the penalty and J'r its gradient; J'J is that of the
@@ -23,7 +23,7 @@ from creepkit.inverse.sparsity.contributions import TermContributions
 from creepkit.language import CreepLaw
 
 Strength: TypeAlias = float | Literal["auto"]
-"""A number, or chosen along the path from none to all (see path)."""
+"""A number, or chosen along the path from none to all (see term_selection.trace_path)."""
 
 
 DEFAULT_STRENGTH = 24.0

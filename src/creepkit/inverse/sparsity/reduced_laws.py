@@ -1,8 +1,8 @@
 """Laws of some terms of a sum, fitted to the same data with the same covariance.
 
-All laws are compared under the covariance of the sum fitted without penalty, so that chi-squares can be subtracted. That
-covariance contains the correlation between frames; each frame then counts as one in BIC. Exponents that can be off are,
-where BIC does not rise by it.
+All laws are compared under the covariance of the sum fitted without penalty, so that chi-squares can be subtracted.
+That covariance contains the correlation between frames; each frame then counts as one in BIC. Exponents that can be off
+are switched off where BIC does not rise by it.
 """
 
 from __future__ import annotations

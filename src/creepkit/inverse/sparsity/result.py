@@ -36,11 +36,11 @@ class Sparsity(Presentable):
     """How a sum was reduced; the terms are those of `law`, the sum.
 
     penalty : its class; strength : None of a choice among subsets, which has none.
-    kept, dropped : terms; off : exponents switched off, where BIC did not rise by it.
-    proposed : terms that the penalty left, before the reduced law was confirmed.
-    shares : contributions without penalty, with it, and after the refit of what was kept.
-    whole, reduced : misfits of the sum and of the reduced law on one covariance.
-    frames : measured values, N of BIC.
+    kept_terms, dropped_terms : of the sum; exponents_off : exponents switched off, where BIC did not rise by it.
+    proposed_terms : that the penalty left, before the reduced law was confirmed.
+    contributions_* : {term: contribution} without penalty, with it, and after the refit of what was kept.
+    full, reduced : statistics of the sum and of the reduced law under one covariance.
+    observations : measured values, N of BIC.
     path : over the strength, where that was chosen automatically (not saved).
     """
 
@@ -93,13 +93,14 @@ class Sparsity(Presentable):
         """What was dropped, what that cost, and whether it was too much, in one or two sentences."""
         dropped = _quoted_list([*self.dropped_terms, *(f"exponent {name}" for name in self.exponents_off)])
         cost = (
-            f"chi-square rises by {max(self.chi_square_rise, 0.0):.1f} for {self.parameters_dropped} parameters fewer (p = {self.p_value:.2g}) "
-            f"and BIC changes by {self.bic_difference:+.1f}"
+            f"chi-square rises by {max(self.chi_square_rise, 0.0):.1f} for {self.parameters_dropped} parameters fewer "
+            f"(p = {self.p_value:.2g}) and BIC changes by {self.bic_difference:+.1f}"
         )
         if not dropped:
             sentence = f"all terms of '{self.law}' are kept"
         else:
-            sentence = f"without {dropped} of '{self.law}' {cost}: {_quoted_list(self.kept_terms)} suffice{'s' * (len(self.kept_terms) == 1)}"
+            verb = "suffices" if len(self.kept_terms) == 1 else "suffice"
+            sentence = f"without {dropped} of '{self.law}' {cost}: {_quoted_list(self.kept_terms)} {verb}"
         if self.confirmed:
             return sentence
         restored = _quoted_list([term for term in self.kept_terms if term not in self.proposed_terms])
@@ -118,10 +119,10 @@ def _quoted_list(names: list[str] | TermNames) -> str:
 class PenaltyPath(Presentable):
     """One row for each strength, the first of which is 0.
 
-    penalty : its formula in a word; labels : the terms.
-    shares : (strengths, terms) contributions; chi_square : (strengths,) of the data, penalty apart.
-    kept : the terms that are left; criterion : (strengths,) BIC of these refitted, less the least of all.
-    x : (strengths, unknowns) where the penalised fits ended; chosen : the row of choice.
+    penalty : its class; terms : of the sum; strengths : (strengths,) -, half a chi-square.
+    contributions : (strengths, terms) -; chi_square : (strengths,) - of the data, penalty apart.
+    kept_terms : that are left; bic_excess : (strengths,) - BIC of these refitted, less the least of all.
+    x : (strengths, unknowns) where the penalised fits ended; chosen : the row that was chosen.
     """
 
     penalty: str

@@ -16,7 +16,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import StartingEstimate, identify
-from creepkit.inverse.search.cost_function import GlobalSearch, SearchTrace
+from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum
 from creepkit.inverse.search.multistart import distinct
 from creepkit.inverse.settings import IdentificationSettings
@@ -27,11 +27,11 @@ from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
 CONTINUED_STARTS, COMPLETED_STARTS = 5, 2
-"""Starts that are followed for some steps, and how many of them to the end."""
+"""Starts that are refined for some steps, and how many of them to the end."""
 
 
 PRELIMINARY_STEPS = 12
-"""Steps of least squares to see where a start leads."""
+"""Steps of the first refinement."""
 
 
 def penalised_starts(reductions: ReducedLaws) -> list[Floats]:
@@ -42,7 +42,7 @@ def penalised_starts(reductions: ReducedLaws) -> list[Floats]:
 
 
 def penalised_fit(problem: TermProblem, penalty: PenalisedTerms, starts: Sequence[Floats]) -> Minimum:
-    """The lowest minimum of misfit and penalty: the best starts are followed some steps, the best ends polished."""
+    """The lowest minimum of chi-square and penalty, from starts (unknowns,): first some steps, then to the end."""
     costs = [0.5 * problem.problem.chi_square(x) + float(penalty.values(x[None])[0]) for x in starts]
     order = sorted(range(len(starts)), key=lambda k: costs[k])[:CONTINUED_STARTS]
     preliminary = sorted((problem.minimise(starts[k], penalty, PRELIMINARY_STEPS) for k in order), key=lambda m: m.cost)
@@ -108,10 +108,10 @@ def _next_fit(
 
 @dataclass(frozen=True, eq=False)
 class TermChoice:
-    """What a penalty left over.
+    """The terms that a penalty keeps.
 
-    shares : contributions of all terms under the penalty; strength, path : None of a choice among subsets; trace : of
-        the global search, if there was one.
+    contributions : of all terms under the penalty; x : (unknowns,) there.
+    strength, path : None of a choice among subsets; trace : of the global search, if there was one.
     """
 
     kept_terms: TermNames
@@ -130,7 +130,7 @@ def choose_terms(
 ) -> TermChoice:
     """The terms that a penalty keeps.
 
-    search : where the penalised landscape is searched besides the usual starts; not for subsets, nor along a path.
+    search : a global search of the penalised cost besides the usual starts; not for subsets, nor along a path.
     """
     problem = reductions.problem
     if isinstance(penalty, Subsets):
@@ -172,7 +172,7 @@ def identify_sparse(
     settings: IdentificationSettings | None = None,
     progress: IterationCallback | None = None,
 ) -> Identification:
-    """Identify the law of those terms of a sum that the histories need; what was dropped stands in `sparsity`.
+    """Identify the law of those terms of a sum that the histories need; what was dropped is recorded in `sparsity`.
 
     The whole sum is identified without penalty first: it gives the covariance on which everything is compared. Then
     misfit and penalty together are minimised from its optimum, from each term's own, and where `search` finds minima;
@@ -192,7 +192,7 @@ def identify_reduced(
     search: GlobalSearch | None = None,
     progress: IterationCallback | None = None,
 ) -> Identification:
-    """The same from the whole sum, identified and opened before."""
+    """The same from the whole sum, identified before."""
     choice = choose_terms(reductions, penalty, search, progress)
     reduced = confirmed_law(reductions, choice)
     parameter_count = len(reduced.law.params)

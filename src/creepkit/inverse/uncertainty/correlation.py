@@ -1,7 +1,7 @@
-"""How estimates hang together, and what is not determined of them.
+"""Correlation of estimates, and what the tests do not determine.
 
 A and n of a power law are each known poorly and their combination, the rate in the middle of the tests, well: the
-correlation says so. In the author's parameters (ln of a coefficient) it is often beyond .99; in the conditioned
+correlation says so. In the author's parameters (ln of a coefficient) it is often beyond 0.99; in the conditioned
 coordinates (see inverse.coordinates), where the ln rate at the reference point stands for a coefficient and the local
 exponent there for what only it shows, small.
 """
@@ -27,7 +27,7 @@ CoordinateSystem = Literal["author", "conditioned"]
 
 
 STRONG_CORRELATION = 0.95
-"""Correlation beyond which two parameters are told only together."""
+"""Correlation beyond which two parameters are determined only together."""
 
 
 UNDETERMINED_WIDTH = 1.0 / 3.0
@@ -40,7 +40,7 @@ WELL_DETERMINED_SD = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Correlation(Presentable):
-    """The correlation of estimates, (parameters, parameters), and their standard deviations, (parameters,).
+    """The correlation of estimates: matrix (parameters, parameters) -, and sd (parameters,) on the internal scale.
 
     names : as the matrix is to be read, "ln A" where the logarithm is meant, "ln rate" of a conditioned coefficient.
     """
@@ -65,7 +65,7 @@ class Correlation(Presentable):
 def correlation(fit: Identification, coordinates: CoordinateSystem = "author") -> Correlation:
     """The correlation of a fit's estimates, in the author's parameters or in the conditioned coordinates."""
     if coordinates not in ("author", "conditioned"):
-        raise FitError(f"frame is '{coordinates}'; allowed are 'author' and 'conditioned'")
+        raise FitError(f"coordinates is '{coordinates}'; allowed are 'author' and 'conditioned'")
     covariance = fit.covariance if coordinates == "conditioned" else _covariance_of_parameters(fit)
     sd = np.sqrt(np.diag(covariance))
     matrix = covariance / np.outer(sd, sd)
@@ -77,7 +77,7 @@ def undetermined(fit: Identification) -> tuple[str, ...]:
     """What the tests do not determine, a sentence for each group of parameters, and which combination they do.
 
     A parameter counts as such where its 95 % interval fills a third of its bounds; those tied to it by a correlation of
-    .95 or more belong to its group. Empty where every parameter is determined.
+    0.95 or more belong to its group. Empty where every parameter is determined.
     """
     undetermined_indices = np.flatnonzero(_relative_widths(fit) > UNDETERMINED_WIDTH)
     groups = _groups(fit, undetermined_indices)
@@ -115,7 +115,7 @@ def _relative_widths(fit: Identification) -> Floats:
 
 
 def _groups(fit: Identification, undetermined_indices: Ints) -> list[list[int]]:
-    """Loose parameters with all that are tied to them, joined where they share one."""
+    """Undetermined parameters with all that are correlated with them, joined where they share one."""
     is_correlated = np.abs(correlation(fit).matrix) > STRONG_CORRELATION
     groups: list[set[int]] = []
     for k in undetermined_indices:
@@ -129,7 +129,8 @@ def _undetermined_sentence(fit: Identification, group: list[int]) -> str:
     names = [fit.law.names[k] for k in group]
     if len(group) == 1:
         estimate, relative_width = fit.estimates[group[0]], float(_relative_widths(fit)[group[0]])
-        return f"{names[0]} is not determined: its interval [{estimate.low:.3g}, {estimate.high:.3g}] fills {relative_width:.0%} of its bounds"
+        interval = f"[{estimate.low:.3g}, {estimate.high:.3g}]"
+        return f"{names[0]} is not determined: its interval {interval} fills {relative_width:.0%} of its bounds"
     sentence = f"{', '.join(names[:-1])} and {names[-1]} are not determined singly"
     combination = _best_determined_combination(fit, group)
     return f"{sentence}; their combination {combination} is" if combination else sentence
@@ -166,6 +167,6 @@ def _determined_sentence(fit: Identification) -> str:
     rate, rate_low, rate_high = (float(v) for v in fit.rate(reference.stress))
     exponent, exponent_low, exponent_high = (float(v) for v in fit.local_exponent(reference.stress))
     return (
-        f"what the tests see at {reference.stress:.4g} MPa: the local exponent is {exponent:.3g} [{exponent_low:.3g}, {exponent_high:.3g}], the rate "
-        f"{rate:.3g} [{rate_low:.3g}, {rate_high:.3g}] 1/s"
+        f"what the tests see at {reference.stress:.4g} MPa: the local exponent is {exponent:.3g} "
+        f"[{exponent_low:.3g}, {exponent_high:.3g}], the rate {rate:.3g} [{rate_low:.3g}, {rate_high:.3g}] 1/s"
     )

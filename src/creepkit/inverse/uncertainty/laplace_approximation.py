@@ -1,4 +1,7 @@
-"""Laplace's approximation: covariance and intervals of parameters, and Satterthwaite degrees of freedom of restricted likelihood."""
+"""Laplace's approximation: covariance and intervals of parameters, with their degrees of freedom.
+
+The degrees of freedom of a restricted likelihood are Satterthwaite's.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ LOG_COMPONENT_STEP = 1e-3
 
 
 MINIMUM_FREEDOM = 3.0
-"""Below this a quantile says nothing but that the scatter is unknown."""
+"""Lower limit of degrees of freedom: below it a quantile only says that the variance is unknown."""
 
 
 def restricted_covariance(
@@ -42,7 +45,7 @@ def restricted_covariance(
 ) -> tuple[Floats, float]:
     """Posterior covariance of x = (u, e), (unknowns, unknowns), and its degrees of freedom.
 
-    stated : (output, source) of sizes that are known beside those that nuisances give.
+    fixed : (output, component) that are known beside those that nuisances give.
     Unknowns at their bounds count here as all others: their intervals reach inwards.
     """
     unconstrained = replace(linearised, free=np.ones_like(linearised.free))
@@ -72,7 +75,7 @@ def _information(
 ) -> Floats:
     """I_ij = tr(Q C_i Q C_j) / 2 with Q = C^-1 - B M B', B = C^-1 J: the values that tests share tie them together.
 
-    slopes : C_i of every test; pulled : B' C_i B.
+    covariance_derivatives : C_i, (tests, observations, observations) each; projected : B' C_i B, (unknowns, unknowns).
     """
     weighted = [inverses @ slope for slope in covariance_derivatives]
     left_products = [
@@ -89,7 +92,7 @@ def _information(
 
 
 def _estimated_components(noise_model: NoiseModel, nuisances: Sequence[Nuisance]) -> list[tuple[str, str]]:
-    """(output, source) of the sizes that the data were asked for; "" for the rate."""
+    """(output, component) of the variance components that were estimated; "" for the rate."""
     fixed = fixed_components(nuisances, list(noise_model.outputs))
     components = []
     for output, output_noise in noise_model.outputs.items():
@@ -100,7 +103,7 @@ def _estimated_components(noise_model: NoiseModel, nuisances: Sequence[Nuisance]
 
 
 def _covariance_derivative(residuals: Residuals, noise_model: NoiseModel, output: str, name: str) -> Floats:
-    """Derivative of the covariances to the logarithm of one size, (tests, entries, entries)."""
+    """Derivative of the covariances to the logarithm of one component, (tests, observations, observations)."""
 
     def at(shift: float) -> Floats:
         factor = float(np.exp(shift))
@@ -184,9 +187,10 @@ def normal_matrix(residuals: Residuals, working_noise: NoiseModel) -> Floats:
 def marginal_log_likelihood(
     log_likelihood: float, normal_matrix: Floats, e: Floats, nuisance_parameters: NuisanceParameters
 ) -> float:
-    """Log-likelihood with the unknowns of tests integrated out, by Laplace's approximation.
+    """Log-likelihood with the nuisance parameters integrated out, by Laplace's approximation.
 
-    curve : J' W J of x. A prior without end counts as one of the width of the unknown's limits.
+    normal_matrix : (unknowns, unknowns) J' W J of x; e : (nuisances,). A flat prior counts as one of the width of the
+    limits.
     """
     if not nuisance_parameters.size:
         return log_likelihood
@@ -201,7 +205,10 @@ def marginal_log_likelihood(
 def parameter_estimates(
     law: CreepLaw, coordinates: Coordinates, u: Floats, covariance: Floats, quantile: float
 ) -> tuple[Estimate, ...]:
-    """Intervals of the author's parameters, `wide` standard deviations to each side."""
+    """Intervals of the author's parameters, `quantile` standard deviations to each side.
+
+    u : (parameters,) conditioned coordinates; covariance : (parameters, parameters) theirs.
+    """
     theta = coordinates.theta(u)
     to_theta = coordinates.jacobian(u)
     sd = np.sqrt(np.diag(to_theta @ covariance @ to_theta.T))

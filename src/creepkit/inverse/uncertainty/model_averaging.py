@@ -1,8 +1,8 @@
 """Bayesian model averaging: intervals over the laws of a ranking, and bands of the creep rate.
 
-A quantity (ln of a rate, a local exponent) is normal, or Student's t, under each law; over all laws it has the distribution
-sum_i w_i F_i, whose quantiles are found by bisection (Hoeting et al. (1999), Stat. Sci. 14, 382). At an uncertain
-temperature T the rate has the distribution over laws, parameters and T together (Fig. 6d of Chen et al.),
+A quantity (ln of a rate, a local exponent) is normal, or Student's t, under each law; over all laws it has the
+distribution sum_i w_i F_i, whose quantiles are found by bisection (Hoeting et al. (1999), Stat. Sci. 14, 382). At an
+uncertain temperature T the rate has the distribution over laws, parameters and T together (Fig. 6d of Chen et al.),
 
     p(ln rate) = sum_i w_i integral p_i(ln rate | T') g(T') dT',
 
@@ -49,7 +49,7 @@ INTERVAL_PROBABILITIES = (0.5, 0.025, 0.975)
 class MixtureDistribution:
     """The parts of a mixture: location, spread and degrees of freedom of each, with its weight.
 
-    weight, freedom : (parts,); middle, sd : (parts, ...).
+    weight, degrees_of_freedom : (parts,) -; location, scale : (parts, ...) in the unit of the quantity.
     """
 
     weight: Floats
@@ -92,7 +92,7 @@ class WeightedFit(Protocol):
 
     @property
     def weight(self) -> float:
-        """Its share of belief."""
+        """Its weight."""
         ...
 
 
@@ -202,7 +202,8 @@ class RateBand(Presentable):
     """Creep rates over stress at an uncertain temperature.
 
     stress : (points,) MPa; rate, low, high : (points,) 1/s, median and 95 % band, by parameters, laws and temperature.
-    inner : (low, high) of parameters and laws alone. temperature, plus_minus : K. notes : what it cannot know.
+    parameter_band : (low, high), (points,) 1/s each, of parameters and laws alone. temperature,
+    temperature_uncertainty : K. notes : its limitations.
     """
 
     stress: Floats
@@ -230,7 +231,7 @@ def rate_band(
     strain: float | None = None,
     time: float | None = None,
 ) -> RateBand:
-    """Creep rates at `stresses` (MPa) and temperature +- plus_minus (K), over one law or the laws of a ranking.
+    """Creep rates at `stresses` (MPa) and temperature +- uncertainty (K), over one law or the laws of a ranking.
 
     A law without temperature cannot know how the temperature moves its rate: its part of the band is not widened, and
     a note says so.
@@ -243,8 +244,8 @@ def rate_band(
         and temperature - temperature_uncertainty > 0
     ):
         raise FitError(
-            f"a temperature of {temperature:g} +- {temperature_uncertainty:g} K was asked for; give kelvin, and a finite "
-            "uncertainty that is not negative"
+            f"a temperature of {temperature:g} +- {temperature_uncertainty:g} K was asked for; give kelvin, and a "
+            "finite uncertainty that is not negative"
         )
     if temperature_distribution not in ("uniform", "normal"):
         raise FitError(f"shape is '{temperature_distribution}'; allowed are 'uniform' and 'normal'")
@@ -272,7 +273,7 @@ def rate_band(
 
 
 def _standard_temperatures(temperature_distribution: str) -> Floats:
-    """(nodes,) temperatures of equal probability, in units of plus_minus about the middle."""
+    """(nodes,) temperatures of equal probability, in units of the uncertainty about the middle."""
     probabilities = (np.arange(TEMPERATURE_NODES) + 0.5) / TEMPERATURE_NODES
     return (
         2.0 * probabilities - 1.0
@@ -296,8 +297,8 @@ def _band_notes(mixture: ModelAverage, temperature: float, temperature_uncertain
     laws_without_temperature = [fit.law.name for fit in mixture.fits if not fit.law.uses(TEMPERATURE)]
     if laws_without_temperature and temperature_uncertainty > 0:
         notes.append(
-            f"without a temperature in the law {' and '.join(laws_without_temperature)} the band cannot hold what {temperature_uncertainty:g} K do to "
-            "the rate; identify law.times(arrhenius())"
+            f"without a temperature in the law {' and '.join(laws_without_temperature)} the band cannot hold what "
+            f"{temperature_uncertainty:g} K do to the rate; identify law.times(arrhenius())"
         )
     fit = mixture.fits[0]
     low, high = fit.ranges["temperature"]

@@ -1,17 +1,18 @@
 """The posterior of a law's conditioned coordinates u: its density for many candidates at once, and samples by MCMC.
 
-The prior of u is flat within the law's bounds, and chi2 is taken under the covariance that the fit found. With nu degrees
-of freedom of that covariance and K parameters
+The prior of u is flat within the law's bounds, and chi2 is taken under the covariance that the fit found. With nu
+degrees of freedom of that covariance and K parameters
 
     ln p(u) = -(nu + K) / 2 ln(1 + (chi2(u) - least chi2) / nu),
 
-the multivariate Student's t (Box & Tiao (1973), Bayesian Inference in Statistical Analysis, 2.7); -chi2(u) / 2 for large
-nu. Nuisance parameters of tests are integrated out to first order about their estimates: with r the whitened residuals at
-the estimates, J their derivatives to the nuisance parameters, priors below, chi2(u) = |r|^2 - |Q' r|^2, J = Q R. The
-effect of a test's own rate is taken half way between the optimum and the candidate (see uncertainty.profile_likelihood).
+the multivariate Student's t (Box & Tiao (1973), Bayesian Inference in Statistical Analysis, 2.7); -chi2(u) / 2 for
+large nu. Nuisance parameters of tests are integrated out to first order about their estimates: with r the whitened
+residuals at the estimates, J their derivatives to the nuisance parameters, priors below, chi2(u) = |r|^2 - |Q' r|^2,
+J = Q R. The effect of a test's own rate is taken half way between the optimum and the candidate (see
+uncertainty.profile_likelihood).
 
-Samples are drawn by emcee with moves of differential evolution (ter Braak (2006), Stat. Comput. 16, 239), a fifth of them
-its snooker update (ter Braak & Vrugt (2008), Stat. Comput. 18, 435).
+Samples are drawn by emcee with moves of differential evolution (ter Braak (2006), Stat. Comput. 16, 239), a fifth of
+them its snooker update (ter Braak & Vrugt (2008), Stat. Comput. 18, 435).
 """
 
 from __future__ import annotations
@@ -139,7 +140,7 @@ class Posterior:
         return np.asarray((rows**2).sum(axis=1) - ((rows @ self.nuisance_basis) ** 2).sum(axis=1))
 
     def _residuals(self, u: Floats) -> tuple[Floats, Floats]:
-        """Residuals (candidates, tests, entries), and what a test's own rate does half way to each candidate.
+        """Residuals (candidates, tests, observations), and what a test's own rate does half way to each candidate.
 
         A factor on all rates moves every coefficient, each of which is a coordinate's own. Where a term has none, and
         for tests compared over their whole life, whose derivatives are dear, it does what it does at the optimum.
@@ -168,7 +169,7 @@ class Posterior:
 
 
 def _whitened(whitening: Floats, rate_effect: Floats, values: Floats) -> Floats:
-    """Residuals (..., tests, entries) over their scatter, with a random effect (..., tests, entries) beside.
+    """Residuals (..., tests, observations) over their scatter, with a random effect (..., tests, observations) beside.
 
     With v = W effect the covariance is W^-1 (I + v v') W^-T, and its inverse root (I - b v v') W,
     b = (1 - 1 / sqrt(1 + v'v)) / v'v.
@@ -195,8 +196,8 @@ class PosteriorSamples(Presentable):
     """Draws of a law's values from their posterior.
 
     chain : (steps, walkers, parameters) conditioned coordinates u, all of them; log_probability : (steps, walkers).
-    burn : steps left out at the beginning. acceptance : mean share of accepted moves.
-    autocorrelation : (parameters,) steps until a walker has forgotten where it was.
+    burn_in : steps left out at the beginning. acceptance_fraction : mean share of accepted moves.
+    autocorrelation_time : (parameters,) steps.
     """
 
     coordinates: Coordinates
@@ -341,12 +342,13 @@ def _posterior_samples(
     notes = []
     if steps <= CONVERGED_LENGTH * autocorrelation_time.max():
         notes.append(
-            f"not converged: the chain is {steps / autocorrelation_time.max():.0f} autocorrelation times long, {CONVERGED_LENGTH:.0f} are needed; "
+            f"not converged: the chain is {steps / autocorrelation_time.max():.0f} autocorrelation times long, "
+            f"{CONVERGED_LENGTH:.0f} are needed; "
             f"ask for {int(np.ceil(CONVERGED_LENGTH * autocorrelation_time.max() / 100.0)) * 100 + 100} steps or more"
         )
     acceptance_fraction = float(np.mean(accepted))
     if not 0.05 < acceptance_fraction < 0.8:
-        notes.append(f"a share of {acceptance_fraction:.2f} of the moves was accepted, where .2 to .5 is healthy")
+        notes.append(f"a share of {acceptance_fraction:.2f} of the moves was accepted, where 0.2 to 0.5 is usual")
     return PosteriorSamples(
         fit.coordinates, chain, log_probability, burn_in, acceptance_fraction, autocorrelation_time, tuple(notes)
     )

@@ -1,7 +1,7 @@
 """Profile likelihood: how the misfit rises as one quantity is held away from its best value, all else refitted.
 
 With chi2(x) the sum of squares that the fit minimises under the covariance it found, the profile of a quantity q is
-min {chi2(x) : q(x) = v} over v. Its 95 % interval is where the rise stays below the .95 quantile of F(1, freedom),
+min {chi2(x) : q(x) = v} over v. Its 95 % interval is where the rise stays below the 0.95 quantile of F(1, freedom),
 which is that of chi-square with one degree of freedom where the scatter is well known (Venzon & Moolgavkar (1988),
 J. R. Stat. Soc. C 37, 87; Bates & Watts (1988), Nonlinear Regression Analysis, ch. 6). Unlike Laplace's intervals it
 may be lopsided, and open where the data never rise against a value.
@@ -177,7 +177,7 @@ class _ProfileWalk:
         return self.problem.with_covariance(cholesky_factors(residuals, self.noise_model))
 
     def _chi_square(self, x: Floats) -> float:
-        """Of the data and the priors: the walls stand for bounds, at which a value is possible still."""
+        """Of the data and the priors, without the penalties of bounds, at which a value is still possible."""
         problem = self._problem_at(x) if self.noise_model.rate > 0 else self.problem
         whitened, nuisance_count = problem.whitened(x), x.size - self.size
         observation_count = problem.observations.count
@@ -189,7 +189,7 @@ class _ProfileWalk:
 def profile(fit: Identification, quantity_or_name: str | DerivedQuantity, *, level: float = 0.95) -> ProfileLikelihood:
     """Profile a parameter, by its name, or another quantity such as rate_at(120) or exponent_at(120).
 
-    The interval holds the value with probability `level`, 0.95 unless told otherwise.
+    The interval holds the value with probability `level`, 0.95 by default.
     """
     if not 0.0 < level < 1.0:
         raise FitError(f"level is {level:g}; a probability between 0 and 1 is needed, such as 0.95")

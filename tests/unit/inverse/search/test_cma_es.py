@@ -5,8 +5,8 @@ import pytest
 
 from creepkit.errors import FitError
 from creepkit.inverse.bounds import Bounds
-from creepkit.inverse.search.cost_function import SearchTrace
 from creepkit.inverse.search.derivative_free import CmaEs
+from creepkit.inverse.search.global_search import SearchTrace
 from creepkit.inverse.settings import IdentificationSettings
 from helpers.cost_functions import Known, cube, quadratic, rastrigin, rosenbrock
 

@@ -10,7 +10,7 @@ from scipy.stats import t as student
 from creepkit.errors import FitError
 from creepkit.inverse.identify import identify
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.uncertainty.posterior import interval_problem
+from creepkit.inverse.uncertainty.posterior import interval_noise_model
 from creepkit.inverse.uncertainty.profile_likelihood import profile
 from creepkit.inverse.uncertainty.quantities import DerivedQuantity, exponent_at, rate_at
 from creepkit.laws.norton import NORTON
@@ -102,11 +102,11 @@ def test_scatter_between_few_tests_counts_as_in_laplaces_intervals():
     conditions = [(s, 1000.0) for s in (30.0, 50.0, 80.0, 40.0, 60.0)]
     tests = planted(NORTON, {"A": 1e-16, "n": 5.2}, conditions, seed=5, rate=0.2, noise=1e-5)
     fit = identify(NORTON, tests, Steady(), settings=IdentificationSettings(starts=3, sobol_points=16, frames=20))
-    assert interval_problem(fit).noise_model.rate == pytest.approx(fit.noise_model.rate * np.sqrt(5 / 3))
+    assert interval_noise_model(fit).rate == pytest.approx(fit.noise_model.rate * np.sqrt(5 / 3))
     found = profile(fit, "n")
     assert found.high - found.low == pytest.approx(found.laplace[1] - found.laplace[0], rel=0.2)
     known = replace(fit, settings=replace(fit.settings, nuisances=(Nuisance("offset"), Nuisance("rate", sd=0.2))))
-    assert interval_problem(known).noise_model.rate == fit.noise_model.rate
+    assert interval_noise_model(known).rate == fit.noise_model.rate
 
 
 def test_an_interval_cut_by_a_bound_is_open_on_that_side(tests):
