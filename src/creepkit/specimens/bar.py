@@ -42,8 +42,8 @@ class Bar:
     """A bar; a kind of it says what its point goes through, what its instrument shows, and how that moves with creep.
 
     tolerance : relative local error of a step of the integration; the output is then within about ten times of it.
-    strain_limit : logarithmic creep strain at which the bar has burst.
-    max_steps : cap on the steps of one history, beside STEPS_FOR_A_BREAK for each row of its programs.
+    strain_limit : logarithmic creep strain at which the bar has ruptured.
+    max_steps : cap on the steps of one history, beside STEPS_PER_BREAKPOINT for each row of its programs.
     """
 
     tolerance: float = 1e-5
@@ -70,7 +70,7 @@ class Bar:
         """The same specimen with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
-    # ---- what a kind of bar says -----------------------------------------------------------------------------------
+    # ---- of each kind of bar --------------------------------------------------------------------------------------
 
     def point_test(self, history: History) -> PointTest:
         """What the material point of a history goes through."""
@@ -94,7 +94,7 @@ class Bar:
         """Why a test ended at `end`, s, from what the integration says; output : (times,) up to there, then NaN."""
         return reason
 
-    # ---- what follows from it --------------------------------------------------------------------------------------
+    # ---- of every bar ---------------------------------------------------------------------------------------------
 
     def predict(
         self,

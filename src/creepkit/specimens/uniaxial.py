@@ -1,6 +1,8 @@
 """Uniaxial tension: a bar under steps of stress or load and of temperature, observed by its creep strain.
 
-Under constant load the true stress is the nominal one times exp(creep strain). An engineering strain is exp(creep strain) - 1; a strain that includes the elastic part has stress/E(T) added. Times to given strains and to rupture are predicted too.
+Under constant load the true stress is the nominal one times exp(creep strain). An engineering strain is exp(creep
+strain) - 1; a strain that includes the elastic part has stress/E(T) added. Times to given strains and to rupture are
+predicted too.
 """
 
 from __future__ import annotations
@@ -108,11 +110,11 @@ EARLIEST_RUPTURE = 1e-12
 
 @dataclass(frozen=True)
 class StrainLevels:
-    """The creep strains of a history's frames as levels to arrive at.
+    """The creep strains of a history's frames as levels to be reached.
 
     test : the point test that is followed to the horizon.
     frames : of each level its frame; creep : (frames,) logarithmic creep strain that was measured; where not finite or
-        not above LEAST a frame has no level.
+        not above SMALLEST_STRAIN a frame has no level.
     """
 
     test: PointTest

@@ -77,8 +77,8 @@ class Checkpoint:
         if header.get("call") != self.request:
             differences = ", ".join(_differences(self.request, header.get("call") or {}))
             raise SurrogateError(
-                f"{self.path}: left by another training (it differs in {differences}); finish that one, remove the file, or "
-                "choose another name"
+                f"{self.path}: left by another training (it differs in {differences}); finish that one, remove the "
+                "file, or choose another name"
             )
         try:
             state_of_training.restore(tensors, header["curves"])
@@ -150,7 +150,7 @@ def _training_metadata(
     fit: NetworkTraining,
     request: dict[str, Any],
 ) -> SurrogateMetadata:
-    """What the surrogate is told, with how its training went."""
+    """The metadata of the surrogate, with how its training went."""
     comparison = compare_predictions(fit.module, samples, data, rows[1], output_deviation(samples, rows[0]))
     times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
     provenance = {

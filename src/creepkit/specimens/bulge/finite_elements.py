@@ -46,7 +46,7 @@ MODULUS_TEMPERATURE_STEP = 1.0
 
 @dataclass(frozen=True, eq=False)
 class BulgeSetup:
-    """One test made ready: its body and course, its geometry, its observation operator.
+    """One test set up: its finite element model and load history, its geometry, its observation operator.
 
     refinement : of the structured mesh, None for a mesh from files.
     """
@@ -101,7 +101,7 @@ def modulus_program(elastic: Elastic, temperature: Program, factor: float, where
 
 @lru_cache(maxsize=256)
 def model_of_geometry(geometry: DimpleGeometry, refinement: float) -> FiniteElementModel:
-    """The body of a dimple; kept, for a fit asks for it a thousand times."""
+    """The finite element model of a dimple; kept, for a fit needs it a thousand times."""
     return finite_element_model(geometry.mesh(refinement))
 
 
@@ -207,7 +207,7 @@ def _dimension_name(name: str) -> str:
 
 
 def _direction(setup: BulgeSetup, history: History, name: str) -> Floats:
-    """Derivative of the course's segments, (segments, 10), by a central difference, exact for what enters linearly."""
+    """Derivative of the segments of the load history, (segments, 10): a central difference, exact if linear."""
     load_history = setup.load_history
     if name == "modulus":
         # measured against the modulus that the history states

@@ -12,7 +12,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import History, PressureJump, Program, RecordedLoading
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
-from creepkit.specimens.bulge.reduced_order.time_integration import NUISANCE_DIRECTIONS, FeatureFactors
+from creepkit.specimens.bulge.reduced_order.step_solution import NUISANCE_DIRECTIONS, FeatureFactors
 from creepkit.specimens.bulge.reduced_order.trajectories import TrajectoryOptions, simulate_trajectories
 from creepkit.specimens.bulge.specimen import Bulge
 
