@@ -66,7 +66,7 @@ class Case:
         specimen = self.specimen.replace(**changes)
         made = set_up_test(specimen, self.history(np.array([end])), {})
         kernel = kernels.lower(self.model, "numba")
-        theta = kernel.to_internal(self.model.values(self.values))[0]
+        theta = self.model.to_internal(self.model.values(self.values))[0]
         return simulate(kernel, theta, made.model, made.load_history, settings=solver_settings(specimen)), made
 
     def outcome(self, times: Floats, **changes: float) -> Floats:

@@ -18,7 +18,7 @@ PROGRAM = """
 import sys, time
 import numpy, numba, sympy
 import creepkit
-from creepkit.kernels import calling, compiled, interface
+from creepkit.kernels import compilation, interface
 from creepkit.integration import integrate
 
 law = creepkit.law(sys.argv[1])
@@ -26,7 +26,8 @@ if sys.argv[1] == "combined":
     law = law.times(creepkit.arrhenius()).with_temperature(n_2=creepkit.linear())
 start = time.process_time()
 ready = creepkit.lower(law, "numba")
-calling.call(ready, "update", numpy.array([[100.0, 0.01, 10.0, 1000.0, 100.0, 33.0]]), ready.internal(law.center())[0])
+point = numpy.array([[100.0, 0.01, 10.0, 1000.0, 100.0, 33.0]])
+interface.call_entry(ready, "update", point, law.to_internal(law.center())[0])
 print(time.process_time() - start)
 """
 

@@ -30,7 +30,6 @@ import numpy as np
 import planted
 
 import creepkit as ck
-from creepkit import kernels
 from creepkit.cli import set_numba_cache
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.problem import least_squares_problem
@@ -90,7 +89,7 @@ def quantities(fit, of):
 
 def true_quantities(one, fit):
     """The same of the planted values."""
-    u = fit.coordinates.u(kernels.lower(one.law, "numba").to_internal(one.values)[0])
+    u = fit.coordinates.u(one.law.to_internal(one.values)[0])
     return [q[0] for q in quantities(fit, replace(fit, u=u))], u
 
 

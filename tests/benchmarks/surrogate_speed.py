@@ -81,7 +81,7 @@ def row(name: str, count: int, simulated: int, file: str | None) -> str:
     """CPU times of one law."""
     law, surrogate, exact = ck.law(name), rate_surrogate(file, threads=1), Bulge(threads=1)
     compiled, many, few = kernels.lower(law, "numba"), scattered(name, count), scattered(name, simulated)
-    theta, factors = compiled.to_internal(many), surrogate.recipe.factors
+    theta, factors = law.to_internal(many), surrogate.recipe.factors
     thickness = {"thickness": np.full((1, 1), exact.geometry.apex_thickness)}
     some = {n: v[: max(1, count // 10)] for n, v in many.items()}
     spent = in_turns(
@@ -115,7 +115,7 @@ def walls(name: str, count: int, file: str | None) -> str:
     """Wall times of one law on all cores."""
     law, surrogate, cores = ck.law(name), rate_surrogate(file), len(os.sched_getaffinity(0))
     compiled, many = kernels.lower(law, "numba"), scattered(name, count)
-    theta, factors = compiled.to_internal(many), surrogate.recipe.factors
+    theta, factors = law.to_internal(many), surrogate.recipe.factors
     spent = in_turns(
         (lambda: surrogate.predict(law, law.to_internal(many), [TEST]), 1),
         (

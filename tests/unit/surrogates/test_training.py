@@ -1,4 +1,4 @@
-"""Training: bit-identical when resumed, returned when done, and one sentence for each data set too small to train on."""
+"""Training: bit-identical when resumed, returned when done, and one sentence for each data set that is too small."""
 
 import math
 from dataclasses import replace
