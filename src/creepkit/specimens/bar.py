@@ -81,13 +81,16 @@ class Bar:
         raise NotImplementedError
 
     def output_derivative(self, history: History, creep: Floats) -> Floats:
-        """Derivative of the output to the creep strain."""
+        """Derivative of the output to the creep strain, (candidates, times)."""
         raise NotImplementedError
 
     def modulus_derivative(
         self, result: Prediction, histories: Sequence[History], modulus_changes: Floats
     ) -> Floats | None:
-        """Derivative of the values to the relative change of the modulus; None leaves it to differences."""
+        """Derivative of the values, (candidates, tests, times, 1), to the relative change of the modulus.
+
+        modulus_changes : (tests,) the changes themselves. None leaves the derivative to differences.
+        """
         return None
 
     def end_reason(self, history: History, reason: str, output: Floats, end: float) -> str:

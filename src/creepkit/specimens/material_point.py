@@ -102,7 +102,7 @@ class MaterialPoint:
         return run_material_point(self, law, values, plan)
 
     def reference_stress(self, history: History) -> Floats:
-        """The von Mises stresses that are prescribed, or would be if nothing crept, MPa."""
+        """The von Mises stresses that are prescribed, or would be if nothing crept, (levels,) MPa."""
         return elastic_von_mises(_loading(history), None if history.elastic is None else _elastic(history))
 
     def reference_strain(self, history: History) -> float:

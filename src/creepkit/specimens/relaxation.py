@@ -42,13 +42,13 @@ class Relaxation(Bar):
         return point_test(history)
 
     def observed_output(self, history: History, creep: Floats) -> Floats:
-        """The stress, MPa; NaN where a step down compresses the bar."""
+        """The stress, (candidates, times) MPa; NaN where a step down compresses the bar."""
         test = point_test(history)
         stress = np.asarray(test.driving.at(history.times) - test.stiffness * creep)
         return np.where(stress < -STRESS_TOLERANCE * float(np.max(test.driving.values)), np.nan, stress)
 
     def output_derivative(self, history: History, creep: Floats) -> Floats:
-        """Minus the modulus."""
+        """Minus the modulus, (candidates, times) MPa."""
         return np.full_like(creep, -point_test(history).stiffness)
 
     def end_reason(self, history: History, reason: str, output: Floats, end: float) -> str:

@@ -39,17 +39,20 @@ class Uniaxial(Bar):
         return point_test(history)
 
     def observed_output(self, history: History, creep: Floats) -> Floats:
-        """The strain of the history's measure."""
+        """The strain of the history's measure, (candidates, times)."""
         return observed_strain(history, creep)
 
     def output_derivative(self, history: History, creep: Floats) -> Floats:
-        """Derivative of the observed strain to the creep strain."""
+        """Derivative of the observed strain to the creep strain, (candidates, times)."""
         return np.exp(creep) if history.strain_measure == "engineering" else np.ones_like(creep)
 
     def predict_to_rupture(
         self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
     ) -> Prediction:
-        """Predict as predict() does, and follow each bar to its rupture: by a state's limit, or by the strain limit."""
+        """Predict as predict() does, and follow each bar to its rupture: by a state's limit, or by the strain limit.
+
+        theta : (candidates, parameters) internal values.
+        """
         levels = [strain_levels(history, self.point_test(history)) for history in histories]
         result = self._integrate(law, theta, [own.test for own in levels], sensitivities)
         prediction = self._observed_prediction(histories, result)
@@ -63,7 +66,10 @@ class Uniaxial(Bar):
         )
 
     def modulus_derivative(self, result: Prediction, histories: Sequence[History], modulus_changes: Floats) -> Floats:
-        """Derivative of the strain to the relative change of the modulus: that of its elastic part."""
+        """Derivative of the strain, (candidates, tests, times, 1), to the relative change of the modulus.
+
+        It is that of the elastic part; modulus_changes : (tests,) the changes themselves.
+        """
         slope = np.zeros_like(result.values)
         for k, history in enumerate(histories):
             if history.includes_elastic:

@@ -111,12 +111,12 @@ class ParameterGru:
         return {**tensors, "mask": torch.from_numpy(mask), "domain": torch.from_numpy(domain)}
 
     def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
-        """A fresh network with the scales of the training rows."""
+        """A fresh network with the scales of the training rows; train : (rows,) their positions."""
         sizes = samples["constants"].shape[-1], samples["series"].shape[-1], len(data.outputs)
         return self._network(sizes).with_scales(samples, train)
 
     def metadata(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateMetadata:
-        """Scales by name, the domain, and what was constant."""
+        """Scales by name, the domain, and what was constant; train : (rows,) positions of training rows."""
         history_inputs, law = self._history_inputs(data), LawInputs(data.law)
         names = (*law.names, *history_inputs.constants)
         module = self.module(data, samples, train)
@@ -233,7 +233,7 @@ class ParameterSurrogate(Surrogate):
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
+        """Predict each history's outputs at its times; see Surrogate.predict. theta : (candidates, parameters)."""
         check_applicable(self.metadata, histories, nuisances or (), self.nuisances)
         complete_theta = complete_parameters(self.metadata.law, law, theta)
         complete_theta, nuisances = broadcast_candidates(complete_theta, nuisances, len(histories))

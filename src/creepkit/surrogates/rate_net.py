@@ -150,11 +150,11 @@ class RateNet:
         return {**single, "mask": torch.from_numpy(mask), "nodes": node_mask, "domain": domain_rows}
 
     def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
-        """A fresh network with the scales of the training rows."""
+        """A fresh network with the scales of the training rows; train : (rows,) their positions."""
         return RateModule(samples["inputs"].shape[-1], self.hidden, self.layers).with_scales(samples, train)
 
     def metadata(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateMetadata:
-        """Scales and domain."""
+        """Scales and domain; train : (rows,) positions of training rows."""
         module = self.module(data, samples, train)
         assert isinstance(module, RateModule)
         input_labels = input_names(self._feature_count)
@@ -253,7 +253,7 @@ class RateSurrogate(Surrogate):
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
+        """Predict each history's outputs at its times; see Surrogate.predict. theta : (candidates, parameters)."""
         check_applicable(self.metadata, histories, nuisances or (), self.nuisances)
         specimen, compiled = self.specimen, kernels.lower(law, "numba")
         assert isinstance(specimen, Bulge)

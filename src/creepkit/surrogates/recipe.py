@@ -156,9 +156,9 @@ class Standardisation(nn.Module):
         return cls(torch.zeros(columns), torch.ones(columns))
 
     def forward(self, values: Tensor) -> Tensor:
-        """Standardised values."""
+        """Standardised values, (..., columns)."""
         return (values - self.mean.to(values.dtype)) / self.deviation.to(values.dtype)
 
     def inverse(self, values: Tensor) -> Tensor:
-        """Physical values of standardised ones."""
+        """Physical values of standardised ones, (..., columns)."""
         return values * self.deviation.to(values.dtype) + self.mean.to(values.dtype)

@@ -85,7 +85,7 @@ def _check_lengths(where: str, history: History, geometry: Any) -> None:
 
 
 def prediction_frames(grid: TimeGrid, histories: Sequence[History]) -> list[Floats]:
-    """The frames, s, at which the network is asked for each history: as many for all, as far as the longest needs."""
+    """The times (frames,) s of the network for each history: as many for all, as far as the longest needs."""
     if grid.relative:
         return [grid.times(float(h.times[-1])) for h in histories]
     last = max(float(h.times[-1]) for h in histories)
@@ -158,7 +158,7 @@ class Surrogate(ABC):
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict each history's outputs at its times; see records.Predictor.
+        """Predict each history's outputs at its times; see records.Predictor. theta : (candidates, parameters).
 
         A row outside the domain of the training has its values all the same, and Status.OUTSIDE_DOMAIN.
         """
@@ -189,7 +189,7 @@ class Surrogate(ABC):
         return True
 
     def reference_stress(self, history: History) -> Floats:
-        """The von Mises stresses, MPa, that stand for the test: the specimen's, or those that are prescribed."""
+        """The reference von Mises stresses, (levels,) MPa: the specimen's, or those that are prescribed."""
         specimen_stress = getattr(self.specimen, "reference_stress", None)
         if specimen_stress is not None:
             return np.asarray(specimen_stress(history))

@@ -286,7 +286,10 @@ def predict_bulge(
     nuisances: NuisanceValues,
     sensitivities: bool,
 ) -> Prediction:
-    """Predict every candidate in every test; see records.Predictor."""
+    """Predict every candidate in every test; see records.Predictor.
+
+    theta : (candidates, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}.
+    """
     check_nuisances(nuisances, specimen.nuisances, "a bulge specimen")
     kernel = kernels.lower(law, "numba")
     theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
@@ -315,7 +318,7 @@ def simulate_and_observe(
     nuisances: Mapping[str, float],
     jacobian: bool,
 ) -> BulgeResponse:
-    """Simulate one test and observe it at the times of its history."""
+    """Simulate one test and observe it at the times of its history; theta : (parameters,) internal values."""
     test_setup = set_up_test(specimen, history, nuisances)
     settings = solver_settings(specimen, exact=jacobian)
     simulation = simulate(

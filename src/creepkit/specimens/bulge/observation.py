@@ -319,7 +319,7 @@ def _points(x: ArrayLike, y: ArrayLike, heights: ArrayLike) -> tuple[Floats, Flo
     X, Y, H = (array[outputs] for array in arrays)
     if H.size < _FEWEST_POINTS or not np.abs(H).max() > 0.0 or not min(np.ptp(X), np.ptp(Y)) > 0.0:
         raise FitError(
-            f"a field of {H.size} finite points cannot be fitted; it needs {_FEWEST_POINTS} or more, over x and y, "
+            f"a field of {H.size} finite points cannot be fitted; it needs at least {_FEWEST_POINTS}, over x and y, "
             "and heights that are not all zero"
         )
     return X, Y, H

@@ -39,7 +39,10 @@ class Bulge(BulgeSettings):
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict amplitude (mm), width (mm) and shape of each history at its times; see records.Predictor."""
+        """Predict amplitude (mm), width (mm) and shape of each history at its times; see records.Predictor.
+
+        theta : (candidates, parameters) internal values.
+        """
         from creepkit.specimens.bulge.finite_elements import predict_bulge
 
         return predict_bulge(self, law, theta, histories, nuisances or {}, sensitivities)

@@ -121,7 +121,7 @@ def simulate_profiles(
     level: float,
     tolerance: float = 5e-3,
 ) -> OfflineSimulation:
-    """Simulate, keeping the displacement of the top."""
+    """Simulate, keeping the displacement of the top; theta : (2,) ln A and n. level : ln(A P^n)."""
     settings = SolverSettings(
         tolerance=tolerance,
         newton=4e-3 * tolerance,

@@ -61,7 +61,10 @@ class BulgeReducedOrderModel:
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict amplitude, width and shape of each history at its times; see records.Predictor."""
+        """Predict amplitude, width and shape of each history at its times; see records.Predictor.
+
+        theta : (candidates, parameters) internal values.
+        """
         check_nuisances(nuisances or (), self.nuisances, "a bulge specimen")
         compiled = kernels.lower(law, "numba")
         theta, _ = broadcast_candidates(theta, nuisances, len(histories))
@@ -77,7 +80,7 @@ class BulgeReducedOrderModel:
         return assemble_prediction(parts, histories, OBSERVED, len(theta))
 
     def reference_stress(self, history: History) -> Floats:
-        """As the specimen's."""
+        """As the specimen's, (levels,) MPa."""
         return self.specimen.reference_stress(history)
 
 

@@ -252,7 +252,7 @@ _SIZES = (1.5, 1.18, 1.0, 0.8)
 
 
 def redistribution_sizes(deflections: Floats) -> Floats:
-    """Size of redistribution by D/h."""
+    """Size of redistribution; deflections : (...) D/h."""
     known = PchipInterpolator(np.log(0.1 + np.array(_DEFLECTIONS)), _SIZES)
     return np.asarray(known(np.log(0.1 + np.minimum(deflections, _DEFLECTIONS[-1]))))
 
