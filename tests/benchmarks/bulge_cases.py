@@ -76,7 +76,7 @@ class Case:
         specimen = self.specimen.replace(**changes)
         setup = set_up_test(specimen, self.history(np.array([end])), {})
         kernel = kernels.lower(self.model, "numba")
-        theta = kernel.to_internal(self.model.values(self.values))[0]
+        theta = self.model.to_internal(self.model.values(self.values))[0]
         return simulate(kernel, theta, setup.model, setup.load_history, settings=solver_settings(specimen)), setup
 
     def outcome(self, times: Floats, **changes: float) -> Floats:

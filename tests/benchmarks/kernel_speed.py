@@ -119,7 +119,7 @@ def numba_runs(law: CreepLaw, points: Any, values: dict[str, float]) -> list[tup
     """Compiled loops over rows."""
     compiled = ck.lower(law, "numba")
     x = np.column_stack([points, np.ones(len(points)), points[:, 0], points[:, 0] / 3])
-    theta, given = compiled.to_internal(values)[0], tuple(values.values())
+    theta, given = law.to_internal(values)[0], tuple(values.values())
     rate, derivatives = (
         loop_by_hand(f, several) for f, several in zip(LAWS[law.name](math), (False, True), strict=True)
     )

@@ -32,7 +32,7 @@ if sys.argv[1] == "combined":
 start = time.process_time()
 kernel = creepkit.lower(law, "numba")
 point = numpy.array([[100.0, 0.01, 10.0, 1000.0, 100.0, 33.0]])
-call_entry(kernel, "update", point, kernel.to_internal(law.center())[0])
+call_entry(kernel, "update", point, law.to_internal(law.center())[0])
 print(time.process_time() - start)
 """
 

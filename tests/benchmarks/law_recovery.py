@@ -32,7 +32,6 @@ from measured import Page, arguments, progress
 from proportions import share_with_interval
 
 import creepkit as ck
-from creepkit import kernels
 from creepkit.cli import set_numba_cache
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.selection.discrimination import equivalent_laws
@@ -104,7 +103,7 @@ def quantities(fit, source):
 
 def true_quantities(specimen, fit):
     """The four quantities of the planted values, and these values in the fit's coordinates."""
-    u = fit.coordinates.u(kernels.lower(specimen.law, "numba").to_internal(specimen.values)[0])
+    u = fit.coordinates.u(specimen.law.to_internal(specimen.values)[0])
     return [q[0] for q in quantities(fit, replace(fit, u=u))], u
 
 

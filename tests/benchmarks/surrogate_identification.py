@@ -21,7 +21,6 @@ import numpy as np
 from measured import Page, arguments
 
 import creepkit as ck
-from creepkit import kernels
 
 SEED = 78
 LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
@@ -55,7 +54,7 @@ def identified(law, test, using):
 
 def true_u(fit, values):
     """The true values in the coordinates of a fit."""
-    return fit.coordinates.u(kernels.lower(fit.law, "numba").to_internal(values)[0])
+    return fit.coordinates.u(fit.law.to_internal(values)[0])
 
 
 def rate_at(fit, u, stress):

@@ -102,7 +102,7 @@ def cpu_times(name: str, count: int, simulated: int, file: str | None) -> list[s
     """CPU times of one law, ms, and ratios."""
     law, surrogate, exact = ck.law(name), rate_surrogate(file, threads=1), Bulge(threads=1)
     kernel, many, few = kernels.lower(law, "numba"), scattered(name, count), scattered(name, simulated)
-    theta, factors = kernel.to_internal(many), surrogate.recipe.factors
+    theta, factors = law.to_internal(many), surrogate.recipe.factors
     thickness = {"thickness": np.full((1, 1), exact.geometry.apex_thickness)}
     some = {n: v[: max(1, count // 10)] for n, v in many.items()}
     spent = in_turns(
@@ -136,7 +136,7 @@ def wall_times(name: str, count: int, file: str | None) -> list[str]:
     """Wall times of one law on all cores, ms."""
     law, surrogate, cores = ck.law(name), rate_surrogate(file), len(os.sched_getaffinity(0))
     kernel, many = kernels.lower(law, "numba"), scattered(name, count)
-    theta, factors = kernel.to_internal(many), surrogate.recipe.factors
+    theta, factors = law.to_internal(many), surrogate.recipe.factors
     spent = in_turns(
         (lambda: predict(surrogate, law, many, [TEST]), 1),
         (

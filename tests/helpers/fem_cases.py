@@ -78,7 +78,7 @@ def run(
 ) -> Simulation:
     """Simulate without limits on deflection or strain, unless settings give them."""
     kernel = lowered(law)
-    theta = kernel.to_internal(values)[0]
+    theta = law.to_internal(values)[0]
     settings = SolverSettings(**{**FREE, **settings})
     return simulate(
         kernel, theta, finite_element_model(mesh), way, settings=settings, same_steps_as=like, keep_points=keep

@@ -34,7 +34,7 @@ G, K = E / (2 * (1 + NU)), E / (3 * (1 - 2 * NU))
 def driven(law: CreepLaw, values, controls, times, elastic=STEEL, temperature=300.0) -> PointTrajectory:
     kernel = lower(law, "numba")
     run = integrate_tensor_point(
-        kernel, kernel.to_internal(values)[0], elastic, controls, temperature, times, settings=ENDLESS
+        kernel, law.to_internal(values)[0], elastic, controls, temperature, times, settings=ENDLESS
     )
     assert run.status == Status.COMPLETE
     assert run.reason == ""

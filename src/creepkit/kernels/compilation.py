@@ -269,7 +269,6 @@ def compile_law(law: CreepLaw) -> CompiledLaw:
         update=module.update,
         sensitivity=module.sensitivity,
         names=law.names,
-        log_scale=frozen([p.scale == "log" for p in law.params.values()], dtype=bool),
         initial=initial,
         limits=frozen([np.inf if state.limit is None else state.limit for state in law.states.values()]),
         leading_exponent=partial(_leading_exponent, module, (*_REFERENCE_POINT, *initial)),

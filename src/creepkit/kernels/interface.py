@@ -18,7 +18,7 @@ The returned flags add up: 1 a rate is not finite, 2 a derivative is not finite.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -70,7 +70,6 @@ class CompiledLaw:
 
     rate, update, sensitivity : entries, to be passed to numba functions declared with ENTRY; each has `.address`.
     initial : (S,) states at time zero; limits : (S,) values at which the point has failed (inf: none).
-    log_scale : (P,) which internal parameters are logarithms.
     leading_exponent : function of theta (..., P) giving the exponent beta of time in strain ~ t^beta as t -> 0+ from a
         virgin state at constant stress, (...,). Where an exponent varies with the point, a second argument
         (..., 6 + S) says which; else it is taken at 100 MPa and 1000 K.
@@ -80,7 +79,6 @@ class CompiledLaw:
     update: Any
     sensitivity: Any
     names: tuple[str, ...]
-    log_scale: np.ndarray[Any, np.dtype[np.bool_]]
     initial: Floats
     limits: Floats
     leading_exponent: Callable[..., Floats]
@@ -91,14 +89,6 @@ class CompiledLaw:
     def states(self) -> int:
         """Number of internal variables, S."""
         return int(self.initial.size)
-
-    def to_internal(self, values: Mapping[str, Any]) -> Floats:
-        """Return theta, (candidates, P), from author's values {name: number or (candidates,)}."""
-        columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values[name], float)) for name in self.names))
-        theta = np.stack(columns, axis=-1) if columns else np.zeros((1, 0))
-        with np.errstate(divide="ignore"):
-            theta[:, self.log_scale] = np.log(theta[:, self.log_scale])
-        return np.ascontiguousarray(theta)
 
 
 _DOUBLE_POINTER = ctypes.POINTER(ctypes.c_double)

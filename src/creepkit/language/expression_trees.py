@@ -2,7 +2,7 @@
 
 A tree is a symbol ("stress"), an integer (2) or a list whose first entry is a head: ["mul", "A", ["pow", "stress",
 "n"]]. Other numbers are ["rational", 1, 3] and ["float", 0.1]; a Float of other than double precision is ["float",
-mantissa, exponent, bits]. Rebuilt expressions equal the original exactly, since sympy is told not to rearrange them.
+mantissa, exponent, bits]. Rebuilt expressions equal the original exactly, since sympy does not rearrange them.
 Evaluation works at mpmath's current precision; a number whose exponent would be astronomical raises OverflowError.
 """
 

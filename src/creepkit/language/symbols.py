@@ -150,7 +150,7 @@ class Param:
         return f"from {low:g} to {high:g}{unit}{off}"
 
     def within_bounds(self, value: float, relative_tolerance: float = 1e-9) -> bool:
-        """Say whether `value` lies within the bounds (to a relative `slack`) or is the off value."""
+        """Say whether `value` lies within the bounds (to a relative tolerance) or is the off value."""
         if self.off is not None and value == self.off:
             return True
         low, high = self.bounds

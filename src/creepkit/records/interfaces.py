@@ -104,7 +104,10 @@ class SupportsRupturePrediction(Predictor, Protocol):
     def predict_to_rupture(
         self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
     ) -> Prediction:
-        """Predict as predict() does, with `times_to_strain`: when measured strains are reached, and when it breaks."""
+        """Predict as predict() does, with `times_to_strain`: when measured strains are reached, and when it ruptures.
+
+        theta : (candidates, parameters) internal values.
+        """
         ...
 
 

@@ -1,4 +1,4 @@
-"""Loading of a specimen: programs in time, steps of stress or strain, a pressure jump, components at a material point."""
+"""Loading of a specimen: programs in time, steps of stress or strain, a pressure jump, components at a point."""
 
 from __future__ import annotations
 

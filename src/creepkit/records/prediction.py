@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
-
-if TYPE_CHECKING:
-    pass
-
 
 NuisanceValues: TypeAlias = Mapping[str, Floats]
 """{kind: (candidates or 1, tests)}: the value of an explicit nuisance in each test."""
@@ -31,14 +27,15 @@ class Status(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class TimesToStrain:
-    """When a prediction arrives at what was measured, and when it breaks, for candidates x tests, padded as there.
+    """When a prediction reaches what was measured, and when it ruptures, for candidates x tests, padded as Prediction.
 
-    arrivals : (candidates, tests, times) s, when the strain measured at each frame is predicted; the rupture where that
+    times : (candidates, tests, times) s, when the strain measured at each frame is predicted; the rupture where that
         comes first; 0 where the measured strain is not above zero, NaN where neither comes before the horizon.
-    slopes : (candidates, tests, times) derivative of the predicted output to ln t there, infinite at rupture.
-    ruptures : (candidates, tests) s, NaN where the specimen lasts to the horizon.
+    log_time_derivatives : (candidates, tests, times) derivative of the predicted output to ln t there, infinite at
+        rupture.
+    rupture_times : (candidates, tests) s, NaN where the specimen lasts to the horizon.
     horizon : (tests,) s, up to which was predicted.
-    arrival_jacobian, rupture_jacobian : (..., parameters) derivatives of the ln of these times with respect to the
+    time_jacobian, rupture_jacobian : (..., parameters) derivatives of the ln of these times with respect to the
         law's internal parameters, or None.
     """
 
@@ -54,15 +51,16 @@ class TimesToStrain:
 class Prediction:
     """Predicted outputs for candidates x tests, padded to the longest test.
 
-    values : (candidates, tests, times, outputs); NaN after a row's end and beyond a test's last time.
+    values : (candidates, tests, times, outputs) in the units of the outputs; NaN after a row's end and
+        beyond a test's last time.
     outputs : names along the last axis.
     lengths : (tests,) number of times of each test.
     status : (candidates, tests) Status of each row; end_times : (candidates, tests) s, where it ended.
     jacobian : (candidates, tests, times, outputs, parameters) or None: derivatives with respect to the law's
         *internal* parameters (the natural logarithm where the scale is log), in the law's order.
-    nuisance_jacobian : {kind: (candidates, tests, times, outputs)}: derivatives with respect to each test's own effect,
-        in the unit of that kind (see Nuisance); without the kinds that the predictor cannot differentiate.
-    life : when measured strains are arrived at, and rupture, where that was asked for (see WholeLife).
+    nuisance_jacobian : {kind: (candidates, tests, times, outputs)}: derivatives with respect to each test's own
+        nuisance, in the unit of that kind (see Nuisance); without the kinds that the predictor cannot differentiate.
+    times_to_strain : when measured strains and rupture are reached, where that was asked for (see TimesToStrain).
     """
 
     values: Floats
@@ -84,7 +82,7 @@ NuisanceKind: TypeAlias = Literal["offset", "rate", "thickness", "modulus", "tem
 
 
 SIMULATED_NUISANCES: tuple[NuisanceKind, ...] = ("thickness", "modulus", "temperature", "window")
-"""Kinds that change the simulation; "offset" and "rate" only change how its residuals scatter."""
+"""Kinds that change the simulation; "offset" and "rate" only enter the covariance of its residuals."""
 
 
 LENGTH_NUISANCES: tuple[NuisanceKind, ...] = ("thickness", "window")
@@ -93,13 +91,13 @@ LENGTH_NUISANCES: tuple[NuisanceKind, ...] = ("thickness", "window")
 
 @dataclass(frozen=True)
 class Nuisance:
-    """Something unknown about a test that is not part of the law, with its prior.
+    """A nuisance parameter: something unknown about a test that is not part of the law, with its prior.
 
     kind : "offset" (added to an output, in its unit), "rate" (ln of a factor on this test's creep rate: heat-to-heat
         scatter), "thickness" (the apex thickness itself, mm), "window" (the radius within which the profile was
-        observed, mm), "modulus" (relative change of Young's modulus: .05 makes it 5 % stiffer) or "temperature"
+        observed, mm), "modulus" (relative change of Young's modulus: 0.05 makes it 5 % stiffer) or "temperature"
         (K above what the history says).
-    scope : one unknown for each "test", each "alloy", or for "all" tests together.
+    scope : one nuisance parameter for each "test", each "alloy", or for "all" tests together.
     output : to which output an offset belongs; "" stands for each output having its own.
     mean, sd : Gaussian prior, in the unit of the kind; sd = inf leaves it free, sd = None lets the fit estimate the
         spread. A thickness and a window are lengths, and so is their mean: `Nuisance("thickness", mean=0.4935,

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from creepkit.inverse.search.cost_function import SearchTrace
+    from creepkit.inverse.search.global_search import SearchTrace
     from creepkit.inverse.sparsity.bootstrap import SelectionFrequencies
     from creepkit.inverse.sparsity.result import PenaltyPath, Sparsity
 

@@ -42,8 +42,8 @@ class Bar:
     """A bar; a kind of it says what its point goes through, what its instrument shows, and how that moves with creep.
 
     tolerance : relative local error of a step of the integration; the output is then within about ten times of it.
-    strain_limit : logarithmic creep strain at which the bar has burst.
-    max_steps : cap on the steps of one history, beside STEPS_FOR_A_BREAK for each row of its programs.
+    strain_limit : logarithmic creep strain at which the bar has ruptured.
+    max_steps : cap on the steps of one history, beside STEPS_PER_BREAKPOINT for each row of its programs.
     """
 
     tolerance: float = 1e-5
@@ -70,7 +70,7 @@ class Bar:
         """The same specimen with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
-    # ---- what a kind of bar says -----------------------------------------------------------------------------------
+    # ---- of each kind of bar --------------------------------------------------------------------------------------
 
     def point_test(self, history: History) -> PointTest:
         """What the material point of a history goes through."""
@@ -81,20 +81,23 @@ class Bar:
         raise NotImplementedError
 
     def output_derivative(self, history: History, creep: Floats) -> Floats:
-        """Derivative of the output to the creep strain."""
+        """Derivative of the output to the creep strain, (candidates, times)."""
         raise NotImplementedError
 
     def modulus_derivative(
         self, result: Prediction, histories: Sequence[History], modulus_changes: Floats
     ) -> Floats | None:
-        """Derivative of the values to the relative change of the modulus; None leaves it to differences."""
+        """Derivative of the values, (candidates, tests, times, 1), to the relative change of the modulus.
+
+        modulus_changes : (tests,) the changes themselves. None leaves the derivative to differences.
+        """
         return None
 
     def end_reason(self, history: History, reason: str, output: Floats, end: float) -> str:
         """Why a test ended at `end`, s, from what the integration says; output : (times,) up to there, then NaN."""
         return reason
 
-    # ---- what follows from it --------------------------------------------------------------------------------------
+    # ---- of every bar ---------------------------------------------------------------------------------------------
 
     def predict(
         self,

@@ -1,6 +1,9 @@
 """A material point under prescribed stresses and total strains of its six components.
 
-Outputs are "strain", the equivalent creep strain, "strain_11" to "strain_13", the components of creep strain (of the tensor; elastic strain is added where the history says so), and "stress_11" to "stress_13", MPa. Small strain, isotropic elasticity, creep along the deviator of stress. Derivatives are exact under proportional loading, else central differences.
+Outputs are "strain", the equivalent creep strain, "strain_11" to "strain_13", the components of creep strain (of the
+tensor; elastic strain is added where the history says so), and "stress_11" to "stress_13", MPa. Small strain,
+isotropic elasticity, creep along the deviator of stress. Derivatives are exact under proportional loading, else
+central differences.
 """
 
 from __future__ import annotations
@@ -52,7 +55,7 @@ class MaterialPoint:
     """A material point.
 
     tolerance : relative local error of a step of the integration. strain_limit : equivalent creep strain at which the
-    point has burst. max_steps : cap on the steps of one history, beside those for its frames and each row of its
+    point has ruptured. max_steps : cap on the steps of one history, beside those for its frames and each row of its
     programs.
     """
 
@@ -99,7 +102,7 @@ class MaterialPoint:
         return run_material_point(self, law, values, plan)
 
     def reference_stress(self, history: History) -> Floats:
-        """The von Mises stresses that are prescribed, or would be if nothing crept, MPa."""
+        """The von Mises stresses that are prescribed, or would be if nothing crept, (levels,) MPa."""
         return elastic_von_mises(_loading(history), None if history.elastic is None else _elastic(history))
 
     def reference_strain(self, history: History) -> float:
@@ -160,7 +163,7 @@ class MaterialPoint:
         return HistoryPrediction(values, result.status[:, 0], result.end_times[:, 0], changes)
 
     def simulate(self, kernel: CompiledLaw, theta: Floats, history: History) -> PointTrajectory:
-        """March one candidate, theta (P,) in internal form, through one history in six components."""
+        """Integrate one candidate, theta (P,) internal values, through one history in six components."""
         from creepkit.integration.tensor_integration import integrate_tensor_point, prescribed_strain, prescribed_stress
         from creepkit.integration.time_discretisation import SDIRK4
 
@@ -224,7 +227,7 @@ def _imposed(history: History) -> Floats:
 
 
 def point_outputs(run: PointTrajectory, history: History) -> Floats:
-    """The outputs of a driven point, (frames, outputs), NaN after its end."""
+    """The outputs of a simulated point, (frames, outputs), NaN after its end."""
     strains = run.strain if history.includes_elastic else run.creep_strain
     rows = np.concatenate([run.equivalent[:, None], strains, run.stress], axis=1)
     shown = np.full((history.times.size, len(OUTPUTS)), np.nan)

@@ -42,13 +42,13 @@ class Relaxation(Bar):
         return point_test(history)
 
     def observed_output(self, history: History, creep: Floats) -> Floats:
-        """The stress, MPa; NaN where a step down compresses the bar."""
+        """The stress, (candidates, times) MPa; NaN where a step down compresses the bar."""
         test = point_test(history)
         stress = np.asarray(test.driving.at(history.times) - test.stiffness * creep)
         return np.where(stress < -STRESS_TOLERANCE * float(np.max(test.driving.values)), np.nan, stress)
 
     def output_derivative(self, history: History, creep: Floats) -> Floats:
-        """Minus the modulus."""
+        """Minus the modulus, (candidates, times) MPa."""
         return np.full_like(creep, -point_test(history).stiffness)
 
     def end_reason(self, history: History, reason: str, output: Floats, end: float) -> str:
@@ -62,13 +62,13 @@ class Relaxation(Bar):
         return reason
 
     def reference_stress(self, history: History) -> Floats:
-        """The elastic stress of each strain and the last stress seen, MPa: what a law is looked at in a test."""
+        """The least and the largest stress at which a law acts in a test, (2,) MPa: measured, and elastic."""
         levels = np.unique(point_test(history).driving.values)
         outputs = np.abs(history.outputs["stress"][history.used]) if "stress" in history.outputs else levels[levels > 0]
         return np.array([float(np.min(outputs[outputs > 0], initial=levels.max())), float(levels.max())])
 
     def reference_strain(self, history: History) -> float:
-        """The largest creep strain that a test reached, as far as its stress tells."""
+        """The largest creep strain that a test reached, as far as its stress says."""
         test = point_test(history)
         fallen = test.driving.at(history.times) - history.outputs["stress"]
         return float(np.max(fallen[history.used], initial=0.0)) / test.stiffness

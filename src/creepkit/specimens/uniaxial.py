@@ -1,6 +1,8 @@
 """Uniaxial tension: a bar under steps of stress or load and of temperature, observed by its creep strain.
 
-Under constant load the true stress is the nominal one times exp(creep strain). An engineering strain is exp(creep strain) - 1; a strain that includes the elastic part has stress/E(T) added. Times to given strains and to rupture are predicted too.
+Under constant load the true stress is the nominal one times exp(creep strain). An engineering strain is exp(creep
+strain) - 1; a strain that includes the elastic part has stress/E(T) added. Times to given strains and to rupture are
+predicted too.
 """
 
 from __future__ import annotations
@@ -37,17 +39,20 @@ class Uniaxial(Bar):
         return point_test(history)
 
     def observed_output(self, history: History, creep: Floats) -> Floats:
-        """The strain of the history's measure."""
+        """The strain of the history's measure, (candidates, times)."""
         return observed_strain(history, creep)
 
     def output_derivative(self, history: History, creep: Floats) -> Floats:
-        """Derivative of the observed strain to the creep strain."""
+        """Derivative of the observed strain to the creep strain, (candidates, times)."""
         return np.exp(creep) if history.strain_measure == "engineering" else np.ones_like(creep)
 
     def predict_to_rupture(
         self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
     ) -> Prediction:
-        """Predict as predict() does, and follow each bar to its rupture: by a state's limit, or by the strain limit."""
+        """Predict as predict() does, and follow each bar to its rupture: by a state's limit, or by the strain limit.
+
+        theta : (candidates, parameters) internal values.
+        """
         levels = [strain_levels(history, self.point_test(history)) for history in histories]
         result = self._integrate(law, theta, [own.test for own in levels], sensitivities)
         prediction = self._observed_prediction(histories, result)
@@ -61,7 +66,10 @@ class Uniaxial(Bar):
         )
 
     def modulus_derivative(self, result: Prediction, histories: Sequence[History], modulus_changes: Floats) -> Floats:
-        """Derivative of the strain to the relative change of the modulus: that of its elastic part."""
+        """Derivative of the strain, (candidates, tests, times, 1), to the relative change of the modulus.
+
+        It is that of the elastic part; modulus_changes : (tests,) the changes themselves.
+        """
         slope = np.zeros_like(result.values)
         for k, history in enumerate(histories):
             if history.includes_elastic:
@@ -108,11 +116,11 @@ EARLIEST_RUPTURE = 1e-12
 
 @dataclass(frozen=True)
 class StrainLevels:
-    """The creep strains of a history's frames as levels to arrive at.
+    """The creep strains of a history's frames as levels to be reached.
 
     test : the point test that is followed to the horizon.
     frames : of each level its frame; creep : (frames,) logarithmic creep strain that was measured; where not finite or
-        not above LEAST a frame has no level.
+        not above SMALLEST_STRAIN a frame has no level.
     """
 
     test: PointTest

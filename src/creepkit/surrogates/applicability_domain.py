@@ -1,10 +1,10 @@
 """The applicability domain of a surrogate: how far inputs lie from the training rows.
 
-A row of inputs is inside when each stands within the range of the training rows (with a margin) and the
-row lies no farther from their middle than the farthest training row as the others see it: Mahalanobis distance, whose
-leave-one-out value has a closed form. The range catches one input that leaves its range, the distance a combination that
-never occurred (a coefficient and an exponent that between them make no creep). What never varied in training may not
-vary at all.
+A row of inputs is inside when each stands within the range of the training rows (with a margin) and the row lies no
+farther from their middle than the farthest training row as the others see it: Mahalanobis distance, whose
+leave-one-out value has a closed form. The range catches one input that leaves its range, the distance a combination
+that never occurred (a coefficient and an exponent that between them make no creep). What never varied in training may
+not vary at all.
 """
 
 from __future__ import annotations

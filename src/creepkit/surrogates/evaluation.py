@@ -1,6 +1,9 @@
 """Evaluation of surrogates against data: Eq. (4) of the paper, MSE, MAE, R2, and the largest errors of whole histories.
 
-Eq. (4): O^i is the vector of outputs at the i-th time, each divided by its standard deviation over the training rows; its mean is taken over samples at the i-th time; squares are summed over samples, times and outputs, numerator and denominator separately. Frames after the end of a history are excluded. For a single output at a single time it is 1 - R2.
+Eq. (4): O^i is the vector of outputs at the i-th time, each divided by its standard deviation over the training rows;
+its mean is taken over samples at the i-th time; squares are summed over samples, times and outputs, numerator and
+denominator separately. Frames after the end of a history are excluded. For a single output at a single time it is 1 -
+R2.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ if TYPE_CHECKING:
 
 
 PAPER_EVALUATION_TIMES = (7_500.0, 22_500.0, 37_500.0)
-"""s, at which Fig. 4 looks; other lengths of tests are looked at after the same shares of twelve hours."""
+"""s, of Fig. 4; tests of other lengths are evaluated at the same shares of their end as of twelve hours."""
 
 
 PAPER_TEST_DURATION = 43_200.0
@@ -110,7 +113,7 @@ def error_metrics(true: Floats, predicted: Floats, mask: Bools) -> dict[str, flo
 
 
 def comparison_metrics(comparison: PredictionComparison, times: Sequence[float]) -> dict[str, Any]:
-    """Everything that is told of a network: {"loss", "outputs", "times", "worst", "samples"}; NaN becomes None."""
+    """Everything that is stated of a network: {"loss", "outputs", "times", "worst", "samples"}; NaN becomes None."""
     largest = comparison.largest_errors()
     outputs = {}
     for k, name in enumerate(comparison.outputs):
@@ -174,7 +177,7 @@ EVALUATION_BATCH = 256
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """What a surrogate predicts of samples beside what is true, the metrics of it, and the times these look at."""
+    """Predictions of a surrogate beside the truth, their metrics, and the times at which those are evaluated."""
 
     comparison: PredictionComparison
     metrics: dict[str, Any]

@@ -1,4 +1,4 @@
-"""ParameterGru: the surrogate of one law as in the paper, with optional improvements at the same size, and its predictor."""
+"""ParameterGru: the surrogate of one law as in the paper, with optional improvements, and its predictor."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ class ParameterGru:
         frame before: it tells when between two frames the load jumped), "time" and "step". () is "load" alone, and for
         grids that stretch with the test "load", "mean_load", "time" and "step".
     target : "value" of the first output, or its "log".
-    base : "none"; or "one-dof": the specimen's cheap stand-in predicts the first output, and the network corrects the
-        logarithm of it. Derivatives are then left to differences.
+    base : "none"; or "one-dof": the specimen's reduced-order model predicts the first output, and the network corrects
+        the logarithm of it. Derivatives are then left to differences.
     """
 
     hidden: int = 128
@@ -91,10 +91,10 @@ class ParameterGru:
             if name not in SERIES_INPUTS:
                 raise SurrogateError(f"ParameterGru: there is no input '{name}': {nearest(name, SERIES_INPUTS)}")
 
-    # ---- what the trainer asks -------------------------------------------------------------------------------------
+    # ---- for the training ------------------------------------------------------------------------------------------
 
     def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:
-        """Tensors of a data set: constants, series, targets, mask, base, and "domain" for the guard."""
+        """Tensors of a data set: constants, series, targets, mask, base, and "domain" for the applicability domain."""
         law, history_inputs = LawInputs(data.law), self._history_inputs(data)
         mask = np.asarray(np.isfinite(data.values).all(axis=-1))
         constants, series, domain_rows = load_history_arrays(data, history_inputs, progress)
@@ -111,12 +111,12 @@ class ParameterGru:
         return {**tensors, "mask": torch.from_numpy(mask), "domain": torch.from_numpy(domain)}
 
     def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
-        """A fresh network with the scales of the training rows."""
+        """A fresh network with the scales of the training rows; train : (rows,) their positions."""
         sizes = samples["constants"].shape[-1], samples["series"].shape[-1], len(data.outputs)
         return self._network(sizes).with_scales(samples, train)
 
     def metadata(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateMetadata:
-        """Scales by name, the domain, and what was constant."""
+        """Scales by name, the domain, and what was constant; train : (rows,) positions of training rows."""
         history_inputs, law = self._history_inputs(data), LawInputs(data.law)
         names = (*law.names, *history_inputs.constants)
         module = self.module(data, samples, train)
@@ -177,7 +177,7 @@ def _is_constant(column: Tensor) -> bool:
 
 
 NUISANCE_OF_INPUT = {"modulus": "modulus", "apex_thickness": "thickness", "temperature": "temperature"}
-"""{input: the nuisance that moves it}."""
+"""{input: the nuisance that changes it}."""
 
 
 BATCH_NUMBERS = 2**24
@@ -186,11 +186,11 @@ BATCH_NUMBERS = 2**24
 
 @dataclass(frozen=True, eq=False)
 class NetworkQuery:
-    """What is asked of the network: candidates x tests.
+    """Inputs of the network for candidates x tests.
 
-    theta : (candidates, parameters) internal. rows : (candidates, columns) of the law, as the network sees them.
-    numbers : (candidates, tests, constants). series : (tests, frames, series). base : (candidates, tests, frames).
-    slopes : {effect: (candidates, tests, constants)} derivatives of the numbers.
+    theta : (candidates, parameters) internal values. law_rows : (candidates, columns) of the law, as network inputs.
+    constants : (candidates, tests, constants). series : (tests, frames, series). base : (candidates, tests, frames).
+    derivatives : {nuisance: (candidates, tests, constants)} of the constants.
     """
 
     theta: Floats
@@ -201,7 +201,7 @@ class NetworkQuery:
     derivatives: Mapping[str, Floats]
 
     def batch(self, candidates: slice) -> SampleTensors:
-        """Some candidates, each with every test: what the module eats, a row for each pair."""
+        """Some candidates, each with every test: inputs of the module, a row for each pair."""
         constants = self.constants[candidates]
         count, tests = constants.shape[:2]
         rows = np.repeat(self.law_rows[candidates], tests, axis=0)
@@ -233,7 +233,7 @@ class ParameterSurrogate(Surrogate):
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
+        """Predict each history's outputs at its times; see Surrogate.predict. theta : (candidates, parameters)."""
         check_applicable(self.metadata, histories, nuisances or (), self.nuisances)
         complete_theta = complete_parameters(self.metadata.law, law, theta)
         complete_theta, nuisances = broadcast_candidates(complete_theta, nuisances, len(histories))
@@ -250,7 +250,7 @@ class ParameterSurrogate(Surrogate):
             parts.append(replace(part, status=status[:, k]))
         return assemble_prediction(parts, histories, self.outputs, len(complete_theta))
 
-    # ---- what the network is asked ---------------------------------------------------------------------------------
+    # ---- inputs of the network ----------------------------------------------------------------------------------
 
     @cached_property
     def _history_inputs(self) -> LoadHistoryInputs:
@@ -295,7 +295,7 @@ class ParameterSurrogate(Surrogate):
         prediction = reduced_order_model_of(self.specimen).predict(self.metadata.law, theta, tests, nuisances=nuisances)
         return hold_last_value(prediction.values[..., prediction.outputs.index(self.outputs[0])])
 
-    # ---- what it answers -------------------------------------------------------------------------------------------
+    # ---- outputs ---------------------------------------------------------------------------------------------------
 
     @torch.no_grad()
     def _values(self, query: NetworkQuery) -> Floats:
@@ -306,7 +306,7 @@ class ParameterSurrogate(Surrogate):
 
     @torch.no_grad()
     def _derivatives(self, query: NetworkQuery, positions: Sequence[int]) -> Floats:
-        """(candidates, tests, frames, outputs, directions): to the parameters `own`, then to the nuisances."""
+        """(candidates, tests, frames, outputs, directions): to the parameters at `positions`, then to the nuisances."""
         width = (len(positions) + len(query.derivatives)) * self._double_precision.network.hidden_size * 4
         parts = [self._batch_derivatives(query, part, positions) for part in _batches(query, width)]
         return np.concatenate(parts).reshape(*query.constants.shape[:2], *parts[0].shape[1:])
@@ -371,7 +371,7 @@ class ParameterSurrogate(Surrogate):
         return np.where(outside, int(Status.OUTSIDE_DOMAIN), int(Status.COMPLETE)).astype(np.int64)
 
     def _domain_inputs(self, query: NetworkQuery, histories: Sequence[History], frames: Sequence[Floats]) -> Floats:
-        """(candidates, tests, inputs) what the guard sees."""
+        """(candidates, tests, inputs) of the applicability domain."""
         count, tests, constants = query.constants.shape
         test_rows = np.stack([self._history_inputs.domain_inputs(h, t) for h, t in zip(histories, frames, strict=True)])
         test_summary = np.broadcast_to(test_rows[None, :, constants:], (count, tests, test_rows.shape[1] - constants))

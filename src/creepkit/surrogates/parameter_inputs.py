@@ -1,6 +1,8 @@
 """Inputs of ParameterGru: law parameters, load history, test conditions, and the values of a reduced law.
 
-Parameters on a log scale enter as log10. A coefficient that is switched off (0) has a NaN column, standardised to zero, and an indicator column equal to one. A law that lacks terms of the trained law is predicted with the coefficients of these terms at zero.
+Parameters on a log scale enter as log10. A coefficient that is switched off (0) has a NaN column, standardised to
+zero, and an indicator column equal to one. A law that lacks terms of the trained law is predicted with the
+coefficients of these terms at zero.
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ the time since the frame before."""
 
 
 TEMPERATURE_STEP = 0.1
-"""K, by which a modulus is differenced."""
+"""K, of the central difference of a modulus."""
 
 
 JUMP_TOLERANCE = 0.02
@@ -48,8 +50,8 @@ LARGEST_TEMPERATURE_CHANGE = 1.0
 class LoadHistoryInputs:
     """Inputs that tests of one specimen give.
 
-    constants : of CONSTANTS, those that the data set varied. series : of SERIES, those of the recipe. relative :
-    whether frames are at shares of a test's end.
+    constants : of CONSTANT_INPUTS, those that the data set varied. series : of SERIES_INPUTS, those of the
+    recipe. relative : whether frames are at shares of a test's end.
     """
 
     specimen: Specimen
@@ -96,7 +98,7 @@ class LoadHistoryInputs:
         return np.stack([_SERIES_FUNCTIONS[name](program, times) for name in self.series], axis=1)
 
     def domain_inputs(self, history: History, times: Floats) -> Floats:
-        """What the domain guard sees of a test, named by `domain_names`.
+        """Inputs of the applicability domain from a test, named by `domain_names`.
 
         The constants, and a thickness also where it did not vary; of the load over the frames the value at the first
         that is loaded, the last, the mean, and how unlike one jump from the first to the last it is; and where grids
@@ -126,8 +128,8 @@ def _constant_input(name: str, history: History, specimen: Specimen) -> float:
     temperature = history.temperature_program().values
     if name in ("modulus", "temperature") and np.ptp(temperature) > LARGEST_TEMPERATURE_CHANGE:
         raise SurrogateError(
-            f"{where}: its temperature goes from {temperature.min():g} to {temperature.max():g} K; the surrogate was trained at "
-            "temperatures that do not change, use the specimen itself"
+            f"{where}: its temperature goes from {temperature.min():g} to {temperature.max():g} K; the surrogate was "
+            "trained at temperatures that do not change, use the specimen itself"
         )
     if name == "temperature":
         return float(temperature.mean())
@@ -256,7 +258,7 @@ def _zero_coefficients(trained: CreepLaw, law: CreepLaw) -> frozenset[str]:
     coefficients = [_term_coefficient(trained, label) for label in missing_labels]
     if not is_reduction or None in coefficients or dict(law.states) != dict(trained.states):
         raise SurrogateError(
-            f"a surrogate of law '{trained.name}' cannot predict law '{law.name}': it answers for its own law, and for "
+            f"a surrogate of law '{trained.name}' cannot predict law '{law.name}': it predicts its own law, and "
             f"that less some of its terms ({', '.join(trained.terms)}) by {trained.name}.without(...)"
         )
     return frozenset(name for name in coefficients if name is not None)
@@ -274,7 +276,7 @@ def _term_coefficient(law: CreepLaw, label: str) -> str | None:
 
 
 def base_outputs(data: Dataset, progress: ProgressCallback | None = None) -> Floats:
-    """(n, frames) what the specimen's stand-in predicts of the first output; its last value after its end."""
+    """(n, frames) first output of the specimen's reduced-order model; its last value after its end."""
     reduced_model = reduced_order_model_of(data.specimen)
     base, theta = np.empty(data.values.shape[:2]), data.law.to_internal(data.parameters)
     for k in range(len(data)):
@@ -289,7 +291,7 @@ def base_outputs(data: Dataset, progress: ProgressCallback | None = None) -> Flo
 def load_history_arrays(
     data: Dataset, history_inputs: LoadHistoryInputs, progress: ProgressCallback | None
 ) -> tuple[Floats, ...]:
-    """Constants (n, C), series (n, frames, S) and what the guard sees (n, ...) of all tests."""
+    """Constants (n, C), series (n, frames, S) and inputs of the applicability domain (n, ...) of all tests."""
     parts = []
     for k in range(len(data)):
         plan, times = data.planned_test(k), data.times(k)
@@ -309,9 +311,9 @@ def load_history_arrays(
 
 
 def reduced_order_model_of(specimen: Any) -> Any:
-    """The specimen's cheap stand-in; SurrogateError where it has none."""
+    """The specimen's reduced-order model; SurrogateError where it has none."""
     if not isinstance(specimen, SupportsReducedOrderModel):
-        raise SurrogateError(f"specimen '{specimen.name}' has no stand-in of one degree of freedom; use base='none'")
+        raise SurrogateError(f"specimen '{specimen.name}' has no reduced-order model; use base='none'")
     return specimen.reduced_order_model()
 
 

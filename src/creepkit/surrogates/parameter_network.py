@@ -1,6 +1,7 @@
 """The recurrent network of ParameterGru, and its forward-mode derivatives.
 
-torch differentiates recurrent layers backwards, once for each output and frame. A fit needs the derivatives to a dozen inputs at all frames, so they are carried forward with the values.
+torch differentiates recurrent layers backwards, once for each output and frame. A fit needs the derivatives to a
+dozen inputs at all frames, so they are carried forward with the values.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
-"""RateNet: a surrogate of the bulge test that takes creep rates as input and therefore applies to laws outside its training.
+"""RateNet: a surrogate of the bulge test that takes creep rates as input, also for laws outside its training.
 
-The reduced-order model of the dimple follows a law along a reference path. At each node the network receives how the rate of the law changes around the path, and means of that over the creep so far, and returns a correction of the reduced-order model. It is trained on the rate family.
+The reduced-order model of the dimple follows a law along a reference path. At each node the network receives how the
+rate of the law changes around the path, and means of that over the creep so far, and returns a correction of the
+reduced-order model. It is trained on the rate family.
 """
 
 from __future__ import annotations
@@ -74,9 +76,9 @@ others. A pressure that falls or cycles, or a thicker roof, is another matter.
 
 @dataclass(frozen=True)
 class RateNet:
-    """What is asked of a law around the reference path, and the network that hears it.
+    """The points around the reference path at which a law is evaluated, and the network that takes these rates.
 
-    hidden, layers : of the network. stress_factors, strain_factors : where the rate is asked for, as shares of the
+    hidden, layers : of the network. stress_factors, strain_factors : where the rate is evaluated, as shares of the
     reference stress and strain.
     """
 
@@ -106,7 +108,7 @@ class RateNet:
         """Where the features are taken."""
         return FeatureFactors(np.array(self.stress_factors), np.array(self.strain_factors))
 
-    # ---- what the trainer asks -------------------------------------------------------------------------------------
+    # ---- for the training ------------------------------------------------------------------------------------------
 
     def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:
         """Tensors of a data set: inputs and base at nodes, weights of frames, targets and masks."""
@@ -148,11 +150,11 @@ class RateNet:
         return {**single, "mask": torch.from_numpy(mask), "nodes": node_mask, "domain": domain_rows}
 
     def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
-        """A fresh network with the scales of the training rows."""
+        """A fresh network with the scales of the training rows; train : (rows,) their positions."""
         return RateModule(samples["inputs"].shape[-1], self.hidden, self.layers).with_scales(samples, train)
 
     def metadata(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateMetadata:
-        """Scales and domain."""
+        """Scales and domain; train : (rows,) positions of training rows."""
         module = self.module(data, samples, train)
         assert isinstance(module, RateModule)
         input_labels = input_names(self._feature_count)
@@ -194,7 +196,7 @@ def bulge_of(data: Dataset) -> Bulge:
 
 
 def base_columns(trajectory: Any) -> Any:
-    """(..., nodes, 4) what the network corrects, from courses (..., nodes, columns)."""
+    """(..., nodes, 4) what the network corrects, from trajectories (..., nodes, columns)."""
     return trajectory[..., [TRAJECTORY_COLUMNS.index(name) for name in BASE_COLUMNS]]
 
 
@@ -214,7 +216,7 @@ def _domain_nodes(nodes: int) -> list[int]:
 
 
 VALUE_BATCH_NUMBERS = 2**17
-"""Numbers in the courses that a thread looks at, about what a cache holds."""
+"""Numbers in the trajectories of a batch of one thread, about what a cache holds."""
 
 
 DERIVATIVE_BATCH_NUMBERS = 2**22
@@ -232,7 +234,7 @@ class NodeOutputs(NamedTuple):
 
 
 class RateSurrogate(Surrogate):
-    """The one-degree-of-freedom model of a dimple, corrected by a network; for any law."""
+    """The reduced-order model of a dimple, corrected by a network; for any law."""
 
     recipe: RateNet
     nuisances = NUISANCE_DIRECTIONS
@@ -240,7 +242,7 @@ class RateSurrogate(Surrogate):
     @property
     def title(self) -> str:
         """One line for people."""
-        return f"{self.specimen.title}, by a network fed with creep rates; for any law"
+        return f"{self.specimen.title}, by a network of creep rates; for any law"
 
     def predict(
         self,
@@ -251,7 +253,7 @@ class RateSurrogate(Surrogate):
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict each history's outputs at its times; see records.Predictor and Surrogate.predict."""
+        """Predict each history's outputs at its times; see Surrogate.predict. theta : (candidates, parameters)."""
         check_applicable(self.metadata, histories, nuisances or (), self.nuisances)
         specimen, compiled = self.specimen, kernels.lower(law, "numba")
         assert isinstance(specimen, Bulge)
@@ -292,7 +294,7 @@ class RateSurrogate(Surrogate):
         return torch.from_numpy(np.array(nuisances["thickness"][:, test]) if "thickness" in nuisances else thicknesses)
 
     def _node_outputs(self, trajectories: Trajectories, test: int, thickness: Tensor, threads: int) -> NodeOutputs:
-        """What the network makes of the courses of one test."""
+        """The corrected outputs at the nodes of one test."""
         nodes = trajectories.schedules[test].times.size
         trajectory = torch.from_numpy(trajectories.values[:, test, :nodes])
         values, outside = self._values(trajectory, thickness, threads)
@@ -307,7 +309,7 @@ class RateSurrogate(Surrogate):
         return NodeOutputs(values, np.concatenate(derivative_parts), outside)
 
     def _values(self, trajectory: Tensor, thickness: Tensor, threads: int) -> tuple[Floats, Bools]:
-        """Outputs at nodes, and who is outside; threads share the candidates."""
+        """Outputs at nodes, and which candidates are outside the domain; threads share the candidates."""
         step = max(1, min(VALUE_BATCH_NUMBERS // trajectory[0].numel(), -(-len(trajectory) // threads)))
         parts = [slice(k, k + step) for k in range(0, len(trajectory), step)]
         values, outside = np.empty((*trajectory.shape[:2], 3)), np.zeros(len(trajectory), bool)

@@ -1,6 +1,7 @@
 """Inputs and network of RateNet: rate features along the path of the reduced-order model, and its correction.
 
-Times, rates and stresses enter as ratios only, so that inputs do not depend on the length of the test or the units of the law.
+Times, rates and stresses enter as ratios only, so that inputs do not depend on the length of the test or the units of
+the law.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COL
 from creepkit.surrogates.recipe import SampleTensors, SurrogateModule
 
 FEATURE_START = len(TRAJECTORY_COLUMNS)
-"""Where features begin in a course."""
+"""First column of the features in a trajectory."""
 
 
 LOCAL_INPUTS = (
@@ -28,7 +29,7 @@ LOCAL_INPUTS = (
     "log10 strain/(rate time)",
     "apex thickness",
 )
-"""What is known at a node beside the features; see specimens.reduced_courses for the columns they are made of."""
+"""What is known at a node beside the features; see TRAJECTORY_COLUMNS for what they are made of."""
 
 
 MEMORY_STRAIN = 1.0
@@ -50,7 +51,7 @@ def input_names(features: int) -> tuple[str, ...]:
 
 
 def network_inputs(trajectory: Tensor, thickness: Tensor) -> Tensor:
-    """(rows, nodes, inputs) from courses (rows, nodes, columns) and apex thicknesses (rows,) mm."""
+    """(rows, nodes, inputs) from trajectories (rows, nodes, columns) and apex thicknesses (rows,) mm."""
     return with_running_means(trajectory, local_inputs(trajectory, thickness))
 
 
@@ -130,7 +131,7 @@ width (mm) or shape.
 
 
 _LARGEST_INPUT = 6.0
-"""Standard deviations that the network looks at."""
+"""Standard deviations to which inputs are limited."""
 
 
 class RateModule(SurrogateModule):

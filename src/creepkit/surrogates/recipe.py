@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 SampleTensors: TypeAlias = dict[str, Tensor]
 """Tensors whose leading axis is the sample. Always there: "targets" (n, frames, outputs), physical, float32, zero where
-there is none; "mask" (n, frames), which frames are data. The rest is the recipe's own: what its module eats."""
+there is none; "mask" (n, frames), which frames are data. The rest is the recipe's own: the inputs of its module."""
 
 
 ProgressCallback: TypeAlias = Callable[[str, int, int, str], None]
@@ -86,7 +86,7 @@ class SurrogateModule(nn.Module, ABC):
 class SurrogateMetadata:
     """What a surrogate knows beside its weights; all of it stands in the header of its file.
 
-    law, specimen, outputs, grid : of the data set; a surrogate of one law answers for that law.
+    law, specimen, outputs, grid : of the data set; a surrogate of one law predicts that law.
     parameters, conditions : names of the data set's columns.
     scaling : {input: (mean, standard deviation)}, and of outputs, for people to read; the module holds its own.
     domain : where the training rows lie, in the inputs that the recipe names.
@@ -110,7 +110,7 @@ class SurrogateMetadata:
 
     @classmethod
     def from_dataset(cls, data: Dataset, **fields: Any) -> SurrogateMetadata:
-        """What a data set says; more : the other fields."""
+        """The metadata of a data set; fields : the other fields."""
         return cls(
             law=data.law,
             specimen=data.specimen,
@@ -129,7 +129,8 @@ CONSTANT_TOLERANCE = 1e-6
 class Standardisation(nn.Module):
     """Standardises the last axis; its mean and deviation are buffers, float64, saved with the weights.
 
-    A column that is constant in training is only shifted: the network sees zero, and the domain guard sees others.
+    A column that is constant in training is only shifted: its standardised value is zero, and the applicability
+    domain refuses others.
     """
 
     mean: Tensor
@@ -155,9 +156,9 @@ class Standardisation(nn.Module):
         return cls(torch.zeros(columns), torch.ones(columns))
 
     def forward(self, values: Tensor) -> Tensor:
-        """Standardised values."""
+        """Standardised values, (..., columns)."""
         return (values - self.mean.to(values.dtype)) / self.deviation.to(values.dtype)
 
     def inverse(self, values: Tensor) -> Tensor:
-        """Physical values of standardised ones."""
+        """Physical values of standardised ones, (..., columns)."""
         return values * self.deviation.to(values.dtype) + self.mean.to(values.dtype)

@@ -71,7 +71,7 @@ def check_history(metadata: SurrogateMetadata, history: History) -> None:
 
 
 def _check_lengths(where: str, history: History, geometry: Any) -> None:
-    """Lengths but the apex thickness, which the domain guard watches, must be those of the specimen."""
+    """Lengths but the apex thickness, which the applicability domain checks, must be those of the specimen."""
     for name, value in history.geometry.items():
         trained = getattr(geometry, name, None)
         if (
@@ -83,7 +83,7 @@ def _check_lengths(where: str, history: History, geometry: Any) -> None:
 
 
 def prediction_frames(grid: TimeGrid, histories: Sequence[History]) -> list[Floats]:
-    """The frames, s, at which the network is asked for each history: as many for all, as far as the longest needs."""
+    """The times (frames,) s of the network for each history: as many for all, as far as the longest needs."""
     if grid.relative:
         return [grid.times(float(h.times[-1])) for h in histories]
     last = max(float(h.times[-1]) for h in histories)
@@ -117,7 +117,7 @@ def observation_derivative(specimen: Specimen, history: History, values: Floats)
 class Surrogate(Presentable, ABC):
     """A trained network in the place of a specimen; a records.Predictor.
 
-    recipe, module, told : what it was trained as, its network (on the CPU), and what it knows of its training.
+    recipe, module, metadata : what it was trained as, its network (on the CPU), and what is known of its training.
     """
 
     nuisances: tuple[str, ...] = ()
@@ -138,7 +138,7 @@ class Surrogate(Presentable, ABC):
 
     @property
     def specimen(self) -> Specimen:
-        """What it stands for."""
+        """The specimen whose outputs it predicts."""
         return self.metadata.specimen
 
     @property
@@ -156,16 +156,16 @@ class Surrogate(Presentable, ABC):
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict each history's outputs at its times; see records.Predictor.
+        """Predict each history's outputs at its times; see records.Predictor. theta : (candidates, parameters).
 
         A row outside the domain of the training has its values all the same, and Status.OUTSIDE_DOMAIN.
         """
 
     @property
     def error(self) -> dict[str, float]:
-        """{output: standard deviation of its error}, in the output's unit, as validation saw it.
+        """{output: standard deviation of its error}, in the output's unit, from the validation rows.
 
-        1.25 times the mean absolute error, that of a Gaussian: rare large errors would make every answer unsure.
+        1.25 times the mean absolute error, that of a Gaussian: rare large errors would widen every interval.
         """
         outputs = self.metadata.metrics.get("outputs", {})
         return {name: 1.2533 * float(errors["mae"]) for name, errors in outputs.items() if "mae" in errors}
@@ -187,7 +187,7 @@ class Surrogate(Presentable, ABC):
         return True
 
     def reference_stress(self, history: History) -> Floats:
-        """The von Mises stresses, MPa, that stand for the test: the specimen's, or those that are prescribed."""
+        """The reference von Mises stresses, (levels,) MPa: the specimen's, or those that are prescribed."""
         specimen_stress = getattr(self.specimen, "reference_stress", None)
         if specimen_stress is not None:
             return np.asarray(specimen_stress(history))
@@ -219,11 +219,11 @@ class Recipe(Protocol):
     """A frozen record of what is trained: its fields are plain numbers and words, and make the recipe again."""
 
     kind: ClassVar[str]
-    """The word for it in files; surrogate.surrogate.KINDS says where the class is."""
+    """The word for it in files; RECIPE_CLASSES of surrogates.loading says where the class is."""
 
     @property
     def training(self) -> Training:
-        """How it is trained, unless train() is told otherwise; a field."""
+        """How it is trained, unless train() is given other settings; a field."""
         ...
 
     def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:

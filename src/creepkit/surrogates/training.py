@@ -142,7 +142,7 @@ def _training_metadata(
     fit: NetworkTraining,
     request: dict[str, Any],
 ) -> SurrogateMetadata:
-    """What the surrogate is told, with how its training went."""
+    """The metadata of the surrogate, with how its training went."""
     comparison = compare_predictions(fit.module, samples, data, rows[1], output_deviation(samples, rows[0]))
     times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
     provenance = {

@@ -1,6 +1,7 @@
-"""Training of a network: rows of a data set for training and validation, the learning-rate schedule, and epochs of Adam.
+"""Training of a network: rows for training and validation, the learning-rate schedule, and epochs of Adam.
 
-Every epoch has its own random seed, derived from the seed of the training and the epoch number, so that a training resumed from a checkpoint gives the same result.
+Every epoch has its own random seed, derived from the seed of the training and the epoch number, so that a training
+resumed from a checkpoint gives the same result.
 """
 
 from __future__ import annotations
@@ -46,8 +47,8 @@ def trainable_samples(data: Dataset) -> Dataset:
     accepted = data.accepted
     if len(accepted) < LEAST_SAMPLES:
         raise DatasetError(
-            f"a data set with {len(accepted)} accepted samples of {len(data)} teaches nothing; {LEAST_SAMPLES} are the least, "
-            "generate more"
+            f"a data set with {len(accepted)} accepted samples of {len(data)} is too small to train on; "
+            f"{LEAST_SAMPLES} are the least, generate more"
         )
     _check_units(accepted)
     finite_frames: Bools = np.asarray(np.isfinite(accepted.values).all(axis=-1))
@@ -174,7 +175,7 @@ class NetworkTraining:
                 progress("epochs", done, self.training.epochs, note)
 
     def epoch(self) -> None:
-        """One pass over the training rows, then a look at the others."""
+        """One pass over the training rows, then the loss of the validation rows."""
         loss, rate = self._train_epoch()
         validation, rse = self.validate()
         if not (math.isfinite(loss) and math.isfinite(validation)):

@@ -101,7 +101,7 @@ def tangents(geometry: DimpleGeometry) -> tuple[FiniteElementModel, np.ndarray, 
     """Body, displacements, the tangent that Newton's method takes, and differences of the residual, (size, size)."""
     body, u = deformed(geometry)
     kernel = kernels.lower(NORTON, "numba")
-    theta = kernel.to_internal({"A": 1e-15, "n": 4.0})[0]
+    theta = NORTON.to_internal({"A": 1e-15, "n": 4.0})[0]
     stage = StageConditions(0.0, 0.0, 300.0, E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU)), PRESSURE)
     points, room, forces = virgin_points(4 * len(body.elements), 0, 2), point_workspace(0, 0), force_workspace(body)
 

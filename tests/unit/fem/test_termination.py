@@ -32,7 +32,7 @@ def run(
     kernel = kernels.lower(creep, "numba")
     course = LoadHistory(pressure, Program.constant(300.0), Program.constant(150e3), end)
     return simulate(
-        kernel, kernel.to_internal(values)[0], body, course, settings=SolverSettings(**settings), keep_points=True
+        kernel, creep.to_internal(values)[0], body, course, settings=SolverSettings(**settings), keep_points=True
     )
 
 

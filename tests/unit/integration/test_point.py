@@ -37,7 +37,7 @@ VALUES = {**SINH, **HARDENING, "A_3": 1e-12, "n_3": 3.0, "m_2": -0.4}
 def run(law, values, driving, times, stiffness=0.0, constant_load=False, **kwargs):
     kernel = lower(law, "numba")
     test = PointTest(driving, ROOM, np.asarray(times, float), stiffness, constant_load)
-    return integrate(kernel, kernel.to_internal(values), [test], **kwargs)
+    return integrate(kernel, law.to_internal(values), [test], **kwargs)
 
 
 def test_constant_load_bursts_when_the_closed_form_says() -> None:
@@ -128,7 +128,7 @@ def test_strain_hardening_continues_from_its_strain_after_steps_and_holds() -> N
 
 def test_many_tests_and_candidates_in_one_call_equal_one_by_one() -> None:
     kernel = lower(COMBINED, "numba")
-    theta = kernel.to_internal({**VALUES, "n_1": np.array([1.5, 2.0, 2.5])})
+    theta = COMBINED.to_internal({**VALUES, "n_1": np.array([1.5, 2.0, 2.5])})
     tests = [PointTest(Program.constant(s), ROOM, np.linspace(0, 1e5, count)) for s, count in ((60.0, 11), (100.0, 7))]
     together = integrate(kernel, theta, tests, jacobian=True)
     assert together.strain.shape == (3, 18)
@@ -181,7 +181,7 @@ def test_a_candidate_that_is_not_a_number_ends_as_not_converged() -> None:
 
 def test_no_times_and_time_zero() -> None:
     kernel = lower(NORTON, "numba")
-    theta = kernel.to_internal({"A": 1e-15, "n": 4.0})
+    theta = NORTON.to_internal({"A": 1e-15, "n": 4.0})
     empty = PointTest(Program.constant(100.0), ROOM, np.zeros(0))
     start = PointTest(Program.constant(100.0), ROOM, np.zeros(1))
     result = integrate(kernel, theta, [empty, start], jacobian=True)

@@ -72,7 +72,7 @@ def test_measured_order_of_step_and_dense_output(tableau: Tableau) -> None:
     """p' = A s^n p^m under constant true stress from p(0) = p0: p^(1-m) is a straight line in time."""
     A, n, m, stress, start, length = 1e-12, 3.0, -0.6, 100.0, 0.2, 2e5
     kernel = lower(STRAIN_HARDENING, "numba")
-    theta = kernel.to_internal({"A": A, "n": n, "m": m})[0]
+    theta = STRAIN_HARDENING.to_internal({"A": A, "n": n, "m": m})[0]
     segment, drive = Segment(0.0, length, stress, stress, 1000.0, 1000.0), StressControl(0.0, 0.0, UNIAXIAL)
 
     def exact(time: float) -> float:

@@ -58,7 +58,7 @@ KACHANOV = CreepLaw(
 
 def run(law, values, controls, times, temperature=300.0, settings=None, tableau=SDIRK2):
     kernel = lower(law, "numba")
-    theta = kernel.to_internal(values)[0]
+    theta = law.to_internal(values)[0]
     return integrate_tensor_point(
         kernel, theta, STEEL, controls, temperature, times, settings=settings, tableau=tableau
     )
@@ -68,7 +68,7 @@ def run(law, values, controls, times, temperature=300.0, settings=None, tableau=
 def test_the_tangent_is_the_derivative_of_stress(weight: float) -> None:
     """Central differences of strain, for a law of all four: von Mises, principal, mean stress and a state."""
     kernel = lower(DAMAGING, "numba")
-    theta = kernel.to_internal({"A": 1e-14, "n": 4.0, "C": 1e-13, "v": 3.5})[0]
+    theta = DAMAGING.to_internal({"A": 1e-14, "n": 4.0, "C": 1e-13, "v": 3.5})[0]
     point = TensorPoint(kernel, theta, STEEL, np.zeros(6, bool))
     point.row[TIME], point.row[TEMPERATURE] = 1e3, 300.0
     base = np.array([1e-4, -6e-5, -4e-5, 3e-5, 0.0, 1e-5, 2e-4, 0.1])

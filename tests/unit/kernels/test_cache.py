@@ -20,7 +20,8 @@ from creepkit.kernels.interface import call_entry
 from creepkit.laws.norton import NORTON
 
 compiled = lower(NORTON, "numba")
-out, flags = call_entry(compiled, "rate", numpy.array([[100.0] + 5 * [0.0]]), compiled.to_internal({"A": 1e-16, "n": 4.0})[0])
+theta = NORTON.to_internal({"A": 1e-16, "n": 4.0})[0]
+out, flags = call_entry(compiled, "rate", numpy.array([[100.0] + 5 * [0.0]]), theta)
 print(out[0, 0], flags, compiled.rate.cache_hits)
 """
 

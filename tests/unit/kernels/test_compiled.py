@@ -34,7 +34,7 @@ def point(**given: float) -> Floats:
 
 def test_norton_by_hand() -> None:
     compiled = lower(NORTON, "numba")
-    theta = compiled.to_internal({"A": 1e-16, "n": 4.0})[0]
+    theta = NORTON.to_internal({"A": 1e-16, "n": 4.0})[0]
 
     rate, flags = call_entry(compiled, "rate", point(), theta)
     update, _ = call_entry(compiled, "update", point(), theta)
@@ -48,8 +48,9 @@ def test_norton_by_hand() -> None:
 
 def test_damage_comes_after_the_rate_row_by_row() -> None:
     """Rate A s^n (1 + omega) and damage rate B s omega: values, then slopes to x of both, then to theta."""
-    compiled = lower(damage(A * stress**n * (1 + omega), B * stress * omega, {A: RATE, n: POWER, B: RATE}), "numba")
-    theta = compiled.to_internal({"A": 1e-16, "n": 4.0, "B": 1e-9})[0]
+    damaging = damage(A * stress**n * (1 + omega), B * stress * omega, {A: RATE, n: POWER, B: RATE})
+    compiled = lower(damaging, "numba")
+    theta = damaging.to_internal({"A": 1e-16, "n": 4.0, "B": 1e-9})[0]
     x = np.column_stack([point(), [[0.25]]])
 
     rate, _ = call_entry(compiled, "rate", x, theta)
@@ -97,7 +98,7 @@ def test_code_compiled_once_takes_any_law() -> None:
 
     for law_, expected in ((NORTON, 1e-8), (STRAIN_HARDENING, 1e-7)):
         compiled, out = lower(law_, "numba"), np.empty(1)
-        theta = compiled.to_internal({"A": 1e-16, "n": 4.0, **({"m": -0.5} if "m" in law_.names else {})})[0]
+        theta = law_.to_internal({"A": 1e-16, "n": 4.0, **({"m": -0.5} if "m" in law_.names else {})})[0]
         assert called(compiled.rate, point()[0], theta, out) == 0
         assert out[0] == pytest.approx(expected, rel=1e-13)
 
@@ -111,7 +112,7 @@ def flags(compiled: CompiledLaw, entry: str, x: Floats, theta: Floats) -> int:
 
 def test_a_rate_beyond_float64_is_flagged_but_not_its_logarithm() -> None:
     compiled = lower(HYPERBOLIC_SINE, "numba")
-    theta = compiled.to_internal({"A": 1e-5, "n": 8.0, "B": 1.0})[0]
+    theta = HYPERBOLIC_SINE.to_internal({"A": 1e-5, "n": 8.0, "B": 1.0})[0]
 
     assert flags(compiled, "rate", point(stress=2000.0), theta) == RATE_NOT_FINITE
     assert flags(compiled, "sensitivity", point(stress=2000.0), theta) == RATE_NOT_FINITE | DERIVATIVE_NOT_FINITE
@@ -120,7 +121,7 @@ def test_a_rate_beyond_float64_is_flagged_but_not_its_logarithm() -> None:
 
 def test_one_bad_row_among_good_ones_is_flagged() -> None:
     compiled = lower(HYPERBOLIC_SINE, "numba")
-    theta = compiled.to_internal({"A": 1e-5, "n": 8.0, "B": 1.0})[0]
+    theta = HYPERBOLIC_SINE.to_internal({"A": 1e-5, "n": 8.0, "B": 1.0})[0]
     rows = np.vstack([point(stress=1.0), point(stress=2000.0), point(stress=2.0)])
 
     out, found = call_entry(compiled, "rate", rows, theta)
@@ -131,8 +132,9 @@ def test_one_bad_row_among_good_ones_is_flagged() -> None:
 
 def test_a_derivative_alone_can_be_flagged() -> None:
     """The rate at strain 0 is 1e-10 (1e-30)^-10 = 1e290, its slope a factor 1e31 larger."""
-    compiled = lower(law(A * stress / strain**10, {A: scale(1e-12, 1e-5)}), "numba")
-    theta = compiled.to_internal({"A": 1e-10})[0]
+    steep = law(A * stress / strain**10, {A: scale(1e-12, 1e-5)})
+    compiled = lower(steep, "numba")
+    theta = steep.to_internal({"A": 1e-10})[0]
 
     assert flags(compiled, "sensitivity", point(strain=0.0, stress=1.0), theta) == DERIVATIVE_NOT_FINITE
 
@@ -147,7 +149,7 @@ def test_large_numbers_that_are_finite_are_not_flagged() -> None:
 @each_law
 def test_a_nan_is_flagged(law_: CreepLaw) -> None:
     compiled = lower(law_, "numba")
-    theta, x = compiled.to_internal(law_.center())[0], point(stress=np.nan)
+    theta, x = law_.to_internal(law_.center())[0], point(stress=np.nan)
     x = np.column_stack([x, np.full((1, compiled.states), 0.1)])
 
     assert flags(compiled, "rate", x, theta) & RATE_NOT_FINITE
@@ -177,7 +179,7 @@ def test_a_term_that_is_off_leaves_the_others() -> None:
     compiled = lower(COMBINED, "numba")
     values = {**COMBINED.center(), "A_1": 0.0, "A_3": 0.0, "A_2": 1e-16, "n_2": 4.0, "m_1": -0.5}
 
-    update, _ = call_entry(compiled, "update", point(), compiled.to_internal(values)[0])
+    update, _ = call_entry(compiled, "update", point(), COMBINED.to_internal(values)[0])
 
     np.testing.assert_allclose(update, [[np.log(1e-7), 0.04, -50.0, 0, 0, 0, 0]], rtol=1e-12)
 
@@ -186,11 +188,9 @@ def test_a_term_that_is_off_leaves_the_others() -> None:
 
 
 def test_internal_parameters_are_logarithms_where_the_scale_is_log() -> None:
-    compiled = lower(HYPERBOLIC_SINE, "numba")
+    theta = HYPERBOLIC_SINE.to_internal({"A": np.array([1e-10, 0.0]), "n": 2.0, "B": 10.0})
 
-    theta = compiled.to_internal({"A": np.array([1e-10, 0.0]), "n": 2.0, "B": 10.0})
-
-    assert compiled.log_scale.tolist() == [True, False, True]
+    assert HYPERBOLIC_SINE.log_scale.tolist() == [True, False, True]
     np.testing.assert_array_equal(theta, [[np.log(1e-10), 2.0, np.log(10.0)], [-np.inf, 2.0, np.log(10.0)]])
 
 

@@ -319,7 +319,7 @@ def test_recipes_that_make_no_sense(changes: dict, told: str) -> None:
 
 
 def test_a_bar_has_no_stand_in(tension: Dataset) -> None:
-    with pytest.raises(SurrogateError, match="specimen 'uniaxial' has no stand-in of one degree of freedom"):
+    with pytest.raises(SurrogateError, match="specimen 'uniaxial' has no reduced-order model"):
         train(tension, ParameterGru(4, 1, base="one-dof", training=BRIEF))
 
 

@@ -1,4 +1,4 @@
-"""Training: bit-identical when resumed, returned when done, and one sentence for each data set that teaches nothing."""
+"""Training: bit-identical when resumed, returned when done, and one sentence for each data set that is too small."""
 
 import math
 from dataclasses import replace
@@ -160,7 +160,7 @@ def test_samples_that_were_rejected_teach_nothing(data: Dataset) -> None:
     assert model.metadata.provenance["training_rows"] + model.metadata.provenance["validation_rows"] == 20
     reasons[9:] = -1
     with pytest.raises(
-        DatasetError, match="a data set with 9 accepted samples of 96 teaches nothing; 10 are the least"
+        DatasetError, match="a data set with 9 accepted samples of 96 is too small to train on; 10 are the least"
     ):
         train(replace(data, reasons=reasons), SMALL)
 

@@ -46,7 +46,7 @@ MODULUS_TEMPERATURE_STEP = 1.0
 
 @dataclass(frozen=True, eq=False)
 class BulgeSetup:
-    """One test made ready: its body and course, its geometry, its observation operator.
+    """One test set up: its finite element model and load history, its geometry, its observation operator.
 
     refinement : of the structured mesh, None for a mesh from files.
     """
@@ -101,7 +101,7 @@ def modulus_program(elastic: Elastic, temperature: Program, factor: float, where
 
 @lru_cache(maxsize=256)
 def model_of_geometry(geometry: DimpleGeometry, refinement: float) -> FiniteElementModel:
-    """The body of a dimple; kept, for a fit asks for it a thousand times."""
+    """The finite element model of a dimple; kept, for a fit needs it a thousand times."""
     return finite_element_model(geometry.mesh(refinement))
 
 
@@ -207,7 +207,7 @@ def _dimension_name(name: str) -> str:
 
 
 def _direction(setup: BulgeSetup, history: History, name: str) -> Floats:
-    """Derivative of the course's segments, (segments, 10), by a central difference, exact for what enters linearly."""
+    """Derivative of the segments of the load history, (segments, 10): a central difference, exact if linear."""
     load_history = setup.load_history
     if name == "modulus":
         # measured against the modulus that the history states
@@ -286,7 +286,10 @@ def predict_bulge(
     nuisances: NuisanceValues,
     sensitivities: bool,
 ) -> Prediction:
-    """Predict every candidate in every test; see records.Predictor."""
+    """Predict every candidate in every test; see records.Predictor.
+
+    theta : (candidates, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}.
+    """
     check_nuisances(nuisances, specimen.nuisances, "a bulge specimen")
     kernel = kernels.lower(law, "numba")
     theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
@@ -315,7 +318,7 @@ def simulate_and_observe(
     nuisances: Mapping[str, float],
     jacobian: bool,
 ) -> BulgeResponse:
-    """Simulate one test and observe it at the times of its history."""
+    """Simulate one test and observe it at the times of its history; theta : (parameters,) internal values."""
     test_setup = set_up_test(specimen, history, nuisances)
     settings = solver_settings(specimen, exact=jacobian)
     simulation = simulate(

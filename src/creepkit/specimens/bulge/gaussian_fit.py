@@ -18,7 +18,7 @@ _FARTHEST = 6.0  # exp(-exp(6)) = 1e-175 is nothing, and its products with q sti
 
 
 class PolarGrid(NamedTuple):
-    """Where profiles are looked at.
+    """Where profiles are sampled.
 
     log_radius : (radii,) ln(r / window). radial : (radii,) their weights.
     log_cosine, log_sine : (angles,) logarithms of |cos a| and |sin a|. angular : (angles,) their weights.
@@ -138,7 +138,7 @@ def solve_damped(normal: NormalEquations, damping: float, solution: Floats) -> b
 
 @njit(cache=True, error_model="numpy")
 def derivatives_to_profile(grid: PolarGrid, x: Floats, normal: NormalEquations, pull: Floats) -> None:
-    """Derivatives (3, radii) of x = (D, ln S, ln p) to the profile, `normal` being that of the answer."""
+    """Derivatives (3, radii) of x = (D, ln S, ln p) to the profile, `normal` being that of the result."""
     p, inverse, solution = exp(x[2]), np.empty((3, 3)), np.empty(3)
     for v in range(3):
         normal.slope[0], normal.slope[1], normal.slope[2] = 0.0, 0.0, 0.0
@@ -173,7 +173,7 @@ _WIDTHS = (log(0.02), log(20.0))
 
 
 _SHAPES = (log(0.25), log(40.0))
-"""Least and greatest ln(S / window) and ln p of an answer: beyond them a profile shows an edge or its middle alone."""
+"""Least and greatest ln(S / window) and ln p of a result: beyond them a profile shows an edge or its middle alone."""
 
 
 _UNEXPLAINED = 0.2
@@ -247,9 +247,10 @@ def _state_and_scale(profile: Floats) -> tuple[int, float]:
 
 @njit(cache=True, error_model="numpy")
 def _fit(grid: PolarGrid, y: Floats, last: Floats, x: Floats, normal: NormalEquations) -> bool:
-    """Fit one profile, largest value 1; `x` (3,) and `normal` are the answer.
+    """Fit one profile, largest value 1; `x` (3,) and `normal` are the result.
 
-    The first clear fit is taken, begun at the answer before it or else at the starts; of noisy ones, the best of all.
+    The first clear fit is taken, started from the result before it or else at the starts; of noisy ones, the
+    best of all.
     """
     whole = _half_square(grid, y)
     trial, least = np.empty(3), _UNEXPLAINED * whole

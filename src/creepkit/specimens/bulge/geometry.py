@@ -1,6 +1,8 @@
 """Geometry and structured mesh of the dimple: a plate hollowed from below until a thin roof is left.
 
-Half section, mm: a flat floor z = H - h for r <= R - a, an elliptic roof (R - a + a sin q, H - h - b + b cos q) for q from 0 to pi/2, a vertical wall r = R down to z = 0. With a = R the floor is absent. The mesh is a strip of columns from the axis over the roof and down the wall.
+Half section, mm: a flat floor z = H - h for r <= R - a, an elliptic roof (R - a + a sin q, H - h - b + b cos q) for q
+from 0 to pi/2, a vertical wall r = R down to z = 0. With a = R the floor is absent. The mesh is a strip of columns
+from the axis over the roof and down the wall.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """The observation operator: amplitude D_amp, width S_d and shape S_p of a generalised Gaussian.
 
-Fitted by least squares to the displacement of the top within a window of the undeformed radius: as "profile", D exp(-(r/S)^p), the paper's Eq. (3), or as "field", Eq. (7). `fit_field` fits Eq. (7) to measured points whose centre is unknown.
+Fitted by least squares to the displacement of the top within a window of the undeformed radius: as "profile", D
+exp(-(r/S)^p), the paper's Eq. (3), or as "field", Eq. (7). `fit_field` fits Eq. (7) to measured points whose centre
+is unknown.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ Form = Literal["profile", "field"]
 
 
 DEFAULT_RADII: dict[str, int] = {"profile": 76, "field": 40}
-"""Radii looked at by default: for the profile 0, 0.1 ... 7.5 mm in the default window."""
+"""Radii observed by default: for the profile 0, 0.1 ... 7.5 mm in the default window."""
 
 
 _ANGLES = 6
@@ -54,8 +56,8 @@ class ProfileSampling(NamedTuple):
 class Observation:
     """How a top profile becomes D_amp, S_d, S_p: form, window and grid of the generalised Gaussian fit.
 
-    form : "profile" or "field". window : mm, the largest radius looked at, in the undeformed plate.
-    points : radii looked at; None for 76 of a profile and 40 of a field (Gauss points, at 6 angles each).
+    form : "profile" or "field". window : mm, the largest radius observed, in the undeformed plate.
+    points : observed radii; None for 76 of a profile and 40 of a field (Gauss points, at 6 angles each).
 
     The radii are fixed shares of the window, so that what is observed changes smoothly with it.
     """
@@ -150,7 +152,7 @@ class Observation:
         """What is observed (frames, 3), and its derivatives (frames, 3, radii) to the profile at the radii."""
         from creepkit.specimens.bulge import gaussian_fit
 
-        with np.errstate(invalid="ignore"):  # a profile that is not finite becomes NaN, which is the answer to it
+        with np.errstate(invalid="ignore"):  # a profile that is not finite becomes NaN, and so do its outputs
             samples = frames @ sampling.nodes.values.T
         fits, states = np.empty((len(samples), 3)), np.empty(len(samples), dtype=np.int64)
         derivatives = np.full((len(samples) if slopes else 0, 3, samples.shape[1]), np.nan)
@@ -197,7 +199,7 @@ def _fill_rest_shapes(fits: Floats, derivatives: Floats, resting: Ints, fitted: 
 
 @lru_cache(maxsize=64)
 def _sampling_of(operator: Observation, nodes: bytes) -> ProfileSampling:
-    """Where `operator` looks on a surface with these radii."""
+    """Where `operator` observes a surface with these radii."""
     from creepkit.specimens.bulge.gaussian_fit import LOG_OF_ZERO, PolarGrid
 
     radii = checked_surface_radii(np.frombuffer(nodes))
@@ -234,11 +236,11 @@ _FEWEST_POINTS = 12
 
 
 _SHAPES = (0.25, 40.0)
-"""Least and greatest p of an answer, as in the fit of profiles."""
+"""Least and greatest p of a result, as in the fit of profiles."""
 
 
 _LEAST_SIGNAL_TO_ERROR = 5.0
-"""Least ratio of D to its standard error in an answer; the best fit to noise alone reached 3 in forty trials."""
+"""Least ratio of D to its standard error in a result; the best fit to noise alone reached 3 in forty trials."""
 
 
 _START_QUANTILES = (1.0, 0.98)
@@ -252,7 +254,7 @@ class FieldFit:
     amplitude, width : D and S, mm. shape : p. x_center, y_center : mm.
     standard_errors : of these five, in this order, if the points err independently. Pixels with overlapping subsets do
         not: true errors are greater by the root of the number of pixels that share one error.
-    scatter : mm, root mean square of what the fit leaves. points : how many were fitted.
+    scatter : mm, root mean square of the residuals. points : how many were fitted.
     """
 
     amplitude: float
@@ -317,7 +319,7 @@ def _points(x: ArrayLike, y: ArrayLike, heights: ArrayLike) -> tuple[Floats, Flo
     X, Y, H = (array[outputs] for array in arrays)
     if H.size < _FEWEST_POINTS or not np.abs(H).max() > 0.0 or not min(np.ptp(X), np.ptp(Y)) > 0.0:
         raise FitError(
-            f"a field of {H.size} finite points cannot be fitted; it needs at least {_FEWEST_POINTS}, spread over x and y, "
+            f"a field of {H.size} finite points cannot be fitted; it needs at least {_FEWEST_POINTS}, over x and y, "
             "and heights that are not all zero"
         )
     return X, Y, H

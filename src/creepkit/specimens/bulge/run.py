@@ -101,10 +101,10 @@ class BulgeRun(Run):
     """A simulated bulge test.
 
     `times` below are s and by default those of the run. A number instead of an array takes its axis away from the
-    answer; a time after the end is refused, for nothing is known there. At the time of a sudden change of load the
+    result; a time after the end is refused, for nothing is known there. At the time of a sudden change of load the
     state before it is meant.
 
-    made : body, course, geometry and observation operator; simulation : the accepted steps.
+    setup : finite element model, load history, geometry and observation operator; simulation : the accepted steps.
     states : names of the law's internal variables.
     """
 

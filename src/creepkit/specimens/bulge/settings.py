@@ -1,4 +1,4 @@
-"""BulgeSettings: what a bulge specimen is and how it is simulated, as the finite elements and the reduced-order model read it."""
+"""BulgeSettings: what a bulge specimen is and how it is simulated, in finite elements or the reduced-order model."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ class BulgeSettings:
     geometry : the dimple; its fields may be given to `replace` directly. A history's own geometry (such as its
         measured apex_thickness, mm) takes precedence in a prediction.
     observation : the observation operator of histories that name none.
-    mesh : a mesh of another body (read from files, say) in place of the geometry's own; refinement : of the latter.
+    mesh : another mesh (read from files, say) in place of the geometry's own; refinement : of the latter.
     tolerance : estimated error of the displacements in a step, over their largest plus 0.01 mm; with 0.01 the
         steps of a 12 h history add less than the mesh, some 0.06 % of its largest displacement in the median and up to
         1.6 % for sinh laws that are nearly plastic; raise `refinement` for those.
-    deflection_limit : mm, displacement of the top at which the dimple has burst. strain_limit : creep strain at which
-        a point has. max_steps : cap on the steps of one simulation, so on its cost.
+    deflection_limit : mm, displacement of the top at which the dimple has ruptured. strain_limit : creep strain at
+        which a point has. max_steps : cap on the steps of one simulation, so on its cost.
     threads : simulations that run at the same time; None for one on each core.
     """
 
@@ -75,7 +75,7 @@ class BulgeSettings:
         return replace(self, **changes)
 
     def reference_stress(self, history: History) -> Floats:
-        """The von Mises stress, (levels,) MPa, that stands for each pressure level: 12.5 P (t/0.5 mm)^-1.15 for the default.
+        """Reference von Mises stress of each pressure level, (levels,) MPa: 12.5 P (t/0.5 mm)^-1.15 for the default.
 
         k = sigma/P of the reduced-order model at 0.3 to 0.5 mm of deflection of the default dimple; for others
         scaled as a plate of the same radius to thickness.

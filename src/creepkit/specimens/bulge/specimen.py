@@ -1,6 +1,8 @@
 """The bulge test: gas pressure on the cavity of a dimple, observed by cameras that watch its flat top.
 
-The dimple is simulated by finite elements (see `fem`). Outputs are amplitude, width and shape of the generalised Gaussian fitted to the displacement of the top (see `observation`). Time starts with the first pressure ramp; creep acts during ramps.
+The dimple is simulated by finite elements (see `fem`). Outputs are amplitude, width and shape of the generalised
+Gaussian fitted to the displacement of the top (see `observation`). Time starts with the first pressure ramp; creep
+acts during ramps.
 """
 
 from __future__ import annotations
@@ -37,7 +39,10 @@ class Bulge(BulgeSettings):
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict amplitude, width and shape of each history at its times; see records.Predictor."""
+        """Predict amplitude (mm), width (mm) and shape of each history at its times; see records.Predictor.
+
+        theta : (candidates, parameters) internal values.
+        """
         from creepkit.specimens.bulge.finite_elements import predict_bulge
 
         return predict_bulge(self, law, theta, histories, nuisances or {}, sensitivities)

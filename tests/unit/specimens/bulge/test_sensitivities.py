@@ -77,7 +77,7 @@ def base(request) -> Base:
         elastic=Elastic(E=210e3 - 60 * temperature),
     )  # fmt: skip
     kernel = kernels.lower(creep, "numba")
-    theta = kernel.to_internal(values)[0]
+    theta = creep.to_internal(values)[0]
     made = set_up_test(SPECIMEN, history, {})
     found = simulate(kernel, theta, made.model, made.load_history, settings=SETTINGS, keep_stages=True)
     assert found.status == Status.COMPLETE

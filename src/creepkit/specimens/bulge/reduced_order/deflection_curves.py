@@ -130,10 +130,10 @@ def grid_position(deflection: Any, dimple: DimpleCurves) -> GridPosition:
 
 
 @njit(cache=True, error_model="numpy")
-def curve_value(which: int, at: GridPosition, dimple: DimpleCurves, thicker: Any) -> Any:
-    """A curve there; thicker : mm."""
+def curve_value(which: int, at: GridPosition, dimple: DimpleCurves, thickness_change: Any) -> Any:
+    """A curve there; thickness_change : mm."""
     value = _blended(dimple.curves, which, at)
-    return value if thicker == 0.0 else value + thicker * _blended(dimple.slopes, which, at)
+    return value if thickness_change == 0.0 else value + thickness_change * _blended(dimple.slopes, which, at)
 
 
 @njit(cache=True, error_model="numpy")
@@ -143,8 +143,10 @@ def _blended(c: Floats, k: int, at: GridPosition) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-def write_curves(first: int, last: int, at: GridPosition, dimple: DimpleCurves, thicker: Any, values: Any) -> None:
-    """Write the curves from `first` to before `last` there into values (CURVES,); thicker : mm.
+def write_curves(
+    first: int, last: int, at: GridPosition, dimple: DimpleCurves, thickness_change: Any, values: Any
+) -> None:
+    """Write the curves from `first` to before `last` there into values (CURVES,); thickness_change : mm.
 
     Many at once: numba counts references to arrays at each call, which costs more than a curve.
     """
@@ -152,10 +154,10 @@ def write_curves(first: int, last: int, at: GridPosition, dimple: DimpleCurves, 
     c = dimple.curves
     for k in range(first, last):
         values[k] = w0 * c[i, k] + w1 * c[i + 1, k] + w2 * c[i + 2, k] + w3 * c[i + 3, k]
-    if thicker != 0.0:
+    if thickness_change != 0.0:
         c = dimple.slopes
         for k in range(first, last):
-            values[k] += thicker * (w0 * c[i, k] + w1 * c[i + 1, k] + w2 * c[i + 2, k] + w3 * c[i + 3, k])
+            values[k] += thickness_change * (w0 * c[i, k] + w1 * c[i + 1, k] + w2 * c[i + 2, k] + w3 * c[i + 3, k])
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,4 +1,4 @@
-"""Finite element simulations from which the tables of the reduced-order model are computed: Norton creep and elastic."""
+"""Finite element simulations behind the tables of the reduced-order model: Norton creep, and elasticity."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 THICKNESS_RATIOS = (0.85, 1.0, 1.2)
-"""Apex thicknesses of the runs over the nominal one: those of a plate scatter by 15 %."""
+"""Apex thicknesses of the runs over the nominal one: those of a plate vary by 15 %."""
 
 
 LOAD_RANGE = (1e-7, 3e-3)
@@ -82,14 +82,14 @@ def offline_simulations(specimen: BulgeSettings, geometry: DimpleGeometry) -> tu
 
 
 def offline_model(specimen: BulgeSettings, geometry: DimpleGeometry, thickness: float) -> FiniteElementModel:
-    """The body of a trial; the only one of a mesh from files."""
+    """The finite element model of a simulation; the only one of a mesh from files."""
     if specimen.mesh is not None:
         return finite_element_model(specimen.mesh)
     return finite_element_model(replace(geometry, apex_thickness=thickness).mesh(specimen.refinement))
 
 
 def offline_thicknesses(specimen: BulgeSettings, geometry: DimpleGeometry) -> list[float]:
-    """Apex thicknesses of the trials, mm: as the plate allows; the only one of a mesh from files."""
+    """Apex thicknesses of the simulations, mm: as the plate allows; the only one of a mesh from files."""
     nominal, most = geometry.apex_thickness, geometry.plate_thickness - geometry.roof_axial
     if specimen.mesh is not None:
         return [nominal]
@@ -97,7 +97,7 @@ def offline_thicknesses(specimen: BulgeSettings, geometry: DimpleGeometry) -> li
 
 
 def _norton(specimen: BulgeSettings, body: FiniteElementModel, exponent: float, guess: float) -> OfflineSimulation:
-    """A Norton run at 1 MPa until the dimple bursts."""
+    """A Norton run at 1 MPa until the dimple ruptures."""
     level = np.log(_RATE) - exponent * np.log(guess)
     pressure = Program(np.array([0.0, 5.0]), np.array([0.0, 1.0]))
     load_history = LoadHistory(pressure, Program.constant(1.0), Program.constant(_STIFFNESS), _LONGEST)
@@ -105,7 +105,7 @@ def _norton(specimen: BulgeSettings, body: FiniteElementModel, exponent: float, 
 
 
 def _elastic(specimen: BulgeSettings, body: FiniteElementModel) -> OfflineSimulation:
-    """An elastic run in which P/E rises to the end of its range, or till the dimple is as deep as can be."""
+    """An elastic run in which P/E rises to the end of its range, or until the dimple is as deep as it can be."""
     end = 1e4
     pressure = Program(np.array([0.0, end]), np.array([0.0, 1.0]))
     load_history = LoadHistory(pressure, Program.constant(1.0), Program.constant(1.0 / LOAD_RANGE[1]), end)
@@ -121,7 +121,7 @@ def simulate_profiles(
     level: float,
     tolerance: float = 5e-3,
 ) -> OfflineSimulation:
-    """March, keeping what an operator looks at."""
+    """Simulate, keeping the displacement of the top; theta : (2,) ln A and n. level : ln(A P^n)."""
     settings = SolverSettings(
         tolerance=tolerance,
         newton=4e-3 * tolerance,

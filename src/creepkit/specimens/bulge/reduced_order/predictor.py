@@ -39,7 +39,7 @@ _OBSERVED_COLUMNS = slice(AMPLITUDE_COLUMN, AMPLITUDE_COLUMN + len(OBSERVED))
 
 @dataclass(frozen=True)
 class BulgeReducedOrderModel:
-    """A bulge specimen with one degree of freedom; same outputs, nuisances and complaints.
+    """A bulge specimen with one degree of freedom; same outputs, nuisances and errors.
 
     Its tables come from some runs of `specimen` at the first prediction (some seconds of CPU for each dimple). Law
     states are integrated beside the strain. Derivatives are exact, but for the window, of which there are none.
@@ -61,7 +61,10 @@ class BulgeReducedOrderModel:
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict amplitude, width and shape of each history at its times; see records.Predictor."""
+        """Predict amplitude, width and shape of each history at its times; see records.Predictor.
+
+        theta : (candidates, parameters) internal values.
+        """
         check_nuisances(nuisances or (), self.nuisances, "a bulge specimen")
         compiled = kernels.lower(law, "numba")
         theta, _ = broadcast_candidates(theta, nuisances, len(histories))
@@ -77,7 +80,7 @@ class BulgeReducedOrderModel:
         return assemble_prediction(parts, histories, OBSERVED, len(theta))
 
     def reference_stress(self, history: History) -> Floats:
-        """As the specimen's."""
+        """As the specimen's, (levels,) MPa."""
         return self.specimen.reference_stress(history)
 
 

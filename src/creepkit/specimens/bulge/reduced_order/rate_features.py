@@ -26,18 +26,18 @@ def rate_features(
     stress_factors: Floats,
     strain_factors: Floats,
     rows: Floats,
-    said: Floats,
+    law_values: Floats,
     out: Floats,
 ) -> None:
     """log10 of the rate at (strain factors) x (stress factors) of a point over the rate there; log_rate : ln of that.
 
-    rows (features, 6 + S), said : room for the law.
+    rows (features, 6 + S), law_values : workspace for the law.
     """
     _around(point, stress_factors, strain_factors, rows)
-    rate(rows.shape[0], data_pointer(rows), data_pointer(theta), data_pointer(said))
+    rate(rows.shape[0], data_pointer(rows), data_pointer(theta), data_pointer(law_values))
     columns = point.size - 5  # the rate, then each state's
     for k in range(rows.shape[0]):
-        out[k] = (np.log(max(said[k * columns], 1e-300)) - log_rate) / _LOG_10
+        out[k] = (np.log(max(law_values[k * columns], 1e-300)) - log_rate) / _LOG_10
     for k in range(rows.shape[0]):
         out[k] /= _bent(out[k])
 
@@ -74,7 +74,7 @@ def rate_feature_derivatives(
     stress_factors: Floats,
     strain_factors: Floats,
     rows: Floats,
-    said: Floats,
+    law_values: Floats,
     out: Floats,
 ) -> None:
     """Derivatives of the features, (features, directions), the parameters first.
@@ -82,23 +82,23 @@ def rate_feature_derivatives(
     changes : (directions, 6 + S) of the point; log_rate_changes : (directions,) of ln of the rate there.
     """
     _around(point, stress_factors, strain_factors, rows)
-    sensitivity(rows.shape[0], data_pointer(rows), data_pointer(theta), data_pointer(said))
+    sensitivity(rows.shape[0], data_pointer(rows), data_pointer(theta), data_pointer(law_values))
     width, parameters = point.size, theta.size
     outputs = width - 5
     columns = outputs * (1 + width + parameters)
     for k in range(rows.shape[0]):
         first = k * columns
-        rate = max(said[first], 1e-300)
+        rate = max(law_values[first], 1e-300)
         value = (np.log(rate) - log_rate) / _LOG_10
         bend = _bent(value)
         scale = 1.0 / (bend * bend * bend * bend * bend * _LOG_10)
         s, c = stress_factors[k % stress_factors.size], strain_factors[k // stress_factors.size]
         for i in range(width):
-            said[first + outputs + i] *= (
+            law_values[first + outputs + i] *= (
                 s if i in (STRESS, PRINCIPAL_STRESS, MEAN_STRESS) else (c if i == STRAIN else 1.0)
             )
         for p in range(changes.shape[0]):
-            total = said[first + outputs * (1 + width) + p] if p < parameters else 0.0
+            total = law_values[first + outputs * (1 + width) + p] if p < parameters else 0.0
             for i in range(width):
-                total += said[first + outputs + i] * changes[p, i]
+                total += law_values[first + outputs + i] * changes[p, i]
             out[k, p] = scale * (total / rate - log_rate_changes[p])

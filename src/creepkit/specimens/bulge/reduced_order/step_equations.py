@@ -118,7 +118,7 @@ def within(x: Any, low: float, high: float, rounding: float) -> Any:
 
 @njit(cache=True, error_model="numpy")
 def write_probes(
-    node: StepData, state: Any, unknown: Any, dimple: DimpleCurves, thicker: Any, rows: Any, values: Any
+    node: StepData, state: Any, unknown: Any, dimple: DimpleCurves, thickness_change: Any, rows: Any, values: Any
 ) -> StepMidpoint:
     """Write the rows that the law is asked at, (PROBES, 6 + S), and the curves up to WIDTH into values (CURVES,).
 
@@ -127,7 +127,7 @@ def write_probes(
     strained, grown = exp(unknown[0]), exp(unknown[1])
     deflection = 0.5 * (node.elastic0 + node.elastic) + state[CREEP_DEFLECTION] + 0.5 * grown
     at = grid_position(deflection, dimple)
-    write_curves(LOG_STRESS, WIDTH, at, dimple, thicker, values)
+    write_curves(LOG_STRESS, WIDTH, at, dimple, thickness_change, values)
     pressure = node.pressure0 + node.share * (node.pressure - node.pressure0) + _FLOOR
     stress = exp(values[LOG_STRESS]) * pressure
     strain = state[STRAIN_STATE] + 0.5 * strained
@@ -252,7 +252,7 @@ _SIZES = (1.5, 1.18, 1.0, 0.8)
 
 
 def redistribution_sizes(deflections: Floats) -> Floats:
-    """Size of redistribution by D/h."""
+    """Size of redistribution; deflections : (...) D/h."""
     known = PchipInterpolator(np.log(0.1 + np.array(_DEFLECTIONS)), _SIZES)
     return np.asarray(known(np.log(0.1 + np.minimum(deflections, _DEFLECTIONS[-1]))))
 
@@ -286,14 +286,14 @@ TRAJECTORY_COLUMNS = (
     "exponent",
     "hardening",
 )
-"""See `reduced_courses`."""
+"""Columns of a trajectory at each node; see write_node_outputs and write_step_outputs."""
 
 
 AMPLITUDE_COLUMN = TRAJECTORY_COLUMNS.index("amplitude")
 
 
 FIRST_STEP_COLUMN = TRAJECTORY_COLUMNS.index("middle")
-"""The first of those that are told of the step before a node."""
+"""The first of the columns of the step before a node."""
 
 
 LOG_RATE_COLUMN = TRAJECTORY_COLUMNS.index("log_rate")
@@ -312,16 +312,23 @@ _PRESSURE_FLOOR = 1e-6
 
 @njit(cache=True, error_model="numpy")
 def write_node_outputs(
-    node: StepData, state: Any, toughness: Any, dimple: DimpleCurves, thicker: Any, time: float, values: Any, out: Any
+    node: StepData,
+    state: Any,
+    toughness: Any,
+    dimple: DimpleCurves,
+    thickness_change: Any,
+    time: float,
+    values: Any,
+    out: Any,
 ) -> None:
-    """Write what is told of the end of a step; toughness : n'/(n' + 2) there, for a dimple that has not crept.
+    """Write the columns at the end of a step; toughness : n'/(n' + 2) there, for a dimple that has not crept.
 
-    values : room for the curves, (CURVES,).
+    values : workspace for the curves, (CURVES,).
     """
     deflection = node.elastic + state[CREEP_DEFLECTION]
     at = grid_position(deflection, dimple)
-    write_curves(LOG_STRESS, LOG_STRESS + 1, at, dimple, thicker, values)
-    write_curves(WIDTH, CURVES, at, dimple, thicker, values)
+    write_curves(LOG_STRESS, LOG_STRESS + 1, at, dimple, thickness_change, values)
+    write_curves(WIDTH, CURVES, at, dimple, thickness_change, values)
     end = node.pressure + _PRESSURE_FLOOR
     stress = exp(values[LOG_STRESS]) * end
     mean = (state[EXPONENT_STATE] + _REST_DEFLECTION * toughness) / (state[CREEP_DEFLECTION] + _REST_DEFLECTION)
@@ -338,6 +345,6 @@ def write_node_outputs(
 
 @njit(cache=True, error_model="numpy")
 def write_step_outputs(strain: Any, now: StepExponents, log_rate: Any, out: Any) -> None:
-    """Write what is told of the step itself: strain and ln of the rate in its middle, local exponents."""
+    """Write the columns of the step itself: strain and ln of the rate in its middle, local exponents."""
     out[14], out[15], out[16] = strain, log_rate * _DECADES, now.log_multiplier
     out[17], out[18] = now.exponent, now.hardening

@@ -50,7 +50,7 @@ def differentiate_step(
     slopes: ReducedSensitivities,
     changes: Floats,
 ) -> None:
-    """Derivatives of what is told of node j along all directions, and of the state there."""
+    """Derivatives of the columns of node j along all directions, and of the state there."""
     if test[TIMES, j] > test[TIMES, j - 1]:
         _differentiate_step_outputs(test, j, candidate, dimple, before, unknown, work, slopes)
         first = slopes.ends.shape[1] - len(TRAJECTORY_COLUMNS)
@@ -81,16 +81,18 @@ def _differentiate_node(
     slopes: ReducedSensitivities,
     changes: Floats,
 ) -> None:
-    """Of what is told of node j itself."""
-    parameters, moved, told, values = candidate.theta.size, slopes.state, slopes.told, slopes.values
+    """Of the columns of node j itself."""
+    parameters, moved, recorded, values = candidate.theta.size, slopes.state, slopes.recorded, slopes.values
     for d in range(changes.shape[2]):
         for i in range(state.size):
             moved[i] = complex(state[i], COMPLEX_STEP * slopes.tangents[d, i])
-        node = complex_node(test, j, j, d - parameters, candidate.stiffer, 0.5 + 0j, 0j, 0j)
+        node = complex_node(test, j, j, d - parameters, candidate.modulus_change, 0.5 + 0j, 0j, 0j)
         turned = complex(toughness, COMPLEX_STEP * slopes.turned[d])
-        write_node_outputs(node, moved, turned, dimple, _thicker(d, parameters), test[TIMES, j], values, told)
+        write_node_outputs(
+            node, moved, turned, dimple, _thickness_step(d, parameters), test[TIMES, j], values, recorded
+        )
         for c in range(FIRST_STEP_COLUMN):
-            changes[j, c, d] = told[c].imag / COMPLEX_STEP
+            changes[j, c, d] = recorded[c].imag / COMPLEX_STEP
 
 
 @njit(cache=True, error_model="numpy")
@@ -104,7 +106,7 @@ def _differentiate_step_outputs(
     work: ReducedWorkspace,
     slopes: ReducedSensitivities,
 ) -> None:
-    """Of the state after a step and what is told of the step: along each unknown, along each direction, then both."""
+    """Of the state after a step and the columns of the step: along each unknown, along each direction, then both."""
     parameters, size, ends = candidate.theta.size, unknown.size, slopes.ends
     share, time, weight = midpoint_time(test[TIMES, j - 1], test[TIMES, j], candidate.beta + COMPLEX_STEP * 1j)
     for k in range(ends.shape[0]):
@@ -119,7 +121,7 @@ def _differentiate_step_outputs(
             j - 1,
             j,
             d - parameters,
-            candidate.stiffer,
+            candidate.modulus_change,
             complex(share.real, slower * share.imag),
             complex(time.real, slower * time.imag),
             complex(weight.real, slower * weight.imag),
@@ -144,23 +146,23 @@ def _along(
     slopes: ReducedSensitivities,
     ends: Floats,
 ) -> None:
-    """One direction: what must be zero, into `left`; the state after, the middle's point and what is told, to ends."""
-    rows, values, state, told = slopes.rows, slopes.values, slopes.state, slopes.told
+    """One direction: what must be zero, into `left`; the state after, the middle's point and its columns, to ends."""
+    rows, values, state, recorded = slopes.rows, slopes.values, slopes.state, slopes.recorded
     fast, slow = state[FAST], state[SLOW]
-    middle = write_probes(node, state, slopes.unknown, dimple, _thicker(direction, parameters), rows, values)
-    _law_along(work.said, slopes.full, work.logs, rows, direction, parameters, slopes.logs, slopes.rates)
+    middle = write_probes(node, state, slopes.unknown, dimple, _thickness_step(direction, parameters), rows, values)
+    _law_along(work.law_values, slopes.full, work.logs, rows, direction, parameters, slopes.logs, slopes.rates)
     now = step_exponents(node, fast, slow, values, dimple.redistribution, middle, slopes.logs)
     step_residual(node, state, slopes.unknown, values[LOG_GROWTH], now, slopes.logs[0], slopes.rates, slopes.left)
     advance_state(state, slopes.unknown, middle, now, work.gains)
-    write_step_outputs(rows[0, STRAIN], now, slopes.logs[0], told)
-    told[0], told[1] = now.place, slopes.logs[0]  # columns of nodes are free here
+    write_step_outputs(rows[0, STRAIN], now, slopes.logs[0], recorded)
+    recorded[0], recorded[1] = now.place, slopes.logs[0]  # columns of nodes are free here
     point, first = state.size, state.size + rows.shape[1]
     for i in range(point):
         ends[i] = state[i].imag / COMPLEX_STEP
     for i in range(rows.shape[1]):
         ends[point + i] = rows[0, i].imag / COMPLEX_STEP
-    for c in range(told.size):
-        ends[first + c] = told[c].imag / COMPLEX_STEP
+    for c in range(recorded.size):
+        ends[first + c] = recorded[c].imag / COMPLEX_STEP
 
 
 @njit(cache=True, error_model="numpy")
@@ -180,30 +182,30 @@ def _combine(size: int, states: int, slopes: ReducedSensitivities) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _law_along(
-    said: Floats, full: Floats, known: Floats, rows: Any, direction: int, parameters: int, logs: Any, rates: Any
+    law_values: Floats, full: Floats, known: Floats, rows: Any, direction: int, parameters: int, logs: Any, rates: Any
 ) -> None:
     """ln of rates and the rates of states along a direction, in which the rows have imaginary parts.
 
-    said, full : of `update` and `sensitivity`; known : (PROBES,) ln of rates.
+    law_values, full : of `update` and `sensitivity`; known : (PROBES,) ln of rates.
     """
     width, outputs = rows.shape[1], 1 + rates.size
     own = 0 <= direction < parameters
     for k in range(PROBES):
         total = 0.0
         for i in range(width):
-            total += said[k, outputs + i] * rows[k, i].imag
+            total += law_values[k, outputs + i] * rows[k, i].imag
         if own and full[k, 0] > 0.0:
             total += COMPLEX_STEP * full[k, outputs * (1 + width) + direction] / full[k, 0]
         logs[k] = complex(known[k], total)
     for v in range(rates.size):
         total = 0.0
         for i in range(width):
-            total += said[0, outputs + (1 + v) * width + i] * rows[0, i].imag
+            total += law_values[0, outputs + (1 + v) * width + i] * rows[0, i].imag
         if own:
             total += COMPLEX_STEP * full[0, outputs * (1 + width) + (1 + v) * parameters + direction]
-        rates[v] = complex(said[0, 1 + v], total)
+        rates[v] = complex(law_values[0, 1 + v], total)
 
 
 @njit(cache=True, error_model="numpy")
-def _thicker(direction: int, parameters: int) -> complex:
+def _thickness_step(direction: int, parameters: int) -> complex:
     return COMPLEX_STEP * 1j if direction == parameters else 0j

@@ -48,14 +48,14 @@ deflection mm with its derivatives to thickness and to ln of the modulus. One ar
 
 
 class ReducedCandidate(NamedTuple):
-    """Internal parameters (P,), exponent of the clock with its derivatives (P,), relative change of the modulus; the
-    law's initial states and limits (S,); limits of deflection mm and strain.
+    """Internal parameters (P,), exponent of the time transformation with its derivatives (P,), relative change of the
+    modulus; the law's initial states and limits (S,); limits of deflection mm and strain.
     """
 
     theta: Floats
     beta: float
     beta_slopes: Floats
-    stiffer: float
+    modulus_change: float
     initial: Floats
     limits: Floats
     deflection_limit: float
@@ -72,13 +72,13 @@ class FeatureFactors(NamedTuple):
 class ReducedWorkspace(NamedTuple):
     """Working arrays: for the law at the probes and at the features, for curves and Newton's method.
 
-    rows (PROBES, 6 + S), said (PROBES, .) of `update`; wide, wide_said at features; values (CURVES,).
+    rows (PROBES, 6 + S), law_values (PROBES, .) of `update`; wide, feature_values at features; values (CURVES,).
     """
 
     rows: Floats
-    said: Floats
+    law_values: Floats
     wide: Floats
-    wide_said: Floats
+    feature_values: Floats
     values: Floats
     logs: Floats
     rates: Floats
@@ -102,7 +102,7 @@ class ReducedSensitivities(NamedTuple):
     left: Any
     state: Any
     unknown: Any
-    told: Any
+    recorded: Any
     full: Floats
     wide_full: Floats
     matrix: Floats
@@ -136,9 +136,9 @@ def reduced_workspace(states: int, count: int) -> ReducedWorkspace:
 def sensitivity_workspace(
     states: int, parameters: int, count: int, directions: int, columns: int
 ) -> ReducedSensitivities:
-    """Allocate for `count` features and some directions of derivatives (none: 0) of as many columns of a course."""
+    """Allocate for `count` features and some directions of derivatives (none: 0) of as many columns of a trajectory."""
     width, size, some = POINT_SIZE + states, 2 + states, 1 if directions > 0 else 0
-    said = (1 + states) * (1 + width + parameters)
+    law_columns = (1 + states) * (1 + width + parameters)
     kind = np.complex128
     return ReducedSensitivities(
         np.zeros((PROBES, width), kind),
@@ -149,8 +149,8 @@ def sensitivity_workspace(
         np.zeros(STATES + states, kind),
         np.zeros(size, kind),
         np.zeros(columns, kind),
-        np.zeros((PROBES, said)),
-        np.zeros(some * count * said),
+        np.zeros((PROBES, law_columns)),
+        np.zeros(some * count * law_columns),
         np.zeros((size, size)),
         np.zeros((size, directions)),
         np.zeros((size + directions, STATES + states + width + columns)),
@@ -209,19 +209,19 @@ def end_of(test: Floats, j: int) -> StepData:
 
 @njit(cache=True, error_model="numpy")
 def complex_node(
-    test: Floats, i: int, j: int, effect: int, stiffer: float, share: Any, time: Any, weight: Any
+    test: Floats, i: int, j: int, effect: int, modulus_change: float, share: Any, time: Any, weight: Any
 ) -> StepData:
     """What lies between nodes i and j along one of the EFFECTS (none: less than 0).
 
-    stiffer : relative change of the modulus; share, time, weight : of the clock, with derivatives.
+    modulus_change : relative change of the modulus; share, time, weight : of the time transformation, with derivatives.
     """
-    warm = COMPLEX_STEP * 1j if effect == 2 else 0j
-    first, last = _change(test, i, effect, stiffer), _change(test, j, effect, stiffer)
+    temperature_step = COMPLEX_STEP * 1j if effect == 2 else 0j
+    first, last = _change(test, i, effect, modulus_change), _change(test, j, effect, modulus_change)
     return StepData(
         test[PRESSURE, i],
         test[PRESSURE, j],
-        test[TEMPERATURES, i] + warm,
-        test[TEMPERATURES, j] + warm,
+        test[TEMPERATURES, i] + temperature_step,
+        test[TEMPERATURES, j] + temperature_step,
         test[MODULUS, i] + COMPLEX_STEP * 1j * first,
         test[MODULUS, j] + COMPLEX_STEP * 1j * last,
         test[ELASTIC, i] + COMPLEX_STEP * 1j * _lifted(test, i, effect, first),
@@ -233,10 +233,10 @@ def complex_node(
 
 
 @njit(cache=True, error_model="numpy")
-def _change(test: Floats, j: int, effect: int, stiffer: float) -> float:
+def _change(test: Floats, j: int, effect: int, modulus_change: float) -> float:
     """Derivative of the modulus to an effect."""
     if effect == 1:
-        return test[MODULUS, j] / (1.0 + stiffer)  # type: ignore[no-any-return]
+        return test[MODULUS, j] / (1.0 + modulus_change)  # type: ignore[no-any-return]
     return test[SOFTENING, j] if effect == 2 else 0.0
 
 
@@ -257,7 +257,7 @@ _STILL = -600.0
 
 
 _LOG_OVER = float(np.log(100.0))
-"""Of strain, or mm, of an increment; a dimple has burst long before."""
+"""Of strain, or mm, of an increment; a dimple has ruptured long before."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -272,28 +272,28 @@ def solve_step(
     work: ReducedWorkspace,
 ) -> tuple[StepMidpoint, StepExponents]:
     """Newton's method for the unknowns, in place; the middle of the step and the pace then."""
-    rows, said, values = work.rows, work.said, work.values
+    rows, law_values, values = work.rows, work.law_values, work.values
     logs, rates, right, matrix = work.logs, work.rates, work.right, work.matrix
     for iteration in range(_ITERATIONS):
         middle = write_probes(node, state, unknown, dimple, 0.0, rows, values)
-        update(PROBES, data_pointer(rows), data_pointer(theta), data_pointer(said))
+        update(PROBES, data_pointer(rows), data_pointer(theta), data_pointer(law_values))
         for k in range(PROBES):
-            logs[k] = max(said[k, 0], _STILL) if said[k, 0] < 0.0 else said[k, 0]
+            logs[k] = max(law_values[k, 0], _STILL) if law_values[k, 0] < 0.0 else law_values[k, 0]
         for v in range(rates.size):
-            rates[v] = said[0, 1 + v]
+            rates[v] = law_values[0, 1 + v]
         now = step_exponents(node, state[FAST], state[SLOW], values, dimple.redistribution, middle, logs)
         step_residual(node, state, unknown, values[LOG_GROWTH], now, logs[0], rates, right[:, 0])
         largest = _largest(right)
         if not np.isfinite(largest) or largest < tolerance or iteration == _ITERATIONS - 1:
             break
-        _jacobian(node, unknown, rows, said, dimple, middle, now, matrix)
+        _jacobian(node, unknown, rows, law_values, dimple, middle, now, matrix)
         if not solve_dense(matrix, right):
             break
         factor = min(1.0, _STEP / _largest(right))
         for k in range(unknown.size):
             unknown[k] -= factor * right[k, 0]
         unknown[0], unknown[1] = min(unknown[0], _LOG_OVER), min(unknown[1], _LOG_OVER)
-    _damp(node, rows.shape[1], said, work.gains)
+    _damp(node, rows.shape[1], law_values, work.gains)
     return middle, now
 
 
@@ -312,7 +312,7 @@ def _jacobian(
     node: StepData,
     unknown: Floats,
     rows: Floats,
-    said: Floats,
+    law_values: Floats,
     dimple: DimpleCurves,
     middle: StepMidpoint,
     now: StepExponents,
@@ -327,15 +327,15 @@ def _jacobian(
     for v in range(-1, size - 2):
         start = size - 1 + (1 + v) * width
         factor, row = (1.0, 0) if v < 0 else (weight, 2 + v)
-        stiffer = (
-            said[0, start + STRESS]
-            + said[0, start + PRINCIPAL_STRESS]
-            + MEAN_STRESS_RATIO * said[0, start + MEAN_STRESS]
+        stress_derivative = (
+            law_values[0, start + STRESS]
+            + law_values[0, start + PRINCIPAL_STRESS]
+            + MEAN_STRESS_RATIO * law_values[0, start + MEAN_STRESS]
         )
-        matrix[row, 0] = factor * said[0, start + STRAIN] * half_strain
-        matrix[row, 1] = factor * stiffer * softer
+        matrix[row, 0] = factor * law_values[0, start + STRAIN] * half_strain
+        matrix[row, 1] = factor * stress_derivative * softer
         for u in range(size - 2):
-            matrix[row, 2 + u] = factor * said[0, start + POINT_SIZE + u]
+            matrix[row, 2 + u] = factor * law_values[0, start + POINT_SIZE + u]
         matrix[row, row] -= 1.0
     for u in range(size - 2):
         matrix[1, 2 + u] = 0.0
@@ -344,8 +344,8 @@ def _jacobian(
 
 
 @njit(cache=True, error_model="numpy")
-def _damp(node: StepData, width: int, said: Floats, gains: Floats) -> None:
+def _damp(node: StepData, width: int, law_values: Floats, gains: Floats) -> None:
     """1 where the midpoint rule serves; less where a state settles within the step and would overshoot."""
     for v in range(gains.size):
-        settling = -0.5 * np.exp(node.log_weight) * said[0, 1 + gains.size + (1 + v) * width + POINT_SIZE + v]
+        settling = -0.5 * np.exp(node.log_weight) * law_values[0, 1 + gains.size + (1 + v) * width + POINT_SIZE + v]
         gains[v] = (1.0 + max(settling, 0.0) ** 3) ** (-1.0 / 3.0)

@@ -1,6 +1,7 @@
 """Tables of the reduced-order model of a dimple, computed from finite element simulations, and their files.
 
-In steady Norton creep of a dimple of apex thickness h the amplitude D grows as if one point crept: dD/dt = kappa(D, h) A (k(D, h) P)^n.
+In steady Norton creep of a dimple of apex thickness h the amplitude D grows as if one point crept: dD/dt = kappa(D,
+h) A (k(D, h) P)^n.
 """
 
 from __future__ import annotations
@@ -164,7 +165,7 @@ def _extended(curves: Floats) -> Floats:
 
 
 def deflection_grid(specimen: BulgeSettings) -> TableGrid:
-    """Deflections of the tables, mm, up to where the dimple has burst."""
+    """Deflections of the tables, mm, up to where the dimple has ruptured."""
     least = _SMALLEST * specimen.geometry.apex_thickness
     return TableGrid.spanning(max(specimen.deflection_limit, 2 * least), least, _DEFLECTIONS)
 

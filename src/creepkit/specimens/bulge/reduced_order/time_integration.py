@@ -47,11 +47,11 @@ from creepkit.specimens.bulge.reduced_order.step_solution import (
 @njit(cache=True, error_model="numpy")
 def evaluate_law(update: Any, sensitivity: Any, theta: Floats, work: ReducedWorkspace, full: Floats) -> None:
     """What the law says at the solution."""
-    update(PROBES, data_pointer(work.rows), data_pointer(theta), data_pointer(work.said))
+    update(PROBES, data_pointer(work.rows), data_pointer(theta), data_pointer(work.law_values))
     sensitivity(PROBES, data_pointer(work.rows), data_pointer(theta), data_pointer(full))
 
 
-REACHED_END, BURST, NOT_CONVERGED = range(3)
+REACHED_END, RUPTURED, NOT_CONVERGED = range(3)
 """Ends; values of records.Status."""
 
 
@@ -75,7 +75,7 @@ def integrate_candidate(
     out: Floats,
     changes: Floats,
 ) -> tuple[int, float]:
-    """March to the last of `count` nodes, or to where the dimple bursts; how that ended and when, s.
+    """Integrate to the last of `count` nodes, or to where the dimple ruptures; how that ended and when, s.
 
     test : (8, nodes). out : (nodes, columns and features). changes : (nodes, columns and features, P + 3), or no nodes
     where derivatives are not wanted.
@@ -111,7 +111,7 @@ def integrate_candidate(
                 factors.stress,
                 factors.strain,
                 work.wide,
-                work.wide_said,
+                work.feature_values,
                 out[j, len(TRAJECTORY_COLUMNS) :],
             )
         write_node_outputs(end_of(test, j), state, toughness, dimple, 0.0, test[TIMES, j], work.values, out[j])
@@ -147,17 +147,17 @@ def integrate_candidate(
                 )
             if j == 1:
                 changes[0, FIRST_STEP_COLUMN:] = changes[1, FIRST_STEP_COLUMN:]
-        share = burst_fraction(test, j, candidate, before, state)
+        share = rupture_fraction(test, j, candidate, before, state)
         if share >= 0.0:
             out[j, AMPLITUDE_COLUMN] = min(out[j, AMPLITUDE_COLUMN], candidate.deflection_limit)
             _stay(out, changes, j + 1, count)
-            return BURST, test[TIMES, j - 1] + share * (test[TIMES, j] - test[TIMES, j - 1])
+            return RUPTURED, test[TIMES, j - 1] + share * (test[TIMES, j] - test[TIMES, j - 1])
     return REACHED_END, test[TIMES, count - 1]
 
 
 @njit(cache=True, error_model="numpy")
-def burst_fraction(test: Floats, j: int, candidate: ReducedCandidate, before: Floats, state: Floats) -> float:
-    """The share of the step to node j after which the dimple has burst; -1 if it has not."""
+def rupture_fraction(test: Floats, j: int, candidate: ReducedCandidate, before: Floats, state: Floats) -> float:
+    """The share of the step to node j after which the dimple has ruptured; -1 if it has not."""
     reached = test[ELASTIC, j] + state[CREEP_DEFLECTION]
     if reached > candidate.deflection_limit:
         last = test[ELASTIC, j - 1] + before[CREEP_DEFLECTION]
@@ -187,7 +187,7 @@ def integrate_candidates(
     theta: Floats,
     beta: Floats,
     beta_slopes: Floats,
-    stiffer: Floats,
+    modulus_change: Floats,
     counts: Ints,
     tests: Floats,
     curves: Floats,
@@ -219,7 +219,7 @@ def integrate_candidates(
         e = c if tests.shape[0] > 1 else 0
         for k in range(counts.size):
             candidate = ReducedCandidate(
-                theta[c], beta[c], beta_slopes[c], stiffer[e, k], initial, limits, ends[0], ends[1]
+                theta[c], beta[c], beta_slopes[c], modulus_change[e, k], initial, limits, ends[0], ends[1]
             )
             r = row[e, k]
             dimple = DimpleCurves(curves[r], slopes[r], redistribution[r], grid[0], grid[1])

@@ -44,7 +44,7 @@ _OFFSET = 20.0
 
 @dataclass(frozen=True, eq=False)
 class TimeNodes:
-    """When a test is looked at: nodes (nodes,) with time s, pressure MPa and temperature K; weights of frames.
+    """The time nodes of a test: nodes (nodes,) with time s, pressure MPa and temperature K; weights of frames.
 
     frames : (frames, nodes) the values at the history's times as sums of those at nodes.
     """
@@ -58,7 +58,7 @@ class TimeNodes:
 
 @lru_cache(maxsize=1024)
 def time_nodes(specimen: BulgeSettings, history: History) -> TimeNodes:
-    """The schedule of a test; complains as the specimen does where the test cannot be simulated."""
+    """The time nodes of a test; SolveError, as of the specimen, where the test cannot be simulated."""
     test_setup = set_up_test(specimen, history, {})
     segments, largest = test_setup.load_history.segments, float(test_setup.load_history.pressure.values.max())
     nodes, values, rows, origins = [np.zeros(0)], [np.zeros((0, 2))], [], []
@@ -111,7 +111,7 @@ def _weights(nodes: Floats, rows: Sequence[tuple[int, int]], starts: Floats, ori
         mine, known = which == n, slice(first, last + 1)
         here = np.flatnonzero(mine)
         at_node = np.minimum(first + np.searchsorted(nodes[known], times[here]), last)
-        if (nodes[at_node] == times[here]).all():  # as a campaign asks that only looks at ends
+        if (nodes[at_node] == times[here]).all():  # as a sampling campaign asks, which needs ends alone
             out[here, at_node] = 1.0
         else:
             spline = CubicSpline(np.log(nodes[known] - origins[n] + _OFFSET), np.eye(last + 1 - first))
@@ -127,7 +127,7 @@ _TOLERANCE, _EXACT_TOLERANCE = 1e-5, 1e-11
 
 
 _BETA = (0.05, 1.0)
-"""Exponents of the clock; plain time where strain begins faster than time."""
+"""Exponents of the time transformation; plain time where strain begins faster than time."""
 
 
 _BETA_STEP = 1e-5
@@ -139,11 +139,11 @@ _NO_LOAD = 1e-15
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """Courses of candidates in tests, padded to the longest test with its last node.
+    """Trajectories of candidates in tests, padded to the longest test with its last node.
 
-    values : (candidates, tests, nodes, columns). changes : the same with a last axis of P + 3 derivatives, to the law's
-    internal parameters and to EFFECTS (apex thickness mm, relative modulus, temperature K), or None.
-    plans : of each test, with nodes and `frames`. status, end_times : (candidates, tests) Status, and s.
+    values : (candidates, tests, nodes, columns). jacobian : the same with a last axis of P + 3 derivatives, to the
+    law's internal parameters and to NUISANCE_DIRECTIONS (apex thickness mm, relative modulus, temperature K), or None.
+    schedules : of each test, with nodes and `frames`. status, end_times : (candidates, tests) Status, and s.
     """
 
     values: Floats
@@ -300,7 +300,7 @@ def _refuse_another(known: ReducedOrderTables, history: History, plan: TimeNodes
     for name, result, allowed in [*pairs, ("window", window, known.window)]:
         if abs(result - allowed) > 1e-6 * allowed:
             raise SolveError(
-                f"{where}: {name} is {result:g} mm, but the tables of the one-degree-of-freedom model are for "
+                f"{where}: {name} is {result:g} mm, but the tables of the reduced-order model are for "
                 f"{allowed:g} mm; make others with 'creepkit reduced-model'"
             )
 
@@ -321,13 +321,13 @@ def _tests(
     counts: Ints,
     rows: int,
 ) -> tuple[Floats, Floats]:
-    """Each test as in `reduced_problem`, (candidates or 1, tests, 8, nodes), and relative changes of the modulus."""
+    """Rows of each test as in step_solution, (candidates or 1, tests, 8, nodes), and relative modulus changes."""
     shape = (rows, len(plans))
     out = np.zeros((*shape, 8, int(counts.max())))
     modulus_changes = np.broadcast_to(nuisances.get("modulus", np.zeros((1, 1))), shape).astype(float)
     temperature_changes = np.broadcast_to(nuisances.get("temperature", np.zeros((1, 1))), shape)
     for k, (plan, history) in enumerate(zip(plans, histories, strict=True)):
-        assert history.elastic is not None  # the schedule has complained
+        assert history.elastic is not None  # time_nodes has checked
         temperature, factor = plan.temperature + temperature_changes[:, k, None], 1.0 + modulus_changes[:, k, None]
         warm, which = np.unique(temperature, return_inverse=True)
         modulus, softening = (
@@ -373,7 +373,7 @@ def _refuse_soft(history: History, modulus: Floats) -> None:
 
 
 def _beta(law: CompiledLaw, theta: Floats, exact: bool) -> tuple[Floats, Floats]:
-    """Exponents of the clock, (candidates,), and their derivatives (candidates, P) where wanted."""
+    """Exponents of the time transformation, (candidates,), and their derivatives (candidates, P) where wanted."""
     parameters = theta.shape[1]
     steps = np.concatenate([np.zeros((1, parameters)), *(_BETA_STEP * s * np.eye(parameters) for s in (1, -1))])
     points = theta + steps[: None if exact else 1, None]

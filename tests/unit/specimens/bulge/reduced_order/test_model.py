@@ -347,7 +347,7 @@ def test_tables_come_back_from_their_file(tmp_path):
     file = write_tables(known(), tmp_path / "dimple.safetensors")
     back = read_tables(file)
     compiled = lower(NORTON, "numba")
-    theta = compiled.to_internal(SLOW)
+    theta = NORTON.to_internal(SLOW)
     own, theirs = (
         simulate_trajectories(BULGE, compiled, theta, [JUMP], options=TrajectoryOptions(tables=tables))
         for tables in (None, back)

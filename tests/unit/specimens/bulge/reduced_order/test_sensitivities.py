@@ -12,7 +12,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.records import History, PressureJump, Program, RecordedLoading
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
-from creepkit.specimens.bulge.reduced_order.time_integration import NUISANCE_DIRECTIONS, FeatureFactors
+from creepkit.specimens.bulge.reduced_order.step_solution import NUISANCE_DIRECTIONS, FeatureFactors
 from creepkit.specimens.bulge.reduced_order.trajectories import TrajectoryOptions, simulate_trajectories
 from creepkit.specimens.bulge.specimen import Bulge
 
@@ -64,7 +64,7 @@ def values_of(law, theta, history, **nuisances):
 def test_derivatives_are_those_of_the_march(case, history):
     law, values = CASES[case]
     compiled = kernels.lower(law, "numba")
-    theta = compiled.to_internal(values)[0]
+    theta = law.to_internal(values)[0]
     found = values_of(compiled, theta, history).jacobian[0, 0]
     for p in range(theta.size):
         step = np.zeros(theta.size)
@@ -89,7 +89,7 @@ def _close(found, above, below, step):
 def test_threads_do_the_same():
     law, values = CASES["strain hardening"]
     compiled = kernels.lower(law, "numba")
-    theta = compiled.to_internal({**values, "n": np.linspace(2.5, 3.5, 7)})
+    theta = law.to_internal({**values, "n": np.linspace(2.5, 3.5, 7)})
     one, three = (
         simulate_trajectories(
             BULGE, compiled, theta, [JUMP, DOWN], options=TrajectoryOptions(factors=FACTORS, threads=n)
@@ -104,7 +104,7 @@ def test_features_of_a_power_law_are_its_exponents():
     law, values = CASES["strain hardening"]
     compiled = kernels.lower(law, "numba")
     found = simulate_trajectories(
-        BULGE, compiled, compiled.to_internal(values), [JUMP], options=TrajectoryOptions(factors=FACTORS)
+        BULGE, compiled, law.to_internal(values), [JUMP], options=TrajectoryOptions(factors=FACTORS)
     ).values[0, 0, 1:, len(TRAJECTORY_COLUMNS) :]
     expected = 3 * np.log10(FACTORS.stress) - 0.5 * np.log10(FACTORS.strain)[:, None]
     np.testing.assert_allclose(found, np.broadcast_to(expected.ravel(), found.shape), rtol=1e-3, atol=1e-9)
