@@ -30,10 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-if TYPE_CHECKING:
-    from creepkit.discovery.combinations import FormWeight
-
-
 TEMPERATURE_LAW = DocumentFormat(
     "creepkit-temperature-law",
     2,
@@ -101,11 +97,12 @@ TAIL_PROBABILITY = 0.025
 def mixture_interval(
     values: Floats, standard_deviations: Floats, weights: Floats, degrees_of_freedom: Sequence[float]
 ) -> tuple[float, float]:
-    """The 95 % interval of a mixture of Student distributions, (candidates,) each; weights sum to 1."""
-    scales, freedom_of_each = (
-        np.maximum(standard_deviations, 1e-300),
-        np.maximum(np.asarray(degrees_of_freedom, float), 1.0),
-    )
+    """The 95 % interval of a mixture of Student distributions.
+
+    values, standard_deviations, weights : (candidates,) of each; weights sum to 1.
+    """
+    scales = np.maximum(standard_deviations, 1e-300)
+    freedom_of_each = np.maximum(np.asarray(degrees_of_freedom, float), 1.0)
 
     def below(x: float) -> float:
         return float(weights @ student.cdf((x - values) / scales, freedom_of_each))
@@ -128,8 +125,9 @@ UNDETERMINED_FRACTION = 0.8
 class CandidateLaw:
     """One combination of forms with its numbers.
 
-    internal : {name: value} of all numbers, the logarithm where the scale is log; covariance in the same order.
-    excess : of the criterion over the best's; weight : share of belief. fit : the identification, once refitted.
+    internal_values : {name: value} of all parameters, the logarithm where the scale is log. covariance : (parameters,
+    parameters) of them, in the same order. degrees_of_freedom : of its intervals. criterion_difference : of the
+    criterion from the best's. weight : of the candidate among all. fit : the identification, once refitted.
     """
 
     candidate_forms: tuple[CandidateForm, ...]
@@ -146,26 +144,27 @@ class CandidateLaw:
         return {form.parameter: form.name for form in self.candidate_forms}
 
     def theta(self, T: Floats) -> Floats:
-        """(temperatures, parameters) of internal parameters."""
+        """Internal values of the isothermal law's parameters, (temperatures, parameters), at T (temperatures,) K."""
         return evaluate_forms(self.candidate_forms, self.internal_values, T)
 
     def standard_deviation(self, name: str) -> float:
-        """Standard deviation of one number."""
+        """Standard deviation of the internal value of one parameter."""
         k = list(self.internal_values).index(name)
         return float(np.sqrt(max(self.covariance[k, k], 0.0)))
 
 
 @dataclass(frozen=True, eq=False)
 class TemperatureLaw:
-    """The answer of discover() and of refit().
+    """The result of discover() and of refit().
 
-    law : an ordinary law with temperature in it, printed and exported like any other; `valued` has its numbers.
-    base : the law without. T_ref : K, where its parameters have the values stated.
-    estimates : its numbers with 95 % intervals, over all candidates that share the form they belong to.
-    range : K, the temperatures it was found from. judged_by : "points" when regression on estimates chose the forms,
-        "histories" when the tests themselves did.
-    sets : {parameter: forms that remain, best first}. candidates : combinations of forms, best first.
-    odds : {parameter: {form: prior odds}}. fit : the identification of `law` from all tests, once refitted.
+    law : with temperature in it, printed and exported like any other; `valued` has its values. isothermal_law : the
+        law without. T_ref : K, where the parameters of `isothermal_law` have the values stated.
+    estimates : its parameters with 95 % intervals, over all candidates that share the form they belong to.
+    temperature_range : K, of the temperatures it was found from. criterion_data : "points" when regression on
+        estimates chose the forms, "histories" when the tests themselves did.
+    plausible_forms : {parameter: forms that remain, best first}. candidates : combinations of forms, best first.
+    prior_odds : {parameter: {form: prior odds}}. isothermal_estimates, combinations : what it was found from.
+    fit : the identification of `law` from all tests, once refitted.
     """
 
     law: CreepLaw
@@ -205,7 +204,7 @@ class TemperatureLaw:
         raise FitError(f"law '{self.law.name}' has no parameter '{name}': {nearest(name, self.law.names)}")
 
     def parameters_at(self, T: ArrayLike) -> dict[str, Floats]:
-        """{parameter of `base`: (temperatures,) its values} at temperatures in K; FitError outside the range."""
+        """{parameter of `isothermal_law`: (temperatures,) its values} at T (temperatures,) K; FitError outside the range."""
         temperatures = np.atleast_1d(np.asarray(T, float))
         low, high = self.temperature_range
         if ((temperatures < low - 1e-6) | (temperatures > high + 1e-6)).any():
@@ -235,8 +234,11 @@ def temperature_law_from_combinations(
     estimates: IsothermalEstimates, combinations: RankedCombinations, prior_odds: Mapping[str, Mapping[str, float]]
 ) -> TemperatureLaw:
     """The answer that the points alone give."""
-    degrees_of_freedom = [INFINITE_FREEDOM if combinations.overdispersion == 1.0 else max(combination.regression.rows - combination.regression.parameter_count, 1)
-               for combination in combinations.combinations]  # fmt: skip
+    regressions = [combination.regression for combination in combinations.combinations]
+    degrees_of_freedom = [
+        INFINITE_FREEDOM if combinations.overdispersion == 1.0 else max(r.rows - r.parameter_count, 1)
+        for r in regressions
+    ]
     candidates = tuple(
         CandidateLaw(
             weighted.regression.candidate_forms,
