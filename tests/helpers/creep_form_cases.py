@@ -1,4 +1,4 @@
-"""Laws that codes have built in, written by catalogue, by sum, by reduction and by strangers' hands."""
+"""Laws that codes have built in, written by catalogue, by sum, by reduction and in other notations."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ STEEL = Elastic(150e3, 0.3)
 
 _A, _n, _B, _Q, _W = parameters("A n B Q W")
 _RATE = Param("rate coefficient", (1e-40, 1e20), "1/s", "log")
-STRANGER = CreepLaw(
-    name="stranger's hardening",
+OTHER_NOTATION = CreepLaw(
+    name="activated hardening",
     terms={"written oddly": 2 * _A * (stress / _B) ** 5 / sqrt(strain) * exp(-_Q / (GAS_CONSTANT * temperature))},
     params={
         _A: _RATE,
@@ -48,35 +48,35 @@ def valued(law: CreepLaw, units: Units | None = None, elastic: Elastic | None = 
     return LawWithValues(law, values, notes, units or Units(), elastic)
 
 
-WARM = arrhenius(1073.15)
+ARRHENIUS = arrhenius(1073.15)
 CASES: dict[str, LawWithValues] = {
     "norton": valued(NORTON, elastic=STEEL, A=1.2e-16, n=5.2),
-    "norton warm": valued(NORTON.times(WARM), elastic=STEEL, A=1.2e-16, n=5.2, Q=4e5),
+    "norton with temperature": valued(NORTON.times(ARRHENIUS), elastic=STEEL, A=1.2e-16, n=5.2, Q=4e5),
     "strain hardening": valued(STRAIN_HARDENING, A=3e-12, n=4.0, m=-0.5),
     "strain hardening, small": valued(STRAIN_HARDENING, A=3e-27, n=4.0, m=-0.25),
-    "strain hardening warm": valued(STRAIN_HARDENING.times(WARM), A=3e-14, n=4.0, m=-0.5, Q=3e5),
+    "strain hardening with temperature": valued(STRAIN_HARDENING.times(ARRHENIUS), A=3e-14, n=4.0, m=-0.5, Q=3e5),
     "time hardening": valued(TIME_HARDENING, A=3e-13, n=4.5, m=-0.6),
     "time hardening, small": valued(TIME_HARDENING, A=3e-30, n=7.5, m=-0.6),
-    "time hardening warm": valued(TIME_HARDENING.times(WARM), A=3e-13, n=4.5, m=-0.6, Q=3e5),
-    "time hardening warm, small": valued(TIME_HARDENING.times(WARM), A=3e-30, n=7.5, m=-0.8, Q=3e5),
+    "time hardening with temperature": valued(TIME_HARDENING.times(ARRHENIUS), A=3e-13, n=4.5, m=-0.6, Q=3e5),
+    "time hardening with temperature, small": valued(TIME_HARDENING.times(ARRHENIUS), A=3e-30, n=7.5, m=-0.8, Q=3e5),
     "sine": valued(HYPERBOLIC_SINE, A=3e-10, n=3.2, B=40.0),
-    "sine warm": valued(HYPERBOLIC_SINE.times(WARM), A=3e-10, n=3.2, B=40.0, Q=4.2e5),
+    "sine with temperature": valued(HYPERBOLIC_SINE.times(ARRHENIUS), A=3e-10, n=3.2, B=40.0, Q=4.2e5),
     "garofalo": valued(GAROFALO, A=2e9, n=4.1, W=0.021, Q=3.9e5),
     "exponential": valued(EXPONENTIAL, A=2e-9, B=17.0),
     "two power laws": valued(NORTON + NORTON, elastic=STEEL, A_1=1e-12, n_1=3.0, A_2=1e-18, n_2=6.5),
-    "two power laws warm": valued(
-        (NORTON + NORTON).times(WARM), elastic=STEEL, A_1=1e-12, n_1=3, A_2=1e-18, n_2=6, Q=3e5
+    "two power laws with temperature": valued(
+        (NORTON + NORTON).times(ARRHENIUS), elastic=STEEL, A_1=1e-12, n_1=3, A_2=1e-18, n_2=6, Q=3e5
     ),
     "primary and steady": valued(NORTON + TIME_HARDENING, A_1=1e-16, n_1=5.0, A_2=1e-12, n_2=4.0, m=-0.7),
-    "primary and steady warm": valued(
-        NORTON.times(WARM) + TIME_HARDENING.times(WARM),
+    "primary and steady with temperature": valued(
+        NORTON.times(ARRHENIUS) + TIME_HARDENING.times(ARRHENIUS),
         **dict(A_1=1e-16, n_1=5.0, Q_1=4e5, A_2=1e-12, n_2=4.0, m=-0.7, Q_2=3e5),
     ),
     "graham": valued(
         NORTON + TIME_HARDENING + TIME_HARDENING,
         **dict(A_1=1e-14, n_1=4.0, A_2=1e-12, n_2=4.0, m_1=-0.7, A_3=1e-13, n_3=4.0, m_2=-0.3),
     ),
-    "stranger": valued(STRANGER, A=2e9, B=30.0, Q=4e5),
+    "other notation": valued(OTHER_NOTATION, A=2e9, B=30.0, Q=4e5),
     "combined, all but one off": valued(
         COMBINED, A_1=0.0, n_1=3, B=30, A_2=2e-13, n_2=4.4, m_1=-0.3, A_3=0.0, n_3=2, m_2=-0.5
     ),
@@ -86,23 +86,58 @@ CASES: dict[str, LawWithValues] = {
 
 HAS = {
     "abaqus-cards": {
-        *("norton", "norton warm", "strain hardening", "strain hardening, small", "strain hardening warm"),
-        *("time hardening", "time hardening, small", "time hardening warm", "time hardening warm, small"),
-        *("sine", "sine warm", "garofalo"),
-        *("two power laws", "two power laws warm", "stranger", "combined, all but one off"),
+        *(
+            "norton",
+            "norton with temperature",
+            "strain hardening",
+            "strain hardening, small",
+            "strain hardening with temperature",
+        ),
+        *(
+            "time hardening",
+            "time hardening, small",
+            "time hardening with temperature",
+            "time hardening with temperature, small",
+        ),
+        *("sine", "sine with temperature", "garofalo"),
+        *("two power laws", "two power laws with temperature", "other notation", "combined, all but one off"),
         "strain hardening without hardening",
     },
     "ansys": {*CASES},
     "moose": {
-        *("norton", "norton warm", "time hardening", "time hardening, small", "time hardening warm"),
-        "time hardening warm, small",
-        *("two power laws", "two power laws warm", "primary and steady", "primary and steady warm", "graham"),
+        *(
+            "norton",
+            "norton with temperature",
+            "time hardening",
+            "time hardening, small",
+            "time hardening with temperature",
+        ),
+        "time hardening with temperature, small",
+        *(
+            "two power laws",
+            "two power laws with temperature",
+            "primary and steady",
+            "primary and steady with temperature",
+            "graham",
+        ),
         "strain hardening without hardening",
     },
     "code_aster": {
-        *("norton", "norton warm", "strain hardening", "strain hardening, small", "strain hardening warm"),
-        *("stranger", "combined, all but one off", "strain hardening without hardening"),
+        *(
+            "norton",
+            "norton with temperature",
+            "strain hardening",
+            "strain hardening, small",
+            "strain hardening with temperature",
+        ),
+        *("other notation", "combined, all but one off", "strain hardening without hardening"),
     },
-    "neml2": {"norton", "norton warm", "two power laws", "two power laws warm", "strain hardening without hardening"},
+    "neml2": {
+        "norton",
+        "norton with temperature",
+        "two power laws",
+        "two power laws with temperature",
+        "strain hardening without hardening",
+    },
 }
 """{exporter: the cases that its code has}, told from the codes' manuals."""

@@ -30,10 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-if TYPE_CHECKING:
-    from creepkit.discovery.combinations import FormWeight
-
-
 TEMPERATURE_LAW = DocumentFormat(
     "creepkit-temperature-law",
     2,
@@ -134,7 +130,7 @@ class CandidateLaw:
         return evaluate_forms(self.candidate_forms, self.internal_values, T)
 
     def standard_deviation(self, name: str) -> float:
-        """Standard deviation of one number."""
+        """Standard deviation of the internal value of one parameter."""
         k = list(self.internal_values).index(name)
         return float(np.sqrt(max(self.covariance[k, k], 0.0)))
 

@@ -54,8 +54,8 @@ RECOGNISED = dict(recognised())
 
 def test_the_catalogues_power_laws_and_sines_are_among_those_recognised():
     shipped = {"norton", "strain-hardening", "time-hardening", "hyperbolic-sine", "combined"}
-    strangers = {"Garofalo", "shared parameters", "one term of two parts", "integer powers", "two activated"}
-    assert shipped | strangers <= {*RECOGNISED}
+    others = {"Garofalo", "shared parameters", "one term of two parts", "integer powers", "two activated"}
+    assert shipped | others <= {*RECOGNISED}
 
 
 @pytest.mark.parametrize("name", sorted(RECOGNISED))
@@ -108,8 +108,8 @@ def test_what_is_switched_off_is_left_out():
 
 
 def test_temperature_at_a_number_is_part_of_the_coefficient():
-    warm = LawWithValues(NORTON.times(arrhenius(1073.15)), {"A": 1e-9, "n": 4.0, "Q": 3e5})
-    (form,), (cold,) = forms(warm), forms(warm.at(1000.0))
+    activated = LawWithValues(NORTON.times(arrhenius(1073.15)), {"A": 1e-9, "n": 4.0, "Q": 3e5})
+    (form,), (cold,) = forms(activated), forms(activated.at(1000.0))
     assert cold.Q == 0
     assert cold.log_coefficient == pytest.approx(form.log_coefficient_at(1000.0), rel=1e-13)
     assert form.log_coefficient_at(1073.15) == pytest.approx(math.log(1e-9), rel=1e-13)

@@ -19,7 +19,7 @@ from helpers.literature_laws import EQUATIONS
 
 LAWS = {name: default_registry().law(name) for name in sorted(default_registry().laws())} | EQUATIONS
 NOTES = ("n = 4.5 [4.4, 4.6]", "valid from 700 to 900 C\nand below 200 MPa", "a | b & <c> `d` $e$ _f_ *g* \x0b\x00")
-WARM = LawWithValues(NORTON.times(arrhenius(1073.15)), {"A": 1.2e-16, "n": 5.2, "Q": 4e5}, NOTES)
+ARRHENIUS = LawWithValues(NORTON.times(arrhenius(1073.15)), {"A": 1.2e-16, "n": 5.2, "Q": 4e5}, NOTES)
 SHEETS = [MarkdownExporter(), MathmlExporter(), LatexExporter()]
 
 
@@ -71,7 +71,7 @@ def test_mathml_reads_as_the_equation():
 
 
 def test_mathml_writes_arrhenius_factors_and_limits_as_papers_do():
-    _, (rate, *_) = page(WARM.law)
+    _, (rate, *_) = page(ARRHENIUS.law)
     assert flat(rate) == "ε˙cr=Aσenexp[−QR(1T−11073.15K)]"
     infinite = ET.fromstring(f"<x>{MathmlPrinter().doprint(DRIFTING_EXPONENT.symbol('n_inf'))}</x>")
     assert flat(infinite) == "n∞"
@@ -112,7 +112,7 @@ def test_markdown_has_one_table_whose_rows_have_four_cells(name):
 
 
 def test_markdown_makes_nothing_of_notes():
-    text = MarkdownExporter().text(WARM)
+    text = MarkdownExporter().text(ARRHENIUS)
     assert r"- a \| b & \<c\> \`d\` \$e\$ \_f\_ \*g\*" in text
     assert r"- n = 4.5 \[4.4, 4.6\]" in text
     assert "| $A$ | rate coefficient | $1.2 \\times 10^{-16}$ | 1/s |" in text
@@ -125,7 +125,7 @@ def test_markdown_makes_nothing_of_notes():
 @pytest.mark.parametrize("exporter", SHEETS, ids=lambda e: e.name)
 def test_values_are_told_in_the_units_asked_for_with_the_reference(exporter):
     """A' = 3600 A (1e-6)^n for stress as a ratio to 1 Pa and rates per hour; 1.2e-16 at n = 5.2 gives 2.7257e-44."""
-    text = exporter.text(WARM.replace(units=Units("Pa", "h")))
+    text = exporter.text(ARRHENIUS.replace(units=Units("Pa", "h")))
     assert 3600 * 1.2e-16 * 1e-6**5.2 == pytest.approx(2.7257e-44, rel=1e-4)
     assert re.search(r"2\.7257\d?", text)
     assert "-44" in text.replace("−", "-")
@@ -136,7 +136,7 @@ def test_values_are_told_in_the_units_asked_for_with_the_reference(exporter):
 
 def test_latex_converts_the_coefficient_without_reference_temperature_too():
     """A_inf = A exp(Q/(R T_ref)): 2.7257e-44/h times e^44.829."""
-    text = LatexExporter().text(WARM.replace(units=Units("Pa", "h")))
+    text = LatexExporter().text(ARRHENIUS.replace(units=Units("Pa", "h")))
     shown = re.search(r"= ([\d.]+) \\times 10\^\{(.+?)\} \\; \\mathrm\{h\}\^\{-1\}", text)
     found = float(shown[1]) * 10.0 ** int(shown[2])
     assert found == pytest.approx(
@@ -146,7 +146,7 @@ def test_latex_converts_the_coefficient_without_reference_temperature_too():
 
 @pytest.mark.parametrize("exporter", SHEETS, ids=lambda e: e.name)
 def test_native_units_leave_values_as_they_are(exporter):
-    assert "1.2" in exporter.text(WARM)
+    assert "1.2" in exporter.text(ARRHENIUS)
 
 
 @pytest.mark.parametrize("exporter", SHEETS, ids=lambda e: e.name)

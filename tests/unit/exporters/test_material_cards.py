@@ -31,7 +31,12 @@ from helpers.paths import GOLDEN
 EXPORTERS = {e.name: e for e in (AbaqusCards(), AnsysCards(), MooseBlock(), CodeAsterMaterial(), Neml2Model())}
 EXACT = cache(MultiprecisionLaw)
 UNITS = [Units(), Units("Pa", "h"), Units("psi", "min")]
-TABLES = {"strain hardening warm", "time hardening warm", "time hardening warm, small", "stranger"}
+TABLES = {
+    "strain hardening with temperature",
+    "time hardening with temperature",
+    "time hardening with temperature, small",
+    "other notation",
+}
 """Cases that Abaqus takes as a table against temperature."""
 
 
@@ -69,9 +74,11 @@ def test_the_manuals_formula_gives_the_laws_rate(name, case, units):
 def test_between_the_rows_of_a_table_abaqus_is_within_a_thousandth(case):
     """Linear interpolation of a convex function lies above it."""
     rate, source = abaqus(exported("abaqus-cards", case)), CASES[case]
-    warmth = np.arange(873.2, 1273.0, 0.3)
-    truth = lower(source.law, "numpy").rate(source.values, stress=100.0, strain=0.01, time=1e4, temperature=warmth)
-    errors = [rate(100.0, 0.01, 1e4, T) / true - 1 for T, true in zip(warmth, truth, strict=True)]
+    temperatures = np.arange(873.2, 1273.0, 0.3)
+    truth = lower(source.law, "numpy").rate(
+        source.values, stress=100.0, strain=0.01, time=1e4, temperature=temperatures
+    )
+    errors = [rate(100.0, 0.01, 1e4, T) / true - 1 for T, true in zip(temperatures, truth, strict=True)]
     assert -1e-11 < min(errors) < 1e-4 < max(errors) < 1e-3
 
 
@@ -170,7 +177,7 @@ def test_abaqus_time_and_strain_hardening_have_one_set_of_constants():
 
 @pytest.mark.parametrize("name", EXPORTERS)
 def test_the_header_tells_units_reference_intervals_and_new_names(name):
-    head = exported(name, "norton warm", Units("Pa", "h"))
+    head = exported(name, "norton with temperature", Units("Pa", "h"))
     for told in (
         "Numbers below are in Pa and h, temperatures in K: stress is a ratio to 1 Pa, time to 1 h",
         "n = 5.2 [5.1, 5.3]",
@@ -202,11 +209,11 @@ def test_elastic_moduli_follow_the_unit_of_stress():
     assert hit(EXPORTERS["neml2"].text(source))["Models"]["elasticity"]["coefficients"] == "150 0.3"
 
 
-WARM_STEEL = Elastic(wachtman(210e3, 60.0, 300.0), 0.3)
+STEEL_WITH_TEMPERATURE = Elastic(wachtman(210e3, 60.0, 300.0), 0.3)
 
 
 def test_moduli_that_depend_on_temperature_are_tabulated_or_written_as_a_formula():
-    source = CASES["norton warm"].replace(elastic=WARM_STEEL, units=Units("Pa"))
+    source = CASES["norton with temperature"].replace(elastic=STEEL_WITH_TEMPERATURE, units=Units("Pa"))
     _, rows = abaqus_cards(EXPORTERS["abaqus-cards"].text(source))["ELASTIC"]
     assert (rows[0][2], rows[-1][2]) == (873.15, 1273.15)
     for E, nu, T in rows:
@@ -225,7 +232,7 @@ def test_moduli_that_depend_on_temperature_are_tabulated_or_written_as_a_formula
 @pytest.mark.parametrize("name", ["moose", "neml2"])
 def test_moduli_that_depend_on_temperature_are_refused_where_numbers_are_needed(name):
     with pytest.raises(ExportError, match=r"the elastic moduli depend on temperature.*give elastic.at\(1073\)"):
-        EXPORTERS[name].text(CASES["norton"].replace(elastic=WARM_STEEL))
+        EXPORTERS[name].text(CASES["norton"].replace(elastic=STEEL_WITH_TEMPERATURE))
 
 
 AT = dict(A=1e-9, n=4)
@@ -300,21 +307,21 @@ def golden_cases() -> dict[str, str]:
             ("abaqus-cards", "norton", None),
             ("abaqus-cards", "strain hardening", Units("Pa", "h")),
             ("abaqus-cards", "time hardening, small", None),
-            ("abaqus-cards", "sine warm", Units("Pa", "h")),
-            ("abaqus-cards", "two power laws warm", None),
-            ("ansys", "strain hardening warm", Units("Pa", "s")),
-            ("ansys", "primary and steady warm", Units("Pa", "h")),
+            ("abaqus-cards", "sine with temperature", Units("Pa", "h")),
+            ("abaqus-cards", "two power laws with temperature", None),
+            ("ansys", "strain hardening with temperature", Units("Pa", "s")),
+            ("ansys", "primary and steady with temperature", Units("Pa", "h")),
             ("ansys", "garofalo", None),
-            ("moose", "norton warm", Units("Pa", "s")),
+            ("moose", "norton with temperature", Units("Pa", "s")),
             ("moose", "primary and steady", None),
             ("code_aster", "strain hardening", None),
-            ("code_aster", "norton warm", Units("Pa", "h")),
+            ("code_aster", "norton with temperature", Units("Pa", "h")),
             ("neml2", "norton", None),
-            ("neml2", "two power laws warm", None),
+            ("neml2", "two power laws with temperature", None),
         )
     }
-    short = AbaqusCards(lowest_temperature=1000.0, highest_temperature=1010.0).text(CASES["stranger"])
-    return files | {"abaqus-cards_stranger_1000_to_1010_K.inp": short}
+    short = AbaqusCards(lowest_temperature=1000.0, highest_temperature=1010.0).text(CASES["other notation"])
+    return files | {"abaqus-cards_other_notation_1000_to_1010_K.inp": short}
 
 
 @pytest.mark.parametrize("file", sorted(golden_cases()))
