@@ -142,7 +142,7 @@ def _fill_template(text: Template, name: str) -> str:
 
 
 def _check_absent(path: Path) -> None:
-    """What exists is left as it is."""
+    """Write the file unless it exists."""
     from creepkit.errors import PluginError
 
     if path.exists():

@@ -81,7 +81,7 @@ class SamplingDomain:
 
     @property
     def condition_names(self) -> tuple[str, ...]:
-        """What is drawn of a test."""
+        """Names of the conditions that are drawn."""
         return self.conditions.names
 
     @property
@@ -272,7 +272,7 @@ DEFAULT_DRAWS = 4096
 
 @dataclass(frozen=True, eq=False)
 class Acceptance:
-    """What is known of a design without simulating it.
+    """Acceptance of a design as far as it is known without simulation.
 
     draws : rows of the design. criteria_met : {criterion before simulation: (rows,) whether it is met on its own}.
     log10_strains : (rows,) log10 of the mean rate at the reference stress times the duration of the test.
@@ -381,7 +381,7 @@ class SamplingDesign(Protocol):
 
     @property
     def condition_names(self) -> tuple[str, ...]:
-        """What is drawn of a test, in the order of the columns."""
+        """Names of the conditions that are drawn, in the order of the columns."""
         ...
 
     @property
@@ -391,7 +391,7 @@ class SamplingDesign(Protocol):
 
     @property
     def criteria(self) -> tuple[Criterion, ...]:
-        """What a sample must meet to be kept, those before simulation first."""
+        """Criteria that a sample must meet to be kept, those before simulation first."""
         ...
 
     def draw(self, first: int, count: int, seed: int) -> Draws:

@@ -85,7 +85,7 @@ MAX_DRAWS = 20
 
 @dataclass(frozen=True, eq=False)
 class AlloyTruth:
-    """What an alloy was planted with: its law, values, apex thickness (mm), and shares of the base alloys."""
+    """True values of a planted alloy: its law, parameters, apex thickness (mm), and fractions of the base alloys."""
 
     law: str
     values: Mapping[str, float]
