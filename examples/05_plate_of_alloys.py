@@ -14,9 +14,6 @@ from collections import Counter
 from pathlib import Path
 
 import creepkit as ck
-from creepkit.inverse.settings import IdentificationSettings
-from creepkit.screening.planted import THICKNESS_MEAN_SD, planted_plate
-from creepkit.screening.screen import screen
 
 options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 options.add_argument("--alloys", type=int, default=3)
@@ -27,7 +24,7 @@ arguments = options.parse_args()
 
 # ---- 1. The plate: tests, compositions and the truth, as files -------------------------------------------------------
 
-planted = planted_plate(arguments.alloys, thickness_known=not arguments.unknown_thickness)
+planted = ck.planted_plate(arguments.alloys, thickness_known=not arguments.unknown_thickness)
 tests, compositions = planted.write(arguments.to)
 for name, truth in planted.truth.items():
     mixed = ", ".join(f"{100 * share:.0f} % {base}" for base, share in truth.base_fractions.items() if share > 0.01)
@@ -40,12 +37,15 @@ for name, truth in planted.truth.items():
 began = time.monotonic()
 nuisances = [ck.Nuisance("offset"), ck.Nuisance("rate")]
 if arguments.unknown_thickness:
-    nuisances.append(ck.Nuisance("thickness", mean=THICKNESS_MEAN_SD[0], sd=THICKNESS_MEAN_SD[1]))
-plate = screen(
-    tests, compositions=compositions, nuisances=nuisances, settings=IdentificationSettings(starts=4, sobol_points=32, frames=60),
-    confirm=True, dense="combined" if arguments.dense else None, to=arguments.to / "screened",
+    nuisances.append(planted.thickness_prior)
+settings = ck.IdentificationSettings(starts=4, sobol_points=32, frames=60, nuisances=tuple(nuisances))
+plate = ck.screen(
+    tests,
+    compositions=compositions,
+    to=arguments.to / "screened",
+    options=ck.ScreeningOptions(settings, dense="combined" if arguments.dense else None, confirm=True),
     progress=lambda task, done, total, note: print(f"{task}: {done} of {total} ({note})", file=sys.stderr),
-)  # fmt: skip
+)
 seconds = time.monotonic() - began
 print(f"\n{plate}")
 plate.to_csv(arguments.to / "plate.csv")

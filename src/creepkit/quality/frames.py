@@ -204,7 +204,7 @@ def noise_standard_deviation(times: Floats, values: Floats) -> float:
 
 
 def _interpolation_residuals(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Standardised residuals from the cubic of the neighbours, and their scale, (n - 4,) each: the outer frames have none.
+    """Standardised residuals from the cubic of the neighbours, and their scale, (n - 4,) each; outer frames have none.
 
     The cubic is one in time or in its logarithm, whichever fits better: some tests are read evenly, some over decades.
     """
