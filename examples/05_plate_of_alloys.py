@@ -65,7 +65,7 @@ contained = sum(planted.truth[name].law in answer.credible_laws for name, answer
 decisive_names = [name for name, answer in results.items() if answer.decisive]
 wrong = sum(planted.truth[name].law != results[name].best.law.name for name in decisive_names)
 print(
-    f"best law right {correct} of {len(results)}, truth in the set {contained}; decisive {len(decisive_names)}, of them wrong {wrong}; "
-    f"{seconds:.0f} s"
+    f"best law right {correct} of {len(results)}, truth in the set {contained}; decisive {len(decisive_names)}, "
+    f"of them wrong {wrong}; {seconds:.0f} s"
 )
 print("pictures:", ", ".join(map(str, pictures)))
