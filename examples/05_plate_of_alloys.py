@@ -14,6 +14,9 @@ from collections import Counter
 from pathlib import Path
 
 import creepkit as ck
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.screening.planted import THICKNESS_MEAN_SD, planted_plate
+from creepkit.screening.screen import screen
 
 options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 options.add_argument("--alloys", type=int, default=3)
@@ -24,7 +27,7 @@ arguments = options.parse_args()
 
 # ---- 1. The plate: tests, compositions and the truth, as files -------------------------------------------------------
 
-planted = ck.planted_plate(arguments.alloys, thickness_known=not arguments.unknown_thickness)
+planted = planted_plate(arguments.alloys, thickness_known=not arguments.unknown_thickness)
 tests, compositions = planted.write(arguments.to)
 for name, truth in planted.truth.items():
     mixed = ", ".join(f"{100 * share:.0f} % {base}" for base, share in truth.base_fractions.items() if share > 0.01)
@@ -37,15 +40,12 @@ for name, truth in planted.truth.items():
 began = time.monotonic()
 nuisances = [ck.Nuisance("offset"), ck.Nuisance("rate")]
 if arguments.unknown_thickness:
-    nuisances.append(planted.thickness_prior)
-settings = ck.IdentificationSettings(starts=4, sobol_points=32, frames=60, nuisances=tuple(nuisances))
-plate = ck.screen(
-    tests,
-    compositions=compositions,
-    to=arguments.to / "screened",
-    options=ck.ScreeningOptions(settings, dense="combined" if arguments.dense else None, confirm=True),
+    nuisances.append(ck.Nuisance("thickness", mean=THICKNESS_MEAN_SD[0], sd=THICKNESS_MEAN_SD[1]))
+plate = screen(
+    tests, compositions=compositions, nuisances=nuisances, settings=IdentificationSettings(starts=4, sobol_points=32, frames=60),
+    confirm=True, dense="combined" if arguments.dense else None, to=arguments.to / "screened",
     progress=lambda task, done, total, note: print(f"{task}: {done} of {total} ({note})", file=sys.stderr),
-)
+)  # fmt: skip
 seconds = time.monotonic() - began
 print(f"\n{plate}")
 plate.to_csv(arguments.to / "plate.csv")
@@ -65,7 +65,7 @@ contained = sum(planted.truth[name].law in answer.credible_laws for name, answer
 decisive_names = [name for name, answer in results.items() if answer.decisive]
 wrong = sum(planted.truth[name].law != results[name].best.law.name for name in decisive_names)
 print(
-    f"best law right {correct} of {len(results)}, truth in the set {contained}; decisive {len(decisive_names)}, "
-    f"of them wrong {wrong}; {seconds:.0f} s"
+    f"best law right {correct} of {len(results)}, truth in the set {contained}; decisive {len(decisive_names)}, of them wrong {wrong}; "
+    f"{seconds:.0f} s"
 )
 print("pictures:", ", ".join(map(str, pictures)))

@@ -142,7 +142,7 @@ def _fill_template(text: Template, name: str) -> str:
 
 
 def _check_absent(path: Path) -> None:
-    """Write the file unless it exists."""
+    """What exists is left as it is."""
     from creepkit.errors import PluginError
 
     if path.exists():

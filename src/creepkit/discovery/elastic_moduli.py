@@ -30,7 +30,7 @@ _T0_BOUNDS = (100.0, 3000.0)
 
 @dataclass(frozen=True, eq=False)
 class ModulusEstimates:
-    """Moduli identified from the first frames of tests.
+    """What the first frames say of the modulus.
 
     names : of the tests. temperatures : (tests,) K; values, sd : (tests,) MPa.
     elastic : Wachtman's form through them, with the first history's Poisson's ratio, or None for fewer than three

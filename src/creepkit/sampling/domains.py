@@ -272,7 +272,7 @@ DEFAULT_DRAWS = 4096
 
 @dataclass(frozen=True, eq=False)
 class Acceptance:
-    """Acceptance of a design as far as it is known without simulation.
+    """What is known of a design without simulating it.
 
     draws : rows of the design. criteria_met : {criterion before simulation: (rows,) whether it is met on its own}.
     log10_strains : (rows,) log10 of the mean rate at the reference stress times the duration of the test.
