@@ -22,6 +22,7 @@ from .api.simulation import rate_family as rate_family
 from .api.simulation import simulate as simulate
 from .api.simulation import train as train
 from .dataset.storage import read_dataset as read_dataset
+from .dataset.storage import write_dataset as write_dataset
 from .discovery.discover import discover as discover
 from .discovery.discover import group_by_temperature as group_by_temperature
 from .discovery.discover import temperature_study as temperature_study

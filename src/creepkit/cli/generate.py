@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 RATE_FAMILY = "rate-family"
-"""What is asked for in the place of a law, to have rate functions of many laws."""
+"""Name that stands in the place of a law for rate functions of many laws."""
 
 
 def command(
@@ -88,7 +88,7 @@ def command(
 
 
 def design_changes(ranges: list[str], end_h: float | None, domain: str | None, unscreened: bool) -> dict[str, Any]:
-    """What options change in a design."""
+    """Changes of a design that the options state."""
     from creepkit.errors import DatasetError
 
     changes: dict[str, Any] = dict(parse_range(text) for text in ranges)

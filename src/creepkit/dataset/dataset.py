@@ -164,8 +164,6 @@ def join(one: Dataset, other: Dataset) -> Dataset:
     """The samples of both, one after the other; designs and seeds may differ, what was simulated may not."""
     _check_compatible(one, other)
     _check_no_shared_rows(one, other)
-    columns: dict[str, Any] = {name: np.concatenate([getattr(one, name), getattr(other, name)]) for name in COLUMNS}
-    failures = {**one.failures, **{len(one) + row: text for row, text in other.failures.items()}}
     same = one.design_document == other.design_document
     design = (
         one.design_document
@@ -173,7 +171,17 @@ def join(one: Dataset, other: Dataset) -> Dataset:
         else {"joined": [*_joined_documents(one.design_document), *_joined_documents(other.design_document)]}
     )
     provenance = {"joined": [*_joined_documents(one.provenance), *_joined_documents(other.provenance)]}
-    return replace(one, **columns, failures=failures, design_document=design, provenance=provenance)
+    return replace(concatenate([one, other]), design_document=design, provenance=provenance)
+
+
+def concatenate(parts: Sequence[Dataset]) -> Dataset:
+    """The samples of data sets of one kind, one after the other; everything else is that of the first."""
+    columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
+    offsets = np.cumsum([0, *(len(part) for part in parts)]).tolist()
+    failures = {
+        offset + row: text for offset, part in zip(offsets, parts, strict=False) for row, text in part.failures.items()
+    }
+    return replace(parts[0], **columns, failures=failures)
 
 
 def _joined_documents(document: Any) -> list[Any]:

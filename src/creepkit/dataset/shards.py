@@ -22,7 +22,7 @@ import numpy as np
 
 from creepkit import registry
 from creepkit.dataset import storage
-from creepkit.dataset.dataset import COLUMNS, Dataset, first_difference
+from creepkit.dataset.dataset import COLUMNS, Dataset, concatenate, first_difference
 from creepkit.dataset.simulation import SampleFailedError, empty_dataset, simulate_rows
 from creepkit.dataset.storage import LAYOUT_VERSION
 from creepkit.errors import DatasetError
@@ -56,7 +56,7 @@ _log = logging.getLogger("creepkit.dataset")
 
 @dataclass(frozen=True)
 class GenerationJob:
-    """What is simulated, and in which folder its shards lie.
+    """The simulations of a data set, divided into shards that are kept in a folder.
 
     rows : of a shard. Worker processes are sent this record.
     """
@@ -213,14 +213,7 @@ def accepted_count(job: GenerationJob, number: int, *, quiet: bool = False) -> i
 
 def read_shards(job: GenerationJob, numbers: Sequence[int]) -> Dataset:
     """The samples of several shards."""
-    parts = [read_shard(job, number) for number in numbers] or [job.header]
-    columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
-    failures: dict[int, str] = {}
-    offset = 0
-    for shard_samples in parts:
-        failures.update({offset + row: text for row, text in shard_samples.failures.items()})
-        offset += len(shard_samples)
-    return replace(job.header, **columns, failures=failures)
+    return concatenate([job.header, *(read_shard(job, number) for number in numbers)])
 
 
 POLL_INTERVAL = 0.5
@@ -272,7 +265,7 @@ def _write_merged(job: GenerationJob, record: ProgressRecord, path: Path, progre
 
 
 def _identity(data: Dataset) -> dict[str, Any]:
-    """What decides a data set, as far as its file says it."""
+    """Everything in the file of a data set that decides its samples."""
     document = {
         "law": law_to_json(data.law),
         "specimen": specimen_to_json(data.specimen),

@@ -172,7 +172,7 @@ def candidate_form(
 def _separate_linear_terms(
     expression: sympy.Expr, symbols: Sequence[sympy.Symbol]
 ) -> tuple[dict[str, sympy.Expr], sympy.Expr, list[sympy.Symbol]]:
-    """What stands in a sum as a factor, what is left without, and the symbols that stand elsewhere."""
+    """Factors of a sum, what is left without them, and the symbols that stand elsewhere."""
     terms: dict[str, sympy.Expr] = {}
     linear: list[sympy.Symbol] = []
     for s in symbols:

@@ -295,7 +295,7 @@ def solve_with_pysindy(features: Floats, target: Floats) -> Floats:
 
 
 def _variable_projection(design: _DesignMatrix, estimates: IsothermalEstimates) -> Floats:
-    """What is inside exponentials, with the coefficients solved for at each trial."""
+    """Values of the nonlinear parameters; the coefficients are solved for at each trial."""
     low, high = (np.array([p.bounds[end] for p in design.nonlinear_parameters.values()]) for end in (0, 1))
     scale = high - low
 
@@ -328,7 +328,7 @@ def _nonlinear_sensitivities(
 
 
 def _parameter_covariance(sensitivities: Floats, design: _DesignMatrix) -> Floats:
-    """Of all numbers; what is inside exponentials has the variance of its bounds where the points say nothing."""
+    """Covariance of all numbers; undetermined nonlinear parameters have the variance of their bounds."""
     information = sensitivities.T @ sensitivities
     for k, param in enumerate(design.nonlinear_parameters.values(), start=len(design.parameter_of_column)):
         information[k, k] += 12.0 / (param.bounds[1] - param.bounds[0]) ** 2

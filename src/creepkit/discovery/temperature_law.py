@@ -285,7 +285,7 @@ def _estimate(name: str, form: CandidateForm, candidates: Sequence[CandidateLaw]
 
 
 def export_notes(temperature_law: TemperatureLaw) -> list[str]:
-    """What must travel with an exported law."""
+    """Validity, intervals and forms of a law, as comments of an export."""
     low, high = temperature_law.temperature_range
     parameter_lines = [
         f"{e.name} = {e.value:.8g} [{e.low:.4g}, {e.high:.4g}] {e.unit}: {e.verdict}" for e in temperature_law.estimates

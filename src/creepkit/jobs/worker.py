@@ -20,7 +20,7 @@ from creepkit.errors import CreepkitError
 
 @dataclass(frozen=True)
 class TaskResult:
-    """What became of a task.
+    """Outcome of a task.
 
     number : of the task. status : "done"; "taken", by another process; "died", its own process did; "error", as `text`
         says. accepted : how many samples it left that count.
@@ -33,11 +33,11 @@ class TaskResult:
 
 
 class Job(Protocol):
-    """What worker processes are sent, pickled, to do tasks of."""
+    """Numbered tasks that worker processes do; it is pickled and sent to them."""
 
     @property
     def task_name(self) -> str:
-        """What a task is called, such as "shard"."""
+        """Name of a task in messages, such as "shard"."""
         ...
 
     def on_one_thread(self) -> Job:

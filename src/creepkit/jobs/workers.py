@@ -98,7 +98,7 @@ class ClusterWorkers:
         return [self._result(future, self._futures.pop(future)) for future in finished]
 
     def _result(self, future: Any, number: int) -> TaskResult:
-        """What a task returned; that its workers died is a result too."""
+        """The result of a task; that its workers died is a result too."""
         error = future.exception()
         if error is None:
             result: TaskResult = future.result()
@@ -258,7 +258,7 @@ class ProcessWorkers:
         return process
 
     def _read_results(self, process: WorkerProcess) -> list[TaskResult]:
-        """What a process reports: that it is ready, or its result; the end of its output means that it died."""
+        """Results that a process reports; the end of its output means that it died."""
         data = _pipe(process.popen.stdout).read(1 << 16)
         if not data:
             return self._after_death(process)

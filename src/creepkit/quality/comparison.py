@@ -52,11 +52,12 @@ that scatter by 5.5 % do to a deflection. Bars: rates scatter by a factor of two
 
 
 _COMPARISON_FRACTIONS = np.linspace(0.2, 1.0, 9)
-"""Of the common time, at which replicates are compared; the median counts, as the end of a failing test says little."""
+"""Fractions of the common time at which replicates are compared; the median counts, as the end of a failing test may
+differ."""
 
 
 COMMON_TIME_FRACTION = 0.5
-"""Of the shorter test, for which two tests must have been loaded alike to be compared."""
+"""Fraction of the shorter test for which two tests must have been loaded alike to be compared."""
 
 
 FEWEST_TREND_TESTS = 6
@@ -76,11 +77,12 @@ MODULUS_ERROR = 0.03
 
 
 ELASTIC_ERROR = 0.15
-"""Of the elastic deflection, that a first frame must be off it: thicknesses and moduli known to 5 % make 10 %."""
+"""Fraction of the elastic deflection by which a first frame must differ from it: thicknesses and moduli known to 5 %
+make 10 %."""
 
 
 NEGLIGIBLE_CREEP = 0.1
-"""Of the elastic deflection: largest creep before the first frame with which the latter can be judged."""
+"""Fraction of the elastic deflection, largest creep before the first frame with which the latter can be judged."""
 
 
 _FIRST_FRAMES = 5
@@ -206,7 +208,7 @@ def first_frame_deviations(histories: Sequence[History], specimen: Predictor) ->
 
 
 def _elastic_value(history: History, frame: int, specimen: Predictor, output: str) -> float:
-    """What the specimen shows without creep at a frame."""
+    """Output of the specimen without creep at a frame."""
     elastic_history = history.replace(times=history.times[frame : frame + 1], outputs={}, standard_deviation={})
     result = specimen.predict(_NO_CREEP_LAW, _NO_CREEP_LAW.to_internal({"A": 0.0, "n": 1.0}), [elastic_history])
     return float(result.of(0)[0, result.outputs.index(output)])

@@ -20,7 +20,7 @@ FEW_FRAMES_CORRECTION = 10.0
 
 
 DECREASE_FRACTION = 0.02
-"""Of the largest value: less can be drift of instruments; a loaded dimple or bar does not recover at all."""
+"""Fraction of the largest value: less can be drift of instruments; a loaded dimple or bar does not recover at all."""
 
 
 DECREASE_THRESHOLD = 6.0
@@ -46,11 +46,11 @@ OPPOSITE_NEIGHBOUR_FRACTION = 0.3
 
 
 _ROUNDING_FRACTION = 0.5
-"""Of the smallest step between values: noise cannot be seen below."""
+"""Fraction of the smallest step between values, below which noise cannot be seen."""
 
 
 _MOST_OUTLIERS = 0.05
-"""Of the frames that may be outliers; more are not outliers."""
+"""Largest fraction of frames that are outliers; more are not outliers."""
 
 
 class FlaggedFrames(NamedTuple):
@@ -204,7 +204,7 @@ def noise_standard_deviation(times: Floats, values: Floats) -> float:
 
 
 def _interpolation_residuals(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Standardised residual of each frame but the outer two from the cubic of its neighbours, and its scale, (n - 4,) each.
+    """Standardised residuals from the cubic of the neighbours, and their scale, (n - 4,) each; outer frames have none.
 
     The cubic is one in time or in its logarithm, whichever fits better: some tests are read evenly, some over decades.
     """

@@ -318,7 +318,7 @@ def _required_number(conditions: StatedConditions, name: str, companion: StatedN
 def _stated_loading(
     conditions: StatedConditions, frames: Frames, quantity: str
 ) -> float | TimeValuePairs | Program | None:
-    """What was given of a quantity: a number, steps as (time, value), or a Program."""
+    """The value given for a quantity: a number, steps as (time, value), or a Program."""
     kind = LOADING_KINDS[quantity]
     number = conditions.take_number(quantity)
     steps = conditions.take_pairs(f"{quantity}_steps", kind)

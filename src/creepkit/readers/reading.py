@@ -64,7 +64,7 @@ def _existing_paths(paths: PathsLike) -> list[Path]:
 
 
 def _readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
-    """What to read for a path: itself, or the files in a folder that no reader accepts as a whole."""
+    """The paths to read: the path itself, or the files in a folder that no reader accepts as a whole."""
     if path.is_file() or any(reader.accepts(path) for reader in readers):
         return [path]
     files = [file for file in sorted(path.iterdir()) if file.is_file() and any(r.accepts(file) for r in readers)]

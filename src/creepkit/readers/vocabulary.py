@@ -151,7 +151,7 @@ SPECIMEN_OUTPUTS: Mapping[str, Mapping[str, QuantityKind]] = {
         **{f"stress_{c}": SIGNED_STRESS for c in COMPONENTS},
     },
 }
-"""What each specimen's outputs are called, and of which kind they are."""
+"""Names and kinds of the outputs of each specimen."""
 
 
 IDENTIFIABLE_SPECIMENS = ("uniaxial", "bulge")
@@ -159,7 +159,7 @@ IDENTIFIABLE_SPECIMENS = ("uniaxial", "bulge")
 
 
 LOADING_KINDS: Mapping[str, QuantityKind] = {"stress": STRESS, "pressure": STRESS, "temperature": TEMPERATURE}
-"""What may be imposed on a specimen: a number, `_steps`, a `_program`, or a column."""
+"""Loadings of a specimen: a number, `_steps`, a `_program`, or a column."""
 
 
 CONDITION_KINDS: Mapping[str, QuantityKind] = {
@@ -173,14 +173,14 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
 
 
 STRAIN_LOADING_KINDS: Mapping[str, QuantityKind] = {"strain": STRAIN}
-"""What may be imposed on a bar in relaxation: `_steps` or a `_program` alone, for its number would be an output."""
+"""Loadings of a bar in relaxation: `_steps` or a `_program` alone, for its number would be an output."""
 
 
 COMPONENT_LOADING_KINDS: Mapping[str, QuantityKind] = {
     **{f"stress_{c}": SIGNED_STRESS for c in COMPONENTS},
     **{f"strain_{c}": STRAIN for c in COMPONENTS},
 }
-"""What may be imposed on a material point: `_steps` or a `_program`."""
+"""Loadings of a material point: `_steps` or a `_program`."""
 
 
 TEXT_KEYS = frozenset(
@@ -195,7 +195,7 @@ TEXT_KEYS = frozenset(
 
 
 SPECIMEN_NAME_PATTERN = re.compile(r"[a-z][a-z0-9_-]*")
-"""What the name of a specimen looks like; any other text after `specimen` is a label."""
+"""Pattern of the name of a specimen; any other text after `specimen` is a label."""
 
 
 CREEP_MACHINE_DEFAULTS: Mapping[str, str] = {
@@ -203,7 +203,7 @@ CREEP_MACHINE_DEFAULTS: Mapping[str, str] = {
     "strain_measure": "engineering",
     "includes_elastic": "no",
 }
-"""What a creep machine with a dead load and an extensometer records, unless the file says otherwise."""
+"""Defaults of a creep machine with a dead load and an extensometer."""
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ LIFE_FRACTIONS = (0.03, 0.7)
 
 
 QUADRATURE_POINTS = 64
-"""Of the integral over an internal variable, in the middle of equal spans."""
+"""Points of the integral over an internal variable, in the middle of equal intervals."""
 
 
 @dataclass(frozen=True)

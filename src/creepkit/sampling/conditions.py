@@ -29,7 +29,7 @@ MOST_FRAMES = 100_000
 
 
 RELATIVE_TIMES = (0.0, 60 / 43200, 240 / 43200, *(k / 48 for k in range(1, 49)))
-"""Of the end of a test: 51 frames, two of them in the fast start; 900 s apart in 12 h."""
+"""Times as fractions of the end of a test: 51 frames, two of them in the fast start; 900 s apart in 12 h."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +229,7 @@ class ConditionRange:
 
 @dataclass(frozen=True)
 class ConditionRanges:
-    """What is drawn of each test.
+    """Ranges from which the conditions of each test are drawn.
 
     kind : of specimen. ranges : (condition, its range), in the order of the columns. end : s, of tests whose end is
         not drawn.

@@ -81,7 +81,7 @@ class SamplingDomain:
 
     @property
     def condition_names(self) -> tuple[str, ...]:
-        """What is drawn of a test."""
+        """Names of the conditions that are drawn."""
         return self.conditions.names
 
     @property
@@ -344,7 +344,7 @@ class SamplingDesign(Protocol):
 
     @property
     def condition_names(self) -> tuple[str, ...]:
-        """What is drawn of a test, in the order of the columns."""
+        """Names of the conditions that are drawn, in the order of the columns."""
         ...
 
     @property
@@ -354,7 +354,7 @@ class SamplingDesign(Protocol):
 
     @property
     def criteria(self) -> tuple[Criterion, ...]:
-        """What a sample must meet to be kept, those before simulation first."""
+        """Criteria that a sample must meet to be kept, those before simulation first."""
         ...
 
     def draw(self, first: int, count: int, seed: int) -> Draws:

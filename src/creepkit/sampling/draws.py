@@ -82,10 +82,6 @@ class Draws:
             raise DatasetError(f"these draws have no condition '{name}': {nearest(name, self.condition_names)}")
         return np.full(len(self), default)
 
-    def conditions_of(self, row: int) -> dict[str, float]:
-        """{condition: value} of one row."""
-        return dict(zip(self.condition_names, map(float, self.conditions[row]), strict=True))
-
 
 CONCENTRATION = 0.7
 """Parameter of the Dirichlet distribution of rate fractions: below 1 one group tends to dominate."""

@@ -50,7 +50,7 @@ DECAYING_FRACTION, DECAY_TIME_FRACTIONS = 0.35, (0.03, 1.0)
 
 
 THICKNESS_FACTORS = (0.88, 1.2)
-"""Of the specimen's own apex thickness: 0.44 to 0.60 mm of the paper's dimple."""
+"""Bounds of the apex thickness over the specimen's own: 0.44 to 0.60 mm of the paper's dimple."""
 
 
 END_TIME_RANGE, JUMP_FRACTIONS = (1200.0, 86400.0), (0.15, 0.85)

@@ -137,7 +137,7 @@ def mean_ln_rate(law: CreepLaw, theta: Floats, points: RateEvaluationPoints, str
 
 
 LARGEST_REFERENCE_STRAIN = 0.2
-"""Of the reference strain when the test ends; the paper's dimple is then some 2 mm deep."""
+"""Largest reference strain at the end of a test; the paper's dimple is then some 2 mm deep."""
 
 
 @dataclass(frozen=True)

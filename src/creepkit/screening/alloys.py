@@ -57,7 +57,7 @@ def check_tests(alloy: Alloy, predictor: Predictor) -> None:
 
 
 def limitations(alloy: Alloy, predictor: Predictor) -> tuple[str, ...]:
-    """What cannot be known from the tests of an alloy, whatever law is identified from them."""
+    """Notes on what the tests of an alloy leave unknown, whatever law is identified from them."""
     notes, tests = [], alloy.tests
     if len(tests) == 1:
         notes.append("one test: how dimples or bars of this alloy differ cannot be known from it")
@@ -137,13 +137,13 @@ ALLOWED_TOTAL = (98.0, 102.0)
 
 @dataclass(frozen=True)
 class Compositions:
-    """What alloys are made of: {alloy: {element: at.%}}, and where that was written."""
+    """Compositions of alloys, {alloy: {element: at.%}}, and their source."""
 
     atomic: Mapping[str, Mapping[str, float]]
     source: str = ""
 
     def class_of(self, alloy: str) -> str:
-        """Such as "Fe-rich", or "near-equimolar"; "unknown" for an alloy that the table lacks."""
+        """Class of an alloy, such as "Fe-rich" or "near-equimolar"; "unknown" for an alloy that the table lacks."""
         if alloy not in self.atomic:
             return UNKNOWN_CLASS
         contents = sorted(self.atomic[alloy].items(), key=lambda pair: -pair[1])

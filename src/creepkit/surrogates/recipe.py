@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -11,6 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from creepkit.errors import SurrogateError
+from creepkit.jobs.shard_progress import ProgressCallback as ProgressCallback
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
@@ -23,10 +24,6 @@ if TYPE_CHECKING:
 SampleTensors: TypeAlias = dict[str, Tensor]
 """Tensors whose leading axis is the sample. Always there: "targets" (n, frames, outputs), physical, float32, zero where
 there is none; "mask" (n, frames), which frames are data. The rest is the recipe's own: the inputs of its module."""
-
-
-ProgressCallback: TypeAlias = Callable[[str, int, int, str], None]
-"""Called with (task, parts done, parts in all, what else there is to say)."""
 
 
 @dataclass(frozen=True)

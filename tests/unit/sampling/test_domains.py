@@ -157,7 +157,7 @@ def informative_share(design, specimen, samples):
     """Share of the first samples that meet every criterion, simulated."""
     draws, good = design.draw(0, samples, seed=1), 0
     for row in range(samples):
-        test = planned_test(specimen, draws.conditions_of(row), design.grid)
+        test = planned_test(specimen, dict(zip(draws.condition_names, draws.conditions[row], strict=True)), design.grid)
         at = hold_times(test)
         times = np.union1d(test.times[::24], at)
         values = dict(zip(design.law.names, draws.parameters[row].tolist(), strict=True))
