@@ -127,7 +127,7 @@ def _planted_bulge_test(folder: Path) -> list[Path]:
     pressures = " then ".join(dict.fromkeys(f"{value:g}" for value in test.loading.program().values if value > 0))
     hours, height = test.times[-1] / 3600, test.outputs["amplitude"][-1]
     typer.echo(
-        f"\nSIMULATED: a bulge test with the noise of cameras, {pressures} MPa, {test.times.size} frames to {hours:.0f} h,\n"
+        f"\nSIMULATED: a bulge test with camera noise, {pressures} MPa, {test.times.size} frames to {hours:.0f} h,\n"
         f"top raised by {height:.2f} mm; every law is simulated by finite elements"
     )
     laws = [ck.law(name) for name in BULGE_LAWS]
