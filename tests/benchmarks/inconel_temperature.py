@@ -91,7 +91,8 @@ def one_form_each(
         if form.parameter == "A" or form.name == "constant":
             continue
         law = law_with_forms(LAW, [arrhenius, form])
-        start = Coordinates(law, base.reference).u(start_values(law, base))
+        u = Coordinates(law, base.reference).u(start_values(law, base))
+        start = StartingEstimate(u, reference=base.reference)
         name = f"Arrhenius, {form.parameter}: {form.name}"
         fits[name] = identify(
             law, tests, using, settings=settings, start=StartingEstimate(start, reference=base.reference)

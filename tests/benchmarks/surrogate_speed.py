@@ -108,7 +108,11 @@ def cpu_times(name: str, count: int, simulated: int, file: str | None) -> list[s
     spent = in_turns(
         (
             lambda: simulate_trajectories(
-                exact, kernel, theta, [TEST], options=TrajectoryOptions(factors=WITHOUT_FEATURES)
+                exact,
+                kernel,
+                theta,
+                [TEST],
+                options=TrajectoryOptions(options=TrajectoryOptions(factors=WITHOUT_FEATURES)),
             ),
             count,
         ),
@@ -141,7 +145,11 @@ def wall_times(name: str, count: int, file: str | None) -> list[str]:
         (lambda: predict(surrogate, law, many, [TEST]), 1),
         (
             lambda: simulate_trajectories(
-                Bulge(), kernel, theta, [TEST], options=TrajectoryOptions(factors=factors, threads=cores)
+                Bulge(),
+                kernel,
+                theta,
+                [TEST],
+                options=TrajectoryOptions(options=TrajectoryOptions(factors=factors, threads=cores)),
             ),
             1,
         ),

@@ -52,7 +52,7 @@ LAW_CODEC = ValueCodec(law_to_json, law_from_json)
 
 CODEC = RecordCodec(
     omitted={
-        Identification: ("histories", "predictor", "search_trace", "linearised"),
+        Identification: ("histories", "predictor", "search_trace", "linearised", "problem"),
         Sparsity: ("path",),
     },
     ranges={
