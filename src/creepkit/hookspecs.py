@@ -15,11 +15,7 @@ if TYPE_CHECKING:
 
 
 PROJECT = "creepkit"
-
-
 hookspec = pluggy.HookspecMarker(PROJECT)
-
-
 hookimpl = pluggy.HookimplMarker(PROJECT)
 
 

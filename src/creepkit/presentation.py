@@ -15,7 +15,6 @@ from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 
-
 PRESENTERS: dict[str, dict[str, str]] = {
     # specimens
     "Run": {"text": "creepkit.report.simulation:run_text"},

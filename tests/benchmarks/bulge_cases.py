@@ -33,14 +33,7 @@ TIMES = np.arange(1, 289) * 150.0
 
 FILLET = Bulge(geometry=DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",)), threads=1)
 TRUE = Bulge(threads=1)
-DRAWN_LAWS = (
-    "norton",
-    "strain-hardening",
-    "time-hardening",
-    "hyperbolic-sine",
-    "drifting-exponent",
-    "combined",
-)
+DRAWN_LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine", "drifting-exponent", "combined")
 
 
 @dataclass(frozen=True)

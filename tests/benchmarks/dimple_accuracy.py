@@ -21,16 +21,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from bulge_cases import (
-    DRAWN_LAWS,
-    TIMES,
-    TRUE,
-    Case,
-    PublishedCase,
-    dimple_references,
-    drawn_cases,
-    fillet_references,
-)
+from bulge_cases import DRAWN_LAWS, TIMES, TRUE, Case, PublishedCase, dimple_references, drawn_cases, fillet_references
 from measured import Page, arguments, progress
 from public_calls import predict
 

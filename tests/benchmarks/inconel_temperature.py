@@ -155,11 +155,7 @@ def verdict(results: CrossValidated) -> str:
 
 
 def nested_table(
-    page: Page,
-    alone: list[Identification],
-    tests: list[ck.History],
-    using: object,
-    refitting: dict[str, object],
+    page: Page, alone: list[Identification], tests: list[ck.History], using: object, refitting: dict[str, object]
 ) -> None:
     """Forms chosen without the test that is then predicted."""
     page.heading("Forms chosen anew without the test held out")

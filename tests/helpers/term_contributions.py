@@ -4,10 +4,7 @@ import numpy as np
 
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.reference_conditions import ReferencePoint
-from creepkit.inverse.sparsity.contributions import (
-    EvaluationPoints,
-    TermContributions,
-)
+from creepkit.inverse.sparsity.contributions import EvaluationPoints, TermContributions
 from creepkit.records import History, constant_stress
 
 HOUR = 3600.0

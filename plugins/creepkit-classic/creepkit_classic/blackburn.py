@@ -34,10 +34,7 @@ BLACKBURN = CreepLaw(
         K_f: SPEED,
         K_s: SPEED,
     },
-    states={
-        f: State(0.0, fast, "strain of the fast transient"),
-        g: State(0.0, slow, "strain of the slow transient"),
-    },
+    states={f: State(0.0, fast, "strain of the fast transient"), g: State(0.0, slow, "strain of the slow transient")},
     constraints=(K_f >= K_s,),
     references=(
         "Blackburn (1972), The Generation of Isochronous Stress-Strain Curves, ASME, 15",

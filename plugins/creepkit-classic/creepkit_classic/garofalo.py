@@ -21,10 +21,7 @@ GAROFALO = CreepLaw(
         n: Param("exponent of sinh", bounds=(1, 12)),
         Q: Param("activation energy", unit="J/mol", bounds=(1e4, 9e5)),
     },
-    references=(
-        "Garofalo (1963), Trans. AIME 227, 351",
-        "Sellars and McTegart (1966), Acta Metall. 14, 1136",
-    ),
+    references=("Garofalo (1963), Trans. AIME 227, 351", "Sellars and McTegart (1966), Acta Metall. 14, 1136"),
 )
 
 TYPICAL = {"A": 277984.0, "alpha": 0.02447, "n": 6.41, "Q": 6500.0 * GAS_CONSTANT}

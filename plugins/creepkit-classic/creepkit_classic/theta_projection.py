@@ -30,10 +30,7 @@ THETA_PROJECTION = CreepLaw(
         theta[3]: Param("rate constant of tertiary creep", unit="1/s", bounds=(1e-15, 1.0), scale="log", off=0.0),
         **{k: Param(f"slope of ln theta_{i} with stress", unit="1/MPa", bounds=(0, 0.1)) for i, k in enumerate(c, 1)},
     },
-    states={
-        p: State(0.0, hardening, "strain of primary creep"),
-        q: State(0.0, weakening, "strain of tertiary creep"),
-    },
+    states={p: State(0.0, hardening, "strain of primary creep"), q: State(0.0, weakening, "strain of tertiary creep")},
     references=("Evans and Wilshire (1985), Creep of Metals and Alloys, The Institute of Metals",),
 )
 

@@ -70,7 +70,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-
 COMMANDS: dict[str, Callable[..., None]] = {
     "laws": laws.command,
     "specimens": specimens.command,

@@ -65,8 +65,7 @@ def command(
         typer.Option(help="Of whole tests: gaussian; or student, with which one far from its replicates weighs less."),
     ] = "gaussian",
     weights: Annotated[
-        str,
-        typer.Option(help="noise; likelihood; equal, Eq. (4); paper, Eq. (S3); or amplitude=0.99,width=0.01."),
+        str, typer.Option(help="noise; likelihood; equal, Eq. (4); paper, Eq. (S3); or amplitude=0.99,width=0.01.")
     ] = "noise",
     search: Annotated[str, typer.Option(help="How to begin: multi-start, swarm or cma-es.")] = "multi-start",
     penalty: Annotated[

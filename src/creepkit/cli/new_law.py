@@ -40,7 +40,6 @@ def creepkit_laws():
     return [$constant]
 ''')
 
-
 PROJECT_TEMPLATE = Template("""\
 [build-system]
 requires = ["hatchling>=1.26"]
@@ -61,7 +60,6 @@ $name = "$module"
 include = ["$module.py"]
 """)
 
-
 README_TEMPLATE = Template("""\
 # $package
 
@@ -72,7 +70,6 @@ $title: say here what it describes, and where it was published.
     creepkit check $name
     pytest
 """)
-
 
 TEST_TEMPLATE = Template("""\
 import creepkit

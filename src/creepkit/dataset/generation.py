@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from creepkit.sampling.domains import SamplingDesign
 
 _log = logging.getLogger("creepkit.dataset")
-
-
 MOST_WORKER_DEATHS = 20
 """Deaths of workers at one shard, after which something else than a sample must be wrong."""
 

@@ -45,11 +45,9 @@ if TYPE_CHECKING:
 MOST_PROCESS_DEATHS = 2
 """How often a sample may kill its process before it counts as failed."""
 
-
 GENERATION_FILE = FileKind(
     "the settings of a data set", DatasetError, "it is damaged; remove it if the shards beside it are of this data set"
 )
-
 
 _log = logging.getLogger("creepkit.dataset")
 

@@ -68,8 +68,6 @@ def _first_rejection(design: SamplingDesign, screening_outcome: SimulationOutcom
 
 TOO_MANY_FAILURES = 8
 """First samples of a shard after whose failure, all of them, the shard is given up."""
-
-
 REJECTED_DIGITS = 12
 """Binary digits of the histories of rejected samples, 1 part in 4000: these serve inspection, not training."""
 

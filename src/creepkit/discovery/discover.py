@@ -26,8 +26,6 @@ from creepkit.registry.arguments import check_histories, resolve_law, resolve_pr
 
 Forms = Sequence[str] | Mapping[str, Sequence[str]]
 """Names of temperature forms, or {parameter: names}."""
-
-
 PriorOdds = Mapping[str, Mapping[str, float]]
 """{parameter: {form: odds}}."""
 
@@ -71,10 +69,7 @@ def discover(
 
 
 def candidate_forms_of(
-    estimates: IsothermalEstimates,
-    forms: Forms | None,
-    prior: PriorOdds,
-    parameters: Sequence[str] | None,
+    estimates: IsothermalEstimates, forms: Forms | None, prior: PriorOdds, parameters: Sequence[str] | None
 ) -> dict[str, list[CandidateForm]]:
     """{parameter: its candidate forms}, in the law's order."""
     law = estimates.law
@@ -167,12 +162,7 @@ def temperature_study(
         notes.append(str(error))
     else:
         temperature_law = discover(
-            isothermal_fits,
-            histories=histories,
-            using=predictor,
-            settings=settings,
-            progress=progress,
-            **form_options,
+            isothermal_fits, histories=histories, using=predictor, settings=settings, progress=progress, **form_options
         )
     return TemperatureStudy(
         tuple(histories), moduli_fit, joint_fit, tuple(isothermal_fits), temperature_law, tuple(notes)

@@ -37,7 +37,6 @@ TEMPERATURE_LAW = DocumentFormat(
     remedy="run discover again",
 )
 
-
 MAX_COMBINATIONS_WRITTEN = 20
 """Combinations that are written, best first."""
 
@@ -84,17 +83,11 @@ def write_temperature_law(temperature_law: TemperatureLaw, path: str | Path) -> 
 
 
 CODEC = RecordCodec(
-    values={
-        CreepLaw: LAW_CODEC,
-        Identification: ValueCodec(identification_to_json, identification_from_json),
-    }
+    values={CreepLaw: LAW_CODEC, Identification: ValueCodec(identification_to_json, identification_from_json)}
 )
-
 
 NOTED_OVERDISPERSION = 1.5
 """Inflation of covariances from which a note is made."""
-
-
 UNDETERMINED_FRACTION = 0.8
 """Fraction of the bounds from which an interval that fills it says that the parameter is not determined."""
 

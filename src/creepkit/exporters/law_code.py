@@ -68,8 +68,6 @@ def factor_text(factor: float) -> str:
 
 
 Assignments = tuple[tuple[sympy.Symbol, sympy.Expr], ...]
-
-
 _kernel_entries = lru_cache(maxsize=128)(symbolic_kernel)
 
 

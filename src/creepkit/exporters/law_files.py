@@ -7,14 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from creepkit.errors import ExportError
-from creepkit.files.json_documents import (
-    DocumentFormat,
-    check_heading,
-    check_keys,
-    json_text,
-    parse_json,
-    read_json,
-)
+from creepkit.files.json_documents import DocumentFormat, check_heading, check_keys, json_text, parse_json, read_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, RecordError
 from creepkit.files.writing import check_target, write_text
@@ -32,7 +25,6 @@ VALUED_LAW = DocumentFormat(
     FileKind("a law", ExportError, "give a law that creepkit exported as JSON"),
     remedy="export the law again",
 )
-
 
 _CONVENTIONS = {
     "units": {"stress": "MPa", "time": "s", "temperature": "K", "energy": "J/mol"},

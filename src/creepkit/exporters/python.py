@@ -27,11 +27,7 @@ from creepkit.records import LawWithValues, Units
 
 STRESS_SYMBOLS = (stress, principal_stress, mean_stress)
 """The variables of a point that are in the units of stress."""
-
-
 _MODULE_NAMES = ("INITIAL", "LIMIT", "errstate", "inf", "max", "min", "np", "rate", "state_rates")
-
-
 LogSymbols = Mapping[sympy.Symbol, sympy.Symbol]
 
 
@@ -106,10 +102,7 @@ class _ModuleFunctions:
     def _return_statement(self) -> list[str]:
         """The return statement, each term under its name."""
         texts = [self._printed(sympy.exp(term, evaluate=False)) for term in self.terms]
-        labels, factor = (
-            [printable_text(label) for label in self.law.terms],
-            factor_text(self.source.units.seconds),
-        )
+        labels, factor = ([printable_text(label) for label in self.law.terms], factor_text(self.source.units.seconds))
         if len(texts) == 1:
             return [f"# {labels[0]}", f"return {factor}{texts[0]}"]
         signs = ["", *["+ "] * (len(texts) - 1)]

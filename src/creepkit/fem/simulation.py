@@ -46,7 +46,6 @@ REASONS = {
 }
 """What each ending means, in words."""
 
-
 _STATUS = {
     REACHED_END: Status.COMPLETE,
     DEFLECTION_LIMIT: Status.RUPTURED,

@@ -15,18 +15,10 @@ from creepkit.fem.banded_system import FiniteElementModel
 from creepkit.fem.material_point import EQUIVALENT_STRAIN, PointWorkspace
 from creepkit.integration.time_discretisation import SMALLEST_EXPONENT
 
-(
-    REACHED_END,
-    DEFLECTION_LIMIT,
-    STRAIN_LIMIT,
-    STATE_LIMIT,
-    LIMIT_LOAD,
-    LOST_CONVERGENCE,
-    TOO_MANY_STEPS,
-    LAW_FAILED,
-) = range(8)
+(REACHED_END, DEFLECTION_LIMIT, STRAIN_LIMIT, STATE_LIMIT, LIMIT_LOAD, LOST_CONVERGENCE, TOO_MANY_STEPS, LAW_FAILED) = (
+    range(8)
+)
 """Codes of an ending; whatever it is, the history so far is kept."""
-
 
 START, END, PRESSURE, END_PRESSURE, START_TEMPERATURE, FINAL_TEMPERATURE, MODULUS, END_MODULUS, MOTION, END_MOTION = (
     range(10)
@@ -147,8 +139,6 @@ def record_step(
 
 OFFSET = 20.0
 """s; twice the first step after a change of load."""
-
-
 SHORT = 0.2
 """A last step this much shorter than the one before does not count for the spline."""
 

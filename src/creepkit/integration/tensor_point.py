@@ -31,29 +31,13 @@ from creepkit.records import COMPONENTS, PointLoading, Program
 
 EQUIVALENT_STRAIN = 6
 """Place of the equivalent creep strain in a point's vector: six creep strains, then this, then the states."""
-
-
 _UNIT = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-
-
 _TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
-
-
 _ROWS, _COLUMNS = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
-
-
 _DEVIATOR = np.eye(6) - np.outer(_UNIT, _UNIT) / 3.0
-
-
 _ITERATIONS = 30
-
-
 _BALANCE, _NO_STRESS = 1e-9, 1e-12
-
-
 _LAST_CORRECTION = 1e-8
-
-
 _FIRST_INCREMENT = 1e-6
 
 
@@ -194,11 +178,7 @@ class TensorPoint:
 
 _PROPORTIONALITY_TOLERANCE = 1e-9
 """Of the largest stress: what differs by less is the same direction."""
-
-
 _SHEAR_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
-
-
 _MEAN_DIRECTION = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 

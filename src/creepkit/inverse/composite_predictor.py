@@ -204,8 +204,6 @@ def reduced_order_model_of(predictor: Predictor) -> Predictor | None:
 
 RELATIVE_STEP = 1e-4
 """Of internal parameters (ln of a coefficient, an exponent), relative to the larger of their size and one."""
-
-
 NUISANCE_STEPS = {"thickness": 1e-3, "window": 1e-2, "modulus": 1e-3, "temperature": 0.1}
 """mm, mm, relative, K: far above what the error of a solver's steps is, and bending outputs by under 1e-6 of them."""
 

@@ -28,33 +28,16 @@ IDENTIFICATION = DocumentFormat(
     remedy="identify again",
 )
 
-
 NOT_NEGATIVE = NumberRange(low=0.0)
-
-
 POSITIVE = NumberRange(low=0.0, open_low=True)
-
-
 POSITIVE_OR_INFINITE = NumberRange(low=0.0, open_low=True, infinite=True)
-
-
 NAN_ALLOWED = NumberRange(nan=True)
-
-
 NOT_NEGATIVE_OR_NAN = NumberRange(low=0.0, nan=True, infinite=True)
-
-
 INFINITY_ALLOWED = NumberRange(infinite=True)
-
-
 LAW_CODEC = ValueCodec(law_to_json, law_from_json)
 
-
 CODEC = RecordCodec(
-    omitted={
-        Identification: ("histories", "predictor", "search_trace", "linearised", "problem"),
-        Sparsity: ("path",),
-    },
+    omitted={Identification: ("histories", "predictor", "search_trace", "linearised", "problem"), Sparsity: ("path",)},
     ranges={
         Identification: {"rms": NOT_NEGATIVE_OR_NAN, "effective_frames": POSITIVE, "freedom": POSITIVE},
         ReferencePoint: dict.fromkeys(("stress", "strain", "time", "temperature"), POSITIVE),
@@ -72,10 +55,7 @@ CODEC = RecordCodec(
             "chi_square": NOT_NEGATIVE_OR_NAN,
         },
         OutputFit: {"noise": NOT_NEGATIVE},
-        RuptureComparison: {
-            "measured": POSITIVE,
-            **dict.fromkeys(("predicted", "low", "high"), INFINITY_ALLOWED),
-        },
+        RuptureComparison: {"measured": POSITIVE, **dict.fromkeys(("predicted", "low", "high"), INFINITY_ALLOWED)},
         TestFit: {
             "frames": NOT_NEGATIVE,
             "log_strain_rms": NAN_ALLOWED,
@@ -93,10 +73,7 @@ CODEC = RecordCodec(
         Sparsity: {"observations": NOT_NEGATIVE},
     },
     values={CreepLaw: LAW_CODEC},
-    names={
-        "Sparsity": Sparsity,
-        **dict.fromkeys(("PenaltyPath", "SearchTrace", "LinearisedProblem"), object),
-    },
+    names={"Sparsity": Sparsity, **dict.fromkeys(("PenaltyPath", "SearchTrace", "LinearisedProblem"), object)},
 )
 """Of identifications; histories, predictor, search trace and linearised problem are not stored."""
 

@@ -22,8 +22,6 @@ from creepkit.records import History, Prediction, Status
 
 LOW_TEST_WEIGHT = 0.5
 """Weight below which a test is named."""
-
-
 LARGE_STRAIN, LARGE_RUPTURE_STRAIN = 0.5, 2.0
 """Strains above these are worth a word: of a test whose end is not known, and of one that was followed to it."""
 

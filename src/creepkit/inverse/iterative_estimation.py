@@ -24,12 +24,9 @@ from creepkit.inverse.working_noise import WorkingNoise, robust_test_weights, wi
 
 PRIOR_STEPS = 30
 """Steps of the estimate of prior standard deviations in each round; they cost no simulation."""
-
-
 LIKELIHOOD_TOLERANCE = 1e-5
 """Relative change of a chi-square that ends a refinement by likelihood: some thousandth of one, well inside an interval
 and above what the steps of a solver leave."""
-
 
 CONVERGED_GAIN = 0.02
 """Gain of the log-likelihood, and change of a test's weight, that ends the rounds."""
@@ -46,8 +43,6 @@ class IterationLimits:
 
 APPROXIMATE_LIMITS = IterationLimits(rounds=3, steps=15, tolerance=1e-4)
 """For a predictor on the way to another."""
-
-
 SIMULATION_LIMITS = IterationLimits(rounds=5, steps=25, tolerance=1e-6)
 """For predictors with a reduced-order model: solvers are smooth to about that."""
 

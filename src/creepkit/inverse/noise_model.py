@@ -47,8 +47,6 @@ class Residuals:
 
 MINIMUM_TESTS = 3
 """Below this many tests the scatter between them cannot be estimated."""
-
-
 ASSUMED_RATE_SD = 0.3
 """Scatter of ln rate between tests that is assumed then, unless a likelihood is asked for."""
 

@@ -20,8 +20,6 @@ from creepkit.records import History, Prediction, Predictor
 
 LOGARITHMIC_OUTPUTS = ("strain",)
 """Outputs that span decades."""
-
-
 RUPTURE_OUTPUT = "rupture"
 """The output of tests that were followed to rupture: the rupture time, s. It has no frames of its own."""
 

@@ -33,11 +33,7 @@ from creepkit.inverse.history_checks import check_creep, check_explicit_nuisance
 from creepkit.inverse.noise_model import Residuals, cholesky_factors, whiten
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history
-from creepkit.inverse.reference_conditions import (
-    ReferencePoint,
-    median_log_inverse_duration,
-    median_log_strain_rate,
-)
+from creepkit.inverse.reference_conditions import ReferencePoint, median_log_inverse_duration, median_log_strain_rate
 from creepkit.inverse.residuals import (
     candidate_residuals,
     candidate_residuals_and_jacobian,
@@ -59,12 +55,8 @@ from creepkit.records import History, Prediction, Predictor
 
 CACHED_EVALUATIONS = 4
 """Points whose residuals are remembered: a search ends at one that it has evaluated, and the next begins there."""
-
-
 FAILED_COST = 1e12
 """Cost of a candidate that cannot be predicted at all."""
-
-
 PRIOR_STRENGTH = 1e-4
 """Weak prior of each unknown about the middle of its bounds, in standard deviations of data per width of the bounds.
 

@@ -25,8 +25,6 @@ from creepkit.records import Prediction
 
 SLOPE_AFTER_RUPTURE = 3.0
 """Growth of the transformed output per unit of ln(t / t_rupture) after a predicted rupture."""
-
-
 SMALLEST_INCREASE = 0.01
 """Of a transformed output since the first frame: smaller increases say nothing about the creep rate."""
 

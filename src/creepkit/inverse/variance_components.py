@@ -111,16 +111,11 @@ def scaled_inverse(matrix: Floats) -> Floats:
 
 LONGEST_CORRELATION = 3.0
 """Longest correlation of the drift, a factor 20 in time or 0.6 of a test: what lasts longer is scatter of the rate."""
-
-
 SMALLEST_NOISE_RATIO, LARGEST_NOISE_RATIO = 0.1, 30.0
 """Of the noise that was stated or estimated from neighbouring frames: where an estimate of it may go."""
-
-
 OVERSHOOT = float(np.log(30.0))
 """Decrease of the logarithm of a component that may have overshot to where the likelihood hardly depends on it: the
 search is repeated from half way."""
-
 
 COMPONENTS = ("noise", "misfit", "offset", "drift", "correlation_length")
 

@@ -33,21 +33,14 @@ from creepkit.inverse.variance_components import (
 
 STUDENT_FREEDOM = 4.0
 """Degrees of freedom of Student's t for whole tests; the usual choice where tails are unknown (Lange et al. 1989)."""
-
-
 SMALLEST_NOISE = 1e-2
 """Least noise of a likelihood, over the floor of the output's transform: simulated histories have none of their own."""
-
-
 DRIFT_CONFIDENCE = 0.95
 """Residuals are autocorrelated where the likelihood gains more by it than by chance in so many cases; each output that
 drifts has two components more, drift and correlation length."""
 
-
 INITIAL_RUPTURE_SD = 0.3
 """Scatter of ln of rupture times to begin from: one of each test, which has no noise, and cannot drift."""
-
-
 SMALLEST_WEIGHT = 1e-6
 """Relative weight of an output that the weights do not name."""
 

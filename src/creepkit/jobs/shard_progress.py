@@ -26,8 +26,6 @@ from creepkit.jobs.worker import ShardedJob
 
 UNSUPPORTED_LOCK_ERRORS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
 """Errors of file systems without locks."""
-
-
 MOST_DIGITS = 19
 """Digits of the number of a sample; longer ones are damage."""
 

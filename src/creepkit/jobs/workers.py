@@ -27,19 +27,11 @@ from creepkit.jobs.worker import Job, ShardedJob, TaskResult, run_task
 
 SHARD_ROWS = 256
 """Samples of a shard: some seconds of work, so that little is lost when a process dies."""
-
-
 ADDRESS = re.compile(r"inproc://.+|[a-z]+://.+:[0-9]+/?")
-
-
 CONNECT_TIMEOUT = 30
 """s, in which a scheduler answers."""
-
-
 LEAST_QUEUED = 8
 """Shards handed over while a cluster has few workers or none: an adaptive one grows with its queue."""
-
-
 DEAD_WORKER_ERRORS = ("KilledWorker", "FutureCancelledError", "CancelledError")
 """Errors that dask gives a task whose workers died."""
 
@@ -121,11 +113,7 @@ def _one_line(error: BaseException) -> str:
 
 THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMBA")
 """Libraries that start threads of their own: two threads on one busy core are many times slower than one."""
-
-
 ONE_THREAD = dict.fromkeys((f"{library}_NUM_THREADS" for library in THREADED_LIBRARIES), "1")
-
-
 TERMINATION_TIMEOUT = 5
 """s, in which a worker that is asked to end does so."""
 

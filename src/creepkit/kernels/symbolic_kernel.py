@@ -28,7 +28,6 @@ _RESERVED_NAMES = (
     *("rows", "row", "x", "theta", "out", "flags"),
 )
 
-
 _TEMPORARY_PATTERN = re.compile(r"[xy]\d+")
 
 
@@ -92,8 +91,6 @@ class PrintableNames:
 
 LOG_RATE_OFF = sympy.Float(-1e30)
 """ln of the rate of a law whose terms are all off: finite, in single precision too."""
-
-
 Assignments = Mapping[sympy.Symbol, sympy.Expr]
 
 

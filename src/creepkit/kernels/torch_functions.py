@@ -21,10 +21,7 @@ __all__ = [
     "log_tanh", "power", "sin", "sinh", "smaller", "sqrt", "square", "tanh",
 ]  # fmt: skip
 
-
 both, either = torch.logical_and, torch.logical_or
-
-
 _LN2 = math.log(2.0)
 
 
@@ -111,8 +108,6 @@ def exp_difference(a: Any, b: Any) -> Any:
 
 FUNCTIONS = {name: globals()[name] for name in __all__}
 """What printed text calls."""
-
-
 TensorFunction = Callable[..., Sequence[Any]]
 
 

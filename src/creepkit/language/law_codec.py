@@ -16,15 +16,7 @@ from creepkit.language.expression_trees import condition_from_tree, expression_f
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES, Param, ParameterScale, State
 
-__all__ = [
-    "LAW",
-    "condition_from_tree",
-    "expression_from_tree",
-    "expression_to_tree",
-    "law_from_json",
-    "law_to_json",
-]
-
+__all__ = ["LAW", "condition_from_tree", "expression_from_tree", "expression_to_tree", "law_from_json", "law_to_json"]
 
 LAW = DocumentFormat(
     "creepkit-law",
@@ -32,7 +24,6 @@ LAW = DocumentFormat(
     FileKind("a law", LawError, "give a law that creepkit wrote"),
     remedy="write it again from the law",
 )
-
 
 _T = TypeVar("_T")
 

@@ -4,7 +4,6 @@ from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress
 
 A, n = parameters("A n")
 
-
 NORTON = CreepLaw(
     name="norton",
     title="Norton power law (PL)",

@@ -4,7 +4,6 @@ from creepkit.language import CreepLaw, Param, hookimpl, parameters, strain, str
 
 A, n, m = parameters("A n m")
 
-
 STRAIN_HARDENING = CreepLaw(
     name="strain-hardening",
     title="Strain-hardening power law (SPL)",

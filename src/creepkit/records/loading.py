@@ -198,8 +198,6 @@ class RecordedLoading:
 
 COMPONENTS = ("11", "22", "33", "12", "23", "13")
 """Names of the components of a stress or strain, in the order of every vector of six; shear strains of the tensor."""
-
-
 ComponentHistory: TypeAlias = float | Program | Sequence[tuple[float, float]]
 """A constant, a program, or steps as (start time, value) pairs."""
 

@@ -86,8 +86,6 @@ def _failure_text(alloy: str, failure: str) -> str:
 
 PLOT_RADII = (0.0, 2.0, 4.0)
 """mm, those of Fig. 7a."""
-
-
 PROFILE_OUTPUTS = ("amplitude", "width", "shape")
 
 
@@ -107,7 +105,6 @@ MISFIT_MEASURES = (
     ("loss of Eq. (4), mean over outputs", mean_relative_squared_error),
     ("chi-square, mean over outputs", mean_chi_square),
 )
-
 
 LOG_TICKS, MIN_LOG_RATIO = (1.0, 2.0, 5.0), 5.0
 """Of logarithmic axes: where ticks are, and the ratio of their ends below which they are linear instead."""
@@ -194,8 +191,6 @@ def _law_fraction(members: tuple[AlloyResult, ...], law: str, decisive: bool) ->
 
 MAX_CLASSES = 4
 """Classes that are shown."""
-
-
 SECONDS_PER_HOUR = 3600.0
 
 

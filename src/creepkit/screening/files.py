@@ -50,7 +50,6 @@ ALLOY_RESULT = DocumentFormat(
     remedy="remove it, and it is worked out again",
 )
 
-
 CODEC = RecordCodec(
     ranges={
         AlloyResult: {"predicted": ANY_NUMBER},
@@ -77,8 +76,6 @@ def read_result(path: Path) -> AlloyResult:
 
 
 WRITE_ADVICE = "choose a file in a folder that exists and has room"
-
-
 HDF5_FORMAT, HDF5_LAYOUT, HDF5_UNITS = "creepkit-plate", 1, "MPa, mm, s, K"
 
 

@@ -163,8 +163,6 @@ def _predict_tests(best: Identification, tests: Sequence[History], predictor: Pr
 
 FITS_FOLDER = "fits"
 """The folder of the best identifications, inside that of the results."""
-
-
 METADATA_FIELDS = ("source", "labels")
 """Fields of a history that no identification uses."""
 

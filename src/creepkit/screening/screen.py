@@ -30,20 +30,12 @@ from creepkit.screening.results import AlloyResult, Plate
 
 CANDIDATE_LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
 """Laws of Table 1 of Chen et al."""
-
-
 DENSE_LAW = "combined"
 """The law of Eq. (2), which is identified without sparsity."""
-
-
 MOST_WORKER_DEATHS = 2
 """How often an alloy may kill its worker process."""
-
-
 POLL_INTERVAL = 1.0
 """s to wait for results before it is checked which processes have died."""
-
-
 _log = logging.getLogger("creepkit.screening")
 
 

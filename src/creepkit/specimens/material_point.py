@@ -40,12 +40,8 @@ if TYPE_CHECKING:
 
 
 OUTPUTS = ("strain", *(f"strain_{c}" for c in COMPONENTS), *(f"stress_{c}" for c in COMPONENTS))
-
-
 DIFFERENCE_STEP = 1e-3
 """Of the central differences in internal parameters, relative where a parameter of linear scale is above one."""
-
-
 DEFAULT_ELASTICITY = (150e3, 0.3)
 """E, MPa, and nu where stresses alone are prescribed and no elastic data are given: creep does not depend on them."""
 

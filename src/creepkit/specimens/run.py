@@ -24,8 +24,6 @@ STATUS_TEXT = {
     Status.OUTSIDE_DOMAIN: "outside the domain",
 }
 """What a status means where nobody gives a reason."""
-
-
 _RunType = TypeVar("_RunType", bound="Run")
 
 

@@ -178,8 +178,6 @@ def _is_constant(column: Tensor) -> bool:
 
 NUISANCE_OF_INPUT = {"modulus": "modulus", "apex_thickness": "thickness", "temperature": "temperature"}
 """{input: the nuisance that changes it}."""
-
-
 BATCH_NUMBERS = 2**24
 """Numbers in the inputs of a batch."""
 
@@ -268,11 +266,7 @@ class ParameterSurrogate(Surrogate):
         return module
 
     def _query(
-        self,
-        theta: Floats,
-        histories: Sequence[History],
-        frames: Sequence[Floats],
-        nuisances: NuisanceValues,
+        self, theta: Floats, histories: Sequence[History], frames: Sequence[Floats], nuisances: NuisanceValues
     ) -> NetworkQuery:
         perturbed = [
             self._history_inputs.with_nuisances(h, {kind: v[:, k] for kind, v in nuisances.items()}, len(theta))
@@ -334,12 +328,7 @@ class ParameterSurrogate(Surrogate):
         return derivatives.movedim(1, -1).numpy()
 
     def _history_prediction(
-        self,
-        history: History,
-        frames: Floats,
-        outputs: Floats,
-        derivatives: Floats | None,
-        nuisances: tuple[str, ...],
+        self, history: History, frames: Floats, outputs: Floats, derivatives: Floats | None, nuisances: tuple[str, ...]
     ) -> HistoryPrediction:
         """One history at its times, as its instrument shows it.
 

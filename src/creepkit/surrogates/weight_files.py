@@ -29,7 +29,6 @@ SURROGATE = DocumentFormat(
     remedy="train again",
 )
 
-
 CHECKPOINT = DocumentFormat(
     "creepkit-training-checkpoint",
     1,

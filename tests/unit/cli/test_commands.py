@@ -350,10 +350,7 @@ def test_a_point_is_loaded_by_components() -> None:
             (*DIMPLE, "--pressure", "8", "--every", "9999"),
             "--every 9999 s is not a step of a test of 7200 s (allowed are 1 to 1000000 frames)",
         ),
-        (
-            (*DIMPLE, "--pressure", "8", "--picture", "none/section.png"),
-            "none/section.png: the plot cannot be written",
-        ),
+        ((*DIMPLE, "--pressure", "8", "--picture", "none/section.png"), "none/section.png: the plot cannot be written"),
     ],
 )
 def test_a_simulation_that_makes_no_sense_is_one_line(words: tuple[str, ...], said: str) -> None:

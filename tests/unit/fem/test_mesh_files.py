@@ -213,11 +213,7 @@ def test_what_is_wrong_in_tables(tmp_path, changes, message):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (
-            "CAX4R",
-            "CPE4",
-            "mesh.inp:10: element type CPE4 is not supported; allowed are CAX4, CAX4R, CAX8, CAX8R",
-        ),
+        ("CAX4R", "CPE4", "mesh.inp:10: element type CPE4 is not supported; allowed are CAX4, CAX4R, CAX8, CAX8R"),
         (" 2, 2, 5,\n 6, 3", " 2, 2, 5, 6", "mesh.inp:12: an element CAX4R has a number and 4 nodes, found 4 cells"),
         (" 1, 1, 2, 5, 4", " 1, 1, 2, 5, 9", "mesh.inp:11: element 1 names node 9, which is not among the nodes"),
         (

@@ -8,13 +8,7 @@ import pytest
 
 from creepkit.errors import ExportError, FitError
 from creepkit.files.reading import FileKind, check_readable, read_bytes, read_text
-from creepkit.files.writing import (
-    check_target,
-    remove_temporary_files,
-    replace_on_success,
-    write_if_absent,
-    write_text,
-)
+from creepkit.files.writing import check_target, remove_temporary_files, replace_on_success, write_if_absent, write_text
 
 NOTE = FileKind("a note", FitError, "give a note", maximum_bytes=100)
 

@@ -14,14 +14,7 @@ from hypothesis import strategies as st
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import CreepkitError, FitError
-from creepkit.files.json_documents import (
-    DocumentFormat,
-    check_heading,
-    json_text,
-    parse_json,
-    read_json,
-    write_json,
-)
+from creepkit.files.json_documents import DocumentFormat, check_heading, json_text, parse_json, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError, ValueCodec
 

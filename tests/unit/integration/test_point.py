@@ -22,10 +22,7 @@ KACHANOV = kachanov(stress, 0.9)
 RABOTNOV = CreepLaw(
     name="rabotnov in damage itself",
     terms={"creep": A * stress**n},
-    params={
-        **{key: KACHANOV.params[key] for key in (A, n, C, v)},
-        phi: Param("exponent of damage", bounds=(0, 30)),
-    },
+    params={**{key: KACHANOV.params[key] for key in (A, n, C, v)}, phi: Param("exponent of damage", bounds=(0, 30))},
     states={damage: State(0.0, C * stress**v / ((1 + phi) * (1 - damage) ** phi), limit=0.99)},
     references=("Rabotnov (1969)",),
 )

@@ -11,11 +11,7 @@ from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
 from creepkit.laws.norton import NORTON
 
-LAWS = [
-    NORTON,
-    DRIFTING_EXPONENT,
-    COMBINED.times(arrhenius(T_ref=1073.15)).with_temperature(n_2=linear(T_ref=1073.15)),
-]
+LAWS = [NORTON, DRIFTING_EXPONENT, COMBINED.times(arrhenius(T_ref=1073.15)).with_temperature(n_2=linear(T_ref=1073.15))]
 REFERENCE = ReferencePoint(stress=63.0, strain=4e-3, time=2.3e4, temperature=1040.0)
 
 

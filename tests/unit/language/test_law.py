@@ -58,10 +58,7 @@ BAD_LAWS = {
         {"terms": {"x": A * sympy.Symbol("time", real=True)}, "params": {A: RATE, time: EXPONENT}},
         "'time' is a word of the language",
     ),
-    "name used twice": (
-        {"params": {A: RATE, n: EXPONENT}, "states": {n: State(0, A)}},
-        "the name 'n' is used twice",
-    ),
+    "name used twice": ({"params": {A: RATE, n: EXPONENT}, "states": {n: State(0, A)}}, "the name 'n' is used twice"),
     "not an identifier": (
         {"terms": {"x": sympy.Symbol("2x", real=True) * stress}, "params": {sympy.Symbol("2x", real=True): EXPONENT}},
         "'2x' is not a plain name",

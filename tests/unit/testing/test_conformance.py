@@ -81,11 +81,7 @@ BROKEN: dict[str, tuple[CreepLaw, str, str]] = {
         "lowering",
         "must hold in all remaining cases: write (..., True)",
     ),
-    "overflow": (
-        law(A * stress**n * exp(sinh(stress)), PLAIN),
-        "ln rate is finite",
-        "such as stress ",
-    ),
+    "overflow": (law(A * stress**n * exp(sinh(stress)), PLAIN), "ln rate is finite", "such as stress "),
     "digits lost as written": (
         law(A * stress * (sqrt(1 + strain) - 1), {A: RATE}),
         "numpy value against 50 digits",

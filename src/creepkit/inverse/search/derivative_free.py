@@ -229,10 +229,7 @@ class _Swarm:
 
     def __init__(self, rules: ParticleSwarm, problem: LeastSquaresProblem) -> None:
         self.rules, self.problem, seed = rules, problem, problem.settings.seed
-        self.rng, self.term_mask = (
-            np.random.default_rng(seed),
-            TermMask.from_problem(problem, rules.maskable_terms),
-        )
+        self.rng, self.term_mask = (np.random.default_rng(seed), TermMask.from_problem(problem, rules.maskable_terms))
         count, size = rules.particles, problem.bounds.lower.size
         self.x, self.velocity = _sobol_points(count, size, seed), np.zeros((count, size))
         self.masks = self.term_mask.initial_masks(count, self.rng)

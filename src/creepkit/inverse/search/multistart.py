@@ -129,7 +129,6 @@ EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS = 1e-5, 5e-3
 """Root mean square difference of predictions, over the spread of what was measured, below which two minima are one. A
 reduced-order model is not better than the latter, and along a valley one start is enough for its predictor."""
 
-
 WORKING_ERROR = 0.3
 """Misfit that is assumed in a search, over that spread (see inverse.noise_model.initial_working_noise)."""
 

@@ -20,12 +20,8 @@ from creepkit.language import CreepLaw
 
 ANY_TERM = "any"
 """In place of names: every term may be switched off."""
-
-
 EXPECTED_FLIPS = 0.5
 """Mask elements that mutate in each draw of a candidate, on average: enough to leave a wrong subset, not to drift."""
-
-
 OFF_MARGIN = 0.5
 """In ln of a rate: a rate nearer to its lower bound than this counts as at it."""
 
@@ -122,8 +118,6 @@ def _maskable_terms(
 
 SAME_BASIN = 0.1
 """Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
-
-
 CONVERGED_DECREASE = 1e-3
 """A decrease of the cost, half of chi-square, below which a search has converged."""
 

@@ -155,8 +155,6 @@ def _nuisance_log_determinant(linearised: LinearisedProblem, inverses: Floats, p
 
 DISTINGUISHABLE_CHI_SQUARE = 2.0 * float(np.log(0.95 / 0.05))
 """Chi-square between predictions from which on a test can be expected to decide."""
-
-
 STRESS_POINTS = 21
 """Stresses at which local exponents are compared."""
 

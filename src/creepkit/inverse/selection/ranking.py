@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 
 CRITERIA = ("bic", "aicc", "hold-out")
-
-
 Criterion = Literal["bic", "aicc", "hold-out"]
 
 

@@ -64,12 +64,9 @@ def _distinct_laws(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
 
 SELECTION_FRAMES = 60
 """Frames of a history that are compared, unless settings say otherwise."""
-
-
 RULED_OUT_EXCESS = 40.0
 """Criterion over the best from which a law is ruled out by a surrogate already: e^-20 of the weight, which the errors
 of a surrogate, some noise in chi-square, do not make up for."""
-
 
 DRIFT_LIMIT = 2.0
 """Drift of the first output under the best single law, in units of its noise, above which sums are tried."""

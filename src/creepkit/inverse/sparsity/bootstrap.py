@@ -27,8 +27,6 @@ from creepkit.records import History
 
 BLOCK_FRAMES = 6
 """Frames of a block: an eighth of a bulge test of 48."""
-
-
 ZERO_WEIGHT = 1e-12
 """Weight of observations that were not drawn."""
 

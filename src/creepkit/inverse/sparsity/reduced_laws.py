@@ -28,8 +28,6 @@ from creepkit.records import Predictor
 
 TOLERANCES = Tolerances(max_steps=40, tolerance=1e-7)
 """Of the fits of reduced laws."""
-
-
 IDLE_SAMPLES = 64
 """Draws of the parameters of a term that is to be absent, besides its rate."""
 

@@ -28,8 +28,6 @@ from creepkit.records import History, Predictor
 
 CONTINUED_STARTS, COMPLETED_STARTS = 5, 2
 """Starts that are refined for some steps, and how many of them to the end."""
-
-
 PRELIMINARY_STEPS = 12
 """Steps of the first refinement."""
 

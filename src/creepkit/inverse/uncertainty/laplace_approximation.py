@@ -31,8 +31,6 @@ from creepkit.records import Nuisance
 
 LOG_COMPONENT_STEP = 1e-3
 """Of the logarithm of a size, for differences of the covariance, which is smooth in it."""
-
-
 MINIMUM_FREEDOM = 3.0
 """Lower limit of degrees of freedom: below it a quantile only says that the variance is unknown."""
 

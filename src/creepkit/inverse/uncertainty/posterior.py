@@ -185,8 +185,6 @@ def _whitened(whitening: Floats, rate_effect: Floats, values: Floats) -> Floats:
 
 CONVERGED_LENGTH = 50.0
 """Steps over autocorrelation time that emcee's authors ask for before its estimate may be trusted."""
-
-
 MAX_START_DRAWS = 50
 """Draws of a walker's start that may fall outside the bounds."""
 

@@ -39,20 +39,12 @@ if TYPE_CHECKING:
 
 CONSTRAINT_WIDTH = 0.02
 """w over the standard deviation of the quantity."""
-
-
 STEP_RISE = 0.35
 """Aimed at from point to point: the rise of sqrt(chi2) over that of the interval's end."""
-
-
 MAX_POINTS = 15
 """Points to each side; an end that lies further out than they reach is called open."""
-
-
 BLOCKED_FRACTION = 0.5
 """Share of a step below which what was asked for cannot be had: the law's bounds are in the way."""
-
-
 ZERO_TOLERANCE = 1e-9
 """Of the standard deviation: nearer to zero than this is zero."""
 

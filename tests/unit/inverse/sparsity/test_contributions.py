@@ -5,12 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from creepkit.errors import FitError
-from creepkit.inverse.sparsity.contributions import (
-    STRESS_FACTORS,
-    EvaluationPoints,
-    strain_history,
-    stress_history,
-)
+from creepkit.inverse.sparsity.contributions import STRESS_FACTORS, EvaluationPoints, strain_history, stress_history
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON

@@ -7,17 +7,7 @@ from scipy.optimize import curve_fit
 
 from creepkit.errors import SolveError
 from creepkit.specimens.bulge.observation import Observation
-from helpers.bulge_profiles import (
-    FINE,
-    LOOKED_AT,
-    NODES,
-    bell,
-    cross,
-    plates,
-    profile_with_apex,
-    richardson,
-    table,
-)
+from helpers.bulge_profiles import FINE, LOOKED_AT, NODES, bell, cross, plates, profile_with_apex, richardson, table
 from helpers.paths import needs_shared_data
 
 FORMS = [Observation(), Observation("field"), Observation("profile", 5.3, 51), Observation("field", 4.7)]

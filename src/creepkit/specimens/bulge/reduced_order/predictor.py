@@ -23,11 +23,7 @@ from creepkit.records import (
 from creepkit.specimens.bulge.observation import OBSERVED
 from creepkit.specimens.bulge.reduced_order.step_equations import AMPLITUDE_COLUMN
 from creepkit.specimens.bulge.reduced_order.step_solution import NUISANCE_DIRECTIONS
-from creepkit.specimens.bulge.reduced_order.trajectories import (
-    Trajectories,
-    TrajectoryOptions,
-    simulate_trajectories,
-)
+from creepkit.specimens.bulge.reduced_order.trajectories import Trajectories, TrajectoryOptions, simulate_trajectories
 from creepkit.specimens.bulge.settings import BulgeSettings
 
 if TYPE_CHECKING:

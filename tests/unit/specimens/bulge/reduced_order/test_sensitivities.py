@@ -39,10 +39,7 @@ CASES = {
     "norton, warm": (WARM, {"A": 3e-15, "n": 3.5, "n_T": 0.004}),
     "strain hardening": (STRAIN_HARDENING, {"A": 3e-16, "n": 3.0, "m": -0.5}),
     "hyperbolic sine": (HYPERBOLIC_SINE, {"A": 3e-9, "n": 3.0, "B": 90.0}),
-    "damage": (
-        KACHANOV_RABOTNOV,
-        {"A": 1e-13, "n": 3.5, "B": 1e-10, "chi": 3.0, "phi": 3.0, "alpha": 0.5, "m": -0.2},
-    ),
+    "damage": (KACHANOV_RABOTNOV, {"A": 1e-13, "n": 3.5, "B": 1e-10, "chi": 3.0, "phi": 3.0, "alpha": 0.5, "m": -0.2}),
     "drifting": (
         DRIFTING_EXPONENT,
         {"A": 1e-14, "n_0": 3.8, "n_inf": 3.2, "C": 0.3, "tau_d": 3e3, "tau_r": 6e3, "m": -0.2},
