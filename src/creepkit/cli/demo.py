@@ -38,7 +38,7 @@ def command(
     to: Annotated[Path, typer.Option(help="Folder for results; made if needed.")] = Path("demo"),
     uniaxial: Annotated[bool, typer.Option("--uniaxial", help="Simulated creep curves instead of both.")] = False,
 ) -> None:
-    """Identify laws from measured creep curves to rupture, then from a simulated bulge test.
+    """Identify laws from measured curves, then a bulge test.
 
     Rupture times are printed beside the measured ones, the true law of the simulated test beside the identified one.
     """

@@ -94,9 +94,9 @@ def test_text_file_and_plot(trend, tmp_path):
     assert "prior odds" in text
     assert "5 temperatures, 973 to 1083 K, and valid between them" in text
     data = json.loads(trend.save(tmp_path / "trend.json").read_text())
-    assert data["kind"] == "creepkit temperature law"
-    assert data["sets"]["n"][0]["name"] == "linear"
-    assert data["fit"]["kind"] == "creepkit identification"
+    assert data["format"] == "creepkit-temperature-law"
+    assert data["plausible_forms"]["n"][0]["name"] == "linear"
+    assert data["fit"]["format"] == "creepkit-identification"
     figure = trend.plot(tmp_path / "trend.png")
     assert [axes.get_xlabel() for axes in figure.axes] == ["temperature, K"] * 2
     assert (tmp_path / "trend.png").stat().st_size > 10_000
