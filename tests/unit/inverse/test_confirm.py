@@ -116,4 +116,5 @@ def test_confirm_command(fit, tmp_path):
     answer = json.loads(creepkit("confirm", str(path), str(tmp_path / "*.csv"), "--json").stdout)
     assert answer["tests"][0]["outputs"][0]["rms_difference"] is None
     assert {t["name"] for t in answer["tests"]} == {h.name for h in TESTS}
-    assert "there is no such file" in one_line(creepkit("confirm", str(tmp_path / "none.json"), str(tmp_path / "*.csv")))
+    refused = creepkit("confirm", str(tmp_path / "none.json"), str(tmp_path / "*.csv"))
+    assert "there is no such file" in one_line(refused)
