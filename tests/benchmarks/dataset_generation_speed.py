@@ -47,7 +47,7 @@ def cpu_seconds() -> float:
 def timed(design: SamplingDesign, to: Path, workers: int, **wanted: int) -> tuple[Dataset, Cost]:
     """A data set and its cost."""
     cpu, wall = cpu_seconds(), time.perf_counter()
-    data = generate(design, DIMPLE, seed=1, to=to, workers=workers, rows=ROWS, **wanted)
+    data = generate(design, DIMPLE, seed=1, to=to, execution=ck.ParallelExecution(workers, shard_rows=ROWS), **wanted)
     return data, Cost(cpu_seconds() - cpu, time.perf_counter() - wall)
 
 

@@ -23,6 +23,7 @@ import tempfile
 import time
 from collections import Counter
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,12 +46,15 @@ def screening_options(options):
     nuisances = [ck.Nuisance("offset"), ck.Nuisance("rate")]
     if options.unknown_thickness:
         nuisances.append(ck.Nuisance("thickness", mean=THICKNESS_MEAN_SD[0], sd=THICKNESS_MEAN_SD[1]))
+    screening = ck.ScreeningOptions()
     return {
         "using": surrogate if options.how == "surrogate" else None,
-        "through": surrogate if options.how == "through" else None,
-        "nuisances": nuisances,
-        "dense": None if options.no_full_law else "combined",
-        "confirm": True,
+        "options": ck.ScreeningOptions(
+            settings=replace(screening.settings, nuisances=tuple(nuisances)),
+            through=surrogate if options.how == "through" else None,
+            dense=None if options.no_full_law else "combined",
+            confirm=True,
+        ),
         "workers": options.workers,
         "progress": lambda task, done, total, note: progress(f"{task}: {done} of {total} ({note})"),
     }

@@ -64,7 +64,7 @@ class Case:
 def exported_case(name: str, folder: Path) -> Case:
     """Export and compile one law."""
     law = law_of(name)
-    text = ck.export(law, "calculix", LAWS[name], notes=["for the verification against CalculiX"])
+    text = ck.export(ck.law_with_values(law, LAWS[name], notes=["for the verification against CalculiX"]), "calculix")
     return Case(name, law, LAWS[name], compiled(text, folder, name.replace(" ", "_").replace("-", "_")))
 
 
