@@ -109,6 +109,22 @@ def test_every_measured_page_has_its_program():
     assert [page for page in pages - MEASURED_BY_OTHERS if not page.startswith(programs)] == []
 
 
+def test_measured_pages_end_with_the_command_that_repeats_them():
+    """The command is that of the page's program, and has no option that the program does not know."""
+    for page in (DOCS / "measured").glob("*.md"):
+        if page.stem in MEASURED_BY_OTHERS:
+            continue
+        last = page.read_text(encoding="utf-8").splitlines()[-1]
+        command = re.search(r"`python (tests/benchmarks/(\w+)\.py)( [^`]*)?`\.$", last)
+        assert command, f"{page.name} does not end with its command"
+        assert page.stem.startswith(command[2]), f"{page.name} is not written by {command[1]}"
+        text = (ROOT / command[1]).read_text(encoding="utf-8")
+        options = set(re.findall(r"--[a-z][a-z-]*", command[3] or "")) - {"--write"}
+        assert [option for option in options if f'"{option}"' not in text] == [], page.name
+        by_hand = re.search(r"kept by hand until `([\w./]+)` writes this page", last)
+        assert not by_hand or by_hand[1] == command[1], page.name
+
+
 def test_every_page_is_reachable_from_the_index():
     """Each folder of docs/ has an index whose table of contents names its pages, or takes all of them."""
     for index in [DOCS / "index.md", *DOCS.glob("*/index.md")]:
