@@ -75,6 +75,13 @@ def test_numbers_have_a_digit_before_the_point(page):
     assert not found, f"write 0.05 in the place of .05: {found}"
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if page.parent.name != "measured"], ids=page_name)
+def test_words_are_those_of_the_field(page):
+    """None of the words that docs/design/vocabulary.md has replaced."""
+    replaced = r"stand-in|\bfences?\b|landscape|ledger|campaign|\btold\b|\bpolish|side by side|\bdoors?\b|\bbox(es)?\b"
+    assert not re.search(replaced, page.read_text(encoding="utf-8"), flags=re.IGNORECASE)
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if python_blocks(page)], ids=page_name)
 def test_snippets_are_python_with_public_names(page):
     public = {*ck.__all__, "__version__"}
