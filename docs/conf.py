@@ -15,7 +15,6 @@ version = release = distribution_version("creepkit")
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
     "sphinx_gallery.gen_gallery",
     "law_pages",
     "reference_pages",
@@ -30,11 +29,14 @@ html_theme = "furo"
 html_title = "creepkit"
 html_theme_options = {"navigation_with_keys": True}
 
-myst_enable_extensions = ["dollarmath", "deflist"]
+myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 3
+# Options of commands keep their two hyphens.
+smartquotes = False
 
 # Signatures keep the annotations of the source; nothing is evaluated, so no type has to be imported.
 autodoc_typehints = "signature"
+autodoc_type_aliases = {name: name for name in ("ArrayLike", "Bools", "Floats", "Ints")}
 python_maximum_signature_line_length = 100
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
@@ -49,6 +51,7 @@ sphinx_gallery_conf = {
     "examples_dirs": "../build/gallery",
     "gallery_dirs": "gallery",
     "plot_gallery": "False",
+    "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
     "show_memory": False,
     "min_reported_time": 1e9,

@@ -1,5 +1,9 @@
-"""A page for every registered law, made from its record: equation, parameters, references and a creep curve."""
+"""A page for every registered law, made from its record: equation, parameters, references and a creep curve.
 
+Equations are MathML, which browsers show without a script from the network.
+"""
+
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +12,10 @@ import numpy as np
 from sphinx.application import Sphinx
 
 import creepkit as ck
-from creepkit.language import temperature
-from creepkit.language.law import symbols_used
-from creepkit.language.printing import LatexLawPrinter, latex_equations
+from creepkit.exporters.mathml import MathmlExporter, MathmlPrinter
+from creepkit.language.law_record import symbols_used
+from creepkit.language.symbols import POINT_VARIABLES
+from creepkit.records import LawWithValues
 from creepkit.registry import default_registry
 from creepkit.specimens.run import Run
 
@@ -45,65 +50,69 @@ def _sorted(registered: dict[str, Any]) -> list[tuple[str, str, ck.CreepLaw]]:
 
 
 def _page(law: ck.CreepLaw, origin: str, caption: str) -> str:
-    printer = LatexLawPrinter(law)
-    equations = [_aligned(left, summands) for left, summands in latex_equations(law, printer)]
     parts = [
         f"# {law.title}",
         f"Name: `{law.name}`. Package: {origin}.",
-        "$$\n\\begin{aligned}\n" + " \\\\\n".join(equations) + "\n\\end{aligned}\n$$",
+        *(f'<div class="equation">{equation}</div>' for equation in _equations(law)),
         _words(law),
         "## Parameters",
-        _parameters(law, printer),
+        _parameters(law),
     ]
     if law.states:
-        parts += ["## Internal variables", _states(law, printer)]
+        parts += ["## Internal variables", _states(law)]
     if law.constraints:
-        relations = ", ".join(f"${printer.doprint(relation)}$" for relation in law.constraints)
+        relations = ", ".join(_math(relation) for relation in law.constraints)
         parts += [f"The law holds where {relations}."]
     parts += ["## Creep curve", f"![creep curve of {law.name}]({law.name}.png)", caption]
     parts += ["## References", "\n".join(f"- {reference}" for reference in law.references) or "None."]
     return "\n\n".join(parts) + "\n"
 
 
-def _aligned(left: str, summands: list[str]) -> str:
-    return " \\\\\n&\\quad + ".join([f"{left} &= {summands[0]}", *summands[1:]])
+def _equations(law: ck.CreepLaw) -> list[str]:
+    """The equations of a page of the exporter, each a <math> element."""
+    page = MathmlExporter().text(LawWithValues(law, law.center()))
+    return re.findall(r'<math [^>]*display="block">.*?</math>', page, flags=re.DOTALL)
 
 
-WORDS = {
-    "stress": r"$\sigma_e$ is the von Mises stress over 1 MPa",
-    "strain": r"$\varepsilon_{cr}$ the equivalent creep strain",
-    "time": "$t$ the time over 1 s",
-    "temperature": "$T$ the temperature in K",
-    "principal_stress": r"$\sigma_1$ the largest principal stress over 1 MPa",
-    "mean_stress": r"$\sigma_m$ the mean stress over 1 MPa",
+def _math(expression: Any) -> str:
+    return f"<math>{MathmlPrinter().doprint(expression)}</math>"
+
+
+MEANINGS = {
+    "stress": "the von Mises stress over 1 MPa",
+    "strain": "the equivalent creep strain",
+    "time": "the time over 1 s",
+    "temperature": "the temperature in K",
+    "principal_stress": "the largest principal stress over 1 MPa",
+    "mean_stress": "the mean stress over 1 MPa",
 }
 """What the symbols of a material point mean."""
 
 
 def _words(law: ck.CreepLaw) -> str:
     """A sentence on the symbols of the material point that the law uses."""
-    used = {symbol.name for symbol in symbols_used(law)} | {"strain"}
-    words = [text for name, text in WORDS.items() if name in used]
-    return "Here " + ", ".join(words) + "."
+    used = symbols_used(law) | {ck.strain}
+    meanings = [f"{_math(symbol)} is {MEANINGS[symbol.name]}" for symbol in POINT_VARIABLES if symbol in used]
+    return "Here " + ", ".join(meanings) + "."
 
 
-def _parameters(law: ck.CreepLaw, printer: LatexLawPrinter) -> str:
+def _parameters(law: ck.CreepLaw) -> str:
     """Table of the parameters: symbol, meaning, unit, bounds, scale, and the value that switches it off."""
     rows = ["| symbol | name | meaning | unit | lower bound | upper bound | scale | switched off at |"]
     rows.append("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for symbol, param in law.params.items():
         low, high = param.bounds
         off = "-" if param.off is None else f"{param.off:g}"
-        cells = (f"${printer.doprint(symbol)}$", f"`{symbol.name}`", param.meaning, param.unit)
+        cells = (_math(symbol), f"`{symbol.name}`", param.meaning, param.unit)
         rows.append(f"| {' | '.join(cells)} | {low:g} | {high:g} | {param.scale} | {off} |")
     return "\n".join(rows)
 
 
-def _states(law: ck.CreepLaw, printer: LatexLawPrinter) -> str:
+def _states(law: ck.CreepLaw) -> str:
     rows = ["| symbol | meaning | unit | initial value | material has failed at |", "| --- | --- | --- | --- | --- |"]
     for symbol, state in law.states.items():
         limit = "-" if state.limit is None else f"{state.limit:.10g}"
-        rows.append(f"| ${printer.doprint(symbol)}$ | {state.meaning} | {state.unit} | {state.initial:g} | {limit} |")
+        rows.append(f"| {_math(symbol)} | {state.meaning} | {state.unit} | {state.initial:g} | {limit} |")
     return "\n".join(rows)
 
 
@@ -130,7 +139,7 @@ def _draw_creep_curve(law: ck.CreepLaw, path: Path) -> str:
     axes.set(xlabel="time, s", ylabel="creep strain, %", xlim=(0, None), ylim=(0, None))
     figure.savefig(path, dpi=110)
     plt.close(figure)
-    warm = f" and {TEMPERATURE:g} K" if temperature in symbols_used(law) else ""
+    warm = f" and {TEMPERATURE:g} K" if ck.temperature in symbols_used(law) else ""
     return (
         f"Creep under a constant load of initially {stress:g} MPa{warm}, every parameter in the middle of its bounds. "
         "Bounds of rate coefficients span many powers of ten, so the time scale is that of no particular material."

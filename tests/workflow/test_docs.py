@@ -75,6 +75,13 @@ def test_numbers_have_a_digit_before_the_point(page):
     assert not found, f"write 0.05 in the place of .05: {found}"
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if page.parent.name != "measured"], ids=page_name)
+def test_words_are_those_of_the_field(page):
+    """None of the words that docs/design/vocabulary.md has replaced."""
+    replaced = r"stand-in|\bfences?\b|landscape|ledger|campaign|\btold\b|\bpolish|side by side|\bdoors?\b|\bbox(es)?\b"
+    assert not re.search(replaced, page.read_text(encoding="utf-8"), flags=re.IGNORECASE)
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if python_blocks(page)], ids=page_name)
 def test_snippets_are_python_with_public_names(page):
     public = {*ck.__all__, "__version__"}
@@ -107,6 +114,22 @@ def test_every_measured_page_has_its_program():
     programs = tuple(path.stem for path in (ROOT / "tests" / "benchmarks").glob("*.py"))
     pages = {path.stem for path in (DOCS / "measured").glob("*.md")}
     assert [page for page in pages - MEASURED_BY_OTHERS if not page.startswith(programs)] == []
+
+
+def test_measured_pages_end_with_the_command_that_repeats_them():
+    """The command is that of the page's program, and has no option that the program does not know."""
+    for page in (DOCS / "measured").glob("*.md"):
+        if page.stem in MEASURED_BY_OTHERS:
+            continue
+        last = page.read_text(encoding="utf-8").splitlines()[-1]
+        command = re.search(r"`python (tests/benchmarks/(\w+)\.py)( [^`]*)?`\.$", last)
+        assert command, f"{page.name} does not end with its command"
+        assert page.stem.startswith(command[2]), f"{page.name} is not written by {command[1]}"
+        text = (ROOT / command[1]).read_text(encoding="utf-8")
+        options = set(re.findall(r"--[a-z][a-z-]*", command[3] or "")) - {"--write"}
+        assert [option for option in options if f'"{option}"' not in text] == [], page.name
+        by_hand = re.search(r"kept by hand until `([\w./]+)` writes this page", last)
+        assert not by_hand or by_hand[1] == command[1], page.name
 
 
 def test_every_page_is_reachable_from_the_index():
