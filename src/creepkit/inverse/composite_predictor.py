@@ -55,7 +55,10 @@ class CompositePredictor:
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict each group of histories with its predictor; outputs that a test does not have are NaN."""
+        """Predict each group of histories with its predictor; outputs that a test does not have are NaN.
+
+        theta : (candidates, parameters) internal values.
+        """
         predictions = []
         for predictor, tests in self.groups(histories):
             group_nuisances = {k: v[:, tests] for k, v in (nuisances or {}).items() if supports_nuisance(predictor, k)}
@@ -157,7 +160,10 @@ def predict(
     nuisances: NuisanceValues | None = None,
     sensitivities: bool = False,
 ) -> Prediction:
-    """Predict, mentioning nuisances only where there are any: a closed form need not know of them."""
+    """Predict, mentioning nuisances only where there are any: a closed form need not know of them.
+
+    theta : (candidates, parameters) internal values.
+    """
     if nuisances:
         return predictor.predict(law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)
     return predictor.predict(law, theta, histories, sensitivities=sensitivities)
@@ -255,7 +261,10 @@ def _difference_points(
 def predict_to_rupture(
     using: Predictor, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
 ) -> Prediction:
-    """Predict with `times_to_strain`; tests whose predictor follows none to rupture arrive nowhere and never break."""
+    """Predict with `times_to_strain`; tests whose predictor follows none to rupture reach no strain and never break.
+
+    theta : (candidates, parameters) internal values.
+    """
     groups = (
         using.groups(histories) if isinstance(using, CompositePredictor) else [(using, list(range(len(histories))))]
     )

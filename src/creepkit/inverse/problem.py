@@ -247,11 +247,11 @@ class LeastSquaresProblem:
     # ---- chi-square ------------------------------------------------------------------------------------------------
 
     def whiten(self, values: Floats) -> Floats:
-        """(data,) or (data, columns) whitened rows of the data: values (tests, observations[, columns])."""
+        """(data[, columns]) whitened rows of the data, of values (tests, observations[, columns])."""
         return np.asarray(whiten(self.covariance_factor, values)[self.observations.present])
 
     def whitened(self, x: Floats) -> Floats:
-        """(data + penalties,) - whitened residuals of the data, then those of bound and prior penalties."""
+        """(data + penalties,) - at x (unknowns,): whitened residuals of the data, then of bound and prior penalties."""
         return np.concatenate([self.whiten(self.residuals(x).values), self.bound_penalties.residuals(x)])
 
     def jacobian(self, x: Floats) -> Floats:
@@ -287,9 +287,10 @@ class LeastSquaresProblem:
         additional: AdditionalResiduals | None = None,
         tolerances: Tolerances | None = None,
     ) -> Minimum:
-        """Bounded least squares from `start` (unknowns,).
+        """Bounded least squares.
 
-        fixed : {position: value} of unknowns that keep their values; additional : further residuals.
+        start : (unknowns,) where it begins. fixed : {position: value} of unknowns that keep their values.
+        additional : further residuals.
         """
         fixed, margin = dict(fixed or {}), 1e-9 * self.bounds.width
         initial = np.array(start, float)

@@ -90,7 +90,10 @@ PROFILE_OUTPUTS = ("amplitude", "width", "shape")
 
 
 def profile_displacement(outputs: Mapping[str, Floats], radius: float) -> Floats:
-    """D exp(-(r / S)^p), (frames,) mm; NaN where width or shape is not above zero or was not observed."""
+    """D exp(-(r / S)^p), (frames,) mm; NaN where width or shape is not above zero or was not observed.
+
+    outputs : {name: (frames,)}, "amplitude" and "width" in mm, "shape". radius : mm.
+    """
     amplitude = np.asarray(outputs["amplitude"], float)
     if radius == 0.0:
         return amplitude

@@ -61,7 +61,8 @@ def run_from_outputs(
 ) -> _RunType:
     """The run of a plan: its frames up to the end; SolveError if it ended before any of them.
 
-    rows : (times of the plan, names) outputs. more : fields that this kind of run has beside those of Run.
+    rows : (times, names) outputs at the times of the plan. Further keywords are fields that this kind of run has
+    beside those of Run.
     """
     reason = reason or STATUS_TEXT[status]
     reached = np.isfinite(rows).all(axis=1)

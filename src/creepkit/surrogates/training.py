@@ -184,8 +184,8 @@ class SizeStudyResult:
     """One training of a sweep.
 
     cell, hidden, layers, samples : what was varied; samples are those learnt from.
-    weights : numbers that were fitted. loss : Eq. (4) of the validation rows at the best epoch; training : the loss of
-        the training rows in that epoch. outputs : {output: its RSE}. losses : Eq. (4) of each epoch.
+    weight_count : numbers that were fitted. loss : Eq. (4) of the validation rows at the best epoch.
+    training : the loss of the training rows in that epoch. outputs : {output: its RSE}. losses : Eq. (4) of each epoch.
     """
 
     cell: RecurrentCell

@@ -205,7 +205,10 @@ class ParticleSwarm:
         return refine_candidates(problem, swarm.candidates(), self.refined_candidates, trace, progress)
 
     def next_velocity(self, velocity: Floats, attraction: Floats, iteration: int) -> Floats:
-        """(particles, parameters) velocity after an iteration, from the one before and the attraction."""
+        """(particles, parameters) velocity after an iteration.
+
+        velocity, attraction : (particles, parameters), the velocity before it and the steps towards the best points.
+        """
         if self.form == "constriction":
             acceleration = self.cognitive + self.social
             updated = (

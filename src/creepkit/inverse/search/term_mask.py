@@ -58,7 +58,7 @@ class TermMask:
         return cls(terms, first_rates, own, resting, len(terms) < len(law.terms))
 
     def applied(self, u: Floats, masks: Bools) -> Floats:
-        """(..., parameters) u with coordinates of terms that are off at their resting values."""
+        """u (..., parameters) with coordinates of terms that are off at their resting values; masks : (..., terms)."""
         return np.where(self.active_parameters(masks), u, self.resting_values)
 
     def active_parameters(self, masks: Bools) -> Bools:
@@ -81,8 +81,9 @@ class TermMask:
         return self._never_empty(masks, rng)
 
     def recombined(self, personal_best: Bools, global_best: Bools, rng: np.random.Generator) -> Bools:
-        """(candidates, terms) masks of the next draw: each element at random from a candidate's own best mask
-        (candidates, terms) or from the global best one (terms,), with mutations.
+        """(candidates, terms) masks of the next draw: each element at random from one of two, with mutations.
+
+        personal_best : (candidates, terms) each candidate's own best mask. global_best : (terms,) the best of all.
         """
         if not self.terms:
             return personal_best
@@ -143,7 +144,10 @@ class SearchCandidates:
         return () if self.term_mask is None else self.term_mask.terms_off(u)
 
     def most_different(self, width: Floats, max_count: int) -> list[int]:
-        """The best that differ, at most so many: a term that is off in one of two makes them differ."""
+        """The best that differ, at most max_count: a term that is off in one of two makes them differ.
+
+        width : (parameters,) of the bounds.
+        """
         selected: list[int] = []
         for k in np.argsort(self.cost, kind="stable"):
             if all((np.abs(self.u[k] - self.u[other]) > SAME_BASIN * width).any() for other in selected):
