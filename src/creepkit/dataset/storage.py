@@ -137,7 +137,7 @@ def write_dataset(data: Dataset, path: str | Path) -> Path:
 
 
 def write_header(file: h5py.File, data: Dataset) -> None:
-    """Write everything but the samples, with room for these."""
+    """Write everything but the samples, with space for these."""
     file.attrs.update({"format": FORMAT, "layout": LAYOUT_VERSION, "units": FILE_UNITS})
     for name in NAME_LISTS:
         write_names(file, name, getattr(data, name))
@@ -182,7 +182,7 @@ def _extend(dataset: h5py.Dataset, values: Any) -> None:
 
 
 def read_dataset(path: str | Path, *, accepted_only: bool = False) -> Dataset:
-    """Read a data set that `write` or a campaign wrote; DatasetError, in one sentence, when the file is another.
+    """Read a data set that write_dataset or generate wrote; DatasetError, in one sentence, when the file is another.
 
     accepted_only : leave rejected and failed samples in the file, which spares their memory.
     """

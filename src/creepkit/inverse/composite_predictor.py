@@ -121,7 +121,7 @@ def _concatenated(groups: Sequence[tuple[list[int], Prediction]], histories: Seq
 
 
 def _concatenated_life(groups: Sequence[tuple[list[int], Prediction]], shape: tuple[int, ...]) -> TimesToStrain | None:
-    """The lives of groups as one, if they have any; shape : (candidates, tests, times, outputs)."""
+    """The times to strain of groups as one, if they have any; shape : (candidates, tests, times, outputs)."""
     life_predictions = [(tests, found.times_to_strain) for tests, found in groups if found.times_to_strain is not None]
     if len(life_predictions) < len(groups):
         return None

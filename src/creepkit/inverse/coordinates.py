@@ -226,7 +226,7 @@ class Coordinates:
 def _state_rate_laws(law: CreepLaw) -> list[CreepLaw]:
     """A law for each internal variable, its rate being how fast that one moves; none where that has no logarithm.
 
-    Only the coefficient's coordinate hangs on it: without, the coefficient is a coordinate itself.
+    Only the coefficient's coordinate depends on it: without it, the coefficient is a coordinate itself.
     """
     rate_laws, rate_parameters = [], {p for state in law.states.values() for p in state.rate.free_symbols}
     state_parameters = {p: param for p, param in law.params.items() if p in rate_parameters}

@@ -39,7 +39,7 @@ __all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "Outp
 
 @dataclass(frozen=True, eq=False)
 class Identification(Presentable):
-    """The answer of identify().
+    """The result of identify().
 
     estimates : one Estimate for each parameter, in the order of the law.
     u : (parameters,) conditioned coordinates at the optimum; covariance : (parameters, parameters) their posterior

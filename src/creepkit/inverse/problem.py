@@ -54,7 +54,7 @@ from creepkit.language import CreepLaw
 from creepkit.records import History, Prediction, Predictor
 
 CACHED_EVALUATIONS = 4
-"""Points whose residuals are remembered: a search ends at one that it has evaluated, and the next begins there."""
+"""Points whose residuals are cached: a search ends at one that it has evaluated, and the next begins there."""
 FAILED_COST = 1e12
 """Cost of a candidate that cannot be predicted at all."""
 PRIOR_STRENGTH = 1e-4
@@ -73,7 +73,7 @@ class EvaluationCache:
         self._residuals: dict[bytes, Residuals] = {}
 
     def residuals(self, key: bytes, evaluate: Callable[[], Residuals]) -> Residuals:
-        """The residuals of a point, evaluated unless they are remembered."""
+        """The residuals of a point, evaluated unless they are cached."""
         if key not in self._residuals:
             self._residuals = dict([*self._residuals.items()][1 - CACHED_EVALUATIONS :])
             self._residuals[key] = evaluate()
@@ -188,7 +188,7 @@ class LeastSquaresProblem:
     # ---- residuals ---------------------------------------------------------------------------------------------------
 
     def residuals(self, x: Floats) -> Residuals:
-        """Residuals of one x (unknowns,), with exact derivatives to x; the last few are remembered."""
+        """Residuals of one x (unknowns,), with exact derivatives to x; the last few are cached."""
         fixed_values = self.nuisance_parameters.mean.tobytes() if self.nuisance_parameters.fixed else b""
         return self.evaluations.residuals(x.tobytes() + fixed_values, lambda: self._evaluated(x))
 

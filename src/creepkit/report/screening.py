@@ -51,9 +51,9 @@ def summary_lines(plate: Plate) -> list[str]:
             )
             lines.append(f"{name} ({len(plate.by_class()[name])}): {fractions}")
     lines += [f"failed: {_failure_text(alloy, reason)}" for alloy, reason in plate.failures.items()]
-    for answer in plate.identified:
-        if answer.confirmation is not None and not answer.confirmation.confirmed:
-            lines.append(f"{answer.alloy}: {answer.confirmation.verdict}")
+    for result in plate.identified:
+        if result.confirmation is not None and not result.confirmation.confirmed:
+            lines.append(f"{result.alloy}: {result.confirmation.verdict}")
     return [*lines, *(f"note: {note}" for note in plate.notes)]
 
 

@@ -240,7 +240,7 @@ def modulus_estimates_text(estimates: ModulusEstimates) -> str:
 
 
 def temperature_law_to_json(temperature_law: TemperatureLaw, written: Sequence[Path]) -> dict[str, Any]:
-    """The answer and the files that were written, as JSON-able data."""
+    """The result and the files that were written, as JSON-able data."""
     return {
         "law": temperature_law.law.name,
         "judged_by": temperature_law.criterion_data,

@@ -27,7 +27,7 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
 
 
 def print_json(value: Any) -> None:
-    """Print an answer, records and arrays among it, as JSON."""
+    """Print a result, records and arrays among it, as JSON."""
     from creepkit.files.json_documents import json_text
     from creepkit.files.record_codec import record_to_json
 

@@ -29,9 +29,9 @@ class ParameterModule(SurrogateModule):
     deviation : (outputs,) of the training rows, in physical units. spread, floor, most : (...) scalars, the mean square
     of the training rows, the floor of the logarithm, and its greatest value.
 
-    The loss is Eq. (4) as surrogate.metrics reads it, with the mean square of the training rows below the line, so that
+    The loss is Eq. (4) as surrogates.evaluation reads it, divided by the mean square of the training rows, so that
     batches add up to it. Where the first output is learnt by its logarithm, half of the loss is that, and half the mean
-    square of what the network itself gives, standardised: Eq. (4) alone is deaf to histories of little creep.
+    square of what the network itself gives, standardised: Eq. (4) alone ignores histories of little creep.
     """
 
     deviation: Tensor

@@ -30,7 +30,7 @@ LOCAL_INPUTS = (
 )
 """What is known at a node beside the features; see TRAJECTORY_COLUMNS for what they are made of."""
 MEMORY_STRAIN = 1.0
-"""Elastic strains of creep in which a stress field forgets where it came from: the memory of the fading means."""
+"""Elastic strains of creep over which a stress field loses its history: the decay of the exponential means."""
 _LOAD, _AGE, _DEFLECTION, _TINY = 1e-6, 1e-3, 1e-4, 1e-12
 """Floors: P/E; creep strain over elastic strain; mm, a tenth of a micron; mm or strain."""
 _LARGEST_EXPONENT = 20.0
@@ -103,7 +103,7 @@ def _saturated(x: Tensor, largest: float) -> Tensor:
 
 
 def _exponential_means(features: Tensor, age: Tensor) -> Tensor:
-    """Means of features that forget over an elastic strain of creep: m_k = l_k m_{k-1} + (1 - l_k) f_k.
+    """Exponential means of features that decay over an elastic strain of creep: m_k = l_k m_{k-1} + (1 - l_k) f_k.
 
     Spans of 1, 2, 4 ... steps are joined until each reaches back to the first node.
     """

@@ -87,9 +87,9 @@ class SurrogateMetadata:
     parameters, conditions : names of the data set's columns.
     scaling : {input: (mean, standard deviation)}, and of outputs, for people to read; the module holds its own.
     domain : where the training rows lie, in the inputs that the recipe names.
-    metrics : of the validation rows (see surrogate.metrics). curves : {name: one number an epoch}.
+    metrics : of the validation rows (see surrogates.evaluation). curves : {name: one number an epoch}.
     provenance : versions, seed, fingerprints, counts, when.
-    notes : what to be wary of, a sentence each.
+    notes : limitations, a sentence each.
     """
 
     law: CreepLaw

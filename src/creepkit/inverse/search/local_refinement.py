@@ -16,7 +16,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.bounds import Bounds
 
 IterationCallback = Callable[[str, int, int], None]
-"""What is told of the progress of a search: (name of the step, how many are done, how many there are)."""
+"""Reports the progress of a search: (name of the step, how many are done, how many there are)."""
 
 
 class AdditionalResiduals(Protocol):

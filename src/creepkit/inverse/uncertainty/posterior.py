@@ -226,7 +226,7 @@ class PosteriorSamples(Presentable):
 
     @property
     def effective_sample_size(self) -> float:
-        """Number of independent draws that tell as much."""
+        """Number of independent draws that are worth as much."""
         return float(len(self.u) / self.autocorrelation_time.max())
 
     def interval(self, quantity_or_name: str | DerivedQuantity) -> tuple[float, float, float]:

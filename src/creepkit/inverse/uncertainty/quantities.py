@@ -1,4 +1,4 @@
-"""What intervals are asked of: a parameter, the creep rate at a point, the local stress exponent there.
+"""Quantities that have intervals: a parameter, the creep rate at a point, the local stress exponent there.
 
 Each is a function of the conditioned coordinates u, looked at on the scale on which it is nearly normal.
 """
