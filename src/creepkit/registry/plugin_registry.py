@@ -82,7 +82,7 @@ class Plugin:
 
 
 class Registry:
-    """A plugin manager that knows where everything came from; it loads what is installed at the first question."""
+    """A plugin manager that records where everything came from; it loads what is installed when first used."""
 
     def __init__(self) -> None:
         self._manager = pluggy.PluginManager(hookspecs.PROJECT)

@@ -232,7 +232,7 @@ def size_study(
 ) -> list[SizeStudyResult]:
     """Train every combination, each to a file of its own in the folder `to`; those that are there already are read.
 
-    Every training is judged by the same rows, a share of the whole data set that none of them learns from.
+    Every training is evaluated on the same rows, a share of the whole data set that none of them learns from.
     """
     data, folder = trainable_samples(data), Path(to)
     training_count = len(training_split(len(data), recipe.training, seed)[0])

@@ -48,14 +48,14 @@ class TermMask:
         positions = {label: [law.names.index(n) for n in law.only(label).names] for label in law.terms}
         rate_positions = {label: [k for k in owned if k in rates] for label, owned in positions.items()}
         terms = _maskable_terms(law, rate_positions, maskable)
-        own = np.zeros((len(terms), problem.bounds.lower.size), bool)
-        for row, label in zip(own, terms, strict=True):
+        owned_parameters = np.zeros((len(terms), problem.bounds.lower.size), bool)
+        for row, label in zip(owned_parameters, terms, strict=True):
             shared = {k for other, other_positions in positions.items() if other != label for k in other_positions}
             row[[k for k in positions[label] if k not in shared]] = True
         resting = problem.bounds.centre
         resting[list(rates)] = problem.bounds.lower[list(rates)]
         first_rates = np.array([rate_positions[label][0] for label in terms], np.int64)
-        return cls(terms, first_rates, own, resting, len(terms) < len(law.terms))
+        return cls(terms, first_rates, owned_parameters, resting, len(terms) < len(law.terms))
 
     def applied(self, u: Floats, masks: Bools) -> Floats:
         """u (..., parameters) with coordinates of terms that are off at their resting values; masks : (..., terms)."""

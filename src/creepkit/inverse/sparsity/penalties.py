@@ -4,7 +4,7 @@ Contributions are fractions that add up to about one, whatever the law is. There
 where one term has them all. Strength times the penalty is added to half the chi-square: with strength s a change of its
 value by one costs as much as a chi-square that is larger by 2 s.
 
-Least squares sees a penalty through parabolas w c^2 + const that touch it (iteratively reweighted least squares). With
+For least squares a penalty is replaced by parabolas w c^2 + const that touch it (iteratively reweighted). With
 weights updated at every point, half the sum of squares is the penalty and J'r its gradient; J'J is that of the
 parabolas, which lie above a concave penalty: steps are short rather than long.
 """
@@ -105,12 +105,12 @@ class GroupL2:
 
 @dataclass(frozen=True)
 class Sqrt:
-    """strength x [ sum (c_i + d)^(1/2) + exponents x sum (|m_j| + .02)^(1/2) ], d = .003.
+    """strength x [ sum (c_i + d)^(1/2) + exponents x sum (|m_j| + 0.02)^(1/2) ], d = 0.003.
 
     Concave, hence smallest where one term has it all: this one selects. m_j are the exponents of linear scale that can
     be off within their bounds, such as the strain exponent of strain hardening; they weigh a third, so that a simple
-    term is preferred to one with memory. d makes the slope at zero finite: a term of no use still sees where the data
-    want it. Being concave it has a minimum at each corner, and asks for many starts.
+    term is preferred to one with memory. d makes the slope at zero finite: a term of no use can still
+    grow where the data require it. Being concave it has a minimum at each corner, and needs many starts.
     """
 
     strength: Strength = DEFAULT_STRENGTH

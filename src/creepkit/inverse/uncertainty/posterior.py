@@ -143,7 +143,7 @@ class Posterior:
         """Residuals (candidates, tests, observations), and what a test's own rate does half way to each candidate.
 
         A factor on all rates moves every coefficient, each of which is a coordinate's own. Where a term has none, and
-        for tests compared over their whole life, whose derivatives are dear, it does what it does at the optimum.
+        for tests compared over their whole life, whose derivatives are expensive, that effect is taken at the optimum.
         """
         problem, law = self.problem, self.problem.law
         coefficients = list(problem.coordinates.coefficients)
@@ -187,7 +187,7 @@ def _whitened(whitening: Floats, rate_effect: Floats, values: Floats) -> Floats:
 
 
 CONVERGED_LENGTH = 50.0
-"""Steps over autocorrelation time that emcee's authors ask for before its estimate may be trusted."""
+"""Steps over autocorrelation time that emcee's authors require before its estimate is reliable."""
 MAX_START_DRAWS = 50
 """Draws of a walker's start that may fall outside the bounds."""
 

@@ -135,7 +135,7 @@ class BulgeRun(Run):
         """Least and greatest von Mises stress of the integration points at radii up to `within` mm.
 
         times : number or (times,) s, by default those of the frames.
-        By default the whole roof, up to the radius of the cavity. The least of these hangs on the mesh: it is that of
+        By default the whole roof, up to the radius of the cavity. The least of these depends on the mesh: it is that of
         the point nearest to where bending changes its sign.
         """
         reach = self.setup.geometry.cavity_radius if within is None else float(within)
