@@ -17,7 +17,7 @@ __all__ = ["ArrayLike", "Bools", "Floats", "Ints", "frozen"]
 
 
 def frozen(values: ArrayLike | Sequence[Any], dtype: type = np.float64) -> NDArray[Any]:
-    """Return a read-only contiguous copy of `values`."""
+    """A read-only contiguous copy, (...,), of values (...,)."""
     array: NDArray[Any] = np.array(values, dtype=dtype, order="C")
     array.flags.writeable = False
     return array

@@ -102,9 +102,9 @@ def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
             resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
         return str(caught.value)
 
-    assert re.search(r"0000\d\.h5: cannot be written: File too large; make room and start again", complaint(shard // 2))
+    assert re.search(r"0000\d\.h5: cannot be written: File too large; free some space", complaint(shard // 2))
     assert shards_of(to) == []
-    assert re.search(r"a\.h5: cannot be written: File too large; make room and start again", complaint(3 * shard // 2))
+    assert re.search(r"a\.h5: cannot be written: File too large; free some space", complaint(3 * shard // 2))
     made = {path: path.stat().st_mtime_ns for path in shards_of(to)}
     assert len(made) * ROWS >= len(expected)
     assert left_behind(tmp_path / "a.h5.parts") == ["merging.lock"]

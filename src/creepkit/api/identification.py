@@ -238,7 +238,7 @@ def law_with_values(
     name: str = "",
     notes: Sequence[str] = (),
 ) -> LawWithValues:
-    """Return a law with its values and what travels with them into every export.
+    """Return a law with its values and what goes with them into every export.
 
     source, values, name : as export() takes them; notes say which values were set by hand in the place of others.
     elastic : E in MPa, and nu, for targets that state them. notes : lines that become comments.

@@ -78,7 +78,7 @@ def check_data_quality(
 ) -> tuple[QualityFlag, ...]:
     """Return what looks wrong in histories: unloading, falling amplitudes, outliers, tests far from others.
 
-    specimen : what the first frames are compared with, which should show its elastic deflection; None believes them.
+    specimen : what the first frames are compared with, which should show its elastic deflection; without it, none.
     """
     from creepkit.quality import check_data_quality as run
 

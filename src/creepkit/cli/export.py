@@ -36,7 +36,7 @@ def command(
 ) -> None:
     """Write a law with its values as text, or for a solver.
 
-    Intervals and the range of validity travel as comments.
+    Intervals and the range of validity are written as comments.
     """
     import creepkit as ck
     from creepkit.records import ZERO_CELSIUS

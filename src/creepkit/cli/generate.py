@@ -50,7 +50,7 @@ def command(
     part: Annotated[
         str | None, typer.Option(metavar="K/N", help="Simulate every N-th shard only, from the K-th on; do not merge.")
     ] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Tell what would be drawn; simulate nothing.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be drawn; simulate nothing.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Simulate a data set for training.

@@ -46,7 +46,7 @@ def command(
     recipe = select_recipe("parameter-gru", {"target": target}, training_options)
     assert isinstance(recipe, ParameterGru)
     with ProgressBar() as progress:
-        entries = size_study(
+        trainings = size_study(
             read_dataset(data, accepted_only=True),
             recipe,
             NetworkSizes(
@@ -60,11 +60,11 @@ def command(
             device=device,
             progress=progress.tick,
         )
-    size_study_figure(entries, to / "sweep.png")
+    size_study_figure(trainings, to / "sweep.png")
     if as_json:
-        print_json({"trainings": [vars(e) for e in entries], "picture": str(to / "sweep.png")})
+        print_json({"trainings": [vars(e) for e in trainings], "picture": str(to / "sweep.png")})
         return
-    print_table("", *size_study_rows(entries))
+    print_table("", *size_study_rows(trainings))
     typer.echo(f"wrote {to / 'sweep.png'}")
 
 

@@ -116,7 +116,7 @@ class Dataset(Presentable):
         return self.rows(self.reasons == 0)
 
     def rows(self, selection: Sequence[int] | slice | Ints | Bools) -> Dataset:
-        """The data set of some rows: a slice, numbers (k,), or a mask (n,)."""
+        """The data set of some rows; selection : (k,) their numbers, a mask (rows,) or a slice."""
         numbers = np.arange(len(self))[selection]
         new_row = {int(old): new for new, old in enumerate(numbers)}
         columns = {name: getattr(self, name)[numbers] for name in COLUMNS}

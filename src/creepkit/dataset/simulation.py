@@ -128,7 +128,7 @@ def simulate_rows(
 
 
 def rounded_outputs(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Values (...,) rounded to REJECTED_DIGITS binary digits, which take a third of the space in a compressed file."""
+    """The values (...,) rounded to REJECTED_DIGITS binary digits, which take a third of the space when compressed."""
     fractions, exponents = np.frexp(values)
     return np.asarray(
         np.ldexp(np.round(fractions * 2**REJECTED_DIGITS) / 2**REJECTED_DIGITS, exponents), dtype=np.float32

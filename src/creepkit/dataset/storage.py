@@ -137,7 +137,7 @@ def write_dataset(data: Dataset, path: str | Path) -> Path:
 
 
 def write_header(file: h5py.File, data: Dataset) -> None:
-    """Write everything but the samples, with room for these."""
+    """Write everything but the samples, with space for these."""
     file.attrs.update({"format": FORMAT, "layout": LAYOUT_VERSION, "units": FILE_UNITS})
     for name in NAME_LISTS:
         write_names(file, name, getattr(data, name))
@@ -182,9 +182,9 @@ def _extend(dataset: h5py.Dataset, values: Any) -> None:
 
 
 def read_dataset(path: str | Path, *, accepted_only: bool = False) -> Dataset:
-    """Read a data set that `write` or a campaign wrote; DatasetError, in one sentence, when the file is another.
+    """Read a data set that write_dataset or generate wrote; DatasetError, in one sentence, when the file is another.
 
-    accepted_only : leave rejected and failed samples in the file, which spares their memory.
+    accepted_only : leave rejected and failed samples in the file, which saves memory.
     """
     with open_hdf5(Path(path), DATASET_FILE) as file:
         return read_samples(file, read_header(file, str(path)), accepted_only)
@@ -238,7 +238,7 @@ def _read_grid(array: h5py.Dataset, source: str) -> TimeGrid:
 
 
 def read_samples(file: h5py.File, header: Dataset, accepted_only: bool = False) -> Dataset:
-    """The header with the samples of a file, in blocks that spare memory."""
+    """The header with the samples of a file, in blocks, to save memory."""
     reasons = file["reasons"][:]
     selected = reasons == 0 if accepted_only else np.ones(len(reasons), dtype=bool)
     columns: dict[str, Any] = {name: _read_rows(file[name], selected, COLUMNS[name].memory_type) for name in COLUMNS}

@@ -165,7 +165,7 @@ def squared_mahalanobis(
 
 
 def akaike_weights(scores: Floats) -> Floats:
-    """(n,) weights that sum to 1, of criteria (n,) such as BIC or AICc."""
+    """(laws,) weights that sum to 1; scores : (laws,) a criterion such as BIC or AICc."""
     weights = np.exp(-0.5 * (scores - scores.min()))
     return np.asarray(weights / weights.sum())
 

@@ -41,7 +41,7 @@ def discover(
     settings: IdentificationSettings | None = None,
     progress: IterationCallback | None = None,
 ) -> TemperatureLaw:
-    """Find closed forms of the parameters against temperature, and judge them by the tests where those are given.
+    """Find closed forms of the parameters against temperature, and compare them on the tests where those are given.
 
     fits : identifications of one law, each at one temperature; three temperatures or more.
     forms : names of registered temperature forms, or {parameter: names}; by default all that suit a parameter.

@@ -77,7 +77,10 @@ def identify_moduli(
 
 
 def fit_wachtman(temperatures: Floats, values: Floats, sd: Floats) -> tuple[float, float, float]:
-    """E0 MPa, b MPa/K and T0 K of Wachtman's form through moduli (tests,) in MPa, weighted by their sd."""
+    """E0 MPa, b MPa/K and T0 K of Wachtman's form.
+
+    temperatures : (tests,) K. values : (tests,) MPa, the moduli. sd : (tests,) MPa, their standard deviations.
+    """
     weights = 1.0 / np.maximum(sd, 1e-3 * values)
 
     def linear(T0: float) -> tuple[Floats, Floats]:

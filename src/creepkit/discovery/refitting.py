@@ -138,7 +138,7 @@ def refit(
     """Refit the forms that remain to the tests, and weigh them by how well they follow these.
 
     settings : where values are to come from frames of equal weight ("noise", the default) the likelihood takes its
-        place: combinations must be judged under one covariance, with scatter between tests and autocorrelation in it.
+        place: combinations must be compared under one covariance, with scatter between tests and autocorrelation in it.
     max_forms : forms of one parameter that are tried; where an identification is expensive, 3 are enough. The simplest
         law, Arrhenius with every other parameter constant, is always among the combinations.
     search_again : whether the best law is searched for again over the whole of its bounds.

@@ -42,7 +42,7 @@ MAX_COMBINATIONS_WRITTEN = 20
 
 
 def temperature_law_to_json(temperature_law: TemperatureLaw) -> dict[str, Any]:
-    """The answer as JSON-able data."""
+    """The result as JSON-able data."""
     estimates = temperature_law.isothermal_estimates
     content = {
         "creepkit": version("creepkit"),
@@ -192,7 +192,7 @@ class TemperatureLaw(Presentable):
         return dict(zip(self.isothermal_law.names, values.T, strict=True))
 
     def save(self, path: str | Path) -> Path:
-        """Write the answer as JSON (to a temporary name, then renamed)."""
+        """Write the result as JSON (to a temporary name, then renamed)."""
         return write_temperature_law(self, Path(path))
 
     def plot(self, path: str | Path | None = None) -> Figure:

@@ -236,7 +236,7 @@ class DiscriminatingExperiment:
 
 @dataclass(frozen=True)
 class DiscriminationDesign(Presentable):
-    """Further tests, the most telling first, if law `true` holds and law `other` is fitted.
+    """Further tests, the most informative first, if law `true` holds and law `other` is fitted.
 
     current_chi_square : expected by the tests that were made. excluded : candidates that rupture at once.
     """

@@ -236,8 +236,8 @@ _FUNCTION_CALLS = {
 def law_subroutine(code: LawCode, name: str) -> list[str]:
     """Return `subroutine NAME(x, out)` as lines of fixed-form Fortran.
 
-    x : stress MPa, strain, time s, temperature K, largest principal and mean stress MPa, then internal variables.
-    out : row by row (value, derivatives to x) of ln rate and of each state's rate, as creepkit's kernels put it out.
+    Its x is stress MPa, strain, time s, temperature K, largest principal and mean stress MPa, then internal variables;
+    out is row by row (value, derivatives to x) of ln rate and of each state's rate, in the order of creepkit's kernels.
     """
     function = code.function("update")
     width = len(POINT_VARIABLES) + len(code.states)

@@ -36,9 +36,10 @@ class PythonDialect:
     """What sets one kind of module apart.
 
     printer : of its expressions. helpers : {name: text} of the functions that the module takes along where needed.
-    imports : import statements for the names that a module reads.
-    log : text of a parameter's logarithm, from its name. guard : statement around the body, or nothing.
-    overflow : the sentence on results that no double holds.
+    import_lines : import statements for the names that a module reads.
+    log_expression : text of a parameter's logarithm, from its name.
+    context_manager : statement around the body, or nothing.
+    overflow_sentence : the sentence on results that no double holds.
     """
 
     printer: KernelPrinter

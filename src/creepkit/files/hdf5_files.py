@@ -68,7 +68,7 @@ def write_hdf5(path: Path, error: type[CreepkitError], advice: str) -> Iterator[
 
 @contextmanager
 def create_hdf5(path: Path) -> Iterator[h5py.File]:
-    """A new file, of a version in which attributes may be long; OSError when there is no room for it."""
+    """A new file, of a version in which attributes may be long; OSError when there is no space for it."""
     with FaultTolerantFile(path, "w+") as raw:
         try:
             with h5py.File(raw, "w", libver=("v110", "v110")) as file:

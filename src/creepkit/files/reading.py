@@ -28,7 +28,7 @@ class FileKind:
 
 
 _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
-"""Without blocking: to open a pipe that nobody writes to must not wait."""
+"""Without blocking: to open a pipe without a writer must not wait."""
 
 
 def check_readable(path: Path, kind: FileKind) -> None:

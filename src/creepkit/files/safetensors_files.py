@@ -22,14 +22,14 @@ HEADER_KEY = "creepkit"
 def write_safetensors(
     path: str | Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], document: DocumentFormat
 ) -> Path:
-    """Write arrays, of any shapes, and a JSON-able header below the heading of its format."""
+    """Write arrays (...,) by name and a JSON-able header below the heading of its format."""
     text = compact_json({**document.heading, **header})
     contiguous = {name: np.array(array, order="C", copy=True) for name, array in arrays.items()}
     return write_bytes(save(contiguous, metadata={HEADER_KEY: text}), Path(path), document.kind.error)
 
 
 def read_safetensors(path: str | Path, document: DocumentFormat) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """The arrays and the header, without its heading, of a file of this format; else the error of its kind."""
+    """The arrays, {name: (...,)}, and the header without its heading; the error of its kind for other files."""
     path, kind = Path(path), document.kind
     check_readable(path, kind)
     try:

@@ -14,7 +14,7 @@ from creepkit.errors import CreepkitError
 
 @contextmanager
 def replace_on_success(
-    path: Path, error: type[CreepkitError], advice: str = "choose a file in a folder that exists and has room"
+    path: Path, error: type[CreepkitError], advice: str = "choose a file in a folder that exists and has space"
 ) -> Iterator[Path]:
     """A temporary name beside `path` that takes its place at the end, and is removed when the writing fails.
 
@@ -46,7 +46,7 @@ def write_bytes(content: bytes, path: Path, error: type[CreepkitError]) -> Path:
 
 
 def write_if_absent(path: Path, text: str) -> None:
-    """Write a file that the first of several writers decides; OSError when there is no room for it."""
+    """Write a file that the first of several writers decides; OSError when there is no space for it."""
     temporary = _temporary_name(path)
     try:
         temporary.write_bytes(text.encode("utf-8"))
@@ -71,7 +71,7 @@ def check_target(path: Path, error: type[CreepkitError], *, force: bool = True) 
 
 
 def remove_temporary_files(path: Path) -> None:
-    """Remove what processes that died while they wrote `path` have left; nobody must be writing it now."""
+    """Remove what processes that ended while they wrote `path` have left; none may be writing it now."""
     for temporary in path.parent.glob(f".{path.name}.*.part"):
         temporary.unlink(missing_ok=True)
 
@@ -83,4 +83,4 @@ def _temporary_name(path: Path) -> Path:
 def _cause(failure: OSError, advice: str) -> str:
     message = os.strerror(failure.errno) if failure.errno else " ".join(str(failure).split())
     full = failure.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-    return f"{message}; {'make room and start again' if full else advice}"
+    return f"{message}; {'free some space and start again' if full else advice}"

@@ -1,1 +1,1 @@
-"""From histories to a law with intervals: coordinates, objective, search, scatter, uncertainty, ranking."""
+"""From histories to a law with intervals: coordinates, objective, search, noise model, uncertainty, ranking."""

@@ -55,7 +55,10 @@ class CompositePredictor:
         nuisances: NuisanceValues | None = None,
         sensitivities: bool = False,
     ) -> Prediction:
-        """Predict each group of histories with its predictor; outputs that a test does not have are NaN."""
+        """Predict each group of histories with its predictor; outputs that a test does not have are NaN.
+
+        theta : (candidates, parameters) internal values.
+        """
         predictions = []
         for predictor, tests in self.groups(histories):
             group_nuisances = {k: v[:, tests] for k, v in (nuisances or {}).items() if supports_nuisance(predictor, k)}
@@ -113,22 +116,24 @@ def _concatenated(groups: Sequence[tuple[list[int], Prediction]], histories: Seq
         jacobian,
         times,
         nuisance_jacobian,
-        _concatenated_life(groups, shape),
+        _concatenated_times(groups, shape),
     )
 
 
-def _concatenated_life(groups: Sequence[tuple[list[int], Prediction]], shape: tuple[int, ...]) -> TimesToStrain | None:
-    """The lives of groups as one, if they have any; shape : (candidates, tests, times, outputs)."""
-    life_predictions = [(tests, found.times_to_strain) for tests, found in groups if found.times_to_strain is not None]
-    if len(life_predictions) < len(groups):
+def _concatenated_times(groups: Sequence[tuple[list[int], Prediction]], shape: tuple[int, ...]) -> TimesToStrain | None:
+    """The times to strain of groups as one, if they have any; shape : (candidates, tests, times, outputs)."""
+    groups_with_times = [
+        (tests, prediction.times_to_strain) for tests, prediction in groups if prediction.times_to_strain is not None
+    ]
+    if len(groups_with_times) < len(groups):
         return None
 
     def gathered(name: str, axes: int, fill: float) -> Any:
-        arrays = [getattr(life, name) for _, life in life_predictions]
+        arrays = [getattr(times_to_strain, name) for _, times_to_strain in groups_with_times]
         if any(array is None for array in arrays):
             return None
         out = np.full((*shape[:axes], *arrays[0].shape[axes:]), fill)
-        for (tests, _), array in zip(life_predictions, arrays, strict=True):
+        for (tests, _), array in zip(groups_with_times, arrays, strict=True):
             if axes == 3:
                 out[:, tests, : array.shape[2]] = array
             else:
@@ -136,8 +141,8 @@ def _concatenated_life(groups: Sequence[tuple[list[int], Prediction]], shape: tu
         return out
 
     horizon = np.zeros(shape[1])
-    for tests, life in life_predictions:
-        horizon[tests] = life.horizon
+    for tests, times_to_strain in groups_with_times:
+        horizon[tests] = times_to_strain.horizon
     return TimesToStrain(
         gathered("times", 3, np.nan),
         gathered("log_time_derivatives", 3, np.inf),
@@ -157,7 +162,10 @@ def predict(
     nuisances: NuisanceValues | None = None,
     sensitivities: bool = False,
 ) -> Prediction:
-    """Predict, mentioning nuisances only where there are any: a closed form need not know of them."""
+    """Predict, mentioning nuisances only where there are any: a closed form need not know of them.
+
+    theta : (candidates, parameters) internal values.
+    """
     if nuisances:
         return predictor.predict(law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)
     return predictor.predict(law, theta, histories, sensitivities=sensitivities)
@@ -255,7 +263,10 @@ def _difference_points(
 def predict_to_rupture(
     using: Predictor, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
 ) -> Prediction:
-    """Predict with `times_to_strain`; tests whose predictor follows none to rupture arrive nowhere and never break."""
+    """Predict with `times_to_strain`; tests whose predictor follows none to rupture reach no strain and never break.
+
+    theta : (candidates, parameters) internal values.
+    """
     groups = (
         using.groups(histories) if isinstance(using, CompositePredictor) else [(using, list(range(len(histories))))]
     )
@@ -279,10 +290,10 @@ def predict_to_rupture(
 
 
 def _without_rupture(prediction: Prediction, parameters: int) -> TimesToStrain:
-    """The life of what never ends."""
+    """Times to strain of tests that are followed to none."""
     shape = prediction.values.shape[:3]
-    no_arrivals, no_ruptures = np.full(shape, np.nan), np.full(shape[:2], np.nan)
+    no_strains, no_ruptures = np.full(shape, np.nan), np.full(shape[:2], np.nan)
     jacobians = np.full((*shape, parameters), np.nan), np.full((*shape[:2], parameters), np.nan)
     return TimesToStrain(
-        no_arrivals, np.full(shape, np.inf), no_ruptures, np.array([t[-1] for t in prediction.times]), *jacobians
+        no_strains, np.full(shape, np.inf), no_ruptures, np.array([t[-1] for t in prediction.times]), *jacobians
     )

@@ -37,7 +37,10 @@ class LocalExponent:
     coefficients: Callable[..., tuple[object, ...]]
 
     def evaluate(self, point: Sequence[float], theta: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """a, b (...,) and their derivatives to the internal parameters `others`, (..., others)."""
+        """a, b (...,) and their derivatives to the internal parameters `others`, (..., others).
+
+        theta : (..., parameters) internal values.
+        """
         other_values = [theta[..., k] for k in self.others]
         with np.errstate(all="ignore"):
             evaluated = self.coefficients(*point, *other_values)
@@ -164,7 +167,7 @@ class Coordinates:
         return theta
 
     def values(self, u: Floats) -> dict[str, float]:
-        """{parameter: value} in the author's units, of one u."""
+        """{parameter: value} in the author's units, of one u (parameters,)."""
         return {name: float(value) for name, value in self.law.from_internal(self.theta(u)).items()}
 
     def u(self, theta: Floats) -> Floats:
@@ -223,7 +226,7 @@ class Coordinates:
 def _state_rate_laws(law: CreepLaw) -> list[CreepLaw]:
     """A law for each internal variable, its rate being how fast that one moves; none where that has no logarithm.
 
-    Only the coefficient's coordinate hangs on it: without, the coefficient is a coordinate itself.
+    Only the coefficient's coordinate depends on it: without it, the coefficient is a coordinate itself.
     """
     rate_laws, rate_parameters = [], {p for state in law.states.values() for p in state.rate.free_symbols}
     state_parameters = {p: param for p, param in law.params.items() if p in rate_parameters}

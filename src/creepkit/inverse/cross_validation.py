@@ -39,7 +39,7 @@ FoldBy = Literal["test", "condition", "time"]
 class Fold:
     """One fold: the tests that are predicted, and the fit to the rest.
 
-    held_out : whole histories; in cross-validation by time all of them, of which the fit knows the beginning.
+    held_out : whole histories; in cross-validation by time all of them, of which the beginning is fitted.
     """
 
     held_out: tuple[History, ...]
@@ -171,7 +171,7 @@ def _folds(
 
 
 def _first_part(history: History, fitted_fraction: float) -> History:
-    """The first part of a history, which does not know how the test will end."""
+    """The first part of a history, without how the test ended."""
     used = history.used & (history.times <= fitted_fraction * float(history.times[-1]))
     return history.replace(used=used, rupture_time=None, unruptured=False)
 
@@ -290,8 +290,8 @@ def times_to_rupture(
 
 def _crossing_time(strain: Floats, times: Floats, target: float, prediction: Prediction, test: int) -> float:
     """Time at which the prediction crosses; its burst when it ends below; the grid's ends beyond them."""
-    alive = np.isfinite(strain)
-    crossed = np.flatnonzero(alive & (strain >= target))
+    finite = np.isfinite(strain)
+    crossed = np.flatnonzero(finite & (strain >= target))
     if crossed.size == 0:
         status, end = prediction.status[0, test], prediction.end_times[0, test]
         return float(end) if status == Status.RUPTURED else float(times[-1])

@@ -26,7 +26,10 @@ from creepkit.records import History, Prediction, Predictor, constant_stress
 def relative_squared_error(
     measured: Sequence[ArrayLike], predicted: Sequence[ArrayLike], about: Literal["all", "test", "frame"] = "all"
 ) -> float:
-    """Return sum (p - m)^2 / sum (m - mean)^2 over all frames of all tests; each test a (frames,) array."""
+    """Return sum (p - m)^2 / sum (m - mean)^2 over all frames of all tests.
+
+    measured, predicted : (frames,) of each test, in one unit.
+    """
     measured_arrays = [np.asarray(m, float) for m in measured]
     squares = sum(
         float(((np.asarray(p, float) - m) ** 2).sum()) for m, p in zip(measured_arrays, predicted, strict=True)
@@ -39,7 +42,7 @@ def relative_squared_error(
 
 
 def total_sum_of_squares(tests: Sequence[Floats], about: Literal["all", "test", "frame"] = "all") -> float:
-    """Sum of (m - mean)^2 over all frames of all tests."""
+    """Sum of (m - mean)^2 over all frames of all tests; tests : (frames,) of each."""
     if about == "test":
         return sum(float(((m - m.mean()) ** 2).sum()) for m in tests if m.size)
     if about == "all":
@@ -71,7 +74,7 @@ class OutputErrors:
 
 
 def output_errors(measured: Floats, predicted: Floats, noise: Floats) -> OutputErrors:
-    """Errors of predicted against measured values, (frames,) each; noise : (frames,) standard deviations."""
+    """Errors of predicted values; measured, predicted : (frames,); noise : (frames,) standard deviations."""
     nan = float("nan")
     if measured.size == 0:
         return OutputErrors(0, nan, nan, nan, nan, nan)
@@ -294,8 +297,9 @@ def predict_rupture_times(
 ) -> tuple[Floats, Floats, Floats]:
     """Rupture times of histories, s, with intervals: (time, low, high), (tests,) each; infinite where none comes.
 
-    By the delta method on ln t, from the covariance of u (parameters, parameters); with `noise_model` the scatter of
-    single tests is added.
+    By the delta method on ln t; with `noise_model` the scatter of single tests is added.
+
+    u : (parameters,) conditioned coordinates. covariance : (parameters, parameters) of u.
     """
     for history in histories:
         if not predicts_rupture(predictor, history):
@@ -331,7 +335,10 @@ def _extended_to_rupture(history: History) -> History:
 def constant_stress_tests(
     stress: ArrayLike, temperature: ArrayLike, duration: float, control: str
 ) -> tuple[list[History], tuple[int, ...]]:
-    """Uniaxial tests at constant load or stress for every pair of stress (MPa) and temperature (K), and their shape."""
+    """Uniaxial tests at constant load or stress, and their shape.
+
+    stress, temperature : numbers or arrays that broadcast, MPa and K.
+    """
     stresses, temperatures = np.broadcast_arrays(np.asarray(stress, float), np.asarray(temperature, float))
     if control not in ("load", "stress"):
         raise FitError(f"control is '{control}'; allowed are load and stress")
@@ -353,7 +360,10 @@ def compare_rupture_times(
     histories: Sequence[History],
     predictor: Predictor,
 ) -> list[RuptureComparison | None]:
-    """Measured against predicted, for every history; None where its end is not known or not predicted."""
+    """Measured against predicted, for every history; None where its end is not known or not predicted.
+
+    u : (parameters,) conditioned coordinates. covariance : (parameters, parameters) of u.
+    """
     followed = [k for k, h in enumerate(histories) if h.end_known and predicts_rupture(predictor, h)]
     comparisons: list[RuptureComparison | None] = [None] * len(histories)
     if not followed:

@@ -90,5 +90,5 @@ def check_explicit_nuisances(
     name = getattr(predictor_for(predictor, history), "name", "predictor")
     raise FitError(
         f"nuisance '{kinds[0]}' cannot be fitted beside tests that are followed to their end ('{history.name}', "
-        f"{name}); leave it out, or forget how they ended: history.replace(rupture_time=None, unruptured=False)"
+        f"{name}); leave it out, or drop how they ended: history.replace(rupture_time=None, unruptured=False)"
     )

@@ -39,7 +39,7 @@ __all__ = ["Identification", "IdentificationSettings", "NuisanceEstimate", "Outp
 
 @dataclass(frozen=True, eq=False)
 class Identification(Presentable):
-    """The answer of identify().
+    """The result of identify().
 
     estimates : one Estimate for each parameter, in the order of the law.
     u : (parameters,) conditioned coordinates at the optimum; covariance : (parameters, parameters) their posterior
@@ -132,7 +132,8 @@ class Identification(Presentable):
     ) -> tuple[Floats, Floats, Floats]:
         """Creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape.
 
-        stress MPa, temperature K; strain and time default to those of the reference point.
+        stress, temperature, strain, time : numbers or arrays that broadcast, in MPa, K, - and s; by default those of
+        the reference point.
         """
         from creepkit.inverse.uncertainty.quantities import log_rate
 
@@ -149,7 +150,10 @@ class Identification(Presentable):
         strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
     ) -> tuple[Floats, Floats, Floats]:
-        """Local stress exponent d ln rate / d ln stress with its 95 % interval."""
+        """Local stress exponent d ln rate / d ln stress with its 95 % interval: (exponent, low, high).
+
+        stress, temperature, strain, time : as in `rate`, numbers or arrays that broadcast; results have that shape.
+        """
         from creepkit.inverse.uncertainty.quantities import local_exponent
 
         function = local_exponent(self.coordinates, stress, temperature, strain, time)
@@ -168,8 +172,9 @@ class Identification(Presentable):
     ) -> tuple[Floats, Floats, Floats]:
         """When a bar will break, s, with its 95 % interval: (time, low, high), each of the broadcast shape.
 
-        stress MPa (nominal, held as `control` says); temperature K, by default that of the reference point.
-        scatter : whether the interval is that of a single test, which has its own rate, or that of the law alone.
+        stress : number or (...,) MPa, nominal, held as `control` says. temperature : number or (...,) K, by default
+        that of the reference point.
+        test_scatter : whether the interval is that of a single test, which has its own rate, or that of the law alone.
         Infinite where nothing breaks within some thousand times the longest test.
         """
         from creepkit.inverse.goodness_of_fit import constant_stress_tests
@@ -198,8 +203,8 @@ class Identification(Presentable):
     ) -> Prediction:
         """Predict histories (by default those that were fitted) at the identified values.
 
-        own : fitted tests, known by name, with their own nuisances and offsets; else, and all other histories, with
-            what is known of their alloy or of all tests, or the prior means, and without offset.
+        own_nuisances : fitted tests, known by name, with their own nuisances and offsets; else, and all other
+            histories, with what is known of their alloy or of all tests, or the prior means, and without offset.
         """
         predictor = using or self.predictor
         if predictor is None:

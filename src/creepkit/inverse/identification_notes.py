@@ -1,4 +1,4 @@
-"""Provenance and notes of an identification: versions and fingerprints, ranges of the tests, and what to be wary of."""
+"""Provenance and notes of an identification: versions and fingerprints, ranges of the tests, and its limitations."""
 
 from __future__ import annotations
 
@@ -105,12 +105,12 @@ def identification_notes(
 
 
 def domain_notes(prediction: Prediction, histories: Sequence[History]) -> tuple[str, ...]:
-    """The tests for which a surrogate speaks of what it was not trained on, in one sentence."""
+    """The tests that lie outside what a surrogate was trained on, in one sentence."""
     outside = [h.name for h, s in zip(histories, prediction.status[0], strict=True) if s == Status.OUTSIDE_DOMAIN]
     if not outside:
         return ()
     named_tests = f"'{outside[0]}'" + (f" and {len(outside) - 1} more" if len(outside) > 1 else "")
-    problem = "the answer lies outside the domain that the surrogate was trained in"
+    problem = "the identified law lies outside the domain that the surrogate was trained in"
     return (f"{problem}, in test {named_tests}: simulate it with the specimen itself",)
 
 

@@ -177,7 +177,7 @@ def whiten(covariance_factor: Floats, values: Floats) -> Floats:
     """L^-1 v, whose covariance is the identity where that of v is L L'.
 
     covariance_factor : (tests, observations, observations) Cholesky factors L.
-    values : (tests, observations) or (tests, observations, columns) residuals, derivatives, or both.
+    values : (tests, observations[, columns]) residuals, derivatives, or both. Returns (tests, observations[, columns]).
     """
     if values.ndim == 2:
         return np.asarray(np.linalg.solve(covariance_factor, values[..., None])[..., 0])

@@ -98,7 +98,10 @@ class NuisanceParameters:
         return {kind: values[np.maximum(index, 0)][None] for kind, index in self.test_index.items()}
 
     def jacobian(self, sensitivities: Mapping[str, Floats]) -> Floats:
-        """(tests, observations, nuisances) derivatives, from {kind: (tests, observations)} those to each test's own."""
+        """(tests, observations, nuisances) derivatives.
+
+        sensitivities : {kind: (tests, observations)} to each test's own nuisance.
+        """
         jacobian_matrix = np.zeros((*next(iter(sensitivities.values())).shape, self.size))
         for kind, index in self.test_index.items():
             for test, position in enumerate(index):
@@ -120,7 +123,7 @@ class NuisanceParameters:
         return replace(residuals, values=values, random_effect_sensitivities=sensitivities * self.sd[test_parameters])
 
     def with_prior_sd(self, e: Floats, variance: Floats) -> NuisanceParameters:
-        """With standard deviations estimated where none is given, from e and its variance, (nuisances,) each."""
+        """With standard deviations estimated where none is given, from e (nuisances,) and its variance (nuisances,)."""
         sd = self.sd.copy()
         for nuisance in dict.fromkeys(self.nuisances):
             if nuisance.sd is None:

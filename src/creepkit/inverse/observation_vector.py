@@ -260,7 +260,7 @@ class ObservationVector:
         return self._transformed(g, lambda scale: scale.inverse)
 
     def derivative(self, y: Floats) -> Floats:
-        """(..., tests, observations) 1 / unit, derivative of the transform at outputs y."""
+        """(..., tests, observations) 1 / unit, derivative of the transform at outputs y (..., tests, observations)."""
         return self._transformed(y, lambda scale: scale.derivative)
 
     def per_observation(self, values: Sequence[float] | Floats) -> Floats:

@@ -1,6 +1,6 @@
 """Orthogonal residuals of tests that were followed to rupture: distances in strain and in the logarithm of time.
 
-Near rupture strain grows without limit within almost no time, and an error in strain says nothing: what counts is the
+Near rupture strain grows without limit within almost no time, and an error in strain has no meaning: what counts is the
 distance of a measured point from the predicted curve, in units of both errors.
 """
 
@@ -70,27 +70,29 @@ class OrthogonalResiduals:
 
 
 def orthogonal_residuals(
-    observations: ObservationVector, vertical: Floats, alive: Bools, prediction: Prediction
+    observations: ObservationVector, vertical: Floats, reached: Bools, prediction: Prediction
 ) -> OrthogonalResiduals:
     """Orthogonal residuals from those in strain alone.
 
     vertical : (candidates, tests, observations) -, transformed prediction less transformed observation.
-    alive : (candidates, tests, observations), whether the prediction reaches the time of the frame.
+    reached : (candidates, tests, observations), whether the prediction reaches the time of the frame.
     """
     unit, zeros = np.ones_like(vertical), np.zeros_like(vertical)
     if prediction.times_to_strain is None:
         return OrthogonalResiduals(vertical, unit, zeros, np.broadcast_to(observations.present, vertical.shape))
-    life, frames = (
+    strain_times, frames = (
         prediction.times_to_strain,
         observations.followed_to_rupture[:, None] & observations.present & ~observations.rupture_mask,
     )
-    log_time_ratio = observations.log_times - _log_times(observations.select_frames(life.times))
-    not_converged = ~alive & np.isneginf(log_time_ratio)  # neither alive nor ruptured: the solver did not converge
+    log_time_ratio = observations.log_times - _log_times(observations.select_frames(strain_times.times))
+    not_converged = ~reached & np.isneginf(log_time_ratio)  # neither reached nor ruptured: no convergence
     curve_slope = observations.derivative(np.where(frames, observations.values, 1.0)) * observations.select_frames(
-        life.log_time_derivatives
+        strain_times.log_time_derivatives
     )
     orthogonal = orthogonal_distance(
-        np.where(alive | not_converged, vertical, np.inf), np.where(not_converged, -np.inf, log_time_ratio), curve_slope
+        np.where(reached | not_converged, vertical, np.inf),
+        np.where(not_converged, -np.inf, log_time_ratio),
+        curve_slope,
     )
     values = np.where(frames, orthogonal.values, vertical)
     by_strain, by_time = (
@@ -98,16 +100,18 @@ def orthogonal_residuals(
         np.where(frames, orthogonal.time_derivative, zeros),
     )
     return _with_rupture_times(
-        observations, life, OrthogonalResiduals(values, by_strain, by_time, np.broadcast_to(unit > 0, unit.shape))
+        observations,
+        strain_times,
+        OrthogonalResiduals(values, by_strain, by_time, np.broadcast_to(unit > 0, unit.shape)),
     )
 
 
 def _with_rupture_times(
-    observations: ObservationVector, life: TimesToStrain, frame_residuals: OrthogonalResiduals
+    observations: ObservationVector, strain_times: TimesToStrain, frame_residuals: OrthogonalResiduals
 ) -> OrthogonalResiduals:
     """With ln of measured over predicted rupture time; a stopped test counts where it lasted longer than that."""
-    ruptured = np.isfinite(life.rupture_times)
-    log_end_times = np.log(np.where(ruptured, life.rupture_times, life.horizon))
+    ruptured = np.isfinite(strain_times.rupture_times)
+    log_end_times = np.log(np.where(ruptured, strain_times.rupture_times, strain_times.horizon))
     log_time_ratio = np.where(observations.rupture_mask, observations.log_times - log_end_times[..., None], 0.0)
     uninformative = observations.rupture_mask & observations.censored[:, None] & (log_time_ratio <= 0.0)
     values = np.where(observations.rupture_mask, np.where(uninformative, 0.0, log_time_ratio), frame_residuals.values)
@@ -120,21 +124,23 @@ def _with_rupture_times(
     )
 
 
-def time_jacobian(observations: ObservationVector, life: TimesToStrain) -> Floats:
+def time_jacobian(observations: ObservationVector, strain_times: TimesToStrain) -> Floats:
     """(candidates, tests, observations, parameters) -, derivatives of -ln of the times to strain and to rupture.
 
     They are to internal parameters, and zero where neither is reached.
     """
-    assert life.time_jacobian is not None
-    assert life.rupture_jacobian is not None
-    arrivals = observations.select_frames(life.time_jacobian)
-    jacobian = -np.where(observations.rupture_mask[..., None], life.rupture_jacobian[:, :, None], arrivals)
+    assert strain_times.time_jacobian is not None
+    assert strain_times.rupture_jacobian is not None
+    strain_time_jacobian = observations.select_frames(strain_times.time_jacobian)
+    jacobian = -np.where(
+        observations.rupture_mask[..., None], strain_times.rupture_jacobian[:, :, None], strain_time_jacobian
+    )
     return np.where(np.isfinite(jacobian), jacobian, 0.0)
 
 
-def offset_time_derivative(observations: ObservationVector, life: TimesToStrain) -> Floats:
+def offset_time_derivative(observations: ObservationVector, strain_times: TimesToStrain) -> Floats:
     """(candidates, tests, observations) 1 / unit, derivative of -ln(time to strain) to an added offset."""
-    curve_slope = observations.select_frames(life.log_time_derivatives)
+    curve_slope = observations.select_frames(strain_times.log_time_derivatives)
     positive_slope = np.where(np.isfinite(curve_slope) & (curve_slope > 0), curve_slope, np.inf)
     return np.where(observations.rupture_mask, 0.0, 1.0 / positive_slope)
 

@@ -24,15 +24,15 @@ class OutputTransform(Protocol):
         ...
 
     def forward(self, y: Floats) -> Floats:
-        """The compared quantity."""
+        """The compared quantity (...,) of outputs y (...,)."""
         ...
 
     def inverse(self, g: Floats) -> Floats:
-        """The output whose compared quantity is g."""
+        """The outputs (...,) whose compared quantity is g (...,)."""
         ...
 
     def derivative(self, y: Floats) -> Floats:
-        """dg/dy."""
+        """dg/dy (...,) at outputs y (...,)."""
         ...
 
 
@@ -48,15 +48,15 @@ class LogTransform:
         return float(np.arcsinh(1.0 / (2.0 * self.floor)))
 
     def forward(self, y: Floats) -> Floats:
-        """The compared quantity."""
+        """The compared quantity (...,) of outputs y (...,)."""
         return np.arcsinh(y / (2.0 * self.floor))
 
     def inverse(self, g: Floats) -> Floats:
-        """The output whose compared quantity is g."""
+        """The outputs (...,) whose compared quantity is g (...,)."""
         return 2.0 * self.floor * np.sinh(g)
 
     def derivative(self, y: Floats) -> Floats:
-        """dg/dy; 1/y well above the floor."""
+        """dg/dy (...,) at outputs y (...,); 1/y well above the floor."""
         return 1.0 / np.hypot(y, 2.0 * self.floor)
 
 
@@ -81,15 +81,15 @@ class LinearTransform:
         return self.largest / self.scale
 
     def forward(self, y: Floats) -> Floats:
-        """The compared quantity."""
+        """The compared quantity (...,) of outputs y (...,)."""
         return y / self.scale
 
     def inverse(self, g: Floats) -> Floats:
-        """The output whose compared quantity is g."""
+        """The outputs (...,) whose compared quantity is g (...,)."""
         return g * self.scale
 
     def derivative(self, y: Floats) -> Floats:
-        """dg/dy."""
+        """dg/dy (...,) at outputs y (...,)."""
         return np.full(np.shape(y), 1.0 / self.scale)
 
 
@@ -101,13 +101,13 @@ class LogTimeTransform:
     ceiling: float = 0.0
 
     def forward(self, y: Floats) -> Floats:
-        """The compared quantity."""
+        """The compared quantity (...,) of outputs y (...,)."""
         return -np.log(y)
 
     def inverse(self, g: Floats) -> Floats:
-        """The rupture time whose compared quantity is g."""
+        """The rupture times (...,) s whose compared quantity is g (...,)."""
         return np.exp(-g)
 
     def derivative(self, y: Floats) -> Floats:
-        """dg/dy."""
+        """dg/dy (...,) at outputs y (...,)."""
         return -1.0 / y

@@ -54,7 +54,7 @@ from creepkit.language import CreepLaw
 from creepkit.records import History, Prediction, Predictor
 
 CACHED_EVALUATIONS = 4
-"""Points whose residuals are remembered: a search ends at one that it has evaluated, and the next begins there."""
+"""Points whose residuals are cached: a search ends at one that it has evaluated, and the next begins there."""
 FAILED_COST = 1e12
 """Cost of a candidate that cannot be predicted at all."""
 PRIOR_STRENGTH = 1e-4
@@ -73,7 +73,7 @@ class EvaluationCache:
         self._residuals: dict[bytes, Residuals] = {}
 
     def residuals(self, key: bytes, evaluate: Callable[[], Residuals]) -> Residuals:
-        """The residuals of a point, evaluated unless they are remembered."""
+        """The residuals of a point, evaluated unless they are cached."""
         if key not in self._residuals:
             self._residuals = dict([*self._residuals.items()][1 - CACHED_EVALUATIONS :])
             self._residuals[key] = evaluate()
@@ -188,7 +188,7 @@ class LeastSquaresProblem:
     # ---- residuals ---------------------------------------------------------------------------------------------------
 
     def residuals(self, x: Floats) -> Residuals:
-        """Residuals of one x (unknowns,), with exact derivatives to x; the last few are remembered."""
+        """Residuals of one x (unknowns,), with exact derivatives to x; the last few are cached."""
         fixed_values = self.nuisance_parameters.mean.tobytes() if self.nuisance_parameters.fixed else b""
         return self.evaluations.residuals(x.tobytes() + fixed_values, lambda: self._evaluated(x))
 
@@ -247,11 +247,11 @@ class LeastSquaresProblem:
     # ---- chi-square ------------------------------------------------------------------------------------------------
 
     def whiten(self, values: Floats) -> Floats:
-        """(data,) or (data, columns) whitened rows of the data: values (tests, observations[, columns])."""
+        """(data[, columns]) whitened rows of the data, of values (tests, observations[, columns])."""
         return np.asarray(whiten(self.covariance_factor, values)[self.observations.present])
 
     def whitened(self, x: Floats) -> Floats:
-        """(data + penalties,) - whitened residuals of the data, then those of bound and prior penalties."""
+        """(data + penalties,) - at x (unknowns,): whitened residuals of the data, then of bound and prior penalties."""
         return np.concatenate([self.whiten(self.residuals(x).values), self.bound_penalties.residuals(x)])
 
     def jacobian(self, x: Floats) -> Floats:
@@ -287,9 +287,10 @@ class LeastSquaresProblem:
         additional: AdditionalResiduals | None = None,
         tolerances: Tolerances | None = None,
     ) -> Minimum:
-        """Bounded least squares from `start` (unknowns,).
+        """Bounded least squares.
 
-        fixed : {position: value} of unknowns that keep their values; additional : further residuals.
+        start : (unknowns,) where it begins. fixed : {position: value} of unknowns that keep their values.
+        additional : further residuals.
         """
         fixed, margin = dict(fixed or {}), 1e-9 * self.bounds.width
         initial = np.array(start, float)

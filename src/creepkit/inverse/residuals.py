@@ -56,15 +56,15 @@ def candidate_residuals_and_jacobian(observations: ObservationVector, prediction
     """
     assert prediction.jacobian is not None
     predicted = _predicted_values(observations, prediction)
-    alive = np.isfinite(predicted)
-    derivatives = observations.derivative(np.where(alive, predicted, 1.0))
+    reached = np.isfinite(predicted)
+    derivatives = observations.derivative(np.where(reached, predicted, 1.0))
     with np.errstate(invalid="ignore"):
         jacobian = derivatives[..., None] * observations.select_outputs(prediction.jacobian, prediction)
     jacobian = np.where(np.isfinite(jacobian), jacobian, np.nan)
     filled = np.stack(
         [
-            _jacobian_of_lost_frames(one, alive_rows, observations.output_index)
-            for one, alive_rows in zip(jacobian, alive & observations.present, strict=True)
+            _jacobian_after_rupture(one, reached_rows, observations.output_index)
+            for one, reached_rows in zip(jacobian, reached & observations.present, strict=True)
         ]
     )
     values = np.where(observations.present, _orthogonal_residuals(observations, predicted, prediction).values, 0.0)
@@ -84,11 +84,11 @@ def residuals_of_prediction(
     """
     assert prediction.jacobian is not None
     predicted = _predicted_values(observations, prediction)
-    orthogonal, alive = _orthogonal_residuals(observations, predicted, prediction), np.isfinite(predicted[0])
-    derivatives = observations.derivative(np.where(alive, predicted[0], 1.0))
-    jacobian = _transformed_jacobian(observations, prediction, nuisance_parameters, derivatives, alive)
+    orthogonal, reached = _orthogonal_residuals(observations, predicted, prediction), np.isfinite(predicted[0])
+    derivatives = observations.derivative(np.where(reached, predicted[0], 1.0))
+    jacobian = _transformed_jacobian(observations, prediction, nuisance_parameters, derivatives, reached)
     jacobian = orthogonal.strain_derivative[0, ..., None] * jacobian
-    derivatives = orthogonal.strain_derivative[0] * np.where(alive, derivatives, 0.0)
+    derivatives = orthogonal.strain_derivative[0] * np.where(reached, derivatives, 0.0)
     times = prediction.times_to_strain
     if times is not None:
         jacobian += orthogonal.time_derivative[0, ..., None] * time_jacobian(observations, times)[0]
@@ -161,13 +161,13 @@ def _orthogonal_residuals(
 
 def _extended_after_rupture(observations: ObservationVector, predicted: Floats, end_times: Floats) -> Floats:
     """(candidates, tests, observations) transformed prediction, continued after a rupture."""
-    alive = np.isfinite(predicted)
-    transformed = observations.forward(np.where(alive, predicted, 0.0))
-    lost = observations.present & ~alive
-    if lost.any():
+    reached = np.isfinite(predicted)
+    transformed = observations.forward(np.where(reached, predicted, 0.0))
+    unreached = observations.present & ~reached
+    if unreached.any():
         ceilings = observations.per_observation([transform.ceiling for transform in observations.transforms])
         log_delay = np.log(np.maximum(observations.times / np.maximum(end_times[..., None], 1e-12), 1.0))
-        transformed = np.where(lost, ceilings + SLOPE_AFTER_RUPTURE * log_delay, transformed)
+        transformed = np.where(unreached, ceilings + SLOPE_AFTER_RUPTURE * log_delay, transformed)
     return transformed
 
 
@@ -176,7 +176,7 @@ def _transformed_jacobian(
     prediction: Prediction,
     nuisance_parameters: NuisanceParameters,
     derivatives: Floats,
-    alive: Bools,
+    reached: Bools,
 ) -> Floats:
     """(tests, observations, unknowns) derivatives of transformed outputs to internal and nuisance parameters."""
     assert prediction.jacobian is not None
@@ -189,7 +189,7 @@ def _transformed_jacobian(
     with np.errstate(invalid="ignore"):
         jacobian = derivatives[..., None] * jacobian
     jacobian = np.where(np.isfinite(jacobian), jacobian, np.nan)
-    return _jacobian_of_lost_frames(jacobian, alive & observations.present, observations.output_index)
+    return _jacobian_after_rupture(jacobian, reached & observations.present, observations.output_index)
 
 
 def _time_derivative(observations: ObservationVector, predicted: Floats, orthogonal: OrthogonalResiduals) -> Floats:
@@ -198,8 +198,8 @@ def _time_derivative(observations: ObservationVector, predicted: Floats, orthogo
     For a law without explicit time at constant stress it is that to ln of a factor on all rates: the strain depends on
     factor x time alone.
     """
-    alive = np.isfinite(predicted)
-    transformed = observations.forward(np.where(alive, predicted, observations.values))
+    reached = np.isfinite(predicted)
+    transformed = observations.forward(np.where(reached, predicted, observations.values))
     sensitivity = np.zeros_like(transformed)
     for k, present in enumerate(observations.present):
         for position in np.unique(observations.output_index[k, present]):
@@ -230,14 +230,14 @@ def _masked_residuals(
     )
 
 
-def _jacobian_of_lost_frames(jacobian: Floats, alive: Bools, output: Ints) -> Floats:
+def _jacobian_after_rupture(jacobian: Floats, reached: Bools, output: Ints) -> Floats:
     """Derivatives at frames after a rupture: those of the last frame of the output that the prediction reaches."""
-    if alive.all():
+    if reached.all():
         return jacobian
-    frames = np.broadcast_to(np.arange(alive.shape[1]), alive.shape)
+    frames = np.broadcast_to(np.arange(reached.shape[1]), reached.shape)
     index = np.array(frames)
     for position in np.unique(output):
-        mask = alive & (output == position)
+        mask = reached & (output == position)
         last_alive = np.maximum.accumulate(np.where(mask, frames, -1), axis=1)
         first_alive = np.where(mask.any(axis=1), mask.argmax(axis=1), 0)
         index = np.where(output == position, np.where(last_alive >= 0, last_alive, first_alive[:, None]), index)

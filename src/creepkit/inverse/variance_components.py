@@ -38,7 +38,7 @@ class LinearisedProblem:
         return self.residuals.jacobian[..., self.free]
 
     def solve(self, inverses: Floats) -> LinearSolution:
-        """The optimum under covariances of given inverses, (tests, observations, observations)."""
+        """The optimum under covariances of given inverses (tests, observations, observations)."""
         J, p = self.jacobian, self.precision[self.free]
         weighted_jacobian = inverses @ J
         normal_matrix = np.einsum("tep,teq->pq", J, weighted_jacobian) + np.diag(p)
@@ -64,7 +64,12 @@ class LinearisedProblem:
 
 @dataclass(frozen=True, eq=False)
 class LinearSolution:
-    """The optimum of a linear problem: step, residuals r, C^-1 r, C^-1 J, A^-1, chi-square with priors, and ln|A|."""
+    """The optimum of a linear problem.
+
+    step : (free unknowns,). residuals : (tests, observations) r. weighted_residuals : (tests, observations) C^-1 r.
+    weighted_jacobian : (tests, observations, free unknowns) C^-1 J. covariance : (free unknowns, free unknowns) A^-1.
+    chi_square : with priors. log_det : ln|A|.
+    """
 
     step: Floats
     residuals: Floats
@@ -104,7 +109,7 @@ def restricted_log_likelihood(linearised: LinearisedProblem, noise_model: NoiseM
 
 
 def scaled_inverse(matrix: Floats) -> Floats:
-    """Inverse of a positive matrix whose rows differ by orders of magnitude."""
+    """Inverse (n, n) of a positive definite matrix (n, n) whose rows differ by orders of magnitude."""
     scale = np.sqrt(np.diag(matrix))
     return np.asarray(np.linalg.inv(matrix / np.outer(scale, scale)) / np.outer(scale, scale))
 

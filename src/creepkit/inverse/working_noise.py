@@ -223,7 +223,7 @@ def _weight_per_observation(residuals: Residuals) -> Floats:
 def robust_test_weights(residuals: Residuals, working: NoiseModel) -> Floats:
     """(tests,) weights (nu + 1) / (nu + m / s): m the mean squared white residual of a test, s its median over tests.
 
-    Each output is judged on its own, and the worst one counts, if it is worse than the median: amplitudes far from
+    Each output is taken on its own, and the worst one counts, if it is worse than the median: amplitudes far from
     those of the twins are not hidden among good widths. Iterated with the fit this is the likelihood of tests that
     scatter as Student's t does: one like the others weighs one, one of ten times their error a twentieth.
     """

@@ -31,7 +31,7 @@ MOST_DIGITS = 19
 
 
 class ShardLock:
-    """The lock of a shard; a context, `held` in it when nobody else has it.
+    """The lock of a shard; a context, `held` in it when no other process has it.
 
     deaths : {sample: how often its process died in it}.
     """

@@ -12,7 +12,7 @@ out : one row a point,
     sensitivity (1 + S) (1 + 6 + S + P)     [rate, state rates], then derivatives to x, then derivatives to theta.
 The returned flags add up: 1 a rate is not finite, 2 a derivative is not finite.
 
-`update` speaks of ln rate because Newton's method is nearly linear in it and nothing overflows.
+`update` gives ln rate because Newton's method is nearly linear in it and nothing overflows.
 """
 
 from __future__ import annotations

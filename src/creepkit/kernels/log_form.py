@@ -171,7 +171,7 @@ def _vanishing_factors(term: sympy.Expr) -> set[sympy.Symbol]:
 
 
 class _LogLowering:
-    """One walk over a law's expressions. logs : {parameter: its logarithm}; bases : what FLOOR applies to."""
+    """One pass over a law's expressions. logs : {parameter: its logarithm}; bases : what FLOOR applies to."""
 
     def __init__(self, logs: dict[sympy.Symbol, sympy.Symbol], bases: set[sympy.Symbol]) -> None:
         self.logs, self.bases = logs, bases

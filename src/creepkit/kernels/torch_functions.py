@@ -136,9 +136,9 @@ def with_derivatives(values: TensorFunction, derivatives: TensorFunction, width:
 
     def by_input(inputs: Sequence[Any], results: int) -> list[Sequence[Any]]:
         """For each input, the derivatives of every result to it; 0.0 where there is none."""
-        found = derivatives(*inputs)
+        results_by_input = derivatives(*inputs)
         rest = len(inputs) - width
-        to_point, to_rest = found[results : results * (1 + width)], found[results * (1 + width) :]
+        to_point, to_rest = results_by_input[results : results * (1 + width)], results_by_input[results * (1 + width) :]
         return [to_point[k::width] for k in range(width)] + [to_rest[k::rest] for k in range(rest)]
 
     class WithDerivatives(torch.autograd.Function):
@@ -157,9 +157,9 @@ def with_derivatives(values: TensorFunction, derivatives: TensorFunction, width:
         @staticmethod
         def backward(ctx: Any, *gradients: Any) -> tuple[Any, ...]:
             columns = by_input(ctx.saved_tensors, ctx.results)
-            wanted = zip(ctx.saved_tensors, columns, ctx.needs_input_grad, strict=True)
+            selected = zip(ctx.saved_tensors, columns, ctx.needs_input_grad, strict=True)
             return tuple(
-                _vector_jacobian_product(gradients, column, x) if needed else None for x, column, needed in wanted
+                _vector_jacobian_product(gradients, column, x) if needed else None for x, column, needed in selected
             )
 
         @staticmethod

@@ -175,7 +175,7 @@ def _pruned(
     name: str,
     title: str,
 ) -> Law:
-    """Drop the states that no remaining term needs, then the parameters and constraints nobody uses."""
+    """Drop the states that no remaining term needs, then unused parameters and constraints."""
     needed = set().union(*(t.free_symbols for t in terms.values()))
     while True:
         needed_states = {s: z for s, z in states.items() if s in needed}

@@ -140,7 +140,7 @@ T0_BOUNDS = (300.0, 3e4)
 class _BasisFunction:
     """One shape of temperature: the suffix of its coefficient, what it means, its unit, and the size of its bounds.
 
-    reach : bounds of the coefficient for a parameter whose range is 1.
+    coefficient_bound : bounds of the coefficient for a parameter whose range is 1.
     """
 
     suffix: str

@@ -29,7 +29,7 @@ FRAME_FLAG_KINDS: tuple[FlagKind, ...] = ("unloading", "falling", "outlier")
 
 @dataclass(frozen=True)
 class QualityFlag:
-    """Something of a history that a fit should perhaps not believe.
+    """Something of a history that may be wrong and should perhaps not be fitted.
 
     history : its name. kind : what is wrong. frames : which of its frames, counted from 0; empty for the whole test.
     reason : a sentence with the numbers.
@@ -48,7 +48,7 @@ class QualityFlag:
 def check_data_quality(histories: Sequence[History], specimen: Predictor | None = None) -> tuple[QualityFlag, ...]:
     """Everything suspect in the histories, test by test.
 
-    specimen : what predicts the elastic deflection of a first frame; without it first frames are believed. Tests are
+    specimen : what predicts the elastic deflection of a first frame; without it first frames are not checked. Tests are
     compared where they are of the same alloy and specimen and were loaded alike.
     """
     results = [[*_frame_flags(history, FRAME_FLAG_KINDS)] for history in histories]

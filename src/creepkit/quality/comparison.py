@@ -67,7 +67,7 @@ ELASTIC_ERROR = 0.15
 make 10 %."""
 
 NEGLIGIBLE_CREEP = 0.1
-"""Fraction of the elastic deflection, largest creep before the first frame with which the latter can be judged."""
+"""Fraction of the elastic deflection, largest creep before the first frame with which the latter can be checked."""
 _FIRST_FRAMES = 5
 _A, _n = parameters("A n")
 

@@ -167,7 +167,7 @@ def errors_located_at(location: str) -> Iterator[None]:
     """Give a complaint of a record about its fields the place in the file that they came from."""
     try:
         yield
-    except HistoryError:  # speaks of a place already
+    except HistoryError:  # names a place already
         raise
     except CreepkitError as error:
         raise HistoryError(f"{location}: {error}") from error

@@ -21,8 +21,8 @@ from creepkit.records import History
 class IndexedFolderReader:
     """Reader of a folder with an index; the alloy is the folder's name unless the index has a column `alloy`.
 
-    key : the column that names the test, in the index and, where one file holds all frames, there too.
-    frames : name of the file of frames; with `{key}` in it, one file a test.
+    key_column : the column that names the test, in the index and, where one file holds all frames, there too.
+    frames_file : name of the file of frames; with `{key}` in it, one file a test.
     """
 
     name: str

@@ -72,7 +72,7 @@ def _readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
 
 
 def _reader_of(path: Path, readers: Sequence[Reader]) -> Reader:
-    """The one reader for a path; a reader without rivals is not asked."""
+    """The one reader for a path; a reader that is the only one is not asked."""
     if len(readers) == 1:
         return readers[0]
     accepting = [reader for reader in readers if reader.accepts(path)]

@@ -1,4 +1,4 @@
-"""The nouns: what goes into and comes out of the verbs. Frozen records; MPa, mm, s, K throughout."""
+"""The records that the public functions take and return. Frozen; MPa, mm, s, K throughout."""
 
 from creepkit.records.history import EVERY_FRAME, ZERO_CELSIUS, History
 from creepkit.records.interfaces import (

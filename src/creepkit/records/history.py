@@ -34,9 +34,10 @@ class History:
     temperature : K, a number or a Program.
     strain_measure : "logarithmic" or "engineering" (the observation operator of a uniaxial strain).
     includes_elastic : whether the strain contains the elastic strain on loading.
+    standard_deviation : {output: (frames,)} of the noise, where it is known, in the unit of the output.
     used : (frames,) which frames a fit may use; EVERY_FRAME stands for all of them.
     operator : which observation operator, and window, made the outputs (empty: the specimen's default).
-    rupture_time : s, when the specimen broke; None where it did not, or where nobody knows.
+    rupture_time : s, when the specimen broke; None where it did not, or where that is not known.
     unruptured : whether the test was stopped, at its last time, before the specimen broke. A test with neither says
         nothing of how it ended.
     """

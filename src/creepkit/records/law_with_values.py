@@ -53,7 +53,7 @@ class Units:
 
 @dataclass(frozen=True)
 class LawWithValues:
-    """A law with its values, and what travels with them.
+    """A law with its values, and what belongs to them.
 
     values : {parameter: number in its unit}, completed and checked.
     notes : lines that become comments: intervals, range of validity, provenance.

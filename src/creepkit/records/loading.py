@@ -62,7 +62,7 @@ class Program:
         return cls(np.array(times), np.array(values))
 
     def at(self, times: ArrayLike) -> Floats:
-        """Values at `times` (any shape), the later one at a jump, the last one beyond the end."""
+        """(...,) values at times (...,) s: the later one at a jump, the last one beyond the end."""
         t = np.asarray(times, dtype=float)
         index = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, self.times.size - 1)
         following = np.minimum(index + 1, self.times.size - 1)

@@ -54,7 +54,7 @@ class Prediction:
     values : (candidates, tests, times, outputs) in the units of the outputs; NaN after a row's end and
         beyond a test's last time.
     outputs : names along the last axis.
-    lengths : (tests,) number of times of each test.
+    lengths : (tests,) number of times of each test. times : (times,) s, of each test; may be empty.
     status : (candidates, tests) Status of each row; end_times : (candidates, tests) s, where it ended.
     jacobian : (candidates, tests, times, outputs, parameters) or None: derivatives with respect to the law's
         *internal* parameters (the natural logarithm where the scale is log), in the law's order.

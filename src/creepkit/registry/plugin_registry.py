@@ -1,8 +1,8 @@
 """The registry: every law, specimen, reader, exporter and temperature form that plugins contribute, with provenance.
 
 Built-in and other plugins come through the same entry-point group; files come from CREEPKIT_PLUGINS and `load_file`.
-All are imported at the first question. A plugin that cannot be used is kept with the reason and the others stand;
-only `load_file`, where somebody asked for that very plugin, raises.
+All are imported when first asked for. A plugin that cannot be used is kept with the reason and the others stand;
+only `load_file`, which was asked for that very plugin, raises.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Registered(Generic[_T]):
 class Plugin:
     """One plugin: where it came from, and what it offers or why it cannot be used.
 
-    contributions : {kind: {name: thing}} with the kinds "law", "specimen", "reader", "exporter", "temperature form".
+    contributions : {kind: {name: object}} with the kinds "law", "specimen", "reader", "exporter", "temperature form".
     commands : whether it adds commands to the command line.
     problem : one sentence when the plugin is broken, else empty.
     """
@@ -82,7 +82,7 @@ class Plugin:
 
 
 class Registry:
-    """A plugin manager that knows where everything came from; it loads what is installed at the first question."""
+    """A plugin manager that records where everything came from; it loads what is installed when first used."""
 
     def __init__(self) -> None:
         self._manager = pluggy.PluginManager(hookspecs.PROJECT)
@@ -243,7 +243,7 @@ class Registry:
 
 @cache
 def default_registry() -> Registry:
-    """The registry that the verbs share: made at its first use, from what is installed and the environment names."""
+    """The registry of the public functions, made at its first use from what is installed and the environment names."""
     return Registry()
 
 

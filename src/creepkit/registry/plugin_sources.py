@@ -127,7 +127,7 @@ COMMANDS_HOOK = "creepkit_commands"
 class ContributionKind:
     """One kind of contribution: its name, the hook that returns it, the error when a name is unknown, and its record.
 
-    record_module : module of the record that each thing must be; imported when there is a thing to check.
+    record_module : module of the record that each object must be; imported when there is one to check.
     """
 
     label: str
@@ -137,7 +137,7 @@ class ContributionKind:
     record_name: str
 
     def named_contributions(self, returned: Any) -> list[tuple[str, Any]]:
-        """Return [(name, thing)] of what a hook returned; PluginError when it is not what the hook promises."""
+        """Return [(name, object)] of what a hook returned; PluginError when it is not what the hook promises."""
         if not isinstance(returned, Sequence) or isinstance(returned, str):
             raise PluginError(f"must return a list of {self.record_name} records, found {_type_text(returned)}")
         required = getattr(import_module(self.record_module), self.record_name) if returned else object
@@ -193,7 +193,7 @@ def hook_implementations(
 
 
 def contributions_of(kind: ContributionKind, implementation: pluggy.HookImpl) -> dict[str, Any]:
-    """Return {name: thing} that one plugin's hook offers."""
+    """Return {name: object} that one plugin's hook offers."""
     returned = call_hook(implementation)
     try:
         contributions = kind.named_contributions(returned)

@@ -54,7 +54,7 @@ def input_histograms(data: Dataset, path: str | Path | None = None) -> Figure:
 
 
 def _histogram(axes: Axes, values: Floats, accepted: Bools, name: str, unit: str) -> None:
-    """One column; what is switched off (0 on a logarithmic axis) is told in words."""
+    """One column; what is switched off (0 on a logarithmic axis) is stated in words."""
     finite = np.isfinite(values)
     positive = finite & (values > 0)
     positive_values = values[positive]

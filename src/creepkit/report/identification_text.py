@@ -183,7 +183,7 @@ def _unit(kind: str) -> str:
 
 
 def identification_comments(fit: Identification) -> list[str]:
-    """Intervals, validity and provenance as lines, to travel as comments with an exported law."""
+    """Intervals, validity and provenance as lines, as comments of an exported law."""
     lines = [f"identified with creepkit {fit.provenance.get('creepkit', '')} from {_tests(len(fit.tests))}"]
     for e in fit.estimates:
         unit = "" if e.unit == "1" else f" {e.unit}"

@@ -36,7 +36,7 @@ def _equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
 
 
 def discrimination_design_text(design: DiscriminationDesign) -> str:
-    """The most telling test in a sentence, then the expected chi-square of each, and those that burst at once."""
+    """The most informative test in a sentence, then the expected chi-square of each, and those that burst at once."""
     rows = [f"  {test.chi_square:9.3g}  {test.description}" for test in design.experiments]
     return "\n".join([design.sentence, *rows, *(f"      burst  {name}" for name in design.excluded)])
 

@@ -39,7 +39,7 @@ def acceptance_figure(acceptance: Acceptance, path: str | Path | None = None) ->
     _draw_strains(strains, acceptance)
     design = acceptance.design
     figure.suptitle(
-        f"{design.law.title or design.law.name}: {design.name} box, {len(acceptance.draws)} draws", fontsize=11
+        f"{design.law.title or design.law.name}: {design.name} domain, {len(acceptance.draws)} draws", fontsize=11
     )
     return save_figure(figure, path, DatasetError)
 
@@ -65,7 +65,7 @@ def _draw_rates(axes: Axes, acceptance: Acceptance) -> None:
     axes.set_xticks([20, 50, 100, 200, 400, 700], minor=False)
     axes.tick_params(axis="x", which="minor", labelbottom=False)
     axes.grid(alpha=0.25)
-    axes.set_title(f"{len(curves)} of the sampled laws; box: useful rates at reference stresses", fontsize=10)
+    axes.set_title(f"{len(curves)} of the sampled laws; rectangle: useful rates at reference stresses", fontsize=10)
 
 
 def _rate_curves(acceptance: Acceptance, stress: Floats) -> Floats:

@@ -51,9 +51,9 @@ def summary_lines(plate: Plate) -> list[str]:
             )
             lines.append(f"{name} ({len(plate.by_class()[name])}): {fractions}")
     lines += [f"failed: {_failure_text(alloy, reason)}" for alloy, reason in plate.failures.items()]
-    for answer in plate.identified:
-        if answer.confirmation is not None and not answer.confirmation.confirmed:
-            lines.append(f"{answer.alloy}: {answer.confirmation.verdict}")
+    for result in plate.identified:
+        if result.confirmation is not None and not result.confirmation.confirmed:
+            lines.append(f"{result.alloy}: {result.confirmation.verdict}")
     return [*lines, *(f"note: {note}" for note in plate.notes)]
 
 
@@ -90,7 +90,10 @@ PROFILE_OUTPUTS = ("amplitude", "width", "shape")
 
 
 def profile_displacement(outputs: Mapping[str, Floats], radius: float) -> Floats:
-    """D exp(-(r / S)^p), (frames,) mm; NaN where width or shape is not above zero or was not observed."""
+    """D exp(-(r / S)^p), (frames,) mm; NaN where width or shape is not above zero or was not observed.
+
+    outputs : {name: (frames,)}, "amplitude" and "width" in mm, "shape". radius : mm.
+    """
     amplitude = np.asarray(outputs["amplitude"], float)
     if radius == 0.0:
         return amplitude

@@ -149,7 +149,7 @@ CRITERION = {"points": "the quasi AICc of the estimates", "histories": "the BIC 
 
 EQUIVALENCE_NOTE = {
     "points": "=: these data cannot tell it from the best",
-    "histories": "=: not refitted, another that these data cannot tell from it stood for it",
+    "histories": "=: not refitted; these data cannot tell it from one that was",
 }
 
 
@@ -213,7 +213,7 @@ def _combination_lines(temperature_law: TemperatureLaw) -> list[str]:
 
 
 def _prior_lines(temperature_law: TemperatureLaw) -> list[str]:
-    """The prior: what was believed before, where it is not even."""
+    """The prior: stated where it is not uniform."""
     odds_lines = []
     for name, odds_by_form in temperature_law.prior_odds.items():
         if len(odds_by_form) > 1:
@@ -240,7 +240,7 @@ def modulus_estimates_text(estimates: ModulusEstimates) -> str:
 
 
 def temperature_law_to_json(temperature_law: TemperatureLaw, written: Sequence[Path]) -> dict[str, Any]:
-    """The answer and the files that were written, as JSON-able data."""
+    """The result and the files that were written, as JSON-able data."""
     return {
         "law": temperature_law.law.name,
         "judged_by": temperature_law.criterion_data,

@@ -27,7 +27,7 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]
 
 
 def print_json(value: Any) -> None:
-    """Print an answer, records and arrays among it, as JSON."""
+    """Print a result, records and arrays among it, as JSON."""
     from creepkit.files.json_documents import json_text
     from creepkit.files.record_codec import record_to_json
 
@@ -38,7 +38,7 @@ class ProgressBar:
     """Use as a context; call `tick(task, done, total)`, maybe with a note, from the work. Writes to stderr."""
 
     LINE_INTERVAL, ELAPSED_FRACTION = 2.0, 0.01
-    """s between plain lines, and the share of the time so far: nobody reads five thousand lines of three hours."""
+    """s between plain lines, and the share of the time so far that passes between two: long runs print few."""
 
     def __init__(self) -> None:
         self._bar: Any = None

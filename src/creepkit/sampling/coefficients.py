@@ -125,7 +125,10 @@ class DamageRateScaling:
     range: float
 
     def ln_initial_rate(self, theta: Floats, life_fraction: Floats, points: RateEvaluationPoints) -> Floats:
-        """ln of the initial rate in 1/s, (rows,), for which a test takes `life_fraction` (rows,) of the life."""
+        """ln of the initial rate in 1/s, (rows,), for which a test takes life_fraction (rows,) of its life.
+
+        theta : (rows, parameters) internal values.
+        """
         return np.asarray(
             np.log(life_fraction * abs(self.range) / points.end_times) + self._ln_life_factor(theta, points)
         )

@@ -207,7 +207,7 @@ class ConditionRange:
     fraction_of: str = ""
 
     def values(self, unit_coordinates: Floats) -> Floats:
-        """Values, (rows,) in the unit of the condition, at coordinates (rows,) from 0 to 1."""
+        """Values, (rows,) in the unit of the condition; unit_coordinates : (rows,) from 0 to 1."""
         if self.scale == "log":
             return np.asarray(np.exp(np.log(self.low) + unit_coordinates * np.log(self.high / self.low)))
         return self.low + unit_coordinates * (self.high - self.low)
@@ -234,7 +234,7 @@ class ConditionRanges:
         return tuple(name for name, _ in self.ranges)
 
     def draw(self, unit_coordinates: Floats) -> Floats:
-        """Conditions, (rows, conditions) in MPa, s, mm and K, at coordinates of that shape from 0 to 1."""
+        """Conditions, (rows, conditions) in MPa, s, mm and K; unit_coordinates : (rows, conditions) from 0 to 1."""
         drawn = {
             name: condition_range.values(u)
             for (name, condition_range), u in zip(self.ranges, unit_coordinates.T, strict=True)

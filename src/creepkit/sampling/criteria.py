@@ -50,7 +50,7 @@ def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:
 FIRST_HOLD, BEFORE_JUMP, AFTER_JUMP, END = range(4)
 """Rows of `hold_outputs`: a hold is from the first to the second, and from the third to the fourth."""
 BURST_TIME_FACTOR = 2.0
-"""How many times too early the reduced-order model must burst before it is believed; that of a dimple is within 1.6 as
+"""How many times too early the reduced-order model must burst before that counts; that of a dimple is within 1.6 as
 a rule."""
 
 
@@ -233,7 +233,7 @@ PAPER_LEAST_CREEP = {"bulge": 0.01, "uniaxial": 1e-4}
 
 
 def paper_criteria(kind: str) -> tuple[Criterion, ...]:
-    """Criteria 1 to 5 of the paper; of a bar 4 and 5 speak of its strain."""
+    """Criteria 1 to 5 of the paper; of a bar 4 and 5 concern its strain."""
     least = _with_unit(kind, PAPER_LEAST_CREEP[kind])
     output = "amplitude" if kind == BULGE else "strain"
     return (

@@ -106,7 +106,10 @@ class SamplingDomain:
 
 
 def uniform_in_bounds(law: CreepLaw, unit_coordinates: Floats) -> Floats:
-    """Internal values, (rows, parameters), at coordinates of that shape from 0 to 1, each uniform on its own scale."""
+    """Internal values, (rows, parameters), each uniform on its own scale.
+
+    unit_coordinates : (rows, parameters) from 0 to 1.
+    """
     low, high = np.array([[p.to_internal(b) for b in p.bounds] for p in law.params.values()]).reshape(-1, 2).T
     return np.asarray(low + unit_coordinates * (high - low))
 

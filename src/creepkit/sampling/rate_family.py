@@ -71,6 +71,7 @@ class RateFamilyDomain(ConditionedDomain):
     def shape_parameters(self, unit_coordinates: Floats, active: Bools, points: RateEvaluationPoints) -> Floats:
         """Internal values, (rows, parameters), before coefficients: n uniform; m, k and q may be off.
 
+        unit_coordinates : (rows, parameters) from 0 to 1. active : (rows, terms) which terms a law has.
         A term that is alone does not rise with strain: it would have no strain to begin with.
         """
         theta = uniform_in_bounds(self.law, unit_coordinates)

@@ -26,7 +26,10 @@ from creepkit.specimens.bulge.specimen import Bulge
 
 @dataclass(frozen=True, eq=False)
 class RateArguments:
-    """Where rates are evaluated: stress MPa, strain, time s, temperature K; each a number or (rows, ...)."""
+    """Where rates are evaluated.
+
+    stress : number or (rows, ...) MPa; strain, time, temperature : number or (rows, ...) -, s, K.
+    """
 
     stress: ArrayLike
     strain: ArrayLike
@@ -67,7 +70,7 @@ def ln_rate(
 
 
 def author_parameters(law: CreepLaw, theta: Floats) -> Floats:
-    """The author's values, (rows, parameters) in the law's order, of internal ones."""
+    """The author's values, (rows, parameters) in the law's order, of internal ones, theta (rows, parameters)."""
     return np.stack(list(law.from_internal(theta).values()), axis=-1)
 
 
@@ -100,7 +103,7 @@ class RateEvaluationPoints:
         return RateArguments(stress, REFERENCE_STRAIN, seconds, temperature)
 
     def rows(self, rows: Ints) -> RateEvaluationPoints:
-        """Some of the rows, by their numbers (k,)."""
+        """Some of the rows; rows : (k,) their numbers."""
         return RateEvaluationPoints(self.stress[rows], self.times[rows], self.temperature[rows])
 
     @property

@@ -75,7 +75,7 @@ def read_result(path: Path) -> AlloyResult:
         raise FitError(f"{path}: {error}; {ALLOY_RESULT.remedy}") from None
 
 
-WRITE_ADVICE = "choose a file in a folder that exists and has room"
+WRITE_ADVICE = "choose a file in a folder that exists and has space"
 HDF5_FORMAT, HDF5_LAYOUT, HDF5_UNITS = "creepkit-plate", 1, "MPa, mm, s, K"
 
 

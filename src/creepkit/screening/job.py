@@ -227,7 +227,7 @@ class ScreeningJob:
 
 
 def _history_text(history: History) -> str:
-    """All that a history says of its test, for hashing."""
+    """All data of a history, for hashing."""
     values = {f.name: getattr(history, f.name) for f in fields(history) if f.name not in METADATA_FIELDS}
     program = history.loading.program()
     loading = (type(history.loading).__name__, _plain_value(program), getattr(history.loading, "control", ""))
@@ -235,7 +235,7 @@ def _history_text(history: History) -> str:
 
 
 def _plain_value(value: Any) -> Any:
-    """A value whose repr says all of it."""
+    """A value whose repr is complete."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, Program):

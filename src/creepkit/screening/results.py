@@ -111,7 +111,7 @@ class Plate(Presentable):
 
     results : one for each alloy, in the order of their first tests. histories : {alloy: its tests}.
     compositions : of the alloys, None where they are not known. folder : where the results are kept, or None.
-    notes : what is odd about the plate as a whole.
+    notes : what is unusual about the plate as a whole.
     """
 
     results: tuple[AlloyResult, ...]

@@ -78,7 +78,7 @@ def screen(
     workers: int | None = None,
     progress: ProgressCallback | None = None,
 ) -> Plate:
-    """Identify the law of every alloy from its tests, and set the alloys side by side.
+    """Identify the law of every alloy from its tests, and compare the alloys.
 
     histories : of all alloys, or a folder of their files. Tests of one alloy are identified together; one that names
         no alloy is an alloy by itself.

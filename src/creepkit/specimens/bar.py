@@ -75,11 +75,11 @@ class Bar:
         raise NotImplementedError
 
     def observed_output(self, history: History, creep: Floats) -> Floats:
-        """The output, (candidates, times), from logarithmic creep strain."""
+        """The output, (candidates, times); creep : (candidates, times) logarithmic creep strain."""
         raise NotImplementedError
 
     def output_derivative(self, history: History, creep: Floats) -> Floats:
-        """Derivative of the output to the creep strain, (candidates, times)."""
+        """Derivative of the output to the creep strain; both, as creep (candidates, times)."""
         raise NotImplementedError
 
     def modulus_derivative(
@@ -181,6 +181,7 @@ def predict_with_nuisances(
 ) -> Prediction:
     """Predict with nuisances, if there are any, a candidate at a time where they differ from candidate to candidate.
 
+    theta : (candidates, parameters) internal values.
     Derivatives are central differences, of 0.1 K and of a thousandth of the modulus to each side, but for that to the
     modulus where `modulus_derivative` gives it.
     """
@@ -263,7 +264,10 @@ def _concatenated(parts: Sequence[Prediction]) -> Prediction:
 
 
 def observed_strain(history: History, creep: Floats) -> Floats:
-    """The strain that a history's instrument shows, (candidates, times), from logarithmic creep strain."""
+    """The strain that a history's instrument shows, (candidates, times).
+
+    creep : (candidates, times) logarithmic creep strain.
+    """
     strain = np.expm1(creep) if history.strain_measure == "engineering" else creep
     return strain + elastic_strain(history) if history.includes_elastic else strain
 

@@ -102,7 +102,7 @@ class MaterialPoint:
         return elastic_von_mises(_loading(history), None if history.elastic is None else _elastic(history))
 
     def reference_strain(self, history: History) -> float:
-        """The largest equivalent creep strain that a test reached, about as far as its outputs tell."""
+        """The largest equivalent creep strain that a test reached, as its outputs show."""
         for kind in ("strain", "strain_", "stress_"):
             result = [v[history.used] for name, v in history.outputs.items() if name.startswith(kind)]
             if result and kind == "stress_":
@@ -311,12 +311,12 @@ def elastic_von_mises(loading: PointLoading, elastic: tuple[float, float] | None
             )
         strain_controlled = [COMPONENTS.index(name) for name in loading.strain]
         flexibility = compliance(elastic)
-        wanted = (
+        elastic_residual = (
             np.stack([p.at(marks) for p in loading.strain.values()], axis=-1)
             - stress @ flexibility[strain_controlled].T
         )
         stress[:, strain_controlled] = np.linalg.solve(
-            flexibility[np.ix_(strain_controlled, strain_controlled)], wanted.T
+            flexibility[np.ix_(strain_controlled, strain_controlled)], elastic_residual.T
         ).T
     deviator = stress - stress[:, :3].mean(axis=1)[:, None] * np.array([1, 1, 1, 0, 0, 0])
     levels = np.unique(np.sqrt(1.5 * (deviator**2 @ _SHEAR_WEIGHTS)))

@@ -42,17 +42,23 @@ class Relaxation(Bar):
         return point_test(history)
 
     def observed_output(self, history: History, creep: Floats) -> Floats:
-        """The stress, (candidates, times) MPa; NaN where a step down compresses the bar."""
+        """The stress, (candidates, times) MPa; NaN where a step down compresses the bar.
+
+        creep : (candidates, times) logarithmic creep strain.
+        """
         test = point_test(history)
         stress = np.asarray(test.driving.at(history.times) - test.stiffness * creep)
         return np.where(stress < -STRESS_TOLERANCE * float(np.max(test.driving.values)), np.nan, stress)
 
     def output_derivative(self, history: History, creep: Floats) -> Floats:
-        """Minus the modulus, (candidates, times) MPa."""
+        """Minus the modulus, (candidates, times) MPa; creep : (candidates, times)."""
         return np.full_like(creep, -point_test(history).stiffness)
 
     def end_reason(self, history: History, reason: str, output: Floats, end: float) -> str:
-        """Says so where the bar would be compressed: steps get stuck where a fall of strain takes away all stress."""
+        """Says so where the bar would be compressed: steps get stuck where a fall of strain takes away all stress.
+
+        output : (times,) MPa.
+        """
         from creepkit.integration.event_location import STEP_TOO_SMALL
 
         driving, moment = point_test(history).driving, 1e-9 * max(end, 1e-3)

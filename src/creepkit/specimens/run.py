@@ -23,7 +23,7 @@ STATUS_TEXT = {
     Status.NOT_CONVERGED: "not converged",
     Status.OUTSIDE_DOMAIN: "outside the domain",
 }
-"""What a status means where nobody gives a reason."""
+"""What a status means where no reason is given."""
 _RunType = TypeVar("_RunType", bound="Run")
 
 
@@ -61,7 +61,8 @@ def run_from_outputs(
 ) -> _RunType:
     """The run of a plan: its frames up to the end; SolveError if it ended before any of them.
 
-    rows : (times of the plan, names) outputs. more : fields that this kind of run has beside those of Run.
+    rows : (times, names) outputs at the times of the plan. Further keywords are fields that this kind of run has
+    beside those of Run.
     """
     reason = reason or STATUS_TEXT[status]
     reached = np.isfinite(rows).all(axis=1)
@@ -69,7 +70,7 @@ def run_from_outputs(
     if status is not Status.COMPLETE:
         reached &= plan.times <= end_time
         labels["ended"] = reason
-    # at rest, at time zero, there is nothing that an end could spare
+    # at rest, at time zero, there is nothing to leave out
     if not (reached & ((plan.times > 0.0) | (plan.times[-1] == 0.0))).any():
         raise SolveError(
             f"{plan.source or plan.name} ended at {end_time:g} s, before any of the times asked for: {reason}; "

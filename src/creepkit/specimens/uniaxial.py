@@ -39,11 +39,11 @@ class Uniaxial(Bar):
         return point_test(history)
 
     def observed_output(self, history: History, creep: Floats) -> Floats:
-        """The strain of the history's measure, (candidates, times)."""
+        """The strain of the history's measure, (candidates, times); creep : (candidates, times)."""
         return observed_strain(history, creep)
 
     def output_derivative(self, history: History, creep: Floats) -> Floats:
-        """Derivative of the observed strain to the creep strain, (candidates, times)."""
+        """Derivative of the observed strain to the creep strain, (candidates, times); creep : (candidates, times)."""
         return np.exp(creep) if history.strain_measure == "engineering" else np.ones_like(creep)
 
     def predict_to_rupture(
@@ -115,8 +115,8 @@ class StrainLevels:
     """The creep strains of a history's frames as levels to be reached.
 
     test : the point test that is followed to the horizon.
-    frames : of each level its frame; creep : (frames,) logarithmic creep strain that was measured; where not finite or
-        not above SMALLEST_STRAIN a frame has no level.
+    frames : (levels,) the frame of each. creep : (frames,) logarithmic creep strain that was measured; a frame where it
+        is not finite or not above SMALLEST_STRAIN has no level.
     """
 
     test: PointTest

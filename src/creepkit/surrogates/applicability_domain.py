@@ -51,7 +51,10 @@ class ApplicabilityDomain:
 
     @classmethod
     def from_rows(cls, names: Sequence[str], rows: Floats, margin: ArrayLike = DEFAULT_MARGIN) -> ApplicabilityDomain:
-        """The domain of training rows, (n, inputs); NaN, an input that is not there, counts nowhere."""
+        """The domain of training rows (n, inputs); NaN, an input that is not there, counts nowhere.
+
+        margin : number or (inputs,).
+        """
         rows = np.array(rows, float)
         finite = np.isfinite(rows)
         rows[:, ~finite.any(axis=0)] = 0.0
@@ -78,7 +81,7 @@ class ApplicabilityDomain:
         return np.asarray(self.distance(rows) > 1.0)
 
     def excess(self, rows: Floats) -> Floats:
-        """By what share of its training range each input leaves it, (..., inputs); negative inside."""
+        """By what share of its training range each input of rows (..., inputs) leaves it, likewise; negative inside."""
         width = np.where(self.high > self.low, self.high - self.low, 1e-6 * self.scale)
         return np.asarray(np.maximum(self.low - rows, rows - self.high) / width)
 
@@ -86,7 +89,7 @@ class ApplicabilityDomain:
         return self.excess(rows) - self.margin
 
     def reason(self, row: Floats) -> str:
-        """Why one row is outside, in words; "" inside."""
+        """Why one row (inputs,) is outside, in words; "" inside."""
         row = np.asarray(row, float)
         if not self.outside(row):
             return ""

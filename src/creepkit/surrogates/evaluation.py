@@ -56,7 +56,7 @@ class PredictionComparison:
     index: Ints
 
     def at_time(self, time: float) -> tuple[Floats, Floats]:
-        """True and predicted outputs at a time, (samples that last so long, outputs), linear between frames."""
+        """True and predicted outputs, (samples, outputs), of samples that last until a time; linear between frames."""
         last = np.where(self.mask, self.times, -np.inf).max(axis=1)
         rows = [k for k in np.flatnonzero(last >= time) if self.times[k, self.mask[k]][0] <= time]
         values = [
@@ -77,7 +77,10 @@ def _interpolated(time: float, times: Floats, values: Floats, mask: Bools) -> Fl
 
 
 def relative_squared_error(true: Floats, predicted: Floats, mask: Bools, scale: Floats | None = None) -> float:
-    """Eq. (4) over the outputs together: (n, frames, outputs) each, mask (n, frames), scale (outputs,)."""
+    """Eq. (4) over the outputs together.
+
+    true, predicted : (n, frames, outputs). mask : (n, frames) which frames are data. scale : (outputs,).
+    """
     scale = np.ones(true.shape[-1]) if scale is None else scale
     error_squares, deviation_squares = (
         _sum_of_squares(v / scale, mask) for v in (predicted - true, deviations_from_mean(true, mask))
@@ -86,7 +89,7 @@ def relative_squared_error(true: Floats, predicted: Floats, mask: Bools, scale: 
 
 
 def deviations_from_mean(true: Floats, mask: Bools) -> Floats:
-    """True outputs less their mean over samples at each time, (n, frames, outputs)."""
+    """Outputs true (n, frames, outputs) less their mean over samples at each time; mask : (n, frames)."""
     count = np.maximum(mask.sum(axis=0), 1)[:, None]
     mean = np.where(mask[..., None], true, 0.0).sum(axis=0) / count
     return np.asarray(true - mean)
@@ -97,7 +100,7 @@ def _sum_of_squares(values: Floats, mask: Bools) -> Floats:
 
 
 def error_metrics(true: Floats, predicted: Floats, mask: Bools) -> dict[str, float]:
-    """RSE, MSE, MAE and R2 of one output: (n, frames) each."""
+    """RSE, MSE, MAE and R2 of one output; true, predicted, mask : (n, frames)."""
     residuals, true_values = (predicted - true)[mask], true[mask]
     total_squares = float(((true_values - true_values.mean()) ** 2).sum()) if true_values.size else 0.0
     return {
@@ -137,7 +140,10 @@ def _metrics_at_time(comparison: PredictionComparison, time: float) -> dict[str,
 
 
 def worst_histories(comparison: PredictionComparison, largest: Floats) -> list[dict[str, float]]:
-    """The samples with the largest errors of the first output: number in the design, row, error and when."""
+    """The samples with the largest errors of the first output: number in the design, row, error and when.
+
+    largest : (n, outputs) largest absolute errors.
+    """
     rows = np.argsort(-largest[:, 0])[:WORST_COUNT]
     absolute_errors = np.where(comparison.mask, np.abs(comparison.predicted - comparison.true)[..., 0], -1.0)
     return [
@@ -211,7 +217,7 @@ def check_same_kind(metadata: SurrogateMetadata, data: Dataset) -> None:
 def compare_predictions(
     module: SurrogateModule, samples: SampleTensors, data: Dataset, rows: Tensor, scale: Tensor
 ) -> PredictionComparison:
-    """What a network says of rows of a data set, beside what is true."""
+    """What a network predicts for rows (n,) of a data set, beside what is true; scale : (outputs,)."""
     module.eval()
     parts = [module({name: v[part] for name, v in samples.items()}) for part in torch.split(rows, EVALUATION_BATCH)]
     row_numbers = rows.numpy()

@@ -54,10 +54,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ParameterGru:
-    """A recurrent network that sees a law's parameters and the load: the paper's, at its defaults.
+    """A recurrent network whose inputs are a law's parameters and the load: the paper's, at its defaults.
 
     hidden, layers, cell : of the network; cell "gru" or "lstm".
-    inputs : what is seen at each frame, of "load" (at the frame, all that the paper's sees), "mean_load" (since the
+    inputs : inputs at each frame, of "load" (at the frame, all that the paper uses), "mean_load" (since the
         frame before: it tells when between two frames the load jumped), "time" and "step". () is "load" alone, and for
         grids that stretch with the test "load", "mean_load", "time" and "step".
     target : "value" of the first output, or its "log".

@@ -59,7 +59,10 @@ class LoadHistoryInputs:
     def with_nuisances(
         self, history: History, nuisances: Mapping[str, Floats], count: int
     ) -> tuple[Floats, dict[str, Floats]]:
-        """(count, constants) of one test with nuisances, {kind: (count,)}, and {kind: derivatives}; see Nuisance."""
+        """(count, constants) of one test, and {kind: (count, constants)} their derivatives; see Nuisance.
+
+        nuisances : {kind: (count,)}.
+        """
         values = np.tile(self.constant_values(history), (count, 1))
         derivatives = {kind: np.zeros_like(values) for kind in nuisances}
         position = {name: k for k, name in enumerate(self.constants)}
@@ -86,12 +89,12 @@ class LoadHistoryInputs:
         return values, derivatives
 
     def series_values(self, history: History, times: Floats) -> Floats:
-        """(frames, series) at the times of frames, s."""
+        """(frames, series) at times (frames,) s."""
         program = history.loading.program()
         return np.stack([_SERIES_FUNCTIONS[name](program, times) for name in self.series], axis=1)
 
     def domain_inputs(self, history: History, times: Floats) -> Floats:
-        """Inputs of the applicability domain from a test, named by `domain_names`.
+        """Inputs of the applicability domain from a test, (inputs,), named by `domain_names`; times : (frames,) s.
 
         The constants, and a thickness also where it did not vary; of the load over the frames the value at the first
         that is loaded, the last, the mean, and how unlike one jump from the first to the last it is; and where grids
@@ -207,14 +210,14 @@ class LawInputs:
         return np.array([1.0 / LN10 if p.scale == "log" else 1.0 for p in self.law.params.values()])
 
     def input_rows(self, theta: Floats) -> Floats:
-        """(rows, columns) of internal parameters (rows, parameters)."""
+        """(rows, columns) of internal parameters theta (rows, parameters)."""
         off = np.isneginf(theta)
         return np.concatenate(
             [np.where(off, np.nan, theta * self._column_scales), off[:, list(self.switchable)]], axis=1
         )
 
     def derivatives(self, theta: Floats) -> Floats:
-        """(rows, columns, parameters) derivatives of `rows`; zero where a coefficient is off."""
+        """(rows, columns, parameters) derivatives of `input_rows` at theta (rows, parameters); zero where it is off."""
         count = theta.shape[1]
         derivatives = np.zeros((len(theta), len(self.names), count))
         derivatives[:, range(count), range(count)] = np.where(np.isneginf(theta), 0.0, self._column_scales)
@@ -310,7 +313,7 @@ def reduced_order_model_of(specimen: Any) -> Any:
 
 
 def hold_last_value(values: Floats) -> Floats:
-    """Values (..., frames) with their last finite one in the place of NaN after it, and none below zero."""
+    """The values (..., frames) with their last finite one in the place of NaN after it, and none below zero."""
     frames = np.where(np.isfinite(values), np.arange(values.shape[-1]), 0)
     last_finite = np.maximum.accumulate(frames, axis=-1)
     return np.nan_to_num(np.maximum(np.take_along_axis(values, last_finite, axis=-1), 0.0), nan=0.0)

@@ -23,12 +23,15 @@ LARGEST_LOG_EXCESS = 2.0
 class ParameterModule(SurrogateModule):
     """Standardised constants and series into recurrent layers, and a linear layer to standardised outputs.
 
-    samples : "constants" (n, C), NaN where a coefficient is off; "series" (n, frames, S); and "base" (n, frames) where
-        the first output is predicted as a correction, ln of the ratio, of that base.
+    Its samples are "constants" (n, C), NaN where a coefficient is off; "series" (n, frames, S); and "base" (n, frames)
+    where the first output is predicted as a correction, ln of the ratio, of that base.
 
-    The loss is Eq. (4) as surrogate.metrics reads it, with the mean square of the training rows below the line, so that
+    deviation : (outputs,) of the training rows, in physical units. spread, floor, most : (...) scalars, the mean square
+    of the training rows, the floor of the logarithm, and its greatest value.
+
+    The loss is Eq. (4) as surrogates.evaluation reads it, divided by the mean square of the training rows, so that
     batches add up to it. Where the first output is learnt by its logarithm, half of the loss is that, and half the mean
-    square of what the network itself gives, standardised: Eq. (4) alone is deaf to histories of little creep.
+    square of what the network itself gives, standardised: Eq. (4) alone ignores histories of little creep.
     """
 
     deviation: Tensor
@@ -62,7 +65,7 @@ class ParameterModule(SurrogateModule):
             self.register_buffer(name, torch.ones((), dtype=torch.float64))
 
     def with_scales(self, samples: SampleTensors, train: Tensor) -> ParameterModule:
-        """The same network with the scales of these rows."""
+        """The same network with the scales of the training rows train (n,)."""
         rows = {name: tensor[train] for name, tensor in samples.items()}
         mask, targets = rows["mask"], rows["targets"]
         data = targets[mask].double()
@@ -93,11 +96,14 @@ class ParameterModule(SurrogateModule):
         return torch.cat([constants[:, None].expand(-1, series.shape[1], -1), series], dim=-1)
 
     def standardised_outputs(self, inputs: Tensor) -> Tensor:
-        """(rows, frames, outputs) standardised."""
+        """(rows, frames, outputs) standardised, of inputs (rows, frames, inputs)."""
         return self.head(self.network(inputs)[0])  # type: ignore[no-any-return]
 
     def decoded(self, raw: Tensor, base: Tensor | None) -> Tensor:
-        """Physical outputs of standardised ones."""
+        """Physical outputs (rows, frames, outputs) of standardised ones.
+
+        raw : (rows, frames, outputs). base : (rows, frames) what is corrected, or None.
+        """
         outputs = self.targets.inverse(raw)
         if not self.logarithm:
             return outputs
@@ -107,7 +113,7 @@ class ParameterModule(SurrogateModule):
         return torch.cat([(scale * first - floor)[..., None], outputs[..., 1:]], dim=-1)
 
     def decoded_derivatives(self, raw: Tensor) -> Tensor:
-        """(rows, frames, outputs) derivative of physical outputs to standardised ones; without a base."""
+        """(rows, frames, outputs) derivative of physical outputs to standardised ones, raw (rows, frames, outputs)."""
         derivatives = self.targets.deviation.to(raw.dtype).expand_as(raw)
         if not self.logarithm:
             return derivatives
@@ -116,11 +122,11 @@ class ParameterModule(SurrogateModule):
         return torch.cat([(inside * derivatives[..., 0])[..., None], derivatives[..., 1:]], dim=-1)
 
     def loss(self, batch: SampleTensors) -> Tensor:
-        """See the class."""
+        """A number: see the class."""
         return self.loss_and_outputs(batch)[0]
 
     def loss_and_outputs(self, batch: SampleTensors) -> tuple[Tensor, Tensor]:
-        """The loss and the outputs."""
+        """The loss, a number, and the outputs (rows, frames, outputs)."""
         raw, mask = self.standardised_outputs(self.standardised_inputs(batch)), batch["mask"]
         outputs, count = self.decoded(raw, batch.get("base")), mask.sum()
         errors = (outputs - batch["targets"]) / self.deviation.to(outputs.dtype)

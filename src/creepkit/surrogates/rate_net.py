@@ -212,8 +212,10 @@ DERIVATIVE_BATCH_NUMBERS = 2**22
 
 
 class NodeOutputs(NamedTuple):
-    """At nodes: outputs (candidates, nodes, 3), their derivatives with a last axis of directions, or None; and which
-    candidates leave the domain, (candidates,).
+    """Outputs at nodes.
+
+    values : (candidates, nodes, 3). derivatives : (candidates, nodes, 3, directions) or None. outside : (candidates,)
+        which candidates leave the domain.
     """
 
     values: Floats

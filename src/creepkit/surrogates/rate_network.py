@@ -30,7 +30,7 @@ LOCAL_INPUTS = (
 )
 """What is known at a node beside the features; see TRAJECTORY_COLUMNS for what they are made of."""
 MEMORY_STRAIN = 1.0
-"""Elastic strains of creep in which a stress field forgets where it came from: the memory of the fading means."""
+"""Elastic strains of creep over which a stress field loses its history: the decay of the exponential means."""
 _LOAD, _AGE, _DEFLECTION, _TINY = 1e-6, 1e-3, 1e-4, 1e-12
 """Floors: P/E; creep strain over elastic strain; mm, a tenth of a micron; mm or strain."""
 _LARGEST_EXPONENT = 20.0
@@ -44,12 +44,18 @@ def input_names(features: int) -> tuple[str, ...]:
 
 
 def network_inputs(trajectory: Tensor, thickness: Tensor) -> Tensor:
-    """(rows, nodes, inputs) from trajectories (rows, nodes, columns) and apex thicknesses (rows,) mm."""
+    """(rows, nodes, inputs) of the network.
+
+    trajectory : (rows, nodes, columns). thickness : (rows,) mm, of the apex.
+    """
     return with_running_means(trajectory, local_inputs(trajectory, thickness))
 
 
 def with_running_means(trajectory: Tensor, local_values: Tensor) -> Tensor:
-    """The same from what is known at each node alone, (rows, nodes, features + LOCAL)."""
+    """(rows, nodes, inputs): what is known at each node alone, and running means of it.
+
+    trajectory : (rows, nodes, columns). local_values : (rows, nodes, features + LOCAL).
+    """
     features = trajectory.shape[-1] - FEATURE_START
     creep_increments = torch.diff(
         _column(trajectory, "creep"), dim=1, prepend=torch.zeros_like(trajectory[:, :1, 0])
@@ -61,7 +67,10 @@ def with_running_means(trajectory: Tensor, local_values: Tensor) -> Tensor:
 
 
 def local_inputs(trajectory: Tensor, thickness: Tensor) -> Tensor:
-    """(rows, nodes, features + LOCAL) what is known at each node alone."""
+    """(rows, nodes, features + LOCAL) what is known at each node alone.
+
+    trajectory : (rows, nodes, columns). thickness : (rows,) mm, of the apex.
+    """
 
     def column(name: str) -> Tensor:
         return _column(trajectory, name)
@@ -94,7 +103,7 @@ def _saturated(x: Tensor, largest: float) -> Tensor:
 
 
 def _exponential_means(features: Tensor, age: Tensor) -> Tensor:
-    """Means of features that forget over an elastic strain of creep: m_k = l_k m_{k-1} + (1 - l_k) f_k.
+    """Exponential means of features that decay over an elastic strain of creep: m_k = l_k m_{k-1} + (1 - l_k) f_k.
 
     Spans of 1, 2, 4 ... steps are joined until each reaches back to the first node.
     """
@@ -123,7 +132,10 @@ _LARGEST_INPUT = 6.0
 
 
 class RateModule(SurrogateModule):
-    """Layers of SiLU on standardised inputs; its last layer starts at zero, so that training begins at the base."""
+    """Layers of SiLU on standardised inputs; its last layer starts at zero, so that training begins at the base.
+
+    mean, deviation : (inputs,) of the training rows.
+    """
 
     mean: Tensor
     deviation: Tensor
@@ -142,14 +154,17 @@ class RateModule(SurrogateModule):
         self.layers = nn.Sequential(*parts)
 
     def with_scales(self, samples: SampleTensors, train: Tensor) -> RateModule:
-        """Itself, with scales of the nodes of the training rows."""
+        """Itself, with scales of the nodes of the training rows train (n,)."""
         rows = samples["inputs"][train][samples["nodes"][train]].double()
         self.mean.copy_(rows.mean(dim=0))
         self.deviation.copy_(rows.std(dim=0).clamp(min=1e-4))
         return self
 
     def at_nodes(self, inputs: Tensor, base: Tensor) -> Tensor:
-        """Amplitude, width and shape, (rows, nodes, 3), from inputs and what is corrected (rows, nodes, 4)."""
+        """Amplitude, width and shape, (rows, nodes, 3).
+
+        inputs : (rows, nodes, inputs). base : (rows, nodes, 4) what is corrected.
+        """
         inputs = inputs.to(self.last.weight.dtype)
         correction = self.last(
             self.layers(((inputs - self.mean) / self.deviation).clamp(-_LARGEST_INPUT, _LARGEST_INPUT))
@@ -166,7 +181,10 @@ class RateModule(SurrogateModule):
         )
 
     def derivatives(self, inputs: Tensor, base: Tensor, input_directions: Tensor, base_directions: Tensor) -> Tensor:
-        """Derivatives of `at_nodes`, (directions, rows, nodes, 3), along those of what it is given."""
+        """Derivatives of `at_nodes`, (directions, rows, nodes, 3).
+
+        inputs, base : as there, (rows, nodes, ...). input_directions, base_directions : (directions, rows, nodes, ...).
+        """
         dtype = self.last.weight.dtype
         values = (inputs.to(dtype) - self.mean) / self.deviation
         derivatives = input_directions.to(dtype) * ((values.abs() < _LARGEST_INPUT) / self.deviation)
@@ -198,11 +216,11 @@ class RateModule(SurrogateModule):
         return batch["frames"] @ self.at_nodes(batch["inputs"], batch["base"])
 
     def loss(self, batch: SampleTensors) -> Tensor:
-        """Mean square of the errors over those that count alike."""
+        """A number: the mean square of the errors at the frames that are data."""
         return self._mean_square_error(self(batch), batch)
 
     def loss_and_outputs(self, batch: SampleTensors) -> tuple[Tensor, Tensor]:
-        """Loss and outputs."""
+        """The loss, a number, and the outputs (rows, frames, 3)."""
         outputs = self(batch)
         return self._mean_square_error(outputs, batch), outputs
 

@@ -75,7 +75,7 @@ class SurrogateModule(nn.Module, ABC):
         """What training makes small: a number, the mean over the rows of the batch."""
 
     def loss_and_outputs(self, batch: SampleTensors) -> tuple[Tensor, Tensor]:
-        """The loss and the outputs at once; a module may spare itself the second pass."""
+        """The loss, a number, and the outputs (rows, frames, outputs); a module may spare itself the second pass."""
         return self.loss(batch), self(batch)
 
 
@@ -87,9 +87,9 @@ class SurrogateMetadata:
     parameters, conditions : names of the data set's columns.
     scaling : {input: (mean, standard deviation)}, and of outputs, for people to read; the module holds its own.
     domain : where the training rows lie, in the inputs that the recipe names.
-    metrics : of the validation rows (see surrogate.metrics). curves : {name: one number an epoch}.
+    metrics : of the validation rows (see surrogates.evaluation). curves : {name: one number an epoch}.
     provenance : versions, seed, fingerprints, counts, when.
-    notes : what to be wary of, a sentence each.
+    notes : limitations, a sentence each.
     """
 
     law: CreepLaw
@@ -124,8 +124,9 @@ CONSTANT_TOLERANCE = 1e-6
 
 
 class Standardisation(nn.Module):
-    """Standardises the last axis; its mean and deviation are buffers, float64, saved with the weights.
+    """Standardises the last axis; its scales are buffers, float64, saved with the weights.
 
+    mean, deviation : (columns,) of the training rows.
     A column that is constant in training is only shifted: its standardised value is zero, and the applicability
     domain refuses others.
     """
@@ -140,7 +141,10 @@ class Standardisation(nn.Module):
 
     @classmethod
     def from_rows(cls, values: Tensor, mask: Tensor | None = None) -> Standardisation:
-        """The scale of columns; values : (..., columns), mask : (...) which rows count. NaN counts nowhere."""
+        """The scale of columns; NaN counts nowhere.
+
+        values : (..., columns). mask : (...,) which rows count.
+        """
         rows = (values[mask] if mask is not None else values.reshape(-1, values.shape[-1])).double()
         mean = torch.nan_to_num(rows.nanmean(dim=0), nan=0.0)
         deviation = torch.nan_to_num((rows - mean).square().nanmean(dim=0).sqrt(), nan=0.0)
@@ -153,9 +157,9 @@ class Standardisation(nn.Module):
         return cls(torch.zeros(columns), torch.ones(columns))
 
     def forward(self, values: Tensor) -> Tensor:
-        """Standardised values, (..., columns)."""
+        """The values (..., columns), standardised."""
         return (values - self.mean.to(values.dtype)) / self.deviation.to(values.dtype)
 
     def inverse(self, values: Tensor) -> Tensor:
-        """Physical values of standardised ones, (..., columns)."""
+        """Physical values, (..., columns), of standardised values (..., columns)."""
         return values * self.deviation.to(values.dtype) + self.mean.to(values.dtype)

@@ -90,7 +90,10 @@ def prediction_frames(grid: TimeGrid, histories: Sequence[History]) -> list[Floa
 
 
 def interpolation_weights(frames: Floats, times: Floats) -> Floats:
-    """(times, frames): linear in time between frames, constant before the first and beyond the last."""
+    """(times, frames) weights: linear in time between frames, constant before the first and beyond the last.
+
+    frames : (frames,) s. times : (times,) s.
+    """
     position = np.interp(times, frames, np.arange(frames.size, dtype=float))
     below = np.minimum(position.astype(int), frames.size - 1)
     fraction, rows = position - below, np.arange(times.size)
@@ -101,13 +104,16 @@ def interpolation_weights(frames: Floats, times: Floats) -> Floats:
 
 
 def observed_outputs(specimen: Specimen, history: History, values: Floats) -> Floats:
-    """What a history's instrument shows, (candidates, times, outputs): of a bar's creep strain, its own measure."""
+    """What a history's instrument shows, (candidates, times, outputs): of a bar's creep strain, its own measure.
+
+    values : (candidates, times, outputs) of the network.
+    """
     observe: Any = getattr(specimen, "observed_output", None)
     return values if observe is None else np.asarray(observe(history, values[..., 0]))[..., None]
 
 
 def observation_derivative(specimen: Specimen, history: History, values: Floats) -> Floats:
-    """Derivative of what is shown to what the network gives, (candidates, times, outputs)."""
+    """Derivative of what is shown to what the network gives, values (candidates, times, outputs); of that shape."""
     derivative: Any = getattr(specimen, "output_derivative", None)
     return np.ones_like(values) if derivative is None else np.asarray(derivative(history, values[..., 0]))[..., None]
 
@@ -229,11 +235,11 @@ class Recipe(Protocol):
         ...
 
     def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
-        """A fresh network for these data; scales are those of the training rows, positions (rows,), alone."""
+        """A fresh network for these data; its scales are those of the training rows, train (rows,), alone."""
         ...
 
     def metadata(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateMetadata:
-        """What the data say of a surrogate before its training: scaling, domain and notes among it."""
+        """What the data say of a surrogate before its training: scaling, domain and notes among it; train : (rows,)."""
         ...
 
     def empty_module(self, metadata: SurrogateMetadata) -> SurrogateModule:

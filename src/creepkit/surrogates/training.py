@@ -184,8 +184,8 @@ class SizeStudyResult:
     """One training of a sweep.
 
     cell, hidden, layers, samples : what was varied; samples are those learnt from.
-    weights : numbers that were fitted. loss : Eq. (4) of the validation rows at the best epoch; training : the loss of
-        the training rows in that epoch. outputs : {output: its RSE}. losses : Eq. (4) of each epoch.
+    weight_count : numbers that were fitted. loss : Eq. (4) of the validation rows at the best epoch.
+    training : the loss of the training rows in that epoch. outputs : {output: its RSE}. losses : Eq. (4) of each epoch.
     """
 
     cell: RecurrentCell
@@ -232,7 +232,7 @@ def size_study(
 ) -> list[SizeStudyResult]:
     """Train every combination, each to a file of its own in the folder `to`; those that are there already are read.
 
-    Every training is judged by the same rows, a share of the whole data set that none of them learns from.
+    Every training is evaluated on the same rows, a share of the whole data set that none of them learns from.
     """
     data, folder = trainable_samples(data), Path(to)
     training_count = len(training_split(len(data), recipe.training, seed)[0])

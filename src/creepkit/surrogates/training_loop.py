@@ -74,7 +74,7 @@ def _check_units(data: Dataset) -> None:
 
 
 def training_split(count: int, training: Training, seed: int) -> tuple[Tensor, Tensor]:
-    """Positions of training and validation rows, in the order of the data; the seed draws those set aside."""
+    """Positions (rows,) of training and of validation rows, in the order of the data; the seed draws the latter."""
     order = np.random.default_rng(seed).permutation(count)
     validation_count = min(max(round(training.validation * count), 1), count - 1)
     training_rows = np.sort(order[validation_count:])
@@ -95,7 +95,7 @@ LEAST_LEARNING_RATE = 1e-8
 
 
 def learning_rate(training: Training, losses: Sequence[float], epoch_fraction: float = 0.0) -> float:
-    """The rate in the epoch that follows these validation losses; share : of that epoch's batches that are done."""
+    """The rate in the epoch that follows these validation losses; epoch_fraction : of its batches that are done."""
     if training.schedule == "constant":
         return training.rate
     if training.schedule == "cosine":
@@ -125,6 +125,7 @@ VALIDATION_BATCH = 256
 class NetworkTraining:
     """A network between epochs.
 
+    rows : positions (rows,) of the training and of the validation rows.
     curves : {"loss": of training rows during the epoch, "validation": of those set aside after it, "rse": Eq. (4) of
         the latter, "rate": Adam's}, a number each epoch. best : weights of the epoch with the lowest validation loss.
     """
@@ -241,7 +242,7 @@ class NetworkTraining:
     # ---- between runs ----------------------------------------------------------------------------------------------
 
     def state(self) -> dict[str, Tensor]:
-        """All tensors that going on needs: weights, the best ones, Adam's moments."""
+        """{name: (...,)} all tensors that going on needs: weights, the best ones, Adam's moments."""
         tensors = {f"module/{name}": tensor for name, tensor in self._weights().items()}
         tensors |= {f"best/{name}": tensor for name, tensor in self.best.items()}
         for number, moments in self.adam.state_dict()["state"].items():
@@ -249,7 +250,7 @@ class NetworkTraining:
         return tensors
 
     def restore(self, tensors: dict[str, Tensor], curves: dict[str, list[float]]) -> None:
-        """Go back to where `state` was asked."""
+        """Go back to where `state` was asked; tensors : {name: (...,)} what it gave."""
         self.module.load_state_dict(_with_prefix(tensors, "module/"))
         self.best = _with_prefix(tensors, "best/")
         moments: dict[int, dict[str, Any]] = {}
@@ -261,7 +262,7 @@ class NetworkTraining:
 
 
 def output_deviation(samples: SampleTensors, rows: Tensor) -> Tensor:
-    """Standard deviation of each output over the frames of these rows, (outputs,) float64."""
+    """Standard deviation of each output over the frames of rows (n,), (outputs,) float64."""
     target_rows = samples["targets"][rows][samples["mask"][rows]].double()
     standard_deviation = target_rows.std(dim=0, correction=0)
     return torch.where(standard_deviation > 0, standard_deviation, 1.0)

@@ -60,12 +60,12 @@ CODEC = RecordCodec(
 def write_weights(
     path: str | Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any], document: DocumentFormat = SURROGATE
 ) -> Path:
-    """Write tensors of any shapes with a JSON-able header; the file is whole or absent."""
+    """Write tensors (...,) by name with a JSON-able header; the file is whole or absent."""
     arrays = {name: tensor.detach().cpu().numpy() for name, tensor in tensors.items()}
     return write_safetensors(path, arrays, header, document)
 
 
 def read_weights(path: str | Path, document: DocumentFormat = SURROGATE) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """The tensors and the header of a file; SurrogateError says what is wrong with any other."""
+    """The tensors, {name: (...,)}, and the header of a file; SurrogateError says what is wrong with any other."""
     arrays, header = read_safetensors(path, document)
     return {name: torch.from_numpy(array) for name, array in arrays.items()}, header

@@ -1,4 +1,4 @@
-"""The conformance kit: check_law(law) says whether a law is fit for every verb. `creepkit check FILE` runs it.
+"""The conformance kit: check_law(law) says whether a law is fit for all uses. `creepkit check FILE` runs it.
 
 Points are Sobol samples of the full bounds and of stress 1e-3 to 2000 MPa, strain 1e-12 to 1, time 1e-3 to 1e6 s,
 temperature 600 to 1600 K, wherever the law's constraints hold. So that rates at zero strain and zero time are finite,

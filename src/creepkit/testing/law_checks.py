@@ -100,7 +100,7 @@ def check_printing(law: CreepLaw, _: LawSamples) -> Iterator[ConformanceCheck]:
 
 
 def check_signs(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck]:
-    """No term is negative: each is judged by the author's own expression."""
+    """No term is negative: each is checked with the author's own expression."""
     exact = MultiprecisionLaw(law)
     for point, theta in zip(samples.points, samples.theta, strict=True):
         for label, value in zip(law.terms, exact.terms(point, theta), strict=True):

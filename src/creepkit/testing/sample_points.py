@@ -61,7 +61,7 @@ def draw_samples(law: CreepLaw, samples: int, seed: int = 0) -> LawSamples:
 
 
 def constraints_hold(law: CreepLaw, points: Floats, theta: Floats) -> Bools:
-    """Where every constraint of the law holds, (samples,)."""
+    """Where every constraint of the law holds, (samples,); points (samples, 6 + S), theta (samples, parameters)."""
     values = [np.exp(t) if p.scale == "log" else t for p, t in zip(law.params.values(), theta.T, strict=True)]
     holds = np.ones(len(points), bool)
     for relation in law.constraints:

@@ -275,7 +275,7 @@ def half_written(path):
 def test_a_writing_that_fails_leaves_what_was_there(data, tmp_path):
     path = storage.write_dataset(data, tmp_path / "a.h5")
     before = path.read_bytes()
-    with pytest.raises(DatasetError, match="No space left on device; make room and start again"):
+    with pytest.raises(DatasetError, match="No space left on device; free some space and start again"):
         half_written(path)
     assert path.read_bytes() == before
     assert os.listdir(tmp_path) == ["a.h5"]

@@ -73,7 +73,7 @@ def test_a_failed_writing_leaves_what_was_there(tmp_path):
             temporary.write_text("half")
             raise OSError(28, "full")
 
-    with pytest.raises(ExportError, match="No space left on device; make room and start again"):
+    with pytest.raises(ExportError, match="No space left on device; free some space and start again"):
         fail()
     assert path.read_text() == "old"
     assert os.listdir(tmp_path) == ["note"]

@@ -261,7 +261,7 @@ def test_identify_with_it_finds_what_was_planted(guarded: RateSurrogate) -> None
 def test_an_answer_outside_the_domain_says_so_wherever_it_is_told(guarded: RateSurrogate, tmp_path) -> None:
     values, test = STRANGE["thick"]
     fit = ck.identify(NORTON, [planted(guarded, values, test)], using=guarded, starts=1)
-    told = "the answer lies outside the domain that the surrogate was trained in, in test 'planted'"
+    told = "the identified law lies outside the domain that the surrogate was trained in, in test 'planted'"
     assert f"note: {told}" in str(fit)
     fit.save(tmp_path / "fit.json")
     assert told in (tmp_path / "fit.json").read_text()

@@ -47,7 +47,7 @@ class CmaEs:
     """CMA-ES in the unit cube of the bounds, with restarts.
 
     iterations : generations of all runs together. population : of the first run, None for 8 + 6 ln(parameters), twice
-    the default of the cmaes package, as cost functions of creep laws have several valleys. initial_step_size : first
+    the default of the cmaes package, as cost functions of creep laws have several minima. initial_step_size : first
     standard deviation, in widths of the bounds. restarts : further runs at most, each of twice the population.
     refined_candidates : how many of the best that differ are refined by least squares; 0 leaves the best as it is.
     """
@@ -98,7 +98,7 @@ class _CmaEsRuns:
         self.optimiser = self._new_optimiser(np.full(problem.bounds.lower.size, 0.5))
 
     def generation(self) -> None:
-        """Ask, evaluate all at once, and tell."""
+        """One generation: propose candidates, evaluate all at once, update the distribution."""
         bounds = self.problem.bounds
         points = np.array([self.optimiser.ask() for _ in range(self.optimiser.population_size)])
         cost = self.problem.cost(bounds.lower + points * bounds.width)
@@ -205,7 +205,10 @@ class ParticleSwarm:
         return refine_candidates(problem, swarm.candidates(), self.refined_candidates, trace, progress)
 
     def next_velocity(self, velocity: Floats, attraction: Floats, iteration: int) -> Floats:
-        """(particles, parameters) velocity after an iteration, from the one before and the attraction."""
+        """(particles, parameters) velocity after an iteration.
+
+        velocity, attraction : (particles, parameters), the velocity before it and the steps towards the best points.
+        """
         if self.form == "constriction":
             acceleration = self.cognitive + self.social
             updated = (
@@ -238,7 +241,7 @@ class _Swarm:
         self.best_by_mask: dict[bytes, tuple[float, Floats, Bools]] = {}
 
     def evaluate(self) -> Floats:
-        """(particles,) - costs at their positions, in one prediction; the best are remembered."""
+        """(particles,) - costs at their positions, in one prediction; the best are kept."""
         cost = self.problem.cost(self._coordinates(self.x, self.masks))
         better = cost < self.best_cost
         self.best_position[better], self.best_masks[better], self.best_cost[better] = (
@@ -258,7 +261,7 @@ class _Swarm:
             self.best_by_mask[key] = cost, position.copy(), mask.copy()
 
     def move(self, iteration: int) -> None:
-        """One step of all; coordinates that are masked in the better ones attract nobody."""
+        """One step of all; coordinates that are masked in the better ones attract no particle."""
         shape, rules = self.x.shape, self.rules
         self.masks = self.term_mask.recombined(self.best_masks, self.best_masks[self.best_cost.argmin()], self.rng)
         leaders, masks = self._leaders()

@@ -57,7 +57,7 @@ class SearchTrace:
 
     @classmethod
     def from_costs(cls, search: str, costs: Sequence[Floats], restarts: Sequence[int] = ()) -> SearchTrace:
-        """The trace of the costs of the candidates of each iteration, an array (candidates,) for each."""
+        """The trace of a search; costs : (candidates,) of each iteration."""
         lowest = np.minimum.accumulate([float(np.min(candidate_costs)) for candidate_costs in costs])
         evaluations = np.cumsum([len(each) for each in costs])
         quartiles = np.array([np.percentile(each, QUARTILES) for each in costs])

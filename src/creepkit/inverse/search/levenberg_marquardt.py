@@ -53,7 +53,7 @@ def batched_levenberg_marquardt(
 
 
 def _continued(problem: LeastSquaresProblem, minima: Sequence[Minimum]) -> list[Minimum]:
-    """Minima that have not converged are refined one by one, in a trust region that follows bent valleys better."""
+    """Minima that have not converged are refined one by one, in a trust region, which follows curved valleys better."""
     finished = []
     for minimum in minima:
         if not minimum.converged:

@@ -16,7 +16,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.bounds import Bounds
 
 IterationCallback = Callable[[str, int, int], None]
-"""What is told of the progress of a search: (name of the step, how many are done, how many there are)."""
+"""Reports the progress of a search: (name of the step, how many are done, how many there are)."""
 
 
 class AdditionalResiduals(Protocol):
@@ -117,7 +117,7 @@ def bounded_least_squares(
 
 
 def robust_loss(squared: Floats, loss: str) -> Floats:
-    """(...,) - the losses of scipy, of squared whitened residuals (...,)."""
+    """(...,) - the losses of scipy; squared : (...,) squares of whitened residuals."""
     if loss == "linear":
         return squared
     if loss == "soft_l1":
@@ -128,7 +128,7 @@ def robust_loss(squared: Floats, loss: str) -> Floats:
 
 
 def robust_weight(squared: Floats, loss: str) -> Floats:
-    """(...,) - their derivatives: the weights of iteratively reweighted least squares."""
+    """(...,) - their derivatives at squared (...,): the weights of iteratively reweighted least squares."""
     if loss == "linear":
         return np.ones_like(squared)
     if loss == "soft_l1":

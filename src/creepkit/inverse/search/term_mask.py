@@ -48,17 +48,17 @@ class TermMask:
         positions = {label: [law.names.index(n) for n in law.only(label).names] for label in law.terms}
         rate_positions = {label: [k for k in owned if k in rates] for label, owned in positions.items()}
         terms = _maskable_terms(law, rate_positions, maskable)
-        own = np.zeros((len(terms), problem.bounds.lower.size), bool)
-        for row, label in zip(own, terms, strict=True):
+        owned_parameters = np.zeros((len(terms), problem.bounds.lower.size), bool)
+        for row, label in zip(owned_parameters, terms, strict=True):
             shared = {k for other, other_positions in positions.items() if other != label for k in other_positions}
             row[[k for k in positions[label] if k not in shared]] = True
         resting = problem.bounds.centre
         resting[list(rates)] = problem.bounds.lower[list(rates)]
         first_rates = np.array([rate_positions[label][0] for label in terms], np.int64)
-        return cls(terms, first_rates, own, resting, len(terms) < len(law.terms))
+        return cls(terms, first_rates, owned_parameters, resting, len(terms) < len(law.terms))
 
     def applied(self, u: Floats, masks: Bools) -> Floats:
-        """(..., parameters) u with coordinates of terms that are off at their resting values."""
+        """u (..., parameters) with coordinates of terms that are off at their resting values; masks : (..., terms)."""
         return np.where(self.active_parameters(masks), u, self.resting_values)
 
     def active_parameters(self, masks: Bools) -> Bools:
@@ -81,8 +81,9 @@ class TermMask:
         return self._never_empty(masks, rng)
 
     def recombined(self, personal_best: Bools, global_best: Bools, rng: np.random.Generator) -> Bools:
-        """(candidates, terms) masks of the next draw: each element at random from a candidate's own best mask
-        (candidates, terms) or from the global best one (terms,), with mutations.
+        """(candidates, terms) masks of the next draw: each element at random from one of two, with mutations.
+
+        personal_best : (candidates, terms) each candidate's own best mask. global_best : (terms,) the best of all.
         """
         if not self.terms:
             return personal_best
@@ -143,7 +144,10 @@ class SearchCandidates:
         return () if self.term_mask is None else self.term_mask.terms_off(u)
 
     def most_different(self, width: Floats, max_count: int) -> list[int]:
-        """The best that differ, at most so many: a term that is off in one of two makes them differ."""
+        """The best that differ, at most max_count: a term that is off in one of two makes them differ.
+
+        width : (parameters,) of the bounds.
+        """
         selected: list[int] = []
         for k in np.argsort(self.cost, kind="stable"):
             if all((np.abs(self.u[k] - self.u[other]) > SAME_BASIN * width).any() for other in selected):

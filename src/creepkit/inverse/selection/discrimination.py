@@ -164,7 +164,7 @@ class EquivalentLaws:
     """Two laws that the tests cannot separate.
 
     first, second : their names, the better one first. chi_square : between their predictions on the tests.
-    reduced : "m = 0" where the richer law becomes the other one so, and the tests allow it; else empty.
+    reduction : "m = 0" where the richer law becomes the other one so, and the tests allow it; else empty.
     sentence : for people.
     """
 

@@ -105,7 +105,7 @@ class Ranking(Presentable):
 def rank(
     fits: Sequence[Identification], criterion: Criterion = "bic", failed: Mapping[str, str] | None = None
 ) -> Ranking:
-    """Rank identifications made from the same histories; by : "bic" or "aicc"."""
+    """Rank identifications made from the same histories; criterion : "bic" or "aicc"."""
     if not fits:
         raise FitError("there are no identifications to rank")
     if criterion not in ("bic", "aicc"):
@@ -139,7 +139,10 @@ def ranking_from_scores(
     chi_square: Floats | None = None,
     failed: Mapping[str, str] | None = None,
 ) -> Ranking:
-    """The ranking of identifications with these scores, -2 ln of their evidence."""
+    """The ranking of identifications.
+
+    scores : (laws,) -2 ln of their evidence. chi_square : (laws,) of their residuals.
+    """
     excess, weight = criterion_weights(scores)
     chi_squares = np.full(len(fits), np.nan) if chi_square is None else chi_square
     order = np.argsort(excess, kind="stable")

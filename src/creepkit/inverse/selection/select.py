@@ -120,7 +120,7 @@ def _identify_all(
 ) -> list[Identification]:
     """The laws that can be identified; the others go to `failed`.
 
-    through : all laws are identified with it first, and those far behind go no further: they stay as it sees them.
+    through : all laws are identified with it first, and those far behind keep their values from it.
     """
     first_predictor, fits = through or using, []
     for k, law in enumerate(laws):
@@ -157,7 +157,7 @@ def _try_to_identify(
 
 
 def _ruled_out(fit: Identification) -> Identification:
-    note = f"ruled out as the {fit.provenance['specimen']} sees it, and not refined any further"
+    note = f"ruled out with the {fit.provenance['specimen']}, and not refined any further"
     return replace(fit, notes=(*fit.notes, note))
 
 

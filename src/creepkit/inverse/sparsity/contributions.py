@@ -33,8 +33,9 @@ MIN_STRAIN_FRACTION = 0.1
 
 @dataclass(frozen=True, eq=False)
 class EvaluationPoints:
-    """Points, (points,) each: stress MPa, strain, time s, temperature K, and weights that add up to one.
+    """Points at which rates of terms are compared.
 
+    stress, strain, time, temperature, weight : (points,) MPa, -, s, K, -; weights add up to one.
     All tests weigh alike, however many frames they have.
     """
 
@@ -69,7 +70,7 @@ def _points_of_test(history: History, predictor: Predictor | None) -> Floats:
 
 
 def stress_history(history: History, predictor: Predictor | None, times: Floats) -> Floats:
-    """(times, stresses) reference stresses at each time, MPa.
+    """(times, stresses) reference stresses at each time, MPa; times : (times,) s.
 
     A bulge test has one for each level of pressure, between which it is linear; a specimen whose stress moves by
     itself, as in relaxation, has all of its reference stresses at all times.
@@ -136,7 +137,7 @@ class TermContributions:
         return np.asarray(np.maximum(np.nan_to_num(log_rates, nan=LOG_ZERO_RATE), LOG_ZERO_RATE))
 
     def fractions(self, u: Floats) -> Floats:
-        """f_i / sum_j f_j, (candidates, points, terms); from logarithms, so that nothing overflows."""
+        """f_i / sum_j f_j, (candidates, points, terms), of u (candidates, parameters); they do not overflow."""
         log_rates = self.log_rates(u)
         rates = np.exp(log_rates - log_rates.max(axis=-1, keepdims=True))
         return np.asarray(rates / rates.sum(axis=-1, keepdims=True))
@@ -146,11 +147,11 @@ class TermContributions:
         return np.asarray(np.sqrt(np.einsum("p,cpt->ct", self.points.weight, self.fractions(u) ** 2)))
 
     def jacobian(self, u: Floats) -> Floats:
-        """dc/du at one u, (terms, parameters), by central differences in one batch."""
+        """dc/du at one u (parameters,), (terms, parameters), by central differences in one batch."""
         steps = DIFFERENCE_STEP * np.eye(u.size)
         above, below = np.split(self.values(np.concatenate([u + steps, u - steps])), 2)
         return np.asarray((above - below).T / (2 * DIFFERENCE_STEP))
 
     def by_term(self, u: Floats) -> dict[str, float]:
-        """{term: c} of one u."""
+        """{term: c} of one u (parameters,)."""
         return dict(zip(self.terms, map(float, self.values(u[None])[0]), strict=True))

@@ -4,7 +4,7 @@ Contributions are fractions that add up to about one, whatever the law is. There
 where one term has them all. Strength times the penalty is added to half the chi-square: with strength s a change of its
 value by one costs as much as a chi-square that is larger by 2 s.
 
-Least squares sees a penalty through parabolas w c^2 + const that touch it (iteratively reweighted least squares). With
+For least squares a penalty is replaced by parabolas w c^2 + const that touch it (iteratively reweighted). With
 weights updated at every point, half the sum of squares is the penalty and J'r its gradient; J'J is that of the
 parabolas, which lie above a concave penalty: steps are short rather than long.
 """
@@ -44,11 +44,14 @@ class ContributionPenalty(Protocol):
         ...
 
     def value(self, c: Floats) -> Floats:
-        """(candidates,) without the strength."""
+        """(candidates,) without the strength; c : (candidates, terms) contributions."""
         ...
 
     def weights(self, c: Floats) -> Floats:
-        """w, (candidates, terms): the parabola w c^2 + const touches the value at c, and lies above a concave one."""
+        """w, (candidates, terms): the parabola w c^2 + const touches the value at c, and lies above a concave one.
+
+        c : (candidates, terms) contributions.
+        """
         ...
 
 
@@ -68,11 +71,11 @@ class L2:
         check_strength(self.strength)
 
     def value(self, c: Floats) -> Floats:
-        """sum c_i^2."""
+        """sum c_i^2, (candidates,), of c (candidates, terms)."""
         return np.asarray((c**2).sum(axis=-1))
 
     def weights(self, c: Floats) -> Floats:
-        """1: it is a sum of squares."""
+        """1, of the shape of c (candidates, terms): it is a sum of squares."""
         return np.ones_like(c)
 
 
@@ -92,22 +95,22 @@ class GroupL2:
         check_strength(self.strength)
 
     def value(self, c: Floats) -> Floats:
-        """sum c_i."""
+        """sum c_i, (candidates,), of c (candidates, terms)."""
         return np.asarray(c.sum(axis=-1))
 
     def weights(self, c: Floats) -> Floats:
-        """1 / (2 c_i)."""
+        """1 / (2 c_i), (candidates, terms), of c (candidates, terms)."""
         return np.asarray(0.5 / np.maximum(c, MIN_CONTRIBUTION))
 
 
 @dataclass(frozen=True)
 class Sqrt:
-    """strength x [ sum (c_i + d)^(1/2) + exponents x sum (|m_j| + .02)^(1/2) ], d = .003.
+    """strength x [ sum (c_i + d)^(1/2) + exponents x sum (|m_j| + 0.02)^(1/2) ], d = 0.003.
 
     Concave, hence smallest where one term has it all: this one selects. m_j are the exponents of linear scale that can
     be off within their bounds, such as the strain exponent of strain hardening; they weigh a third, so that a simple
-    term is preferred to one with memory. d makes the slope at zero finite: a term of no use still sees where the data
-    want it. Being concave it has a minimum at each corner, and asks for many starts.
+    term is preferred to one with memory. d makes the slope at zero finite: a term of no use can still
+    grow where the data require it. Being concave it has a minimum at each corner, and needs many starts.
     """
 
     strength: Strength = DEFAULT_STRENGTH
@@ -121,11 +124,11 @@ class Sqrt:
             raise FitError(f"the weight of exponents is {self.exponents}; it must be a number, 0 or above")
 
     def value(self, c: Floats) -> Floats:
-        """sum (c_i + d)^(1/2)."""
+        """sum (c_i + d)^(1/2), (candidates,), of c (candidates, terms)."""
         return np.asarray(np.sqrt(c + self.OFFSET).sum(axis=-1))
 
     def weights(self, c: Floats) -> Floats:
-        """1 / (4 c_i (c_i + d)^(1/2))."""
+        """1 / (4 c_i (c_i + d)^(1/2)), (candidates, terms), of c (candidates, terms)."""
         return np.asarray(0.25 / (np.maximum(c, MIN_CONTRIBUTION) * np.sqrt(c + self.OFFSET)))
 
 
@@ -160,12 +163,18 @@ EXPONENT_OFFSET = 0.02
 
 
 def exponent_penalty(distances: Floats) -> Floats:
-    """sum (|m_j| + .02)^(1/2) of distances of exponents from where they are off, (candidates, exponents)."""
+    """sum (|m_j| + 0.02)^(1/2), (candidates,).
+
+    distances : (candidates, exponents) |m_j|, of exponents from where they are off.
+    """
     return np.asarray(np.sqrt(distances + EXPONENT_OFFSET).sum(axis=-1))
 
 
 def exponent_weights(distances: Floats) -> Floats:
-    """w, (candidates, exponents): the parabola w m^2 + const touches it at m."""
+    """w, (candidates, exponents): the parabola w m^2 + const touches it at m.
+
+    distances : (candidates, exponents) |m|, of exponents from where they are off.
+    """
     return np.asarray(0.25 / (np.maximum(distances, 1e-6) * np.sqrt(distances + EXPONENT_OFFSET)))
 
 
@@ -173,8 +182,8 @@ def exponent_weights(distances: Floats) -> Floats:
 class PenalisedTerms:
     """strength x penalty, as a function of conditioned coordinates; x = (u, e) may be given where u is meant.
 
-    frozen : amounts (contributions, then distances of exponents from off) at which the weights are taken, for least
-        squares with fixed weights; None takes them at every point anew.
+    frozen_at : (terms + exponents,) amounts (contributions, then distances of exponents from off) at which the weights
+        are taken, for least squares with fixed weights; None takes them at every point anew.
     """
 
     contributions: TermContributions
@@ -207,17 +216,20 @@ class PenalisedTerms:
         return np.asarray(self.strength * penalties)
 
     def frozen_weights_at(self, u: Floats) -> PenalisedTerms:
-        """With weights taken at u, and kept."""
+        """With weights taken at u (parameters,), and kept."""
         return replace(self, frozen_at=self._amounts(u))
 
     def residuals(self, x: Floats) -> Floats:
-        """(terms + exponents + 1,); half the sum of their squares touches values() where the weights were taken."""
+        """(terms + exponents + 1,); half the sum of their squares touches values() where the weights were taken.
+
+        x : (parameters or more,).
+        """
         amounts = self._amounts(x)
         roots, constant = self._root_weights(amounts if self.frozen_at is None else self.frozen_at)
         return np.append(roots * amounts, constant)
 
     def jacobian(self, x: Floats) -> Floats:
-        """(terms + exponents + 1, parameters or more), weights kept."""
+        """(terms + exponents + 1, parameters or more), weights kept; x : (parameters or more,)."""
         u = x[: self._parameter_count]
         root_weights, _ = self._root_weights(self._amounts(x) if self.frozen_at is None else self.frozen_at)
         derivatives = np.zeros((root_weights.size + 1, x.size))

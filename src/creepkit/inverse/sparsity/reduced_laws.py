@@ -78,7 +78,7 @@ class TermProblem:
         return replace(self.problem, penalty=penalty).minimise(start, tolerances=tolerances)
 
     def lowest_minimum(self, starts: Sequence[Floats]) -> Minimum:
-        """The lowest of the minima from several x (unknowns,), without penalty."""
+        """The lowest of the minima from several starts (unknowns,), without penalty."""
         return min((self.minimise(x) for x in starts), key=lambda minimum: minimum.cost)
 
     def bic(self, minimum: Minimum) -> float:
@@ -98,7 +98,7 @@ class TermProblem:
         return replace(reduced, start=reduced.with_log_total_rate(reduced.start, self.log_total_rate(self.start)))
 
     def embedded(self, law: CreepLaw, x: Floats) -> Floats:
-        """(unknowns,) x of a law of some of the terms as one of this law: the other rates at their lower bounds.
+        """x of a law of some of the terms as one of this law, (unknowns,): the other rates at their lower bounds.
 
         Exponents of the other terms that can be off are; the rest of their parameters is drawn so that they contribute
         least, within the bound penalties. x : (unknowns of that law,).
@@ -132,13 +132,13 @@ class TermProblem:
         return float(np.logaddexp.reduce(x[rates])) if rates else 0.0
 
     def with_log_total_rate(self, x: Floats, log_total: float) -> Floats:
-        """(unknowns,) x with all rates multiplied by one factor, so that they add up to exp(log_total) 1/s."""
+        """x (unknowns,) with all rates multiplied by one factor, so that they add up to exp(log_total) 1/s."""
         shifted, rates = np.array(x), list(self.problem.coordinates.term_rates)
         shifted[rates] += log_total - self.log_total_rate(x)
         return self.problem.bounds.clip(shifted)
 
     def with_fractions(self, x: Floats, fractions: Sequence[float] | Floats) -> Floats:
-        """(unknowns,) x with these fractions (terms,) of its rate, in the order of coordinates.term_rates."""
+        """x (unknowns,) with these fractions (terms,) of its rate, in the order of coordinates.term_rates."""
         shifted, rates = np.array(x), list(self.problem.coordinates.term_rates)
         shifted[rates] = self.log_total_rate(x) + np.log(fractions)
         return self.problem.bounds.clip(shifted)
@@ -167,7 +167,7 @@ INITIAL_FRACTION = 0.05
 class ReducedLaw:
     """A law of some of the terms, and its fit without penalty.
 
-    kept : its terms, in the order of the sum; off : its exponents that were switched off; criterion : BIC.
+    kept_terms : its terms, in the order of the sum; exponents_off : its exponents that were switched off; bic : BIC.
     """
 
     problem: TermProblem
@@ -183,7 +183,7 @@ class ReducedLaw:
 
     @property
     def x(self) -> Floats:
-        """Where it fits best."""
+        """(unknowns,) where it fits best."""
         return self.minimum.u
 
     @property

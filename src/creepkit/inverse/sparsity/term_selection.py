@@ -33,7 +33,7 @@ PRELIMINARY_STEPS = 12
 
 
 def penalised_starts(reductions: ReducedLaws) -> list[Floats]:
-    """The optimum without penalty, the same with each term leading, and each term's own optimum."""
+    """(unknowns,) each: the optimum without penalty, the same with each term leading, and each term's own optimum."""
     problem = reductions.problem
     single_term_optima = [problem.embedded(single.law, single.x) for single in reductions.single_terms()]
     return [problem.start, *problem.fraction_permutations(problem.start), *single_term_optima]

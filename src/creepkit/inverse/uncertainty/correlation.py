@@ -85,7 +85,7 @@ def _covariance_of_parameters(fit: Identification) -> Floats:
 
 
 def _parameter_names(fit: Identification, coordinate_system: CoordinateSystem) -> tuple[str, ...]:
-    """The parameters as they are correlated; in conditioned coordinates what stands in the place of some of them."""
+    """The parameters as they are correlated; in conditioned coordinates what replaces some of them."""
     names = [f"ln {n}" if p.scale == "log" else n for n, p in fit.law.table.items()]
     if coordinate_system == "author":
         return tuple(names)

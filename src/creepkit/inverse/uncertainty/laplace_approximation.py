@@ -235,7 +235,8 @@ def delta_method(
 ) -> tuple[Floats, Floats]:
     """Value and standard deviation of functions of u, by the delta method with central differences.
 
-    function : u (parameters,) -> (...,); returns two arrays of that shape.
+    function : u (parameters,) -> (...,). point : (parameters,) u. covariance : (parameters, parameters) of u.
+    Returns (...,) values and (...,) standard deviations.
     """
     sd = np.sqrt(np.diag(covariance))
     columns = []

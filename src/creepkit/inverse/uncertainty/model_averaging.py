@@ -134,7 +134,8 @@ class ModelAverage(Presentable):
     ) -> tuple[Floats, Floats, Floats]:
         """Median creep rate over the laws, 1/s, with its 95 % interval: (rate, low, high).
 
-        stress MPa, temperature K; what is not given is that of the best law's reference point.
+        stress, temperature, strain, time : numbers or arrays that broadcast, in MPa, K, - and s; what is not given is
+        that of the best law's reference point.
         """
         distribution = self.distribution(log_rate, stress, temperature, strain, time)
         median, low, high = (np.exp(v) for v in distribution.interval())
@@ -148,7 +149,10 @@ class ModelAverage(Presentable):
         strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
     ) -> tuple[Floats, Floats, Floats]:
-        """Median local stress exponent over the laws, with its 95 % interval."""
+        """Median local stress exponent over the laws, with its 95 % interval: (exponent, low, high).
+
+        stress, temperature, strain, time : as in `rate`, numbers or arrays that broadcast; the results have that shape.
+        """
         return self.distribution(local_exponent, stress, temperature, strain, time).interval()
 
     def distribution(
@@ -159,7 +163,10 @@ class ModelAverage(Presentable):
         strain: ArrayLike | None,
         time: ArrayLike | None,
     ) -> MixtureDistribution:
-        """The distribution under each law of what(coordinates, stress, temperature, strain, time), at one point."""
+        """The distribution over the laws of quantity(coordinates, stress, temperature, strain, time).
+
+        stress, temperature, strain, time : numbers or arrays that broadcast, as in `rate`.
+        """
         reference = self.fits[0].reference
         point = [
             default if given is None else given
@@ -225,7 +232,7 @@ def rate_band(
     strain: float | None = None,
     time: float | None = None,
 ) -> RateBand:
-    """Creep rates at `stresses` (MPa) and temperature +- uncertainty (K), over one law or the laws of a ranking.
+    """Creep rates at stresses (points,) MPa and temperature +- uncertainty (K), over one law or the laws of a ranking.
 
     A law without temperature cannot know how the temperature moves its rate: its part of the band is not widened, and
     a note says so.

@@ -121,7 +121,7 @@ class Posterior:
         return self.problem.bounds.upper
 
     def __call__(self, u: Floats) -> Floats:
-        """(candidates,) ln p; -inf outside the bounds. All candidates are one prediction."""
+        """(candidates,) ln p of u (candidates, parameters), in one prediction; -inf outside the bounds."""
         log_density, is_inside = np.full(len(u), -np.inf), self.inside(u)
         if is_inside.any():
             rise = np.maximum(self.chi_square(u[is_inside]) - self.least_chi_square, -0.5 * self.degrees_of_freedom)
@@ -131,7 +131,7 @@ class Posterior:
         return np.where(np.isfinite(log_density), log_density, -np.inf)
 
     def chi_square(self, u: Floats) -> Floats:
-        """(candidates,) least sum of squares that any values of the nuisances leave."""
+        """(candidates,) least sum of squares that any values of the nuisances leave; u : (candidates, parameters)."""
         residuals, rate_effect = self._residuals(u)
         whitened = _whitened(self.whitening, rate_effect, residuals)[:, self.problem.observations.present]
         rows = np.concatenate(
@@ -143,7 +143,7 @@ class Posterior:
         """Residuals (candidates, tests, observations), and what a test's own rate does half way to each candidate.
 
         A factor on all rates moves every coefficient, each of which is a coordinate's own. Where a term has none, and
-        for tests compared over their whole life, whose derivatives are dear, it does what it does at the optimum.
+        for tests compared over their whole life, whose derivatives are expensive, that effect is taken at the optimum.
         """
         problem, law = self.problem, self.problem.law
         coefficients = list(problem.coordinates.coefficients)
@@ -157,7 +157,10 @@ class Posterior:
         return residuals, 0.5 * (self.rate_effect + jacobian[..., coefficients].sum(axis=-1) * rate_scatter)
 
     def inside(self, u: Floats) -> Bools:
-        """(candidates,) whether the bounds of u and of the law's parameters, and its constraints, hold."""
+        """(candidates,) whether the bounds of u and of the law's parameters, and its constraints, hold.
+
+        u : (candidates, parameters).
+        """
         is_inside = np.asarray(((u >= self.lower) & (u <= self.upper)).all(axis=1))
         theta, (lower, upper) = self.problem.coordinates.theta(u), self.parameter_bounds
         tolerance = 1e-9 * (upper - lower)
@@ -184,7 +187,7 @@ def _whitened(whitening: Floats, rate_effect: Floats, values: Floats) -> Floats:
 
 
 CONVERGED_LENGTH = 50.0
-"""Steps over autocorrelation time that emcee's authors ask for before its estimate may be trusted."""
+"""Steps over autocorrelation time that emcee's authors require before its estimate is reliable."""
 MAX_START_DRAWS = 50
 """Draws of a walker's start that may fall outside the bounds."""
 
@@ -223,7 +226,7 @@ class PosteriorSamples(Presentable):
 
     @property
     def effective_sample_size(self) -> float:
-        """Number of independent draws that tell as much."""
+        """Number of independent draws that are worth as much."""
         return float(len(self.u) / self.autocorrelation_time.max())
 
     def interval(self, quantity_or_name: str | DerivedQuantity) -> tuple[float, float, float]:
@@ -240,7 +243,10 @@ class PosteriorSamples(Presentable):
         strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
     ) -> tuple[Floats, Floats, Floats]:
-        """Median creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape."""
+        """Median creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape.
+
+        stress, temperature, strain, time : numbers or arrays that broadcast, in MPa, K, - and s.
+        """
         draws = log_rate(self.coordinates, stress, temperature, strain, time)(self.u)
         median, low, high = np.exp(np.quantile(draws, INTERVAL_PROBABILITIES, axis=0))
         return median, low, high
@@ -253,7 +259,10 @@ class PosteriorSamples(Presentable):
         strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
     ) -> tuple[Floats, Floats, Floats]:
-        """Median local stress exponent with its 95 % interval."""
+        """Median local stress exponent with its 95 % interval: (exponent, low, high).
+
+        stress, temperature, strain, time : as in `rate`, numbers or arrays that broadcast; the results have that shape.
+        """
         draws = local_exponent(self.coordinates, stress, temperature, strain, time)(self.u)
         median, low, high = np.quantile(draws, INTERVAL_PROBABILITIES, axis=0)
         return median, low, high

@@ -103,7 +103,7 @@ class _ProfilePoint:
     chi_square: float
 
 
-class _ProfileWalk:
+class _ProfileTrace:
     """Points of a profile, one after the other outwards from the optimum."""
 
     def __init__(self, fit: Identification, quantity: DerivedQuantity, root: float) -> None:
@@ -188,14 +188,14 @@ def profile(fit: Identification, quantity_or_name: str | DerivedQuantity, *, lev
     quantity = quantity_of(fit.coordinates, quantity_or_name)
     root = float(student.ppf(0.5 + 0.5 * level, max(fit.freedom, 1.0)))
     with single_threaded_blas():
-        walk = _ProfileWalk(fit, quantity, root)
-        (below, low), (above, high) = walk.one_side(-1.0), walk.one_side(1.0)
-    return _profile(quantity, walk, [*below[:0:-1], *above], (low, high), level)
+        trace = _ProfileTrace(fit, quantity, root)
+        (below, low), (above, high) = trace.one_side(-1.0), trace.one_side(1.0)
+    return _profile(quantity, trace, [*below[:0:-1], *above], (low, high), level)
 
 
 def _profile(
     quantity: DerivedQuantity,
-    walk: _ProfileWalk,
+    trace: _ProfileTrace,
     points: list[_ProfilePoint],
     is_closed: tuple[bool, bool],
     level: float,
@@ -204,11 +204,11 @@ def _profile(
     best = int(chi_square.argmin())
     rise = chi_square - chi_square[best]
     ends = [
-        _interval_end(values, np.sqrt(rise), walk.root, best, sign) if c else None
+        _interval_end(values, np.sqrt(rise), trace.root, best, sign) if c else None
         for c, sign in zip(is_closed, (-1, 1), strict=True)
     ]
     low, high = (None if end is None else float(quantity.to_unit(end)) for end in ends)
-    laplace = [float(quantity.to_unit(walk.start.value + s * walk.root * walk.sd)) for s in (-1, 1)]
+    laplace = [float(quantity.to_unit(trace.start.value + s * trace.root * trace.sd)) for s in (-1, 1)]
     return ProfileLikelihood(
         quantity.name,
         quantity.unit,
@@ -217,10 +217,10 @@ def _profile(
         float(quantity.to_unit(values[best])),
         low,
         high,
-        walk.root**2,
+        trace.root**2,
         level,
         (laplace[0], laplace[1]),
-        _notes(quantity, points, rise, is_closed, walk),
+        _notes(quantity, points, rise, is_closed, trace),
     )
 
 
@@ -237,7 +237,7 @@ def _notes(
     points: list[_ProfilePoint],
     rise: Floats,
     is_closed: tuple[bool, bool],
-    walk: _ProfileWalk,
+    trace: _ProfileTrace,
 ) -> tuple[str, ...]:
     notes = []
     for is_side_closed, k, side in ((is_closed[0], 0, "below"), (is_closed[1], -1, "above")):
@@ -245,9 +245,9 @@ def _notes(
             reached = float(quantity.to_unit(points[k].value))
             notes.append(
                 f"not bounded {side} within the law's bounds: at {reached:.4g} chi-square has risen by {rise[k]:.2g} "
-                f"of {walk.root**2:.2g}"
+                f"of {trace.root**2:.2g}"
             )
-    better = walk.start.chi_square - min(p.chi_square for p in points)
+    better = trace.start.chi_square - min(p.chi_square for p in points)
     if better > 0.5:
         notes.append(f"a better minimum was met on the way, by {better:.2g} in chi-square: identify with more starts")
     return tuple(notes)

@@ -1,4 +1,4 @@
-"""What intervals are asked of: a parameter, the creep rate at a point, the local stress exponent there.
+"""Quantities that have intervals: a parameter, the creep rate at a point, the local stress exponent there.
 
 Each is a function of the conditioned coordinates u, looked at on the scale on which it is nearly normal.
 """
@@ -26,7 +26,7 @@ class DerivedQuantity:
     """Something that follows from the values of a law.
 
     scale : "log" where its logarithm is what is nearly normal.
-    of : the function of u, on that scale, of a law's coordinates; u (..., parameters) to (...,).
+    function : the function of u, on that scale, of a law's coordinates; u (..., parameters) to (...,).
     """
 
     name: str
@@ -35,7 +35,7 @@ class DerivedQuantity:
     function: Callable[[Coordinates], CoordinateFunction]
 
     def to_unit(self, value: Floats | float) -> Floats:
-        """In the quantity's unit, from its scale."""
+        """In the quantity's unit, (...,), from a value (...,) on its scale."""
         return np.exp(value) if self.scale == "log" else np.asarray(value, float)
 
 
@@ -77,7 +77,8 @@ def log_rate(
 ) -> CoordinateFunction:
     """ln of the creep rate (1/s) of virgin material at points, as a function of u: (..., parameters) to (..., points).
 
-    What is not given is that of the reference point.
+    stress, temperature, strain, time : numbers or arrays that broadcast to (points,), in MPa, K, - and s; what is not
+    given is that of the reference point.
     """
     from creepkit.kernels import lower
 
@@ -110,7 +111,7 @@ def local_exponent(
     strain: ArrayLike | None = None,
     time: ArrayLike | None = None,
 ) -> CoordinateFunction:
-    """The local stress exponent at points, likewise."""
+    """The local stress exponent at points; stress, temperature, strain, time : as in `log_rate`, they broadcast."""
     level = np.asarray(stress, float)
     above, below = (
         log_rate(coordinates, level * f, temperature, strain, time)
@@ -125,7 +126,7 @@ def quantity_of(coordinates: Coordinates, quantity_or_name: str | DerivedQuantit
 
 
 def gradient(function: CoordinateFunction, u: Floats, scale: Floats, step: float = 1e-4) -> Floats:
-    """(..., parameters) derivatives of a function's numbers at one u, by central differences of step times scale."""
+    """(..., parameters) derivatives at one u (parameters,); central differences of step times scale (parameters,)."""
     h = np.diag(step * np.maximum(scale, 1e-8))
     change = function(u + h) - function(u - h)
     return np.moveaxis(change, 0, -1) / (2 * np.diag(h))

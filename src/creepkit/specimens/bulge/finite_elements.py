@@ -134,7 +134,10 @@ _TIME_SHIFT = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class BulgeSensitivities:
-    """Derivatives of the outputs, (times, 3, parameters) to the law's and {name: (times, 3)} to everything else."""
+    """Derivatives of the outputs.
+
+    law : (times, 3, parameters) to the internal parameters. nuisances : {name: (times, 3)} to everything else.
+    """
 
     law: Floats
     nuisances: Mapping[str, Floats]
@@ -151,6 +154,7 @@ def output_sensitivities(
 ) -> tuple[Floats, BulgeSensitivities]:
     """Outputs (times, 3) and their derivatives.
 
+    theta : (parameters,) internal values. profiles : (times, nodes) mm, displacements of the top.
     names : "modulus" (relative), "temperature" (K), "thickness" (mm) and any length of the dimple, "window" (mm), and
         the numbers of the loading, such as P1, P2 and Tj.
     """
@@ -270,7 +274,11 @@ def _velocity(geometry: DimpleGeometry, name: str, setup: BulgeSetup) -> tuple[G
 
 @dataclass(frozen=True, eq=False)
 class BulgeResponse:
-    """One candidate in one test: outputs (times, 3), how it ended, and derivatives if asked for."""
+    """One candidate in one test.
+
+    values : (times, 3) outputs: D and S in mm, p. status, end_time : how it ended, and when, s.
+    sensitivities : derivatives of the outputs, if asked for.
+    """
 
     values: Floats
     status: Status

@@ -30,10 +30,10 @@ class PolarGrid(NamedTuple):
 
 
 class NormalEquations(NamedTuple):
-    """Half the sum of squares at one place: `squares` (1,).
+    """Half the sum of squares at one place, and its derivatives.
 
-    slope : (3,) its derivatives. matrix : (3, 3) its second derivatives, the upper half. diagonal : (3,) of the part of
-        `matrix` that knows no residuals, as in the method of Gauss and Newton: never negative.
+    squares : (1,) half the sum. slope : (3,) its derivatives. matrix : (3, 3) its second derivatives, the upper half.
+    diagonal : (3,) of the part of `matrix` that knows no residuals, as in the Gauss-Newton method: never negative.
     """
 
     slope: Floats
@@ -61,7 +61,10 @@ def _bell(far: float, p: float, g: float) -> tuple[float, float]:
 
 @njit(cache=True, error_model="numpy")
 def best_amplitude(grid: PolarGrid, y: Floats, x: Floats) -> float:
-    """D of the least squares at given ln S and ln p: D is linear."""
+    """D in mm of the least squares at given ln S and ln p; D is linear.
+
+    y : (radii,) mm, the profile. x : (3,) D, ln S and ln p.
+    """
     p = exp(x[2])
     product, square = 0.0, 0.0
     for j in range(grid.angular.size):
@@ -75,7 +78,10 @@ def best_amplitude(grid: PolarGrid, y: Floats, x: Floats) -> float:
 
 @njit(cache=True, error_model="numpy")
 def sum_up(grid: PolarGrid, y: Floats, x: Floats, normal: NormalEquations) -> None:
-    """Half the sum of squares at x = (D, ln S, ln p), and its derivatives, into `normal`."""
+    """Half the sum of squares, and its derivatives, into `normal`.
+
+    y : (radii,) mm, the profile. x : (3,) D, ln S and ln p.
+    """
     p, squares = exp(x[2]), 0.0
     slope, matrix, diagonal = normal.slope, normal.matrix, normal.diagonal
     for v in range(3):
@@ -110,7 +116,10 @@ def sum_up(grid: PolarGrid, y: Floats, x: Floats, normal: NormalEquations) -> No
 
 @njit(cache=True, error_model="numpy")
 def solve_damped(normal: NormalEquations, damping: float, solution: Floats) -> bool:
-    """Cholesky's method for the damped matrix and the slope; false where the matrix is not positive definite."""
+    """Solution (3,) of the damped system by Cholesky's method; false where its matrix is not positive definite.
+
+    solution : (3,) is written.
+    """
     lower = np.empty((3, 3))
     for a in range(3):
         for b in range(a + 1):
@@ -135,8 +144,11 @@ def solve_damped(normal: NormalEquations, damping: float, solution: Floats) -> b
 
 
 @njit(cache=True, error_model="numpy")
-def derivatives_to_profile(grid: PolarGrid, x: Floats, normal: NormalEquations, pull: Floats) -> None:
-    """Derivatives (3, radii) of x = (D, ln S, ln p) to the profile, `normal` being that of the result."""
+def derivatives_to_profile(grid: PolarGrid, x: Floats, normal: NormalEquations, derivatives: Floats) -> None:
+    """Derivatives of x (3,) = (D, ln S, ln p) to the profile, `normal` being that of the result.
+
+    derivatives : (3, radii) is written.
+    """
     p, inverse, solution = exp(x[2]), np.empty((3, 3)), np.empty(3)
     for v in range(3):
         normal.slope[0], normal.slope[1], normal.slope[2] = 0.0, 0.0, 0.0
@@ -144,19 +156,19 @@ def derivatives_to_profile(grid: PolarGrid, x: Floats, normal: NormalEquations, 
         solve_damped(normal, 0.0, solution)
         for w in range(3):
             inverse[v, w] = solution[w]
-    for v in range(pull.shape[0]):
-        for i in range(pull.shape[1]):
-            pull[v, i] = 0.0
+    for v in range(derivatives.shape[0]):
+        for i in range(derivatives.shape[1]):
+            derivatives[v, i] = 0.0
     for j in range(grid.angular.size):
         g, first, _ = _angle(grid, p, j)
-        for i in range(pull.shape[1]):
+        for i in range(derivatives.shape[1]):
             far = grid.log_radius[i] - x[1]
             q, m = _bell(far, p, g)
             weight = grid.angular[j] * grid.radial[i] * m
             fq = x[0] * q * p
             for v in range(3):
                 a, b, c = inverse[v, 0], inverse[v, 1], inverse[v, 2]
-                pull[v, i] += weight * (a + fq * (b - c * (far + first)))
+                derivatives[v, i] += weight * (a + fq * (b - c * (far + first)))
 
 
 FITTED, AT_REST, FAILED = 0, 1, 2
@@ -183,7 +195,7 @@ def fit_frames(grid: PolarGrid, samples: Floats, fits: Floats, states: Ints, der
 
     fits : (frames, 3) becomes D in mm, S / window and p, each frame starting from the last one fitted.
     states : (frames,) becomes FITTED, AT_REST or FAILED.
-    pulls : (frames, 3, radii) becomes the derivatives of `fits` to `samples`; with a length of zero they are left out.
+    derivatives : (frames, 3, radii) becomes those of `fits` to `samples`; with a length of zero they are left out.
     """
     normal = NormalEquations(np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(1))
     x, last, y = np.zeros(3), np.zeros(3), np.zeros(samples.shape[1])

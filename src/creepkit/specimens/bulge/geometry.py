@@ -185,7 +185,7 @@ SHIFT = 1 / 3
 """How much denser the columns of a tapered roof are at its middle, where it bulges most."""
 STEEPEST = 1.5
 """Largest power of the fan over the columns it runs through: the middle node of the last side along the top then lies
-at .32 of it, and at .25 the element would fold."""
+at 0.32 of it, and at 0.25 the element would fold."""
 
 GROWTH_RATIO = 1.35
 """How much later the top of a tapered dimple fans out, for its roof bulges where the columns stand upright."""

@@ -35,7 +35,11 @@ _TEXT = re.compile(r"\s*(\w+)\s+0\s*(?:-|to)\s*(\S+)\s*mm\s*(?:,\s*(\d+)\s+radii
 
 
 class ProfileSampling(NamedTuple):
-    """What a form, a window and a set of nodes come to: the radii as shares of the window, the way there, the grid."""
+    """What follows from a form, a window and a set of nodes.
+
+    shares : (radii,) the radii that are sampled, as shares of the window. nodes : interpolation from the nodes to them.
+    grid : of the fit.
+    """
 
     shares: Floats
     nodes: SurfaceInterpolation
@@ -106,7 +110,7 @@ class Observation:
         return self._fit(sampling, _frames(profiles, sampling), slopes=False)[0]
 
     def observe_with_derivatives(self, radii: ArrayLike, profiles: ArrayLike) -> tuple[Floats, Floats]:
-        """As `observe`, and the exact derivatives (frames, 3, nodes) to `profiles`.
+        """As `observe`, and the exact derivatives (frames, 3, nodes); radii (nodes,) mm, profiles (frames, nodes) mm.
 
         At rest D has the derivatives of the frame that lent its shape (those of D do not change with the size of a
         profile), S and p have none and are given zeros.
@@ -116,7 +120,10 @@ class Observation:
         return outputs, derivatives @ sampling.nodes.values
 
     def window_derivatives(self, radii: ArrayLike, profiles: ArrayLike) -> Floats:
-        """Derivatives (frames, 3) of what is observed to the window, 1/mm of each."""
+        """Derivatives (frames, 3) of what is observed to the window, 1/mm of each.
+
+        radii : (nodes,) mm at rest. profiles : (frames, nodes) mm.
+        """
         sampling = self._sampling(radii)
         frames = _frames(profiles, sampling)
         outputs, derivatives = self._fit(sampling, frames, slopes=True)
@@ -127,6 +134,7 @@ class Observation:
     def node_derivatives(self, radii: ArrayLike, profiles: ArrayLike, shift: ArrayLike) -> Floats:
         """Derivatives (frames, 3) of what is observed when the top nodes move along the radius, keeping their u_z.
 
+        radii : (nodes,) mm at rest. profiles : (frames, nodes) mm.
         shift : (nodes,) mm for each unit of what moves them, such as the apex thickness of a mesh that follows it.
         """
         sampling = self._sampling(radii)
@@ -238,7 +246,7 @@ class FieldFit:
     amplitude, width : D and S, mm. shape : p. x_center, y_center : mm.
     standard_errors : of these five, in this order, if the points err independently. Pixels with overlapping subsets do
         not: true errors are greater by the root of the number of pixels that share one error.
-    scatter : mm, root mean square of the residuals. points : how many were fitted.
+    residual_sd : mm, root mean square of the residuals. points : how many were fitted.
     """
 
     amplitude: float
@@ -252,7 +260,7 @@ class FieldFit:
 
 
 def fit_field(x: ArrayLike, y: ArrayLike, heights: ArrayLike) -> FieldFit:
-    """Fit Eq. (7) by unweighted least squares to points x, y, heights, each (points,) in mm, in any order or shape.
+    """Fit Eq. (7) by unweighted least squares to points; x, y, heights : (points,) mm, in any order or shape.
 
     Points that are not finite (a camera lost them) are left out. The fit has no offset: take off first what the surface
     showed without pressure.

@@ -44,7 +44,10 @@ if TYPE_CHECKING:
 
 
 def uniaxial_points(stresses: Floats, strains: Floats, states: Floats, time: float, temperature: float) -> Floats:
-    """Points of a law, (points, 6 + S), under uniaxial stress; stress and strain a little above zero at least."""
+    """Points of a law, (points, 6 + S), under uniaxial stress; stress and strain a little above zero at least.
+
+    stresses : (points,) MPa. strains : (points,). states : (points, S).
+    """
     points = np.zeros((stresses.size, POINT_SIZE + states.shape[1]))
     points[:, STRESS] = points[:, PRINCIPAL_STRESS] = np.maximum(stresses, 1e-3)
     points[:, MEAN_STRESS] = points[:, STRESS] / 3.0
@@ -56,6 +59,7 @@ def uniaxial_points(stresses: Floats, strains: Floats, states: Floats, time: flo
 def missing_rate_message(law: CompiledLaw, theta: Floats, points: Floats) -> str:
     """The first of these points where the law has no rate, or one without derivatives, in words; empty when none is.
 
+    theta : (parameters,) internal values. points : (points, 6 + S).
     Kernels floor what they take logarithms of: where an equation has no number, such as the logarithm of something
     negative, its rate may look small instead, but then its derivatives are not finite. A rate too large for a number
     is one: its logarithm is what the integration works with.
@@ -76,21 +80,24 @@ STRESS_FIELD, CREEP_STRAIN_FIELD = "stress", "creep strain"
 
 
 class TopProfile(NamedTuple):
-    """The top of the dimple: radii (nodes,) at rest, mm, and how far each has risen, (times, nodes) mm."""
+    """The top of the dimple: radii (nodes,) at rest, mm; displacement : (times, nodes) mm, how far each has risen."""
 
     radii: Floats
     displacement: Floats
 
 
 class StressRange(NamedTuple):
-    """Least and greatest von Mises stress, (times,) MPa."""
+    """Least and greatest von Mises stress; low, high : (times,) MPa."""
 
     low: Floats
     high: Floats
 
 
 class FieldValues(NamedTuple):
-    """A quantity at the integration points: places (points, 2), r and z at rest in mm, and values (times, points)."""
+    """A quantity at the integration points.
+
+    points : (points, 2) r and z at rest, mm. values : (times, points).
+    """
 
     points: Floats
     values: Floats
@@ -113,18 +120,22 @@ class BulgeRun(Run):
     states: tuple[str, ...] = ()
 
     def displacement(self, radius: ArrayLike = 0.0, times: ArrayLike | None = None) -> Floats:
-        """How far the top has risen at a radius (mm, at rest), (times,) mm, or at several, (times, radii)."""
+        """How far the top has risen, (times,) mm at one radius, (times, radii) at several.
+
+        radius : number or (radii,) mm, at rest. times : number or (times,) s, by default those of the frames.
+        """
         rows = self._at(self._profiles, times) @ surface_interpolation(self.setup.radii, radius).T
         return rows if np.ndim(radius) else np.asarray(rows[..., 0])
 
     def profile(self, times: ArrayLike | None = None) -> TopProfile:
-        """The whole top, at the nodes of the mesh."""
+        """The whole top, at the nodes of the mesh; times : number or (times,) s, by default those of the frames."""
         return TopProfile(self.setup.radii, self._at(self._profiles, times))
 
     def mises_range(self, times: ArrayLike | None = None, within: float | None = None) -> StressRange:
         """Least and greatest von Mises stress of the integration points at radii up to `within` mm.
 
-        By default the whole roof, up to the radius of the cavity. The least of these hangs on the mesh: it is that of
+        times : number or (times,) s, by default those of the frames.
+        By default the whole roof, up to the radius of the cavity. The least of these depends on the mesh: it is that of
         the point nearest to where bending changes its sign.
         """
         reach = self.setup.geometry.cavity_radius if within is None else float(within)
@@ -135,7 +146,10 @@ class BulgeRun(Run):
         return StressRange(values.min(axis=-1), values.max(axis=-1))
 
     def field(self, name: str = STRESS_FIELD, times: ArrayLike | None = None) -> FieldValues:
-        """Von Mises "stress" (MPa), equivalent "creep strain" or a state of the law by its name, at all points."""
+        """Von Mises "stress" (MPa), equivalent "creep strain" or a state of the law by its name, at all points.
+
+        times : number or (times,) s, by default those of the frames.
+        """
         values = self._at(self._field_at_steps(name), times)
         return FieldValues(
             self.point_coordinates, np.maximum(values, 0.0) if name in (STRESS_FIELD, CREEP_STRAIN_FIELD) else values
