@@ -21,7 +21,8 @@ GENERATED = ("kernels/numpy_functions.py", "kernels/numba_functions.py", "kernel
 ARRAY = re.compile(r"\b(Floats|Ints|Bools|NDArray|ndarray|ArrayLike|Tensor)\b")
 _SIZE = r"(?:\.{3}|[\w`{}]+(?:[ +*/-]+[\w`{}]+){0,4})"
 SHAPE = re.compile(
-    rf"\((?:\.{{3}}|{_SIZE},|{_SIZE}(?:,\s+{_SIZE}|\[,\s+{_SIZE}\])+)\)|\b(?:number|scalar|broadcast|any shapes?\b)",
+    rf"\((?:\.{{3}}|{_SIZE},|{_SIZE}(?:,\s+{_SIZE}|\[,\s+{_SIZE}\])+)\)"
+    r"|\b(?:numbers?\b(?! of)|scalar|broadcast|any shapes?\b)",
     re.IGNORECASE,
 )
 ENTRY = re.compile(r"(?:^|(?<=[.;] ))((?:\*{0,2}[A-Za-z_]\w*)(?:,\s+\*{0,2}[A-Za-z_]\w*)*)\s:\s", re.MULTILINE)
