@@ -7,4 +7,6 @@ Every public name stands once, in __init__.pyi; its module is loaded when the na
 import lazy_loader as _lazy
 
 __getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)
+
+
 __version__ = "0.1.0"

@@ -41,7 +41,7 @@ from .inverse.sparsity.penalties import Sqrt as Sqrt
 from .inverse.sparsity.penalties import Subsets as Subsets
 from .inverse.sparsity.term_selection import penalty_path as penalty_path
 from .inverse.uncertainty.model_averaging import rate_band as rate_band
-from .jobs.workers import ParallelExecution as ParallelExecution
+from .jobs.worker_pools import ParallelExecution as ParallelExecution
 from .kernels.lowering import lower as lower
 from .language.elastic import Elastic as Elastic
 from .language.elastic import wachtman as wachtman

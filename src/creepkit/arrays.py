@@ -11,8 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
 Floats: TypeAlias = NDArray[np.float64]
+
+
 Ints: TypeAlias = NDArray[np.int64]
+
+
 Bools: TypeAlias = NDArray[np.bool_]
+
+
 __all__ = ["ArrayLike", "Bools", "Floats", "Ints", "frozen"]
 
 

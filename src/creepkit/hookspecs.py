@@ -15,7 +15,11 @@ if TYPE_CHECKING:
 
 
 PROJECT = "creepkit"
+
+
 hookspec = pluggy.HookspecMarker(PROJECT)
+
+
 hookimpl = pluggy.HookimplMarker(PROJECT)
 
 

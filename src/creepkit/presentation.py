@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 
+
 PRESENTERS: dict[str, dict[str, str]] = {
     # specimens
     "Run": {"text": "creepkit.report.simulation:run_text"},
@@ -69,7 +70,7 @@ PRESENTERS: dict[str, dict[str, str]] = {
         "plot": "creepkit.report.uncertainty:rate_band_figure",
     },
     # screening, discovery, experiments
-    "Plate": {
+    "ScreeningResult": {
         "text": "creepkit.report.screening:screening_text",
         "plot": "creepkit.report.screening:plot_screening",
         "to_csv": "creepkit.screening.files:write_csv",

@@ -63,7 +63,7 @@ class RecordedMinima:
 
     def minima(self, cost_function, progress=None):
         result = self.search.minima(cost_function, progress)
-        self.starts = [m.u for m in distinct(result.minima, cost_function.bounds, max_count=REFINED_MINIMA)]
+        self.starts = [m.x for m in distinct(result.minima, cost_function.bounds, max_count=REFINED_MINIMA)]
         return result
 
 

@@ -9,8 +9,8 @@ import pytest
 from creepkit.dataset.dataset import COLUMNS
 from creepkit.dataset.generation import generate
 from creepkit.dataset.shards import GenerationJob
-from creepkit.jobs.worker import run_task
-from creepkit.jobs.workers import ParallelExecution
+from creepkit.jobs.worker_pools import ParallelExecution
+from creepkit.jobs.worker_process import run_task
 from helpers.planted_sampling import BAR, Planted
 
 ROWS = 16

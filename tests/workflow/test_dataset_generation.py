@@ -111,7 +111,7 @@ SCRIPT = """
 import sys
 from helpers.planted_sampling import *
 from creepkit.dataset.generation import generate
-from creepkit.jobs.workers import ParallelExecution
+from creepkit.jobs.worker_pools import ParallelExecution
 data = generate(Planted((Strong(), Visible(log={log!r}, seconds={seconds}))), BAR, samples={samples}, seed=0,
                 to={to!r}, execution=ParallelExecution({workers}, shard_rows=16))
 """

@@ -131,7 +131,7 @@ def test_a_full_disk_loses_nothing_that_was_done(tmp_path):
     ],
 )
 def test_what_cannot_be_asked_for(tmp_path, how, message, monkeypatch):
-    monkeypatch.setattr("creepkit.jobs.workers.CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr("creepkit.jobs.worker_pools.CONNECT_TIMEOUT", 0.5)
     with pytest.raises(DatasetError, match=message):
         run(tmp_path / "a.h5", **how)
 

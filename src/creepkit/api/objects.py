@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from creepkit.registry import Plugin
     from creepkit.surrogates.surrogate import Surrogate
 
+
 EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
 
 

@@ -18,12 +18,13 @@ if TYPE_CHECKING:
     from creepkit.arrays import ArrayLike
     from creepkit.dataset.dataset import Dataset
     from creepkit.jobs.shard_progress import ProgressCallback
-    from creepkit.jobs.workers import ParallelExecution
+    from creepkit.jobs.worker_pools import ParallelExecution
     from creepkit.language import CreepLaw, Elastic
     from creepkit.quality import QualityFlag
     from creepkit.sampling.domains import SamplingDesign
     from creepkit.surrogates.recipe import Training
     from creepkit.surrogates.surrogate import Recipe, Surrogate
+
 
 ROOM_TEMPERATURE = 293.15
 """K; stands where a law does not ask for a temperature."""

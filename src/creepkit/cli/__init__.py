@@ -13,7 +13,11 @@ import zlib
 from pathlib import Path
 
 _SOURCES = Path(__file__).parents[1]
+
+
 _COMPILED_SOURCES = ("integration/*.py", "kernels/*.py", "fem/*.py", "specimens/bulge/**/*.py")
+
+
 _KEPT_CACHES = 3
 
 

@@ -70,6 +70,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+
 COMMANDS: dict[str, Callable[..., None]] = {
     "laws": laws.command,
     "specimens": specimens.command,

@@ -22,15 +22,27 @@ if TYPE_CHECKING:
 
 
 EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
+
+
 MEASURED = EXAMPLE_DATA / "cmsx6"
 """Nine creep curves of CMSX-6, most of them to rupture."""
+
+
 PLANTED = EXAMPLE_DATA / "planted_creep_curves"
 """Nine simulated creep curves of bars, and the truth behind them."""
+
+
 PLANTED_BULGE = EXAMPLE_DATA / "planted_bulge_test"
 """A simulated bulge test of one dimple, and the truth behind it."""
+
+
 MEASURED_LAWS = ("norton", "mpc-omega", "kachanov-rabotnov")
 """Norton's law comes with creepkit, the two with tertiary creep with its plugins."""
+
+
 UNIAXIAL_LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
+
+
 BULGE_LAWS = ("norton", "strain-hardening", "time-hardening")
 
 

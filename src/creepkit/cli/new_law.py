@@ -40,6 +40,7 @@ def creepkit_laws():
     return [$constant]
 ''')
 
+
 PROJECT_TEMPLATE = Template("""\
 [build-system]
 requires = ["hatchling>=1.26"]
@@ -60,6 +61,7 @@ $name = "$module"
 include = ["$module.py"]
 """)
 
+
 README_TEMPLATE = Template("""\
 # $package
 
@@ -70,6 +72,7 @@ $title: say here what it describes, and where it was published.
     creepkit check $name
     pytest
 """)
+
 
 TEST_TEMPLATE = Template("""\
 import creepkit

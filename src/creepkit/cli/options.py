@@ -54,8 +54,11 @@ def penalty_named(name: str | None) -> ContributionPenalty | Subsets | None:
 
 
 BULGE, UNIAXIAL, RELAXATION, MATERIAL_POINT = "bulge", "uniaxial", "relaxation", "point"
+
+
 RAMP_TIME = 5.0
 """s, in which each pressure is reached."""
+
 
 SPECIMENS_OF_OPTION = {
     "--stress": (UNIAXIAL, MATERIAL_POINT),

@@ -47,6 +47,7 @@ COLUMNS = {
     "index": Column(np.int64, np.int64),
 }
 
+
 HOLD_TIMES = 4
 """Ends of the first ramp, of the first hold, of the second ramp, and of the test."""
 
@@ -62,6 +63,8 @@ def empty_columns(sizes: Mapping[str, int]) -> dict[str, Any]:
 
 FAILED = -1
 """The reason of a sample whose simulation did not work; its text says why."""
+
+
 NOT_SIMULATED = -1
 """The status of a sample that was rejected before it was simulated."""
 

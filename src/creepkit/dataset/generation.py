@@ -16,15 +16,18 @@ from creepkit.dataset import shards, storage
 from creepkit.dataset.shards import POLL_INTERVAL, GenerationJob, is_complete, merge_shards
 from creepkit.errors import DatasetError
 from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord, ProgressReporter
-from creepkit.jobs.worker import TaskResult
-from creepkit.jobs.workers import ParallelExecution, WorkerDeaths, Workers
+from creepkit.jobs.worker_pools import ParallelExecution, WorkerDeaths, Workers
+from creepkit.jobs.worker_process import TaskResult
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
     from creepkit.records import Specimen
     from creepkit.sampling.domains import SamplingDesign
 
+
 _log = logging.getLogger("creepkit.dataset")
+
+
 MOST_WORKER_DEATHS = 20
 """Deaths of workers at one shard, after which something else than a sample must be wrong."""
 

@@ -31,8 +31,8 @@ from creepkit.files.json_documents import as_read_back, canonical_json, json_tex
 from creepkit.files.reading import FileKind
 from creepkit.files.writing import remove_temporary_files, write_if_absent
 from creepkit.jobs.shard_progress import ShardLock
-from creepkit.jobs.worker import TaskResult
-from creepkit.jobs.workers import SHARD_ROWS
+from creepkit.jobs.worker_pools import SHARD_ROWS
+from creepkit.jobs.worker_process import TaskResult
 from creepkit.language.law_codec import law_to_json
 from creepkit.registry.specimen_documents import specimen_to_json
 
@@ -45,9 +45,11 @@ if TYPE_CHECKING:
 MOST_PROCESS_DEATHS = 2
 """How often a sample may kill its process before it counts as failed."""
 
+
 GENERATION_FILE = FileKind(
     "the settings of a data set", DatasetError, "it is damaged; remove it if the shards beside it are of this data set"
 )
+
 
 _log = logging.getLogger("creepkit.dataset")
 

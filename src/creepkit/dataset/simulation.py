@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from creepkit.arrays import Ints
 from creepkit.dataset.dataset import FAILED, HOLD_TIMES, NOT_SIMULATED, Dataset, empty_columns
 from creepkit.errors import DatasetError
-from creepkit.jobs.worker import error_text
+from creepkit.jobs.worker_process import error_text
 from creepkit.records import Predictor, Status, SupportsReducedOrderModel
 from creepkit.sampling.conditions import hold_times, planned_test
 from creepkit.sampling.criteria import CreepInEachHold, SimulationOutcome, SurvivesTime
@@ -68,6 +68,8 @@ def _first_rejection(design: SamplingDesign, screening_outcome: SimulationOutcom
 
 TOO_MANY_FAILURES = 8
 """First samples of a shard after whose failure, all of them, the shard is given up."""
+
+
 REJECTED_DIGITS = 12
 """Binary digits of the histories of rejected samples, 1 part in 4000: these serve inspection, not training."""
 

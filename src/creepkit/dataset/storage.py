@@ -48,11 +48,23 @@ from creepkit.registry.specimen_documents import specimen_from_json, specimen_to
 from creepkit.sampling.conditions import MOST_FRAMES, TimeGrid
 
 DATASET_FILE = FileKind("a data set", DatasetError, "give a data set that creepkit generated", maximum_bytes=2**50)
+
+
 WRITE_ADVICE = "choose another folder and start again, nothing done is lost"
+
+
 FORMAT = "creepkit-dataset"
+
+
 LAYOUT_VERSION = 1
+
+
 FILE_UNITS = "MPa, mm, s, K"
+
+
 NAME_LISTS = ("outputs", "parameter_names", "condition_names", "reason_names", "reason_texts")
+
+
 LARGEST_COMPRESSION = 1032
 """Bytes that one of gzip's may stand for, at most."""
 

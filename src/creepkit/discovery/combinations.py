@@ -25,8 +25,14 @@ from creepkit.inverse.search.local_refinement import IterationCallback
 
 MAX_EXHAUSTIVE = 150
 """Up to so many combinations are all tried."""
+
+
 MAX_SWEEPS = 4
+
+
 CREDIBLE_MASS = 0.95
+
+
 CHI_SQUARE_95 = 3.84
 """chi^2 of one degree of freedom at 95 %: curves closer than that, by the points' own covariances, are equivalent."""
 

@@ -26,6 +26,8 @@ from creepkit.registry.arguments import check_histories, resolve_law, resolve_pr
 
 Forms = Sequence[str] | Mapping[str, Sequence[str]]
 """Names of temperature forms, or {parameter: names}."""
+
+
 PriorOdds = Mapping[str, Mapping[str, float]]
 """{parameter: {form: odds}}."""
 

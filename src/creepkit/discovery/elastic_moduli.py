@@ -19,8 +19,12 @@ from creepkit.presentation import Presentable
 from creepkit.records import History, Nuisance, Predictor
 
 FIRST_FRAMES = 15
+
+
 MODULUS_BOUNDS = (-0.7, 2.0)
 """Bounds of a modulus, relative to what the history states."""
+
+
 _T0_BOUNDS = (100.0, 3000.0)
 """K, bounds of T0: below, the form is a straight line in T; above, a constant over any test."""
 

@@ -22,9 +22,15 @@ from creepkit.language import CreepLaw, Param, TemperatureFactor, TemperatureFor
 from creepkit.laws.temperature_forms import creepkit_temperature_forms
 
 CONSTANT = "constant"
+
+
 ARRHENIUS = "arrhenius"
+
+
 ARRHENIUS_ODDS = 4.0
 """Prior odds of 1/T over any other form of a rate coefficient: that creep is thermally activated."""
+
+
 _RANK_TOLERANCE = 1e-9
 
 

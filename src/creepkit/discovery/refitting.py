@@ -121,6 +121,8 @@ def _plausible_forms_of_refits(
 
 MAX_FORMS = 6
 """Forms of one parameter that are refitted."""
+
+
 SIMILAR_CHI_SQUARE = 0.5
 """chi^2 between the curves of two forms below which other forms are tried first."""
 

@@ -34,8 +34,11 @@ UNDETERMINED_WIDTH = 0.15
 """Standard deviation over the width of the bounds above which a parameter counts as undetermined; that of the uniform
 distribution over them is 0.29."""
 
+
 INFINITE_FREEDOM = 1e9
 """Degrees of freedom of a normal distribution."""
+
+
 MIN_TEMPERATURES = 3
 """Temperatures: two give a slope, which any form can have."""
 
@@ -170,6 +173,8 @@ def _joint_ranges(ranges: Sequence[dict[str, tuple[float, float]]]) -> dict[str,
 
 SOBOL_STARTS = 8
 """Trials from which what is inside exponentials is searched."""
+
+
 BOUND_TOLERANCE_SD = 2.0
 """Standard deviations that a number may lie outside its bounds."""
 

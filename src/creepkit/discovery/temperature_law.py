@@ -37,6 +37,7 @@ TEMPERATURE_LAW = DocumentFormat(
     remedy="run discover again",
 )
 
+
 MAX_COMBINATIONS_WRITTEN = 20
 """Combinations that are written, best first."""
 
@@ -86,8 +87,11 @@ CODEC = RecordCodec(
     values={CreepLaw: LAW_CODEC, Identification: ValueCodec(identification_to_json, identification_from_json)}
 )
 
+
 NOTED_OVERDISPERSION = 1.5
 """Inflation of covariances from which a note is made."""
+
+
 UNDETERMINED_FRACTION = 0.8
 """Fraction of the bounds from which an interval that fills it says that the parameter is not determined."""
 

@@ -24,8 +24,12 @@ from creepkit.records import (
 from creepkit.records.loading import Quantity
 
 ControlledQuantity = Literal["load", "stress"]
+
+
 CANDIDATE_FRAMES = 40
 """Of a planned test, half spread over time and half over its logarithm."""
+
+
 LOWER_LEVEL, HIGHER_LEVEL, EXTENSION = 0.7, 1.4, 2.0
 """Levels of further tests, over the lowest and the highest level of those made; and how much longer they may be."""
 

@@ -37,10 +37,16 @@ from creepkit.records import History, Predictor
 
 REFIT_TOLERANCES = Tolerances(max_steps=8, tolerance=1e-5)
 """Of a full refit."""
+
+
 MIN_FRAMES = 5
 """A planned test with fewer frames before it ruptures is left out."""
+
+
 WEAK_PRIOR = 0.03
 """Standard deviations of data per width of the bounds by which a Gauss-Newton step is held where nothing else does."""
+
+
 EXTRAPOLATION_LIMIT = 2.0
 """A planned test is predicted until its leading output is so many times what was measured."""
 

@@ -26,11 +26,18 @@ from creepkit.language.symbols import GAS_CONSTANT
 from creepkit.records import LawWithValues
 
 _ALTERNATIVE = "export it as 'abaqus', a CREEP subroutine"
+
+
 _SMALLEST_COEFFICIENT = 1e-27
 """Below this A the manual warns of numerical difficulties with LAW=STRAIN and LAW=TIME."""
+
+
 _INTERPOLATION_TOLERANCE = 1e-3
 """Relative error of linear interpolation of A between the rows of a table."""
+
+
 _TEMPERATURE_STEPS = (50.0, 25.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.25, 0.1)
+
 
 _TABLE_NOTE = (
     "Table from {low:g} to {high:g} K in steps of {step:g} K: Abaqus interpolates linearly between rows, which is "

@@ -22,6 +22,7 @@ from creepkit.records import LawWithValues
 
 _ALTERNATIVE = "export it as 'c' or 'abaqus', and call that rate in a USERCREEP subroutine"
 
+
 _CREEP_OPTIONS = {
     1: "strain hardening, rate = C1 s^C2 e^C3 exp(-C4/T)",
     2: "time hardening, rate = C1 s^C2 t^C3 exp(-C4/T)",

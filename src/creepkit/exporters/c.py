@@ -25,6 +25,7 @@ _Imaginary asm typeof main
 """
 """C99, with the words that compilers add."""
 
+
 _CPP_KEYWORDS = """
 alignas alignof and and_eq bitand bitor bool catch char8_t char16_t char32_t class co_await co_return co_yield compl
 concept const_cast consteval constexpr constinit decltype delete dynamic_cast explicit export false friend mutable
@@ -34,6 +35,7 @@ std min max abs eval
 """
 """What C++20 has beside C99, and names that code for it calls unqualified."""
 
+
 _MATH_FUNCTIONS = """
 acos asin atan atan2 cos sin tan acosh asinh atanh cosh sinh tanh exp exp2 expm1 frexp ilogb ldexp log log10 log1p log2
 logb modf scalbn scalbln cbrt fabs hypot pow sqrt erf erfc lgamma tgamma ceil floor nearbyint rint lrint llrint round
@@ -42,6 +44,7 @@ casin casinh catan catanh ccos ccosh cexp cimag clog conj cpow cproj creal csin 
 y1 yn drem scalb significand exp10 pow10
 """
 """math.h and complex.h, with what Unix adds: compilers know these as functions, included or not; also with f and l."""
+
 
 _LIBRARY_NAMES = """
 fpclassify isfinite isinf isnan isnormal signbit isgreater isgreaterequal isless islessequal islessgreater isunordered
@@ -56,9 +59,11 @@ towupper
 """
 """Macros and types of math.h, and functions of other headers that compilers know without them."""
 
+
 C_RESERVED = frozenset(f"{_KEYWORDS} {_CPP_KEYWORDS} {_LIBRARY_NAMES}".split()) | {
     name + suffix for name in _MATH_FUNCTIONS.split() for suffix in ("", "f", "l")
 }
+
 
 STABLE_FUNCTIONS: dict[str, tuple[tuple[str, ...], str]] = {
     "square": (("value",), "value * value"),
@@ -80,6 +85,8 @@ STABLE_FUNCTIONS: dict[str, tuple[tuple[str, ...], str]] = {
     ),
 }
 """{name: (arguments, result)}, each after those it calls; the formulas are those of kernels.numba_functions."""
+
+
 STABLE_FUNCTION_NAMES = frozenset((*TARGET_FUNCTIONS, *STABLE_FUNCTIONS, "value", "other", "least"))
 
 

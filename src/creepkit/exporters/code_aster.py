@@ -26,7 +26,11 @@ from creepkit.exporters.law_code import Identifiers
 from creepkit.records import LawWithValues
 
 _ALTERNATIVE = "export it as 'mfront', which code_aster reads with RELATION='MFRONT'"
+
+
 _FORMULA = "LEMAITRE: rate = (UN_SUR_K s / e^UN_SUR_M)^N, of equivalent stress s and creep strain e."
+
+
 _RESERVED = (*keyword.kwlist, "_F", "DEFI_CONSTANTE", "DEFI_MATERIAU", "FORMULE")
 
 

@@ -22,10 +22,16 @@ from creepkit.language.symbols import GAS_CONSTANT, strain, stress, temperature,
 from creepkit.records import LawWithValues, Units
 
 _INVERSE_T = sympy.Symbol("per_T", positive=True)
+
+
 _CONSTANT, _INVERSE_TEMPERATURE, _STRESS_MONOMIAL = (0, 0), (1, 0), (0, 1)
 """Monomials of 1/T and stress, as sympy writes them."""
+
+
 _DIGITS = 30
 """Digits of values while products are taken apart, so that none of a double's are lost."""
+
+
 StressFunction = Literal["power", "sinh", "exponential"]
 
 

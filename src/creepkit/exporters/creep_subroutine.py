@@ -22,6 +22,8 @@ from creepkit.records import LawWithValues
 
 _MAX_NAME_LENGTH = 31
 """Characters of a name by any standard since Fortran 90; a longer one might not fit into a line either."""
+
+
 _MAX_STEM_LENGTH = 20
 """Characters of a routine's stem; with its endings it stays a name."""
 

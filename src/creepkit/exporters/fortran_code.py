@@ -18,13 +18,19 @@ from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, KernelPrinter
 from creepkit.language.symbols import POINT_VARIABLES
 
 FORTRAN_LINE_LENGTH = 72
+
+
 _NUMBER = re.compile(r"(?<![\w.])(\d+\.?\d*)(?:[eE]([+-]?\d+))?(?![\w.])")
+
+
 _TOKEN = re.compile(r"\d+\.?\d*(?:d[+-]?\d+)?|\w+|\*\*|[<>=/]=|::|\S|\s+")
+
 
 _FORTRAN_WORDS = """
 abs atanh contains do double else end endif exit function if implicit intent log max merge min none out parameter
 precision pure return subroutine then x
 """
+
 
 FORTRAN_RESERVED = frozenset(_FORTRAN_WORDS.split()) | {*TARGET_FUNCTIONS}
 """Words that no name of a law may be: those of the routine that evaluates it."""
@@ -223,6 +229,7 @@ _FUNCTION_BODIES: dict[str, tuple[str, str, tuple[str, ...]]] = {
 Fortran has neither log1p nor expm1: 2 artanh(a/(2 + a)) and 2 sinh(a/2) exp(a/2) keep all digits near zero, whatever
 an optimiser does to sums.
 """
+
 
 _FUNCTION_CALLS = {
     "log_sinh": ("expm1",),

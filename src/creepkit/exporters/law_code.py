@@ -68,6 +68,8 @@ def factor_text(factor: float) -> str:
 
 
 Assignments = tuple[tuple[sympy.Symbol, sympy.Expr], ...]
+
+
 _kernel_entries = lru_cache(maxsize=128)(symbolic_kernel)
 
 

@@ -26,6 +26,7 @@ VALUED_LAW = DocumentFormat(
     remedy="export the law again",
 )
 
+
 _CONVENTIONS = {
     "units": {"stress": "MPa", "time": "s", "temperature": "K", "energy": "J/mol"},
     "gas_constant": GAS_CONSTANT,

@@ -25,6 +25,7 @@ from creepkit.records import LawWithValues
 
 MATHML_NAMESPACE = "http://www.w3.org/1998/Math/MathML"
 
+
 _VARIABLE_NAMES = {
     stress: ("σ", "e"),
     strain: ("ε", "cr"),
@@ -34,8 +35,11 @@ _VARIABLE_NAMES = {
     mean_stress: ("σ", "m"),
 }
 
+
 _XML_ENTITIES = ("amp", "lt", "gt", "quot", "apos")
 """The names of characters that XML knows itself."""
+
+
 _STYLE = "table { border-collapse: collapse } td, th { border: 1px solid #999; padding: 0.2em 0.6em; text-align: left }"
 
 

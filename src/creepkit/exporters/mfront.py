@@ -52,6 +52,8 @@ EquivalentStress YoungModulus PoissonRatio ShearModulus BulkModulus Pressure Hyd
 TimeUnderLoad
 """
 """Names that MFront or TFEL keep, entries of its glossary that a law may come upon, and this block's own names."""
+
+
 _DERIVATIVE_NAMES = {stress: "stress", principal_stress: "principal", mean_stress: "mean", strain: "strain"}
 """{variable: how the name of a derivative to it ends}."""
 
@@ -238,6 +240,7 @@ def _derived_names(source: LawWithValues) -> set[str]:
 
 _LINE_LENGTH = 120
 
+
 _PREDICTOR_BLOCK = [
     "@Predictor {",
     "  // rates that are singular at zero strain need a first guess",
@@ -246,6 +249,7 @@ _PREDICTOR_BLOCK = [
     "  }",
     "}",
 ]
+
 
 _FORMULA_NODES = (sympy.Add, sympy.Mul, sympy.Pow, sympy.exp, sympy.log, sympy.Symbol, sympy.Number)
 """What the formulas of @ElasticMaterialProperties may hold."""

@@ -49,11 +49,13 @@ def hit_list(items: Sequence[str]) -> str:
 
 _MOOSE_ALTERNATIVE = "export it as 'mfront', whose Abaqus interface AbaqusUMATStress calls"
 
+
 _MOOSE_FORMULA = (
     "PowerLawCreepStressUpdate: rate = coefficient s^n_exponent exp(-activation_energy/(gas_constant T)) "
     "(t - start_time)^m_exponent, of equivalent stress s; ComputeMultipleInelasticStress adds the models. "
     "t is the analysis time: start_time is when the load begins. It takes strain = FINITE, or incremental = true."
 )
+
 
 _MOOSE_RESERVED = ("stress", "elasticity")
 
@@ -130,14 +132,17 @@ def _temperature_notes(forms: Sequence[CreepForm]) -> list[str]:
 
 _NEML2_ALTERNATIVE = "export it as 'python', whose rate a flow rate of your own in NEML2 can follow"
 
+
 _NEML2_FORMULA = (
     "For NEML2 3.1. PerzynaPlasticFlowRate: rate = (s/reference_stress)^exponent, of the von Mises stress s, which "
     "stands in the place of the yield function. The model called `model` makes the stress of strain E and time t."
 )
 
+
 _NEML2_ARRHENIUS = (
     "Reference stresses: reference_value exp(-activation_energy/(R T)), T the input called temperature, in K."
 )
+
 
 _NEML2_RESERVED = (
     *("mandel_stress", "vonmises", "flow", "normality", "flow_rate", "sum", "Eprate", "Erate", "Eerate", "elasticity"),

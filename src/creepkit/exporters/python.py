@@ -27,7 +27,11 @@ from creepkit.records import LawWithValues, Units
 
 STRESS_SYMBOLS = (stress, principal_stress, mean_stress)
 """The variables of a point that are in the units of stress."""
+
+
 _MODULE_NAMES = ("INITIAL", "LIMIT", "errstate", "inf", "max", "min", "np", "rate", "state_rates")
+
+
 LogSymbols = Mapping[sympy.Symbol, sympy.Symbol]
 
 

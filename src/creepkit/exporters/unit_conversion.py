@@ -23,6 +23,8 @@ from creepkit.records import LawWithValues, Units
 
 _FACTOR_TOLERANCE = 1e-9
 """Relative difference of factors that counts as none; rounding of the inputs leaves some 1e-14."""
+
+
 _POINT_COUNT = 12
 
 

@@ -319,11 +319,21 @@ def _scatter_side(body: FiniteElementModel, k: int, pressure: float, forces: For
 
 
 _SPREAD = np.sqrt(0.6)
+
+
 _X = np.array([-_SPREAD, 0.0, _SPREAD])
+
+
 _WEIGHTS = np.array([5.0, 8.0, 5.0]) / 9.0
+
+
 VALUES = np.stack([0.5 * _X * (_X - 1.0), 1.0 - _X**2, 0.5 * _X * (_X + 1.0)], axis=1)
 """Shape functions of a side (first, middle, last node) at three Gauss points, which integrate it exactly."""
+
+
 SLOPES = np.stack([_X - 0.5, -2.0 * _X, _X + 0.5], axis=1)
+
+
 GAUSS_WEIGHTS = _WEIGHTS
 
 

@@ -14,6 +14,8 @@ from creepkit.fem.mesh import Mesh, discretize
 
 BLOCK = 4
 """Columns eliminated at a time; also the number of zeros at the side of the band."""
+
+
 _FAST = {"reassoc", "contract", "nsz"}
 
 

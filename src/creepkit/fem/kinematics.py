@@ -11,10 +11,20 @@ from creepkit.arrays import Floats, Ints
 
 SUM, DIFFERENCE, HOOP, SHEAR = range(4)
 """Places of the components of strain and stress."""
+
+
 Three = tuple[float, float, float]
+
+
 Four = tuple[float, float, float, float]
+
+
 Five = tuple[float, float, float, float, float]
+
+
 _SERIES = 0.05
+
+
 _SHORT = 0.004
 """Below the first y the series of phi has 14 terms, below the second 7; what is left out is under 1e-17."""
 

@@ -23,6 +23,8 @@ from creepkit.integration.stage_solver import solve_stage
 from creepkit.kernels.interface import MEAN_STRESS, PRINCIPAL_STRESS, STRAIN
 
 CREEP_COMPONENTS = 3
+
+
 EQUIVALENT_STRAIN = 3
 """Place of the equivalent creep strain in a point's history: three components, this, then the states."""
 

@@ -63,7 +63,11 @@ def read_input_deck(path: str | Path, *, pressed: str | None = None, top: str | 
 
 
 MESH_FILE = FileKind("a mesh", SolveError, "a mesh is read from text files in UTF-8", maximum_bytes=500_000_000)
+
+
 _CORNERS = ("n1", "n2", "n3", "n4")
+
+
 _MIDDLES = ("n5", "n6", "n7", "n8")
 
 
@@ -117,8 +121,12 @@ def _rows(path: Path, columns: Sequence[str], more: Sequence[str] = ()) -> Itera
 
 
 T = TypeVar("T")
+
+
 ELEMENT_TYPES = {"CAX4": 4, "CAX4R": 4, "CAX8": 8, "CAX8R": 8}
 """Nodes of the element types that are read."""
+
+
 NAMED_SUPPORTS = {"ENCASTRE": (True, True), "PINNED": (True, True), "XSYMM": (True, False), "YSYMM": (False, True)}
 """Whether r and z are held by the supports that Abaqus knows by name."""
 
@@ -284,6 +292,7 @@ _MESH: Mapping[str, Callable[[InputDeck, KeywordCard], None]] = {
     "NSET": _set,
     "ELSET": _set,
 }
+
 
 _USES: Mapping[str, Callable[[InputDeck, KeywordCard], None]] = {
     "SURFACE": _surface,

@@ -48,8 +48,12 @@ from creepkit.kernels.interface import POINT_SIZE, TEMPERATURE, TIME, data_point
 
 LANES = 16
 """Right-hand sides are kept in multiples of this, the numbers that a processor takes at a time twice over."""
+
+
 _NUDGE = 1e-4
 """Share of a segment's length by which its ends are moved to difference its time transformation."""
+
+
 BY_PRESSURE, BY_MOMENT, BY_LOAD_TEMPERATURE, BY_STIFFNESS, BY_WEIGHT = range(5)
 """Rows of ChangeRoom.inputs: change of pressure, of time, of temperature, of ln E, and of ln weight."""
 

@@ -46,6 +46,7 @@ REASONS = {
 }
 """What each ending means, in words."""
 
+
 _STATUS = {
     REACHED_END: Status.COMPLETE,
     DEFLECTION_LIMIT: Status.RUPTURED,

@@ -20,6 +20,7 @@ from creepkit.integration.time_discretisation import SMALLEST_EXPONENT
 )
 """Codes of an ending; whatever it is, the history so far is kept."""
 
+
 START, END, PRESSURE, END_PRESSURE, START_TEMPERATURE, FINAL_TEMPERATURE, MODULUS, END_MODULUS, MOTION, END_MOTION = (
     range(10)
 )
@@ -139,6 +140,8 @@ def record_step(
 
 OFFSET = 20.0
 """s; twice the first step after a change of load."""
+
+
 SHORT = 0.2
 """A last step this much shorter than the one before does not count for the spline."""
 

@@ -40,9 +40,14 @@ CONVERGED, NO_STRESS, UNSTABLE, TOO_FAR, TOO_MANY, UNDEFINED = range(6)
 """Flags: found; a point had no solution; the tangent is not positive definite; corrections grow; too many of them; the
 law gave no finite rate."""
 
+
 _ITERATIONS = 16
+
+
 _LOOSE = 0.03
 """Tolerance of the points' own equations in the first pass, from which the displacements move anyway."""
+
+
 _KEEP = 0.3
 """The tangent is kept while each correction is at most this share of the one before."""
 

@@ -52,6 +52,8 @@ class NumberRange:
 
 
 FINITE = NumberRange()
+
+
 ANY_NUMBER = NumberRange(nan=True, infinite=True)
 
 
@@ -240,6 +242,8 @@ class RecordCodec:
 
 
 _WORDS = {bool: "true or false", int: "a whole number", str: "a text"}
+
+
 _KINDS = {bool: (bool,), int: (int,), float: (int, float, type(None), str), str: (str,), type(None): (type(None),)}
 
 

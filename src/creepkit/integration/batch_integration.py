@@ -39,8 +39,14 @@ REASONS = {
     TOO_MANY_STEPS: "the cap on steps was reached",
 }
 """What each ending means, in words."""
+
+
 _STATUS = np.full(len(REASONS), int(Status.NOT_CONVERGED))
+
+
 _STATUS[REACHED_END] = Status.COMPLETE
+
+
 _STATUS[[STRAIN_LIMIT, STATE_LIMIT, DIVERGED]] = Status.RUPTURED
 
 

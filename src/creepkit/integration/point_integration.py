@@ -56,7 +56,11 @@ from creepkit.integration.time_discretisation import (
 )
 
 _SMALLEST_STEP = 1e-13
+
+
 _SMALLEST_FIRST_STEP = 1e-60
+
+
 _NEGLIGIBLE = 0.01
 """Share of the tolerance within which a time need not be known better."""
 

@@ -16,6 +16,8 @@ from creepkit.kernels.interface import MEAN_STRESS, POINT_SIZE, PRINCIPAL_STRESS
 
 SOLVED, NOT_FINITE, NO_SOLUTION, TOO_MANY = range(4)
 """Flags of a stage: solved; the rate is not finite; no increment satisfies the equation; iterations used up."""
+
+
 NO_RATE = -600.0
 """ln of a rate, 1/s, below which nothing creeps (a law whose terms are off, or a stress of zero)."""
 
@@ -138,6 +140,8 @@ def _swap(rows: Floats, i: int, k: int) -> None:
 
 
 INPUTS = 7
+
+
 BY_TRIAL, BY_STRAIN, BY_TIME, BY_TEMPERATURE, BY_LOG_WEIGHT, BY_PRINCIPAL, BY_MEAN = range(INPUTS)
 """Columns of a response; those of the S initial states z0 and of the P parameters follow."""
 

@@ -37,6 +37,8 @@ from creepkit.integration.stage_problem import (
 from creepkit.kernels.interface import POINT_SIZE, STRAIN, data_pointer
 
 _ITERATIONS = 80
+
+
 _NEAR_ITERATIONS = 4
 
 
@@ -170,7 +172,11 @@ def solve_stage_near_guess(
 
 
 _COUPLED_ITERATIONS = 80
+
+
 _HALVINGS = 12
+
+
 _LONGEST_CORRECTION = 5.0
 
 

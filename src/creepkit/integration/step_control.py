@@ -24,8 +24,12 @@ from creepkit.integration.time_discretisation import (
 from creepkit.kernels.interface import POINT_SIZE, STRAIN, TEMPERATURE, TIME, data_pointer
 
 _SAFETY, _LEAST, _MOST = 0.9, 0.1, 8.0
+
+
 _SENSITIVITY_SLACK = 10.0
 """Sensitivities are of the order of ten strains: d(strain)/d(exponent) = strain ln(stress)."""
+
+
 INITIAL_ERROR_FACTOR = 10.0
 """From a virgin state strain is a sum of broken powers of s, on which the first step is of order 1 and its error is up
 to 2.5 times the estimate; afterwards the estimate exceeds the error some twenty times."""
@@ -144,6 +148,8 @@ def bounded_step(s: float, h: float, longest: float) -> float:
 
 _ZERO_STRAIN = 1e-25
 """Creep strain below this is none."""
+
+
 _NUDGE = 1e-6
 
 

@@ -34,7 +34,7 @@ from creepkit.integration.time_discretisation import (
     transformed_time,
 )
 from creepkit.kernels.interface import CompiledLaw
-from creepkit.records import COMPONENTS, Program, Status
+from creepkit.records import TENSOR_COMPONENTS, Program, Status
 
 _SMALLEST_STEP, _SMALLEST_FIRST_STEP = 1e-13, 1e-60
 
@@ -253,7 +253,7 @@ def integrate_tensor_point(
     """
     outputs = np.atleast_1d(np.asarray(times, dtype=float))
     _check(law, np.size(theta), elastic, controls, outputs)
-    component_controls = [controls.get(name, prescribed_stress(0.0)) for name in COMPONENTS]
+    component_controls = [controls.get(name, prescribed_stress(0.0)) for name in TENSOR_COMPONENTS]
     strain_controlled = np.array([control.quantity == "strain" for control in component_controls])
     point = TensorPoint(law, np.array(theta, dtype=float).reshape(-1), elastic, strain_controlled)
     programs = [*(c.program for c in component_controls), prescribed_stress(temperature).program]
@@ -294,5 +294,5 @@ def _check(
     if not (0 < elastic[0] < inf and -1 < elastic[1] < 0.5):
         raise SolveError(f"E is {elastic[0]:g} MPa and nu {elastic[1]:g}; allowed are E above 0 and nu in (-1, 0.5)")
     for name in controls:
-        if name not in COMPONENTS:
-            raise SolveError(f"there is no component '{name}' to drive; allowed are {', '.join(COMPONENTS)}")
+        if name not in TENSOR_COMPONENTS:
+            raise SolveError(f"there is no component '{name}' to drive; allowed are {', '.join(TENSOR_COMPONENTS)}")

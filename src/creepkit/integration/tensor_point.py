@@ -27,17 +27,33 @@ from creepkit.integration.stage_problem import (
 from creepkit.integration.stage_solver import solve_stage
 from creepkit.integration.time_discretisation import merge_programs
 from creepkit.kernels.interface import POINT_SIZE, STRESS, TEMPERATURE, TIME, CompiledLaw, call_entry
-from creepkit.records import COMPONENTS, PointLoading, Program
+from creepkit.records import TENSOR_COMPONENTS, PointLoading, Program
 
 EQUIVALENT_STRAIN = 6
 """Place of the equivalent creep strain in a point's vector: six creep strains, then this, then the states."""
+
+
 _UNIT = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+
+
 _TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+
+
 _ROWS, _COLUMNS = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
+
+
 _DEVIATOR = np.eye(6) - np.outer(_UNIT, _UNIT) / 3.0
+
+
 _ITERATIONS = 30
+
+
 _BALANCE, _NO_STRESS = 1e-9, 1e-12
+
+
 _LAST_CORRECTION = 1e-8
+
+
 _FIRST_INCREMENT = 1e-6
 
 
@@ -178,7 +194,11 @@ class TensorPoint:
 
 _PROPORTIONALITY_TOLERANCE = 1e-9
 """Of the largest stress: what differs by less is the same direction."""
+
+
 _SHEAR_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+
+
 _MEAN_DIRECTION = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
@@ -202,7 +222,7 @@ def proportional_loading(
     """The scalar problem of a loading up to `end`, s; None where there is none. elastic : E, MPa, and nu."""
     if loading.strain:
         return None if elastic is None else _single_strain(loading, elastic)
-    programs = [loading.stress.get(name, Program.constant(0.0)) for name in COMPONENTS]
+    programs = [loading.stress.get(name, Program.constant(0.0)) for name in TENSOR_COMPONENTS]
     times, stresses = _segment_ends(programs, end)
     means = stresses[:, :3].mean(axis=1)
     deviators = stresses - means[:, None] * _MEAN_DIRECTION
@@ -228,7 +248,7 @@ def _single_strain(loading: PointLoading, elastic: tuple[float, float]) -> Propo
     if (np.diff(strain.values) < 0.0).any() or strain.values[0] < 0.0:
         return None
     (E, nu), shear = elastic, name[0] != name[1]
-    along = np.where(np.arange(6) == COMPONENTS.index(name), 1.0 / np.sqrt(3.0) if shear else 1.0, 0.0)
+    along = np.where(np.arange(6) == TENSOR_COMPONENTS.index(name), 1.0 / np.sqrt(3.0) if shear else 1.0, 0.0)
     stiffness = 1.5 * E / (1.0 + nu) if shear else E
     driving = stiffness * strain.values * (2.0 / np.sqrt(3.0) if shear else 1.0)
     trial = trial_stress(along)

@@ -58,6 +58,7 @@ def _tableau(
 
 _ALEXANDER = 1.0 - np.sqrt(0.5)
 
+
 SDIRK2 = _tableau(
     rows=[[_ALEXANDER], [1.0 - _ALEXANDER, _ALEXANDER]],
     embedded=[1.0, 0.0],
@@ -69,6 +70,7 @@ SDIRK2 = _tableau(
 The embedded solution is the first stage's slope over the whole step; the dense output is the one quadratic that
 meets the conditions of order 2 at every place.
 """
+
 
 SDIRK4 = _tableau(
     rows=[
@@ -150,8 +152,12 @@ def _just_before(program: Program, times: Floats) -> Floats:
 
 SMALLEST_EXPONENT = 0.05
 """Exponents of time are not taken below this: t^m with m = -0.95, where the laws' bounds stop."""
+
+
 _LARGEST_POWER = 12.0
 """Bound of |beta| ln(1 + L/tau): (1 + y/tau)^beta keeps some ten digits next to 1."""
+
+
 _LONGEST_TAU = 1e6
 """A shift this much longer than the segment bends nothing within it."""
 

@@ -133,6 +133,8 @@ def constraint_points(
 
 FORCE_LIMIT = 1.0
 """Force of the data against the bounds of a coefficient, in units of misfit per frame and ln, that is an error."""
+
+
 EXCESS_LIMIT = 0.1
 """In ln beyond the bounds of a coefficient: further than a penalty of the law's bounds ever lets a minimum lie."""
 

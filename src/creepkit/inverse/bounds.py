@@ -17,6 +17,7 @@ LOG_RATE_BOUNDS = (-12.0, 6.0)
 """Bounds of the log rate of a term, or of an internal variable, about the measured one: at 1e-5 of the data it is
 absent, at 400 times it is wrong."""
 
+
 EXPONENT_SAMPLES = 256
 """Points within the bounds of the parameters at which the range of local exponents is evaluated."""
 

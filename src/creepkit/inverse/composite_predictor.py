@@ -212,6 +212,8 @@ def reduced_order_model_of(predictor: Predictor) -> Predictor | None:
 
 RELATIVE_STEP = 1e-4
 """Of internal parameters (ln of a coefficient, an exponent), relative to the larger of their size and one."""
+
+
 NUISANCE_STEPS = {"thickness": 1e-3, "window": 1e-2, "modulus": 1e-3, "temperature": 0.1}
 """mm, mm, relative, K: far above what the error of a solver's steps is, and bending outputs by under 1e-6 of them."""
 
@@ -261,14 +263,16 @@ def _difference_points(
 
 
 def predict_to_rupture(
-    using: Predictor, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
+    predictor: Predictor, law: CreepLaw, theta: Floats, histories: Sequence[History], *, sensitivities: bool = False
 ) -> Prediction:
     """Predict with `times_to_strain`; tests whose predictor follows none to rupture reach no strain and never break.
 
     theta : (candidates, parameters) internal values.
     """
     groups = (
-        using.groups(histories) if isinstance(using, CompositePredictor) else [(using, list(range(len(histories))))]
+        predictor.groups(histories)
+        if isinstance(predictor, CompositePredictor)
+        else [(predictor, list(range(len(histories))))]
     )
     group_predictions = []
     for predictor, tests in groups:

@@ -18,8 +18,12 @@ from creepkit.records import History, Prediction, Predictor, Status
 
 AGREEMENT_LIMIT = 1.0
 """Largest rms difference to what the fit predicts, in standard deviations of the noise, that confirms it."""
+
+
 ACCEPTABLE_CHI_SQUARE = 2.0
 """Mean chi-square above which a law does not follow a test, whoever predicts it."""
+
+
 INCOMPLETE_STATUS = {Status.RUPTURED: "the specimen bursts", Status.NOT_CONVERGED: "the simulation stops"}
 
 

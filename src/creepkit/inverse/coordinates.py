@@ -18,8 +18,12 @@ from creepkit.language.symbols import POINT_VARIABLES
 
 SAMPLE_POINTS = 64
 """Points within the bounds at which the derivative to a candidate parameter is evaluated."""
+
+
 MINIMUM_DERIVATIVE = 0.2
 """Of dh/dp over the bounds: a parameter that the local exponent hardly depends on cannot replace it."""
+
+
 LARGEST_EXPONENT = 30.0
 """Upper bound of local exponents."""
 

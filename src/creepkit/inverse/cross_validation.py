@@ -32,6 +32,8 @@ from creepkit.records import History, Prediction, Predictor, Status
 
 FITTED_FRACTION = 0.7
 """Of the duration of each history: the part that is fitted in cross-validation by time."""
+
+
 FoldBy = Literal["test", "condition", "time"]
 
 

@@ -167,7 +167,7 @@ class TestFit:
         return self.outputs[0].offset if self.outputs else 0.0
 
 
-def goodness_of_tests(
+def test_fits(
     problem: LeastSquaresProblem,
     residuals: Residuals,
     random_effects: tuple[Floats, Floats],
@@ -248,7 +248,7 @@ def _log_ratios(problem: LeastSquaresProblem, residuals: Residuals, offset: Floa
     predicted_strain = np.where(above_floor, np.maximum(predicted, floor), 1.0)
     log_ratio = np.where(
         observations.followed_to_rupture[:, None],
-        residuals.values + residuals.transform_derivatives * offset,
+        residuals.values + residuals.offset_sensitivity * offset,
         np.log(predicted_strain / measured),
     )
     return np.where(above_floor, log_ratio, np.nan)

@@ -28,13 +28,27 @@ IDENTIFICATION = DocumentFormat(
     remedy="identify again",
 )
 
+
 NOT_NEGATIVE = NumberRange(low=0.0)
+
+
 POSITIVE = NumberRange(low=0.0, open_low=True)
+
+
 POSITIVE_OR_INFINITE = NumberRange(low=0.0, open_low=True, infinite=True)
+
+
 NAN_ALLOWED = NumberRange(nan=True)
+
+
 NOT_NEGATIVE_OR_NAN = NumberRange(low=0.0, nan=True, infinite=True)
+
+
 INFINITY_ALLOWED = NumberRange(infinite=True)
+
+
 LAW_CODEC = ValueCodec(law_to_json, law_from_json)
+
 
 CODEC = RecordCodec(
     omitted={Identification: ("histories", "predictor", "search_trace", "linearised", "problem"), Sparsity: ("path",)},

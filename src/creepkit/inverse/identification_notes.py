@@ -22,6 +22,8 @@ from creepkit.records import History, Prediction, Status
 
 LOW_TEST_WEIGHT = 0.5
 """Weight below which a test is named."""
+
+
 LARGE_STRAIN, LARGE_RUPTURE_STRAIN = 0.5, 2.0
 """Strains above these are worth a word: of a test whose end is not known, and of one that was followed to it."""
 
@@ -99,7 +101,7 @@ def identification_notes(
         note = likelihood_note if settings.weights == "likelihood" else assumption_note
         sentences.append(f"fewer than {MINIMUM_TESTS} tests: {note}")
     sentences += _large_strain_notes(histories)
-    if (problem.bound_penalties.constraint_violations(estimation.minimum.u[: problem.parameter_count]) > 1e-3).any():
+    if (problem.bound_penalties.constraint_violations(estimation.minimum.x[: problem.parameter_count]) > 1e-3).any():
         sentences.append("a constraint of the law does not hold over the tests at these values")
     return (*sentences, *_test_notes(problem, tests, nuisances))
 

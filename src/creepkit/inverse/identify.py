@@ -12,12 +12,7 @@ from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.inverse.bound_penalties import check_bounds
 from creepkit.inverse.composite_predictor import predict, prediction_errors_of, reduced_order_model_of
-from creepkit.inverse.goodness_of_fit import (
-    compare_rupture_times,
-    goodness_of_tests,
-    pooled_errors,
-    pooled_log_strain_rms,
-)
+from creepkit.inverse.goodness_of_fit import compare_rupture_times, pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_notes import domain_notes, fitted_ranges, identification_notes, provenance_of
 from creepkit.inverse.iterative_estimation import (
@@ -52,7 +47,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     restricted_covariance,
 )
 from creepkit.inverse.variance_components import estimate_variance_components
-from creepkit.inverse.working_noise import WorkingNoise, with_rupture_weight
+from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_rupture_weight
 from creepkit.language import CreepLaw
 from creepkit.records import History, Nuisance, Predictor
 
@@ -113,7 +108,7 @@ def identify(
         best = _best_estimate(problem, search_outcome, through, start or StartingEstimate(None), progress)
         gradient = _gradient(best)[: len(law.params)]
         check_bounds(
-            best.problem.bound_penalties, best.minimum.u[: len(law.params)], gradient, problem.observations.count
+            best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
         return _result(histories, best, search_outcome)
 
@@ -168,7 +163,7 @@ def _global_search(
         searched.bounds,
         equal_predictions=EQUAL_PREDICTIONS if reduced_order_model is None else EQUAL_REDUCED_ORDER_PREDICTIONS,
     )
-    starts = [minimum.u for minimum in distinct_minima]
+    starts = [minimum.x for minimum in distinct_minima]
     return SearchOutcome(starts, searched.evaluations.count, search_result.trace, distinct_minima[0].terms_off)
 
 
@@ -198,7 +193,7 @@ def _best_estimate(
         cheaper = problem.with_predictor(through)
         results = [estimate_iteratively(cheaper, x, working_estimator, APPROXIMATE_LIMITS, progress) for x in starts]
         best = max(results, key=lambda end: end.log_likelihood)
-        starts, working_noise = [best.minimum.u], best.working_noise
+        starts, working_noise = [best.minimum.x], best.working_noise
     if reduced_order_model_of(problem.predictor) is not None:
         limits = SIMULATION_LIMITS
     if start.u is not None:
@@ -207,13 +202,13 @@ def _best_estimate(
     return max(results, key=lambda end: end.log_likelihood)
 
 
-def _working_estimator(problem: LeastSquaresProblem) -> WorkingNoise:
-    return WorkingNoise(problem.settings, problem.observations, prediction_errors_of(problem.predictor))
+def _working_estimator(problem: LeastSquaresProblem) -> WorkingNoiseEstimator:
+    return WorkingNoiseEstimator(problem.settings, problem.observations, prediction_errors_of(problem.predictor))
 
 
 def _result(histories: Sequence[History], best: EstimationResult, search_outcome: SearchOutcome) -> Identification:
     """Noise model, intervals and goodness of fit at the optimum."""
-    problem, residuals, x = best.problem, best.residuals, best.minimum.u
+    problem, residuals, x = best.problem, best.residuals, best.minimum.x
     law, coordinates, count = problem.law, problem.coordinates, problem.parameter_count
     u = x[:count]
     noise_model, covariance, freedom = _uncertainty(best, len(histories))
@@ -228,7 +223,7 @@ def _result(histories: Sequence[History], best: EstimationResult, search_outcome
     ruptures = compare_rupture_times(
         coordinates, u, law_covariance, noise_model, interval_quantile(freedom), histories, problem.predictor
     )
-    tests = goodness_of_tests(
+    tests = test_fits(
         problem, residuals, predicted_random_effects(residuals, noise_model), histories, prediction, ruptures
     )
     nuisance_estimates = _nuisance_estimates(
@@ -263,10 +258,10 @@ def _result(histories: Sequence[History], best: EstimationResult, search_outcome
 
 def _uncertainty(best: EstimationResult, tests: int) -> tuple[NoiseModel, Floats, float]:
     """The noise model, the posterior covariance of x = (u, e), (unknowns, unknowns), and its degrees of freedom."""
-    problem, x = best.problem, best.minimum.u
+    problem, x = best.problem, best.minimum.x
     settings, working_estimator = problem.settings, _working_estimator(problem)
     if best.linearised is not None:
-        fixed = working_estimator.fixed_components(best.working_noise)
+        fixed = working_estimator.unestimated_drift_components(best.working_noise)
         return best.working_noise, *restricted_covariance(
             best.linearised, best.working_noise, settings.nuisances, fixed
         )

@@ -13,6 +13,8 @@ from creepkit.inverse.noise_model import Residuals
 
 DECISIVE_WEIGHT = 0.95
 """Weight above which one law is decided for."""
+
+
 CREDIBLE_WEIGHT = 0.05
 """Weight above which a law is not ruled out."""
 

@@ -20,13 +20,16 @@ from creepkit.inverse.variance_components import (
     restricted_log_likelihood,
     scaled_inverse,
 )
-from creepkit.inverse.working_noise import WorkingNoise, robust_test_weights, with_rupture_weight
+from creepkit.inverse.working_noise import WorkingNoiseEstimator, robust_test_weights, with_rupture_weight
 
 PRIOR_STEPS = 30
 """Steps of the estimate of prior standard deviations in each round; they cost no simulation."""
+
+
 LIKELIHOOD_TOLERANCE = 1e-5
 """Relative change of a chi-square that ends a refinement by likelihood: some thousandth of one, well inside an interval
 and above what the steps of a solver leave."""
+
 
 CONVERGED_GAIN = 0.02
 """Gain of the log-likelihood, and change of a test's weight, that ends the rounds."""
@@ -43,6 +46,8 @@ class IterationLimits:
 
 APPROXIMATE_LIMITS = IterationLimits(rounds=3, steps=15, tolerance=1e-4)
 """For a predictor on the way to another."""
+
+
 SIMULATION_LIMITS = IterationLimits(rounds=5, steps=25, tolerance=1e-6)
 """For predictors with a reduced-order model: solvers are smooth to about that."""
 
@@ -66,7 +71,7 @@ class EstimationResult:
 def estimate_iteratively(
     problem: LeastSquaresProblem,
     x: Floats,
-    working_estimator: WorkingNoise,
+    working_estimator: WorkingNoiseEstimator,
     limits: IterationLimits,
     progress: IterationCallback | None,
     working_noise: NoiseModel | None = None,
@@ -93,7 +98,7 @@ def estimate_iteratively(
         problem = problem.with_covariance(_covariance_factor(problem, residuals, working_noise, working_estimator))
         tolerance = max(limits.tolerance, LIKELIHOOD_TOLERANCE) if working_estimator.by_likelihood else limits.tolerance
         minimum = problem.minimise(x, tolerances=Tolerances(limits.steps, tolerance))
-        x = minimum.u
+        x = minimum.x
         residuals = problem.residuals(x).with_test_weights(test_weights)
         current = _round_result(problem, minimum, residuals, working_noise, working_estimator.by_likelihood)
         problem = current.problem
@@ -108,7 +113,10 @@ def estimate_iteratively(
 
 
 def _covariance_factor(
-    problem: LeastSquaresProblem, residuals: Residuals, working_noise: NoiseModel, working_estimator: WorkingNoise
+    problem: LeastSquaresProblem,
+    residuals: Residuals,
+    working_noise: NoiseModel,
+    working_estimator: WorkingNoiseEstimator,
 ) -> Floats:
     """(tests, observations, observations) Cholesky factors under which the values of a round are found."""
     fitting_noise = (
@@ -143,17 +151,17 @@ def _round_result(
     """The end of a round, with the prior standard deviations that its residuals show."""
     nuisances = problem.nuisance_parameters
     if restricted:
-        nuisances = _with_estimated_priors(nuisances, residuals, working_noise, minimum.u)
+        nuisances = _with_estimated_priors(nuisances, residuals, working_noise, minimum.x)
         problem = problem.with_nuisances(nuisances)
-        linear = linearised(problem, minimum.u, residuals)
+        linear = linearised(problem, minimum.x, residuals)
         likelihood = restricted_log_likelihood(linear, working_noise)
         return EstimationResult(problem, minimum, residuals, working_noise, likelihood, linear)
     likelihood = log_likelihood(residuals, working_noise)
     if not nuisances.size:
         return EstimationResult(problem, minimum, residuals, working_noise, likelihood)
     information = normal_matrix(residuals, working_noise)
-    nuisances = _with_estimated_priors(nuisances, residuals, working_noise, minimum.u)
-    e = minimum.u[-nuisances.size :]
+    nuisances = _with_estimated_priors(nuisances, residuals, working_noise, minimum.x)
+    e = minimum.x[-nuisances.size :]
     likelihood = marginal_log_likelihood(likelihood, information, e, nuisances)
     return EstimationResult(problem.with_nuisances(nuisances), minimum, residuals, working_noise, likelihood)
 

@@ -17,9 +17,9 @@ class Residuals:
     """Residuals of the observation vector (see inverse.observation_vector), with what their covariance depends on.
 
     values : (tests, observations) -, transformed prediction less transformed observation.
-    transform_derivatives : (tests, observations) 1 / unit, effect of one unit of offset.
+    offset_sensitivity : (tests, observations) 1 / unit, effect of one unit of offset.
     present : (tests, observations) which are data; the others are zero.
-    correlation_time : (tests, observations) -, in which drifts decay (see ObservationVector.correlation_time).
+    correlation_coordinate : (tests, observations) -, in which drifts decay (see ObservationVector.correlation_coordinate).
     jacobian : (tests, observations, unknowns) derivatives to x = (u, e), or None.
     log_rate_sensitivity : (tests, observations) -, derivative to ln of a factor on the creep rate of the test.
     output_index : (tests, observations) position of the output; relative_noise : (tests, observations) -, noise over
@@ -30,9 +30,9 @@ class Residuals:
     """
 
     values: Floats
-    transform_derivatives: Floats
+    offset_sensitivity: Floats
     present: Bools
-    correlation_time: Floats
+    correlation_coordinate: Floats
     jacobian: Floats | None
     log_rate_sensitivity: Floats
     output_index: Ints
@@ -47,6 +47,8 @@ class Residuals:
 
 MINIMUM_TESTS = 3
 """Below this many tests the scatter between them cannot be estimated."""
+
+
 ASSUMED_RATE_SD = 0.3
 """Scatter of ln rate between tests that is assumed then, unless a likelihood is asked for."""
 
@@ -116,7 +118,7 @@ def initial_sd(nuisances: Sequence[Nuisance], kind: str, default: float, output:
     return standard_deviations[0] if standard_deviations else 0.0
 
 
-def fixed_components(nuisances: Sequence[Nuisance], outputs: Sequence[str]) -> set[tuple[str, str]]:
+def components_fixed_by_priors(nuisances: Sequence[Nuisance], outputs: Sequence[str]) -> set[tuple[str, str]]:
     """Those (output, component) that a nuisance states; the rate belongs to the output ""."""
     fixed: set[tuple[str, str]] = {("", "rate") for n in nuisances if n.kind == "rate" and n.sd is not None}
     for output in outputs:
@@ -132,14 +134,14 @@ _JITTER = 1e-10
 def covariance(residuals: Residuals, noise_model: NoiseModel) -> Floats:
     """(tests, observations, observations) -; absent observations have unit variance and no correlation."""
     s, d, present, output = (
-        residuals.transform_derivatives,
+        residuals.offset_sensitivity,
         residuals.log_rate_sensitivity,
         residuals.present,
         residuals.output_index,
     )
     drift, offset = noise_model.per_observation(output, "drift"), noise_model.per_observation(output, "offset") * s
     c = (drift**2)[:, :, None] * np.exp(
-        -time_lags(residuals) / noise_model.per_observation(output, "correlation_length")[:, :, None]
+        -correlation_lags(residuals) / noise_model.per_observation(output, "correlation_length")[:, :, None]
     )
     c += offset[:, :, None] * offset[:, None, :]
     c = np.where(same_output(residuals), c, 0.0) if len(noise_model.outputs) > 1 else c
@@ -157,9 +159,9 @@ def covariance(residuals: Residuals, noise_model: NoiseModel) -> Floats:
     return np.asarray(c)
 
 
-def time_lags(residuals: Residuals) -> Floats:
+def correlation_lags(residuals: Residuals) -> Floats:
     """(tests, observations, observations) differences of correlation time."""
-    t = residuals.correlation_time
+    t = residuals.correlation_coordinate
     return np.abs(t[:, :, None] - t[:, None, :])
 
 
@@ -198,7 +200,7 @@ def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> t
     """Best linear prediction of each test's offsets, (tests, outputs) in their units, and ln rate factor, (tests,)."""
     unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
     weighted = np.linalg.solve(covariance(unweighted, noise_model), -residuals.values[..., None])[..., 0]
-    weighted_sensitivity = residuals.transform_derivatives * weighted
+    weighted_sensitivity = residuals.offset_sensitivity * weighted
     offsets = [
         s.offset**2 * np.where(residuals.output_index == k, weighted_sensitivity, 0.0).sum(axis=1)
         for k, s in enumerate(noise_model.outputs.values())

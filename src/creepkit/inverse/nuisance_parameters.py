@@ -18,8 +18,12 @@ from creepkit.records import LENGTH_NUISANCES, SIMULATED_NUISANCES, History, Nui
 
 INITIAL_PRIOR_SD = {"thickness": 0.03, "window": 0.3, "modulus": 0.05, "temperature": 5.0}
 """Where the estimate of a prior standard deviation begins: mm, mm, relative, K."""
+
+
 LIMITS = {"thickness": (0.3, 3.0), "window": (0.3, 3.0), "modulus": (-0.7, 2.0), "temperature": (-150.0, 150.0)}
 """Limits of nuisance parameters; thickness and window as multiples of their mean."""
+
+
 SMALLEST_PRIOR_SD = 1e-3
 """Of the initial prior standard deviation: an estimated one is never less."""
 

@@ -15,11 +15,13 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.errors import FitError, SolveError
 from creepkit.inverse.composite_predictor import compared_outputs, predicts_rupture
-from creepkit.inverse.output_transforms import LinearTransform, LogTimeTransform, LogTransform, OutputTransform
+from creepkit.inverse.output_transforms import LinearTransform, LogTransform, NegativeLogTransform, OutputTransform
 from creepkit.records import History, Prediction, Predictor
 
 LOGARITHMIC_OUTPUTS = ("strain",)
 """Outputs that span decades."""
+
+
 RUPTURE_OUTPUT = "rupture"
 """The output of tests that were followed to rupture: the rupture time, s. It has no frames of its own."""
 
@@ -27,7 +29,7 @@ RUPTURE_OUTPUT = "rupture"
 def transform_for(histories: Sequence[History], output: str) -> OutputTransform:
     """The transform of one output of these histories, all of which have it."""
     if output == RUPTURE_OUTPUT:
-        return LogTimeTransform()
+        return NegativeLogTransform()
     return (
         log_transform_for(histories, output)
         if output in LOGARITHMIC_OUTPUTS
@@ -120,7 +122,7 @@ def thinned_history(history: History, count: int) -> History:
     )
 
 
-LINEAR_TEST_DURATION = 5.0
+LINEAR_COORDINATE_LENGTH = 5.0
 """Correlation time of a whole test where outputs have a linear transform: about a decade and a half in ln t."""
 
 
@@ -243,13 +245,15 @@ class ObservationVector:
         return np.log(self.times)
 
     @property
-    def correlation_time(self) -> Floats:
+    def correlation_coordinate(self) -> Floats:
         """(tests, observations) -, ln t where the transform is logarithmic, else 5 t / last time."""
         last_times = np.where(self.present, self.times, 0.0).max(axis=1, keepdims=True)
         logarithmic = (
             self.per_observation([float(name in (*LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT)) for name in self.outputs]) > 0
         )
-        return np.where(logarithmic, self.log_times, LINEAR_TEST_DURATION * self.times / np.maximum(last_times, 1e-300))
+        return np.where(
+            logarithmic, self.log_times, LINEAR_COORDINATE_LENGTH * self.times / np.maximum(last_times, 1e-300)
+        )
 
     def forward(self, y: Floats) -> Floats:
         """(..., tests, observations) - transformed outputs y (..., tests, observations)."""

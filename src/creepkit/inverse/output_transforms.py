@@ -94,7 +94,7 @@ class LinearTransform:
 
 
 @dataclass(frozen=True)
-class LogTimeTransform:
+class NegativeLogTransform:
     """g(t) = -ln t of a rupture time t in s: larger where a test breaks earlier, as strains are where it is faster."""
 
     floor: float = 0.0

@@ -49,14 +49,18 @@ from creepkit.inverse.search.local_refinement import (
     robust_loss,
 )
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.inverse.working_noise import WorkingNoise, with_rupture_weight
+from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_rupture_weight
 from creepkit.language import CreepLaw
 from creepkit.records import History, Prediction, Predictor
 
 CACHED_EVALUATIONS = 4
 """Points whose residuals are cached: a search ends at one that it has evaluated, and the next begins there."""
+
+
 FAILED_COST = 1e12
 """Cost of a candidate that cannot be predicted at all."""
+
+
 PRIOR_STRENGTH = 1e-4
 """Weak prior of each unknown about the middle of its bounds, in standard deviations of data per width of the bounds.
 
@@ -126,7 +130,7 @@ class LeastSquaresProblem:
         check_explicit_nuisances([n.kind for n in nuisances.nuisances], observations, tests, predictor)
         log_rate, log_internal_rate = median_log_strain_rate(tests, predictor), median_log_inverse_duration(tests)
         bounds = Bounds.from_law(law, coordinates, log_rate, log_internal_rate).with_nuisances(nuisances)
-        noise = WorkingNoise(settings, observations, prediction_errors_of(predictor)).initial()
+        noise = WorkingNoiseEstimator(settings, observations, prediction_errors_of(predictor)).initial()
         covariance_factor = cholesky_factors(
             residuals_at_measured_values(observations), with_rupture_weight(noise, observations)
         )

@@ -15,8 +15,12 @@ from creepkit.records import ZERO_CELSIUS, History, Predictor
 
 LOAD_TOLERANCE = 0.02
 """Relative change of a load within which it is held."""
+
+
 MINIMUM_FRAMES = 6
 """Frames of a hold from which an increase can be estimated."""
+
+
 SIGNIFICANT_ERRORS = 5.0
 """Standard errors that an increase must exceed; and it must exceed the noise of one frame."""
 
@@ -77,6 +81,8 @@ def _load_holds(history: History, used: Bools) -> Iterator[Ints]:
 
 
 STRESS_PER_PRESSURE = 12.5
+
+
 AMPLITUDE_PER_STRAIN = 30.0
 """mm."""
 

@@ -25,6 +25,8 @@ from creepkit.records import Prediction
 
 SLOPE_AFTER_RUPTURE = 3.0
 """Growth of the transformed output per unit of ln(t / t_rupture) after a predicted rupture."""
+
+
 SMALLEST_INCREASE = 0.01
 """Of a transformed output since the first frame: smaller increases say nothing about the creep rate."""
 
@@ -219,9 +221,9 @@ def _masked_residuals(
 ) -> Residuals:
     return Residuals(
         values=np.where(mask, values, 0.0),
-        transform_derivatives=np.where(mask, derivatives, 0.0),
+        offset_sensitivity=np.where(mask, derivatives, 0.0),
         present=mask,
-        correlation_time=observations.correlation_time,
+        correlation_coordinate=observations.correlation_coordinate,
         jacobian=None if jacobian is None else np.where(mask[..., None], jacobian, 0.0),
         log_rate_sensitivity=np.where(mask, log_rate_sensitivity, 0.0),
         output_index=observations.output_index,

@@ -13,9 +13,17 @@ from creepkit.errors import FitError
 from creepkit.records import LENGTH_NUISANCES, SIMULATED_NUISANCES, Nuisance
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
+
+
 TEST_LOSSES = ("gaussian", "student")
+
+
 WEIGHTINGS = ("noise", "likelihood", "equal", "paper")
+
+
 OutputWeights = Literal["noise", "likelihood", "equal", "paper"] | Mapping[str, float]
+
+
 PAPER_WEIGHTS = MappingProxyType({"amplitude": 0.99, "width": 0.005, "shape": 0.005})
 """The paper's weighted loss for measured histories, Eq. (S3): 0.99 on D_amp; how the rest is split is not said."""
 

@@ -9,7 +9,14 @@ import numpy as np
 from scipy.optimize import OptimizeResult, minimize
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.noise_model import NoiseModel, Residuals, covariance, fixed_components, same_output, time_lags
+from creepkit.inverse.noise_model import (
+    NoiseModel,
+    Residuals,
+    components_fixed_by_priors,
+    correlation_lags,
+    covariance,
+    same_output,
+)
 from creepkit.records import Nuisance
 
 BOUND_TOLERANCE = 1e-6
@@ -116,13 +123,18 @@ def scaled_inverse(matrix: Floats) -> Floats:
 
 LONGEST_CORRELATION = 3.0
 """Longest correlation of the drift, a factor 20 in time or 0.6 of a test: what lasts longer is scatter of the rate."""
+
+
 SMALLEST_NOISE_RATIO, LARGEST_NOISE_RATIO = 0.1, 30.0
 """Of the noise that was stated or estimated from neighbouring frames: where an estimate of it may go."""
+
+
 OVERSHOOT = float(np.log(30.0))
 """Decrease of the logarithm of a component that may have overshot to where the likelihood hardly depends on it: the
 search is repeated from half way."""
 
-COMPONENTS = ("noise", "misfit", "offset", "drift", "correlation_length")
+
+NOISE_COMPONENTS = ("noise", "misfit", "offset", "drift", "correlation_length")
 
 
 def estimate_variance_components(
@@ -138,10 +150,10 @@ def estimate_variance_components(
     Components at zero, named in `fixed` or with a given prior stay; by default the noise, which was measured.
     linearised : with it the likelihood is the restricted one, parameters of the law integrated out.
     """
-    fixed_by_prior = fixed_components(nuisances, list(start.outputs))
+    fixed_by_prior = components_fixed_by_priors(nuisances, list(start.outputs))
     free = [
         (o, n)
-        for n in COMPONENTS
+        for n in NOISE_COMPONENTS
         for o, components in start.outputs.items()
         if getattr(components, n) > 0
         and (o, n) not in fixed_by_prior
@@ -184,7 +196,7 @@ class _Likelihood:
         linearised: LinearisedProblem | None = None,
     ) -> None:
         self.residuals, self.start, self.free, self.linear = residuals, start, free, linearised
-        self.names, self.time_lags = list(start.outputs), time_lags(residuals)
+        self.names, self.time_lags = list(start.outputs), correlation_lags(residuals)
         present = residuals.present[:, :, None] & residuals.present[:, None, :]
         self.same_output = same_output(residuals) & present
 
@@ -232,12 +244,12 @@ class _Likelihood:
             return noise_model.rate**2 * float(np.einsum("ti,tij,tj->", d, G, d))
         components, mask = noise_model[output], r.present & (r.output_index == self.names.index(output))
         if name == "noise":
-            noise_variance = (components.noise * r.relative_noise * r.transform_derivatives) ** 2
+            noise_variance = (components.noise * r.relative_noise * r.offset_sensitivity) ** 2
             return float((np.einsum("tii->ti", G) * noise_variance)[mask].sum())
         if name == "misfit":
             return components.misfit**2 * float(np.einsum("tii->ti", G)[mask].sum())
         if name == "offset":
-            s = np.where(mask, r.transform_derivatives, 0.0)
+            s = np.where(mask, r.offset_sensitivity, 0.0)
             return components.offset**2 * float(np.einsum("ti,tij,tj->", s, G, s))
         correlation = np.exp(-self.time_lags / components.correlation_length) * (self.same_output & mask[:, :, None])
         if name == "drift":
@@ -261,5 +273,5 @@ def _bounds(residuals: Residuals, noise_model: NoiseModel, output: str, name: st
     if name != "offset":
         return float(np.log(1e-4)), float(np.log(5.0))
     mask = residuals.present & (residuals.output_index == list(noise_model.outputs).index(output))
-    typical_output = float(np.median(1.0 / np.maximum(residuals.transform_derivatives[mask], 1e-12)))
+    typical_output = float(np.median(1.0 / np.maximum(residuals.offset_sensitivity[mask], 1e-12)))
     return float(np.log(1e-5 * typical_output)), float(np.log(typical_output))

@@ -33,19 +33,26 @@ from creepkit.inverse.variance_components import (
 
 STUDENT_FREEDOM = 4.0
 """Degrees of freedom of Student's t for whole tests; the usual choice where tails are unknown (Lange et al. 1989)."""
+
+
 SMALLEST_NOISE = 1e-2
 """Least noise of a likelihood, over the floor of the output's transform: simulated histories have none of their own."""
+
+
 DRIFT_CONFIDENCE = 0.95
 """Residuals are autocorrelated where the likelihood gains more by it than by chance in so many cases; each output that
 drifts has two components more, drift and correlation length."""
 
+
 INITIAL_RUPTURE_SD = 0.3
 """Scatter of ln of rupture times to begin from: one of each test, which has no noise, and cannot drift."""
+
+
 SMALLEST_WEIGHT = 1e-6
 """Relative weight of an output that the weights do not name."""
 
 
-class WorkingNoise:
+class WorkingNoiseEstimator:
     """How the working noise follows from the settings: by likelihood, or by the weights of outputs."""
 
     def __init__(
@@ -85,7 +92,7 @@ class WorkingNoise:
         if self.relative_sd is None:
             return estimate_variance_components(residuals, previous, nuisances)
         offsets = predicted_random_effects(residuals, previous)[0]
-        remaining = residuals.values + residuals.transform_derivatives * np.take_along_axis(
+        remaining = residuals.values + residuals.offset_sensitivity * np.take_along_axis(
             offsets, residuals.output_index, axis=1
         )
         relative_sd = self.observations.per_observation([self.relative_sd[name] for name in self.observations.outputs])
@@ -139,7 +146,7 @@ class WorkingNoise:
             noise_model = noise_model.with_output(name, drift=float(np.hypot(noise_model[name].drift, error)))
         return noise_model
 
-    def fixed_components(self, noise_model: NoiseModel) -> set[tuple[str, str]]:
+    def unestimated_drift_components(self, noise_model: NoiseModel) -> set[tuple[str, str]]:
         """Those (output, component) that were not estimated: drifts that are the predictor's error and no more."""
         outputs = [
             n

@@ -22,10 +22,12 @@ from typing import TypeAlias
 import numpy as np
 
 from creepkit.errors import DatasetError
-from creepkit.jobs.worker import ShardedJob
+from creepkit.jobs.worker_process import ShardedJob
 
 UNSUPPORTED_LOCK_ERRORS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.EINVAL)
 """Errors of file systems without locks."""
+
+
 MOST_DIGITS = 19
 """Digits of the number of a sample; longer ones are damage."""
 

@@ -41,7 +41,11 @@ if TYPE_CHECKING:
 
 
 SOURCE_FILE, CHECKSUM_FILE = "law.py", "SHA256SUMS"
+
+
 _loaded_modules: dict[str, ModuleType] = {}
+
+
 _numba_settings: Any = config
 
 

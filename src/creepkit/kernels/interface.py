@@ -29,12 +29,24 @@ from numba.extending import intrinsic
 from creepkit.arrays import Floats
 
 POINT_SIZE = 6
+
+
 STRESS, STRAIN, TIME, TEMPERATURE, PRINCIPAL_STRESS, MEAN_STRESS = range(POINT_SIZE)
+
+
 _DOUBLES: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
+
+
 SIGNATURE = types.int64(types.int64, _DOUBLES, _DOUBLES, _DOUBLES)
+
+
 ENTRY_TYPE = types.FunctionType(SIGNATURE)
 """The numba type of an entry: a function compiled once for it accepts any law."""
+
+
 RATE_NOT_FINITE = 1
+
+
 DERIVATIVE_NOT_FINITE = 2
 
 
@@ -80,6 +92,8 @@ class CompiledLaw:
 
 
 _DOUBLE_POINTER = ctypes.POINTER(ctypes.c_double)
+
+
 _C_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, _DOUBLE_POINTER, _DOUBLE_POINTER, _DOUBLE_POINTER)
 
 

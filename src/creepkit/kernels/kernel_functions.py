@@ -155,6 +155,7 @@ TARGET_FUNCTION_NAMES = {
 }
 """{sympy class: function of every target}; Heaviside comes from the slopes of Max and Min."""
 
+
 TARGET_FUNCTIONS = (
     *sorted({*TARGET_FUNCTION_NAMES.values()}),
     "both",

@@ -61,8 +61,12 @@ def _exponential_difference(first: tuple[sympy.Expr, sympy.Expr], second: tuple[
 
 FLOOR = 1e-30
 """Stress, strain and states below this act as this when they are bases of powers; slopes are those there."""
+
+
 TIME_FLOOR = 1e-120
 """The same for time: with m = -0.95, t^m has done 2 % of its strain at 1e6 s by 1e-30 s, and 1e-6 of it by 1e-120 s."""
+
+
 COMPOSITE_FLOOR = 1e-200
 """Composite bases, such as Max(stress - threshold, 0), are floored here: a term that is zero becomes about 1e-200 1/s,
 small enough to be nothing and large enough for its slope, which is the term over this floor."""
@@ -79,7 +83,10 @@ KNOWN_FUNCTIONS = (
     *(sympy.Abs, sympy.sign, sympy.Heaviside, sympy.Max, sympy.Min, sympy.Piecewise),
 )
 """The functions that a law may call."""
+
+
 _ALGEBRAIC_NODES = (sympy.Add, sympy.Mul, sympy.Pow, sympy.functions.elementary.piecewise.ExprCondPair)
+
 
 _CONDITIONS = (
     *(sympy.GreaterThan, sympy.StrictGreaterThan, sympy.LessThan, sympy.StrictLessThan, sympy.And, sympy.Or),
@@ -270,6 +277,8 @@ _REWRITES: dict[Any, Callable[..., sympy.Basic]] = {
     sympy.Heaviside: lambda x, half: sympy.Piecewise((1, x > 0), (0, x < 0), (half, True)),
 }
 """Functions whose derivatives in sympy are distributions, or lose digits."""
+
+
 _LOG_FUNCTIONS: dict[Any, Any] = {sympy.sinh: LogSinh, sympy.cosh: LogCosh, sympy.tanh: LogTanh}
 
 

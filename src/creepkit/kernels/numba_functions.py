@@ -13,7 +13,10 @@ __all__ = [
     "power", "sin", "sinh", "smaller", "sqrt", "square", "tanh",
 ]  # fmt: skip
 
+
 _inline = njit(cache=True, error_model="numpy", inline="always")
+
+
 _LN2 = log(2.0)
 
 

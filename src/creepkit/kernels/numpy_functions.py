@@ -14,8 +14,13 @@ __all__ = [
     "log_tanh", "power", "sin", "sinh", "smaller", "sqrt", "square", "tanh",
 ]  # fmt: skip
 
+
 asinh, atan, choose, power = np.arcsinh, np.arctan, np.where, np.power
+
+
 both, either, larger, smaller = np.logical_and, np.logical_or, np.maximum, np.minimum
+
+
 _LN2 = float(np.log(2.0))
 
 

@@ -28,6 +28,7 @@ _RESERVED_NAMES = (
     *("rows", "row", "x", "theta", "out", "flags"),
 )
 
+
 _TEMPORARY_PATTERN = re.compile(r"[xy]\d+")
 
 
@@ -91,6 +92,8 @@ class PrintableNames:
 
 LOG_RATE_OFF = sympy.Float(-1e30)
 """ln of the rate of a law whose terms are all off: finite, in single precision too."""
+
+
 Assignments = Mapping[sympy.Symbol, sympy.Expr]
 
 

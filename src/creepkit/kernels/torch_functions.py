@@ -21,7 +21,10 @@ __all__ = [
     "log_tanh", "power", "sin", "sinh", "smaller", "sqrt", "square", "tanh",
 ]  # fmt: skip
 
+
 both, either = torch.logical_and, torch.logical_or
+
+
 _LN2 = math.log(2.0)
 
 
@@ -108,6 +111,8 @@ def exp_difference(a: Any, b: Any) -> Any:
 
 FUNCTIONS = {name: globals()[name] for name in __all__}
 """What printed text calls."""
+
+
 TensorFunction = Callable[..., Sequence[Any]]
 
 

@@ -15,7 +15,11 @@ from creepkit.language.symbols import POINT_VARIABLES, Param, State, temperature
 from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
 
 Law = TypeVar("Law", bound=LawRecord)
+
+
 _INDEXED_NAME = re.compile(r"^(?P<stem>.+?)_(?P<index>[1-9]\d*)$")
+
+
 _INDEXED_LABEL = re.compile(r"^(?P<stem>.+?) (?P<index>[1-9]\d*)$")
 
 

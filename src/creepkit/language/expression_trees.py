@@ -98,11 +98,18 @@ _FUNCTIONS: dict[Any, Callable[..., Any]] = {
     type(sympy.false): lambda: False,
 }
 
+
 DEPTH_LIMIT, SIZE_LIMIT = 60, 5000
 """Levels and nodes of the largest expression that is written or read."""
+
+
 EXPONENT_LIMIT = 1000
 """Largest numeric exponent."""
+
+
 _INTEGER_DIGIT_LIMIT, _PRECISION_LIMIT = 300, 1024
+
+
 _ANY_NUMBER = SIZE_LIMIT
 
 
@@ -135,8 +142,13 @@ _NODE_TYPES = {
     "or": _NodeType(sympy.Or, 2, _ANY_NUMBER, Boolean, Boolean),
 }
 
+
 _HEAD_OF_TYPE = {head.type: name for name, head in _NODE_TYPES.items()}
+
+
 _CONSTANTS = {"pi": sympy.pi, "e": sympy.E, "true": sympy.true, "false": sympy.false}
+
+
 _KNOWN_HEADS = (*_NODE_TYPES, *_CONSTANTS, "rational", "float", "piecewise")
 
 

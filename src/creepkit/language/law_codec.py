@@ -18,12 +18,14 @@ from creepkit.language.symbols import POINT_VARIABLES, Param, ParameterScale, St
 
 __all__ = ["LAW", "condition_from_tree", "expression_from_tree", "expression_to_tree", "law_from_json", "law_to_json"]
 
+
 LAW = DocumentFormat(
     "creepkit-law",
     2,
     FileKind("a law", LawError, "give a law that creepkit wrote"),
     remedy="write it again from the law",
 )
+
 
 _T = TypeVar("_T")
 

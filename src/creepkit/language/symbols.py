@@ -19,15 +19,30 @@ import sympy
 from creepkit.errors import LawError
 
 stress = sympy.Symbol("stress", real=True)
+
+
 strain = sympy.Symbol("strain", real=True)
+
+
 time = sympy.Symbol("time", real=True)
+
+
 temperature = sympy.Symbol("temperature", real=True)
+
+
 principal_stress = sympy.Symbol("principal_stress", real=True)
+
+
 mean_stress = sympy.Symbol("mean_stress", real=True)
+
+
 POINT_VARIABLES = (stress, strain, time, temperature, principal_stress, mean_stress)
 """The symbols that describe a material point, in the order of every compiled kernel."""
+
+
 GAS_CONSTANT = 8.314462618
 """R in J/(mol K), CODATA 2018; the paper used 8.31."""
+
 
 LATEX_SYMBOLS = {
     stress: r"\sigma_e",

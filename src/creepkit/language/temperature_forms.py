@@ -130,8 +130,12 @@ def check_reference_temperature(T_ref: float) -> None:
 
 TEMPERATURE_SPAN = 100.0
 """K in which, by default, a parameter may move by half the range of its bounds."""
+
+
 LOG_PARAMETER_RANGE = 20.0
 """The range that counts for parameters of log scale, whose bounds may span fifty decades: e^10 in 100 K."""
+
+
 T0_BOUNDS = (300.0, 3e4)
 """K, of T0 in exp(-T0/T): 2.5 to 250 kJ/mol; below, the form is one in 1/T."""
 

@@ -9,7 +9,10 @@ import sympy
 from creepkit.language import CreepLaw, Param, hookimpl, parameters, strain, stress, time
 
 A, n_0, n_inf, C, tau_d, tau_r, m = parameters("A n_0 n_inf C tau_d tau_r m")
+
+
 n = n_inf + (C + n_0 - n_inf) * sympy.exp(-time / tau_d) - C * sympy.exp(-time / tau_r)
+
 
 DRIFTING_EXPONENT = CreepLaw(
     name="drifting-exponent",

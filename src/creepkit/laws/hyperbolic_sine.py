@@ -6,6 +6,7 @@ from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress
 
 A, n, B = parameters("A n B")
 
+
 HYPERBOLIC_SINE = CreepLaw(
     name="hyperbolic-sine",
     title="Hyperbolic-sine law (HS)",

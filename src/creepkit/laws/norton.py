@@ -4,6 +4,7 @@ from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress
 
 A, n = parameters("A n")
 
+
 NORTON = CreepLaw(
     name="norton",
     title="Norton power law (PL)",

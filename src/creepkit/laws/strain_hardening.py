@@ -4,6 +4,7 @@ from creepkit.language import CreepLaw, Param, hookimpl, parameters, strain, str
 
 A, n, m = parameters("A n m")
 
+
 STRAIN_HARDENING = CreepLaw(
     name="strain-hardening",
     title="Strain-hardening power law (SPL)",

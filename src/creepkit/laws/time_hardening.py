@@ -7,6 +7,7 @@ from creepkit.language import CreepLaw, Param, hookimpl, parameters, stress, tim
 
 A, n, m = parameters("A n m")
 
+
 TIME_HARDENING = CreepLaw(
     name="time-hardening",
     title="Norton-Bailey time-hardening power law (TPL)",

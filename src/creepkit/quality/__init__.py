@@ -23,6 +23,8 @@ from creepkit.quality.frames import FlaggedFrames, decreasing_frames, outlier_fr
 from creepkit.records import History, Predictor
 
 FlagKind = Literal["unloading", "falling", "outlier", "replicate", "first frame", "temperature", "modulus"]
+
+
 FRAME_FLAG_KINDS: tuple[FlagKind, ...] = ("unloading", "falling", "outlier")
 """Kinds that concern frames, which can be marked; the others question whole tests."""
 

@@ -43,33 +43,53 @@ def _same_program(a: Program, b: Program) -> bool:
 
 REPLICATE_TEMPERATURE_TOLERANCE = 3.0
 """K between replicates; at 400 kJ/mol and 800 C it changes rates by 13 %."""
+
+
 REPLICATE_FACTOR = {"amplitude": 1.6, "strain": 3.0}
 """Between the creep of replicates. Dimples: three standard deviations of 2^0.5 times 11 %, which is what thicknesses
 that scatter by 5.5 % do to a deflection. Bars: rates scatter by a factor of two, and products and environments differ.
 """
 
+
 _COMPARISON_FRACTIONS = np.linspace(0.2, 1.0, 9)
 """Fractions of the common time at which replicates are compared; the median counts, as the end of a failing test may
 differ."""
 
+
 COMMON_TIME_FRACTION = 0.5
 """Fraction of the shorter test for which two tests must have been loaded alike to be compared."""
+
+
 FEWEST_TREND_TESTS = 6
 """Least number of tests that show a trend with temperature."""
+
+
 TREND_THRESHOLD = 5.0
 """Standard deviations of the others about their trend that a test must be off it."""
+
+
 TEMPERATURE_ERROR = 15.0
 """K that a temperature must seem wrong by: thermocouples and gradients make up to 10 K."""
+
+
 MODULUS_ERROR = 0.03
 """Relative error of a modulus; curves of handbooks differ by that much."""
+
+
 ELASTIC_ERROR = 0.15
 """Fraction of the elastic deflection by which a first frame must differ from it: thicknesses and moduli known to 5 %
 make 10 %."""
 
+
 NEGLIGIBLE_CREEP = 0.1
 """Fraction of the elastic deflection, largest creep before the first frame with which the latter can be checked."""
+
+
 _FIRST_FRAMES = 5
+
+
 _A, _n = parameters("A n")
+
 
 _NO_CREEP_LAW = CreepLaw(
     name="no creep",

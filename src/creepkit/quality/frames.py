@@ -13,25 +13,42 @@ from creepkit.records import History
 
 OUTLIER_THRESHOLD = 6.0
 """Robust standard deviations by which a single frame must differ from its neighbours: 2 in 1e9 of Gaussian noise do."""
+
+
 FEW_FRAMES_CORRECTION = 10.0
 """The threshold is OUTLIER_THRESHOLD (1 + this / frames): few frames say little about their own noise."""
+
+
 DECREASE_FRACTION = 0.02
 """Fraction of the largest value: less can be drift of instruments; a loaded dimple or bar does not recover at all."""
+
+
 DECREASE_THRESHOLD = 6.0
 """Standard deviations that a fall must have at least."""
+
+
 END_FIT_FRAMES, END_THRESHOLD, MOST_UNLOADING_FRAMES = 12, 4.0, 5
 """Frames through which a line predicts the end, standard deviations of it that an unloading falls short, the most
 frames that it may have: 1 in 3e4 ends of Gaussian noise fall as much.
 """
 
+
 FEWEST_FRAMES = 12
 """Frames under one load below which nothing is said of noise."""
+
+
 LOAD_TOLERANCE, TEMPERATURE_TOLERANCE = 0.01, 2.0
 """Relative change of the load, and K, that begin a new part of a test."""
+
+
 OPPOSITE_NEIGHBOUR_FRACTION = 0.3
 """Fraction of a frame's residual that its neighbours must have with the other sign if it is to be a single outlier."""
+
+
 _ROUNDING_FRACTION = 0.5
 """Fraction of the smallest step between values, below which noise cannot be seen."""
+
+
 _MOST_OUTLIERS = 0.05
 """Largest fraction of frames that are outliers; more are not outliers."""
 

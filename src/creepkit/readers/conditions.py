@@ -43,9 +43,14 @@ _ALLOWED_COMBINATIONS = (
     "there with ramp)"
 )
 
+
 END_OF_TEST_TERMS = ("ruptured", "stopped")
 """How a test may have ended: by rupture, or before it."""
+
+
 _T = TypeVar("_T")
+
+
 TimeValuePairs = tuple[tuple[float, float], ...]
 
 
@@ -203,6 +208,7 @@ def _time_value_pair(item: str, key: str, kind: QuantityKind, location: str) -> 
 
 
 _LOADING_SUFFIXES = ("", "_1", "_steps", "_program")
+
 
 _LOADING_ADVICE = (
     "write stress_MPa for a uniaxial test, strain_steps for a relaxation test, or pressure_1_MPa, pressure_2_MPa and "

@@ -131,6 +131,7 @@ INDEXED_TABLE = IndexedFolderReader(
 )
 """How the creep curves of Alloy 617 in the moga_neml repository are kept (ACME-MG, github.com)."""
 
+
 INDEXED_FILES = IndexedFolderReader(
     name="indexed-files",
     title="a folder with index.csv (one line a test) and, for each `test`, a file <test>_creep.csv",

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from creepkit.errors import HistoryError
-from creepkit.records import COMPONENTS, ZERO_CELSIUS
+from creepkit.records import TENSOR_COMPONENTS, ZERO_CELSIUS
 
 
 @dataclass(frozen=True)
@@ -82,9 +82,15 @@ TIME = QuantityKind(
     low=0.0,
 )
 
+
 LENGTH = QuantityKind("length", {"mm": UnitConversion(1.0), "um": UnitConversion(1e-3), "m": UnitConversion(1e3)})
+
+
 STRAIN = QuantityKind("strain", {"": UnitConversion(1.0), "pct": UnitConversion(1e-2), "percent": UnitConversion(1e-2)})
+
+
 NUMBER = QuantityKind("number", {"": UnitConversion(1.0)})
+
 
 STRESS = QuantityKind(
     "stress",
@@ -99,7 +105,9 @@ STRESS = QuantityKind(
     high=1e5,
 )
 
+
 SIGNED_STRESS = replace(STRESS, low=-1e5)
+
 
 MODULUS = QuantityKind(
     "modulus",
@@ -109,7 +117,9 @@ MODULUS = QuantityKind(
     open_interval=True,
 )
 
+
 POISSON = QuantityKind("Poisson's ratio", NUMBER.units, low=-1.0, high=0.5, open_interval=True)
+
 
 TEMPERATURE = QuantityKind(
     "temperature",
@@ -118,6 +128,7 @@ TEMPERATURE = QuantityKind(
     high=1e4,
     open_interval=True,
 )
+
 
 FLAG = QuantityKind("flag", NUMBER.units, low=0.0, high=1.0)
 
@@ -136,15 +147,20 @@ SPECIMEN_OUTPUTS: Mapping[str, Mapping[str, QuantityKind]] = {
     "relaxation": {"stress": STRESS},
     "point": {
         "strain": STRAIN,
-        **{f"strain_{c}": STRAIN for c in COMPONENTS},
-        **{f"stress_{c}": SIGNED_STRESS for c in COMPONENTS},
+        **{f"strain_{c}": STRAIN for c in TENSOR_COMPONENTS},
+        **{f"stress_{c}": SIGNED_STRESS for c in TENSOR_COMPONENTS},
     },
 }
 """Names and kinds of the outputs of each specimen."""
+
+
 IDENTIFIABLE_SPECIMENS = ("uniaxial", "bulge")
 """Specimens that a file need not name: their outputs identify them."""
+
+
 LOADING_KINDS: Mapping[str, QuantityKind] = {"stress": STRESS, "pressure": STRESS, "temperature": TEMPERATURE}
 """Loadings of a specimen: a number, `_steps`, a `_program`, or a column."""
+
 
 CONDITION_KINDS: Mapping[str, QuantityKind] = {
     **LOADING_KINDS,
@@ -154,14 +170,18 @@ CONDITION_KINDS: Mapping[str, QuantityKind] = {
     "poisson": POISSON,
 }
 """Numbers that stand once for a whole test."""
+
+
 STRAIN_LOADING_KINDS: Mapping[str, QuantityKind] = {"strain": STRAIN}
 """Loadings of a bar in relaxation: `_steps` or a `_program` alone, for its number would be an output."""
 
+
 COMPONENT_LOADING_KINDS: Mapping[str, QuantityKind] = {
-    **{f"stress_{c}": SIGNED_STRESS for c in COMPONENTS},
-    **{f"strain_{c}": STRAIN for c in COMPONENTS},
+    **{f"stress_{c}": SIGNED_STRESS for c in TENSOR_COMPONENTS},
+    **{f"strain_{c}": STRAIN for c in TENSOR_COMPONENTS},
 }
 """Loadings of a material point: `_steps` or a `_program`."""
+
 
 TEXT_KEYS = frozenset(
     [
@@ -172,8 +192,11 @@ TEXT_KEYS = frozenset(
     + ["name", "alloy", "specimen", "operator", "control", "strain_measure", "includes_elastic", "ended"]
 )
 """Words that stand once for a whole test; every other key becomes a label."""
+
+
 SPECIMEN_NAME_PATTERN = re.compile(r"[a-z][a-z0-9_-]*")
 """Pattern of the name of a specimen; any other text after `specimen` is a label."""
+
 
 CREEP_MACHINE_DEFAULTS: Mapping[str, str] = {
     "control": "load",

@@ -11,7 +11,7 @@ from creepkit.records.interfaces import (
 )
 from creepkit.records.law_with_values import LawWithValues, Units
 from creepkit.records.loading import (
-    COMPONENTS,
+    TENSOR_COMPONENTS,
     Loading,
     PointLoading,
     PressureJump,
@@ -39,10 +39,10 @@ from creepkit.records.prediction_assembly import (
 )
 
 __all__ = [
-    "COMPONENTS",
     "EVERY_FRAME",
     "LENGTH_NUISANCES",
     "SIMULATED_NUISANCES",
+    "TENSOR_COMPONENTS",
     "ZERO_CELSIUS",
     "Exporter",
     "History",

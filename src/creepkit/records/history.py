@@ -18,8 +18,12 @@ if TYPE_CHECKING:
 
 
 ZERO_CELSIUS = 273.15
+
+
 RUPTURE_TIME_TOLERANCE = 0.01
 """By how much of a rupture time frames may lie after it: laboratories round it to three digits."""
+
+
 EVERY_FRAME: Bools = frozen([], dtype=bool)
 """The value of History.used that marks every frame."""
 

@@ -196,8 +196,10 @@ class RecordedLoading:
         return self.record
 
 
-COMPONENTS = ("11", "22", "33", "12", "23", "13")
+TENSOR_COMPONENTS = ("11", "22", "33", "12", "23", "13")
 """Names of the components of a stress or strain, in the order of every vector of six; shear strains of the tensor."""
+
+
 ComponentHistory: TypeAlias = float | Program | Sequence[tuple[float, float]]
 """A constant, a program, or steps as (start time, value) pairs."""
 
@@ -219,8 +221,8 @@ class PointLoading:
     ) -> None:
         given = {"stress": dict(stress or {}), "strain": dict(strain or {})}
         for name in (*given["stress"], *given["strain"]):
-            if name not in COMPONENTS:
-                raise SolveError(f"there is no component '{name}' to load; allowed are {', '.join(COMPONENTS)}")
+            if name not in TENSOR_COMPONENTS:
+                raise SolveError(f"there is no component '{name}' to load; allowed are {', '.join(TENSOR_COMPONENTS)}")
         for name in given["stress"].keys() & given["strain"].keys():
             raise SolveError(f"component {name} has both a stress and a strain prescribed; keep one of them")
         if not (given["stress"] or given["strain"]):
@@ -228,7 +230,7 @@ class PointLoading:
                 'a material point needs a stress or a strain of some component, such as stress={"11": 100}'
             )
         for kind, components in given.items():
-            ordered = {name: _as_program(components[name]) for name in COMPONENTS if name in components}
+            ordered = {name: _as_program(components[name]) for name in TENSOR_COMPONENTS if name in components}
             object.__setattr__(self, kind, MappingProxyType(ordered))
         object.__setattr__(self, "quantity", "components")
 

@@ -79,8 +79,12 @@ class Prediction:
 
 
 NuisanceKind: TypeAlias = Literal["offset", "rate", "thickness", "modulus", "temperature", "window"]
+
+
 SIMULATED_NUISANCES: tuple[NuisanceKind, ...] = ("thickness", "modulus", "temperature", "window")
 """Kinds that change the simulation; "offset" and "rate" only enter the covariance of its residuals."""
+
+
 LENGTH_NUISANCES: tuple[NuisanceKind, ...] = ("thickness", "window")
 """Kinds that are lengths in themselves, so that their prior mean is one too; the others are deviations, about zero."""
 

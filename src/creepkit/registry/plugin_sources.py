@@ -25,6 +25,8 @@ from creepkit import hookspecs
 from creepkit.errors import CreepkitError, ExportError, HistoryError, LawError, PluginError, SolveError, nearest
 
 ENTRY_POINT_GROUP = "creepkit"
+
+
 ENVIRONMENT_VARIABLE = "CREEPKIT_PLUGINS"
 
 
@@ -120,6 +122,8 @@ def _source_location(error: BaseException) -> str:
 
 
 HOOK_PREFIX = "creepkit_"
+
+
 COMMANDS_HOOK = "creepkit_commands"
 
 
@@ -163,10 +167,20 @@ class TemperatureFormKind(ContributionKind):
 
 
 LAW = ContributionKind("law", "creepkit_laws", LawError, "creepkit.language", "CreepLaw")
+
+
 SPECIMEN = ContributionKind("specimen", "creepkit_specimens", SolveError, "creepkit.records", "Specimen")
+
+
 READER = ContributionKind("reader", "creepkit_readers", HistoryError, "creepkit.records", "Reader")
+
+
 EXPORTER = ContributionKind("exporter", "creepkit_exporters", ExportError, "creepkit.records", "Exporter")
+
+
 TEMPERATURE_FORM = TemperatureFormKind("temperature form", "creepkit_temperature_forms", LawError, "", "function")
+
+
 CONTRIBUTION_KINDS = (LAW, SPECIMEN, READER, EXPORTER, TEMPERATURE_FORM)
 
 

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 COMPUTATION_FIELDS = ("threads",)
 """Fields that say how, not what, is computed."""
+
+
 CODEC = RecordCodec(omitted={object: COMPUTATION_FIELDS}, default_range=ANY_NUMBER)
 
 

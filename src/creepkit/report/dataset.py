@@ -23,10 +23,16 @@ if TYPE_CHECKING:
 
 HISTORIES_SHOWN = 30
 """Histories that are drawn."""
+
+
 PANELS_PER_ROW = 4
 """Panels in a row."""
+
+
 LOG_AXIS_DECADES = 1.5
 """Columns that span more than this are drawn on a logarithmic axis."""
+
+
 _ACCEPTED, _OTHERS = "tab:blue", "0.75"
 
 

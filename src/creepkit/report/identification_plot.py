@@ -25,10 +25,16 @@ if TYPE_CHECKING:
 
 MAXIMUM_LEGEND = 12
 """At most so many tests are named."""
+
+
 HEADROOM = 1.4
 """Top of the panel over the largest value, so that the names do not lie on the curves."""
+
+
 OUTPUT_UNITS = {"amplitude": ("mm", "um", 1e3), "width": ("mm", "um", 1e3), "shape": ("", "1e-3", 1e3)}
 """Of outputs: their unit, and the unit and factor of what is left; a strain has none, a stress is in MPa."""
+
+
 DASHED_BELOW_WEIGHT = 0.5
 """Weight below which a test is drawn dashed."""
 
@@ -117,8 +123,12 @@ def draw_ruptures(axes: Axes, fit: Identification, colours: Sequence[Any]) -> No
 
 
 COLOUR_MAP = "viridis"
+
+
 MANY_TESTS = 12
 """Above this many tests strain over time is a thicket: identified over measured strain is drawn instead."""
+
+
 PLOTTED_STRAIN_RATIO = 0.02
 """Residuals are drawn where a test's strain exceeds this share of its last one; below, noise fills the panel."""
 

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 LISTED_RUPTURES = 15
 """With more tests than this their rupture times are summed up alone."""
+
+
 UNITS = {"amplitude": "mm", "width": "mm", "thickness": "mm", "window": "mm", "temperature": "K"}
 
 

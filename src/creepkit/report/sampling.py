@@ -24,9 +24,15 @@ if TYPE_CHECKING:
 
 CURVES_SHOWN = 60
 """Rows whose rates are drawn: the first of the sequence, which a Sobol sequence spreads."""
+
+
 SHOWN_STRAIN, SHOWN_TIME = 0.01, 1e4
 """At which they are, as in the paper's criteria 1 and 2; s."""
+
+
 REJECTED_COLOUR, KEPT_COLOUR, USEFUL_COLOUR = "0.72", "tab:blue", "tab:green"
+
+
 RATE_DECADES_SHOWN = (-40.0, 10.0)
 """Decades of rate, 1/s, that are shown at most."""
 

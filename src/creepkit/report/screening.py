@@ -21,18 +21,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from creepkit.records import History
-    from creepkit.screening.results import Plate
+    from creepkit.screening.results import ScreeningResult
 
 
 TABLE_COLUMNS = ("alloy", "class", "law", "weight", "rate at 100 MPa, 1/s", "local exponent", "chi-square", "confirmed")
 
 
-def table_rows(plate: Plate) -> list[tuple[str, ...]]:
+def table_rows(plate: ScreeningResult) -> list[tuple[str, ...]]:
     """One row an alloy; its cells are those of TABLE_COLUMNS."""
     return [_table_row(plate, result) for result in plate.results]
 
 
-def screening_text(plate: Plate) -> str:
+def screening_text(plate: ScreeningResult) -> str:
     """The table, the share of each law in each class, and what failed."""
     rows = [TABLE_COLUMNS, *table_rows(plate)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(TABLE_COLUMNS))]
@@ -40,7 +40,7 @@ def screening_text(plate: Plate) -> str:
     return "\n".join([*lines, "", *summary_lines(plate)])
 
 
-def summary_lines(plate: Plate) -> list[str]:
+def summary_lines(plate: ScreeningResult) -> list[str]:
     """What the alloys say together, and what is odd, a line each."""
     decisive = sum(result.decisive for result in plate.identified)
     lines = [f"{len(plate.identified)} of {len(plate.results)} alloys identified, {decisive} of them decisively"]
@@ -57,7 +57,7 @@ def summary_lines(plate: Plate) -> list[str]:
     return [*lines, *(f"note: {note}" for note in plate.notes)]
 
 
-def _table_row(plate: Plate, result: AlloyResult) -> tuple[str, ...]:
+def _table_row(plate: ScreeningResult, result: AlloyResult) -> tuple[str, ...]:
     first_cells = (result.alloy, plate.class_of(result.alloy))
     if not result.identified:
         return (*first_cells, "none", *[""] * (len(TABLE_COLUMNS) - 3))
@@ -86,6 +86,8 @@ def _failure_text(alloy: str, failure: str) -> str:
 
 PLOT_RADII = (0.0, 2.0, 4.0)
 """mm, those of Fig. 7a."""
+
+
 PROFILE_OUTPUTS = ("amplitude", "width", "shape")
 
 
@@ -109,6 +111,7 @@ MISFIT_MEASURES = (
     ("chi-square, mean over outputs", mean_chi_square),
 )
 
+
 LOG_TICKS, MIN_LOG_RATIO = (1.0, 2.0, 5.0), 5.0
 """Of logarithmic axes: where ticks are, and the ratio of their ends below which they are linear instead."""
 
@@ -127,12 +130,12 @@ class LegendLabels:
         return name
 
 
-def class_colours(plate: Plate) -> Mapping[str, str]:
+def class_colours(plate: ScreeningResult) -> Mapping[str, str]:
     """{class: colour}."""
     return {name: f"C{k % 10}" for k, name in enumerate(plate.by_class())}
 
 
-def plot_misfits(plate: Plate, results: list[AlloyResult]) -> Figure:
+def plot_misfits(plate: ScreeningResult, results: list[AlloyResult]) -> Figure:
     """Misfit of the reduced law against that of the dense one (Fig. 7b): Eq. (4), and in units of noise."""
     figure = empty_figure(8.6, 4.6)
     colours, labels = class_colours(plate), LegendLabels()
@@ -164,7 +167,7 @@ def _finish_misfit(axes: Axes, limits: tuple[float, float]) -> None:
         axis.set_minor_formatter(NullFormatter())
 
 
-def plot_law_fractions(plate: Plate) -> Figure:
+def plot_law_fractions(plate: ScreeningResult) -> Figure:
     """Share of each law by class (Fig. 7c): full colour where decisive, hatched what is shared out between laws."""
     figure = empty_figure(7.2, 4.4)
     axes: Axes = figure.subplots()
@@ -194,10 +197,12 @@ def _law_fraction(members: tuple[AlloyResult, ...], law: str, decisive: bool) ->
 
 MAX_CLASSES = 4
 """Classes that are shown."""
+
+
 SECONDS_PER_HOUR = 3600.0
 
 
-def plot_histories(plate: Plate, results: list[AlloyResult]) -> Figure:
+def plot_histories(plate: ScreeningResult, results: list[AlloyResult]) -> Figure:
     """A panel a class: the first test of its first alloy, at three radii."""
     shown_results: dict[str, AlloyResult] = {}
     for name in plate.by_class():
@@ -231,7 +236,7 @@ def _plot_displacements(axes: Axes, test: History, predicted: PredictedOutputs) 
     axes.grid(alpha=0.25)
 
 
-def plot_screening(plate: Plate, folder: Path) -> list[Path]:
+def plot_screening(plate: ScreeningResult, folder: Path) -> list[Path]:
     """Write histories.png and parity.png (bulge tests), misfit.png (with a dense law) and laws.png; their paths."""
     if not plate.identified:
         raise FitError("no alloy of this plate has a law, so there is nothing to draw; see Plate.failed")
@@ -249,7 +254,7 @@ def plot_screening(plate: Plate, folder: Path) -> list[Path]:
     return [folder / name for name in sorted(figures)]
 
 
-def _plot_parity(plate: Plate, results: list[AlloyResult]) -> Figure:
+def _plot_parity(plate: ScreeningResult, results: list[AlloyResult]) -> Figure:
     """Identified against measured displacement at three radii, and their difference (Fig. 7a, of all alloys)."""
     figure = empty_figure(3.7 * len(PLOT_RADII), 5.6)
     panels = figure.subplots(2, len(PLOT_RADII), height_ratios=(2.2, 1.0), sharex="col")
@@ -268,7 +273,7 @@ def _plot_parity(plate: Plate, results: list[AlloyResult]) -> Figure:
     return figure
 
 
-def _displacement_pairs(plate: Plate, result: AlloyResult, radius: float) -> list[tuple[Any, Any]]:
+def _displacement_pairs(plate: ScreeningResult, result: AlloyResult, radius: float) -> list[tuple[Any, Any]]:
     """Measured and identified displacement of each test that has what the radius needs, (frames,) mm."""
     pairs = []
     for test in plate.histories[result.alloy]:
@@ -299,7 +304,7 @@ def _finish_parity(upper: Axes, lower: Axes, radius: float, errors: Any, axis_li
         lower.set_ylabel("difference, um")
 
 
-def print_screening(plate: Plate, written: list[Path], as_json: bool) -> None:
+def print_screening(plate: ScreeningResult, written: list[Path], as_json: bool) -> None:
     """Print the table, what it sums up to, and what was written."""
     if as_json:
         print_json(_plate_to_json(plate, written))
@@ -309,7 +314,7 @@ def print_screening(plate: Plate, written: list[Path], as_json: bool) -> None:
         print(line)
 
 
-def _plate_to_json(plate: Plate, written: list[Path]) -> dict[str, Any]:
+def _plate_to_json(plate: ScreeningResult, written: list[Path]) -> dict[str, Any]:
     return {
         "alloys": [result_columns(plate, result) for result in plate.results],
         "shares": plate.law_fractions(),

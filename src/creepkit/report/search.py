@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 SMALLEST_DRAWN_COST = 1e-12
 """Costs below it are drawn there: the axis is logarithmic."""
+
+
 MARKER_LIMIT = 60
 """Above this many iterations they are drawn without marks."""
 

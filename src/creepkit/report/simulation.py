@@ -26,7 +26,11 @@ if TYPE_CHECKING:
 
 SUBDIVISIONS = 6
 """Facets along the side of an element: its curved sides look smooth."""
+
+
 _LABELS = {"stress": "von Mises stress, MPa", "creep strain": "equivalent creep strain"}
+
+
 _GREY = "0.45"
 
 
@@ -139,8 +143,14 @@ def _duration(time: float) -> str:
 
 _SHOWN = (0.05, 0.1, 0.2, 0.4, 0.6, 0.9, 1.2, 1.6, 2.0, 2.6, 3.2, 4.0, 4.8)
 """Deflections of the text over the apex thickness."""
+
+
 _EXPONENTS = (3.0, 5.0, 8.0, 12.0)
+
+
 _STRAINS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+
+
 _COLUMN = 8
 
 

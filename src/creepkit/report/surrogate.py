@@ -23,8 +23,12 @@ if TYPE_CHECKING:
 
 
 OUTPUT_LABELS = {"amplitude": "amplitude, mm", "width": "width, mm", "shape": "shape", "strain": "strain"}
+
+
 MOST_POINTS = 4000
 """Drawn at most in a panel of a parity plot."""
+
+
 WORST_SHOWN = 6
 """Worst samples that are drawn."""
 
@@ -114,6 +118,8 @@ def worst_samples_figure(comparison: PredictionComparison, path: str | Path | No
 
 
 ERROR_COLUMNS = ("rse", "mse", "mae", "r2", "largest_median", "largest_p95")
+
+
 ERROR_HEADS = ("RSE (Eq. 4)", "MSE", "MAE", "R2", "largest error, median", "95 %")
 
 

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 
 MAX_PANELS_PER_ROW = 3
+
+
 MIN_WEIGHT_SHOWN = 0.02
 """Combinations of less weight are not drawn, but those that a parameter's set names."""
 
@@ -145,7 +147,10 @@ def _curve_standard_deviations(function: Callable[[Floats], Floats], candidate: 
 
 
 MAX_COMBINATIONS_LISTED = 6
+
+
 CRITERION = {"points": "the quasi AICc of the estimates", "histories": "the BIC of the tests"}
+
 
 EQUIVALENCE_NOTE = {
     "points": "=: these data cannot tell it from the best",

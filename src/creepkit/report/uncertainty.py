@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 MAX_DRAWS = 2000
 """Draws in a panel of pairs; more hide one another."""
+
+
 LOGARITHMIC_RATIO = 30.0
 """Ratio of largest to smallest value beyond which an axis is logarithmic."""
 

@@ -107,6 +107,8 @@ def _connected_terms(exponents: Sequence[dict[int, float]]) -> list[list[int]]:
 
 LIFE_FRACTIONS = (0.03, 0.7)
 """Fraction of the life of the material that a test takes: damage is hardly seen, or soon breaks it."""
+
+
 QUADRATURE_POINTS = 64
 """Points of the integral over an internal variable, in the middle of equal intervals."""
 
@@ -201,8 +203,12 @@ def _rate_group(law: CreepLaw, symbol: sympy.Symbol, state: State) -> TermGroup 
 
 
 STRESS_RATIOS = (0.05, 4.0)
+
+
 LARGEST_STRESS_EXPONENT = 12.0
 """Largest local stress exponent."""
+
+
 RATIO_INTERVALS = 32
 """Intervals into which the range of a ratio is divided to find where it may lie."""
 

@@ -22,8 +22,12 @@ from creepkit.records.history import ZERO_CELSIUS
 
 PAPER_INTERVAL, PAPER_END = 150.0, 43200.0
 """s; Materials and Methods of the paper: 289 frames from 0 to 12 h."""
+
+
 MOST_FRAMES = 100_000
 """Largest number of frames of a sample: a typing error should not ask for all the memory."""
+
+
 RELATIVE_TIMES = (0.0, 60 / 43200, 240 / 43200, *(k / 48 for k in range(1, 49)))
 """Times as fractions of the end of a test: 51 frames, two of them in the fast start; 900 s apart in 12 h."""
 
@@ -92,7 +96,10 @@ class TimeGrid:
 
 ROOM_TEMPERATURE = ZERO_CELSIUS + 20.0
 """K; the temperature of tests of laws that do not depend on it."""
+
+
 BULGE, UNIAXIAL = "bulge", "uniaxial"
+
 
 CONDITION_UNITS = {
     "modulus": "MPa",
@@ -106,12 +113,17 @@ CONDITION_UNITS = {
     "temperature": "K",
 }
 
+
 CONDITIONS = {
     BULGE: ("modulus", "P1", "P2", "Tj", "end_time", "apex_thickness", "temperature"),
     UNIAXIAL: ("stress_1", "stress_2", "Tj", "end_time", "temperature"),
 }
 """Conditions of each kind of specimen."""
+
+
 REQUIRED = {BULGE: ("modulus", "P1"), UNIAXIAL: ("stress_1",)}
+
+
 LOAD_LEVELS = {BULGE: ("P1", "P2"), UNIAXIAL: ("stress_1", "stress_2")}
 """The two levels of the load."""
 
@@ -190,6 +202,8 @@ PAPER_RANGES = {
     "uniaxial": {"stress_1": (40.0, 300.0), "stress_2": (40.0, 300.0)},
 }
 """The paper's ranges of a bulge test, and for a bar the stresses of its dimple of 0.5 mm under them, about 12.5 P."""
+
+
 PAPER_JUMP_FRACTIONS = (1 / 6, 5 / 6)
 """The paper's Tj, 2 to 10 h, as fractions of its 12 h."""
 

@@ -24,6 +24,8 @@ from creepkit.sampling.rates import RateArguments, log10_rate
 
 TIME_FRACTIONS = np.concatenate([np.zeros(1), np.geomspace(1e-3, 1.0, 60)])
 """Times at which the constraints of a law are evaluated, as fractions of the end of a test."""
+
+
 CONSTRAINT_STRESS, CONSTRAINT_STRAIN = 100.0, 0.01
 """MPa and strain at which constraints are evaluated that depend on these."""
 
@@ -49,6 +51,8 @@ def constraints_hold(law: CreepLaw, draws: Draws, end_times: Floats) -> Bools:
 
 FIRST_HOLD, BEFORE_JUMP, AFTER_JUMP, END = range(4)
 """Rows of `hold_outputs`: a hold is from the first to the second, and from the third to the fourth."""
+
+
 BURST_TIME_FACTOR = 2.0
 """How many times too early the reduced-order model must burst before that counts; that of a dimple is within 1.6 as
 a rule."""
@@ -226,8 +230,14 @@ class FinalOutputAbove:
 
 
 DrawCriterion: TypeAlias = RateLimit | WithinBounds | ConstraintsHold
+
+
 OutcomeCriterion: TypeAlias = SurvivesTime | CreepInEachHold | TotalCreepAbove | FinalOutputAbove
+
+
 Criterion: TypeAlias = DrawCriterion | OutcomeCriterion
+
+
 PAPER_LEAST_CREEP = {"bulge": 0.01, "uniaxial": 1e-4}
 """mm of amplitude, of criteria 4 and 5: twice the resolution of the paper's cameras; and the like of a strain."""
 

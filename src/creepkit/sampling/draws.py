@@ -85,8 +85,12 @@ class Draws:
 
 CONCENTRATION = 0.7
 """Parameter of the Dirichlet distribution of rate fractions: below 1 one group tends to dominate."""
+
+
 TERM_COUNT_PROBABILITIES = (0.6, 0.3, 0.1)
 """Fractions of samples with one, two and three groups of terms, unless a design says otherwise."""
+
+
 SELECTION_DIMENSIONS = 2
 """Coordinates that the choice of groups takes; their fractions take one for each group."""
 

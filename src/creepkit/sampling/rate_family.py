@@ -31,16 +31,28 @@ from creepkit.specimens.bulge.specimen import Bulge
 
 LARGEST_STRESS_EXPONENTS = (14.0, 14.0, 8.0)
 """Largest stress exponent of each term: two steep ones and a milder one."""
+
+
 FAMILY_TERM_COUNT_PROBABILITIES = (0.25, 0.45, 0.3)
 """Fractions of rows with one, two and three terms: from one term a network learns little."""
+
+
 STRAIN_EXPONENTS, TIME_EXPONENTS = (-0.7, 0.5), (-0.7, 2.0)
 """Bounds of the exponents: decay and rise."""
+
+
 STRAIN_EXPONENT_FRACTIONS, TIME_EXPONENT_FRACTIONS = (0.5, 0.4), (0.4, 0.3)
 """Fractions of the exponents that are 0, and below it; the rest are above."""
+
+
 DECAYING_FRACTION, DECAY_TIME_FRACTIONS = 0.35, (0.03, 1.0)
 """Fraction of the terms that decay, and their time scales as fractions of the end of the test, uniform in the log."""
+
+
 THICKNESS_FACTORS = (0.88, 1.2)
 """Bounds of the apex thickness over the specimen's own: 0.44 to 0.60 mm of the paper's dimple."""
+
+
 END_TIME_RANGE, JUMP_FRACTIONS = (1200.0, 86400.0), (0.15, 0.85)
 """s, from 20 min to 24 h; fractions of the end at which the load jumps."""
 
@@ -59,6 +71,8 @@ def _law() -> CreepLaw:
 
 
 RATE_FAMILY_LAW = _law()
+
+
 PARAMETERS_PER_TERM = len(RATE_FAMILY_LAW.params) // len(LARGEST_STRESS_EXPONENTS)
 
 

@@ -75,8 +75,12 @@ def author_parameters(law: CreepLaw, theta: Floats) -> Floats:
 
 
 POINT_COUNT = 12
+
+
 POINT_FRACTIONS = (np.arange(POINT_COUNT) + 0.5) / POINT_COUNT
 """Times of the points as fractions of the end of the test."""
+
+
 REFERENCE_STRAIN = 0.01
 """At which rates are stated, as in the paper's criteria 1 and 2."""
 

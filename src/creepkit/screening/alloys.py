@@ -119,10 +119,18 @@ ATOMIC_WEIGHTS = {
     "Pb": 207.2, "Bi": 208.98,
 }  # fmt: skip
 """{symbol: standard atomic weight}, abridged: IUPAC, Prohaska et al. (2022), Pure Appl. Chem. 94, 573."""
+
+
 EQUIMOLAR_MARGIN = 5.0
 """at.% between the two largest elements of an alloy below which it is near-equimolar."""
+
+
 NEAR_EQUIMOLAR, UNKNOWN_CLASS = "near-equimolar", "unknown"
+
+
 COMPOSITION_UNITS = ("wt.%", "at.%")
+
+
 ALLOWED_TOTAL = (98.0, 102.0)
 """Per cent that the elements of an alloy must add up to; they are scaled to 100."""
 

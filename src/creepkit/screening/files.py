@@ -40,7 +40,7 @@ from creepkit.records import History
 from creepkit.screening.results import AlloyResult, PredictedOutputs, WeightedLaw, mean_relative_squared_error
 
 if TYPE_CHECKING:
-    from creepkit.screening.results import Plate
+    from creepkit.screening.results import ScreeningResult
 
 
 ALLOY_RESULT = DocumentFormat(
@@ -49,6 +49,7 @@ ALLOY_RESULT = DocumentFormat(
     FileKind("the result of an alloy", FitError, "remove it, and it is worked out again"),
     remedy="remove it, and it is worked out again",
 )
+
 
 CODEC = RecordCodec(
     ranges={
@@ -76,10 +77,12 @@ def read_result(path: Path) -> AlloyResult:
 
 
 WRITE_ADVICE = "choose a file in a folder that exists and has space"
+
+
 HDF5_FORMAT, HDF5_LAYOUT, HDF5_UNITS = "creepkit-plate", 1, "MPa, mm, s, K"
 
 
-def write_plate(plate: Plate, path: Path) -> Path:
+def write_plate(plate: ScreeningResult, path: Path) -> Path:
     """Write the file; it is whole or absent."""
     with write_hdf5(path, FitError, WRITE_ADVICE) as file:
         file.attrs.update({"format": HDF5_FORMAT, "layout": HDF5_LAYOUT, "units": HDF5_UNITS})
@@ -161,7 +164,7 @@ COMPARISON_STRESS = 100.0
 """MPa, at which rates and local exponents of alloys are compared."""
 
 
-def result_columns(plate: Plate, result: AlloyResult) -> dict[str, Any]:
+def result_columns(plate: ScreeningResult, result: AlloyResult) -> dict[str, Any]:
     """Everything that the CSV says of one alloy."""
     first_columns: dict[str, Any] = {"alloy": result.alloy, "class": plate.class_of(result.alloy)}
     if not result.identified:
@@ -200,7 +203,7 @@ def result_columns(plate: Plate, result: AlloyResult) -> dict[str, Any]:
     }
 
 
-def write_csv(plate: Plate, path: Path) -> Path:
+def write_csv(plate: ScreeningResult, path: Path) -> Path:
     """Write the whole table; columns of parameters are those of all laws found, empty where a law has none."""
     rows = [result_columns(plate, result) for result in plate.results]
     columns = list(dict.fromkeys(name for row in rows for name in row))

@@ -31,7 +31,7 @@ from creepkit.inverse.selection.select import select
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets
 from creepkit.inverse.sparsity.term_selection import identify_full, identify_reduced
-from creepkit.jobs.worker import TaskResult
+from creepkit.jobs.worker_process import TaskResult
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor, Program
 from creepkit.registry.specimen_documents import specimen_to_json
@@ -163,6 +163,8 @@ def _predict_tests(best: Identification, tests: Sequence[History], predictor: Pr
 
 FITS_FOLDER = "fits"
 """The folder of the best identifications, inside that of the results."""
+
+
 METADATA_FIELDS = ("source", "labels")
 """Fields of a history that no identification uses."""
 

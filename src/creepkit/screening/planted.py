@@ -39,8 +39,11 @@ BASE_ALLOYS = {
     "MCrAlY": {"Ni": 47.5, "Co": 23.0, "Cr": 17.0, "Al": 12.0, "Y": 0.5},
 }  # fmt: skip
 """{base alloy: {element: wt.%}}."""
+
+
 MIXTURE_CONCENTRATION = 0.6
 """Concentration of the Dirichlet distribution of mixtures: below one, most have one or two bases in the main."""
+
 
 FIGURE_7A = {
     "hyperbolic-sine": {"A": 3.16e-7, "n": 4.15, "B": 87.16},
@@ -48,18 +51,34 @@ FIGURE_7A = {
     "norton": {"A": 1.2e-16, "n": 5.2},
 }
 """{law: values}, 1/s, MPa: Fe-rich, Ni-rich and Co-rich in the caption of Fig. 7."""
+
+
 PARAMETER_SD = {"n": 0.3, "m": 0.05, "B": 8.0}
 """Standard deviations about these."""
+
+
 RATE_FACTOR_RANGE = (0.16, 1.0)
 """Factor on the rate at 100 MPa and a strain of 0.01, drawn on a logarithmic scale."""
+
+
 LAW_PROBABILITIES = {"Fe-rich": (0.8, 0.1, 0.1), "Co-rich": (0.0, 0.5, 0.5)}
 """{class: share of each law of FIGURE_7A}; in other classes all are alike."""
+
+
 THICKNESS_MEAN_SD, MIN_THICKNESS = (0.4935, 0.027), 0.44
 """mm: mean and standard deviation of the apex of 25 measured dimples; thinner than the last burst in such a test."""
+
+
 OUTPUT_SD = {"amplitude": 0.0015, "width": 0.02, "shape": 0.02}
 """mm, mm, 1: standard deviations measured on real dimples."""
+
+
 LOADING, TIMES = PressureJump(P1=8, P2=10, Tj=7200), np.arange(60.0, 4 * 3600 + 1, 60.0)
+
+
 TEMPERATURE, ELASTIC = 1073.15, Elastic(E=150e3)
+
+
 MAX_DRAWS = 20
 """How often values are drawn for an alloy whose dimple would burst."""
 

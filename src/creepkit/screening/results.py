@@ -106,7 +106,7 @@ def mean_chi_square(fit: Identification) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Plate(Presentable):
+class ScreeningResult(Presentable):
     """The result of screen().
 
     results : one for each alloy, in the order of their first tests. histories : {alloy: its tests}.
@@ -128,7 +128,7 @@ class Plate(Presentable):
         predictor: Predictor,
         compositions: Compositions | None,
         folder: Path | None,
-    ) -> Plate:
+    ) -> ScreeningResult:
         """The plate of these alloys, with tests and predictor attached to their identifications."""
         notes = () if compositions is None else compositions.missing([a.name for a in alloys])
         attached = tuple(

@@ -18,24 +18,32 @@ from creepkit.inverse.selection.select import SELECTION_FRAMES
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets, check_penalty
 from creepkit.jobs.shard_progress import ProgressCallback, duration_text
-from creepkit.jobs.worker import TaskResult, run_task
-from creepkit.jobs.workers import ProcessWorkers, WorkerDeaths, process_count
+from creepkit.jobs.worker_pools import ProcessWorkers, WorkerDeaths, process_count
+from creepkit.jobs.worker_process import TaskResult, run_task
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 from creepkit.registry.arguments import read_histories, resolve_law, resolve_predictors
 from creepkit.screening import files
 from creepkit.screening.alloys import Compositions, group_by_alloy, resolve_compositions
 from creepkit.screening.job import FITS_FOLDER, ScreeningJob
-from creepkit.screening.results import AlloyResult, Plate
+from creepkit.screening.results import AlloyResult, ScreeningResult
 
 CANDIDATE_LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
 """Laws of Table 1 of Chen et al."""
+
+
 DENSE_LAW = "combined"
 """The law of Eq. (2), which is identified without sparsity."""
+
+
 MOST_WORKER_DEATHS = 2
 """How often an alloy may kill its worker process."""
+
+
 POLL_INTERVAL = 1.0
 """s to wait for results before it is checked which processes have died."""
+
+
 _log = logging.getLogger("creepkit.screening")
 
 
@@ -77,7 +85,7 @@ def screen(
     options: ScreeningOptions | None = None,
     workers: int | None = None,
     progress: ProgressCallback | None = None,
-) -> Plate:
+) -> ScreeningResult:
     """Identify the law of every alloy from its tests, and compare the alloys.
 
     histories : of all alloys, or a folder of their files. Tests of one alloy are identified together; one that names
@@ -111,7 +119,9 @@ def screen(
         )
         _make_folder(folder / FITS_FOLDER)
         results = _screen_all(job, processes, progress)
-    return Plate.from_results(job.alloys, results, job.predictor, composition_table, None if to is None else folder)
+    return ScreeningResult.from_results(
+        job.alloys, results, job.predictor, composition_table, None if to is None else folder
+    )
 
 
 def _resolve_tests(histories: Sequence[History] | str | Path, compositions: object) -> list[History]:

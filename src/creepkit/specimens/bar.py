@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 STEPS_PER_BREAKPOINT = 20
 """Each straight piece of a program takes some 7 steps of its own; a logged temperature has thousands of pieces."""
+
+
 NUISANCES = ("temperature", "modulus")
 
 
@@ -163,8 +165,12 @@ class Bar:
 
 DIFFERENCE_STEPS = {"temperature": 0.1, "modulus": 1e-3}
 """Of central differences: K, and relative."""
+
+
 PlainPredict = Callable[[Floats, Sequence[History], bool], Prediction]
 """Predict histories for theta (candidates, parameters), with sensitivities or without."""
+
+
 ModulusDerivative = Callable[[Prediction, Sequence[History], Floats], Floats | None]
 """Derivative of the values to the relative change of the modulus; None where it is not known exactly."""
 

@@ -20,7 +20,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.hookspecs import hookimpl
 from creepkit.records import (
-    COMPONENTS,
+    TENSOR_COMPONENTS,
     History,
     HistoryPrediction,
     NuisanceValues,
@@ -39,9 +39,13 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
 
 
-OUTPUTS = ("strain", *(f"strain_{c}" for c in COMPONENTS), *(f"stress_{c}" for c in COMPONENTS))
+OUTPUTS = ("strain", *(f"strain_{c}" for c in TENSOR_COMPONENTS), *(f"stress_{c}" for c in TENSOR_COMPONENTS))
+
+
 DIFFERENCE_STEP = 1e-3
 """Of the central differences in internal parameters, relative where a parameter of linear scale is above one."""
+
+
 DEFAULT_ELASTICITY = (150e3, 0.3)
 """E, MPa, and nu where stresses alone are prescribed and no elastic data are given: creep does not depend on them."""
 
@@ -219,7 +223,7 @@ def _imposed(history: History) -> Floats:
     """(frames, 6) prescribed stresses, MPa; zero where none is."""
     stress = _loading(history).stress
     zero = np.zeros(history.times.size)
-    return np.stack([stress[c].at(history.times) if c in stress else zero for c in COMPONENTS], axis=-1)
+    return np.stack([stress[c].at(history.times) if c in stress else zero for c in TENSOR_COMPONENTS], axis=-1)
 
 
 def point_outputs(run: PointTrajectory, history: History) -> Floats:
@@ -303,13 +307,13 @@ def elastic_von_mises(loading: PointLoading, elastic: tuple[float, float] | None
     marks = np.unique(np.concatenate([p.times for p in (*loading.stress.values(), *loading.strain.values())]))
     stress = np.zeros((marks.size, 6))
     for name, program in loading.stress.items():
-        stress[:, COMPONENTS.index(name)] = program.at(marks)
+        stress[:, TENSOR_COMPONENTS.index(name)] = program.at(marks)
     if loading.strain:
         if elastic is None:
             raise SolveError(
                 "a material point under prescribed strain needs elastic data; set elastic=Elastic(E=150e3)"
             )
-        strain_controlled = [COMPONENTS.index(name) for name in loading.strain]
+        strain_controlled = [TENSOR_COMPONENTS.index(name) for name in loading.strain]
         flexibility = compliance(elastic)
         elastic_residual = (
             np.stack([p.at(marks) for p in loading.strain.values()], axis=-1)

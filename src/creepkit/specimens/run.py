@@ -24,6 +24,8 @@ STATUS_TEXT = {
     Status.OUTSIDE_DOMAIN: "outside the domain",
 }
 """What a status means where no reason is given."""
+
+
 _RunType = TypeVar("_RunType", bound="Run")
 
 

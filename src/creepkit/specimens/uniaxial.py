@@ -104,8 +104,12 @@ def creepkit_specimens() -> list[Specimen]:
 
 HORIZON = 100.0
 """How far beyond the last frame, and the measured rupture, a bar is followed, as a factor on time."""
+
+
 SMALLEST_STRAIN = 1e-12
 """Creep strains below this are there from the beginning."""
+
+
 EARLIEST_RUPTURE = 1e-12
 """s; a bar that breaks at once does so then, for rupture times are compared by their logarithms."""
 

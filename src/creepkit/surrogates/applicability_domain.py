@@ -19,8 +19,12 @@ from creepkit.errors import SurrogateError
 
 DEFAULT_MARGIN = 0.01
 """Share of an input's range by which it may leave it, unless more is forgiven."""
+
+
 LEAST_VARIANCE = 1e-9
 """Variance of a standardised direction below which it never varied."""
+
+
 INPUTS_NAMED = 3
 """Inputs named when a row is outside."""
 

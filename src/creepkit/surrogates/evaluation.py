@@ -34,7 +34,11 @@ if TYPE_CHECKING:
 
 PAPER_EVALUATION_TIMES = (7_500.0, 22_500.0, 37_500.0)
 """s, of Fig. 4; tests of other lengths are evaluated at the same shares of their end as of twelve hours."""
+
+
 PAPER_TEST_DURATION = 43_200.0
+
+
 WORST_COUNT = 10
 
 

@@ -13,6 +13,8 @@ from creepkit.surrogates.surrogate import Recipe, Surrogate
 from creepkit.surrogates.weight_files import CODEC, read_weights
 
 WEIGHTS_FOLDER = Path(__file__).with_name("weights")
+
+
 SUFFIX = ".safetensors"
 
 

@@ -178,6 +178,8 @@ def _is_constant(column: Tensor) -> bool:
 
 NUISANCE_OF_INPUT = {"modulus": "modulus", "apex_thickness": "thickness", "temperature": "temperature"}
 """{input: the nuisance that changes it}."""
+
+
 BATCH_NUMBERS = 2**24
 """Numbers in the inputs of a batch."""
 

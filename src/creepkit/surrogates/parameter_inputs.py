@@ -27,14 +27,21 @@ if TYPE_CHECKING:
 
 CONSTANT_INPUTS = ("modulus", "apex_thickness", "temperature")
 """Conditions that do not change during a test: MPa, mm, K."""
+
+
 SERIES_INPUTS = ("load", "mean_load", "time", "step")
 """Inputs at each frame: the load there, its mean since the frame before (MPa), log10 of 1 s + the time, and of 1 s +
 the time since the frame before."""
 
+
 TEMPERATURE_STEP = 0.1
 """K, of the central difference of a modulus."""
+
+
 JUMP_TOLERANCE = 0.02
 """Mean deviation of a load from a jump, over its largest value, that is none."""
+
+
 LARGEST_TEMPERATURE_CHANGE = 1.0
 """K by which the temperature of a test may drift."""
 
@@ -183,6 +190,7 @@ _SERIES_FUNCTIONS: dict[str, Callable[[Program, Floats], Floats]] = {
     "time": lambda program, times: np.log10(1.0 + times),
     "step": lambda program, times: np.log10(1.0 + np.diff(times, prepend=0.0)),
 }
+
 
 LN10 = float(np.log(10.0))
 

@@ -14,8 +14,12 @@ from torch import Tensor, nn
 from creepkit.surrogates.recipe import SampleTensors, Standardisation, SurrogateModule
 
 RecurrentCell = Literal["gru", "lstm"]
+
+
 LOG_FLOOR = 0.01
 """Share of the median of an output that is added to it before its logarithm is taken: it may begin at zero."""
+
+
 LARGEST_LOG_EXCESS = 2.0
 """By how much (of ln) a prediction may exceed the largest value of the training: an exponential must not overflow."""
 

@@ -52,9 +52,15 @@ if TYPE_CHECKING:
 
 DOMAIN_NODES = 4
 """Nodes of each history that the domain is made of, spread over it: neighbours say the same."""
+
+
 CONDITION_INPUTS = ("ln P/E", "log10 age", "ln D", "ln D/D_elastic", "fast", "slow", "apex thickness")
+
+
 DOMAIN_DIGITS = 6
 """Decimals of what the domain is made of: a feature that is zero but for its rounding does not vary."""
+
+
 CONDITION_MARGIN, RATE_MARGIN = 0.05, 0.5
 """Shares of its range by which a CONDITION of the dimple, and all else, what a law's rate is like, may leave it.
 
@@ -207,6 +213,8 @@ def _domain_nodes(nodes: int) -> list[int]:
 
 VALUE_BATCH_NUMBERS = 2**17
 """Numbers in the trajectories of a batch of one thread, about what a cache holds."""
+
+
 DERIVATIVE_BATCH_NUMBERS = 2**22
 """The same of their derivatives: a call of torch's for them costs some milliseconds, however few they are."""
 

@@ -15,6 +15,7 @@ from creepkit.surrogates.recipe import SampleTensors, SurrogateModule
 FEATURE_START = len(TRAJECTORY_COLUMNS)
 """First column of the features in a trajectory."""
 
+
 LOCAL_INPUTS = (
     "ln P/E",
     "log10 age",
@@ -29,10 +30,16 @@ LOCAL_INPUTS = (
     "apex thickness",
 )
 """What is known at a node beside the features; see TRAJECTORY_COLUMNS for what they are made of."""
+
+
 MEMORY_STRAIN = 1.0
 """Elastic strains of creep over which a stress field loses its history: the decay of the exponential means."""
+
+
 _LOAD, _AGE, _DEFLECTION, _TINY = 1e-6, 1e-3, 1e-4, 1e-12
 """Floors: P/E; creep strain over elastic strain; mm, a tenth of a micron; mm or strain."""
+
+
 _LARGEST_EXPONENT = 20.0
 """Exponents are bent towards it."""
 
@@ -120,12 +127,17 @@ def _exponential_means(features: Tensor, age: Tensor) -> Tensor:
 
 BASE_COLUMNS = ("elastic", "creep", "width", "shape")
 """Columns of "base", what is corrected: mm, mm, mm and a number."""
+
+
 CREEP_CORRECTION_SCALE, SHAPE_CORRECTION_SCALE = 0.1, 0.05
 """What 1 out of the network stands for: in ln of the creep deflection, and in mm of width or in shape."""
+
+
 AMPLITUDE_ERROR, SHAPE_ERROR, AMPLITUDE_FLOOR = 0.01, 0.07, 0.01
 """Errors that count alike in training: relative to the amplitude plus a floor (mm, twice what cameras resolve), and of
 width (mm) or shape.
 """
+
 
 _LARGEST_INPUT = 6.0
 """Standard deviations to which inputs are limited."""

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 CONTROLLED_QUANTITY = {"bulge": "pressure", "uniaxial": "stress"}
 """What drives the tests of each kind of specimen."""
+
+
 RELATIVE_TOLERANCE = 1e-6
 
 

@@ -35,10 +35,6 @@ if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
 
 
-if TYPE_CHECKING:
-    from creepkit.dataset.dataset import Dataset
-
-
 def training_request(data: Dataset, recipe: Recipe, seed: int) -> dict[str, Any]:
     """What was asked for, as JSON-able data: the same call goes on where it was interrupted."""
     config: Any = asdict(recipe)  # type: ignore[call-overload]

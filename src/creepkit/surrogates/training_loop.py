@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 LEAST_SAMPLES = 10
 """Samples below which nothing can be learnt and nothing be said of it."""
 
+
 PLAUSIBLE_RANGES = {
     "modulus": (1e3, 2e6),
     "P1": (1e-4, 1e4),
@@ -90,7 +91,10 @@ PLATEAU_THRESHOLD = 1e-4
 """Relative fall of a loss that counts as one, and DROP what the rate falls to: torch's ReduceLROnPlateau, unset in the
 paper."""
 
+
 PLATEAU_FACTOR = 0.1
+
+
 LEAST_LEARNING_RATE = 1e-8
 
 

@@ -29,6 +29,7 @@ SURROGATE = DocumentFormat(
     remedy="train again",
 )
 
+
 CHECKPOINT = DocumentFormat(
     "creepkit-training-checkpoint",
     1,

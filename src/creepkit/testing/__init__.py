@@ -30,8 +30,10 @@ __all__ = [
     "draw_samples",
 ]
 
+
 _FEWEST_SAMPLES = 8
 """Samples at which the constraints must hold for a verdict to mean something."""
+
 
 _LAW_CHECKS: dict[str, Callable[[CreepLaw, LawSamples], Iterator[ConformanceCheck]]] = {
     "table": law_checks.check_declarations,

@@ -60,8 +60,12 @@ class ConformanceReport:
 
 
 _STRESS_COLUMNS = [0, 4, 5]
+
+
 _SMALLEST_ACCURATE = 1e-290
 """Numbers below this may have lost digits."""
+
+
 _LARGEST_LOG_RATE = 1e29
 """ln rates as far from 0 as this mean that no term is left, or that the rate is infinite."""
 

@@ -78,12 +78,24 @@ KERNEL_EVALUATORS: dict[str, Callable[[CreepLaw, LawSamples], KernelTable]] = {
     "numba": evaluate_numba,
 }
 """{target: function that evaluates it}."""
+
+
 VALUE_TOLERANCE = 1e-12
+
+
 DERIVATIVE_TOLERANCE = 1e-10
+
+
 NEGLIGIBLE_RATE = 1e-100
 """Rates below this, 1/s, count as zero: what floors leave of a term that is exactly zero."""
+
+
 _Rows = Sequence[Sequence[Any]]
+
+
 _SMALLEST, _LARGEST = mpmath.mpf("2.3e-308"), mpmath.mpf("1.7e308")
+
+
 _ROUNDING_FACTOR = 4.0
 """How many times the change from the last bit of every input an error may be where a result cancels."""
 

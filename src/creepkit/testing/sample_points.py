@@ -15,6 +15,8 @@ from creepkit.language.symbols import POINT_VARIABLES, State
 
 STRESS_RANGE, STRAIN_RANGE, TIME_RANGE, TEMPERATURE_RANGE = (1e-3, 2000.0), (1e-12, 1.0), (1e-3, 1e6), (600.0, 1600.0)
 """Ranges in MPa, 1, s and K."""
+
+
 _MOST_BATCHES = 64
 """How many times as many points are drawn, at most, to find enough where the law's constraints hold."""
 

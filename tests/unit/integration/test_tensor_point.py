@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from creepkit.errors import SolveError
 from creepkit.integration import IntegrationSettings
 from creepkit.integration.tensor_integration import (
-    COMPONENTS,
+    TENSOR_COMPONENTS,
     integrate_tensor_point,
     prescribed_strain,
     prescribed_stress,
@@ -106,10 +106,10 @@ def test_a_turned_frame_turns_the_answer() -> None:
     c, s = np.cos(0.5), np.sin(0.5)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
     strain = np.diag([1e-3, 2e-4, -1e-4])
-    rows, columns = [int(k[0]) - 1 for k in COMPONENTS], [int(k[1]) - 1 for k in COMPONENTS]
+    rows, columns = [int(k[0]) - 1 for k in TENSOR_COMPONENTS], [int(k[1]) - 1 for k in TENSOR_COMPONENTS]
     tensors = []
     for tensor in (strain, turn @ strain @ turn.T):
-        controls = {k: prescribed_strain(e) for k, e in zip(COMPONENTS, tensor[rows, columns], strict=True)}
+        controls = {k: prescribed_strain(e) for k, e in zip(TENSOR_COMPONENTS, tensor[rows, columns], strict=True)}
         values = {"A": 1e-14, "n": 4.0, "C": 1e-12, "v": 3.5}
         result = run(DAMAGING, values, controls, [1e3])
         full = np.zeros((3, 3))

@@ -59,7 +59,7 @@ def test_absent_frames_do_not_count():
     present = whole.present.copy()
     present[1, 7:] = False
     part = replace(whole, present=present, values=np.where(present, whole.values, 0),
-                   transform_derivatives=np.where(present, whole.transform_derivatives, 0),
+                   offset_sensitivity=np.where(present, whole.offset_sensitivity, 0),
                    log_rate_sensitivity=np.where(present, whole.log_rate_sensitivity, 0))  # fmt: skip
     c = covariance(whole, scatter)
     truth = multivariate_normal(np.zeros(12), c[0]).logpdf(whole.values[0])
@@ -128,13 +128,13 @@ def by_hand(residuals, scatter, test):
             a, b = (list(scatter.outputs.values())[r.output_index[test, k]] for k in (i, j))
             c[i, j] = scatter.rate**2 * r.log_rate_sensitivity[test, i] * r.log_rate_sensitivity[test, j]
             if a is b:
-                lag = abs(r.correlation_time[test, i] - r.correlation_time[test, j])
+                lag = abs(r.correlation_coordinate[test, i] - r.correlation_coordinate[test, j])
                 c[i, j] += (
                     a.drift**2 * np.exp(-lag / a.correlation_length)
-                    + a.offset**2 * r.transform_derivatives[test, i] * r.transform_derivatives[test, j]
+                    + a.offset**2 * r.offset_sensitivity[test, i] * r.offset_sensitivity[test, j]
                 )
             if i == j:
-                c[i, j] += (a.noise * r.transform_derivatives[test, i]) ** 2 + a.misfit**2
+                c[i, j] += (a.noise * r.offset_sensitivity[test, i]) ** 2 + a.misfit**2
     return c
 
 

@@ -17,7 +17,7 @@ from creepkit.inverse.variance_components import (
     inverse_covariances,
     restricted_log_likelihood,
 )
-from creepkit.inverse.working_noise import WorkingNoise
+from creepkit.inverse.working_noise import WorkingNoiseEstimator
 
 
 def linear_model(values, design, clock=None, outputs=1):
@@ -68,14 +68,17 @@ def test_what_a_predictor_states_of_its_error_is_not_asked_of_the_data():
     """An error of a thousandth, under noise of .3, leaves the noise its n - p = 22; asked of the data it takes most."""
     linear = linear_model(0.3 * np.random.default_rng(1).normal(size=(1, 25)), polynomial(25, 2))
     entries = SimpleNamespace(outputs=("amplitude",), transforms=(LinearTransform(2.0, 1.0),))
-    weighting = WorkingNoise(IdentificationSettings(weights="likelihood"), entries, {"amplitude": 0.004})
+    weighting = WorkingNoiseEstimator(IdentificationSettings(weights="likelihood"), entries, {"amplitude": 0.004})
     scatter = white(0.3, ("amplitude",), drift=0.002)
-    assert weighting.fixed_components(scatter) == {("amplitude", "drift"), ("amplitude", "correlation_length")}
-    assert weighting.fixed_components(white(0.3, ("amplitude",), drift=0.1)) == set()
+    assert weighting.unestimated_drift_components(scatter) == {
+        ("amplitude", "drift"),
+        ("amplitude", "correlation_length"),
+    }
+    assert weighting.unestimated_drift_components(white(0.3, ("amplitude",), drift=0.1)) == set()
     assert restricted_covariance(linear, scatter, ())[1] < 10.0
-    assert restricted_covariance(linear, scatter, (), weighting.fixed_components(scatter))[1] == pytest.approx(
-        22.0, rel=1e-3
-    )
+    assert restricted_covariance(linear, scatter, (), weighting.unestimated_drift_components(scatter))[
+        1
+    ] == pytest.approx(22.0, rel=1e-3)
 
 
 def test_tests_that_share_their_values_share_one_freedom():

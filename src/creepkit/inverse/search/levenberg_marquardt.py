@@ -16,10 +16,16 @@ from creepkit.inverse.problem import FAILED_COST, PRIOR_STRENGTH, LeastSquaresPr
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, robust_loss, robust_weight
 
 MAX_STEPS = 40
+
+
 TOLERANCE = 1e-5
 """Relative decrease of the cost below which a start has converged, twice in turn."""
+
+
 CONTINUED = 4
 """Of the best minima, how many are refined further where they have not converged."""
+
+
 DAMPING_RANGE = (1e-3, 1e8)
 """First damping, relative to the diagonal of J'J over the bounds, and the one at which a start is given up."""
 
@@ -57,7 +63,7 @@ def _continued(problem: LeastSquaresProblem, minima: Sequence[Minimum]) -> list[
     finished = []
     for minimum in minima:
         if not minimum.converged:
-            continued = problem.minimise(minimum.u)
+            continued = problem.minimise(minimum.x)
             minimum = (
                 replace(continued, evaluations=continued.evaluations + minimum.evaluations)
                 if continued.cost < minimum.cost

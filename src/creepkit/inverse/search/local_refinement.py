@@ -53,7 +53,7 @@ class Minimum:
     terms_off : terms of a sum that the search switched off.
     """
 
-    u: Floats
+    x: Floats
     cost: float
     converged: bool
     evaluations: int

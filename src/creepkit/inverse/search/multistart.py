@@ -64,7 +64,7 @@ def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int)
         minimum = batched_levenberg_marquardt(single, screened_starts(single, starts=starts, draws=draws))[0]
         problem.evaluations.count += single.evaluations.count
         u = bounds.centre
-        u[positions] = minimum.u
+        u[positions] = minimum.x
         log_rates = [u[k] for k in rates if k in positions] or [bounds.centre[k] for k in rates]
         for k in rates:
             u[k] = u[k] if k in positions else max(log_rates) - np.log(20.0)
@@ -129,6 +129,7 @@ EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS = 1e-5, 5e-3
 """Root mean square difference of predictions, over the spread of what was measured, below which two minima are one. A
 reduced-order model is not better than the latter, and along a valley one start is enough for its predictor."""
 
+
 WORKING_ERROR = 0.3
 """Misfit that is assumed in a search, over that spread (see inverse.noise_model.initial_working_noise)."""
 
@@ -150,7 +151,7 @@ def distinct(
 
 
 def _same(a: Minimum, b: Minimum, bounds: Bounds, equal_predictions: float, tolerance: float) -> bool:
-    if (np.abs(a.u - b.u) <= tolerance * bounds.width).all():
+    if (np.abs(a.x - b.x) <= tolerance * bounds.width).all():
         return True
     if a.whitened_residuals is None or b.whitened_residuals is None:
         return False

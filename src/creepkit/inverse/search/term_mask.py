@@ -20,8 +20,12 @@ from creepkit.language import CreepLaw
 
 ANY_TERM = "any"
 """In place of names: every term may be switched off."""
+
+
 EXPECTED_FLIPS = 0.5
 """Mask elements that mutate in each draw of a candidate, on average: enough to leave a wrong subset, not to drift."""
+
+
 OFF_MARGIN = 0.5
 """In ln of a rate: a rate nearer to its lower bound than this counts as at it."""
 
@@ -119,6 +123,8 @@ def _maskable_terms(
 
 SAME_BASIN = 0.1
 """Of the width of the bounds: candidates closer than that in every coordinate lead to the same minimum, as a rule."""
+
+
 CONVERGED_DECREASE = 1e-3
 """A decrease of the cost, half of chi-square, below which a search has converged."""
 
@@ -175,7 +181,7 @@ def refine_candidates(
     minima = []
     for done, k in enumerate(selected):
         minimum = problem.minimise(candidates.u[k], fixed=candidates.fixed_values(k))
-        minima.append(replace(minimum, terms_off=candidates.terms_off(minimum.u)))
+        minima.append(replace(minimum, terms_off=candidates.terms_off(minimum.x)))
         if progress is not None:
             progress("refinement", done + 1, len(selected))
     evaluations = sum(minimum.evaluations for minimum in minima)

@@ -72,16 +72,16 @@ def under_common_covariance(fits: Sequence[Identification]) -> CommonCovarianceF
 
 def _with_covariance_of(reference: Residuals, residuals: Residuals) -> Residuals:
     """A law's residuals, with the derivatives that make the covariance, and the weights of tests, of the best law."""
-    transform_derivatives, rate_effect = (
+    offset_sensitivity, rate_effect = (
         np.where(reference.present, reference_values, own_values)
         for reference_values, own_values in (
-            (reference.transform_derivatives, residuals.transform_derivatives),
+            (reference.offset_sensitivity, residuals.offset_sensitivity),
             (reference.log_rate_sensitivity, residuals.log_rate_sensitivity),
         )
     )
     return replace(
         residuals,
-        transform_derivatives=transform_derivatives,
+        offset_sensitivity=offset_sensitivity,
         log_rate_sensitivity=rate_effect,
         test_weights=reference.test_weights,
     )
@@ -155,6 +155,8 @@ def _nuisance_log_determinant(linearised: LinearisedProblem, inverses: Floats, p
 
 DISTINGUISHABLE_CHI_SQUARE = 2.0 * float(np.log(0.95 / 0.05))
 """Chi-square between predictions from which on a test can be expected to decide."""
+
+
 STRESS_POINTS = 21
 """Stresses at which local exponents are compared."""
 

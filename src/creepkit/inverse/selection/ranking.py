@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 
 CRITERIA = ("bic", "aicc", "hold-out")
+
+
 Criterion = Literal["bic", "aicc", "hold-out"]
 
 

@@ -64,9 +64,12 @@ def _distinct_laws(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
 
 SELECTION_FRAMES = 60
 """Frames of a history that are compared, unless settings say otherwise."""
+
+
 RULED_OUT_EXCESS = 40.0
 """Criterion over the best from which a law is ruled out by a surrogate already: e^-20 of the weight, which the errors
 of a surrogate, some noise in chi-square, do not make up for."""
+
 
 DRIFT_LIMIT = 2.0
 """Drift of the first output under the best single law, in units of its noise, above which sums are tried."""
@@ -167,6 +170,6 @@ def _has_systematic_residuals(fit: Identification) -> bool:
     name = next(iter(fit.noise_model.outputs))
     components, residuals = fit.noise_model[name], fit.linearised.residuals
     transform_derivative = float(
-        np.median(np.abs(residuals.transform_derivatives[residuals.present & (residuals.output_index == 0)]))
+        np.median(np.abs(residuals.offset_sensitivity[residuals.present & (residuals.output_index == 0)]))
     )
     return components.drift > DRIFT_LIMIT * components.noise * transform_derivative

@@ -27,6 +27,8 @@ from creepkit.records import History
 
 BLOCK_FRAMES = 6
 """Frames of a block: an eighth of a bulge test of 48."""
+
+
 ZERO_WEIGHT = 1e-12
 """Weight of observations that were not drawn."""
 
@@ -125,7 +127,7 @@ def _terms_kept(
     single_term_optima: Sequence[Floats] = [
         problem.embedded(single.law, single.x) for single in reductions.single_terms()
     ]
-    x = penalised_fit(problem, penalised_terms, [optimum, reductions.full().x, *single_term_optima]).u
+    x = penalised_fit(problem, penalised_terms, [optimum, reductions.full().x, *single_term_optima]).x
     return terms_above(problem.contributions_at(x))
 
 

@@ -25,8 +25,12 @@ from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
 
 STRESS_FACTORS = (0.5, 0.8, 1.0, 1.3)
+
+
 TIMES_PER_TEST = 16
 """Times that are evaluated in each test."""
+
+
 MIN_STRAIN_FRACTION = 0.1
 """Of linear growth to the end strain: least strain at a time, as smaller ones are noise or loading strain."""
 
@@ -103,6 +107,8 @@ def strain_history(history: History, predictor: Predictor | None) -> Floats:
 
 DIFFERENCE_STEP = 1e-6
 """Of differences, in conditioned coordinates: the ln of rates is smooth in them."""
+
+
 LOG_ZERO_RATE = -1e30
 """ln of a rate of zero."""
 

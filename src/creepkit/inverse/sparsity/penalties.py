@@ -24,8 +24,12 @@ from creepkit.language import CreepLaw
 
 Strength: TypeAlias = float | Literal["auto"]
 """A number, or chosen along the path from none to all (see term_selection.trace_path)."""
+
+
 DEFAULT_STRENGTH = 24.0
 """Half the 48 frames of a bulge test of 12 h: what the penalty of square roots was tried with."""
+
+
 MIN_CONTRIBUTION = 1e-9
 """A contribution below this counts as this in a weight."""
 

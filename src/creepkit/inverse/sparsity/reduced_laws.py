@@ -28,6 +28,8 @@ from creepkit.records import Predictor
 
 TOLERANCES = Tolerances(max_steps=40, tolerance=1e-7)
 """Of the fits of reduced laws."""
+
+
 IDLE_SAMPLES = 64
 """Draws of the parameters of a term that is to be absent, besides its rate."""
 
@@ -83,7 +85,7 @@ class TermProblem:
 
     def bic(self, minimum: Minimum) -> float:
         """BIC of a fit without penalty; its deviance is the chi-square, priors included."""
-        parameters = self.determined_parameter_count(minimum.u)
+        parameters = self.determined_parameter_count(minimum.x)
         return 2.0 * minimum.cost + bic_penalty(parameters, self.problem.observations.count)
 
     def determined_parameter_count(self, x: Floats) -> int:
@@ -184,7 +186,7 @@ class ReducedLaw:
     @property
     def x(self) -> Floats:
         """(unknowns,) where it fits best."""
-        return self.minimum.u
+        return self.minimum.x
 
     @property
     def chi_square(self) -> float:
@@ -262,7 +264,7 @@ class ReducedLaws:
         """The problem of these terms, which starts at their optimum."""
         law = self.problem.law if terms == self.terms else self.problem.law.only(*terms)
         problem = self.problem.with_law(law)
-        return replace(problem, start=problem.lowest_minimum(self._starts(problem, terms)).u)
+        return replace(problem, start=problem.lowest_minimum(self._starts(problem, terms)).x)
 
     def _starts(self, problem: TermProblem, terms: TermNames) -> list[Floats]:
         """What the whole law says of these terms; for one term the middle of its bounds, for more their own optima."""

@@ -146,4 +146,6 @@ class PenaltyPath(Presentable):
 
 LEAST_CONTRIBUTION = 0.05
 """A term that contributes less than this is dropped."""
+
+
 TermNames = tuple[str, ...]

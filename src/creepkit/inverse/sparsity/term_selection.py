@@ -28,6 +28,8 @@ from creepkit.records import History, Predictor
 
 CONTINUED_STARTS, COMPLETED_STARTS = 5, 2
 """Starts that are refined for some steps, and how many of them to the end."""
+
+
 PRELIMINARY_STEPS = 12
 """Steps of the first refinement."""
 
@@ -44,7 +46,7 @@ def penalised_fit(problem: TermProblem, penalty: PenalisedTerms, starts: Sequenc
     costs = [0.5 * problem.problem.chi_square(x) + float(penalty.values(x[None])[0]) for x in starts]
     order = sorted(range(len(starts)), key=lambda k: costs[k])[:CONTINUED_STARTS]
     preliminary = sorted((problem.minimise(starts[k], penalty, PRELIMINARY_STEPS) for k in order), key=lambda m: m.cost)
-    completed = [m if m.converged else problem.minimise(m.u, penalty) for m in preliminary[:COMPLETED_STARTS]]
+    completed = [m if m.converged else problem.minimise(m.x, penalty) for m in preliminary[:COMPLETED_STARTS]]
     return min(completed, key=lambda m: m.cost)
 
 
@@ -67,7 +69,7 @@ def trace_path(
     corners = penalised_starts(reductions)[-len(labels) :]
     optima = [full.x]
     for k, strength in enumerate(sorted(strengths)):
-        optima.append(_next_fit(reductions, penalised.with_strength(strength), optima[-1], corners).u)
+        optima.append(_next_fit(reductions, penalised.with_strength(strength), optima[-1], corners).x)
         if progress is not None:
             progress("strength", k + 1, len(strengths))
         if len(terms_above(problem.contributions_at(optima[-1]))) == 1:
@@ -149,9 +151,9 @@ def choose_terms(
     if search is not None:
         searched = problem.search_problem(penalised_terms)
         result = search.minima(searched, progress)
-        starts += [problem.with_nuisances(minimum.u) for minimum in distinct(result.minima, searched.bounds)]
+        starts += [problem.with_nuisances(minimum.x) for minimum in distinct(result.minima, searched.bounds)]
         trace = result.trace
-    x = penalised_fit(problem, penalised_terms, starts).u
+    x = penalised_fit(problem, penalised_terms, starts).x
     contributions = problem.contributions_at(x)
     return TermChoice(terms_above(contributions), contributions, x, penalised_terms.strength, trace=trace)
 

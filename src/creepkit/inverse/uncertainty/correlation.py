@@ -24,10 +24,16 @@ if TYPE_CHECKING:
 
 
 CoordinateSystem = Literal["author", "conditioned"]
+
+
 STRONG_CORRELATION = 0.95
 """Correlation beyond which two parameters are determined only together."""
+
+
 UNDETERMINED_WIDTH = 1.0 / 3.0
 """Width of a 95 % interval over that of the bounds beyond which a parameter is not determined."""
+
+
 WELL_DETERMINED_SD = 0.1
 """Standard deviation of a combination, over that which its parameters' bounds alone would leave, that is well known."""
 

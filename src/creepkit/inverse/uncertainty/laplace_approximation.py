@@ -19,9 +19,9 @@ from creepkit.inverse.noise_model import (
     NoiseModel,
     Residuals,
     cholesky_factors,
+    components_fixed_by_priors,
     covariance,
     effective_sample_size,
-    fixed_components,
     whiten,
 )
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
@@ -31,6 +31,8 @@ from creepkit.records import Nuisance
 
 LOG_COMPONENT_STEP = 1e-3
 """Of the logarithm of a size, for differences of the covariance, which is smooth in it."""
+
+
 MINIMUM_FREEDOM = 3.0
 """Lower limit of degrees of freedom: below it a quantile only says that the variance is unknown."""
 
@@ -91,7 +93,7 @@ def _information(
 
 def _estimated_components(noise_model: NoiseModel, nuisances: Sequence[Nuisance]) -> list[tuple[str, str]]:
     """(output, component) of the variance components that were estimated; "" for the rate."""
-    fixed = fixed_components(nuisances, list(noise_model.outputs))
+    fixed = components_fixed_by_priors(nuisances, list(noise_model.outputs))
     components = []
     for output, output_noise in noise_model.outputs.items():
         names = ["noise"] + ["misfit"] * (output_noise.misfit > 0) + ["offset"] * (output_noise.offset > 0)

@@ -36,8 +36,12 @@ if TYPE_CHECKING:
 
 BISECTIONS = 80
 """Of the interval between the lowest and the highest quantile of the parts: to the last digit."""
+
+
 NORMAL_FREEDOM = 1e9
 """Degrees of freedom at which Student's distribution is the normal one."""
+
+
 INTERVAL_PROBABILITIES = (0.5, 0.025, 0.975)
 
 
@@ -194,6 +198,8 @@ def _normal_under_law(fit: Identification, function: CoordinateFunction) -> tupl
 
 TEMPERATURE_NODES = 81
 """Slices of the temperature's distribution."""
+
+
 SAME_TEMPERATURE = 5.0
 """K: tests within it of one another say nothing of how a rate depends on temperature."""
 

@@ -107,7 +107,7 @@ class Posterior:
             nuisance_basis=np.linalg.qr(np.concatenate([nuisance_rows, root_precision]))[0],
             prior_residuals=root_precision @ (e - nuisances.mean[: nuisances.size]),
             degrees_of_freedom=max(fit.freedom, 1.0),
-            least_chi_square=whole.chi_square(whole.minimise(fit.x, tolerances=REFIT_TOLERANCES).u),
+            least_chi_square=whole.chi_square(whole.minimise(fit.x, tolerances=REFIT_TOLERANCES).x),
         )
 
     @property
@@ -188,6 +188,8 @@ def _whitened(whitening: Floats, rate_effect: Floats, values: Floats) -> Floats:
 
 CONVERGED_LENGTH = 50.0
 """Steps over autocorrelation time that emcee's authors require before its estimate is reliable."""
+
+
 MAX_START_DRAWS = 50
 """Draws of a walker's start that may fall outside the bounds."""
 

@@ -39,12 +39,20 @@ if TYPE_CHECKING:
 
 CONSTRAINT_WIDTH = 0.02
 """w over the standard deviation of the quantity."""
+
+
 STEP_RISE = 0.35
 """Aimed at from point to point: the rise of sqrt(chi2) over that of the interval's end."""
+
+
 MAX_POINTS = 15
 """Points to each side; an end that lies further out than they reach is called open."""
+
+
 BLOCKED_FRACTION = 0.5
 """Share of a step below which what was asked for cannot be had: the law's bounds are in the way."""
+
+
 ZERO_TOLERANCE = 1e-9
 """Of the standard deviation: nearer to zero than this is zero."""
 
@@ -154,9 +162,9 @@ class _ProfileTrace:
         constraint = (
             None if value is None else _QuantityConstraint(self.function, self.size, value, CONSTRAINT_WIDTH * self.sd)
         )
-        x = self.problem.minimise(start, additional=constraint, tolerances=REFIT_TOLERANCES).u
+        x = self.problem.minimise(start, additional=constraint, tolerances=REFIT_TOLERANCES).x
         if self.noise_model.rate > 0:
-            x = self._problem_at(x).minimise(x, additional=constraint, tolerances=REFIT_TOLERANCES).u
+            x = self._problem_at(x).minimise(x, additional=constraint, tolerances=REFIT_TOLERANCES).x
         value_reached = float(self.function(x[: self.size]))
         return _ProfilePoint(
             x, 0.0 if abs(value_reached) < ZERO_TOLERANCE * self.sd else value_reached, self._chi_square(x)

@@ -17,6 +17,8 @@ from creepkit.inverse.coordinates import Coordinates
 
 EXPONENT_STRESS_RATIO = 1.0005
 """Ratio of the stresses between which a local exponent is taken, to each side."""
+
+
 CoordinateFunction = Callable[[Floats], Floats]
 """u (..., parameters) to numbers (..., points)."""
 

@@ -12,6 +12,8 @@ from creepkit.arrays import Floats, Ints
 
 LOG_OF_ZERO = -700.0
 """Stands for ln 0: exp(LOG_OF_ZERO p) is nothing beside 1 for any admitted p, and nothing times -700 still is."""
+
+
 _FARTHEST = 6.0  # exp(-exp(6)) = 1e-175 is nothing, and its products with q still are numbers
 
 
@@ -173,19 +175,37 @@ def derivatives_to_profile(grid: PolarGrid, x: Floats, normal: NormalEquations, 
 
 FITTED, AT_REST, FAILED = 0, 1, 2
 """What became of a frame: fitted; no displacement to fit; no fit that deserves the name."""
+
+
 AT_REST_BELOW = 1e-9
 """Displacement in mm below which a frame shows none; cameras see some 1e-3, solvers resolve some 1e-12."""
+
+
 _WIDTHS = (log(0.02), log(20.0))
+
+
 _SHAPES = (log(0.25), log(40.0))
 """Least and greatest ln(S / window) and ln p of a result: beyond them a profile shows an edge or its middle alone."""
+
+
 _UNEXPLAINED = 0.2
 """Share of the sum of squares that a fit leaves less of: noise of D/4 leaves as much, noise alone nearly all."""
+
+
 _CLEAR = 0.03
 """Share below which a minimum is the one: that of a plate's profile is below 0.001, of noise of D/10 some 0.03."""
+
+
 _STARTS = ((0.0, 2.0), (0.0, 4.0), (0.0, 1.2), (0.25, 2.0), (0.5, 2.0), (1.0, 2.0))
 """(S / window, or 0 for where the profile has fallen to D/e; p): where fits start that no frame before them warms."""
+
+
 _ITERATIONS = 60
+
+
 _LONGEST_STEP = 0.5
+
+
 _CONVERGED = 1e-7  # Newton squares it: the step taken last leaves 1e-13 or so
 
 

@@ -20,10 +20,16 @@ from creepkit.errors import SolveError, nearest
 from creepkit.fem.mesh import Mesh, strip_mesh, strip_nodes
 
 EDGES = ("bottom", "rim")
+
+
 LENGTH_RANGE = (1e-3, 1e4)
 """Least and greatest length, mm."""
+
+
 REFINEMENT_RANGE = (0.5, 16.0)
 """Least and greatest refinement of a mesh; below it two layers would be left, or columns too few for the roof."""
+
+
 _COMPLEX_STEP = 1e-30
 
 
@@ -171,8 +177,14 @@ def _refuse_contradictions(g: DimpleGeometry) -> None:
 
 
 Numbers: TypeAlias = NDArray[np.inexact[Any]]
+
+
 QUARTER = 0.5 * np.pi
+
+
 TAPERED_LAYERS = np.array([0.0, 0.16, 0.38, 0.57, 0.68, 1.0])
+
+
 PLATE_LAYERS = np.array([0.0, 0.17, 0.4, 0.6, 0.83, 1.0])
 """Ends of the layers, from the cavity, of a tapered dimple and of a plate with a fillet.
 
@@ -180,12 +192,18 @@ Their number decides: creep stress has a kink where bending changes sign, sharpe
 layers the less it matters on which side of the kink a point lies.
 """
 
+
 LAYERS = len(PLATE_LAYERS) - 1
+
+
 SHIFT = 1 / 3
 """How much denser the columns of a tapered roof are at its middle, where it bulges most."""
+
+
 STEEPEST = 1.5
 """Largest power of the fan over the columns it runs through: the middle node of the last side along the top then lies
 at 0.32 of it, and at 0.25 the element would fold."""
+
 
 GROWTH_RATIO = 1.35
 """How much later the top of a tapered dimple fans out, for its roof bulges where the columns stand upright."""

@@ -25,12 +25,22 @@ if TYPE_CHECKING:
 
 OBSERVED = ("amplitude", "width", "shape")
 """Columns of what is observed: D_amp in mm, S_d in mm, S_p."""
+
+
 Form = Literal["profile", "field"]
+
+
 DEFAULT_RADII: dict[str, int] = {"profile": 76, "field": 40}
 """Radii observed by default: for the profile 0, 0.1 ... 7.5 mm in the default window."""
+
+
 _ANGLES = 6
 """Gauss points over an eighth of a turn; S_p from 40 radii by 6 angles lies within 5e-5 of that from 1000 by 40."""
+
+
 _FEWEST, _MOST = 8, 2000
+
+
 _TEXT = re.compile(r"\s*(\w+)\s+0\s*(?:-|to)\s*(\S+)\s*mm\s*(?:,\s*(\d+)\s+radii\s*)?")
 
 
@@ -231,10 +241,16 @@ def _disc(operator: Observation) -> tuple[Floats, Floats, Floats, Floats]:
 
 
 _FEWEST_POINTS = 12
+
+
 _SHAPES = (0.25, 40.0)
 """Least and greatest p of a result, as in the fit of profiles."""
+
+
 _LEAST_SIGNAL_TO_ERROR = 5.0
 """Least ratio of D to its standard error in a result; the best fit to noise alone reached 3 in forty trials."""
+
+
 _START_QUANTILES = (1.0, 0.98)
 """Searches start from the greatest height, right for a small bulge, and from one that a few wild points leave alone."""
 

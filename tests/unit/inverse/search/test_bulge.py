@@ -73,5 +73,5 @@ def test_of_a_sum_the_swarm_keeps_the_best_of_each_subset(stand_in, test):
     alone = found[(hardening,)]
     (expected,) = ParticleSwarm(40, 15, refined_candidates=1).minima(search_problem(single, stand_in)).minima
     assert alone.cost == pytest.approx(expected.cost, abs=0.01)
-    np.testing.assert_allclose(alone.u[:2], expected.u, atol=0.02)
+    np.testing.assert_allclose(alone.x[:2], expected.x, atol=0.02)
     assert alone.cost - min(m.cost for m in found.values()) < 5.7

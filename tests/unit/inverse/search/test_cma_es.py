@@ -19,15 +19,15 @@ BARE = CmaEs(refined_candidates=0)
 )
 def test_it_finds_known_minima_by_itself(cost, box, at):
     found = BARE.minima(Known(cost, box)).minima[0]
-    np.testing.assert_allclose(found.u, at, atol=0.02)
-    assert found.cost == cost(found.u[None])[0]
+    np.testing.assert_allclose(found.x, at, atol=0.02)
+    assert found.cost == cost(found.x[None])[0]
 
 
 def test_restarts_find_what_one_run_misses():
     """Of four runs on many minima the best one counts; each has twice the candidates of the one before."""
     landscape = Known(rastrigin, cube(4, 5.12))
     found = CmaEs(iterations=600, restarts=3).minima(landscape)
-    np.testing.assert_allclose(found.minima[0].u, 0.0, atol=1e-3)
+    np.testing.assert_allclose(found.minima[0].x, 0.0, atol=1e-3)
     starts = (0, *found.trace.restarts)
     assert [landscape.calls[k] for k in starts] == [landscape.calls[0] * 2**run for run in range(len(starts))]
     alone = CmaEs(iterations=600, restarts=0, refined_candidates=0).minima(Known(rastrigin, cube(4, 5.12)))
@@ -41,7 +41,7 @@ def test_candidates_stay_in_the_box_and_an_optimum_beyond_a_wall_is_found_on_it(
     everything = np.concatenate(landscape.seen)
     assert (everything >= landscape.bounds.lower).all()
     assert (everything <= landscape.bounds.upper).all()
-    np.testing.assert_allclose(found.u, [2.0, 2.0], atol=1e-4)
+    np.testing.assert_allclose(found.x, [2.0, 2.0], atol=1e-4)
 
 
 def test_a_generation_is_one_call_and_a_seed_gives_the_same_answer_twice():
@@ -50,7 +50,7 @@ def test_a_generation_is_one_call_and_a_seed_gives_the_same_answer_twice():
         landscape = Known(rosenbrock, cube(3), IdentificationSettings(seed=seed))
         runs.append(CmaEs(population=12, iterations=25, restarts=0).minima(landscape))
         assert landscape.calls == [12] * len(runs[-1].trace)
-    np.testing.assert_array_equal(runs[0].minima[0].u, runs[1].minima[0].u)
+    np.testing.assert_array_equal(runs[0].minima[0].x, runs[1].minima[0].x)
     np.testing.assert_array_equal(runs[0].trace.quartiles, runs[1].trace.quartiles)
     assert (runs[0].trace.quartiles != runs[2].trace.quartiles).any()
 

@@ -35,10 +35,10 @@ def test_planted_values_are_found_from_many_starts(name, values):
     law = ck.law(name)
     view = landscape(law, values)
     ends = batched_levenberg_marquardt(view, screened_starts(view, starts=6, draws=32))
-    found = view.coordinates.values(ends[0].u)
+    found = view.coordinates.values(ends[0].x)
     assert {n: found[n] for n in values} == pytest.approx(values, rel=1e-3)
     assert sum(end.cost < ends[0].cost + 1e-4 for end in ends) >= 4
-    assert all((view.bounds.lower <= end.u).all() and (end.u <= view.bounds.upper).all() for end in ends)
+    assert all((view.bounds.lower <= end.x).all() and (end.x <= view.bounds.upper).all() for end in ends)
 
 
 def test_one_prediction_for_all_starts_is_as_good_as_one_each():

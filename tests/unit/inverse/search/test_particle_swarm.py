@@ -38,14 +38,14 @@ def paths(landscape):
 )
 def test_the_papers_swarm_finds_known_minima_by_itself(swarm, cost, box, at):
     found = swarm.minima(Known(cost, box)).minima[0]
-    np.testing.assert_allclose(found.u, at, atol=0.02)
-    assert found.cost == cost(found.u[None])[0]
+    np.testing.assert_allclose(found.x, at, atol=0.02)
+    assert found.cost == cost(found.x[None])[0]
 
 
 def test_least_squares_finishes_what_the_swarm_leaves():
     rough, fine = (s.minima(Known(rosenbrock, cube(5))) for s in (BARE, ParticleSwarm()))
     assert rough.minima[0].cost > 0.01  # a curved valley in five dimensions is too long for 100 iterations
-    np.testing.assert_allclose(fine.minima[0].u, 1.0, atol=1e-3)
+    np.testing.assert_allclose(fine.minima[0].x, 1.0, atol=1e-3)
     assert fine.trace.best_cost[-1] == rough.minima[0].cost
     assert fine.trace.refined_cost == fine.minima[0].cost
 
@@ -53,7 +53,7 @@ def test_least_squares_finishes_what_the_swarm_leaves():
 def test_refined_minima_differ_and_come_best_first():
     found = ParticleSwarm(refined_candidates=4).minima(Known(rastrigin, cube(3, 5.12))).minima
     assert [m.cost for m in found] == sorted(m.cost for m in found)
-    starts = np.array([m.u for m in found])
+    starts = np.array([m.x for m in found])
     assert len(found) == 4
     assert len(np.unique(starts.round(2), axis=0)) > 1
 
@@ -89,8 +89,8 @@ def test_no_step_is_longer_than_the_limit_and_none_leaves_the_box(boundary, velo
 def test_an_optimum_beyond_a_wall_is_found_on_it():
     box = Bounds(np.array([2.0, -5.0]), np.array([5.0, 5.0]))
     found = BARE.minima(Known(quadratic, box)).minima[0]
-    assert found.u[0] == 2.0
-    assert found.u[1] == pytest.approx(2.0, abs=1e-3)
+    assert found.x[0] == 2.0
+    assert found.x[1] == pytest.approx(2.0, abs=1e-3)
 
 
 def test_walls_absorb_or_reflect():
@@ -125,7 +125,7 @@ def test_each_iteration_is_one_call():
 
 def test_a_seed_gives_the_same_answer_twice_and_another_seed_another():
     runs = [SMALL.minima(Known(rastrigin, cube(4), IdentificationSettings(seed=seed))) for seed in (7, 7, 8)]
-    np.testing.assert_array_equal(runs[0].minima[0].u, runs[1].minima[0].u)
+    np.testing.assert_array_equal(runs[0].minima[0].x, runs[1].minima[0].x)
     np.testing.assert_array_equal(runs[0].trace.quartiles, runs[1].trace.quartiles)
     assert (runs[0].trace.quartiles != runs[2].trace.quartiles).any()
 
@@ -142,7 +142,7 @@ def test_patience_ends_a_swarm_that_gains_nothing():
     landscape = Known(quadratic, cube(1))
     found = ParticleSwarm(particles=50, patience=5).minima(landscape)
     assert len(found.trace) < 60
-    assert found.minima[0].u == pytest.approx(1.0, abs=1e-4)
+    assert found.minima[0].x == pytest.approx(1.0, abs=1e-4)
 
 
 # ---- terms that may be off -----------------------------------------------------------------------------------------
@@ -207,7 +207,7 @@ def test_of_subsets_that_fit_alike_the_simplest_comes_first():
 def test_what_is_off_rests_at_the_bottom_of_its_rate():
     found = CAREFUL.minima(planted(POWER)).minima[0]
     assert found.terms_off == (HARDENING,)
-    assert found.u[2] == -12.0
+    assert found.x[2] == -12.0
 
 
 def test_only_what_may_be_off_is():

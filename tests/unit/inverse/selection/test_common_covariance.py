@@ -61,7 +61,7 @@ def test_a_law_that_has_nothing_to_say_of_an_entry_is_compared_by_the_others():
     r = silent.linearised.residuals
     blank = {
         name: np.where(present, getattr(r, name), 0.0)
-        for name in ("values", "transform_derivatives", "log_rate_sensitivity")
+        for name in ("values", "offset_sensitivity", "log_rate_sensitivity")
     }
     residuals = replace(r, present=present, jacobian=present[..., None].astype(float), **blank)
     silent.linearised = replace(silent.linearised, residuals=residuals)

@@ -65,15 +65,26 @@ for _function, _meaning in ((exp, _exp), (log, _log), (sqrt, _sqrt)):
 
 EXPONENTS = (0.5, 1.0, 3.0, 5.0, 8.0, 13.0)
 """Of the Norton runs: those of creep laws of metals, and what hardening and hyperbolic sines make of them."""
+
+
 _PLACES = np.array([n / (n + 2.0) for n in EXPONENTS])
 """Where they stand, about evenly, on the axis along which curves are interpolated."""
+
+
 _SCALES = np.array([1.0 / np.prod([a - b for b in _PLACES if b != a]) for a in _PLACES])
 """Of Lagrange's polynomials through them."""
+
+
 LOG_STRESS, LOG_GROWTH, AMPLITUDE, RESIDUAL = range(4)
+
+
 WIDTH, SHAPE, ELASTIC_WIDTH = (RESIDUAL + k * len(EXPONENTS) for k in (1, 2, 3))
+
+
 ELASTIC_SHAPE = ELASTIC_WIDTH + 1
 """Of the curves over D: ln k, ln kappa, size of redistribution, then what is left of the growth, width and shape, of
 each exponent, and width and shape of an elastic dimple."""
+
 
 CURVES = ELASTIC_SHAPE + 1
 

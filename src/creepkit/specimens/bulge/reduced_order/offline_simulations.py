@@ -24,14 +24,25 @@ if TYPE_CHECKING:
 
 THICKNESS_RATIOS = (0.85, 1.0, 1.2)
 """Apex thicknesses of the runs over the nominal one: those of a plate vary by 15 %."""
+
+
 LOAD_RANGE = (1e-7, 3e-3)
 """P/E of the elastic runs."""
+
+
 _STIFFNESS = 1e6
 """E/P of the Norton runs: elastic strains so small that stresses are steady at the least deflection."""
+
+
 _RATE = 1e-6
 """1/s, about the first rate of a Norton run; with the longest time any dimple reaches its limit."""
+
+
 _LONGEST = 1e10
+
+
 _A, _n = parameters("A n")
+
 
 _NORTON = CreepLaw(
     name="norton",

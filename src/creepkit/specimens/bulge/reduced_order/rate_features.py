@@ -12,6 +12,8 @@ from creepkit.kernels.interface import MEAN_STRESS, PRINCIPAL_STRESS, STRAIN, ST
 
 _LARGEST = 5.0
 """Decades; features are bent towards it smoothly."""
+
+
 _LOG_10 = float(np.log(10.0))
 
 

@@ -36,23 +36,45 @@ from creepkit.specimens.bulge.reduced_order.deflection_curves import (
 
 MEAN_STRESS_RATIO = 2.0 / 3.0
 """Over the von Mises stress, in equibiaxial tension, as in the middle of the roof."""
+
+
 PROBES = 3
 """Rows the law is asked at: the reference point, there with more stress, there with more strain."""
+
+
 PROBE_FACTOR = 1.2
 """Factor on stress, and on strain, that shows their local exponents; elastic stresses lie above sigma*."""
+
+
 _PER_PROBE_FACTOR = float(1.0 / np.log(PROBE_FACTOR))
+
+
 CREEP_DEFLECTION, STRAIN_STATE, EXPONENT_STATE, FAST, SLOW, STATES = range(6)
 """Of a state: creep deflection mm, strain, creep times mean n'/(n' + 2), elastic pressures phi P (MPa), the law's."""
+
+
 SLOW_SIZE, SLOW_SPEED, FAST_SIZE, FAST_OFFSET, FAST_SPEED, CEILING = range(6)
 """Of redistribution: m_slow = . ln n, rho_slow, m_fast = . (n - 1)^2 / (n + .), rho_fast = . n; n at most."""
+
+
 _NODES = np.array([0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262])
+
+
 _WEIGHTS = np.array([0.17392742256872692, 0.3260725774312731, 0.3260725774312731, 0.17392742256872692])
 """Gauss and Legendre's of four points in (0, 1)."""
+
+
 _FLOOR = 1e-6
 """MPa; pressure of a dimple at rest."""
+
+
 POWER = 1.5
+
+
 _RELIEF = 0.3
 """Redistribution after unloading over that after loading, of small changes."""
+
+
 _ROUNDING = 0.02
 
 
@@ -219,8 +241,12 @@ def advance_state(state: Any, unknown: Any, middle: StepMidpoint, now: StepExpon
 
 REDISTRIBUTION = np.array([0.22, 1.15, 1.15, 8.0, 2.0, 14.0])
 """SLOW_SIZE, SLOW_SPEED, FAST_SIZE, FAST_OFFSET, FAST_SPEED and CEILING of `reduced_step`."""
+
+
 _DEFLECTIONS = (0.0, 0.2, 0.8, 1.8)
 """Over the apex thickness."""
+
+
 _SIZES = (1.5, 1.18, 1.0, 0.8)
 """A bulged roof carries more load as a membrane, whose stresses are steady from the first."""
 
@@ -261,13 +287,25 @@ TRAJECTORY_COLUMNS = (
     "hardening",
 )
 """Columns of a trajectory at each node; see write_node_outputs and write_step_outputs."""
+
+
 AMPLITUDE_COLUMN = TRAJECTORY_COLUMNS.index("amplitude")
+
+
 FIRST_STEP_COLUMN = TRAJECTORY_COLUMNS.index("middle")
 """The first of the columns of the step before a node."""
-LOG_RATE_COLUMN = TRAJECTORY_COLUMNS.index("log_rate")
+
+
+LOG10_RATE_COLUMN = TRAJECTORY_COLUMNS.index("log_rate")
+
+
 _REST_DEFLECTION = 1e-9
 """mm; far below what can be measured."""
+
+
 _DECADES = float(1.0 / np.log(10.0))
+
+
 _PRESSURE_FLOOR = 1e-6
 """MPa, as in the step."""
 

@@ -35,8 +35,12 @@ from creepkit.specimens.bulge.reduced_order.step_equations import (
 
 NUISANCE_DIRECTIONS = ("thickness", "modulus", "temperature")
 """Directions of derivatives after the law's parameters: mm, relative, K."""
+
+
 COMPLEX_STEP = 2.0**-100
 """Scale of imaginary parts; to divide by a power of two is to multiply."""
+
+
 TIMES, PRESSURE, TEMPERATURES, MODULUS, SOFTENING, ELASTIC, ELASTIC_THICKNESS, ELASTIC_MODULUS = range(8)
 """Rows of a test, (8, nodes): time s, pressure MPa, temperature K, modulus MPa and its slope to temperature, elastic
 deflection mm with its derivatives to thickness and to ln of the modulus. One array, for each costs at every call.
@@ -246,8 +250,12 @@ def _lifted(test: Floats, j: int, effect: int, change: float) -> float:
 
 _ITERATIONS, _STEP = 25, 4.0
 """Most Newton iterations of a step, and the largest change in one of them."""
+
+
 _STILL = -600.0
 """ln of a rate that is none."""
+
+
 _LOG_OVER = float(np.log(100.0))
 """Of strain, or mm, of an increment; a dimple has ruptured long before."""
 

@@ -49,8 +49,12 @@ if TYPE_CHECKING:
 
 _SMALLEST = 0.05
 """Least deflection seen in the runs, over the apex thickness: below it k and kappa are constant to 2 %."""
+
+
 _STEADY = slice(1, 5)
 """Of the exponents, those that k and kappa are fitted to: 1 to 8."""
+
+
 _DEFLECTIONS, _LOADS = 64, 48
 """Points of the grids."""
 
@@ -75,6 +79,7 @@ class TableGrid(NamedTuple):
 
 LOADS = TableGrid.spanning(LOAD_RANGE[1], 1e-6, _LOADS)
 """P/E of the elastic tables."""
+
 
 _FORMAT = DocumentFormat(
     "creepkit-reduced-order-tables",

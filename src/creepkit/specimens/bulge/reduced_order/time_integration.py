@@ -53,6 +53,8 @@ def evaluate_law(update: Any, sensitivity: Any, theta: Floats, work: ReducedWork
 
 REACHED_END, RUPTURED, NOT_CONVERGED = range(3)
 """Ends; values of records.Status."""
+
+
 _FIRST_RATE = 1e-9
 """1/s, the first guess."""
 

@@ -32,8 +32,12 @@ if TYPE_CHECKING:
 
 FIRST_STEP, STEP_GROWTH, LARGEST_STEP_FRACTION = 2.5, 1.0, 1.0 / 12.0
 """Steps: the first after a change of load, s; later ones over the time since; the longest over the test."""
+
+
 RAMP_STEPS = 4
 """Steps of a ramp from zero to the largest pressure."""
+
+
 _OFFSET = 20.0
 """s; creep after a change of load decays over decades of time since then."""
 
@@ -116,11 +120,19 @@ def _weights(nodes: Floats, rows: Sequence[tuple[int, int]], starts: Floats, ori
 
 
 WITHOUT_FEATURES = FeatureFactors(np.zeros(0), np.zeros(0))
+
+
 _TOLERANCE, _EXACT_TOLERANCE = 1e-5, 1e-11
 """Of ln of increments."""
+
+
 _BETA = (0.05, 1.0)
 """Exponents of the time transformation; plain time where strain begins faster than time."""
+
+
 _BETA_STEP = 1e-5
+
+
 _NO_LOAD = 1e-15
 """P/E of a dimple at rest: its deflection is a million times below the least one measured."""
 

@@ -1,4 +1,6 @@
-"""The worker process, `python -m creepkit.jobs.worker`: it receives a job, then numbers of tasks, and reports results.
+"""The worker process, `python -m creepkit.jobs.worker_process`.
+
+It receives a job, then numbers of tasks, and reports results.
 
 The job is pickled by the process that started the worker, as multiprocessing does.
 """

@@ -23,15 +23,23 @@ from types import TracebackType
 from typing import IO, Any, Protocol
 
 from creepkit.errors import CreepkitError, DatasetError
-from creepkit.jobs.worker import Job, ShardedJob, TaskResult, run_task
+from creepkit.jobs.worker_process import Job, ShardedJob, TaskResult, run_task
 
 SHARD_ROWS = 256
 """Samples of a shard: some seconds of work, so that little is lost when a process dies."""
+
+
 ADDRESS = re.compile(r"inproc://.+|[a-z]+://.+:[0-9]+/?")
+
+
 CONNECT_TIMEOUT = 30
 """s, in which a scheduler answers."""
+
+
 LEAST_QUEUED = 8
 """Shards handed over while a cluster has few workers or none: an adaptive one grows with its queue."""
+
+
 DEAD_WORKER_ERRORS = ("KilledWorker", "FutureCancelledError", "CancelledError")
 """Errors that dask gives a task whose workers died."""
 
@@ -113,7 +121,11 @@ def _one_line(error: BaseException) -> str:
 
 THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMBA")
 """Libraries that start threads of their own: two threads on one busy core are many times slower than one."""
+
+
 ONE_THREAD = dict.fromkeys((f"{library}_NUM_THREADS" for library in THREADED_LIBRARIES), "1")
+
+
 TERMINATION_TIMEOUT = 5
 """s, in which a worker that is asked to end does so."""
 
@@ -232,7 +244,7 @@ class ProcessWorkers:
     def _start(self) -> WorkerProcess:
         """A new process, in a session of its own: Ctrl-C is for us alone, who then end it."""
         popen = subprocess.Popen(
-            [sys.executable, "-m", "creepkit.jobs.worker"],
+            [sys.executable, "-m", "creepkit.jobs.worker_process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             bufsize=0,
