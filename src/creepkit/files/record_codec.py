@@ -22,7 +22,15 @@ from pydantic_core import CoreConfig, CoreSchema, PydanticCustomError
 from pydantic_core import core_schema as schemas
 
 from creepkit.errors import CreepkitError
-from creepkit.files.json_documents import check_keys
+from creepkit.files.record_validators import (
+    as_tuple,
+    built_record,
+    foreign_value,
+    misfit,
+    number,
+    sentence,
+    unknown_type,
+)
 
 Record = TypeVar("Record")
 
@@ -138,7 +146,7 @@ class RecordCodec:
 
         names = tuple(f.name for f in self._stored_fields(record))
         try:
-            result: Record = _record(record, names, data, lambda _: values | {k: value(k, data[k]) for k in data})
+            result: Record = built_record(record, names, data, lambda _: values | {k: value(k, data[k]) for k in data})
             return result
         except PydanticCustomError as error:
             raise RecordError((place or "the document") + error.message()) from None
@@ -147,7 +155,7 @@ class RecordCodec:
         try:
             return self._adapter(hint, allowed).validate_python(data)
         except ValidationError as error:
-            raise RecordError(_sentence(error, place)) from None
+            raise RecordError(sentence(error, place)) from None
 
     def _adapter(self, hint: Any, allowed: NumberRange) -> TypeAdapter[Any]:
         """What validates data of values with an annotation; made when the first is read."""
@@ -161,13 +169,18 @@ class RecordCodec:
         """The schema of what JSON holds of values with an annotation."""
         origin, arguments = get_origin(hint), get_args(hint)
         if hint in self.values or hint in (float, int):
-            read = partial(_value, self.values[hint]) if hint in self.values else partial(_number, hint, allowed)
+            read = (
+                partial(foreign_value, self.values[hint].from_json)
+                if hint in self.values
+                else partial(number, hint, allowed.problem)
+            )
             return schemas.no_info_plain_validator_function(read)
         if hint in _SCHEMAS:
             return _SCHEMAS[hint]
         if origin in (Union, UnionType):
             kinds = {_json_kind(kind): self._schema(kind, allowed) for kind in arguments if kind is not NoneType}
-            union = schemas.tagged_union_schema(kinds, lambda data: f"|{type(data).__name__}")
+            tags = {"|int": "|float", **{tag: tag for tag in kinds}}
+            union = schemas.tagged_union_schema(kinds, lambda data: tags.get(f"|{type(data).__name__}"))
             kind = union if len(kinds) > 1 else next(iter(kinds.values()))
             return schemas.nullable_schema(kind) if NoneType in arguments else kind
         if origin is Literal:
@@ -189,10 +202,12 @@ class RecordCodec:
                 return schemas.list_schema(items[0], fail_fast=True)
             repeated = origin is not tuple or arguments[-1] is ...
             values = schemas.tuple_schema(items, variadic_item_index=0 if repeated else None, fail_fast=True)
-            return schemas.no_info_before_validator_function(partial(_listed, None if repeated else len(items)), values)
+            return schemas.no_info_before_validator_function(
+                partial(as_tuple, None if repeated else len(items)), values
+            )
         if is_dataclass(hint) and isinstance(hint, type):
             return self._record_schema(hint)
-        return schemas.no_info_plain_validator_function(partial(_unknown, hint))
+        return schemas.no_info_plain_validator_function(partial(unknown_type, hint))
 
     def _record_schema(self, record: type[Any]) -> CoreSchema:
         hints, keys = self._hints(record), {}
@@ -200,9 +215,8 @@ class RecordCodec:
             required = f.default is MISSING and f.default_factory is MISSING
             value = self._schema(hints[f.name], self._range(record, f.name))
             keys[f.name] = schemas.typed_dict_field(value, required=required)
-        config = CoreConfig(strict=True, extra_fields_behavior="forbid")
-        data = schemas.typed_dict_schema(keys, config=config)
-        return schemas.no_info_wrap_validator_function(partial(_record, record, tuple(keys)), data)
+        data = schemas.typed_dict_schema(keys, config=CoreConfig(strict=True, extra_fields_behavior="forbid"))
+        return schemas.no_info_wrap_validator_function(partial(built_record, record, tuple(keys)), data)
 
     def _array(self, kind: np.dtype[Any], allowed: NumberRange, data: Any) -> Any:
         """An array from lists, as deep within one another as the first of them are."""
@@ -214,7 +228,7 @@ class RecordCodec:
         try:
             return np.array(values, dtype=kind)
         except (ValueError, OverflowError):
-            raise _misfit(" holds lists of different lengths, where an array is needed") from None
+            raise misfit(" holds lists of different lengths, where an array is needed") from None
 
     def _stored_fields(self, record: type) -> list[Field[Any]]:
         omitted = {name for kind, names in self.omitted.items() if issubclass(record, kind) for name in names}
@@ -229,89 +243,8 @@ class RecordCodec:
 
 
 _MAX_DIMENSIONS = 8
-_SCHEMAS: dict[Any, CoreSchema] = {
-    bool: schemas.bool_schema(strict=True),
-    str: schemas.str_schema(strict=True),
-    **dict.fromkeys((Any, object), schemas.any_schema()),
-}
-_NEEDED = {"bool_type": "true or false", "dict_type": "an object", "list_type": "a list", "string_type": "a text"}
-
-
-def _misfit(message: str) -> PydanticCustomError:
-    """What a validator raises; its message stands behind the place."""
-    return PydanticCustomError("misfit", message.encode(errors="backslashreplace").decode())
-
-
-def _unknown(hint: Any, data: Any) -> Any:
-    raise _misfit(f" {_shown(data)}, where nothing is known of {hint}")
-
-
-def _value(codec: ValueCodec, data: Any) -> Any:
-    try:
-        return codec.from_json(data, "")
-    except CreepkitError as error:
-        raise _misfit(": " + str(error).removeprefix(": ")) from None
-
-
-def _number(kind: type[float], allowed: NumberRange, data: Any) -> float:
-    special = {None: math.nan, "inf": math.inf, "-inf": -math.inf}
-    value: Any = special.get(data, data) if kind is float and (data is None or type(data) is str) else data
-    if type(value) not in (int, kind):
-        raise _misfit(f" {_shown(data)}, where a {'' if kind is float else 'whole '}number is needed")
-    try:
-        problem = allowed.problem(float(value))
-    except OverflowError:
-        problem = "is a whole number too large"
-    if problem:
-        raise _misfit(f" {problem}")
-    return kind(value)
-
-
-def _listed(length: int | None, data: Any) -> tuple[Any, ...]:
-    if not isinstance(data, list):
-        raise _misfit(f" {_shown(data)}, where a list is needed")
-    if length not in (None, len(data)):
-        raise _misfit(f" is a list of {len(data)}, where {length} are needed")
-    return tuple(data)
-
-
-def _record(record: type[Record], names: tuple[str, ...], data: Any, read: Callable[[Any], Any]) -> Record:
-    if not isinstance(data, dict):
-        raise _misfit(f" {_shown(data)}, where an object is needed")
-    if problem := check_keys(data, names, "", optional=True):
-        raise _misfit(problem)
-    values = read(data)
-    try:
-        return record(**values)
-    except CreepkitError as error:
-        raise _misfit(f": {error}") from None
-    except (ValueError, TypeError, ArithmeticError, IndexError, KeyError) as error:
-        raise _misfit(f" is no {record.__name__} ({' '.join(str(error).split())[:200]})") from None
-
-
-def _sentence(error: ValidationError, place: str) -> str:
-    """The first problem, with its place."""
-    first = error.errors(include_url=False)[0]
-    kind, found = first["type"], _shown(first["input"])
-    steps = [repr(str(step))[1:-1][:40] for step in first["loc"] if not str(step).startswith("|")]
-    missing = steps.pop() if kind == "missing" else ""
-    where = ".".join([place, *steps]).strip(".") or "the document"
-    if kind == "misfit":
-        return where + first["msg"]
-    if kind == "missing":
-        return f"{where}: '{missing}' is missing"
-    if kind == "literal_error":
-        return f"{where} {found}; allowed are {first['ctx']['expected'].replace(' or ', ', ')}"
-    if kind == "union_tag_invalid":
-        return f"{where} {found}, which is none of its kinds"
-    return f"{where} {found}, " + (f"where {_NEEDED[kind]} is needed" if kind in _NEEDED else first["msg"])
-
-
-def _shown(data: Any) -> str:
-    """What was found, in a few words."""
-    if isinstance(data, dict | list):
-        return "is an object" if isinstance(data, dict) else "is a list"
-    return "is null" if data is None else f"is {data!r}"[:60]
+_SCHEMAS: dict[Any, CoreSchema] = dict.fromkeys((Any, object), schemas.any_schema())
+_SCHEMAS |= {bool: schemas.bool_schema(), str: schemas.str_schema()}
 
 
 def _json_kind(hint: Any) -> str:
