@@ -20,17 +20,10 @@ import numpy as np
 from pydantic import ConfigDict, GetPydanticSchema, TypeAdapter, ValidationError
 from pydantic_core import CoreConfig, CoreSchema, PydanticCustomError
 from pydantic_core import core_schema as schemas
+from pydantic_core.core_schema import no_info_plain_validator_function as plain
 
 from creepkit.errors import CreepkitError
-from creepkit.files.record_validators import (
-    as_tuple,
-    built_record,
-    foreign_value,
-    misfit,
-    number,
-    sentence,
-    unknown_type,
-)
+from creepkit.files import record_validators as validators
 
 Record = TypeVar("Record")
 
@@ -146,7 +139,9 @@ class RecordCodec:
 
         names = tuple(f.name for f in self._stored_fields(record))
         try:
-            result: Record = built_record(record, names, data, lambda _: values | {k: value(k, data[k]) for k in data})
+            result: Record = validators.built_record(
+                record, names, data, lambda _: values | {k: value(k, data[k]) for k in data}
+            )
             return result
         except PydanticCustomError as error:
             raise RecordError((place or "the document") + error.message()) from None
@@ -155,7 +150,7 @@ class RecordCodec:
         try:
             return self._adapter(hint, allowed).validate_python(data)
         except ValidationError as error:
-            raise RecordError(sentence(error, place)) from None
+            raise RecordError(validators.sentence(error, place)) from None
 
     def _adapter(self, hint: Any, allowed: NumberRange) -> TypeAdapter[Any]:
         """What validates data of values with an annotation; made when the first is read."""
@@ -168,13 +163,10 @@ class RecordCodec:
     def _schema(self, hint: Any, allowed: NumberRange) -> CoreSchema:
         """The schema of what JSON holds of values with an annotation."""
         origin, arguments = get_origin(hint), get_args(hint)
-        if hint in self.values or hint in (float, int):
-            read = (
-                partial(foreign_value, self.values[hint].from_json)
-                if hint in self.values
-                else partial(number, hint, allowed.problem)
-            )
-            return schemas.no_info_plain_validator_function(read)
+        if hint in self.values:
+            return plain(partial(validators.foreign_value, self.values[hint].from_json))
+        if hint in (float, int):
+            return plain(partial(validators.number, hint, allowed.problem))
         if hint in _SCHEMAS:
             return _SCHEMAS[hint]
         if origin in (Union, UnionType):
@@ -192,22 +184,19 @@ class RecordCodec:
             parts = self._schema(GenericAlias(tuple, tuple(get_type_hints(hint).values())), allowed)
             return schemas.no_info_after_validator_function(hint._make, parts)
         if _is_a(origin, np.ndarray):
-            read = partial(self._array, np.dtype(get_args(arguments[1])[0]), allowed)
-            return schemas.no_info_plain_validator_function(read)
+            return plain(partial(self._array, np.dtype(get_args(arguments[1])[0]), allowed))
         if _is_a(origin, Mapping):
             return schemas.dict_schema(schemas.str_schema(), self._schema(arguments[1], allowed))
         if _is_a(origin, Sequence):
             items = [self._schema(part, allowed) for part in arguments if part is not ...]
             if origin is list:
                 return schemas.list_schema(items[0], fail_fast=True)
-            repeated = origin is not tuple or arguments[-1] is ...
-            values = schemas.tuple_schema(items, variadic_item_index=0 if repeated else None, fail_fast=True)
-            return schemas.no_info_before_validator_function(
-                partial(as_tuple, None if repeated else len(items)), values
-            )
+            length = None if origin is not tuple or arguments[-1] is ... else len(items)
+            values = schemas.tuple_schema(items, variadic_item_index=0 if length is None else None, fail_fast=True)
+            return schemas.no_info_before_validator_function(partial(validators.as_tuple, length), values)
         if is_dataclass(hint) and isinstance(hint, type):
             return self._record_schema(hint)
-        return schemas.no_info_plain_validator_function(partial(unknown_type, hint))
+        return plain(partial(validators.unknown_type, hint))
 
     def _record_schema(self, record: type[Any]) -> CoreSchema:
         hints, keys = self._hints(record), {}
@@ -216,7 +205,7 @@ class RecordCodec:
             value = self._schema(hints[f.name], self._range(record, f.name))
             keys[f.name] = schemas.typed_dict_field(value, required=required)
         data = schemas.typed_dict_schema(keys, config=CoreConfig(strict=True, extra_fields_behavior="forbid"))
-        return schemas.no_info_wrap_validator_function(partial(built_record, record, tuple(keys)), data)
+        return schemas.no_info_wrap_validator_function(partial(validators.built_record, record, tuple(keys)), data)
 
     def _array(self, kind: np.dtype[Any], allowed: NumberRange, data: Any) -> Any:
         """An array from lists, as deep within one another as the first of them are."""
@@ -228,7 +217,7 @@ class RecordCodec:
         try:
             return np.array(values, dtype=kind)
         except (ValueError, OverflowError):
-            raise misfit(" holds lists of different lengths, where an array is needed") from None
+            raise validators.misfit(" holds lists of different lengths, where an array is needed") from None
 
     def _stored_fields(self, record: type) -> list[Field[Any]]:
         omitted = {name for kind, names in self.omitted.items() if issubclass(record, kind) for name in names}

@@ -87,7 +87,7 @@ def sentence(error: ValidationError, place: str) -> str:
         return f"{where}: '{missing}' is missing"
     if kind == "literal_error":
         return f"{where} {found}; allowed are {first['ctx']['expected'].replace(' or ', ', ')}"
-    if kind == "union_tag_not_found":
+    if kind.startswith("union_tag"):
         return f"{where} {found}, which is none of its kinds"
     return f"{where} {found}, " + (f"where {_NEEDED[kind]} is needed" if kind in _NEEDED else first["msg"])
 
