@@ -124,7 +124,7 @@ def test_what_is_written_is_read():
         ({"counts": [10**30]}, "counts holds"),
         ({"flags": [1]}, "flags.0 is 1, where true or false is needed"),
         ({"span": [0.5]}, "span is a list of 1, where 2 are needed"),
-        ({"colour": "GREEN"}, "colour is 'GREEN'; allowed are RED, BLUE"),
+        ({"colour": "GREEN"}, "colour is 'GREEN'; allowed are 'RED', 'BLUE'"),
         ({"strength": 0.0}, "strength is 0, which must be above 0"),
         ({"pair": [1.0, 2.0]}, "pair.1 is 2.0, where a whole number is needed"),
         ({"count": 3.0}, "count is 3.0, where a whole number is needed"),
