@@ -58,8 +58,6 @@ class NumberRange:
 
 
 FINITE = NumberRange()
-
-
 ANY_NUMBER = NumberRange(nan=True, infinite=True)
 
 
@@ -233,16 +231,9 @@ class RecordCodec:
         return next(tables, {name: self.default_range})[name]
 
 
-<<<<<<< HEAD
-_WORDS = {bool: "true or false", int: "a whole number", str: "a text"}
-
-
-_KINDS = {bool: (bool,), int: (int,), float: (int, float, type(None), str), str: (str,), type(None): (type(None),)}
-=======
 _MAX_DIMENSIONS = 8
 _SCHEMAS: dict[Any, CoreSchema] = dict.fromkeys((Any, object), schemas.any_schema())
 _SCHEMAS |= {bool: schemas.bool_schema(), str: schemas.str_schema()}
->>>>>>> wt2-pydantic
 
 
 def _json_kind(hint: Any) -> str:

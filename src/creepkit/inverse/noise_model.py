@@ -19,7 +19,7 @@ class Residuals:
     values : (tests, observations) -, transformed prediction less transformed observation.
     offset_sensitivity : (tests, observations) 1 / unit, effect of one unit of offset.
     present : (tests, observations) which are data; the others are zero.
-    correlation_coordinate : (tests, observations) -, in which drifts decay (see ObservationVector.correlation_coordinate).
+    correlation_coordinate : (tests, observations) -, in which drifts decay: ln t or a share of the duration.
     jacobian : (tests, observations, unknowns) derivatives to x = (u, e), or None.
     log_rate_sensitivity : (tests, observations) -, derivative to ln of a factor on the creep rate of the test.
     output_index : (tests, observations) position of the output; relative_noise : (tests, observations) -, noise over

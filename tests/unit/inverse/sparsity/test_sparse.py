@@ -85,7 +85,7 @@ def test_a_swarm_searches_the_penalised_landscape(hardening):
 def test_squared_l2_shares_the_rate_out(hardening):
     """What one term gives alone is given by several: the penalty is smallest at equal shares."""
     stage = hardening[1].problem
-    x = stage.minimise(stage.start, PenalisedTerms.from_problem(stage.problem, L2(240.0))).u
+    x = stage.minimise(stage.start, PenalisedTerms.from_problem(stage.problem, L2(240.0))).x
     contributions = stage.contributions_at(x)
     assert max(contributions.values()) < max(stage.contributions_at(stage.start).values())
     assert len(terms_above(contributions)) > 1
