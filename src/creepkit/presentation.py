@@ -40,6 +40,7 @@ PRESENTERS: dict[str, dict[str, str]] = {
         "correlation": "creepkit.inverse.uncertainty.correlation:correlation",
         "undetermined": "creepkit.inverse.uncertainty.correlation:undetermined",
     },
+    "CrossValidation": {"text": "creepkit.report.identification_text:cross_validation_text"},
     "Confirmation": {"text": "creepkit.report.identification_text:confirmation_text"},
     "SearchTrace": {"plot": "creepkit.report.search:search_figure"},
     "Ranking": {

@@ -7,8 +7,10 @@ command line, the set-up and the tests share this folder.
 
 from __future__ import annotations
 
+import atexit
 import os
 import shutil
+import tempfile
 import zlib
 from pathlib import Path
 
@@ -25,8 +27,16 @@ def set_numba_cache() -> None:
     """Let numba keep its code in that folder unless NUMBA_CACHE_DIR is set; numba must not be imported yet."""
     if "NUMBA_CACHE_DIR" not in os.environ:
         folder = numba_cache_folder()
+        try:
+            _remove_old_caches(folder)
+            folder.mkdir(parents=True, exist_ok=True)
+            usable = os.access(folder, os.W_OK)
+        except OSError:
+            usable = False
+        if not usable:  # no home, or one that is not ours to write to: each process compiles for itself
+            folder = Path(tempfile.mkdtemp(prefix="creepkit-"))
+            atexit.register(shutil.rmtree, folder, ignore_errors=True)
         os.environ["NUMBA_CACHE_DIR"] = str(folder)
-        _remove_old_caches(folder)
 
 
 def numba_cache_folder() -> Path:
@@ -36,7 +46,7 @@ def numba_cache_folder() -> Path:
         for path in sorted(_SOURCES.glob(pattern)):
             checksum = zlib.crc32(path.read_bytes(), checksum)
     configured = os.environ.get("CREEPKIT_CACHE")
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "creepkit"
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path(os.path.expanduser("~")) / ".cache") / "creepkit"
     return Path(configured or cache) / "compiled" / f"{checksum:08x}"
 
 
@@ -45,7 +55,8 @@ def _remove_old_caches(folder: Path) -> None:
     if folder.is_dir():
         os.utime(folder)
         return
-    other_folders = sorted(folder.parent.glob("*"), key=lambda path: path.stat().st_mtime, reverse=True)
+    ages = {path: path.stat().st_mtime for path in folder.parent.glob("*") if path.exists()}
+    other_folders = sorted(ages, key=lambda path: ages[path], reverse=True)
     for old in other_folders[_KEPT_CACHES:]:
         shutil.rmtree(old, ignore_errors=True)
 

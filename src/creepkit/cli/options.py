@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -255,6 +256,8 @@ def parse_nuisances(texts: Sequence[str] | None) -> list[Nuisance] | None:
             raise FitError(
                 f"--nuisance {text}: '{numbers_text}' is not MEAN or MEAN:SD, such as 0.4935:0.027"
             ) from None
+        if not all(math.isfinite(number) for number in numbers if number is not None):
+            raise FitError(f"--nuisance {text}: '{numbers_text}' is not MEAN or MEAN:SD of finite numbers")
         matching_kinds = [known_kind for known_kind in get_args(NuisanceKind) if known_kind == kind]
         if not matching_kinds:
             raise FitError(f"--nuisance {text}: '{kind}' is not known; allowed are {', '.join(get_args(NuisanceKind))}")

@@ -135,7 +135,7 @@ class FiniteElementModel(NamedTuple):
     """What compiled code knows of a mesh; displacements are kept as (2 nodes,) numbers, u_r and u_z in turn.
 
     nodes : (nodes, 2) mm. elements : (elements, 8). by_radius, by_height, over_radius : (elements, 4, 8), weights :
-        (elements, 4), as in `fem.shape`.
+        (elements, 4), as in `fem.mesh`.
     equations : (2 nodes,) number of the equation of a displacement, -1 where it is held.
     size, width : number of equations, half-bandwidth.
     places : (elements, 3, 8, 8) of an element's rr, rz, zz blocks in the symmetric band, laid flat; the last place is
@@ -189,7 +189,7 @@ def finite_element_model(mesh: Mesh) -> FiniteElementModel:
 
 
 def band_shape(size: int, width: int) -> tuple[int, int]:
-    """Shape of the symmetric band with its padding (see `fem.band`)."""
+    """Shape of the symmetric band with its padding (see the module)."""
     return (size + BLOCK - 1) // BLOCK * BLOCK + width + BLOCK, width + 1 + BLOCK
 
 

@@ -92,7 +92,7 @@ def axes_of(elastic: ElasticPredictor) -> Axes:
 
 @njit(cache=True, error_model="numpy")
 def problem_of(stage: StageConditions, elastic: ElasticPredictor, strain: float) -> StageProblem:
-    """The stage of `integration.stage` at this point; strain : equivalent creep strain so far."""
+    """The stage of `integration.stage_problem` at this point; strain : equivalent creep strain so far."""
     stiffness = 3.0 * stage.shear / elastic.volume
     return StageProblem(stiffness * elastic.equivalent, stiffness, 0.0, stage.weight, strain)
 

@@ -62,7 +62,7 @@ class SensitivityDirections(NamedTuple):
     """What is differentiated to, C = P + D + G columns: P law parameters, then these.
 
     directions : (D, segments, 10) change of the load program.
-    gradients, hoops : (G, elements, 4, 2, 2) and (G, elements, 4), see fem.shape.GeometryChange.
+    gradients, hoops : (G, elements, 4, 2, 2) and (G, elements, 4), see fem.mesh.GeometryDerivative.
     velocities : (G, 2 nodes) mm.
     """
 

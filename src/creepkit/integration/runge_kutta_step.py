@@ -55,7 +55,7 @@ class StepWorkspace(NamedTuple):
     value, change : (V,), (V, P) at the start of the step and its derivatives; new_value, new_change : at its end.
     slopes, slope_changes : (stages, V), (stages, V, P) d/ds at the stages.
     base, base_change : (V,), (V, P) history of a stage. row, out, full : for the kernel's entries.
-    gradient, matrix, response : for `integration.response`. clock_change : (2, P) of beta and tau.
+    gradient, matrix, response : for stage_solver. clock_change : (2, P) of beta and tau.
     """
 
     value: Floats

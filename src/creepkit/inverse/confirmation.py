@@ -126,7 +126,7 @@ def confirm(fit: Identification, tests: Sequence[History], using: Predictor | Ma
     """Simulate the identified law for each test, with the nuisances and offsets that the fit found for it.
 
     tests : those of the fit, known by name, or others, which are predicted with what is known of all tests.
-    using : the specimen, such as study.specimen("bulge"), or {specimen: predictor}.
+    using : the specimen, such as ck.specimen("bulge"), or {specimen: predictor}.
     """
     if not tests:
         raise FitError(f"law '{fit.law.name}': there are no tests to confirm it with")

@@ -28,6 +28,7 @@ from creepkit.inverse.observation_vector import usable_frames
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.variance_components import inverse_covariances
 from creepkit.language import CreepLaw
+from creepkit.presentation import Presentable
 from creepkit.records import History, Prediction, Predictor, Status
 
 FITTED_FRACTION = 0.7
@@ -63,8 +64,8 @@ class Fold:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class CrossValidation:
+@dataclass(frozen=True, eq=False, repr=False)
+class CrossValidation(Presentable):
     """The result of cross_validate(): the fit to all histories, and its folds."""
 
     fit: Identification = field(repr=False)

@@ -246,7 +246,13 @@ class Identification(Presentable):
         missing = [m.name for m in self.tests if m.name not in by_name]
         if missing:
             raise FitError(f"this identification was made from '{missing[0]}', which is not among the histories given")
+        if not hasattr(using, "predict"):
+            raise FitError(f"with_histories() takes a predictor such as specimen('uniaxial'), found {using!r}")
         return replace(self, histories=tuple(by_name[m.name] for m in self.tests), predictor=using, problem=None)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the problem, which holds compiled code and is set up again when it is needed."""
+        return {**self.__dict__, "problem": None}
 
     def profile(self, quantity: str | DerivedQuantity, *, level: float = 0.95) -> Any:
         """The ProfileLikelihood of a parameter, by name, or of another quantity (see uncertainty.quantities)."""

@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from creepkit.errors import FitError
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
@@ -117,4 +119,9 @@ def identification_from_json(data: Any, source: str = "identification") -> Ident
     size, names = len(fit.law.params), tuple(e.name for e in fit.estimates)
     if names != fit.law.names or fit.u.shape != (size,) or fit.covariance.reshape(-1).size != size**2:
         raise FitError(f"{source}: estimates, u and covariance do not belong to the {size} parameters of the law")
-    return replace(fit, covariance=fit.covariance.reshape(size, size))  # of a law without parameters it is a list
+    covariance = fit.covariance.reshape(size, size)
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    correlation = covariance / np.maximum(np.outer(scale, scale), 1e-300)
+    if size and (not np.allclose(covariance, covariance.T, rtol=1e-8) or np.linalg.eigvalsh(correlation)[0] < -1e-8):
+        raise FitError(f"{source}: covariance is not symmetric and positive semi-definite; the file is damaged")
+    return replace(fit, covariance=covariance)  # of a law without parameters it is a list

@@ -244,7 +244,7 @@ class ProcessWorkers:
     def _start(self) -> WorkerProcess:
         """A new process, in a session of its own: Ctrl-C is for us alone, who then end it."""
         popen = subprocess.Popen(
-            [sys.executable, "-m", "creepkit.jobs.worker_process"],
+            [sys.executable, "-P", "-m", "creepkit.jobs.worker_process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             bufsize=0,

@@ -98,7 +98,11 @@ class StressSteps:
     quantity: Quantity = field(default="stress", init=False)
 
     def __post_init__(self) -> None:
-        steps = tuple((float(t), float(s)) for t, s in self.steps)
+        try:
+            steps = tuple((float(t), float(s)) for t, s in self.steps)
+        except (TypeError, ValueError):
+            example = "((0.0, 50.0), (3600.0, 60.0)), s and MPa"
+            raise SolveError(f"stress steps are pairs such as {example}; found {self.steps!r}") from None
         if not steps or steps[0][0] != 0.0 or any(b[0] <= a[0] for a, b in pairwise(steps)):
             raise SolveError("stress steps must start at time 0 and follow one another in time")
         if any(not 0 <= s < 1e5 for _, s in steps):

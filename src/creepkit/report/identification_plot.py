@@ -137,7 +137,8 @@ def identification_figure(fit: Identification, path: str | Path | None = None) -
     """Draw the tests and what is left of them over time, an output each, rates with 95 % bands, and ruptures."""
     if not fit.histories:
         raise FitError(
-            "this identification was loaded without its histories: attach them with fit.on(histories, using)"
+            "this identification was loaded without its histories: attach them with "
+            "fit.with_histories(histories, using)"
         )
     outputs = list(dict.fromkeys(m.outputs[0].output for m in fit.tests))
     ruptures = rupture_rows(fit)

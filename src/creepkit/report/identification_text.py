@@ -13,6 +13,7 @@ from creepkit.language.printing import expression_text
 
 if TYPE_CHECKING:
     from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
+    from creepkit.inverse.cross_validation import CrossValidation
     from creepkit.inverse.goodness_of_fit import RuptureComparison
     from creepkit.inverse.identification import Identification
     from creepkit.inverse.nuisance_parameters import NuisanceEstimate
@@ -219,6 +220,15 @@ def confirmation_text(confirmation: Confirmation) -> str:
             difference = f"; apart {o.rms_difference:.2g} noise" if math.isfinite(o.rms_difference) else ""
             chi_square = f"chi-square {o.simulation_errors.chi_square:.3g}{fit}{difference}"
             lines.append(f"  {test.name}, {o.output}: {chi_square}")
+    return "\n".join(lines)
+
+
+def cross_validation_text(validation: CrossValidation) -> str:
+    """One line for each held-out test: its relative squared errors, about the mean of the test."""
+    lines = [f"law '{validation.fit.law.name}', held out by {validation.by}: relative squared errors"]
+    for name, errors in validation.errors.items():
+        cells = ", ".join(f"{output} {e.relative_squared_error:.3g}" for output, e in errors.items())
+        lines.append(f"  {name}: {cells}")
     return "\n".join(lines)
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from creepkit.errors import CreepkitError
+from creepkit.errors import CreepkitError, LawError
 from creepkit.kernels.lowering import lower
 from creepkit.language.law import CreepLaw
 from creepkit.testing import law_checks
@@ -53,6 +53,8 @@ def check_law(law: CreepLaw, samples: int = 64, seed: int = 0) -> ConformanceRep
 
     samples : a power of two.
     """
+    if not isinstance(law, CreepLaw):
+        raise LawError(f"check_law() takes a creep law, found {law!r}; ck.law(name) returns a registered one")
     try:
         lower(law, "numpy")
     except CreepkitError as error:

@@ -240,7 +240,7 @@ def advance_state(state: Any, unknown: Any, middle: StepMidpoint, now: StepExpon
 
 
 REDISTRIBUTION = np.array([0.22, 1.15, 1.15, 8.0, 2.0, 14.0])
-"""SLOW_SIZE, SLOW_SPEED, FAST_SIZE, FAST_OFFSET, FAST_SPEED and CEILING of `reduced_step`."""
+"""SLOW_SIZE, SLOW_SPEED, FAST_SIZE, FAST_OFFSET, FAST_SPEED and CEILING of the constants above."""
 
 
 _DEFLECTIONS = (0.0, 0.2, 0.8, 1.8)

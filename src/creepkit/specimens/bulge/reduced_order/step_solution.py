@@ -211,7 +211,7 @@ def end_of(test: Floats, j: int) -> StepData:
 def complex_node(
     test: Floats, i: int, j: int, effect: int, modulus_change: float, share: Any, time: Any, weight: Any
 ) -> StepData:
-    """What lies between nodes i and j along one of the EFFECTS (none: less than 0).
+    """What lies between nodes i and j along one of the NUISANCE_DIRECTIONS (none: less than 0).
 
     modulus_change : relative change of the modulus; share, time, weight : of the time transformation, with derivatives.
     """

@@ -111,9 +111,9 @@ _ARRAYS = ("thicknesses", "curves", "elastic", "redistribution")
 class ReducedOrderTables:
     """Tables of one observed dimple at some thicknesses.
 
-    thicknesses : (rows,) mm. curves : (rows, CURVES, deflections), named in `reduced_step`, on `grid`.
+    thicknesses : (rows,) mm. curves : (rows, CURVES, deflections), named in step_equations, on `grid`.
     elastic : (rows, loads) ln of the elastic deflection, mm, over P/E, on LOADS.
-    redistribution : the numbers named in `reduced_step`.
+    redistribution : the numbers named in step_equations.
     geometry, window : mm, of the dimple (its apex thickness is the nominal one) and of what was observed.
     """
 

@@ -205,9 +205,9 @@ def integrate_candidates(
     status: Ints,
     end_times: Floats,
 ) -> None:
-    """March the candidates from `first` to before `last` through all tests; arrays as in `reduced_courses`.
+    """March the candidates from `first` to before `last` through all tests; arrays as in trajectories.
 
-    tests : (candidates or 1, tests, 8, nodes) as in `reduced_problem`.
+    tests : (candidates or 1, tests, 8, nodes) as in step_solution.
     """
     exact = changes.shape[0] > 0
     directions = theta.shape[1] + len(NUISANCE_DIRECTIONS) if exact else 0
