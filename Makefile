@@ -1,4 +1,4 @@
-# make test   set up .venv, then check style, types, floors and run all tests, those of plugins/ included
+# make test   set up .venv, then check style, types, layers and run all tests, those of plugins/ included
 # make verify-export   exported laws in a CalculiX built from Debian's source, beside our solver: a table
 # make surrogate   remake the surrogate that ships: 8,000 simulations, 300 epochs; some 20 minutes of CPU
 # make docs   build the documentation into build/docs; needs no network once .venv is set up

@@ -47,7 +47,7 @@ class Penalty(AdditionalResiduals, Protocol):
 class Minimum:
     """The end of a search.
 
-    u : (unknowns,) where it ended; cost : half the sum of squares there; converged : whether it met its tolerance;
+    x : (unknowns,) where it ended; cost : half the sum of squares there; converged : whether it met its tolerance;
     evaluations : how many points it evaluated.
     whitened_residuals : (data,) -, whitened residuals of the data there, where they were kept.
     terms_off : terms of a sum that the search switched off.
