@@ -21,6 +21,7 @@ from creepkit.records import (
     Predictor,
     Status,
     SupportsReducedOrderModel,
+    SupportsRefinement,
     SupportsRupturePrediction,
     TimesToStrain,
 )
@@ -208,6 +209,15 @@ def reduced_order_model_of(predictor: Predictor) -> Predictor | None:
         changed = any(reduced[name] is not p for name, p in predictor.predictors.items())
         return CompositePredictor(reduced) if changed else None
     return predictor.reduced_order_model() if isinstance(predictor, SupportsReducedOrderModel) else None
+
+
+def refined_of(predictor: Predictor) -> Predictor | None:
+    """The more exact predictor of a predictor, or None where it has none."""
+    if isinstance(predictor, CompositePredictor):
+        refined = {name: refined_of(p) or p for name, p in predictor.predictors.items()}
+        changed = any(refined[name] is not p for name, p in predictor.predictors.items())
+        return CompositePredictor(refined) if changed else None
+    return predictor.refined() if isinstance(predictor, SupportsRefinement) else None
 
 
 RELATIVE_STEP = 1e-4

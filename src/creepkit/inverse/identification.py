@@ -12,8 +12,10 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
+from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.composite_predictor import predict
 from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.defect_correction import NumericalError, correct_defect
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.noise_model import NoiseModel, Residuals, cholesky_factors
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate, owner_of, prior_mean
@@ -49,6 +51,8 @@ class Identification(Presentable):
         its own offset (loading strain), none its own rate. NaN without strains.
     errors : {output: OutputErrors} over all used frames of all tests, whatever was minimised.
     nuisances : estimates of explicit nuisances.
+    adequacy : whether the law explains the tests to their noise. numerical_error : of the predictor at the optimum,
+        which was corrected; None where there is no more exact one.
     ranges : {"stress", "temperature", "strain", "time": (low, high)} of the fitted frames; MPa, K, -, s.
     log_likelihood : of the fitted frames as if they were independent (working noise), with explicit nuisances
         integrated out; of identifications by likelihood the restricted one, but for a constant of the law.
@@ -75,6 +79,8 @@ class Identification(Presentable):
     provenance: Mapping[str, Any]
     errors: Mapping[str, OutputErrors] = field(default_factory=dict)
     nuisances: tuple[NuisanceEstimate, ...] = ()
+    adequacy: Adequacy | None = None
+    numerical_error: NumericalError | None = None
     converged: bool = True
     notes: tuple[str, ...] = ()
     histories: tuple[History, ...] = ()
@@ -116,6 +122,8 @@ class Identification(Presentable):
         if self.nuisances:
             prior_sd = np.array([n.prior_sd for n in self.nuisances], float)
             problem = problem.with_nuisances(replace(nuisances, sd=prior_sd))
+        if self.numerical_error is not None:
+            problem, _ = correct_defect(problem, self.x)
         return problem.with_covariance(cholesky_factors(self.residuals_of(problem), self.noise_model))
 
     def residuals_of(self, problem: LeastSquaresProblem) -> Residuals:

@@ -10,8 +10,10 @@ import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import FitError
+from creepkit.inverse.adequacy import adequacy_of
 from creepkit.inverse.bound_penalties import check_bounds
-from creepkit.inverse.composite_predictor import predict, prediction_errors_of, reduced_order_model_of
+from creepkit.inverse.composite_predictor import predict, prediction_errors_of, reduced_order_model_of, refined_of
+from creepkit.inverse.defect_correction import NumericalError, correct_defect, with_correction_at_frames
 from creepkit.inverse.goodness_of_fit import compare_rupture_times, pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_notes import domain_notes, fitted_ranges, identification_notes, provenance_of
@@ -21,6 +23,7 @@ from creepkit.inverse.iterative_estimation import (
     EstimationResult,
     IterationLimits,
     estimate_iteratively,
+    linearised,
     starting_point,
 )
 from creepkit.inverse.noise_model import (
@@ -105,12 +108,14 @@ def identify(
             search_outcome = _global_search(problem, through, search or MultiStart(), progress)
         if search_outcome.dropped_terms:
             return _without_terms(problem, histories, search_outcome, progress)
-        best = _best_estimate(problem, search_outcome, through, start or StartingEstimate(None), progress)
+        best, numerical_error = _best_estimate(
+            problem, search_outcome, through, start or StartingEstimate(None), progress
+        )
         gradient = _gradient(best)[: len(law.params)]
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
-        return _result(histories, best, search_outcome)
+        return _result(histories, best, search_outcome, numerical_error)
 
 
 def _gradient(best: EstimationResult) -> Floats:
@@ -182,8 +187,11 @@ def _best_estimate(
     through: Predictor | None,
     start: StartingEstimate,
     progress: IterationCallback | None,
-) -> EstimationResult:
-    """The best end of the starts, through the cheaper predictor first if there is one; its best end goes on."""
+) -> tuple[EstimationResult, NumericalError | None]:
+    """The best end of the starts, through the cheaper predictor first if there is one; its best end goes on.
+
+    The predictor is corrected where the last estimate begins: at an end of its own, or near one that is known.
+    """
     working_estimator = _working_estimator(problem)
     known_values = {(n.kind, n.owner): n.value for n in start.nuisances}
     starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in search_outcome.starts]
@@ -198,20 +206,40 @@ def _best_estimate(
         limits = SIMULATION_LIMITS
     if start.u is not None:
         limits = replace(limits, rounds=REFIT_ROUNDS)
-    results = [estimate_iteratively(problem, x, working_estimator, limits, progress, working_noise) for x in starts]
-    return max(results, key=lambda end: end.log_likelihood)
+    nearly_there = through is not None or start.u is not None
+    if not nearly_there or refined_of(problem.predictor) is None:
+        results = [estimate_iteratively(problem, x, working_estimator, limits, progress, working_noise) for x in starts]
+        best = max(results, key=lambda end: end.log_likelihood)
+        problem, x, working_noise = best.problem, best.minimum.x, best.working_noise
+        limits = replace(limits, rounds=REFIT_ROUNDS)
+        if refined_of(problem.predictor) is None:
+            return best, None
+    else:
+        x = starts[0]
+    corrected, numerical_error = correct_defect(problem, x)
+    estimator = _working_estimator(corrected, numerical_error)
+    return estimate_iteratively(corrected, x, estimator, limits, progress, working_noise), numerical_error
 
 
-def _working_estimator(problem: LeastSquaresProblem) -> WorkingNoiseEstimator:
-    return WorkingNoiseEstimator(problem.settings, problem.observations, prediction_errors_of(problem.predictor))
+def _working_estimator(
+    problem: LeastSquaresProblem, numerical_error: NumericalError | None = None
+) -> WorkingNoiseEstimator:
+    errors = prediction_errors_of(problem.predictor) if numerical_error is None else numerical_error.remaining
+    return WorkingNoiseEstimator(problem.settings, problem.observations, errors)
 
 
-def _result(histories: Sequence[History], best: EstimationResult, search_outcome: SearchOutcome) -> Identification:
+def _result(
+    histories: Sequence[History],
+    best: EstimationResult,
+    search_outcome: SearchOutcome,
+    numerical_error: NumericalError | None,
+) -> Identification:
     """Noise model, intervals and goodness of fit at the optimum."""
     problem, residuals, x = best.problem, best.residuals, best.minimum.x
     law, coordinates, count = problem.law, problem.coordinates, problem.parameter_count
     u = x[:count]
-    noise_model, covariance, freedom = _uncertainty(best, len(histories))
+    working_estimator = _working_estimator(problem, numerical_error)
+    noise_model, covariance, freedom = _uncertainty(best, working_estimator, len(histories))
     prediction = predict(
         problem.predictor,
         law,
@@ -219,6 +247,7 @@ def _result(histories: Sequence[History], best: EstimationResult, search_outcome
         list(histories),
         nuisances=problem.nuisance_parameters.predictor_values(x[count:]),
     )
+    prediction = with_correction_at_frames(problem, histories, prediction)
     law_covariance = covariance[:count, :count]
     ruptures = compare_rupture_times(
         coordinates, u, law_covariance, noise_model, interval_quantile(freedom), histories, problem.predictor
@@ -229,6 +258,8 @@ def _result(histories: Sequence[History], best: EstimationResult, search_outcome
     nuisance_estimates = _nuisance_estimates(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance))[count:]
     )
+    linear = best.linearised or linearised(problem, x, residuals)
+    adequacy = adequacy_of(problem, linear, noise_model, working_estimator.predictor_errors, histories)
     return Identification(
         law=law,
         estimates=parameter_estimates(law, coordinates, u, law_covariance, interval_quantile(freedom)),
@@ -247,7 +278,13 @@ def _result(histories: Sequence[History], best: EstimationResult, search_outcome
         errors=pooled_errors(histories, prediction, tests),
         nuisances=nuisance_estimates,
         converged=best.minimum.converged,
-        notes=(*identification_notes(best, tests, nuisance_estimates), *domain_notes(prediction, histories)),
+        adequacy=adequacy,
+        numerical_error=numerical_error,
+        notes=(
+            *identification_notes(best, tests, nuisance_estimates),
+            *domain_notes(prediction, histories),
+            *([numerical_error.sentence] if numerical_error is not None else []),
+        ),
         histories=tuple(histories),
         predictor=problem.predictor,
         search_trace=search_outcome.trace,
@@ -256,10 +293,12 @@ def _result(histories: Sequence[History], best: EstimationResult, search_outcome
     )
 
 
-def _uncertainty(best: EstimationResult, tests: int) -> tuple[NoiseModel, Floats, float]:
+def _uncertainty(
+    best: EstimationResult, working_estimator: WorkingNoiseEstimator, tests: int
+) -> tuple[NoiseModel, Floats, float]:
     """The noise model, the posterior covariance of x = (u, e), (unknowns, unknowns), and its degrees of freedom."""
     problem, x = best.problem, best.minimum.x
-    settings, working_estimator = problem.settings, _working_estimator(problem)
+    settings = problem.settings
     if best.linearised is not None:
         fixed = working_estimator.unestimated_drift_components(best.working_noise)
         return best.working_noise, *restricted_covariance(

@@ -1,4 +1,10 @@
-"""Noise model: residuals, standard deviations of the sources of scatter, and the covariance of one test."""
+"""Noise model: residuals, standard deviations of the sources of scatter, and the covariance of one test.
+
+Beside white noise and offsets there are two autocorrelated parts. The drift of an output is slow noise of its
+instrument, with a short correlation length. The model discrepancy is what the law cannot follow: one standard deviation
+and one, longer, correlation length for all outputs, in units in which their noises are alike, so that no law can call
+the misfit of one output noise and fit the others.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +33,8 @@ class Residuals:
     test_weights : (tests,) -; the covariance of a test is divided by it.
     random_effect_sensitivities : (tests, observations, effects) -, effect of one standard deviation of further random
         effects, or None.
+    discrepancy_unit : (tests, observations) -, what a model discrepancy of one is in the transformed output: the stated
+        or estimated noise of the frame; 1 % where the transform is logarithmic; 0 where there can be none.
     """
 
     values: Floats
@@ -39,6 +47,7 @@ class Residuals:
     relative_noise: Floats
     test_weights: Floats
     random_effect_sensitivities: Floats | None = None
+    discrepancy_unit: Floats | None = None
 
     def with_test_weights(self, test_weights: Floats) -> Residuals:
         """The same with other weights of tests."""
@@ -58,7 +67,9 @@ class OutputNoise:
     """Standard deviations of one output.
 
     noise : of one frame, and offset : of a test, in the output's unit. misfit : independent error of a frame, and
-    drift : autocorrelated error, in the transformed output. correlation_length : of the drift, in correlation time.
+    drift : autocorrelated noise of the instrument, in the transformed output. correlation_length : of the drift, in
+    correlation time. stated : the noise that the histories state, its lower bound, in the output's unit; 0 where they
+    state none.
     """
 
     noise: float
@@ -66,6 +77,7 @@ class OutputNoise:
     offset: float = 0.0
     drift: float = 0.0
     correlation_length: float = 1.0
+    stated: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -73,10 +85,14 @@ class NoiseModel:
     """Standard deviations of the sources of scatter, such as noise_model["strain"].offset and noise_model.rate.
 
     outputs : of each output, in the order of the observations; rate : of ln rate between tests.
+    discrepancy : of the model discrepancy, in noises (see Residuals.discrepancy_unit), and discrepancy_length : its
+        correlation length, in correlation time.
     """
 
     outputs: Mapping[str, OutputNoise]
     rate: float = 0.0
+    discrepancy: float = 0.0
+    discrepancy_length: float = 1.0
 
     def __getitem__(self, output: str) -> OutputNoise:
         return self.outputs[output]
@@ -143,6 +159,10 @@ def covariance(residuals: Residuals, noise_model: NoiseModel) -> Floats:
     c = (drift**2)[:, :, None] * np.exp(
         -correlation_lags(residuals) / noise_model.per_observation(output, "correlation_length")[:, :, None]
     )
+    if noise_model.discrepancy > 0:
+        assert residuals.discrepancy_unit is not None
+        unit = noise_model.discrepancy * residuals.discrepancy_unit
+        c += unit[:, :, None] * unit[:, None, :] * np.exp(-correlation_lags(residuals) / noise_model.discrepancy_length)
     c += offset[:, :, None] * offset[:, None, :]
     c = np.where(same_output(residuals), c, 0.0) if len(noise_model.outputs) > 1 else c
     c += noise_model.rate**2 * d[:, :, None] * d[:, None, :]
@@ -224,3 +244,13 @@ def effective_sample_size(residuals: Residuals, noise_model: NoiseModel) -> floa
 
 NEGLIGIBLE_DRIFT = 1e-3
 """A drift below this, in transformed outputs, is none."""
+
+
+NEGLIGIBLE_DISCREPANCY = 0.02
+"""A model discrepancy below this, in noises, is none."""
+
+
+def autocorrelated_components(noise_model: NoiseModel) -> int:
+    """How many components the autocorrelated parts of a noise model have: a size and a length each."""
+    drifting = sum(components.drift > NEGLIGIBLE_DRIFT for components in noise_model.outputs.values())
+    return 2 * (drifting + int(noise_model.discrepancy > NEGLIGIBLE_DISCREPANCY))

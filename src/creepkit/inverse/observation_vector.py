@@ -122,6 +122,14 @@ def thinned_history(history: History, count: int) -> History:
     )
 
 
+RELATIVE_DISCREPANCY_UNIT = 0.01
+"""Unit of the model discrepancy of an output that spans decades, in its logarithm."""
+
+
+SMALLEST_NOISE = 1e-2
+"""Least noise of a likelihood, over the floor of the output's transform: simulated histories have none of their own."""
+
+
 LINEAR_COORDINATE_LENGTH = 5.0
 """Correlation time of a whole test where outputs have a linear transform: about a decade and a half in ln t."""
 
@@ -137,6 +145,7 @@ class ObservationVector:
     values, times : (tests, observations) in the output's unit, and s.
     noise : (outputs,) typical standard deviation of a frame, in the output's unit.
     relative_noise : (tests, observations) -, noise of each observation over that.
+    stated : (outputs,) whether every history states the noise of its frames; else it is estimated from neighbours.
     followed_to_rupture : (tests,) which tests are compared up to rupture.
     censored : (tests,) which of them were stopped before rupture.
     """
@@ -151,6 +160,7 @@ class ObservationVector:
     times: Floats
     noise: Floats
     relative_noise: Floats
+    stated: Bools
     followed_to_rupture: Bools
     censored: Bools
 
@@ -188,6 +198,7 @@ class ObservationVector:
             np.ones(shape),
             noise,
             np.ones(shape),
+            np.array([_states_noise([histories[k] for k in tests_by_output[name]], name) for name in outputs]),
             followed_to_rupture,
             followed_to_rupture & np.array([h.unruptured for h in histories]),
         )
@@ -235,9 +246,24 @@ class ObservationVector:
         rows = {
             name: getattr(self, name)[index]
             for name, value in vars(self).items()
-            if isinstance(value, np.ndarray) and name not in ("noise", "transformed_values")
+            if isinstance(value, np.ndarray)
+            and name not in ("noise", "stated", "transformed_values", "discrepancy_unit")
         }
         return replace(self, **rows)
+
+    @cached_property
+    def discrepancy_unit(self) -> Floats:
+        """(tests, observations) -, what a model discrepancy of one is on the scale of the transformed output."""
+        units = [
+            0.0
+            if name == RUPTURE_OUTPUT
+            else RELATIVE_DISCREPANCY_UNIT
+            if name in LOGARITHMIC_OUTPUTS
+            else max(float(noise), SMALLEST_NOISE * transform.floor) / transform.scale  # type: ignore[attr-defined]
+            for name, noise, transform in zip(self.outputs, self.noise, self.transforms, strict=True)
+        ]
+        logarithmic = self.per_observation([float(name in LOGARITHMIC_OUTPUTS) for name in self.outputs]) > 0
+        return self.per_observation(units) * np.where(logarithmic, 1.0, self.relative_noise)
 
     @property
     def log_times(self) -> Floats:
@@ -304,6 +330,12 @@ class ObservationVector:
             mask = self.output_index == position
             out[..., mask] = method(transform)(y[..., mask])
         return out
+
+
+def _states_noise(histories: Sequence[History], name: str) -> bool:
+    """Whether all of them state a standard deviation of this output."""
+    stated = [np.asarray(h.standard_deviation.get(name, np.nan)) for h in histories]
+    return name != RUPTURE_OUTPUT and all((np.isfinite(sd) & (sd > 0)).any() for sd in stated)
 
 
 def _observed_outputs(history: History, predictor: Predictor) -> tuple[str, ...]:

@@ -92,6 +92,8 @@ class LeastSquaresProblem:
     histories : the tests at the frames that are compared. coordinates : of the law, u to its internal parameters.
     bounds : (unknowns,) of x. covariance_factor : (tests, observations, observations) Cholesky factors, in transformed
         outputs. loss : of the whitened residuals, as scipy names it. penalty : what is added to half the chi-square.
+    correction : (tests, observations) in the output's unit, what is added to predictions: the defect of the predictor
+        against a more exact one (see inverse.defect_correction), or None.
     evaluations : the last residuals, shared by the problems that differ in covariance, priors or penalty alone.
     """
 
@@ -105,6 +107,7 @@ class LeastSquaresProblem:
     covariance_factor: Floats
     loss: str = "linear"
     penalty: Penalty | None = None
+    correction: Floats | None = None
     evaluations: EvaluationCache = field(default_factory=EvaluationCache, repr=False)
 
     @classmethod
@@ -150,8 +153,12 @@ class LeastSquaresProblem:
         )
 
     def with_predictor(self, predictor: Predictor) -> LeastSquaresProblem:
-        """The same with another predictor of the same outputs."""
-        return replace(self, predictor=predictor, evaluations=EvaluationCache())
+        """The same with another predictor of the same outputs, and without correction."""
+        return replace(self, predictor=predictor, correction=None, evaluations=EvaluationCache())
+
+    def with_correction(self, correction: Floats | None) -> LeastSquaresProblem:
+        """The same with a correction (tests, observations), in the output's unit, added to predictions."""
+        return replace(self, correction=correction, evaluations=EvaluationCache())
 
     def with_covariance(self, covariance_factor: Floats) -> LeastSquaresProblem:
         """The same under another covariance: (tests, observations, observations) Cholesky factors."""
@@ -199,7 +206,7 @@ class LeastSquaresProblem:
     def candidate_residuals(self, u: Floats) -> Floats:
         """(candidates, tests, observations) - of u (candidates, parameters), nuisance parameters at their means."""
         self.evaluations.count += len(u)
-        return candidate_residuals(self.observations, self._prediction(u, jacobian=False))
+        return candidate_residuals(self.observations, self._prediction(u, jacobian=False), self.correction)
 
     def candidate_jacobian(self, u: Floats) -> tuple[Floats, Floats]:
         """Residuals (candidates, tests, observations) of u (candidates, parameters), and their derivatives to u.
@@ -212,7 +219,7 @@ class LeastSquaresProblem:
         if prediction.jacobian is None:
             return self._jacobian_one_by_one(u)
         self.evaluations.count += len(u)
-        values, internal_jacobian = candidate_residuals_and_jacobian(self.observations, prediction)
+        values, internal_jacobian = candidate_residuals_and_jacobian(self.observations, prediction, self.correction)
         jacobian = np.einsum("ctep,cpq->cteq", internal_jacobian, self.coordinates.jacobian(u))
         return values, np.where(self.observations.present[..., None], jacobian, 0.0)
 
@@ -241,7 +248,11 @@ class LeastSquaresProblem:
         coefficients = self.coordinates.coefficients
         every_rate_has_one = len(coefficients) == len(self.law.terms) + len(self.law.states)
         residuals = residuals_of_prediction(
-            self.observations, prediction, self.nuisance_parameters, coefficients if every_rate_has_one else None
+            self.observations,
+            prediction,
+            self.nuisance_parameters,
+            coefficients if every_rate_has_one else None,
+            self.correction,
         )
         assert residuals.jacobian is not None
         internal, nuisance_jacobian = np.split(residuals.jacobian, [u.size], axis=-1)

@@ -45,19 +45,28 @@ def residuals_at_measured_values(observations: ObservationVector) -> Residuals:
     )
 
 
-def candidate_residuals(observations: ObservationVector, prediction: Prediction) -> Floats:
-    """(candidates, tests, observations) - residuals of all candidates; zero where there are no data."""
-    values = _orthogonal_residuals(observations, _predicted_values(observations, prediction), prediction).values
+def candidate_residuals(
+    observations: ObservationVector, prediction: Prediction, correction: Floats | None = None
+) -> Floats:
+    """(candidates, tests, observations) - residuals of all candidates; zero where there are no data.
+
+    correction : (tests, observations) in the output's unit, what is added to predictions.
+    """
+    predicted = _predicted_values(observations, prediction, correction)
+    values = _orthogonal_residuals(observations, predicted, prediction).values
     return np.where(observations.present, values, 0.0)
 
 
-def candidate_residuals_and_jacobian(observations: ObservationVector, prediction: Prediction) -> tuple[Floats, Floats]:
+def candidate_residuals_and_jacobian(
+    observations: ObservationVector, prediction: Prediction, correction: Floats | None = None
+) -> tuple[Floats, Floats]:
     """Residuals of all candidates, with derivatives to internal parameters, for tests that are not followed to rupture.
 
-    Returns residuals (candidates, tests, observations) and derivatives (candidates, tests, observations, parameters).
+    correction : (tests, observations) in the output's unit. Returns residuals (candidates, tests, observations) and
+    derivatives (candidates, tests, observations, parameters).
     """
     assert prediction.jacobian is not None
-    predicted = _predicted_values(observations, prediction)
+    predicted = _predicted_values(observations, prediction, correction)
     reached = np.isfinite(predicted)
     derivatives = observations.derivative(np.where(reached, predicted, 1.0))
     with np.errstate(invalid="ignore"):
@@ -78,14 +87,16 @@ def residuals_of_prediction(
     prediction: Prediction,
     nuisance_parameters: NuisanceParameters,
     coefficients: Sequence[int] | None,
+    correction: Floats | None = None,
 ) -> Residuals:
     """Residuals of one candidate, with derivatives to internal parameters and nuisance parameters.
 
     coefficients : positions of the rate coefficients of all terms and internal variables, whose sum is the effect of a
         factor on all rates; None where one has none of its own, and the derivative to ln t takes its place.
+    correction : (tests, observations) in the output's unit, what is added to the prediction.
     """
     assert prediction.jacobian is not None
-    predicted = _predicted_values(observations, prediction)
+    predicted = _predicted_values(observations, prediction, correction)
     orthogonal, reached = _orthogonal_residuals(observations, predicted, prediction), np.isfinite(predicted[0])
     derivatives = observations.derivative(np.where(reached, predicted[0], 1.0))
     jacobian = _transformed_jacobian(observations, prediction, nuisance_parameters, derivatives, reached)
@@ -147,11 +158,12 @@ def median_log_rupture_excess(observations: ObservationVector, residuals: Floats
     return np.median(residuals[:, ruptured], axis=1) if ruptured.any() else np.zeros(len(residuals))
 
 
-def _predicted_values(observations: ObservationVector, prediction: Prediction) -> Floats:
+def _predicted_values(observations: ObservationVector, prediction: Prediction, correction: Floats | None) -> Floats:
     """(candidates, tests, observations) predicted outputs; rupture times are compared separately."""
-    return np.where(
-        observations.rupture_mask, observations.values, observations.select_outputs(prediction.values, prediction)
-    )
+    predicted = observations.select_outputs(prediction.values, prediction)
+    if correction is not None:
+        predicted = predicted + correction
+    return np.where(observations.rupture_mask, observations.values, predicted)
 
 
 def _orthogonal_residuals(
@@ -228,6 +240,7 @@ def _masked_residuals(
         log_rate_sensitivity=np.where(mask, log_rate_sensitivity, 0.0),
         output_index=observations.output_index,
         relative_noise=observations.relative_noise,
+        discrepancy_unit=np.where(mask, observations.discrepancy_unit, 0.0),
         test_weights=np.ones(len(mask)),
     )
 

@@ -122,7 +122,24 @@ def scaled_inverse(matrix: Floats) -> Floats:
 
 
 LONGEST_CORRELATION = 3.0
-"""Longest correlation of the drift, a factor 20 in time or 0.6 of a test: what lasts longer is scatter of the rate."""
+"""Longest correlation of a discrepancy, a factor 20 in time or 0.6 of a test: what lasts longer is scatter of the rate.
+"""
+
+
+LONGEST_DRIFT = 0.5
+"""Longest correlation of the noise of an instrument, a tenth of a test: what lasts longer is a model discrepancy."""
+
+
+SHORTEST_CORRELATION, SHORTEST_DISCREPANCY = 0.05, 0.25
+"""Shortest correlations of an instrument's noise and of a discrepancy: a hundredth and a twentieth of a test."""
+
+
+LARGEST_DISCREPANCY = 1e4
+"""In noises."""
+
+
+NOISE_PRIOR_SD = 0.2
+"""Of ln of the white noise over what the histories state, from which on it is bounded."""
 
 
 SMALLEST_NOISE_RATIO, LARGEST_NOISE_RATIO = 0.1, 30.0
@@ -135,6 +152,10 @@ search is repeated from half way."""
 
 
 NOISE_COMPONENTS = ("noise", "misfit", "offset", "drift", "correlation_length")
+
+
+SHARED_COMPONENTS = ("rate", "discrepancy", "discrepancy_length")
+"""Components that outputs share; they belong to the output ""."""
 
 
 def estimate_variance_components(
@@ -161,6 +182,7 @@ def estimate_variance_components(
         and (n != "correlation_length" or components.drift > 0)
     ]
     free += [("", "rate")] if start.rate > 0 and ("", "rate") not in fixed_by_prior else []
+    free += [("", "discrepancy"), ("", "discrepancy_length")] if start.discrepancy > 0 else []
     if not free:
         return start
     likelihood = _Likelihood(residuals, start, free, linearised)
@@ -205,7 +227,7 @@ class _Likelihood:
         noise_model = self.start
         for (output, name), value in zip(self.free, np.exp(x), strict=True):
             noise_model = (
-                replace(noise_model, rate=float(value))
+                replace(noise_model, **{name: float(value)})  # type: ignore[arg-type]
                 if not output
                 else noise_model.with_output(output, **{name: float(value)})
             )
@@ -214,7 +236,15 @@ class _Likelihood:
     def cost(self, x: Floats) -> tuple[float, Floats]:
         """Value and gradient."""
         value, projected, noise_model = self.gradient(x)
-        return value, np.array([self._derivative(projected, noise_model, output, name) for output, name in self.free])
+        derivative = np.array([self._derivative(projected, noise_model, output, name) for output, name in self.free])
+        excess = np.array([self._log_excess_of_stated(noise_model, *component) for component in self.free])
+        return value + 0.5 * float((excess**2).sum()), derivative + excess / NOISE_PRIOR_SD
+
+    @staticmethod
+    def _log_excess_of_stated(noise_model: NoiseModel, output: str, name: str) -> float:
+        """ln of the noise over what was stated, in standard deviations of its prior; 0 of all else."""
+        stated = noise_model[output].stated if name == "noise" else 0.0
+        return float(np.log(noise_model[output].noise / stated)) / NOISE_PRIOR_SD if stated > 0 else 0.0
 
     def gradient(self, x: Floats) -> tuple[float, Floats, NoiseModel]:
         """-ln L, G of every test (tests, observations, observations), and the noise model."""
@@ -239,6 +269,17 @@ class _Likelihood:
     def _derivative(self, G: Floats, noise_model: NoiseModel, output: str, name: str) -> float:
         """tr(G dC / d ln size) / 2."""
         r = self.residuals
+        if name in ("discrepancy", "discrepancy_length"):
+            assert r.discrepancy_unit is not None
+            unit = noise_model.discrepancy * r.discrepancy_unit
+            weighted = G * np.exp(-self.time_lags / noise_model.discrepancy_length) * self.same_output
+            if name == "discrepancy":
+                return float(np.einsum("ti,tij,tj->", unit, weighted, unit))
+            return (
+                0.5
+                * float(np.einsum("ti,tij,tj->", unit, weighted * self.time_lags, unit))
+                / (noise_model.discrepancy_length)
+            )
         if not output:
             d = r.log_rate_sensitivity
             return noise_model.rate**2 * float(np.einsum("ti,tij,tj->", d, G, d))
@@ -260,16 +301,21 @@ class _Likelihood:
 
 
 def _component(noise_model: NoiseModel, output: str, name: str) -> float:
-    return noise_model.rate if not output else float(getattr(noise_model[output], name))
+    return float(getattr(noise_model[output] if output else noise_model, name))
 
 
 def _bounds(residuals: Residuals, noise_model: NoiseModel, output: str, name: str) -> tuple[float, float]:
     """Bounds of the logarithm of a component: an offset up to the typical output itself."""
     if name == "correlation_length":
-        return float(np.log(0.05)), float(np.log(LONGEST_CORRELATION))
+        return float(np.log(SHORTEST_CORRELATION)), float(np.log(LONGEST_DRIFT))
+    if name == "discrepancy_length":
+        return float(np.log(SHORTEST_DISCREPANCY)), float(np.log(LONGEST_CORRELATION))
+    if name == "discrepancy":
+        return float(np.log(1e-2)), float(np.log(LARGEST_DISCREPANCY))
     if name == "noise":
-        stated = noise_model[output].noise
-        return float(np.log(SMALLEST_NOISE_RATIO * stated)), float(np.log(LARGEST_NOISE_RATIO * stated))
+        measured, stated = noise_model[output].noise, noise_model[output].stated
+        lowest = stated if stated > 0 else SMALLEST_NOISE_RATIO * measured
+        return float(np.log(lowest)), float(np.log(LARGEST_NOISE_RATIO * max(measured, lowest)))
     if name != "offset":
         return float(np.log(1e-4)), float(np.log(5.0))
     mask = residuals.present & (residuals.output_index == list(noise_model.outputs).index(output))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -16,13 +17,14 @@ from creepkit.inverse.noise_model import (
     NoiseModel,
     OutputNoise,
     Residuals,
+    autocorrelated_components,
     cholesky_factors,
     initial_sd,
     initial_working_noise,
     predicted_random_effects,
     whiten,
 )
-from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT, ObservationVector
+from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT, SMALLEST_NOISE, ObservationVector
 from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.settings import PAPER_WEIGHTS, IdentificationSettings
 from creepkit.inverse.variance_components import (
@@ -35,13 +37,21 @@ STUDENT_FREEDOM = 4.0
 """Degrees of freedom of Student's t for whole tests; the usual choice where tails are unknown (Lange et al. 1989)."""
 
 
-SMALLEST_NOISE = 1e-2
-"""Least noise of a likelihood, over the floor of the output's transform: simulated histories have none of their own."""
-
-
-DRIFT_CONFIDENCE = 0.95
+AUTOCORRELATION_CONFIDENCE = 0.95
 """Residuals are autocorrelated where the likelihood gains more by it than by chance in so many cases; each output that
-drifts has two components more, drift and correlation length."""
+drifts, and the discrepancy, has two components more, a size and a correlation length."""
+
+
+INITIAL_AUTOCORRELATION = 0.1
+"""Of the leading output, transformed, before anything was fitted."""
+
+
+INITIAL_DRIFT, INITIAL_DRIFT_LENGTH = 0.01, 0.2
+"""Of the transformed output, and in correlation time, where the estimate of a drift begins."""
+
+
+INITIAL_DISCREPANCY = 1.0
+"""In noises, where the estimate of a discrepancy begins."""
 
 
 INITIAL_RUPTURE_SD = 0.3
@@ -112,38 +122,47 @@ class WorkingNoiseEstimator:
         ):
             offset = initial_sd(nuisances, "offset", scale.floor, name)
             misfit = INITIAL_RUPTURE_SD if name == RUPTURE_OUTPUT else 0.03 if name in LOGARITHMIC_OUTPUTS else 0.0
-            drift = 0.0 if name == RUPTURE_OUTPUT else 0.1
-            by_output[name] = OutputNoise(max(float(noise), SMALLEST_NOISE * scale.floor), misfit, offset, drift)
+            by_output[name] = OutputNoise(max(float(noise), SMALLEST_NOISE * scale.floor), misfit, offset)
         rate_nuisances = [n for n in nuisances if n.kind == "rate" and (n.sd is not None or tests >= MINIMUM_TESTS)]
-        return NoiseModel(by_output, initial_sd(rate_nuisances, "rate", ASSUMED_RATE_SD))
+        units = self.observations.discrepancy_unit[self.observations.present & self.observations.leading_output]
+        discrepancy = INITIAL_AUTOCORRELATION / float(np.median(units)) if (units > 0).any() else 0.0
+        return NoiseModel(by_output, initial_sd(rate_nuisances, "rate", ASSUMED_RATE_SD), discrepancy)
 
     def _by_restricted_likelihood(self, linearised: LinearisedProblem, previous: NoiseModel) -> NoiseModel:
-        """The noise model of largest restricted likelihood; with drift only where that is significantly more likely.
+        """The noise model of largest restricted likelihood; autocorrelated where that is significantly more likely.
 
         A drift is a variance at the edge of what it may be: estimated always, it is above zero half of the time where
-        there is none, and widens every interval.
+        there is none, and widens every interval. Of the parts that are autocorrelated those stay that the others cannot
+        replace: a discrepancy of all outputs rather than drifts of each.
         """
-        nuisances, residuals = self.settings.nuisances, linearised.residuals
-        without_drift = estimate_variance_components(
-            residuals, self._with_initial_drift(previous, 0.0), nuisances, fixed=(), linearised=linearised
-        )
-        with_drift = estimate_variance_components(
-            residuals, self._with_initial_drift(previous, 0.01), nuisances, fixed=(), linearised=linearised
-        )
-        gain = 2.0 * (
-            restricted_log_likelihood(linearised, with_drift) - restricted_log_likelihood(linearised, without_drift)
-        )
-        drifting_outputs = sum(sizes.drift > NEGLIGIBLE_DRIFT for sizes in with_drift.outputs.values())
-        return self._with_predictor_error(
-            with_drift
-            if drifting_outputs and gain > chi2.ppf(DRIFT_CONFIDENCE, 2 * drifting_outputs)
-            else without_drift
-        )
+
+        def estimated(*, drift: bool, discrepancy: bool) -> tuple[NoiseModel, float]:
+            start = self._initial_components(previous, drift=drift, discrepancy=discrepancy)
+            noise_model = estimate_variance_components(
+                linearised.residuals, start, self.settings.nuisances, fixed=(), linearised=linearised
+            )
+            return noise_model, restricted_log_likelihood(linearised, noise_model)
+
+        def suffices(simpler: tuple[NoiseModel, float], richer: tuple[NoiseModel, float]) -> bool:
+            further = autocorrelated_components(richer[0]) - autocorrelated_components(simpler[0])
+            return bool(2.0 * (richer[1] - simpler[1]) < chi2.ppf(AUTOCORRELATION_CONFIDENCE, max(further, 1)))
+
+        white, full = estimated(drift=False, discrepancy=False), estimated(drift=True, discrepancy=True)
+        if suffices(white, full):
+            return self._with_predictor_error(white[0])
+        for drift, discrepancy in ((False, True), (True, False)):
+            candidate = estimated(drift=drift, discrepancy=discrepancy)
+            if suffices(candidate, full):
+                return self._with_predictor_error(candidate[0])
+        return self._with_predictor_error(full[0])
 
     def _with_predictor_error(self, noise_model: NoiseModel) -> NoiseModel:
         """The same with the errors of the predictor as drift: they follow the curve, and do not average out."""
         for name, error in self._transformed_predictor_errors().items():
-            noise_model = noise_model.with_output(name, drift=float(np.hypot(noise_model[name].drift, error)))
+            components = noise_model[name]
+            length = components.correlation_length if components.drift > error else 1.0
+            drift = float(np.hypot(components.drift, error))
+            noise_model = noise_model.with_output(name, drift=drift, correlation_length=length)
         return noise_model
 
     def unestimated_drift_components(self, noise_model: NoiseModel) -> set[tuple[str, str]]:
@@ -165,17 +184,23 @@ class WorkingNoiseEstimator:
             if self.predictor_errors.get(n, 0.0) > 0
         }
 
-    def _with_initial_drift(self, noise_model: NoiseModel, drift: float) -> NoiseModel:
-        """The same with a drift to begin from, or none, and the noise that was measured."""
-        for name, noise, scale in zip(
-            self.observations.outputs, self.observations.noise, self.observations.transforms, strict=True
+    def _initial_components(self, noise_model: NoiseModel, *, drift: bool, discrepancy: bool) -> NoiseModel:
+        """Where an estimate begins: with the noise that was measured, and the autocorrelated parts asked for."""
+        observations = self.observations
+        for name, noise, stated, scale in zip(
+            observations.outputs, observations.noise, observations.stated, observations.transforms, strict=True
         ):
-            initial_drift = max(noise_model[name].drift, drift) if drift > 0 and name != RUPTURE_OUTPUT else 0.0
             initial_noise = max(float(noise), SMALLEST_NOISE * scale.floor)
+            initial_drift = max(noise_model[name].drift, INITIAL_DRIFT) if drift and name != RUPTURE_OUTPUT else 0.0
             noise_model = noise_model.with_output(
-                name, noise=initial_noise, drift=initial_drift, correlation_length=1.0
+                name,
+                noise=initial_noise,
+                drift=initial_drift,
+                correlation_length=INITIAL_DRIFT_LENGTH,
+                stated=initial_noise if stated else 0.0,
             )
-        return noise_model
+        size = max(noise_model.discrepancy, INITIAL_DISCREPANCY) if discrepancy else 0.0
+        return replace(noise_model, discrepancy=size, discrepancy_length=1.0)
 
     def _in_ratio_of_weights(self, noise_model: NoiseModel, scale: float) -> NoiseModel:
         """Misfits in the ratio that the weights ask for, without noise of their own."""

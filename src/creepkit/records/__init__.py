@@ -1,12 +1,13 @@
 """The records that the public functions take and return. Frozen; MPa, mm, s, K throughout."""
 
-from creepkit.records.history import EVERY_FRAME, ZERO_CELSIUS, History
+from creepkit.records.history import EVERY_FRAME, ZERO_CELSIUS, History, output_unit
 from creepkit.records.interfaces import (
     Exporter,
     Predictor,
     Reader,
     Specimen,
     SupportsReducedOrderModel,
+    SupportsRefinement,
     SupportsRupturePrediction,
 )
 from creepkit.records.law_with_values import LawWithValues, Units
@@ -63,6 +64,7 @@ __all__ = [
     "StrainSteps",
     "StressSteps",
     "SupportsReducedOrderModel",
+    "SupportsRefinement",
     "SupportsRupturePrediction",
     "TimesToStrain",
     "Units",
@@ -71,4 +73,5 @@ __all__ = [
     "check_nuisances",
     "constant_strain",
     "constant_stress",
+    "output_unit",
 ]

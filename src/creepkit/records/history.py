@@ -168,5 +168,14 @@ class History:
         return f"{temperature_text} C, {loading_text(self.loading)}"
 
 
+OUTPUT_UNITS = {"amplitude": "mm", "width": "mm"}
+"""Units of outputs that are no strains, numbers, or stresses."""
+
+
+def output_unit(output: str) -> str:
+    """The unit of an output, "" for a number without one."""
+    return "MPa" if output.startswith("stress") else OUTPUT_UNITS.get(output, "")
+
+
 def _rebuild(kind: type[History], state: dict[str, Any]) -> History:
     return kind(**state)

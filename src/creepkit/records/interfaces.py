@@ -72,8 +72,8 @@ class Predictor(Protocol):
     Optional attributes, looked for by name: `outputs`, the names of what is predicted, first the one that grows with
     creep; `nuisances`, the kinds of explicit nuisances that predict() understands (none without it);
     `reference_stress(history)`, the von Mises stress, MPa, that stands for the test (a number, or one for each level
-    of its loading); `reduced_order_model()`, see
-    SupportsReducedOrderModel.
+    of its loading); `reduced_order_model()` and `refined()`, see
+    SupportsReducedOrderModel and SupportsRefinement.
     """
 
     def predict(
@@ -117,6 +117,18 @@ class SupportsReducedOrderModel(Predictor, Protocol):
 
     def reduced_order_model(self) -> Predictor:
         """Return the reduced-order model; it may be some per cent off and need not know derivatives."""
+        ...
+
+
+@runtime_checkable
+class SupportsRefinement(Predictor, Protocol):
+    """A predictor with an error of its own, and a more exact one of the same outputs and nuisances.
+
+    Of a specimen in finite elements: the same on a finer mesh in smaller steps. Of a surrogate: the specimen.
+    """
+
+    def refined(self) -> Predictor:
+        """Return the more exact predictor; a few runs of it may cost as much as the rest of an identification."""
         ...
 
 

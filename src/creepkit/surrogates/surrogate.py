@@ -20,6 +20,7 @@ from creepkit.records import (
     Predictor,
     Specimen,
     SupportsReducedOrderModel,
+    SupportsRefinement,
     check_nuisances,
 )
 from creepkit.sampling.conditions import TimeGrid, test_kind
@@ -181,6 +182,10 @@ class Surrogate(Presentable, ABC):
         if isinstance(self.specimen, SupportsReducedOrderModel):
             return self.specimen.reduced_order_model()
         return self
+
+    def refined(self) -> Predictor:
+        """What it stands for: the specimen itself, on the finer discretisation where it has one."""
+        return self.specimen.refined() if isinstance(self.specimen, SupportsRefinement) else self.specimen
 
     def applies_to(self, specimen: object, histories: Sequence[History]) -> bool:
         """Whether it was trained on this specimen, but for its apex thickness and threads, and knows such histories."""

@@ -25,7 +25,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import LawError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import bic_penalty
-from creepkit.inverse.noise_model import NEGLIGIBLE_DRIFT, Residuals, effective_sample_size
+from creepkit.inverse.noise_model import Residuals, autocorrelated_components, effective_sample_size
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
 from creepkit.inverse.uncertainty.quantities import local_exponent
 from creepkit.inverse.variance_components import LinearisedProblem, inverse_covariances
@@ -99,9 +99,7 @@ def _score_under_own_covariance(fit: Identification, linearised: LinearisedProbl
     """
     inverses, log_det = inverse_covariances(linearised.residuals, fit.noise_model)
     independent_frames = effective_sample_size(linearised.residuals, fit.noise_model)
-    parameter_count = len(fit.u) + sum(
-        1 + 2 * (components.drift > NEGLIGIBLE_DRIFT) for components in fit.noise_model.outputs.values()
-    )
+    parameter_count = len(fit.u) + len(fit.noise_model.outputs) + autocorrelated_components(fit.noise_model)
     return (
         log_det + _optimum_under(linearised, inverses, len(fit.u))[0] + bic_penalty(parameter_count, independent_frames)
     )

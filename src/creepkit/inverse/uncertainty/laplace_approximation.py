@@ -15,6 +15,7 @@ from creepkit.arrays import Floats
 from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.noise_model import (
+    NEGLIGIBLE_DISCREPANCY,
     NEGLIGIBLE_DRIFT,
     NoiseModel,
     Residuals,
@@ -99,7 +100,9 @@ def _estimated_components(noise_model: NoiseModel, nuisances: Sequence[Nuisance]
         names = ["noise"] + ["misfit"] * (output_noise.misfit > 0) + ["offset"] * (output_noise.offset > 0)
         names += ["drift", "correlation_length"] * (output_noise.drift > NEGLIGIBLE_DRIFT)
         components += [(output, name) for name in names if (output, name) not in fixed]
-    return components + ([("", "rate")] if noise_model.rate > 0 and ("", "rate") not in fixed else [])
+    components += [("", "rate")] if noise_model.rate > 0 and ("", "rate") not in fixed else []
+    discrepant = noise_model.discrepancy > NEGLIGIBLE_DISCREPANCY
+    return components + ([("", "discrepancy"), ("", "discrepancy_length")] if discrepant else [])
 
 
 def _covariance_derivative(residuals: Residuals, noise_model: NoiseModel, output: str, name: str) -> Floats:
@@ -108,7 +111,7 @@ def _covariance_derivative(residuals: Residuals, noise_model: NoiseModel, output
     def at(shift: float) -> Floats:
         factor = float(np.exp(shift))
         if not output:
-            return covariance(residuals, replace(noise_model, rate=noise_model.rate * factor))
+            return covariance(residuals, replace(noise_model, **{name: getattr(noise_model, name) * factor}))
         return covariance(
             residuals, noise_model.with_output(output, **{name: getattr(noise_model[output], name) * factor})
         )

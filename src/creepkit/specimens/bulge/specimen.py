@@ -59,6 +59,14 @@ class Bulge(BulgeSettings):
 
         return BulgeReducedOrderModel(self)
 
+    def refined(self) -> Bulge:
+        """The same on a mesh of half the element size, in steps of a tenth of the tolerance.
+
+        Its error is a tenth of this one's in the median (docs/measured/dimple_accuracy.md says how large that is).
+        """
+        refinement = self.refinement if self.mesh is not None else 2.0 * self.refinement
+        return self.replace(refinement=refinement, tolerance=max(0.1 * self.tolerance, 1e-6))
+
 
 @hookimpl
 def creepkit_specimens() -> list[Specimen]:

@@ -1,0 +1,309 @@
+"""Adequacy: whether a law explains the tests to their noise, judged by noise that was not estimated from its misfit.
+
+With r the residuals at the optimum under C0, the covariance of the noise that histories state (or that neighbouring
+frames show), of offsets and of scatter between tests,
+
+    chi2 = r' C0^-1 r
+
+has chi-square's distribution with n less the estimated unknowns degrees of freedom if the law is right and the noise
+white; where the noise was estimated from nu frames, chi2 over its degrees of freedom has that of F. It is taken of all
+outputs together and of each, and the least probability times their number is the p-value (Bonferroni). Below 1 % the
+law leaves a model discrepancy: what must be added to the noise for the same chi-square.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.stats import chi2, f
+
+from creepkit.arrays import Bools, Floats
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
+from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, SMALLEST_NOISE, ObservationVector
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, inverse_covariances
+from creepkit.records import History, output_unit
+
+SIGNIFICANCE = 0.01
+"""p-value below which a law does not explain the tests."""
+
+
+FREEDOM_PER_FRAME = 0.35
+"""Degrees of freedom that a frame gives to a noise estimated from third differences by a median."""
+
+
+LOCAL_FRAMES = 5
+"""Frames whose mean deviation says where a law misses the tests."""
+
+
+AdequacyVerdict = Literal["explains", "leaves a discrepancy", "cannot be judged"]
+
+
+@dataclass(frozen=True)
+class OutputAdequacy:
+    """One output of all tests.
+
+    frames : how many values count. noise : typical standard deviation of one, in the output's unit; noise_source :
+    "stated" by the histories, or "estimated" from neighbouring frames. chi_square : over its degrees of freedom.
+    p_value : of a larger one by chance. discrepancy : standard deviation of what the law leaves beyond noise, in the
+    output's unit; 0 where there is nothing.
+    """
+
+    output: str
+    frames: int
+    noise: float
+    noise_source: Literal["stated", "estimated"]
+    chi_square: float
+    p_value: float
+    discrepancy: float
+
+    @property
+    def discrepancy_in_noises(self) -> float:
+        """The discrepancy over the noise."""
+        return self.discrepancy / self.noise
+
+
+@dataclass(frozen=True)
+class LargestDeviation:
+    """Where a law misses the tests most: the mean of a few frames of one output, in its unit and in their noises.
+
+    test, output : names. time : s. deviation : predicted less measured. noises : over the noise of one frame.
+    """
+
+    test: str
+    output: str
+    time: float
+    deviation: float
+    noises: float
+
+    def __str__(self) -> str:
+        unit = output_unit(self.output)
+        side = "above" if self.deviation > 0 else "below"
+        return (
+            f"{self.output} of '{self.test}' about {self.time:.4g} s, where it lies {abs(self.deviation):.2g}"
+            f"{' ' + unit if unit else ''} {side} what was measured"
+        )
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """Whether a law explains the tests to their noise.
+
+    verdict : "explains", "leaves a discrepancy" or "cannot be judged". outputs : one by one; those without known noise
+    are missing. chi_square : of all of them, over `freedom`, its degrees of freedom. p_value : the least of all and of
+    each, times their number. correlation : of what is left, as a share of the test (of outputs that span decades: the
+    ln of a factor in time); NaN where nothing is. largest : where the law misses most; None if nothing is known.
+    """
+
+    verdict: AdequacyVerdict
+    outputs: tuple[OutputAdequacy, ...]
+    chi_square: float
+    freedom: float
+    p_value: float
+    correlation: float
+    largest: LargestDeviation | None
+
+    @property
+    def explains(self) -> bool:
+        """Whether the law explains the tests to their noise."""
+        return self.verdict == "explains"
+
+    @property
+    def discrepancy_in_noises(self) -> float:
+        """The largest discrepancy of an output, over its noise."""
+        return max((o.discrepancy_in_noises for o in self.outputs), default=float("nan"))
+
+    def __getitem__(self, output: str) -> OutputAdequacy:
+        for one in self.outputs:
+            if one.output == output:
+                return one
+        raise KeyError(output)
+
+    def __str__(self) -> str:
+        """One sentence: the verdict, with what is left and where."""
+        if self.verdict == "cannot be judged":
+            return (
+                "whether it explains the tests cannot be judged: no noise is stated, and too few frames show it; give "
+                "standard_deviation"
+            )
+        source = " and ".join(dict.fromkeys(o.noise_source for o in self.outputs))
+        if self.explains:
+            return (
+                f"explains the tests to their {source} noise: reduced chi-square {self.chi_square:.3g}, "
+                f"p = {self.p_value:.2g}"
+            )
+        parts = [
+            f"{o.discrepancy:.2g}{' ' + output_unit(o.output) if output_unit(o.output) else ''} of {o.output} "
+            f"({o.discrepancy_in_noises:.2g} times its {o.noise_source} noise)"
+            for o in sorted(self.outputs, key=lambda o: -o.discrepancy_in_noises)
+            if o.discrepancy > 0
+        ]
+        p_text = f"p = {self.p_value:.1g}" if self.p_value > 1e-12 else "p < 1e-12"
+        where = f"; most in {self.largest}" if self.largest is not None else ""
+        return (
+            f"leaves {' and '.join(parts) or 'more than noise'} unexplained (reduced chi-square "
+            f"{self.chi_square:.3g}, {p_text}){where}"
+        )
+
+
+def adequacy_of(
+    problem: LeastSquaresProblem,
+    linear: LinearisedProblem,
+    noise_model: NoiseModel,
+    predictor_errors: Mapping[str, float],
+    histories: Sequence[History],
+) -> Adequacy:
+    """The adequacy of a law at the optimum of a problem.
+
+    linear : the problem made linear there. noise_model : of its estimate, for offsets and scatter between tests.
+    predictor_errors : {output: standard deviation} of what the predictor is wrong by, in the output's unit.
+    histories : with all frames.
+    """
+    observations = problem.observations
+    judged = _judged_observations(observations)
+    if not judged.any():
+        nan = float("nan")
+        return Adequacy("cannot be judged", (), nan, 0.0, nan, nan, None)
+    residuals = _of_judged(linear.residuals, observations, judged)
+    independent = _independent_noise(observations, noise_model, predictor_errors)
+    inverses, _ = inverse_covariances(residuals, independent)
+    judged_problem = replace(linear, residuals=residuals)
+    solution = _within_bounds(judged_problem, inverses)
+    share_of_freedom = _freedom(judged_problem, solution) / float(judged.sum())
+    contributions = solution.residuals * solution.weighted_residuals
+    outputs, freedoms = [], []
+    for position, name in enumerate(observations.outputs):
+        mask = judged & (observations.output_index == position)
+        if not mask.any():
+            continue
+        freedom = share_of_freedom * float(mask.sum())
+        reduced = float(contributions[mask].sum()) / freedom
+        frames = sum(int(np.isfinite(h.outputs[name]).sum()) for h in histories if name in h.outputs)
+        stated = bool(observations.stated[position])
+        noise_freedom = np.inf if stated else FREEDOM_PER_FRAME * frames
+        p_value = _probability(reduced, freedom, noise_freedom)
+        noise = max(float(observations.noise[position]), SMALLEST_NOISE * observations.transforms[position].floor)
+        discrepancy = noise * float(np.sqrt(max(reduced - 1.0, 0.0))) if p_value < SIGNIFICANCE else 0.0
+        outputs.append(
+            OutputAdequacy(
+                name, int(mask.sum()), noise, "stated" if stated else "estimated", reduced, p_value, discrepancy
+            )
+        )
+        freedoms.append(noise_freedom)
+    freedom = share_of_freedom * float(judged.sum())
+    reduced = float(contributions[judged].sum()) / freedom
+    pooled = _probability(reduced, freedom, float(np.min(freedoms)))
+    p_values = [pooled, *(o.p_value for o in outputs)] if len(outputs) > 1 else [pooled]
+    p_value = min(1.0, len(p_values) * min(p_values))
+    return Adequacy(
+        "explains" if p_value >= SIGNIFICANCE else "leaves a discrepancy",
+        tuple(outputs),
+        reduced,
+        freedom,
+        p_value,
+        _correlation(noise_model),
+        _largest_deviation(observations, judged, linear.residuals, histories),
+    )
+
+
+def _judged_observations(observations: ObservationVector) -> Bools:
+    """(tests, observations) which are data of outputs whose noise is known."""
+    known = np.array(
+        [
+            name != RUPTURE_OUTPUT and (bool(stated) or noise > 0)
+            for name, stated, noise in zip(observations.outputs, observations.stated, observations.noise, strict=True)
+        ]
+    )
+    return np.asarray(observations.present & known[observations.output_index])
+
+
+def _of_judged(residuals: Residuals, observations: ObservationVector, judged: Bools) -> Residuals:
+    """The residuals of observations that are judged, tests of equal weight; the others are not there."""
+    assert residuals.jacobian is not None
+    mask = judged & residuals.present
+    return replace(
+        residuals,
+        values=np.where(mask, residuals.values, 0.0),
+        jacobian=np.where(mask[..., None], residuals.jacobian, 0.0),
+        offset_sensitivity=np.where(mask, residuals.offset_sensitivity, 0.0),
+        log_rate_sensitivity=np.where(mask, residuals.log_rate_sensitivity, 0.0),
+        present=mask,
+        test_weights=np.ones(len(mask)),
+        relative_noise=observations.relative_noise,
+    )
+
+
+def _independent_noise(
+    observations: ObservationVector, noise_model: NoiseModel, predictor_errors: Mapping[str, float]
+) -> NoiseModel:
+    """Stated or independently estimated noise, the error of the predictor, and offsets and scatter between tests."""
+    outputs = {}
+    for position, (name, transform) in enumerate(zip(observations.outputs, observations.transforms, strict=True)):
+        noise = max(float(observations.noise[position]), SMALLEST_NOISE * transform.floor)
+        scale = getattr(transform, "scale", None)
+        drift = predictor_errors.get(name, 0.0) / scale if scale else 0.0
+        outputs[name] = OutputNoise(noise, offset=noise_model[name].offset, drift=drift, correlation_length=1.0)
+    return NoiseModel(outputs, noise_model.rate)
+
+
+def _within_bounds(linear: LinearisedProblem, inverses: Floats) -> LinearSolution:
+    """The optimum of the linear problem; the point itself where the step would leave the bounds or gain nothing."""
+    solution = linear.solve(inverses)
+    low, high = linear.step_bounds[:, linear.free]
+    inside = bool(((solution.step >= low) & (solution.step <= high)).all())
+    weighted = (inverses @ linear.residuals.values[..., None])[..., 0]
+    at_point = float((linear.residuals.values * weighted).sum())
+    if inside and float((solution.residuals * solution.weighted_residuals).sum()) < at_point:
+        return solution
+    return replace(solution, residuals=linear.residuals.values, weighted_residuals=weighted)
+
+
+def _freedom(linear: LinearisedProblem, solution: LinearSolution) -> float:
+    """Observations less the unknowns that they determine: n - p + tr(M P), with M the covariance and P the priors."""
+    prior = linear.precision[linear.free]
+    determined = prior.size - float((np.diag(solution.covariance) * prior).sum())
+    return max(float(linear.residuals.present.sum()) - determined, 1.0)
+
+
+def _probability(reduced: float, freedom: float, noise_freedom: float) -> float:
+    """Of a larger reduced chi-square by chance, where the noise is known to `noise_freedom` degrees of freedom."""
+    if np.isinf(noise_freedom):
+        return float(chi2.sf(reduced * freedom, freedom))
+    return float(f.sf(reduced, freedom, max(noise_freedom, 1.0)))
+
+
+def _correlation(noise_model: NoiseModel) -> float:
+    from creepkit.inverse.noise_model import NEGLIGIBLE_DISCREPANCY
+    from creepkit.inverse.observation_vector import LINEAR_COORDINATE_LENGTH, LOGARITHMIC_OUTPUTS
+
+    if not noise_model.discrepancy > NEGLIGIBLE_DISCREPANCY:
+        return float("nan")
+    decades = any(name in LOGARITHMIC_OUTPUTS for name in noise_model.outputs)
+    return noise_model.discrepancy_length / (1.0 if decades else LINEAR_COORDINATE_LENGTH)
+
+
+def _largest_deviation(
+    observations: ObservationVector, judged: Bools, residuals: Residuals, histories: Sequence[History]
+) -> LargestDeviation | None:
+    """The mean deviation of a few neighbouring frames that is largest over its noise."""
+    sensitivity = np.maximum(np.abs(residuals.offset_sensitivity), 1e-300)
+    deviation = residuals.values / sensitivity
+    noise = np.maximum(observations.per_observation(observations.noise) * observations.relative_noise, 1e-300)
+    best: LargestDeviation | None = None
+    for test, history in enumerate(histories):
+        for position, name in enumerate(observations.outputs):
+            index = np.flatnonzero(judged[test] & (observations.output_index[test] == position))
+            if not index.size:
+                continue
+            width = min(LOCAL_FRAMES, index.size)
+            weights = np.full(width, 1.0 / width)
+            means = np.convolve(deviation[test, index], weights, mode="valid")
+            noises = np.abs(np.convolve(deviation[test, index] / noise[test, index], weights, mode="valid"))
+            k = int(np.argmax(noises))
+            time = float(observations.times[test, index[k + width // 2]])
+            if best is None or noises[k] > best.noises:
+                best = LargestDeviation(history.name, name, time, float(means[k]), float(noises[k]))
+    return best

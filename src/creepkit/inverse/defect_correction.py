@@ -1,0 +1,140 @@
+"""Defect correction: the error of a predictor, found by one run of a more exact one and added to its predictions.
+
+With y(x) the predictor and z(x) a more exact one (the same specimen on a finer mesh in smaller steps, or the specimen
+that a surrogate stands for), z(x) is nearly y(x) + [z(x0) - y(x0)] in the neighbourhood of x0: the defect changes
+slowly with the values, so that it is worth one run, and the last steps of an estimate then are those of the more exact
+predictor. What is left of the defect is taken as a tenth of it, correlated as the curve is (measured for the bulge
+test: 0.5 um of the amplitude before, 0.03 um after; tests/benchmarks/dimple_accuracy.py measures the same error).
+
+Source: K. Bohmer, P. Hemker and H. Stetter, The defect correction approach, Computing Supplementum 5 (1984) 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from creepkit.arrays import Bools, Floats
+from creepkit.inverse.composite_predictor import predict, refined_of
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.variance_components import scaled_inverse
+from creepkit.records import History, Prediction, Predictor, Status, output_unit
+
+REMAINING_DEFECT = 0.1
+"""Of a defect, standard deviation of what is left of it."""
+
+
+@dataclass(frozen=True)
+class NumericalError:
+    """What the predictor of an identification was found to be wrong by at the optimum, and that it was corrected.
+
+    predictor, refined : names of the predictor and of the more exact one.
+    size : {output: rms of the difference}, in the output's unit. noises : the largest of them, in noises.
+    shift : by how much the values would differ without the correction: the largest change of an unknown, in its
+        posterior standard deviations, to first order.
+    incomplete : tests that the more exact predictor does not follow to their end; they are not corrected.
+    """
+
+    predictor: str
+    refined: str
+    size: Mapping[str, float]
+    noises: float
+    shift: float
+    incomplete: tuple[str, ...] = ()
+
+    @property
+    def remaining(self) -> dict[str, float]:
+        """{output: standard deviation} of what is left of the error, in the output's unit."""
+        return {name: REMAINING_DEFECT * size for name, size in self.size.items()}
+
+    @property
+    def sentence(self) -> str:
+        """For people: what differed, by how much, and what it would have done to the values."""
+        sizes = ", ".join(f"{size:.2g} {output_unit(name)}".strip() + f" in {name}" for name, size in self.size.items())
+        return (
+            f"at the optimum {self.predictor} differs from {self.refined} by {sizes} (rms; at most {self.noises:.2g} "
+            f"noises); this is corrected, and would have moved values by up to {self.shift:.2g} of their standard "
+            "deviations"
+        )
+
+
+def correct_defect(problem: LeastSquaresProblem, x: Floats) -> tuple[LeastSquaresProblem, NumericalError | None]:
+    """The problem with its predictor corrected at x (unknowns,) by the more exact one, if it has one."""
+    refined = refined_of(problem.predictor)
+    if refined is None or problem.observations.followed_to_rupture.any():
+        return problem, None
+    observations, count = problem.observations, problem.parameter_count
+    prediction = predict(
+        refined,
+        problem.law,
+        problem.coordinates.theta(x[:count])[None],
+        problem.histories,
+        nuisances=problem.nuisance_parameters.predictor_values(x[count:]),
+    )
+    coarse = _predicted(problem, x)
+    exact = observations.select_outputs(prediction.values, prediction)[0]
+    complete = np.isin(prediction.status[0], (Status.COMPLETE, Status.OUTSIDE_DOMAIN))
+    known = observations.present & complete[:, None] & np.isfinite(exact) & np.isfinite(coarse)
+    correction = np.where(known, exact - coarse, 0.0)
+    incomplete = tuple(h.name for h, whole in zip(problem.histories, complete, strict=True) if not whole)
+    error = _numerical_error(problem, x, refined, correction, known)
+    return problem.with_correction(correction), NumericalError(**error, incomplete=incomplete)  # type: ignore[arg-type]
+
+
+def with_correction_at_frames(
+    problem: LeastSquaresProblem, histories: Sequence[History], prediction: Prediction
+) -> Prediction:
+    """A prediction of one candidate at all frames of histories, with the problem's correction interpolated in time."""
+    if problem.correction is None:
+        return prediction
+    values = np.array(prediction.values)
+    for test, history in enumerate(histories):
+        for position, name in enumerate(problem.observations.outputs):
+            index = np.flatnonzero(
+                problem.observations.present[test] & (problem.observations.output_index[test] == position)
+            )
+            if index.size and name in prediction.outputs:
+                times = problem.observations.times[test, index]
+                correction = np.interp(history.times, times, problem.correction[test, index])
+                values[0, test, : history.times.size, prediction.outputs.index(name)] += correction
+    return replace(prediction, values=values)
+
+
+def _predicted(problem: LeastSquaresProblem, x: Floats) -> Floats:
+    """(tests, observations) what the predictor itself says at x (unknowns,), in the output's unit."""
+    observations = problem.observations
+    corrected = observations.inverse(problem.residuals(x).values + observations.transformed_values)
+    return corrected if problem.correction is None else corrected - problem.correction
+
+
+def _numerical_error(
+    problem: LeastSquaresProblem, x: Floats, refined: Predictor, correction: Floats, known: Bools
+) -> dict[str, object]:
+    observations = problem.observations
+    sizes, noises = {}, 0.0
+    for position, name in enumerate(observations.outputs):
+        mask = known & (observations.output_index == position)
+        if not mask.any():
+            continue
+        sizes[name] = float(np.sqrt(np.mean(correction[mask] ** 2)))
+        noise = float(observations.noise[position])
+        noises = max(noises, sizes[name] / noise) if noise > 0 else noises
+    jacobian = problem.jacobian(x)
+    covariance = scaled_inverse(jacobian.T @ jacobian + np.diag(12.0 / problem.bounds.width**2))
+    defect = problem.whiten(problem.residuals(x).offset_sensitivity * correction)
+    shift = covariance @ (jacobian[: defect.size].T @ defect)
+    return {
+        "predictor": _name(problem.predictor),
+        "refined": f"{_name(refined)} on a finer mesh"
+        if _name(refined) == _name(problem.predictor)
+        else _name(refined),
+        "size": sizes,
+        "noises": noises,
+        "shift": float(np.abs(shift / np.sqrt(np.diag(covariance))).max()),
+    }
+
+
+def _name(predictor: Predictor) -> str:
+    return str(getattr(predictor, "name", type(predictor).__name__))
