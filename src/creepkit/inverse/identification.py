@@ -23,6 +23,7 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate, delta_method, interval_quantile
+from creepkit.inverse.unmodelled_effects import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import SIMULATED_NUISANCES, History, Nuisance, Prediction, Predictor
@@ -52,7 +53,7 @@ class Identification(Presentable):
     errors : {output: OutputErrors} over all used frames of all tests, whatever was minimised.
     nuisances : estimates of explicit nuisances.
     adequacy : whether the law explains the tests to their noise. numerical_error : of the predictor at the optimum,
-        which was corrected; None where there is no more exact one.
+        which was corrected; None where there is no more exact one. unmodelled : effects that intervals do not include.
     ranges : {"stress", "temperature", "strain", "time": (low, high)} of the fitted frames; MPa, K, -, s.
     log_likelihood : of the fitted frames as if they were independent (working noise), with explicit nuisances
         integrated out; of identifications by likelihood the restricted one, but for a constant of the law.
@@ -81,6 +82,7 @@ class Identification(Presentable):
     nuisances: tuple[NuisanceEstimate, ...] = ()
     adequacy: Adequacy | None = None
     numerical_error: NumericalError | None = None
+    unmodelled: tuple[UnmodelledEffect, ...] = ()
     converged: bool = True
     notes: tuple[str, ...] = ()
     histories: tuple[History, ...] = ()

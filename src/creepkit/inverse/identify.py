@@ -49,6 +49,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     parameter_estimates,
     restricted_covariance,
 )
+from creepkit.inverse.unmodelled_effects import unmodelled_effects
 from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_rupture_weight
 from creepkit.language import CreepLaw
@@ -280,6 +281,7 @@ def _result(
         converged=best.minimum.converged,
         adequacy=adequacy,
         numerical_error=numerical_error,
+        unmodelled=unmodelled_effects(problem, x, linear, noise_model, histories),
         notes=(
             *identification_notes(best, tests, nuisance_estimates),
             *domain_notes(prediction, histories),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -182,6 +182,11 @@ class Surrogate(Presentable, ABC):
         if isinstance(self.specimen, SupportsReducedOrderModel):
             return self.specimen.reduced_order_model()
         return self
+
+    @property
+    def tolerances(self) -> Mapping[str, float]:
+        """Relative standard deviations of lengths that nobody measured better: those of the specimen."""
+        return getattr(self.specimen, "tolerances", {})
 
     def refined(self) -> Predictor:
         """What it stands for: the specimen itself, on the finer discretisation where it has one."""

@@ -1,4 +1,9 @@
-"""Ranking of identified laws with weights: a set of laws, "decisive" only above 0.95.
+"""Ranking of identified laws with weights: a set of laws, and a verdict no stronger than the evidence.
+
+Weights are of the laws tried. An answer is decisive where one of them has more than 95 % of the weight, explains the
+tests to their noise (see inverse.adequacy), was among the laws asked for, and stands every challenge: no sum with a
+share of another law explains the tests as well, and no unmodelled effect would change the answer (see
+selection.challenges).
 
 Identifications by likelihood are compared under a common covariance (see selection.discrimination): chi-square + K ln n
 (BIC), or + 2K + 2K(K+1)/(n-K-1) (AICc), with n the independent frames and nuisance parameters integrated out. For
@@ -9,7 +14,7 @@ a theorem. Weights are exp(-excess / 2) over their sum.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -29,6 +34,8 @@ from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
+    from creepkit.inverse.adequacy import Adequacy
+    from creepkit.inverse.selection.challenges import Challenge
     from creepkit.inverse.selection.discrimination import EquivalentLaws
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 
@@ -56,12 +63,16 @@ class Ranking(Presentable):
     """Identified laws, best first.
 
     criterion : by which; independent_frames : their number; failed : {law: why it could not be identified}.
+    further : names of laws that were tried because none of those asked for explains the tests.
+    challenges : what the tests allow beside the best law; None where that was not examined, as for laws from files.
     """
 
     laws: tuple[RankedLaw, ...]
     criterion: Criterion = "bic"
     independent_frames: float = float("nan")
     failed: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    further: tuple[str, ...] = ()
+    challenges: tuple[Challenge, ...] | None = None
 
     @property
     def best(self) -> Identification:
@@ -70,8 +81,24 @@ class Ranking(Presentable):
 
     @property
     def decisive(self) -> bool:
-        """Whether one law has more than 95 % of the weight."""
-        return self.laws[0].weight > DECISIVE_WEIGHT
+        """Whether one law of several asked for explains the tests, has 95 % of the weight, and stands every challenge."""
+        return (
+            len(self.laws) > 1
+            and self.singled_out
+            and self.best.law.name not in self.further
+            and self.challenges is not None
+            and not self.challenges
+        )
+
+    @property
+    def singled_out(self) -> bool:
+        """Whether one of the laws tried explains the tests and has more than 95 % of the weight."""
+        return self.laws[0].weight > DECISIVE_WEIGHT and self.adequacy is not None and self.adequacy.explains
+
+    @property
+    def adequacy(self) -> Adequacy | None:
+        """Whether the best law explains the tests to their noise."""
+        return self.best.adequacy
 
     @property
     def credible(self) -> tuple[RankedLaw, ...]:
@@ -81,10 +108,7 @@ class Ranking(Presentable):
     @property
     def verdict(self) -> str:
         """One sentence: which law, or which laws these tests cannot tell apart."""
-        names = [r.fit.law.name for r in self.credible]
-        if self.decisive:
-            return f"decisive: {names[0]}" if len(self.laws) > 1 else f"only {names[0]} was fitted"
-        return f"not decisive: these tests cannot tell apart {' and '.join(names)}"
+        return verdict_of(self)
 
     @property
     def model_average(self) -> ModelAverage:
@@ -104,10 +128,52 @@ class Ranking(Presentable):
         return present(self, "further_tests")
 
 
+def verdict_of(ranking: Ranking) -> str:
+    """One sentence: what is known of the law, of how many tried, and what keeps it from being decisive."""
+    names, count, adequacy = [r.fit.law.name for r in ranking.credible], len(ranking.laws), ranking.adequacy
+    best = ranking.best.law.name
+    adequacy_text = f"it {adequacy}" if adequacy is not None else "whether it explains the tests is not known"
+    if count == 1:
+        return f"only {best} was fitted; {adequacy_text}"
+    if ranking.decisive:
+        return f"decisive: {best}, of {count} laws tried; {adequacy_text}"
+    return f"not decisive: {_reason(ranking, names, adequacy_text)}"
+
+
+def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
+    """Why a ranking of several laws is not decisive."""
+    best, count, adequacy = ranking.best.law.name, len(ranking.laws), ranking.adequacy
+    weight = f"weight {ranking.laws[0].weight:.2f} of the laws tried"
+    if adequacy is not None and adequacy.verdict == "leaves a discrepancy":
+        others = "" if len(names) == 1 else f", not told apart from {' and '.join(names[1:])}"
+        return f"none of {count} laws tried explains the tests; the best, {best} ({weight}{others}), {adequacy}"
+    if best in ranking.further:
+        asked, more = count - len(ranking.further), len(ranking.further)
+        found = f"of {more} more that were tried, {best} does ({weight})"
+        return f"none of the {asked} laws asked for explains the tests; {found}: plan tests that can refute it"
+    if len(names) > 1:
+        return f"of {count} laws tried these tests cannot tell apart {' and '.join(names)}; the best: {adequacy_text}"
+    if ranking.challenges is None:
+        unexamined = "what else the tests allow was not examined"
+        return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}; {unexamined}"
+    if ranking.challenges:
+        but = "; and ".join(challenge.sentence for challenge in ranking.challenges)
+        return f"of {count} laws tried only {best} explains the tests ({weight}), but {but}"
+    return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}"
+
+
 def rank(
-    fits: Sequence[Identification], criterion: Criterion = "bic", failed: Mapping[str, str] | None = None
+    fits: Sequence[Identification],
+    criterion: Criterion = "bic",
+    failed: Mapping[str, str] | None = None,
+    *,
+    challenge: bool = True,
 ) -> Ranking:
-    """Rank identifications made from the same histories; criterion : "bic" or "aicc"."""
+    """Rank identifications made from the same histories; criterion : "bic" or "aicc".
+
+    challenge : whether a law that is singled out is challenged (some runs of the predictor), without which no answer
+        is decisive.
+    """
     if not fits:
         raise FitError("there are no identifications to rank")
     if criterion not in ("bic", "aicc"):
@@ -127,9 +193,20 @@ def rank(
         score = np.array([_effective_deviance(fit, independent_frames) for fit in fits])
     penalty = bic_penalty if criterion == "bic" else aicc_penalty
     score = score + [penalty(determined_parameter_count(fit), independent_frames) for fit in fits]
-    return ranking_from_scores(
+    ranking = ranking_from_scores(
         fits, score, criterion, independent_frames=independent_frames, chi_square=chi_square, failed=failed
     )
+    return challenged(ranking) if challenge else ranking
+
+
+def challenged(ranking: Ranking) -> Ranking:
+    """The ranking with its best law challenged, where that is singled out and its tests and predictor are at hand."""
+    from creepkit.inverse.selection.challenges import challenges_of
+
+    fits = [ranked.fit for ranked in ranking.laws]
+    if len(fits) < 2 or not ranking.singled_out or any(f.predictor is None or not f.histories for f in fits):
+        return ranking
+    return replace(ranking, challenges=challenges_of(fits))
 
 
 def ranking_from_scores(

@@ -18,7 +18,7 @@ from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import StartingEstimate, identify
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.discrimination import under_common_covariance
-from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, rank, ranking_from_scores
+from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, challenged, rank, ranking_from_scores
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
 from creepkit.records import History, Predictor
@@ -71,8 +71,8 @@ RULED_OUT_EXCESS = 40.0
 of a surrogate, some noise in chi-square, do not make up for."""
 
 
-DRIFT_LIMIT = 2.0
-"""Drift of the first output under the best single law, in units of its noise, above which sums are tried."""
+FURTHER_LAWS = 8
+"""Laws that are tried, unless another number is asked for, where none of the candidates explains the tests."""
 
 
 def select(
@@ -82,13 +82,16 @@ def select(
     *,
     settings: IdentificationSettings | None = None,
     through: Predictor | None = None,
-    sums: bool | None = False,
+    sums: bool | None = None,
     by: Criterion = "bic",
+    further: Sequence[CreepLaw] = (),
     progress: IterationCallback | None = None,
 ) -> Ranking:
     """Identify every candidate from the same histories by likelihood, and rank them.
 
-    sums : also sums of two candidates: True, False, or None where the best single law leaves more than noise.
+    sums : also sums of two candidates: True, False, or None for sums of the best law where it does not explain the
+        tests to their noise.
+    further : laws that are tried then, after the sums, up to FURTHER_LAWS of both together.
     by : "bic", "aicc", or "hold-out" (the last 30 % of each history predicted from a refit to the first 70 %).
     A law that cannot be identified is named in `failed`; FitError if none can.
     """
@@ -99,17 +102,34 @@ def select(
         raise FitError("there are no candidate laws; give at least one, such as ck.law('norton')")
     failed: dict[str, str] = {}
     fits = _identify_all(list(candidates), histories, using, settings, through, progress, failed)
-    if fits and (sums or (sums is None and _has_systematic_residuals(rank(fits).best))):
+    tried_further: tuple[str, ...] = ()
+    if fits and sums:
         pairs = sums_of_two([fit.law for fit in fits])
         fits += _identify_all(pairs, histories, using, settings, through, progress, failed)
+    elif fits and sums is None:
+        richer = _richer_laws(rank(fits, challenge=False), further)
+        fits += _identify_all(richer, histories, using, settings, through, progress, failed)
+        tried_further = tuple(law.name for law in richer if law.name not in failed)
     if not fits:
         name, reason = next(iter(failed.items()))
         raise FitError(f"none of the {len(failed)} laws could be identified; {name}: {reason}")
     if by == "hold-out":
         noise_model = fits[under_common_covariance(fits).reference_law].noise_model
         scores = [cross_validate(fit, by="time").predictive_deviance(noise_model) for fit in fits]
-        return ranking_from_scores(fits, np.array(scores), by, independent_frames=float("nan"), failed=failed)
-    return rank(fits, by, failed)
+        ranking = ranking_from_scores(fits, np.array(scores), by, independent_frames=float("nan"), failed=failed)
+        return replace(challenged(ranking), further=tried_further)
+    return replace(rank(fits, by, failed), further=tried_further)
+
+
+def _richer_laws(ranking: Ranking, further: Sequence[CreepLaw]) -> list[CreepLaw]:
+    """What is tried where no candidate explains the tests: sums of the best one with the others, then further laws."""
+    if ranking.adequacy is None or ranking.adequacy.verdict != "leaves a discrepancy":
+        return []
+    laws = [ranked.fit.law for ranked in ranking.laws]
+    sums = [laws[0] + other for other in laws[1:]] if laws[0].terms else []
+    tried = {law.fingerprint for law in laws}
+    others = [law for law in _distinct_laws([*sums, *further]) if law.fingerprint not in tried]
+    return others[:FURTHER_LAWS]
 
 
 def _identify_all(
@@ -133,7 +153,7 @@ def _identify_all(
             progress("law", k + 1, len(laws))
     if through is None or not fits:
         return fits
-    competitive = {id(r.fit) for r in rank(fits).laws if r.excess < RULED_OUT_EXCESS}
+    competitive = {id(r.fit) for r in rank(fits, challenge=False).laws if r.excess < RULED_OUT_EXCESS}
     refined = {
         id(fit): _try_to_identify(fit.law, histories, using, settings, failed, fit)
         for fit in fits
@@ -162,14 +182,3 @@ def _try_to_identify(
 def _ruled_out(fit: Identification) -> Identification:
     note = f"ruled out with the {fit.provenance['specimen']}, and not refined any further"
     return replace(fit, notes=(*fit.notes, note))
-
-
-def _has_systematic_residuals(fit: Identification) -> bool:
-    """Whether the residuals of the first output drift by more than the noise."""
-    assert fit.linearised is not None
-    name = next(iter(fit.noise_model.outputs))
-    components, residuals = fit.noise_model[name], fit.linearised.residuals
-    transform_derivative = float(
-        np.median(np.abs(residuals.offset_sensitivity[residuals.present & (residuals.output_index == 0)]))
-    )
-    return components.drift > DRIFT_LIMIT * components.noise * transform_derivative

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -53,6 +55,9 @@ class BulgeSettings:
 
     nuisances: ClassVar[tuple[str, ...]] = ("thickness", "modulus", "temperature", "window")
     """Kinds of explicit nuisances that predict() understands."""
+
+    tolerances: ClassVar[Mapping[str, float]] = MappingProxyType({"thickness": 0.02})
+    """Relative standard deviation of a length that nobody measured better: a thickness is measured to some 0.01 mm."""
 
     def __post_init__(self) -> None:
         for name, (low, high) in _RANGES.items():

@@ -1,0 +1,195 @@
+"""Challenges of a verdict: what the tests allow beside the law that has nearly all the weight of those tried.
+
+A weight is relative to the laws tried, and an information criterion prefers the simplest of equals. Two questions are
+therefore asked before an answer is called decisive:
+
+1. May a share of the rate come from another law? The best law and each other law tried are added, the second carrying
+   SHARE of the rate at the reference point, and the sum is fitted: where its chi-square is not larger by more than
+   3.84 (95 %, one degree of freedom), the tests do not exclude it.
+2. Does the answer rest on something nobody measured? The laws are ranked again with each unmodelled effect (see
+   inverse.unmodelled_effects) as a random effect of every test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.stats import chi2
+
+from creepkit.arrays import Floats
+from creepkit.errors import CreepkitError
+from creepkit.inverse.composite_predictor import reduced_order_model_of
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.information_criteria import DECISIVE_WEIGHT, bic_penalty, criterion_weights
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.search.local_refinement import Tolerances
+from creepkit.inverse.selection.discrimination import under_common_covariance
+from creepkit.inverse.unmodelled_effects import UnmodelledEffect, with_random_effects
+from creepkit.language import CreepLaw
+from creepkit.records import Predictor
+
+SHARE = 0.3
+"""Of the rate at the reference point, that must be excluded of other laws."""
+
+
+NOT_EXCLUDED = float(chi2.ppf(0.95, 1))
+"""Increase of chi-square up to which a sum is not excluded."""
+
+
+SHARE_TOLERANCE = 1e-3
+"""Of ln of the ratio of rates, within which a sum keeps its share."""
+
+
+APPROXIMATE_STEPS = Tolerances(max_steps=15, tolerance=1e-3)
+"""Of the reduced-order model, from which the last steps begin."""
+
+
+LAST_STEPS = Tolerances(max_steps=8, tolerance=1e-4)
+
+
+@dataclass(frozen=True)
+class Challenge:
+    """Something that the tests allow, so that the law of most weight is not proved.
+
+    kind : "sum" of the best law with another, or an "unmodelled effect". subject : the name of the sum, or the effect.
+    sentence : for people, to follow "but".
+    """
+
+    kind: Literal["sum", "unmodelled effect"]
+    subject: str
+    sentence: str
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+def challenges_of(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
+    """The challenges of the first of some identifications, best first; the first sum that is found ends the search."""
+    best, *others = fits
+    sums = (compatible_sum(best, other) for other in others)
+    first_sum = next((challenge for challenge in sums if challenge is not None), None)
+    return (*([first_sum] if first_sum is not None else []), *decisive_effects(fits))
+
+
+# ---- shares of other laws --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ShareResidual:
+    """One residual that holds the ratio of two rates at the reference point; see search.AdditionalResiduals.
+
+    first, second : positions of the ln rates among the unknowns. log_ratio : of the second over the first.
+    """
+
+    first: int
+    second: int
+    log_ratio: float
+
+    def residuals(self, x: Floats) -> Floats:
+        """(1,) - at x (unknowns,)."""
+        return np.array([(x[self.second] - x[self.first] - self.log_ratio) / SHARE_TOLERANCE])
+
+    def jacobian(self, x: Floats) -> Floats:
+        """(1, unknowns) derivatives."""
+        row = np.zeros((1, x.size))
+        row[0, [self.first, self.second]] = -1.0 / SHARE_TOLERANCE, 1.0 / SHARE_TOLERANCE
+        return row
+
+
+def compatible_sum(best: Identification, other: Identification) -> Challenge | None:
+    """The sum of the best law and another one that carries SHARE of the rate, if the tests do not exclude it."""
+    single = best.least_squares_problem
+    if not (single.coordinates.term_rates and other.least_squares_problem.coordinates.term_rates):
+        return None
+    try:
+        total = best.law + other.law
+        excess = _chi_square_of_sum(best, other, total) - _chi_square(single, best.x)
+    except CreepkitError:  # a sum that cannot be predicted is none that the tests allow
+        return None
+    if excess > NOT_EXCLUDED:
+        return None
+    sentence = (
+        f"{total.name} with {100 * SHARE:.0f} % of the rate from {other.law.name} explains them as well (chi-square "
+        f"{excess:+.1f})"
+    )
+    return Challenge("sum", total.name, sentence)
+
+
+def _chi_square_of_sum(best: Identification, other: Identification, law: CreepLaw) -> float:
+    """The least chi-square of the sum at its share: first by the reduced-order model, then by the predictor itself."""
+    single = best.least_squares_problem
+    problem = LeastSquaresProblem.from_histories(
+        law, best.histories, single.predictor, best.settings, single.coordinates.reference
+    )
+    problem = replace(problem, covariance_factor=single.covariance_factor, histories=single.histories)
+    problem = problem.with_nuisances(single.nuisance_parameters).with_correction(single.correction)
+    own_terms = len(single.coordinates.term_rates)
+    own_rates, further_rates = (list(part) for part in np.split(problem.coordinates.term_rates, [own_terms]))
+    x = np.concatenate([best.u, other.u, best.x[best.u.size :]])
+    x[own_rates] += np.log(1.0 - SHARE)
+    x[further_rates] += np.log(SHARE)
+    share = ShareResidual(own_rates[0], further_rates[0], float(x[further_rates[0]] - x[own_rates[0]]))
+    reduced = reduced_order_model_of(single.predictor)
+    if reduced is not None:
+        cheap = problem.with_predictor(reduced)
+        cheap = cheap.with_correction(_difference(single, best.x, reduced))
+        x = cheap.minimise(x, additional=share, tolerances=APPROXIMATE_STEPS).x
+    x = problem.minimise(x, additional=share, tolerances=LAST_STEPS).x
+    return _chi_square(problem, x)
+
+
+def _difference(problem: LeastSquaresProblem, x: Floats, predictor: Predictor) -> Floats:
+    """(tests, observations) what the problem predicts less what a cheaper predictor does, in the output's unit."""
+    observations = problem.observations
+    cheap = problem.with_predictor(predictor)
+    own, cheaper = (
+        observations.inverse(p.residuals(x).values + observations.transformed_values) for p in (problem, cheap)
+    )
+    return np.asarray(own - cheaper)
+
+
+def _chi_square(problem: LeastSquaresProblem, x: Floats) -> float:
+    """Of the data and of the priors of nuisance parameters, without the penalties of bounds."""
+    whitened = problem.whiten(problem.residuals(x).values)
+    nuisances = problem.nuisance_parameters
+    deviation = (x[problem.parameter_count :] - nuisances.mean[: nuisances.size]) ** 2 * nuisances.precision
+    return float((whitened**2).sum() + deviation.sum())
+
+
+# ---- unmodelled effects ----------------------------------------------------------------------------------------------
+
+
+def decisive_effects(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
+    """The unmodelled effects, one by one, with which the first law no longer has nearly all the weight."""
+    kinds = dict.fromkeys(effect.kind for fit in fits for effect in fit.unmodelled)
+    challenges = []
+    for kind in kinds:
+        effects = [next((e for e in fit.unmodelled if e.kind == kind), None) for fit in fits]
+        if any(effect is None or not effect.residual_change.size for effect in effects):
+            continue
+        weights = _weights_with(fits, [e for e in effects if e is not None])
+        if weights[0] > DECISIVE_WEIGHT:
+            continue
+        example = next(e for e in effects if e is not None)
+        rival = fits[int(np.argmax(np.where(np.arange(len(fits)) == 0, -1.0, weights)))].law.name
+        sentence = (
+            f"{example.description}, which was not modelled, would leave it a weight of {weights[0]:.2f} "
+            f"({rival}: {max(w for k, w in enumerate(weights) if k):.2f})"
+        )
+        challenges.append(Challenge("unmodelled effect", kind, sentence))
+    return tuple(challenges)
+
+
+def _weights_with(fits: Sequence[Identification], effects: Sequence[UnmodelledEffect]) -> Floats:
+    """(laws,) weights by BIC with an effect as a random effect of every test."""
+    disturbed = [
+        replace(fit, linearised=with_random_effects(fit.linearised, [effect]))
+        for fit, effect in zip(fits, effects, strict=True)
+        if fit.linearised is not None
+    ]
+    common = under_common_covariance(disturbed)
+    penalties = [bic_penalty(len(fit.u), common.independent_frames) for fit in fits]
+    return criterion_weights(common.chi_square + common.log_determinant + penalties)[1]

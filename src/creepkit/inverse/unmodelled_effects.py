@@ -1,0 +1,197 @@
+"""Unmodelled effects: what the intervals of an identification do not include, and what it would change.
+
+A dimple may be thicker than its drawing, a camera may have moved, a furnace may drift. Where no nuisance parameter
+stands for it, an interval takes it as exactly known. Its effect on the residuals, s (one standard deviation of the
+usual size), moves the values by
+
+    du = -(J'C^-1 J + P)^-1 J'C^-1 s
+
+to first order, and with it the rate. The same effects, as random effects in the covariance, show whether the choice of
+a law rests on their absence (see selection.challenges).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.inverse.composite_predictor import predict_with_sensitivities, predictor_for, supports_nuisance
+from creepkit.inverse.noise_model import NoiseModel
+from creepkit.inverse.nuisance_parameters import prior_mean
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.uncertainty.quantities import gradient, log_rate
+from creepkit.inverse.variance_components import LinearisedProblem, inverse_covariances
+from creepkit.language import temperature
+from creepkit.records import History, Nuisance, Program, output_unit
+
+OFFSET_IN_NOISES = 3.0
+"""Size of an offset that nobody models, in noises of a frame."""
+
+
+USUAL_DRIFT = 5.0
+"""K over a test: what furnaces drift where nobody looks."""
+
+
+USUAL_ACTIVATION_ENERGY = 400e3
+"""J/mol, of the rate of a law that knows no temperature: of nickel alloys and austenitic steels, within 30 %."""
+
+
+GAS_CONSTANT = 8.314462618
+"""J/(mol K)."""
+
+
+CHECKED_DIMENSIONS = ("thickness",)
+"""Nuisance parameters that are checked where the predictor states a tolerance of theirs."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnmodelledEffect:
+    """An effect for which an identification has no nuisance parameter.
+
+    kind : of the nuisance parameter that would stand for it. size : of one standard deviation, and its unit.
+    rate_change : of ln of the rate at the reference point, by one standard deviation in each test.
+    residual_change : (tests, observations) -, of the residuals, by one standard deviation; not saved.
+    """
+
+    kind: str
+    size: float
+    unit: str
+    rate_change: float
+    residual_change: Floats = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+
+    @property
+    def description(self) -> str:
+        """What, and of which size."""
+        return f"a {self.kind} of {self.size:.2g} {self.unit}".strip()
+
+
+def unmodelled_effects(
+    problem: LeastSquaresProblem,
+    x: Floats,
+    linear: LinearisedProblem,
+    noise_model: NoiseModel,
+    full_histories: Sequence[History],
+) -> tuple[UnmodelledEffect, ...]:
+    """The effects that no nuisance parameter of the problem stands for; x : (unknowns,) its optimum."""
+    kinds = {n.kind for n in problem.settings.nuisances}
+    changes: list[tuple[str, float, str, Floats]] = []
+    for kind in (k for k in CHECKED_DIMENSIONS if k not in kinds):
+        changes += _dimension(problem, x, linear, kind)
+    if "offset" not in kinds:
+        changes += _offset(problem, linear)
+    drifting_kinds = {"temperature drift", "rate drift"}
+    if not kinds & drifting_kinds and not any(isinstance(h.temperature, Program) for h in full_histories):
+        changes += _drift(problem, x, linear)
+    if not changes:
+        return ()
+    inverses, _ = inverse_covariances(linear.residuals, noise_model)
+    solution = linear.solve(inverses)
+    coordinates, count = problem.coordinates, problem.parameter_count
+    scale = np.sqrt(np.diag(solution.covariance))
+    free_parameters = np.flatnonzero(linear.free[:count])
+    derivative = gradient(log_rate(coordinates, coordinates.reference.stress), x[:count], np.ones(count))
+    row = np.zeros(scale.size)
+    row[: free_parameters.size] = derivative[free_parameters]
+    effects = []
+    for kind, size, unit, change in changes:
+        by_test = np.einsum("tep,te->tp", solution.weighted_jacobian, change) @ solution.covariance @ row
+        effects.append(UnmodelledEffect(kind, size, unit, float(np.sqrt((by_test**2).sum())), change))
+    return tuple(effects)
+
+
+def _dimension(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, kind: str
+) -> list[tuple[str, float, str, Floats]]:
+    """A length of the test pieces that is known to its tolerance only."""
+    histories, count = problem.histories, problem.parameter_count
+    tolerances = [
+        getattr(predictor_for(problem.predictor, h), "tolerances", {}).get(kind, 0.0)
+        if supports_nuisance(predictor_for(problem.predictor, h), kind)
+        else 0.0
+        for h in histories
+    ]
+    if not all(tolerances):
+        return []
+    nominal = np.array([prior_mean(Nuisance(kind), h, problem.predictor) for h in histories])  # type: ignore[arg-type]
+    nuisances = {**problem.nuisance_parameters.predictor_values(x[count:]), kind: nominal[None]}
+    theta = problem.coordinates.theta(x[:count])
+    prediction = predict_with_sensitivities(problem.predictor, problem.law, theta, histories, nuisances)
+    slope = problem.observations.select_outputs(prediction.nuisance_jacobian[kind], prediction)[0]
+    sizes = nominal * np.array(tolerances)
+    change = linear.residuals.offset_sensitivity * np.where(np.isfinite(slope), slope, 0.0) * sizes[:, None]
+    return [(kind, float(np.median(sizes)), "mm", change)]
+
+
+def _offset(problem: LeastSquaresProblem, linear: LinearisedProblem) -> list[tuple[str, float, str, Floats]]:
+    """An offset of the output that grows with creep."""
+    observations, residuals = problem.observations, linear.residuals
+    leading = observations.present & observations.leading_output
+    if not leading.any():
+        return []
+    position = int(observations.output_index[leading][0])
+    size = OFFSET_IN_NOISES * float(observations.noise[position])
+    if not size > 0:
+        return []
+    change = np.where(leading, residuals.offset_sensitivity * size, 0.0)
+    name = observations.outputs[position]
+    return [(f"offset of {name}", size, output_unit(name), change)]
+
+
+def _drift(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -> list[tuple[str, float, str, Floats]]:
+    """A furnace that drifts linearly over each test: the clock of the creep runs ahead.
+
+    A factor 1 + b g(t) on the rate moves the clock by the integral of b g, and an output by that times its slope, as
+    long as the load is constant; where it changes, the advance counts in the new, faster, clock.
+    """
+    observations, residuals = problem.observations, linear.residuals
+    factor = _log_rate_per_kelvin(problem, x) * USUAL_DRIFT
+    predicted = observations.inverse(residuals.values + observations.transformed_values)
+    change = np.zeros_like(predicted)
+    for test, history in enumerate(problem.histories):
+        for position in np.unique(observations.output_index[test, observations.present[test]]):
+            index = np.flatnonzero(observations.present[test] & (observations.output_index[test] == position))
+            if index.size < 3 or observations.rupture_mask[test, index].any():
+                continue
+            times = observations.times[test, index]
+            change[test, index] = _advance(history, times, predicted[test, index])
+    return [("temperature drift", USUAL_DRIFT, "K over a test", factor * change * residuals.offset_sensitivity)]
+
+
+def _advance(history: History, times: Floats, values: Floats) -> Floats:
+    """(frames,) change of an output by a clock that advances by t^2 / 2 t_end; values : (frames,) in its unit."""
+    program = history.loading.program()
+    levels = program.at(times)
+    change, advance, last_slope = np.zeros_like(values), 0.0, 0.0
+    begin = 0
+    for end in [*(np.flatnonzero(np.abs(np.diff(levels)) > 1e-3 * np.abs(levels).max()) + 1), times.size]:
+        part = slice(begin, end)
+        if end - begin >= 2:
+            slope = np.gradient(values[part], times[part])
+            start = times[begin - 1] if begin else 0.0
+            if begin and slope[0] != 0.0:
+                advance *= last_slope / slope[0]
+            clock = advance + (times[part] ** 2 - start**2) / (2.0 * times[-1])
+            change[part], advance, last_slope = slope * clock, float(clock[-1]), float(slope[-1])
+        begin = end
+    return change
+
+
+def _log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats) -> float:
+    """d ln rate / dT, 1/K, of the law; of one that knows no temperature by the usual activation energy."""
+    T = problem.coordinates.reference.temperature
+    if not problem.law.uses(temperature) or T < 500.0:
+        return USUAL_ACTIVATION_ENERGY / (GAS_CONSTANT * max(T, 1000.0) ** 2)
+    coordinates, u = problem.coordinates, x[: problem.parameter_count]
+    up, down = (float(log_rate(coordinates, coordinates.reference.stress, T + s)(u)) for s in (1.0, -1.0))
+    return 0.5 * (up - down)
+
+
+def with_random_effects(linear: LinearisedProblem, effects: Sequence[UnmodelledEffect]) -> LinearisedProblem:
+    """The linear problem with these effects as random effects of each test in its covariance."""
+    columns = [effect.residual_change[..., None] for effect in effects]
+    present = linear.residuals.random_effect_sensitivities
+    stacked = np.concatenate([*([present] if present is not None else []), *columns], axis=-1)
+    return replace(linear, residuals=replace(linear.residuals, random_effect_sensitivities=stacked))
