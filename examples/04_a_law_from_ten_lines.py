@@ -81,9 +81,9 @@ print("conforms:", ck.check_law(brittle, samples=16).passed)
 # %%
 # Temperature
 # -----------
-# An Arrhenius factor on the creep rate and, since damage is a state of its own, a second one on damage.
+# An Arrhenius factor on every rate: Q of creep and, since damage has a rate coefficient C of its own, Q_C of damage.
 
-law = brittle.times(ck.arrhenius(T_ref=1073.15)).with_temperature(C=ck.activated(T_ref=1073.15))
+law = brittle.times(ck.arrhenius(T_ref=1073.15))
 print(law)
 truth = {"A": 2e-16, "n": 4.5, "C": 3e-14, "v": 4.0, "Q": 3e5, "Q_C": 2.8e5}
 truth = {name: truth[name] for name in law.names}
