@@ -101,7 +101,8 @@ class _FactorParameters:
             taken = {*self.law.names, *(s.name for s in self.law.states)}
             taken |= {s.name for table in self.params.values() for s in table}
             names = {s: sympy.Symbol(unused_name(s.name + suffix, taken), real=True) for s in self.factor.params}
-            meaning = "" if owner is None else f" of {(self.law.params | self.law.states)[owner].meaning}"
+            owners: dict[sympy.Symbol, Param | State] = {**self.law.params, **self.law.states}
+            meaning = "" if owner is None else f" of {owners[owner].meaning}"
             self.params[owner] = {
                 names[s]: replace(p, meaning=p.meaning + meaning) for s, p in self.factor.params.items()
             }
