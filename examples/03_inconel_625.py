@@ -195,9 +195,9 @@ figure, axes = plt.subplots(figsize=(6.0, 4.6))
 for celsius, colour in zip((750.0, 800.0, 850.0), ("C0", "C1", "C3"), strict=True):
     T = celsius + 273.15
     late = 4 * 3600.0
-    rate, _, _ = best.rate(stress, np.full_like(stress, T), time=late)
-    low = best.rate(stress, np.full_like(stress, T - 10), time=late)[1]
-    high = best.rate(stress, np.full_like(stress, T + 10), time=late)[2]
+    rate, _, _ = best.rate(stress, np.full_like(stress, T), time=late, warn=False)
+    low = best.rate(stress, np.full_like(stress, T - 10), time=late, warn=False)[1]
+    high = best.rate(stress, np.full_like(stress, T + 10), time=late, warn=False)[2]
     axes.fill_between(stress, low, high, color=colour, alpha=0.2, lw=0)
     axes.plot(stress, rate, color=colour, label=f"{celsius:.0f} C, identified at 4 h (95 %, and 10 C)")
     compressed = 1.32e6 * stress**4.8 * np.exp(-4.61e5 / (R_PAPER * T))

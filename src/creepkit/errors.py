@@ -38,6 +38,10 @@ class FitError(CreepkitError):
     """An identification was asked for something that it cannot do."""
 
 
+class FitWarning(UserWarning):
+    """An identification answers beyond what its tests cover; `warnings.simplefilter` turns it off, or into an error."""
+
+
 class ExportError(CreepkitError):
     """A law cannot be written in the language that was asked for."""
 

@@ -152,12 +152,18 @@ def confirm(
 ) -> Confirmation:
     """Simulate an identified law for each test by the specimen itself, and compare: finite elements for a bulge test.
 
-    tests : by default those that were fitted; using : by default the specimen that they name.
+    tests : by default those that were fitted; using : by default the specimen that they name, with the settings that
+        it was identified with.
     """
     from creepkit.inverse.confirmation import confirm as run
+    from creepkit.inverse.predictor_documents import registered_specimens
 
     histories = check_histories(list(fit.histories if tests is None else tests))
-    return run(fit, histories, resolve_predictors(using, histories))
+    known = registered_specimens(fit.predictor) if using is None else {}
+    if not histories or not all(h.specimen in known for h in histories):
+        return run(fit, histories, resolve_predictors(using, histories))
+    used = {h.specimen: known[h.specimen] for h in histories}
+    return run(fit, histories, used if len(used) > 1 else next(iter(used.values())))
 
 
 def change_settings(settings: IdentificationSettings, changes: SettingChanges) -> IdentificationSettings:

@@ -55,7 +55,7 @@ def surrogate(name_or_path: str | Path) -> Surrogate:
 def load(path: str | Path) -> Identification:
     """Return the identification saved in a JSON file.
 
-    Attach its histories again with `.with_histories(histories, using)`.
+    It knows its specimen by name and predicts new histories; attach its own with `.with_histories(histories)`.
     """
     from creepkit.inverse.identification_document import read_identification as run
 

@@ -13,12 +13,14 @@ import numpy as np
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.adequacy import Adequacy
-from creepkit.inverse.composite_predictor import predict
+from creepkit.inverse.composite_predictor import CompositePredictor, predict
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.defect_correction import NumericalError, correct_defect
+from creepkit.inverse.extrapolation import warn_of_extrapolation
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
 from creepkit.inverse.noise_model import NoiseModel, Residuals, cholesky_factors
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate, owner_of, prior_mean
+from creepkit.inverse.predictor_documents import PredictorDocument, missing_predictor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
@@ -27,6 +29,7 @@ from creepkit.inverse.unmodelled_effects import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable, present
 from creepkit.records import SIMULATED_NUISANCES, History, Nuisance, Prediction, Predictor
+from creepkit.registry.arguments import resolve_predictors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,6 +65,7 @@ class Identification(Presentable):
     search_trace : how its global search went; linearised : the problem made linear at the optimum, of identifications
         by likelihood; problem : what was minimised, under the covariance that was found (none of them is saved).
     sparsity : how a penalty reduced the sum that this law was part of, if one did.
+    predictor_documents : {specimen: document} of the predictor, of identifications that come from a file.
     """
 
     law: CreepLaw
@@ -91,6 +95,7 @@ class Identification(Presentable):
     linearised: LinearisedProblem | None = field(default=None, repr=False)
     sparsity: Sparsity | None = field(default=None, repr=False)
     problem: LeastSquaresProblem | None = field(default=None, repr=False)
+    predictor_documents: Mapping[str, PredictorDocument] = field(default_factory=dict, repr=False)
 
     @property
     def values(self) -> dict[str, float]:
@@ -112,13 +117,10 @@ class Identification(Presentable):
         """The problem that was solved, under the covariance found; built anew for an identification from a file."""
         if self.problem is not None:
             return self.problem
-        if self.predictor is None or not self.histories:
-            raise FitError(
-                "this identification was loaded from a file: attach its histories and specimen with "
-                "fit.with_histories()"
-            )
+        if not self.histories:
+            raise FitError("this identification was loaded from a file: attach its histories with fit.with_histories()")
         problem = LeastSquaresProblem.from_histories(
-            self.law, self.histories, self.predictor, self.settings, self.reference
+            self.law, self.histories, self._predictor_or(None), self.settings, self.reference
         )
         nuisances = problem.nuisance_parameters
         if self.nuisances:
@@ -139,15 +141,20 @@ class Identification(Presentable):
         *,
         strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
+        warn: bool = True,
     ) -> tuple[Floats, Floats, Floats]:
         """Creep rate, 1/s, with its 95 % interval: (rate, low, high), each of the broadcast shape.
 
         stress, temperature, strain, time : numbers or arrays that broadcast, in MPa, K, - and s; by default those of
-        the reference point.
+        the reference point: without a temperature the rate is that at `reference.temperature`, the median of the tests.
+        warn : whether a point outside `ranges` gives a FitWarning.
         """
         from creepkit.inverse.uncertainty.quantities import log_rate
 
         function = log_rate(self.coordinates, stress, temperature, strain, time)
+        if warn:
+            point = {"stress": stress, "temperature": temperature, "strain": strain, "time": time}
+            warn_of_extrapolation(self.ranges, point)
         log_rate_value, sd = delta_method(function, self.u, self.covariance)
         half_width = self._quantile * sd
         return np.exp(log_rate_value), np.exp(log_rate_value - half_width), np.exp(log_rate_value + half_width)
@@ -159,14 +166,19 @@ class Identification(Presentable):
         *,
         strain: ArrayLike | None = None,
         time: ArrayLike | None = None,
+        warn: bool = True,
     ) -> tuple[Floats, Floats, Floats]:
         """Local stress exponent d ln rate / d ln stress with its 95 % interval: (exponent, low, high).
 
         stress, temperature, strain, time : as in `rate`, numbers or arrays that broadcast; results have that shape.
+        warn : as in `rate`.
         """
         from creepkit.inverse.uncertainty.quantities import local_exponent
 
         function = local_exponent(self.coordinates, stress, temperature, strain, time)
+        if warn:
+            point = {"stress": stress, "temperature": temperature, "strain": strain, "time": time}
+            warn_of_extrapolation(self.ranges, point)
         exponent, sd = delta_method(function, self.u, self.covariance)
         half_width = self._quantile * sd
         return exponent, exponent - half_width, exponent + half_width
@@ -185,12 +197,14 @@ class Identification(Presentable):
         stress : number or (...,) MPa, nominal, held as `control` says. temperature : number or (...,) K, by default
         that of the reference point.
         test_scatter : whether the interval is that of a single test, which has its own rate, or that of the law alone.
-        Infinite where nothing breaks within some thousand times the longest test.
+        Infinite where nothing breaks within some thousand times the longest test. A stress or temperature outside
+        `ranges` gives a FitWarning.
         """
         from creepkit.inverse.goodness_of_fit import constant_stress_tests
 
         T = self.reference.temperature if temperature is None else temperature
         tests, shape = constant_stress_tests(stress, T, self.ranges["time"][1], control)
+        warn_of_extrapolation(self.ranges, {"stress": stress, "temperature": temperature})
         time, low, high = self.rupture_times(tests, test_scatter=test_scatter, using=using)
         return time.reshape(shape), low.reshape(shape), high.reshape(shape)
 
@@ -200,9 +214,7 @@ class Identification(Presentable):
         """The same for histories (by default those that were fitted), whatever their loading: (tests,) each."""
         from creepkit.inverse.goodness_of_fit import predict_rupture_times
 
-        predictor = using or self.predictor
-        if predictor is None:
-            raise FitError("this identification was loaded from a file: give using=, the specimen it was made with")
+        predictor = self._predictor_or(using)
         tests, noise_model = list(histories or self.histories), self.noise_model if test_scatter else None
         return predict_rupture_times(
             self.coordinates, self.u, self.covariance, noise_model, self._quantile, tests, predictor
@@ -216,9 +228,7 @@ class Identification(Presentable):
         own_nuisances : fitted tests, known by name, with their own nuisances and offsets; else, and all other
             histories, with what is known of their alloy or of all tests, or the prior means, and without offset.
         """
-        predictor = using or self.predictor
-        if predictor is None:
-            raise FitError("this identification was loaded from a file: give using=, the specimen it was made with")
+        predictor = self._predictor_or(using)
         tests = list(histories or self.histories)
         prediction = predict(
             predictor,
@@ -250,15 +260,35 @@ class Identification(Presentable):
             if n.kind in SIMULATED_NUISANCES
         }
 
-    def with_histories(self, histories: Sequence[History], using: Predictor) -> Identification:
-        """The same with its histories (found by name) and predictor attached, as after load()."""
+    def with_histories(
+        self, histories: Sequence[History], using: Predictor | str | Mapping[str, Predictor | str] | None = None
+    ) -> Identification:
+        """The same with its histories (found by name) attached, as after load(), and what predicts them.
+
+        using : by default the specimen that the file names, with its settings.
+        """
         by_name = {h.name: h for h in histories}
         missing = [m.name for m in self.tests if m.name not in by_name]
         if missing:
             raise FitError(f"this identification was made from '{missing[0]}', which is not among the histories given")
-        if not hasattr(using, "predict"):
+        tests = tuple(by_name[m.name] for m in self.tests)
+        if using is None and (self.predictor is not None or self.predictor_documents):
+            predictor = self._predictor_or(None)
+        elif using is None or isinstance(using, str | Mapping):
+            resolved = resolve_predictors(using, tests)
+            predictor = CompositePredictor(resolved) if isinstance(resolved, dict) else resolved
+        elif hasattr(using, "predict"):
+            predictor = using
+        else:
             raise FitError(f"with_histories() takes a predictor such as specimen('uniaxial'), found {using!r}")
-        return replace(self, histories=tuple(by_name[m.name] for m in self.tests), predictor=using, problem=None)
+        return replace(self, histories=tests, predictor=predictor, problem=None)
+
+    def _predictor_or(self, using: Predictor | None) -> Predictor:
+        """The predictor given, or the identification's own; FitError where a file does not give it."""
+        predictor = self.predictor if using is None else using
+        if predictor is None:
+            raise FitError(missing_predictor(self.predictor_documents))
+        return predictor
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the problem, which holds compiled code and is set up again when it is needed."""

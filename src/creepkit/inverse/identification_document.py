@@ -16,6 +16,7 @@ from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, RuptureCom
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
+from creepkit.inverse.predictor_documents import predictor_documents, predictor_from_documents
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity
@@ -91,12 +92,13 @@ CODEC = RecordCodec(
     values={CreepLaw: LAW_CODEC},
     names={"Sparsity": Sparsity, **dict.fromkeys(("PenaltyPath", "SearchTrace", "LinearisedProblem"), object)},
 )
-"""Of identifications; histories, predictor, search trace and linearised problem are not stored."""
+"""Of identifications; histories, search trace and linearised problem are not stored; the predictor by its documents."""
 
 
 def identification_to_json(fit: Identification) -> dict[str, Any]:
     """The identification as JSON-able data."""
-    return {**IDENTIFICATION.heading, **CODEC.to_json(fit)}
+    documents = predictor_documents(fit.predictor) or fit.predictor_documents
+    return {**IDENTIFICATION.heading, **CODEC.to_json(replace(fit, predictor_documents=documents))}
 
 
 def write_identification(fit: Identification, path: str | Path) -> Path:
@@ -105,7 +107,7 @@ def write_identification(fit: Identification, path: str | Path) -> Path:
 
 
 def read_identification(path: str | Path) -> Identification:
-    """Read an identification; its law is rebuilt from data and its fingerprint checked."""
+    """Read an identification; its law is rebuilt from data and its fingerprint checked, its specimen by name."""
     return identification_from_json(read_json(Path(path), IDENTIFICATION.kind), str(path))
 
 
@@ -124,4 +126,8 @@ def identification_from_json(data: Any, source: str = "identification") -> Ident
     correlation = covariance / np.maximum(np.outer(scale, scale), 1e-300)
     if size and (not np.allclose(covariance, covariance.T, rtol=1e-8) or np.linalg.eigvalsh(correlation)[0] < -1e-8):
         raise FitError(f"{source}: covariance is not symmetric and positive semi-definite; the file is damaged")
-    return replace(fit, covariance=covariance)  # of a law without parameters it is a list
+    try:
+        predictor = predictor_from_documents(fit.predictor_documents)
+    except FitError as error:
+        raise FitError(f"{source}: {error}") from None
+    return replace(fit, covariance=covariance, predictor=predictor)  # of a law without parameters it is a list

@@ -92,6 +92,10 @@ def identification_notes(
         sentences.append(
             f"the tests span {min(temperatures):.0f} to {max(temperatures):.0f} K and this law knows no temperature"
         )
+    elif max(temperatures) - min(temperatures) > 5:
+        isothermal = [str(s) for s, state in law.states.items() if state.rate != 0 and not state.rate.has(temperature)]
+        if isothermal:
+            sentences.append(f"the rate of {', '.join(isothermal)} knows no temperature, as that of creep does")
     stress_levels = {round(float(v), 3) for h in histories for v in reference_stresses(h, problem.predictor)}
     if len(stress_levels) == 1 and all(h.loading.quantity == "stress" for h in histories):
         sentences.append("all tests have one stress: the stress dependence is not determined by them")

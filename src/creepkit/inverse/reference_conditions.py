@@ -160,7 +160,10 @@ def spans_temperatures(histories: Sequence[History]) -> bool:
 
 
 def with_arrhenius(law: CreepLaw, histories: Sequence[History]) -> CreepLaw:
-    """The law times an Arrhenius factor about the median temperature, if the tests call for one and it has none."""
+    """The law times an Arrhenius factor about the median temperature, if the tests call for one and it has none.
+
+    Internal variables with rates of their own have activation energies of their own, as CreepLaw.times says.
+    """
     if law.uses(temperature) or not spans_temperatures(histories):
         return law
     return law.times(arrhenius(T_ref=reference_temperature(histories)))

@@ -12,7 +12,7 @@ import sympy
 from creepkit.errors import LawError, nearest
 from creepkit.language.law_record import LawRecord
 from creepkit.language.symbols import POINT_VARIABLES, Param, State, temperature
-from creepkit.language.temperature_forms import TemperatureFactor, TemperatureForm
+from creepkit.language.temperature_forms import TemperatureForm
 
 Law = TypeVar("Law", bound=LawRecord)
 
@@ -80,23 +80,6 @@ def fix(law: Law, values: Mapping[str, float]) -> Law:
     return _substituted(law, replacements, f"{law.name}({description})", f"{law.title} with {description}")
 
 
-def times(law: Law, factor: TemperatureFactor) -> Law:
-    """Multiply every term (not the rates of internal variables) by a factor of temperature."""
-    if not isinstance(factor, TemperatureFactor):
-        raise LawError(f"law '{law.name}': times() takes a factor such as arrhenius(T_ref=1073), found {factor!r}")
-    taken_names = {*law.names, *(s.name for s in law.states)}
-    replacements = {s: sympy.Symbol(_unused_name(s.name, taken_names), real=True) for s in factor.params}
-    expression = _renamed(factor.expression, replacements)
-    return replace(
-        law,
-        name=f"{law.name}*{factor.name}",
-        title=f"{law.title}, {factor.name} in temperature",
-        terms={label: term * expression for label, term in law.terms.items()},
-        params={**law.params, **{replacements[s]: p for s, p in factor.params.items()}},
-        references=tuple(dict.fromkeys((*law.references, factor.reference))),
-    )
-
-
 def with_temperature(law: Law, forms: Mapping[str, TemperatureForm]) -> Law:
     """Make parameters functions of temperature; the new parameters follow the one they belong to."""
     if not forms:
@@ -111,7 +94,10 @@ def with_temperature(law: Law, forms: Mapping[str, TemperatureForm]) -> Law:
         expression, extra = form.build(symbol, law.params[symbol])
         clash = sorted(s.name for s in extra if s in params)
         if clash:
-            raise LawError(f"law '{law.name}': {', '.join(clash)} exists already; {name} depends on temperature twice")
+            raise LawError(
+                f"law '{law.name}': {', '.join(clash)} exists already; {name} depends on temperature twice: leave "
+                "this form out, or keep the factor of times() from this rate by its terms= and states="
+            )
         replacements[symbol] = expression
         sign_constraints += _sign_constraints(expression, law.params[symbol])
         ordered: dict[sympy.Symbol, Param] = {}
@@ -233,15 +219,6 @@ def _numbered(
 
 def _renamed(expression: sympy.Basic, replacements: Mapping[sympy.Symbol, sympy.Symbol]) -> sympy.Basic:
     return expression.xreplace({old: to for old, to in replacements.items() if old != to})
-
-
-def _unused_name(name: str, taken: set[str]) -> str:
-    if name not in taken:
-        return name
-    k = 2
-    while f"{name}_{k}" in taken:
-        k += 1
-    return f"{name}_{k}"
 
 
 def _check_labels(law: LawRecord, labels: Sequence[str]) -> None:

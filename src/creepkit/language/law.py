@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from creepkit.language import algebra
 from creepkit.language.law_record import LawRecord
 from creepkit.language.printing import law_latex, law_text
+from creepkit.language.temperature_factors import times
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +35,23 @@ class CreepLaw(LawRecord):
         """The law with parameters at fixed numbers; m=0 makes strain hardening a power law."""
         return algebra.fix(self, values)
 
-    def times(self, factor: Any) -> CreepLaw:
-        """The law with every term multiplied by a factor such as arrhenius(T_ref=1073)."""
-        return algebra.times(self, factor)
+    def times(
+        self,
+        factor: Any,
+        *,
+        terms: Iterable[str] | None = None,
+        states: Iterable[str] | None = None,
+        shared: bool = False,
+    ) -> CreepLaw:
+        """The law with every rate multiplied by a factor such as arrhenius(T_ref=1073), as Eq. (5) does.
+
+        All terms share one activation energy, Q. A rate of an internal variable that is a multiple of the creep rate
+        (of a term's rate coefficient) takes the same factor; one with a rate coefficient of its own, such as the
+        damage rate B s^chi, has an activation energy of its own, Q_B, unless it has one already.
+        terms, states : names of those to multiply, by default all; states=() leaves damage without temperature.
+        shared : whether internal variables share Q.
+        """
+        return times(self, factor, terms, states, shared=shared)
 
     def with_temperature(self, **forms: Any) -> CreepLaw:
         """The law with parameters made functions of temperature, such as n=linear(T_ref=1073)."""

@@ -114,6 +114,15 @@ def expression_text(expression: sympy.Basic) -> str:
     return str(TextPrinter().doprint(expression))
 
 
+def state_equations(law: LawRecord) -> list[str]:
+    """One line for each internal variable: its equation, where it starts, and where the material ends."""
+    return [
+        f"d{symbol}/dt = {expression_text(state.rate)}, from {state.initial:g}"
+        + ("" if state.limit is None else f", broken at {state.limit:.10g}")
+        for symbol, state in law.states.items()
+    ]
+
+
 def law_text(law: LawRecord) -> str:
     """Return the law as a small table for a terminal."""
     lines = [f"{law.name}: {law.title}" if law.title else law.name]
@@ -121,8 +130,7 @@ def law_text(law: LawRecord) -> str:
     for label, term in law.terms.items():
         lines.append(f"  {prefix:6} {expression_text(term)}    [{label}]")
         prefix = "     +"
-    for symbol, state in law.states.items():
-        lines.append(f"  d{symbol}/dt = {expression_text(state.rate)}, from {state.initial:g}")
+    lines += [f"  {equation}" for equation in state_equations(law)]
     for name, param in law.table.items():
         low, high = param.bounds
         off = "" if param.off is None or low <= param.off <= high else f" or {param.off:g}"

@@ -137,8 +137,7 @@ def identification_figure(fit: Identification, path: str | Path | None = None) -
     """Draw the tests and what is left of them over time, an output each, rates with 95 % bands, and ruptures."""
     if not fit.histories:
         raise FitError(
-            "this identification was loaded without its histories: attach them with "
-            "fit.with_histories(histories, using)"
+            "this identification was loaded without its histories: attach them with fit.with_histories(histories)"
         )
     outputs = list(dict.fromkeys(m.outputs[0].output for m in fit.tests))
     ruptures = rupture_rows(fit)
@@ -224,7 +223,7 @@ def _draw_rates(axes: Axes, fit: Identification) -> None:
     temperatures = np.unique(np.round([float(np.mean(h.temperature_program().values)) for h in fit.histories], 0))
     temperatures = temperatures[np.linspace(0, temperatures.size - 1, min(temperatures.size, 5)).round().astype(int)]
     for T, colour in zip(temperatures, _shades(temperatures), strict=True):
-        rate, low, high = fit.rate(grid, np.full_like(grid, T))
+        rate, low, high = fit.rate(grid, np.full_like(grid, T), warn=False)
         axes.fill_between(grid, low, high, color=colour, alpha=0.25, lw=0)
         axes.plot(grid, rate, color=colour, lw=1.4, label=f"{T - ZERO_CELSIUS:.0f} C")
     axes.set(xscale="log", yscale="log", xlabel="stress, MPa", ylabel="creep rate, 1/s")

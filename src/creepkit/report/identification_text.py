@@ -9,7 +9,7 @@ from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
-from creepkit.language.printing import expression_text
+from creepkit.language.printing import expression_text, state_equations
 
 if TYPE_CHECKING:
     from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
@@ -31,6 +31,7 @@ def identification_text(fit: Identification) -> str:
     lines = [
         f"{fit.law.title or fit.law.name}",
         *(f"  {label}: {expression_text(term)}" for label, term in fit.law.terms.items()),
+        *(f"  {equation}" for equation in state_equations(fit.law)),
         "",
         *_values(fit),
         *_reference(fit),

@@ -67,8 +67,8 @@ def _table_row(plate: ScreeningResult, result: AlloyResult) -> tuple[str, ...]:
         *first_cells,
         names,
         f"{result.laws[0].weight:.2f}",
-        _interval_text(fit.rate(COMPARISON_STRESS), 3),
-        _interval_text(fit.local_exponent(COMPARISON_STRESS), 3),
+        _interval_text(fit.rate(COMPARISON_STRESS, warn=False), 3),
+        _interval_text(fit.local_exponent(COMPARISON_STRESS, warn=False), 3),
         f"{mean_chi_square(fit):.3g}",
         confirmation_text(result),
     )

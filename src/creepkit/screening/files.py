@@ -108,8 +108,10 @@ def _write_result(group: Any, result: AlloyResult) -> None:
     for k, weighted_law in enumerate(result.laws):
         _write_law(group.create_group(f"laws/{k}"), weighted_law)
     if result.identified:
-        group["rate"] = np.array([float(v) for v in result.best.rate(COMPARISON_STRESS)])
-        group["local_exponent"] = np.array([float(v) for v in result.best.local_exponent(COMPARISON_STRESS)])
+        group["rate"] = np.array([float(v) for v in result.best.rate(COMPARISON_STRESS, warn=False)])
+        group["local_exponent"] = np.array(
+            [float(v) for v in result.best.local_exponent(COMPARISON_STRESS, warn=False)]
+        )
     if result.confirmation is not None:
         confirmation = result.confirmation
         confirmation_group = group.create_group("confirmation")
@@ -178,8 +180,8 @@ def result_columns(plate: ScreeningResult, result: AlloyResult) -> dict[str, Any
         "decisive": "yes" if result.decisive else "no",
         "not_ruled_out": "; ".join(result.credible_laws[1:]),
         "equivalents": "; ".join(result.equivalents),
-        **_interval_columns("rate_100MPa", fit.rate(COMPARISON_STRESS)),
-        **_interval_columns("local_exponent_100MPa", fit.local_exponent(COMPARISON_STRESS)),
+        **_interval_columns("rate_100MPa", fit.rate(COMPARISON_STRESS, warn=False)),
+        **_interval_columns("local_exponent_100MPa", fit.local_exponent(COMPARISON_STRESS, warn=False)),
         "rate_strain": _number_text(fit.reference.strain),
         "rate_time_s": _number_text(fit.reference.time),
         "rate_temperature_K": _number_text(fit.reference.temperature),

@@ -167,6 +167,7 @@ def _determined_sentence(fit: Identification) -> str:
     rate, rate_low, rate_high = (float(v) for v in fit.rate(reference.stress))
     exponent, exponent_low, exponent_high = (float(v) for v in fit.local_exponent(reference.stress))
     return (
-        f"what the tests see at {reference.stress:.4g} MPa: the local exponent is {exponent:.3g} "
+        f"what the tests see at {reference.stress:.4g} MPa, {reference.temperature:.0f} K: the local exponent is "
+        f"{exponent:.3g} "
         f"[{exponent_low:.3g}, {exponent_high:.3g}], the rate {rate:.3g} [{rate_low:.3g}, {rate_high:.3g}] 1/s"
     )

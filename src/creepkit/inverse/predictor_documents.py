@@ -1,0 +1,138 @@
+"""What predicted the tests of an identification, as a file names it, and back.
+
+A registered specimen is stored with the fields that decide what it predicts. A surrogate is stored by a fingerprint of
+its header and weights, and found again among those that come with creepkit. Anything else is stored by name alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal
+
+from creepkit.errors import DatasetError, FitError
+from creepkit.files.json_documents import as_read_back, canonical_json
+from creepkit.inverse.composite_predictor import CompositePredictor
+from creepkit.records import Predictor
+from creepkit.registry import default_registry
+from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
+
+
+@dataclass(frozen=True)
+class PredictorDocument:
+    """One predictor: fields are those of a specimen that is registered under the name; fingerprint, of a surrogate."""
+
+    kind: Literal["specimen", "surrogate", "other"]
+    name: str
+    fields: Any = None
+    fingerprint: str = ""
+
+
+SINGLE = ""
+"""The key of a predictor of all tests, in the place of the specimen's name."""
+
+
+def predictor_documents(predictor: Predictor | None) -> dict[str, PredictorDocument]:
+    """{specimen: document} of a composite predictor; of any other one document under SINGLE, of none nothing."""
+    if predictor is None:
+        return {}
+    if isinstance(predictor, CompositePredictor):
+        return {specimen: _document_of(one) for specimen, one in predictor.predictors.items()}
+    return {SINGLE: _document_of(predictor)}
+
+
+def predictor_from_documents(documents: Mapping[str, PredictorDocument]) -> Predictor | None:
+    """The predictor, or None where a part of it is not to be had here; FitError for documents that say nonsense."""
+    predictors = {specimen: _predictor_of(document) for specimen, document in documents.items()}
+    present = {specimen: one for specimen, one in predictors.items() if one is not None}
+    if not predictors or len(present) < len(predictors):
+        return None
+    return present[SINGLE] if [*present] == [SINGLE] else CompositePredictor(present)
+
+
+def missing_predictor(documents: Mapping[str, PredictorDocument]) -> str:
+    """Why an identification from a file has no predictor, and what to do, in one sentence."""
+    for document in documents.values():
+        if document.kind == "specimen" and document.name not in default_registry().specimens():
+            return (
+                f"this identification was made with specimen '{document.name:.40}', which is not known here: install "
+                "the plugin that has it, or give using="
+            )
+        if document.kind == "surrogate" and document.fingerprint not in _shipped_surrogates():
+            return (
+                f"this identification was made with the surrogate '{document.name:.80}' of a file: give "
+                "using=ck.surrogate(that file)"
+            )
+        if document.kind == "other":
+            return (
+                f"this identification was made with '{document.name:.40}', which a file cannot hold: give using=, the "
+                "predictor itself or a specimen"
+            )
+    return "this identification was loaded from a file: give using=, the specimen it was made with"
+
+
+def registered_specimens(predictor: Predictor | None) -> dict[str, Predictor]:
+    """{name: specimen} of those parts of a predictor that are registered specimens, with whatever settings."""
+    parts = predictor.predictors.values() if isinstance(predictor, CompositePredictor) else (predictor,)
+    described = [(one, _document_of(one)) for one in parts if one is not None]
+    return {document.name: one for one, document in described if document.kind == "specimen"}
+
+
+# ---- one predictor -------------------------------------------------------------------------------------------------
+
+
+def _document_of(predictor: Predictor) -> PredictorDocument:
+    name = str(getattr(predictor, "name", type(predictor).__name__))
+    if _is_surrogate(predictor):
+        return PredictorDocument("surrogate", name, fingerprint=_fingerprint(predictor))
+    registered = default_registry().specimens().get(name)
+    specimen: Any = predictor
+    if registered is not None and type(registered.value) is type(specimen):
+        try:
+            return PredictorDocument("specimen", name, as_read_back(specimen_to_json(specimen)["fields"]))
+        except DatasetError:  # it holds arrays, such as a mesh
+            pass
+    return PredictorDocument("other", name)
+
+
+def _predictor_of(document: PredictorDocument) -> Predictor | None:
+    if document.kind == "specimen" and document.name in default_registry().specimens():
+        fields = {"name": document.name, "fields": document.fields}
+        try:
+            return specimen_from_json(fields, "predictor_documents", default_registry().specimen)
+        except DatasetError as error:
+            raise FitError(str(error)) from None
+    if document.kind == "surrogate":
+        path = _shipped_surrogates().get(document.fingerprint)
+        return None if path is None else _surrogate_at(path)
+    return None
+
+
+def _is_surrogate(predictor: Predictor) -> bool:
+    """Whether it is a surrogate; where it is, their module has been imported."""
+    module: Any = sys.modules.get("creepkit.surrogates.surrogate")
+    return module is not None and isinstance(predictor, module.Surrogate)
+
+
+def _fingerprint(surrogate: Any) -> str:
+    digest = hashlib.sha256(canonical_json(surrogate.file_header))
+    for name, tensor in sorted(surrogate.module.state_dict().items()):
+        digest.update(name.encode() + tensor.detach().cpu().numpy().tobytes())
+    return digest.hexdigest()[:32]
+
+
+@cache
+def _shipped_surrogates() -> dict[str, str]:
+    """{fingerprint: file} of the surrogates that come with creepkit."""
+    from creepkit.surrogates.loading import load_surrogate, shipped_files
+
+    return {_fingerprint(load_surrogate(path)): str(path) for path in shipped_files().values()}
+
+
+def _surrogate_at(path: str) -> Predictor:
+    from creepkit.surrogates.loading import load_surrogate
+
+    return load_surrogate(path)

@@ -1,0 +1,143 @@
+"""An identification from a file knows what predicted its tests, with changed settings, or says why it does not."""
+
+import json
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.errors import CreepkitError, FitError
+from creepkit.inverse.composite_predictor import CompositePredictor
+from creepkit.inverse.identification_document import identification_from_json, identification_to_json
+from creepkit.inverse.predictor_documents import (
+    PredictorDocument,
+    predictor_documents,
+    predictor_from_documents,
+    registered_specimens,
+)
+from helpers.planted_alloys import bars
+
+BAR = ck.specimen("uniaxial").replace(strain_limit=0.7, max_steps=5000)
+TESTS = bars("X")
+
+
+@dataclass(frozen=True)
+class Foreign:
+    """A predictor that no plugin registers."""
+
+    name: str = "foreign"
+
+    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+        return BAR.predict(law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)
+
+
+@pytest.fixture(scope="module")
+def fit():
+    return ck.identify("norton", TESTS, using=BAR, starts=2)
+
+
+@pytest.fixture(scope="module")
+def document(fit):
+    return json.loads(json.dumps(identification_to_json(fit)))
+
+
+def test_it_predicts_without_using(fit, tmp_path):
+    back = ck.load(fit.save(tmp_path / "fit.json"))
+
+    assert back.predictor == BAR
+    np.testing.assert_array_equal(back.predict(TESTS).values, fit.predict(TESTS).values)
+    np.testing.assert_array_equal(back.rupture_times(TESTS), fit.rupture_times(TESTS))
+    np.testing.assert_array_equal(back.rate(80.0), fit.rate(80.0))
+    assert ck.confirm(back, TESTS).verdict == ck.confirm(fit).verdict
+
+
+def test_with_its_histories_alone_it_is_the_whole_identification(fit, tmp_path):
+    back = ck.load(fit.save(tmp_path / "fit.json")).with_histories(TESTS)
+
+    assert back.predictor == BAR
+    again, profile = back.profile("n"), fit.profile("n")
+    assert (again.low, again.high) == pytest.approx((profile.low, profile.high), rel=1e-6)
+    assert ck.load(back.save(tmp_path / "again.json")).predictor == BAR
+
+
+def test_a_specimen_of_changed_settings_confirms_its_own_fit(fit):
+    assert registered_specimens(fit.predictor) == {"uniaxial": BAR}
+    assert ck.confirm(fit).noise_ratio == 0.0
+
+
+def test_a_fit_that_was_never_told_takes_the_specimens_of_its_histories(document):
+    old = {key: value for key, value in document.items() if key != "predictor_documents"}
+    back = identification_from_json(old)
+
+    with pytest.raises(FitError, match="loaded from a file: give using="):
+        back.predict(TESTS)
+    assert back.with_histories(TESTS).predictor == ck.specimen("uniaxial")
+    assert back.with_histories(TESTS, "uniaxial").predictor == ck.specimen("uniaxial")
+
+
+def test_several_specimens_come_back_each_with_its_settings(fit):
+    several = replace(fit, predictor=CompositePredictor({"uniaxial": BAR, "relaxation": ck.specimen("relaxation")}))
+    back = identification_from_json(json.loads(json.dumps(identification_to_json(several))))
+
+    assert back.predictor == several.predictor
+
+
+def test_a_specimen_of_a_missing_plugin_is_said_in_one_sentence_and_kept(document, tmp_path):
+    changed = {**document, "predictor_documents": {"": {"kind": "specimen", "name": "tube", "fields": {}}}}
+    back = identification_from_json(changed)
+
+    assert back.values["n"] > 1
+    for ask in (lambda: back.predict(TESTS), lambda: back.with_histories(TESTS), lambda: back.rupture_time(80.0)):
+        with pytest.raises(FitError, match=r"with specimen 'tube', which is not known here: install the plugin"):
+            ask()
+    np.testing.assert_array_equal(back.with_histories(TESTS, BAR).predict().values, back.predict(TESTS, BAR).values)
+    assert ck.load(back.save(tmp_path / "fit.json")).predictor_documents == back.predictor_documents
+
+
+def test_a_predictor_that_no_file_holds_is_named(fit, tmp_path):
+    back = ck.load(replace(fit, predictor=Foreign()).save(tmp_path / "fit.json"))
+
+    with pytest.raises(FitError, match="made with 'foreign', which a file cannot hold: give using="):
+        back.predict(TESTS)
+    assert back.predict(TESTS, Foreign()).values.shape[1] == len(TESTS)
+
+
+def test_a_specimen_under_another_ones_name_is_no_specimen():
+    (document,) = predictor_documents(Foreign("uniaxial")).values()
+    assert document.kind == "other"
+
+
+def test_a_surrogate_is_found_again_by_its_fingerprint_among_those_that_come_with_creepkit():
+    dimple = ck.surrogate("dimple")
+    documents = predictor_documents(dimple)
+    found = predictor_from_documents(documents)
+
+    assert documents[""].kind == "surrogate"
+    assert found.title == dimple.title
+    other = {"": replace(documents[""], fingerprint="0" * 32)}
+    assert predictor_from_documents(other) is None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"kind": "pickle", "name": "x"}, "predictor_documents"),
+        ({"kind": "specimen", "name": "uniaxial", "fields": {"no_such": 1}}, "no_such"),
+        ({"kind": "specimen", "name": "uniaxial", "fields": {"max_steps": "many"}}, "max_steps"),
+        ({"kind": "specimen", "name": "uniaxial", "fields": 3}, "uniaxial"),
+        ({"kind": "specimen", "name": "uniaxial", "fields": {}, "module": "os"}, "module"),
+        ({"kind": "specimen"}, "name"),
+        ([], "predictor_documents"),
+    ],
+)
+def test_what_a_file_says_of_its_predictor_is_checked(document, wrong, message):
+    with pytest.raises(CreepkitError, match=message):
+        identification_from_json({**document, "predictor_documents": {"": wrong}})
+
+
+def test_the_document_of_a_specimen_is_plain_data():
+    (document,) = predictor_documents(BAR).values()
+    assert isinstance(document, PredictorDocument)
+    assert document.fields["strain_limit"] == 0.7
+    assert json.loads(json.dumps(document.fields)) == document.fields
