@@ -71,7 +71,7 @@ def simulate(
         return using.run(law, values, planned_test)
     prediction = using.predict(law, law.to_internal(values), [planned_test])
     status, end = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
-    return run_from_outputs(Run, planned_test, prediction.outputs, prediction.of(0), status, end)
+    return run_from_outputs(Run, planned_test, prediction.outputs, prediction.of(0), status, end, prediction.reason)
 
 
 def check_data_quality(

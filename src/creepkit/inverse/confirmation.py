@@ -24,7 +24,11 @@ ACCEPTABLE_CHI_SQUARE = 2.0
 """Mean chi-square above which a law does not follow a test, whoever predicts it."""
 
 
-INCOMPLETE_STATUS = {Status.RUPTURED: "the specimen bursts", Status.NOT_CONVERGED: "the simulation stops"}
+INCOMPLETE_STATUS = {
+    Status.RUPTURED: "the specimen bursts",
+    Status.NOT_CONVERGED: "the simulation stops",
+    Status.OUTSIDE_CLASS: "which does not know this class of laws, the prediction ends",
+}
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ from creepkit.records.prediction_assembly import (
     assemble_prediction,
     broadcast_candidates,
     check_nuisances,
+    unpredicted,
 )
 
 __all__ = [
@@ -71,4 +72,5 @@ __all__ = [
     "check_nuisances",
     "constant_strain",
     "constant_stress",
+    "unpredicted",
 ]
