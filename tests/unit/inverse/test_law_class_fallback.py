@@ -1,7 +1,5 @@
 """Laws that a surrogate does not know are identified with its specimen: alone, in a mixed list, and on the way."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
@@ -10,34 +8,14 @@ from creepkit.inverse.composite_predictor import CompositePredictor, outside_cla
 from creepkit.inverse.identify import identify
 from creepkit.inverse.selection.select import select
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.records import History, Predictor, Status, constant_stress, unpredicted
+from creepkit.records import History, constant_stress
+from helpers.narrow_predictor import Narrow
 
 BARS = ck.specimen("uniaxial")
 NORTON, HARDENING = ck.law("norton"), ck.law("strain-hardening")
 TRUTH = {"A": 2e-16, "n": 4.6}
 TIMES = np.geomspace(600.0, 2e5, 12)
 FEW = {"starts": 2, "sobol_points": 32}
-
-
-@dataclass(frozen=True)
-class Narrow:
-    """In the place of a surrogate: the bars themselves, but for laws that it does not know."""
-
-    unknown: tuple[str, ...] = ("norton",)
-    name: str = "narrow"
-    outputs: tuple[str, ...] = ("strain",)
-
-    @property
-    def specimen(self) -> Predictor:
-        return BARS
-
-    def outside_class(self, law: ck.CreepLaw) -> str:
-        return f"law '{law.name}' is none of its laws" if law.name in self.unknown else ""
-
-    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
-        if self.outside_class(law):
-            return unpredicted(histories, self.outputs, len(theta), Status.OUTSIDE_CLASS, self.outside_class(law))
-        return BARS.predict(law, theta, histories, sensitivities=sensitivities)
 
 
 @pytest.fixture(scope="module")
