@@ -7,7 +7,7 @@ pressures and moduli of the paper, 12 h, frames 900 s apart). Outside: laws that
 same by the network, each with values drawn about planted ones (logarithms within a factor of two; the rate coefficient
 such that the reduced-order model creeps by 30 to 300 um; 8, then 10 MPa, 12 h). Errors are the largest of a history,
 relative to the amplitude at the same time. "Neither" counts the samples that are off by more than 1 % and that the
-surrogate does not flag: silent errors.
+surrogate does not flag: silent errors. A law without samples has a term whose rate the domain cannot set.
 """
 
 import sys
@@ -139,6 +139,7 @@ def main():
             errors, flagged = inside_errors(law, model, options.samples, options.folder)
         except CreepkitError as error:
             progress(f"{name}: {error}")
+            page.row(name, 0, *"------")
             continue
         silent = (errors > LIMIT) & ~flagged
         page.row(name, len(errors), *quantiles(errors), (errors <= LIMIT).sum(), flagged.sum(), silent.sum())
