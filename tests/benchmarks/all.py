@@ -51,6 +51,7 @@ BENCHMARKS = {
     "surrogate_accuracy": Benchmark(10, (("--samples", "150"),)),
     "surrogate_speed": Benchmark(3),
     "surrogate_identification": Benchmark(3, (("--tests", "3"),)),
+    "surrogate_law_classes": Benchmark(15),
     "surrogate_comparison": Benchmark(
         10,
         (("build/case1.h5", "build/case1.safetensors", "--samples", "300"),),

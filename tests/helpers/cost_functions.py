@@ -40,6 +40,9 @@ class Known:
         self.seen.append(u)
         return self.of(u)
 
+    def check_predicted(self, u: np.ndarray) -> None:
+        """A function has a value everywhere."""
+
     def minimise(self, u: np.ndarray, fixed: Mapping[int, float] | None = None) -> Minimum:
         free = np.setdiff1d(np.arange(u.size), list(fixed or {}))
         whole = np.array(u, float)

@@ -57,11 +57,13 @@ def identify(
     penalty : on the contributions of a sum's terms, such as L2(), GroupL2(), Sqrt() or Subsets(): terms that are left
         out stand in `sparsity` of the result, and its law is the one that remains.
     through : a surrogate in which the minima of the search are refined before `using` (finite elements) gives values
-        and intervals; "auto" takes the one that comes with creepkit where it is of this specimen.
+        and intervals; "auto" takes the one that comes with creepkit where it is of this specimen and knows the law.
+        A surrogate that does not know the class of the law is replaced by its specimen, and a note says so.
     settings : what is minimised, nuisance parameters, starts, seed, frames and robust losses; see
         IdentificationSettings. changes : single fields of it by name:
         starts=4, nuisances=[Nuisance("offset")], weights="likelihood".
     """
+    from creepkit.inverse.composite_predictor import through_for_law
     from creepkit.inverse.identify import identify as run
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.inverse.sparsity.term_selection import identify_sparse
@@ -70,6 +72,8 @@ def identify(
     settings = change_settings(settings or IdentificationSettings(), changes)
     predictor = resolve_predictors(using, histories)
     surrogate = _resolve_surrogate(through, predictor, histories)
+    if through == "auto":
+        surrogate = through_for_law(surrogate, law)
     if penalty is None:
         return run(law, histories, predictor, settings=settings, search=search, through=surrogate, progress=progress)
     return identify_sparse(

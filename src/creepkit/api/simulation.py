@@ -71,7 +71,7 @@ def simulate(
         return using.run(law, values, planned_test)
     prediction = using.predict(law, law.to_internal(values), [planned_test])
     status, end = Status(int(prediction.status[0, 0])), float(prediction.end_times[0, 0])
-    return run_from_outputs(Run, planned_test, prediction.outputs, prediction.of(0), status, end)
+    return run_from_outputs(Run, planned_test, prediction.outputs, prediction.of(0), status, end, prediction.reason)
 
 
 def check_data_quality(
@@ -144,7 +144,7 @@ def resolve_design(source: SamplingDesign | CreepLaw | str, specimen: Specimen, 
 
 
 def rate_family(using: Specimen | str | None = None, **changes: Any) -> SamplingDesign:
-    """Return the design of diverse rate functions, not of one law, from which a surrogate learns to serve any law.
+    """Return the design of diverse rate functions, not of one law, from which a surrogate learns to serve many.
 
     using : the specimen, by default the paper's dimple. changes : ranges of conditions, P1=(5, 20); grid=TimeGrid(...).
     """
@@ -166,7 +166,7 @@ def train(
 ) -> Surrogate:
     """Train a network on a data set, or its file, and return it as a predictor: identify(..., using=it).
 
-    recipe : ParameterGru() for the law of the data, RateNet() for any law.
+    recipe : ParameterGru() for the law of the data, RateNet() for any law without internal variables.
     to : file to write. Interrupted, the same call goes on where it was; done, it returns what the file holds.
     seed : of the split into training and validation rows, the first weights and the order of rows.
     training : epochs, rate and so on in the place of the recipe's. device : "auto" (a GPU where there is one), "cpu".

@@ -20,7 +20,7 @@ def command(
     data: Annotated[Path, typer.Argument(metavar="DATA", help="Data set that creepkit generate wrote.")],
     to: Annotated[Path, typer.Option(help="File of the surrogate; a checkpoint lies beside it meanwhile.")],
     recipe: Annotated[
-        str, typer.Option(help="parameter-gru, the paper's network of one law; or rate-net, for any law.")
+        str, typer.Option(help="parameter-gru, the paper's network of one law; or rate-net, for laws without states.")
     ] = "parameter-gru",
     hidden: Annotated[int | None, typer.Option(min=1, help="Width of a layer.")] = None,
     layers: Annotated[int | None, typer.Option(min=1, help="Layers.")] = None,

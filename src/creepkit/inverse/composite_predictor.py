@@ -202,6 +202,54 @@ def compared_outputs(predictor: Predictor, history: History) -> tuple[str, ...]:
     return tuple(name for name in known if name in history.outputs)
 
 
+def underlying_specimen(predictor: Predictor) -> Predictor:
+    """The specimen of a surrogate or a reduced-order model; anything else is taken for the specimen itself."""
+    if isinstance(predictor, CompositePredictor):
+        return CompositePredictor({name: underlying_specimen(p) for name, p in predictor.predictors.items()})
+    specimen: Predictor = getattr(predictor, "specimen", predictor)
+    return specimen
+
+
+def outside_class(predictor: Predictor, law: CreepLaw) -> str:
+    """Why a predictor does not know the class of a law, in a sentence; "" where it does, or knows every law."""
+    if isinstance(predictor, CompositePredictor):
+        return next(filter(None, (outside_class(p, law) for p in predictor.predictors.values())), "")
+    reason: str = predictor.outside_class(law) if hasattr(predictor, "outside_class") else ""
+    return reason
+
+
+def predictor_for_law(predictor: Predictor, law: CreepLaw) -> Predictor:
+    """The predictor itself, or its specimen where the law is outside the class of laws that it knows."""
+    if isinstance(predictor, CompositePredictor):
+        chosen = {name: predictor_for_law(p, law) for name, p in predictor.predictors.items()}
+        unchanged = all(chosen[name] is p for name, p in predictor.predictors.items())
+        return predictor if unchanged else CompositePredictor(chosen)
+    return underlying_specimen(predictor) if outside_class(predictor, law) else predictor
+
+
+def predictors_for_law(
+    law: CreepLaw, using: Predictor | Mapping[str, Predictor], through: Predictor | None
+) -> tuple[Predictor, Predictor | None, tuple[str, ...]]:
+    """Predictors that know a law, in the place of `using` and `through` of identify(), and notes of what changed."""
+    asked = CompositePredictor(dict(using)) if isinstance(using, Mapping) else using
+    chosen, notes = predictor_for_law(asked, law), []
+    if chosen is not asked:
+        notes.append(f"identified with {_name(chosen)} in the place of {_name(asked)}: {outside_class(asked, law)}")
+    on_the_way = through_for_law(through, law)
+    if through is not None and on_the_way is None:
+        notes.append(f"identified without {_name(through)} on the way: {outside_class(through, law)}")
+    return chosen, on_the_way, tuple(notes)
+
+
+def through_for_law(through: Predictor | None, law: CreepLaw) -> Predictor | None:
+    """A cheaper predictor on the way to the values, or None where it does not know the law."""
+    return None if through is None or outside_class(through, law) else through
+
+
+def _name(predictor: Predictor) -> str:
+    return f"'{getattr(predictor, 'name', type(predictor).__name__)}'"
+
+
 def reduced_order_model_of(predictor: Predictor) -> Predictor | None:
     """The reduced-order model of a predictor, or None where it has none."""
     if isinstance(predictor, CompositePredictor):

@@ -9,7 +9,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.composite_predictor import CompositePredictor
+from creepkit.inverse.composite_predictor import CompositePredictor, outside_class
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, errors_of_output
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.observation_vector import noise_standard_deviation, usable_frames
@@ -24,7 +24,11 @@ ACCEPTABLE_CHI_SQUARE = 2.0
 """Mean chi-square above which a law does not follow a test, whoever predicts it."""
 
 
-INCOMPLETE_STATUS = {Status.RUPTURED: "the specimen bursts", Status.NOT_CONVERGED: "the simulation stops"}
+INCOMPLETE_STATUS = {
+    Status.RUPTURED: "the specimen bursts",
+    Status.NOT_CONVERGED: "the simulation stops",
+    Status.OUTSIDE_CLASS: "which does not know this class of laws, the prediction ends",
+}
 
 
 @dataclass(frozen=True)
@@ -132,7 +136,8 @@ def confirm(fit: Identification, tests: Sequence[History], using: Predictor | Ma
         raise FitError(f"law '{fit.law.name}': there are no tests to confirm it with")
     predictor = CompositePredictor(dict(using)) if isinstance(using, Mapping) else using
     prediction = fit.predict(tests, predictor)
-    fit_prediction = None if fit.predictor is None else fit.predict(tests)
+    can_predict = fit.predictor is not None and not outside_class(fit.predictor, fit.law)
+    fit_prediction = fit.predict(tests) if can_predict else None
     name = getattr(predictor, "name", type(predictor).__name__)
     return Confirmation(
         fit.law.name, name, tuple(_confirmed_test(fit, prediction, fit_prediction, k, h) for k, h in enumerate(tests))

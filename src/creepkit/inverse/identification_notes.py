@@ -15,6 +15,7 @@ from creepkit.inverse.iterative_estimation import EstimationResult
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.observation_vector import usable_frames
+from creepkit.inverse.prediction_failures import tests_without_prediction
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_end_strain, reference_stresses
 from creepkit.language import temperature
@@ -111,13 +112,23 @@ def identification_notes(
 
 
 def domain_notes(prediction: Prediction, histories: Sequence[History]) -> tuple[str, ...]:
-    """The tests that lie outside what a surrogate was trained on, in one sentence."""
+    """Tests of which nothing is predicted, and those outside what a surrogate was trained on, a sentence each."""
+    sentences = []
+    missing = tests_without_prediction(prediction, histories)[0]
+    if missing.any():
+        names = [h.name for h, is_missing in zip(histories, missing, strict=True) if is_missing]
+        how = Status(int(prediction.status[0, int(missing.argmax())])).text
+        sentences.append(f"nothing is predicted of test {_named(names)}: {how}")
     outside = [h.name for h, s in zip(histories, prediction.status[0], strict=True) if s == Status.OUTSIDE_DOMAIN]
-    if not outside:
-        return ()
-    named_tests = f"'{outside[0]}'" + (f" and {len(outside) - 1} more" if len(outside) > 1 else "")
-    problem = "the identified law lies outside the domain that the surrogate was trained in"
-    return (f"{problem}, in test {named_tests}: simulate it with the specimen itself",)
+    if outside:
+        problem = "the identified law lies outside the domain that the surrogate was trained in"
+        sentences.append(f"{problem}, in test {_named(outside)}: simulate it with the specimen itself")
+    return tuple(sentences)
+
+
+def _named(tests: Sequence[str]) -> str:
+    """The first of some tests, and how many others there are."""
+    return f"'{tests[0]}'" + (f" and {len(tests) - 1} more" if len(tests) > 1 else "")
 
 
 def _large_strain_notes(histories: Sequence[History]) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,13 @@ from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.inverse.adequacy import adequacy_of
 from creepkit.inverse.bound_penalties import check_bounds
-from creepkit.inverse.composite_predictor import predict, prediction_errors_of, reduced_order_model_of, refined_of
+from creepkit.inverse.composite_predictor import (
+    predict,
+    prediction_errors_of,
+    predictors_for_law,
+    reduced_order_model_of,
+    refined_of,
+)
 from creepkit.inverse.defect_correction import NumericalError, correct_defect, with_correction_at_frames
 from creepkit.inverse.goodness_of_fit import compare_rupture_times, pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.identification import Identification
@@ -95,9 +101,16 @@ def identify(
     search : how to begin; by default least squares from several screened starts (MultiStart).
     through : a cheaper predictor, such as a surrogate, in which the minima of the search are refined before `using`:
         values and intervals are those of `using`.
+    A surrogate that does not know this class of laws is replaced by its specimen, or left out on the way; a note says
+    so.
     start : an estimate to begin from instead of a global search.
     """
     settings = settings or IdentificationSettings()
+    known, known_through, notes = predictors_for_law(law, using, through)
+    if notes:
+        how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
+        fit = identify(law, histories, known, through=known_through, **how)
+        return replace(fit, notes=(*fit.notes, *notes))
     with single_threaded_blas():
         problem = LeastSquaresProblem.from_histories(
             law, histories, using, settings, None if start is None else start.reference
@@ -248,6 +261,8 @@ def _result(
         list(histories),
         nuisances=problem.nuisance_parameters.predictor_values(x[count:]),
     )
+    if not problem.observations.followed_to_rupture.any():
+        problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
     law_covariance = covariance[:count, :count]
     ruptures = compare_rupture_times(

@@ -33,6 +33,7 @@ from creepkit.inverse.history_checks import check_creep, check_explicit_nuisance
 from creepkit.inverse.noise_model import Residuals, cholesky_factors, whiten
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history
+from creepkit.inverse.prediction_failures import PredictionFailures
 from creepkit.inverse.reference_conditions import ReferencePoint, median_log_inverse_duration, median_log_strain_rate
 from creepkit.inverse.residuals import (
     candidate_residuals,
@@ -70,10 +71,13 @@ in tension, leaves the Jacobian short of its rank, and scipy's steps are then al
 
 
 class EvaluationCache:
-    """The residuals of the last few points, and how many candidates were evaluated; one candidate is all tests once."""
+    """The residuals of the last few points, and how many candidates were evaluated; one candidate is all tests once.
+
+    failures : the candidates among them of which nothing was predicted.
+    """
 
     def __init__(self) -> None:
-        self.count = 0
+        self.count, self.failures = 0, PredictionFailures()
         self._residuals: dict[bytes, Residuals] = {}
 
     def residuals(self, key: bytes, evaluate: Callable[[], Residuals]) -> Residuals:
@@ -206,7 +210,9 @@ class LeastSquaresProblem:
     def candidate_residuals(self, u: Floats) -> Floats:
         """(candidates, tests, observations) - of u (candidates, parameters), nuisance parameters at their means."""
         self.evaluations.count += len(u)
-        return candidate_residuals(self.observations, self._prediction(u, jacobian=False), self.correction)
+        prediction = self._prediction(u, jacobian=False)
+        self.evaluations.failures.record(prediction, self.histories)
+        return candidate_residuals(self.observations, prediction, self.correction)
 
     def candidate_jacobian(self, u: Floats) -> tuple[Floats, Floats]:
         """Residuals (candidates, tests, observations) of u (candidates, parameters), and their derivatives to u.
@@ -219,6 +225,7 @@ class LeastSquaresProblem:
         if prediction.jacobian is None:
             return self._jacobian_one_by_one(u)
         self.evaluations.count += len(u)
+        self.evaluations.failures.record(prediction, self.histories)
         values, internal_jacobian = candidate_residuals_and_jacobian(self.observations, prediction, self.correction)
         jacobian = np.einsum("ctep,cpq->cteq", internal_jacobian, self.coordinates.jacobian(u))
         return values, np.where(self.observations.present[..., None], jacobian, 0.0)
@@ -236,6 +243,11 @@ class LeastSquaresProblem:
         nuisances = replace(self.nuisance_parameters, fixed=True).predictor_values(np.zeros(0))
         return predict(self.predictor, self.law, theta, histories, nuisances=nuisances, sensitivities=jacobian)
 
+    def check_predicted(self, u: Floats) -> None:
+        """FitError, with counts over all that were tried, where nothing is predicted at u (candidates, parameters)."""
+        prediction = self._prediction(u, jacobian=False)
+        self.evaluations.failures.check(prediction, self.histories, self.law.name)
+
     def _evaluated(self, x: Floats) -> Residuals:
         u, e = x[: self.parameter_count], x[self.parameter_count :]
         theta = self.coordinates.theta(u)
@@ -245,6 +257,7 @@ class LeastSquaresProblem:
             prediction = predict_with_sensitivities(
                 self.predictor, self.law, theta, self.histories, self.nuisance_parameters.predictor_values(e)
             )
+        self.evaluations.failures.record(prediction, self.histories)
         coefficients = self.coordinates.coefficients
         every_rate_has_one = len(coefficients) == len(self.law.terms) + len(self.law.states)
         residuals = residuals_of_prediction(

@@ -37,6 +37,7 @@ from creepkit.records.prediction_assembly import (
     assemble_prediction,
     broadcast_candidates,
     check_nuisances,
+    unpredicted,
 )
 
 __all__ = [
@@ -74,4 +75,5 @@ __all__ = [
     "constant_strain",
     "constant_stress",
     "output_unit",
+    "unpredicted",
 ]

@@ -72,8 +72,9 @@ class Predictor(Protocol):
     Optional attributes, looked for by name: `outputs`, the names of what is predicted, first the one that grows with
     creep; `nuisances`, the kinds of explicit nuisances that predict() understands (none without it);
     `reference_stress(history)`, the von Mises stress, MPa, that stands for the test (a number, or one for each level
-    of its loading); `reduced_order_model()` and `refined()`, see
-    SupportsReducedOrderModel and SupportsRefinement.
+    of its loading); `reduced_order_model()` and `refined()`, see SupportsReducedOrderModel and SupportsRefinement;
+    `specimen`, that a surrogate stands for; `outside_class(law)`, why it does not know the class of a law, in a
+    sentence, or "" where it does.
     """
 
     def predict(

@@ -17,12 +17,31 @@ NuisanceValues: TypeAlias = Mapping[str, Floats]
 
 
 class Status(IntEnum):
-    """How a predicted row ended."""
+    """How a predicted row ended.
+
+    OUTSIDE_DOMAIN : a surrogate extrapolates; the values are there. OUTSIDE_CLASS : the law is none that the surrogate
+    knows; all values are NaN, and the prediction says why in `reason`.
+    """
 
     COMPLETE = 0
     RUPTURED = 1
     NOT_CONVERGED = 2
     OUTSIDE_DOMAIN = 3
+    OUTSIDE_CLASS = 4
+
+    @property
+    def text(self) -> str:
+        """It in words."""
+        return STATUS_TEXT[self]
+
+
+STATUS_TEXT = {
+    Status.COMPLETE: "complete",
+    Status.RUPTURED: "burst",
+    Status.NOT_CONVERGED: "not converged",
+    Status.OUTSIDE_DOMAIN: "outside the domain",
+    Status.OUTSIDE_CLASS: "outside the class of laws",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +80,7 @@ class Prediction:
     nuisance_jacobian : {kind: (candidates, tests, times, outputs)}: derivatives with respect to each test's own
         nuisance, in the unit of that kind (see Nuisance); without the kinds that the predictor cannot differentiate.
     times_to_strain : when measured strains and rupture are reached, where that was asked for (see TimesToStrain).
+    reason : why nothing is predicted, in a sentence, where a predictor refuses the law.
     """
 
     values: Floats
@@ -72,6 +92,7 @@ class Prediction:
     times: tuple[Floats, ...] = ()
     nuisance_jacobian: Mapping[str, Floats] = field(default_factory=dict)
     times_to_strain: TimesToStrain | None = None
+    reason: str = ""
 
     def of(self, test: int, candidate: int = 0) -> Floats:
         """Outputs of one test, (times, outputs)."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import CreepkitError, SolveError
 from creepkit.records.history import History
-from creepkit.records.prediction import NuisanceValues, Prediction
+from creepkit.records.prediction import NuisanceValues, Prediction, Status
 
 
 def check_nuisances(
@@ -74,6 +74,21 @@ def assemble_prediction(
         times=tuple(h.times for h in histories),
         nuisance_jacobian={kind: _padded([part.nuisance_jacobian[kind] for part in parts], shape) for kind in kinds},
     )
+
+
+def unpredicted(
+    histories: Sequence[History], outputs: tuple[str, ...], candidates: int, status: Status, reason: str
+) -> Prediction:
+    """Return the prediction of a predictor that refuses: NaN throughout, with one status and the reason."""
+    parts = [
+        HistoryPrediction(
+            np.full((candidates, h.times.size, len(outputs)), np.nan),
+            np.full(candidates, int(status)),
+            np.zeros(candidates),
+        )
+        for h in histories
+    ]
+    return replace(assemble_prediction(parts, histories, outputs, candidates), reason=reason)
 
 
 def _padded(arrays: Sequence[Floats], shape: tuple[int, ...]) -> Floats:

@@ -124,9 +124,9 @@ ERROR_HEADS = ("RSE (Eq. 4)", "MSE", "MAE", "R2", "largest error, median", "95 %
 
 
 def surrogate_text(surrogate: Surrogate) -> str:
-    """Title, errors on the validation rows for each output, and where it came from."""
+    """Title, class of laws, errors on the validation rows for each output, and where it came from."""
     metadata = surrogate.metadata
-    lines, metrics = [surrogate.title], metadata.metrics
+    lines, metrics = [surrogate.title, f"predicts {surrogate.law_class}"], metadata.metrics
     if metrics:
         rows = {
             name: [_number_text(errors_of_output[c]) for c in ERROR_COLUMNS]

@@ -21,7 +21,7 @@ import numpy as np
 
 from creepkit.errors import CreepkitError, DatasetError
 from creepkit.files.json_documents import canonical_json
-from creepkit.inverse.composite_predictor import CompositePredictor
+from creepkit.inverse.composite_predictor import CompositePredictor, predictor_for_law, underlying_specimen
 from creepkit.inverse.confirmation import Confirmation, confirm, outside_domain
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
@@ -51,14 +51,6 @@ def single_threaded(predictor: Predictor) -> Predictor:
     if getattr(untyped, "threads", 1) == 1:
         return predictor
     return untyped.replace(threads=1)  # type: ignore[no-any-return]
-
-
-def underlying_specimen(predictor: Predictor) -> Predictor:
-    """The specimen of a surrogate or a reduced-order model; anything else is taken for the specimen itself."""
-    untyped: Any = predictor
-    if isinstance(untyped, CompositePredictor):
-        return CompositePredictor({name: underlying_specimen(p) for name, p in untyped.predictors.items()})
-    return getattr(untyped, "specimen", predictor)
 
 
 def predictor_fingerprint(predictor: Predictor) -> str:
@@ -113,7 +105,7 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
         dense_fit=dense,
         sparse_fit=sparse,
         confirmation=confirmation,
-        predicted=_predict_tests(best, alloy.tests, predictor),
+        predicted=_predict_tests(best, alloy.tests, predictor_for_law(predictor, best.law)),
         notes=(*notes, *best.notes),
     )
 

@@ -17,15 +17,6 @@ if TYPE_CHECKING:
     from creepkit.language import CreepLaw
 
 
-STATUS_TEXT = {
-    Status.COMPLETE: "",
-    Status.RUPTURED: "burst",
-    Status.NOT_CONVERGED: "not converged",
-    Status.OUTSIDE_DOMAIN: "outside the domain",
-}
-"""What a status means where no reason is given."""
-
-
 _RunType = TypeVar("_RunType", bound="Run")
 
 
@@ -61,12 +52,14 @@ def run_from_outputs(
     reason: str = "",
     **more: Any,
 ) -> _RunType:
-    """The run of a plan: its frames up to the end; SolveError if it ended before any of them.
+    """The run of a plan: its frames up to the end; SolveError if it ended before any of them, or the law was refused.
 
     rows : (times, names) outputs at the times of the plan. Further keywords are fields that this kind of run has
     beside those of Run.
     """
-    reason = reason or STATUS_TEXT[status]
+    reason = reason or ("" if status is Status.COMPLETE else status.text)
+    if status is Status.OUTSIDE_CLASS:
+        raise SolveError(reason)
     reached = np.isfinite(rows).all(axis=1)
     labels = dict(plan.labels)
     if status is not Status.COMPLETE:

@@ -25,6 +25,7 @@ from creepkit.records import (
     broadcast_candidates,
 )
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
+from creepkit.surrogates.law_class import LawClass
 from creepkit.surrogates.parameter_inputs import (
     CONSTANT_INPUTS,
     SERIES_INPUTS,
@@ -35,12 +36,12 @@ from creepkit.surrogates.parameter_inputs import (
     hold_last_value,
     load_history_arrays,
     reduced_order_model_of,
+    zero_coefficients,
 )
 from creepkit.surrogates.parameter_network import ParameterModule, RecurrentCell, recurrent_with_derivatives
 from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, SurrogateModule, Training
 from creepkit.surrogates.surrogate import (
     Surrogate,
-    check_applicable,
     interpolation_weights,
     observation_derivative,
     observed_outputs,
@@ -92,6 +93,10 @@ class ParameterGru:
                 raise SurrogateError(f"ParameterGru: there is no input '{name}': {nearest(name, SERIES_INPUTS)}")
 
     # ---- for the training ------------------------------------------------------------------------------------------
+
+    def law_class(self, law: CreepLaw) -> LawClass:
+        """The law of the data, and its reductions: its parameters are the inputs."""
+        return LawClass.of_law(law)
 
     def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:
         """Tensors of a data set: constants, series, targets, mask, base, and "domain" for the applicability domain."""
@@ -224,17 +229,23 @@ class ParameterSurrogate(Surrogate):
         """The nuisances whose inputs were varied."""
         return tuple(NUISANCE_OF_INPUT[name] for name in self._history_inputs.constants)
 
-    def predict(
+    def outside_class(self, law: CreepLaw) -> str:
+        """Why it does not predict a law, in a sentence; "" where it does."""
+        try:
+            zero_coefficients(self.metadata.law, law)
+        except SurrogateError as error:
+            return str(error)
+        return ""
+
+    def _predict(
         self,
         law: CreepLaw,
         theta: Floats,
         histories: Sequence[History],
-        *,
-        nuisances: NuisanceValues | None = None,
-        sensitivities: bool = False,
+        nuisances: NuisanceValues | None,
+        sensitivities: bool,
     ) -> Prediction:
-        """Predict each history's outputs at its times; see Surrogate.predict. theta : (candidates, parameters)."""
-        check_applicable(self.metadata, histories, nuisances or (), self.nuisances)
+        """Predict each history's outputs at its times; theta : (candidates, parameters)."""
         complete_theta = complete_parameters(self.metadata.law, law, theta)
         complete_theta, nuisances = broadcast_candidates(complete_theta, nuisances, len(histories))
         frames = prediction_frames(self.metadata.grid, histories)

@@ -240,7 +240,7 @@ def complete_parameters(trained: CreepLaw, law: CreepLaw, theta: Floats) -> Floa
 
     theta : (candidates, parameters of `law`). Returns (candidates, parameters of the trained law).
     """
-    zero_names = _zero_coefficients(trained, law)
+    zero_names = zero_coefficients(trained, law)
     columns = []
     for name, param in trained.table.items():
         if name in law.names:
@@ -251,8 +251,8 @@ def complete_parameters(trained: CreepLaw, law: CreepLaw, theta: Floats) -> Floa
 
 
 @lru_cache(maxsize=256)
-def _zero_coefficients(trained: CreepLaw, law: CreepLaw) -> frozenset[str]:
-    """Names of the coefficients of the trained law that are zero in `law`."""
+def zero_coefficients(trained: CreepLaw, law: CreepLaw) -> frozenset[str]:
+    """Names of the coefficients of the trained law that are zero in `law`; SurrogateError if it is no reduction."""
     if law.fingerprint == trained.fingerprint:
         return frozenset()
     terms = list(law.terms.values())

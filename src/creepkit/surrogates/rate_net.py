@@ -34,6 +34,7 @@ from creepkit.specimens.bulge.reduced_order.step_solution import NUISANCE_DIRECT
 from creepkit.specimens.bulge.reduced_order.trajectories import Trajectories, TrajectoryOptions, simulate_trajectories
 from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
+from creepkit.surrogates.law_class import LawClass
 from creepkit.surrogates.rate_network import (
     BASE_COLUMNS,
     RateModule,
@@ -43,7 +44,7 @@ from creepkit.surrogates.rate_network import (
     with_running_means,
 )
 from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, SurrogateModule, Training
-from creepkit.surrogates.surrogate import Surrogate, check_applicable
+from creepkit.surrogates.surrogate import Surrogate
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
@@ -106,9 +107,21 @@ class RateNet:
 
     # ---- for the training ------------------------------------------------------------------------------------------
 
+    def law_class(self, law: CreepLaw) -> LawClass:
+        """Rates of stress, strain, time and temperature, whatever the law of the data.
+
+        The inputs are rates along one path. Internal variables have another value at each point of the dimple, and the
+        largest principal and the mean stress another ratio to the von Mises stress, of which the path knows nothing.
+        """
+        return LawClass(("stress", "strain", "time", "temperature"))
+
     def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:
         """Tensors of a data set: inputs and base at nodes, weights of frames, targets and masks."""
-        specimen = bulge_of(data)
+        specimen, reason = bulge_of(data), self.law_class(data.law).reason_outside(data.law)
+        if reason:
+            raise DatasetError(
+                f"law '{data.law.name}' of the data set {reason}, which RateNet is not given; train a ParameterGru"
+            )
         law = kernels.lower(data.law, "numba")
         theta = data.law.to_internal(data.parameters)
         trajectories = []
@@ -232,7 +245,7 @@ class NodeOutputs(NamedTuple):
 
 
 class RateSurrogate(Surrogate):
-    """The reduced-order model of a dimple, corrected by a network; for any law."""
+    """The reduced-order model of a dimple, corrected by a network of creep rates."""
 
     recipe: RateNet
     nuisances = NUISANCE_DIRECTIONS
@@ -240,19 +253,17 @@ class RateSurrogate(Surrogate):
     @property
     def title(self) -> str:
         """One line for people."""
-        return f"{self.specimen.title}, by a network of creep rates; for any law"
+        return f"{self.specimen.title}, by a network of creep rates"
 
-    def predict(
+    def _predict(
         self,
         law: CreepLaw,
         theta: Floats,
         histories: Sequence[History],
-        *,
-        nuisances: NuisanceValues | None = None,
-        sensitivities: bool = False,
+        nuisances: NuisanceValues | None,
+        sensitivities: bool,
     ) -> Prediction:
-        """Predict each history's outputs at its times; see Surrogate.predict. theta : (candidates, parameters)."""
-        check_applicable(self.metadata, histories, nuisances or (), self.nuisances)
+        """Predict each history's outputs at its times; theta : (candidates, parameters)."""
         specimen, compiled = self.specimen, kernels.lower(law, "numba")
         assert isinstance(specimen, Bulge)
         theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
@@ -19,13 +20,17 @@ from creepkit.records import (
     Prediction,
     Predictor,
     Specimen,
+    Status,
     SupportsReducedOrderModel,
     SupportsRefinement,
+    broadcast_candidates,
     check_nuisances,
+    unpredicted,
 )
 from creepkit.sampling.conditions import TimeGrid, test_kind
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.surrogates.law_class import LawClass
 from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, SurrogateModule, Training
 from creepkit.surrogates.weight_files import CODEC, write_weights
 
@@ -153,7 +158,18 @@ class Surrogate(Presentable, ABC):
         """Names of what is predicted."""
         return self.metadata.outputs
 
-    @abstractmethod
+    @property
+    def law_class(self) -> LawClass:
+        """The laws that it predicts."""
+        return self.metadata.law_class or self.recipe.law_class(self.metadata.law)
+
+    def outside_class(self, law: CreepLaw) -> str:
+        """Why it does not predict a law, in a sentence; "" where it does."""
+        reason = self.law_class.reason_outside(law)
+        if not reason:
+            return ""
+        return f"law '{law.name}' {reason}, and the surrogate '{self.name}' predicts {self.law_class}"
+
     def predict(
         self,
         law: CreepLaw,
@@ -165,8 +181,27 @@ class Surrogate(Presentable, ABC):
     ) -> Prediction:
         """Predict each history's outputs at its times; see records.Predictor. theta : (candidates, parameters).
 
-        A row outside the domain of the training has its values all the same, and Status.OUTSIDE_DOMAIN.
+        A row outside the domain of the training has its values all the same, and Status.OUTSIDE_DOMAIN. A law outside
+        the class of the training has Status.OUTSIDE_CLASS, a `reason`, and NaN: nothing bounds the error there.
         """
+        check_applicable(self.metadata, histories, nuisances or (), self.nuisances)
+        reason = self.outside_class(law)
+        if reason:
+            candidates = len(broadcast_candidates(theta, nuisances, len(histories))[0])
+            remedy = f"simulate it with the specimen '{self.specimen.name}' itself"
+            return unpredicted(histories, self.outputs, candidates, Status.OUTSIDE_CLASS, f"{reason}; {remedy}")
+        return self._predict(law, theta, histories, nuisances, sensitivities)
+
+    @abstractmethod
+    def _predict(
+        self,
+        law: CreepLaw,
+        theta: Floats,
+        histories: Sequence[History],
+        nuisances: NuisanceValues | None,
+        sensitivities: bool,
+    ) -> Prediction:
+        """As predict(), of a law and of histories that were checked."""
 
     @property
     def error(self) -> dict[str, float]:
@@ -213,7 +248,8 @@ class Surrogate(Presentable, ABC):
     @property
     def file_header(self) -> dict[str, Any]:
         """Everything that a file says beside the weights."""
-        recipe, metadata = CODEC.to_json(self.recipe), CODEC.to_json(self.metadata)
+        metadata = replace(self.metadata, law_class=self.law_class)
+        recipe, metadata = CODEC.to_json(self.recipe), CODEC.to_json(metadata)
         return {"kind": self.recipe.kind, "recipe": recipe, "metadata": metadata}
 
     def save(self, path: str | Path) -> Path:
@@ -240,6 +276,10 @@ class Recipe(Protocol):
     @property
     def training(self) -> Training:
         """How it is trained, unless train() is given other settings; a field."""
+        ...
+
+    def law_class(self, law: CreepLaw) -> LawClass:
+        """The laws that are predicted after a training on simulations of `law`."""
         ...
 
     def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:

@@ -15,6 +15,7 @@ from creepkit.readers.history_csv import write_history
 from creepkit.screening import files
 from creepkit.screening.alloys import Compositions
 from creepkit.screening.screen import ScreeningOptions, screen
+from helpers.narrow_predictor import Narrow
 from helpers.planted_alloys import NORTON, Deadly, Doubting, bars, bulge
 
 QUICK = IdentificationSettings(starts=2, sobol_points=16)
@@ -112,6 +113,17 @@ def test_where_a_guard_doubts_the_specimen_is_asked(excess, holds):
 
 
 # ---- kept, and done again ------------------------------------------------------------------------------------------
+
+
+def test_laws_outside_the_class_of_a_surrogate_are_the_specimens_own():
+    """Values, curves and the place of the law among the others are those of the bars; a note says by what."""
+    narrow, itself = (screened(TWO[:3], using=using)["X"] for using in (Narrow(), specimen("uniaxial")))
+    assert narrow.best.law.name == "norton"
+    assert narrow.best.values == itself.best.values
+    assert "identified with 'uniaxial' in the place of 'narrow': law 'norton' is none of its laws" in narrow.notes
+    for name, outputs in itself.predicted.items():
+        assert np.isfinite(narrow.predicted[name]["strain"]).all()
+        assert narrow.predicted[name]["strain"] == pytest.approx(outputs["strain"])
 
 
 def test_an_answer_is_read_back_as_it_was(plate, tmp_path):

@@ -17,6 +17,7 @@ from creepkit.surrogates.rate_net import RateNet, RateSurrogate
 from creepkit.surrogates.recipe import Training
 from creepkit.surrogates.training import train
 from creepkit.surrogates.training_loop import training_split
+from helpers.laws_with_states import BACK_STRESS, COUNTED, VALUES
 from helpers.planted_datasets import HOURS, bars, measured, rates, unsimulated_rates
 
 HOW = Training(epochs=60, batch=8, rate=3e-3, schedule="cosine", clip=1.0)
@@ -94,11 +95,8 @@ GRAHAM_WALLES = (
     ck.law("graham-walles"),
     {"C_1": 3e-12, "n_1": 3.2, "C_2": 2e-18, "n_2": 5.0, "C_3": 1e-30, "n_3": 6.0},
 )
+OUTPUT = COUNTED, VALUES[COUNTED]
 WARM = NORTON.with_temperature(n=ck.linear(T_ref=1000.0, slope=(-0.01, 0.01))), {**norton(4.0), "n_T": 0.004}
-DAMAGE = (
-    ck.law("kachanov-rabotnov"),
-    {"A": 1e-13, "n": 3.0, "B": 1e-10, "chi": 3.0, "phi": 3.0, "alpha": 0.5, "m": -0.2},
-)
 
 
 @pytest.mark.parametrize(("law", "values"), [SINH, SUM, GRAHAM_WALLES], ids=["sinh", "sum", "graham-walles"])
@@ -113,7 +111,7 @@ def test_laws_never_seen_are_as_finite_elements_have_them(learnt: RateSurrogate,
 # ---- derivatives -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("law", "values"), [(NORTON, norton(5.0)), DAMAGE, WARM], ids=["norton", "damage", "warm"])
+@pytest.mark.parametrize(("law", "values"), [(NORTON, norton(5.0)), OUTPUT, WARM], ids=["norton", "output", "warm"])
 def test_jacobians_are_central_differences(exact: RateSurrogate, law, values) -> None:
     test = dimple(end=4 * HOURS, elastic=ck.Elastic(E=1.5e5 - 50.0 * symbols.temperature))
     at = {"thickness": np.array([[0.51]]), "modulus": np.array([[0.02]]), "temperature": np.array([[3.0]])}
@@ -265,3 +263,9 @@ def test_an_answer_outside_the_domain_says_so_wherever_it_is_told(guarded: RateS
     assert f"note: {told}" in str(fit)
     fit.save(tmp_path / "fit.json")
     assert told in (tmp_path / "fit.json").read_text()
+
+
+def test_a_law_whose_state_acts_back_teaches_it_nothing(family: Dataset) -> None:
+    """Its inputs are rates along one path, and the state has another value at each point of the dimple."""
+    with pytest.raises(DatasetError, match=r"internal variables that act back \(b\), which RateNet is not given"):
+        RECIPE.sample_tensors(replace(family, law=BACK_STRESS))

@@ -38,8 +38,9 @@ class MultiStart:
     def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
         """The minima of all starts, best first; a sum's best single term stands behind the best."""
         starts, draws = self.starts or problem.settings.starts, self.draws or problem.settings.sobol_points
-        singles = single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2)
-        initial_points = [*singles, *screened_starts(problem, starts=starts, draws=draws)]
+        screened = screened_starts(problem, starts=starts, draws=draws)
+        problem.check_predicted(np.array(screened))  # from where nothing is predicted, no direction leads away
+        initial_points = [*single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2), *screened]
         costs: list[Floats] = []
         minima = batched_levenberg_marquardt(problem, initial_points, progress=progress, costs=costs)
         return SearchResult(tuple(minima), SearchTrace.from_costs("multi-start", costs) if costs else None)

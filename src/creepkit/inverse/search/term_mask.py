@@ -172,6 +172,7 @@ def refine_candidates(
 ) -> SearchResult:
     """The best different candidates refined, best first; with max_count=0 the best one as it is."""
     selected = candidates.most_different(problem.bounds.width, max(max_count, 1))
+    problem.check_predicted(candidates.u[selected])
     if max_count == 0:
         k = selected[0]
         best, cost = candidates.u[k], float(candidates.cost[k])

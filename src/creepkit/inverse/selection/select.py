@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from creepkit.errors import CreepkitError, FitError
+from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import StartingEstimate, identify
@@ -143,11 +144,11 @@ def _identify_all(
 ) -> list[Identification]:
     """The laws that can be identified; the others go to `failed`.
 
-    through : all laws are identified with it first, and those far behind keep their values from it.
+    through : all laws that it knows are identified with it first, and those far behind keep their values from it.
     """
-    first_predictor, fits = through or using, []
+    fits = []
     for k, law in enumerate(laws):
-        fit = _try_to_identify(law, histories, first_predictor, settings, failed)
+        fit = _try_to_identify(law, histories, through_for_law(through, law) or using, settings, failed)
         fits += [fit] if fit is not None else []
         if progress is not None:
             progress("law", k + 1, len(laws))

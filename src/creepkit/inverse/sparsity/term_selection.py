@@ -14,6 +14,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import StartingEstimate, identify
 from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
@@ -237,7 +238,7 @@ def identify_full(
             "identify it without penalty, or a sum of laws with it"
         )
     full = identify(law, histories, using, settings=settings, through=through, progress=progress)
-    return full, ReducedLaws(TermProblem.from_identification(full, through))
+    return full, ReducedLaws(TermProblem.from_identification(full, through_for_law(through, law)))
 
 
 def confirmed_law(reductions: ReducedLaws, choice: TermChoice) -> ReducedLaw:

@@ -25,6 +25,7 @@ import numpy as np
 
 from creepkit.arrays import ArrayLike, Bools, Floats, single_threaded_blas
 from creepkit.errors import FitError
+from creepkit.inverse.composite_predictor import predictor_for_law
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import determined_parameters
@@ -294,7 +295,8 @@ def sample_posterior(
             f"{walkers} walkers and {steps} steps were asked for; a law of {size} parameters needs an even number of "
             f"at least {2 * size + 2} walkers, and at least 10 steps"
         )
-    posterior = Posterior.from_identification(fit if using is None else fit.with_histories(fit.histories, using))
+    sampled = fit if using is None else fit.with_histories(fit.histories, predictor_for_law(using, fit.law))
+    posterior = Posterior.from_identification(sampled)
     rng = np.random.default_rng(seed)
     moves = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)]
     sampler = emcee.EnsembleSampler(walkers, size, posterior, vectorize=True, moves=moves)

@@ -1,0 +1,29 @@
+"""A predictor in the place of a surrogate: bars themselves, but for laws that it does not know."""
+
+from dataclasses import dataclass
+
+import creepkit as ck
+from creepkit.records import Predictor, Status, unpredicted
+
+BARS = ck.specimen("uniaxial")
+
+
+@dataclass(frozen=True)
+class Narrow:
+    """Knows all laws but those named in `unknown`, of which it predicts nothing."""
+
+    unknown: tuple[str, ...] = ("norton",)
+    name: str = "narrow"
+    outputs: tuple[str, ...] = ("strain",)
+
+    @property
+    def specimen(self) -> Predictor:
+        return BARS
+
+    def outside_class(self, law: ck.CreepLaw) -> str:
+        return f"law '{law.name}' is none of its laws" if law.name in self.unknown else ""
+
+    def predict(self, law, theta, histories, *, nuisances=None, sensitivities=False):
+        if self.outside_class(law):
+            return unpredicted(histories, self.outputs, len(theta), Status.OUTSIDE_CLASS, self.outside_class(law))
+        return BARS.predict(law, theta, histories, sensitivities=sensitivities)

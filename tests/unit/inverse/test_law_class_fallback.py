@@ -1,0 +1,105 @@
+"""Laws that a surrogate does not know are identified with its specimen: alone, in a mixed list, and on the way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import creepkit as ck
+from creepkit.inverse.composite_predictor import CompositePredictor, outside_class, predictor_for_law
+from creepkit.inverse.confirmation import confirm
+from creepkit.inverse.identify import identify
+from creepkit.inverse.selection.select import select
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.records import History, constant_stress
+from helpers.narrow_predictor import Narrow
+
+BARS = ck.specimen("uniaxial")
+NORTON, HARDENING = ck.law("norton"), ck.law("strain-hardening")
+TRUTH = {"A": 2e-16, "n": 4.6}
+TIMES = np.geomspace(600.0, 2e5, 12)
+FEW = {"starts": 2, "sobol_points": 32}
+
+
+@pytest.fixture(scope="module")
+def tests() -> list[History]:
+    rng = np.random.default_rng(1)
+    runs = [
+        ck.simulate(NORTON, BARS, TRUTH, loading=constant_stress(s, control="stress"), times=TIMES)
+        for s in (60.0, 80.0, 110.0)
+    ]
+    return [
+        History(
+            f"bar {k}",
+            TIMES,
+            {"strain": run.outputs["strain"] * (1 + 0.02 * rng.standard_normal(12))},
+            run.loading,
+            run.temperature,
+        )
+        for k, run in enumerate(runs)
+    ]
+
+
+def settings(**changes):
+    return IdentificationSettings(**{**FEW, **changes})
+
+
+def test_the_specimen_takes_the_place_of_the_surrogate(tests: list[History]) -> None:
+    found = identify(NORTON, tests, Narrow(), settings=settings())
+    true = identify(NORTON, tests, BARS, settings=settings())
+    assert found.values == true.values
+    assert found.predictor is BARS
+    assert found.notes == (
+        *true.notes,
+        "identified with 'uniaxial' in the place of 'narrow': law 'norton' is none of its laws",
+    )
+
+
+def test_on_the_way_it_is_left_out(tests: list[History]) -> None:
+    found = identify(NORTON, tests, BARS, through=Narrow(), settings=settings())
+    assert found.values == identify(NORTON, tests, BARS, settings=settings()).values
+    assert found.notes[-1] == "identified without 'narrow' on the way: law 'norton' is none of its laws"
+
+
+def test_a_law_that_it_knows_is_left_to_it(tests: list[History]) -> None:
+    surrogate = Narrow(unknown=())
+    found = identify(NORTON, tests, surrogate, through=surrogate, settings=settings())
+    assert found.predictor is surrogate
+    assert not any("narrow" in note for note in found.notes)
+
+
+def test_a_mixed_list_is_ranked_on_the_same_data(tests: list[History]) -> None:
+    found = select([NORTON, HARDENING], tests, Narrow(), settings=settings(frames=12))
+    true = select([NORTON, HARDENING], tests, BARS, settings=settings(frames=12))
+    assert [r.fit.law.name for r in found.laws] == [r.fit.law.name for r in true.laws]
+    assert [r.weight for r in found.laws] == pytest.approx([r.weight for r in true.laws])
+    fits = {r.fit.law.name: r.fit for r in found.laws}
+    assert fits["norton"].provenance["data"] == fits["strain-hardening"].provenance["data"]
+    assert fits["norton"].provenance["specimen"] == "uniaxial"
+    assert fits["strain-hardening"].provenance["specimen"] == "narrow"
+    assert "in the place of 'narrow'" in fits["norton"].notes[-1]
+
+
+def test_select_through_it_takes_the_specimen_for_the_others(tests: list[History]) -> None:
+    found = select([NORTON, HARDENING], tests, BARS, through=Narrow(), settings=settings(frames=12))
+    assert not found.failed
+    assert found.best.law.name == "norton"
+    assert found.best.values["n"] == pytest.approx(TRUTH["n"], rel=0.05)
+
+
+def test_it_confirms_nothing_of_a_law_that_it_does_not_know(tests: list[History]) -> None:
+    """A loaded fit may be given any predictor; what the specimen says is then compared with what the fit reported."""
+    fit = identify(NORTON, tests, BARS, settings=settings())
+    found = confirm(replace(fit, predictor=Narrow()), tests, BARS)
+    assert found.confirmed
+    assert found.noise_ratio == pytest.approx(0.0, abs=1e-3)
+
+
+def test_each_specimen_of_several_has_its_own_answer() -> None:
+    both = CompositePredictor({"uniaxial": Narrow(), "bulge": BARS})
+    chosen = predictor_for_law(both, NORTON)
+    assert isinstance(chosen, CompositePredictor)
+    assert chosen.predictors == {"uniaxial": BARS, "bulge": BARS}
+    assert predictor_for_law(both, HARDENING) is both
+    assert outside_class(both, NORTON) == "law 'norton' is none of its laws"
+    assert outside_class(BARS, NORTON) == ""
