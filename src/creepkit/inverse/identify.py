@@ -13,6 +13,7 @@ from creepkit.errors import FitError
 from creepkit.inverse.bound_penalties import check_bounds
 from creepkit.inverse.composite_predictor import predict, prediction_errors_of, reduced_order_model_of
 from creepkit.inverse.goodness_of_fit import compare_rupture_times, pooled_errors, pooled_log_strain_rms, test_fits
+from creepkit.inverse.history_checks import suspect_frames_note
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_notes import domain_notes, fitted_ranges, identification_notes, provenance_of
 from creepkit.inverse.iterative_estimation import (
@@ -247,7 +248,11 @@ def _result(histories: Sequence[History], best: EstimationResult, search_outcome
         errors=pooled_errors(histories, prediction, tests),
         nuisances=nuisance_estimates,
         converged=best.minimum.converged,
-        notes=(*identification_notes(best, tests, nuisance_estimates), *domain_notes(prediction, histories)),
+        notes=(
+            *suspect_frames_note(histories),
+            *identification_notes(best, tests, nuisance_estimates),
+            *domain_notes(prediction, histories),
+        ),
         histories=tuple(histories),
         predictor=problem.predictor,
         search_trace=search_outcome.trace,

@@ -80,6 +80,15 @@ def fix(law: Law, values: Mapping[str, float]) -> Law:
     return _substituted(law, replacements, f"{law.name}({description})", f"{law.title} with {description}")
 
 
+def with_bounds(law: Law, bounds: Mapping[str, tuple[float, float]]) -> Law:
+    """Change bounds of parameters; LawError for an unknown parameter and for what bounds cannot be."""
+    params = dict(law.params)
+    for name, limits in bounds.items():
+        symbol = law.symbol(name)
+        params[symbol] = replace(params[symbol], bounds=limits)
+    return replace(law, params=params) if bounds else law
+
+
 def times(law: Law, factor: TemperatureFactor) -> Law:
     """Multiply every term (not the rates of internal variables) by a factor of temperature."""
     if not isinstance(factor, TemperatureFactor):
