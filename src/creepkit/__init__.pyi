@@ -30,6 +30,7 @@ from .fem.mesh_files import read_mesh as read_mesh
 from .hookspecs import hookimpl as hookimpl
 from .inverse.cross_validation import cross_validate as cross_validate
 from .inverse.goodness_of_fit import relative_squared_error as relative_squared_error
+from .inverse.reference_conditions import with_arrhenius as with_arrhenius
 from .inverse.search.derivative_free import CmaEs as CmaEs
 from .inverse.search.derivative_free import ParticleSwarm as ParticleSwarm
 from .inverse.search.multistart import MultiStart as MultiStart
@@ -64,6 +65,7 @@ from .language.temperature_forms import inverse_temperature as inverse_temperatu
 from .language.temperature_forms import linear as linear
 from .readers.history_csv import write_history as write_history
 from .records.history import History as History
+from .records.history_selection import select_tests as select_tests
 from .records.law_with_values import LawWithValues as LawWithValues
 from .records.law_with_values import Units as Units
 from .records.loading import PointLoading as PointLoading

@@ -82,6 +82,7 @@ BENCHMARKS = {
     "measured_creep": Benchmark(90, needs=DATA),
     "whole_life": Benchmark(60, needs=DATA),
     "rupture_coverage": Benchmark(4),
+    "weights": Benchmark(8),
     "structure": Benchmark(0.1),
 }
 """{name of the program: what it costs and how it is run}."""

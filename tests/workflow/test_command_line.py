@@ -234,7 +234,7 @@ def test_a_cut_forgets_how_every_test_ended():
 
 
 def test_laws_are_ranked_by_likelihood_and_further_tests_are_told(tmp_path):
-    words = ("--law", "norton", "--law", "hyperbolic-sine", "--weights", "likelihood", "--further-tests", "--starts", 2)
+    words = ("--law", "norton", "--law", "hyperbolic-sine", "--further-tests", "--starts", 2)
     result = creepkit("identify", *CURVES[:3], *words, "--to", tmp_path / "out")
     assert result.exit_code == 0, result.output
     assert "BIC - best" in result.stdout
@@ -245,4 +245,5 @@ def test_a_search_and_a_penalty_are_asked_for_by_name(tmp_path):
     assert "allowed are multi-start, swarm, cma-es" in sentence(creepkit(*words, "--search", "genetic"))
     assert "allowed are l2, group-l2, sqrt, subsets" in sentence(creepkit(*words, "--penalty", "lasso"))
     assert "has one term" in sentence(creepkit(*words, "--penalty", "sqrt"))
-    assert "add --weights likelihood" in sentence(creepkit(*words, "--sums"))
+    told = sentence(creepkit(*words, "--sums", "--loss", "huber"))
+    assert "--sums compares laws by their likelihood: leave out --weights, --search, --penalty and --loss" in told

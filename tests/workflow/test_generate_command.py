@@ -149,3 +149,16 @@ def test_a_job_array_without_slurm_is_one_job(tmp_path):
 
 def test_the_dask_example_is_python():
     compile((EXAMPLES / "dask_slurm.py").read_text(), "dask_slurm.py", "exec")
+
+
+def test_a_few_samples_cost_a_few_draws(tmp_path):
+    """Shards are no larger than what is wanted; a larger set goes on with the shards that are there."""
+    for samples in (8, 20):
+        result = creepkit("generate", *BARS, "--samples", samples, "--to", tmp_path / "few.h5", "--workers", 1)
+        assert result.exit_code == 0, result.output
+        data = ck.read_dataset(tmp_path / "few.h5")
+        assert len(data) % 8 == 0
+        assert samples <= len(data.accepted) < samples + 8
+    first = creepkit("generate", *BARS, "--draws", 8, "--to", tmp_path / "draws.h5", "--workers", 1)
+    assert first.exit_code == 0, first.output
+    assert len(ck.read_dataset(tmp_path / "draws.h5")) == 8

@@ -35,6 +35,7 @@ class SettingChanges(TypedDict, total=False):
     nuisances: Sequence[Nuisance] | None
     weights: OutputWeights
     test_loss: str
+    suspect_frames: Literal["exclude", "keep"]
 
 
 def identify(
@@ -59,17 +60,18 @@ def identify(
     through : a surrogate in which the minima of the search are refined before `using` (finite elements) gives values
         and intervals; "auto" takes the one that comes with creepkit where it is of this specimen and knows the law.
         A surrogate that does not know the class of the law is replaced by its specimen, and a note says so.
-    settings : what is minimised, nuisance parameters, starts, seed, frames and robust losses; see
-        IdentificationSettings. changes : single fields of it by name:
+    settings : what is minimised, nuisance parameters, starts, seed, frames, robust losses, and whether suspect frames
+        are left out; see IdentificationSettings. changes : single fields of it by name:
         starts=4, nuisances=[Nuisance("offset")], weights="likelihood".
     """
     from creepkit.inverse.composite_predictor import through_for_law
+    from creepkit.inverse.history_checks import without_suspect_frames
     from creepkit.inverse.identify import identify as run
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.inverse.sparsity.term_selection import identify_sparse
 
-    histories, law = check_histories(histories), resolve_law(law)
-    settings = change_settings(settings or IdentificationSettings(), changes)
+    law, settings = resolve_law(law), change_settings(settings or IdentificationSettings(), changes)
+    histories = without_suspect_frames(check_histories(histories), settings)
     predictor = resolve_predictors(using, histories)
     surrogate = _resolve_surrogate(through, predictor, histories)
     if through == "auto":
@@ -104,19 +106,25 @@ def select(
 
     laws : candidates; sums : also sums of two of them (None: where no single law goes down to the noise).
     by : the criterion; the result is a set of laws with weights, "decisive" only above 0.95.
-    using, through, settings, changes : as for identify(), with 60 frames of each history; weights are "likelihood".
+    using, through, settings, changes : as for identify(); weights are "likelihood".
     """
-    from creepkit.inverse.selection.select import SELECTION_FRAMES
+    from creepkit.inverse.history_checks import without_suspect_frames
     from creepkit.inverse.selection.select import select as run
     from creepkit.inverse.settings import IdentificationSettings
 
-    histories = check_histories(histories)
+    settings = change_settings(settings or IdentificationSettings(), changes)
+    if changes.get("weights") not in (None, "likelihood"):
+        raise FitError(
+            f"select() compares laws by their likelihood, found weights={changes['weights']!r}; leave weights out, or "
+            "identify each law with them and rank() the results"
+        )
+    histories = without_suspect_frames(check_histories(histories), settings)
     predictor = resolve_predictors(using, histories)
     return run(
         [resolve_law(law) for law in laws],
         histories,
         predictor,
-        settings=change_settings(settings or IdentificationSettings(frames=SELECTION_FRAMES), changes),
+        settings=settings,
         through=_resolve_surrogate(through, predictor, histories),
         sums=sums,
         by=by,
@@ -156,13 +164,14 @@ def confirm(
 ) -> Confirmation:
     """Simulate an identified law for each test by the specimen itself, and compare: finite elements for a bulge test.
 
-    tests : by default those that were fitted; using : by default the specimen that they name, with the settings that
-        it was identified with.
+    tests : by default those that were fitted; of others suspect frames are left out as the fit's settings say.
+    using : by default the specimen that they name, with the settings that it was identified with.
     """
     from creepkit.inverse.confirmation import confirm as run
+    from creepkit.inverse.history_checks import without_suspect_frames
     from creepkit.inverse.predictor_documents import registered_specimens
 
-    histories = check_histories(list(fit.histories if tests is None else tests))
+    histories = without_suspect_frames(check_histories(list(fit.histories if tests is None else tests)), fit.settings)
     known = registered_specimens(fit.predictor) if using is None else {}
     if not histories or not all(h.specimen in known for h in histories):
         return run(fit, histories, resolve_predictors(using, histories))

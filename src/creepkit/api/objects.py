@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit import registry
 from creepkit.errors import HistoryError, PluginError, nearest
+from creepkit.registry.arguments import resolve_law
 
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
@@ -20,8 +21,8 @@ EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
 
 
 def law(name: str) -> CreepLaw:
-    """Return the law called `name`: one of `available("laws")`."""
-    return registry.default_registry().law(name)
+    """Return the law called `name`: one of `available("laws")`, or a sum of them as in "norton+strain-hardening"."""
+    return resolve_law(name)
 
 
 def specimen(name: str) -> Specimen:

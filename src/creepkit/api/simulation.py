@@ -115,8 +115,8 @@ def generate(
         domain="conditioned" (the default, where most creep visibly) or "paper"; `design` says this and what else is
         to differ from it: ranges of conditions in MPa, s, mm and K, as in P1=(5, 20), and the s between frames, as in
         every=900.
-    samples : accepted ones wanted; whole shards of 256 draws are made, so that there are some more. Or draws : how many
-        are simulated or rejected, whatever becomes of them.
+    samples : accepted ones wanted; whole shards are made, of 256 draws or as many as are wanted where these are fewer,
+        so that there may be some more. Or draws : how many are simulated or rejected, whatever becomes of them.
     to : the file; its shards lie in a folder beside it. A call that was interrupted is made again to go on.
     execution : processes or a cluster, and the part of the shards to do; by default one process for each core.
     progress : called as progress(task, done, total, note).

@@ -10,6 +10,7 @@ from __future__ import annotations
 import atexit
 import os
 import shutil
+import sys
 import tempfile
 import zlib
 from pathlib import Path
@@ -63,7 +64,10 @@ def _remove_old_caches(folder: Path) -> None:
 
 def main() -> None:
     """Run the command line; the entry point of the script `creepkit`."""
-    from creepkit.cli.app import app
+    try:
+        from creepkit.cli.app import app
 
-    set_numba_cache()
-    app()
+        set_numba_cache()
+        app()
+    except KeyboardInterrupt:  # before the command began, which says so itself
+        sys.exit(130)

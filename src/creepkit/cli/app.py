@@ -1,6 +1,6 @@
 """The command `creepkit`: its global options, its commands, and how errors end it.
 
-Exit 0 fine, 1 an error that we can explain in one line, 2 wrong usage.
+Exit 0 fine, 1 an error that we can explain in one line, 2 wrong usage, 130 interrupted by Ctrl-C.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from creepkit.cli import (
     sweep,
     train,
 )
+from creepkit.cli.identification_options import CommandWithDefaults
 from creepkit.errors import CreepkitError, PluginError
 
 
@@ -52,6 +53,9 @@ class CommandGroup(TyperGroup):
                 raise
             typer.echo(f"creepkit: {' '.join(str(error).split())}", err=True)
             raise typer.Exit(1) from None
+        except KeyboardInterrupt:
+            typer.echo(f"creepkit: {ctx.invoked_subcommand or ''} interrupted", err=True)
+            raise typer.Exit(130) from None
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of this name, creepkit's own or a plugin's."""
@@ -93,7 +97,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
 
 
 for name, command in COMMANDS.items():
-    app.command(name)(command)
+    app.command(name, cls=CommandWithDefaults)(command)
 
 
 def _print_version(requested: bool) -> None:

@@ -113,7 +113,7 @@ def _planted_creep_curves(folder: Path) -> list[Path]:
     tests = ck.read_histories(PLANTED)
     typer.echo(f"SIMULATED: {len(tests)} creep curves with noise, 750 to 850 C")
     laws = [with_arrhenius(ck.law(name), tests) for name in UNIAXIAL_LAWS]
-    ranking = _identify("creep curves", laws, tests, starts=8)
+    ranking = _identify("creep curves", laws, tests)
     _print_ranking(ranking)
     _print_truth(PLANTED, ranking.best)
     return _write(ranking, folder)
@@ -145,7 +145,7 @@ def _identify(task: str, laws: Sequence[CreepLaw], tests: list[History], **optio
     fits = []
     with ProgressBar() as progress:
         for number, law in enumerate(laws, start=1):
-            fits.append(ck.identify(law, tests, seed=0, loss="linear", **options))
+            fits.append(ck.identify(law, tests, **options))
             progress.tick(task, number, len(laws), law.name)
     return ck.rank(fits)
 

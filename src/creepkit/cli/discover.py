@@ -7,13 +7,27 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from creepkit.cli.identification_options import (
+    BoundOption,
+    FixOption,
+    FramesOption,
+    OnlyOption,
+    SeedOption,
+    StartsOption,
+    SurrogateOption,
+    SuspectFramesOption,
+    WeightsOption,
+    change_laws,
+    select_by_label,
+    setting_changes,
+    surrogate_named,
+)
 from creepkit.cli.options import check_folder, parse_nuisances
 from creepkit.report.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from creepkit.api.identification import SettingChanges
     from creepkit.discovery.discover import FormOptions, TemperatureStudy
     from creepkit.discovery.temperature_law import TemperatureLaw
 
@@ -26,9 +40,10 @@ def command(
     law: Annotated[str, typer.Option("--law", metavar="NAME", help="The law, without temperature.")] = "norton",
     to: Annotated[Path, typer.Option(help="Folder for results; made if needed.")] = Path("discovered"),
     reader: Annotated[str | None, typer.Option(help="Reader to use; by default the one that accepts the file.")] = None,
-    through: Annotated[
-        str | None, typer.Option(help="A surrogate in the specimen's place, such as dimple; quicker.")
-    ] = None,
+    surrogate: SurrogateOption = None,
+    only: OnlyOption = None,
+    fix: FixOption = None,
+    bound: BoundOption = None,
     form: Annotated[
         list[str] | None,
         typer.Option(metavar="PARAMETER=FORM,...", help="Forms a parameter may take, such as n=constant,linear."),
@@ -45,8 +60,11 @@ def command(
     moduli: Annotated[
         bool, typer.Option("--moduli/--no-moduli", help="First find each test's modulus from its first 15 frames.")
     ] = False,
-    starts: Annotated[int, typer.Option(min=1, help="Starts of each search.")] = 8,
-    seed: Annotated[int, typer.Option(help="Seed of the searches.")] = 0,
+    starts: StartsOption = None,
+    seed: SeedOption = None,
+    frames: FramesOption = None,
+    suspect_frames: SuspectFramesOption = None,
+    weights: WeightsOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Find forms of temperature for the parameters of a law.
@@ -57,18 +75,29 @@ def command(
     """
     import creepkit as ck
     from creepkit.api.identification import change_settings
+    from creepkit.errors import FitError
 
     check_folder(to)
     form_options: FormOptions = {"forms": parse_forms(form), "prior": parse_prior_odds(prior)}
     if all(name.endswith(".json") for name in files):
+        if only or fix or bound or surrogate:
+            raise FitError("--only, --fix, --bound and --surrogate are for measured tests, not for identifications")
         temperature_law = _discover_from_identifications(files, form_options)
     else:
-        changes: SettingChanges = {"starts": starts, "seed": seed, "nuisances": parse_nuisances(nuisance)}
+        changes = setting_changes(
+            starts=starts,
+            seed=seed,
+            frames=frames,
+            suspect_frames=suspect_frames,
+            nuisances=parse_nuisances(nuisance),
+            weights=weights,
+        )
+        (changed_law,) = change_laws([ck.law(law)], fix, bound)
         with ProgressBar() as progress:
             study = ck.temperature_study(
-                law,
-                ck.read_histories(files, reader),
-                None if through is None else ck.surrogate(through),
+                changed_law,
+                select_by_label(ck.read_histories(files, reader), only),
+                surrogate_named(surrogate),
                 moduli=moduli,
                 within=within,
                 settings=change_settings(ck.IdentificationSettings(), changes),

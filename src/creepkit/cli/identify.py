@@ -8,7 +8,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from creepkit.cli.options import check_folder, parse_nuisances, parse_weights, penalty_named, search_named
+from creepkit.cli.identification_options import (
+    BoundOption,
+    FixOption,
+    FramesOption,
+    OnlyOption,
+    SeedOption,
+    StartsOption,
+    SurrogateOption,
+    SuspectFramesOption,
+    WeightsOption,
+    change_laws,
+    select_by_label,
+    setting_changes,
+    surrogate_named,
+)
+from creepkit.cli.options import check_folder, parse_nuisances, penalty_named, search_named
 from creepkit.report.ranking import print_ranking, ranking_to_json
 from creepkit.report.terminal import ProgressBar, print_json
 
@@ -44,34 +59,47 @@ def file_stem(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9.=-]+", "-", name).strip("-") or "law"
 
 
-DEFAULT_METHOD = ("likelihood", "multi-start", None, "linear", "gaussian")
-"""Weights, search, penalty, loss and loss of tests with which laws are selected, sums among them."""
-
-
 def command(
     files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Measured files, folders or patterns.")],
-    law: Annotated[list[str], typer.Option("--law", metavar="NAME", help="A law to fit; may be given several times.")],
+    law: Annotated[
+        list[str],
+        typer.Option(
+            "--law", metavar="NAME", help="A law to fit, or a sum, norton+strain-hardening; may be given several times."
+        ),
+    ],
     to: Annotated[Path, typer.Option(help="Folder for results; made if needed.")] = Path("identified"),
     reader: Annotated[str | None, typer.Option(help="Reader to use; by default the one that accepts the file.")] = None,
     temperature: Annotated[
         str, typer.Option(help="auto: an Arrhenius factor when the tests span several temperatures; or none.")
     ] = "auto",
+    only: OnlyOption = None,
+    fix: FixOption = None,
+    bound: BoundOption = None,
+    surrogate: SurrogateOption = None,
     up_to: Annotated[float | None, typer.Option(help="Use frames up to this strain only, such as 0.05.")] = None,
-    starts: Annotated[int, typer.Option(min=1, help="Starts of the search.")] = 8,
-    seed: Annotated[int, typer.Option(help="Seed of the search.")] = 0,
-    loss: Annotated[str, typer.Option(help="Of frames: linear, soft_l1, huber, cauchy or arctan.")] = "linear",
+    starts: StartsOption = None,
+    seed: SeedOption = None,
+    frames: FramesOption = None,
+    suspect_frames: SuspectFramesOption = None,
+    loss: Annotated[
+        str | None,
+        typer.Option(help="Of frames: linear, soft_l1, huber, cauchy or arctan; {settings.loss} by default."),
+    ] = None,
     test_loss: Annotated[
-        str,
-        typer.Option(help="Of whole tests: gaussian; or student, with which one far from its replicates weighs less."),
-    ] = "gaussian",
-    weights: Annotated[
-        str, typer.Option(help="noise; likelihood; equal, Eq. (4); paper, Eq. (S3); or amplitude=0.99,width=0.01.")
-    ] = "noise",
+        str | None,
+        typer.Option(
+            help="Of whole tests: gaussian; or student, with which one far from its replicates weighs less; "
+            "{settings.test_loss} by default."
+        ),
+    ] = None,
+    weights: WeightsOption = None,
     search: Annotated[str, typer.Option(help="How to begin: multi-start, swarm or cma-es.")] = "multi-start",
     penalty: Annotated[
         str | None, typer.Option(metavar="NAME", help="Reduce a sum of terms: l2, group-l2, sqrt or subsets.")
     ] = None,
-    sums: Annotated[bool, typer.Option("--sums", help="With --weights likelihood: sums of two laws as well.")] = False,
+    sums: Annotated[
+        bool | None, typer.Option("--sums/--no-sums", help="Whether sums of two laws are tried as well.")
+    ] = None,
     further: Annotated[
         bool, typer.Option("--further-tests", help="Say which tests would distinguish the remaining laws.")
     ] = False,
@@ -83,7 +111,9 @@ def command(
 ) -> None:
     """Fit laws to creep curves and rank them.
 
-    Every law is fitted to all curves at once; JSON and plots of each, LaTeX and Python of the best, go to a folder.
+    Every law is fitted to all curves at once. Several are compared by their likelihood, as by select() in Python,
+    unless --weights, --search, --penalty or --loss ask for something else; one is identified as by identify(). JSON
+    and plots of each, LaTeX and Python of the best, go to a folder.
     """
     import creepkit as ck
     from creepkit.errors import FitError
@@ -94,26 +124,31 @@ def command(
         raise FitError(f"--up-to {up_to:g} is not a strain above zero; write 0.05 for 5 %")
     check_folder(to)
     candidate_laws = [ck.law(name) for name in dict.fromkeys(law)]
-    histories = ck.read_histories(files, reader)
+    histories = select_by_label(ck.read_histories(files, reader), only)
     if up_to is not None:
         histories = _truncate_at_strain(histories, up_to)
     _warn_of_duplicates(histories)
     if temperature == "auto":
-        from creepkit.inverse.reference_conditions import with_arrhenius
-
-        candidate_laws = [with_arrhenius(candidate_law, histories) for candidate_law in candidate_laws]
-    options: dict[str, Any] = {"starts": starts, "seed": seed, "nuisances": parse_nuisances(nuisance)}
-    by_likelihood = (weights, search, penalty, loss, test_loss) == DEFAULT_METHOD
-    if sums and weights != "likelihood":
-        raise FitError("--sums compares laws by their likelihood; add --weights likelihood")
-    if sums and not by_likelihood:
-        raise FitError(
-            "--sums takes the usual search and losses; leave out --search, --penalty, --loss and --test-loss"
-        )
-    if by_likelihood:
-        ranking = select_laws(candidate_laws, histories, sums=sums, **options)
+        candidate_laws = [ck.with_arrhenius(candidate_law, histories) for candidate_law in candidate_laws]
+    candidate_laws = change_laws(candidate_laws, fix, bound)
+    changes = setting_changes(
+        starts=starts,
+        seed=seed,
+        frames=frames,
+        suspect_frames=suspect_frames,
+        nuisances=parse_nuisances(nuisance),
+        weights=weights,
+        loss=loss,
+        test_loss=test_loss,
+    )
+    options: dict[str, Any] = {"using": surrogate_named(surrogate), **changes}
+    by_likelihood = weights in (None, "likelihood") and loss in (None, "linear") and search == "multi-start"
+    by_likelihood = by_likelihood and penalty is None
+    if sums is not None and not by_likelihood:
+        raise FitError("--sums compares laws by their likelihood: leave out --weights, --search, --penalty and --loss")
+    if by_likelihood and (len(candidate_laws) > 1 or sums is not None):
+        ranking = select_laws(candidate_laws, histories, **({} if sums is None else {"sums": sums}), **options)
     else:
-        options |= {"loss": loss, "test_loss": test_loss, "weights": parse_weights(weights)}
         ranking = rank_laws(
             candidate_laws, histories, search=search_named(search), penalty=penalty_named(penalty), **options
         )

@@ -221,6 +221,17 @@ def check_folder(folder: Path) -> None:
         raise FitError(f"--to {folder}: {existing} cannot be written to; name another folder for the results")
 
 
+def check_file(option: str, path: Path) -> None:
+    """Say now, not after all the work, that a file cannot be written there."""
+    from creepkit.errors import SolveError
+    from creepkit.files.writing import check_target
+
+    check_target(path, SolveError)
+    folder = path.absolute().parent
+    if not folder.is_dir() or not os.access(folder, os.W_OK):
+        raise SolveError(f"{option} {path}: {path.parent} is no folder that can be written to; name a file elsewhere")
+
+
 def parse_weights(text: str) -> Any:
     """The weights of outputs, from text such as amplitude=0.99,width=0.01; or a word."""
     from creepkit.errors import FitError

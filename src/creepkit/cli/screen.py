@@ -7,11 +7,27 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from creepkit.cli.identification_options import (
+    BoundOption,
+    FixOption,
+    FramesOption,
+    OnlyOption,
+    SeedOption,
+    StartsOption,
+    SurrogateOption,
+    SuspectFramesOption,
+    change_laws,
+    select_by_label,
+    setting_changes,
+    surrogate_named,
+)
 from creepkit.cli.options import parse_nuisances, penalty_named
 from creepkit.report.terminal import ProgressBar
 
 if TYPE_CHECKING:
-    from creepkit.records import Predictor
+    from collections.abc import Sequence
+
+    from creepkit.language import CreepLaw
 
 
 CONFIRMATION_CHOICES = {"when-in-doubt": "when in doubt", "always": True, "never": False}
@@ -28,9 +44,7 @@ def command(
     to: Annotated[Path, typer.Option(help="Folder for results; what it holds already is not done again.")] = Path(
         "screened"
     ),
-    surrogate: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Identify through a surrogate alone, such as dimple.")
-    ] = None,
+    surrogate: SurrogateOption = None,
     through: Annotated[
         str | None, typer.Option(metavar="NAME", help="Search sums through a surrogate, end with finite elements.")
     ] = None,
@@ -47,7 +61,13 @@ def command(
         list[str] | None,
         typer.Option(metavar="KIND[=MEAN[:SD]]", help="What differs between tests, such as thickness=0.4935:0.027."),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the search.")] = 0,
+    only: OnlyOption = None,
+    fix: FixOption = None,
+    bound: BoundOption = None,
+    starts: StartsOption = None,
+    seed: SeedOption = None,
+    frames: FramesOption = None,
+    suspect_frames: SuspectFramesOption = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -57,20 +77,27 @@ def command(
     """
     import creepkit as ck
     from creepkit.api.identification import change_settings
+    from creepkit.screening.screen import CANDIDATE_LAWS, resolve_tests
 
-    settings = change_settings(ck.ScreeningOptions().settings, {"seed": seed, "nuisances": parse_nuisances(nuisance)})
+    changes = setting_changes(
+        starts=starts, seed=seed, frames=frames, suspect_frames=suspect_frames, nuisances=parse_nuisances(nuisance)
+    )
+    settings = change_settings(ck.ScreeningOptions().settings, changes)
     options = ck.ScreeningOptions(
         settings=settings,
-        through=_surrogate_named(through),
+        through=surrogate_named(through),
         dense=None if dense == "none" else dense,
         penalty=penalty_named(penalty),
         confirm=_confirmation_choice(confirm),
     )
+    laws: Sequence[CreepLaw | str] = law or CANDIDATE_LAWS
+    if fix or bound:
+        laws = change_laws([ck.law(name) for name in law or CANDIDATE_LAWS], fix, bound)
     with ProgressBar() as progress:
         plate = ck.screen(
-            folder,
-            law,
-            _surrogate_named(surrogate),
+            select_by_label(resolve_tests(folder, compositions), only) if only else folder,
+            laws,
+            surrogate_named(surrogate),
             compositions=compositions,
             to=to,
             options=options,
@@ -83,14 +110,6 @@ def command(
     from creepkit.report.screening import print_screening
 
     print_screening(plate, written, as_json)
-
-
-def _surrogate_named(name: str | None) -> Predictor | None:
-    if name is None:
-        return None
-    import creepkit as ck
-
-    return ck.surrogate(name)
 
 
 def _confirmation_choice(text: str) -> bool | Literal["when in doubt"]:

@@ -13,6 +13,7 @@ from creepkit.cli.options import (
     MATERIAL_POINT,
     RELAXATION,
     UNIAXIAL,
+    check_file,
     check_options,
     parse_loading,
     parse_numbers,
@@ -84,6 +85,12 @@ def command(
         raise SolveError(f"--end-h {end_h:g} is not a time above zero (and below 1e9 h)")
     times = _frame_times(3600.0 * end_h, points, every, specimen)
     loading = parse_loading(specimen, stress, strain, pressure, control, ramp, float(times[-1]))
+    if picture is not None:
+        from creepkit.report.figures import check_figure_target
+
+        check_figure_target(picture, SolveError)
+    if to is not None:
+        check_file("--to", to)
     if modulus_gpa is None and (specimen in (BULGE, RELAXATION) or (specimen == MATERIAL_POINT and strain)):
         requirement = "a dimple" if specimen == BULGE else "a prescribed strain"
         raise SolveError(f"{requirement} needs a modulus: give --modulus-gpa, such as 150")

@@ -16,7 +16,7 @@ from creepkit.dataset import shards, storage
 from creepkit.dataset.shards import POLL_INTERVAL, GenerationJob, is_complete, merge_shards
 from creepkit.errors import DatasetError
 from creepkit.jobs.shard_progress import ProgressCallback, ProgressRecord, ProgressReporter
-from creepkit.jobs.worker_pools import ParallelExecution, WorkerDeaths, Workers
+from creepkit.jobs.worker_pools import SHARD_ROWS, ParallelExecution, WorkerDeaths, Workers
 from creepkit.jobs.worker_process import TaskResult
 
 if TYPE_CHECKING:
@@ -55,7 +55,8 @@ def generate(
     if not path.name:
         raise DatasetError(f"'{to}' is no name of a file; name the HDF5 file to write, such as combined.h5")
     folder = path.with_name(f"{path.name}.parts")
-    job = GenerationJob(design, specimen, _whole_number("seed", seed), folder, execution.shard_rows)
+    rows = execution.shard_rows or shards.rows_of_folder(folder) or _shard_rows(samples or draws)
+    job = GenerationJob(design, specimen, _whole_number("seed", seed), folder, rows)
     record = ProgressRecord(job, samples, draws, execution.part)
     if execution.part is None and is_complete(job, record, path):
         return storage.read_dataset(path)
@@ -67,6 +68,11 @@ def generate(
         return shards.read_shards(job, sorted(record.done))
     merge_shards(job, record, path, progress)
     return storage.read_dataset(path)
+
+
+def _shard_rows(wanted: object) -> int:
+    """Draws of a shard, no more than are wanted; what is no number of them is an error later."""
+    return min(SHARD_ROWS, wanted) if isinstance(wanted, int) and wanted > 0 else SHARD_ROWS
 
 
 def _whole_number(name: str, value: object) -> int:

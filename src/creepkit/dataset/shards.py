@@ -46,6 +46,9 @@ MOST_PROCESS_DEATHS = 2
 """How often a sample may kill its process before it counts as failed."""
 
 
+GENERATION_NAME = "generation.json"
+
+
 GENERATION_FILE = FileKind(
     "the settings of a data set", DatasetError, "it is damaged; remove it if the shards beside it are of this data set"
 )
@@ -125,7 +128,7 @@ class GenerationJob:
 
     def open_folder(self) -> None:
         """Make the folder, or check that the one that is there belongs to this job."""
-        path = self.folder / "generation.json"
+        path = self.folder / GENERATION_NAME
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             if not path.exists():
@@ -139,6 +142,14 @@ class GenerationJob:
                 f"{self.folder}: holds shards of another data set (there and here {difference}); choose another name, "
                 "or remove the folder"
             )
+
+
+def rows_of_folder(folder: Path) -> int | None:
+    """Samples of a shard in a folder that was begun; None where there is none, or none that says so."""
+    path = folder / GENERATION_NAME
+    document = read_json(path, GENERATION_FILE) if path.is_file() else None
+    rows = document.get("rows") if isinstance(document, dict) else None
+    return rows if isinstance(rows, int) and rows > 0 else None
 
 
 def run_shard(job: GenerationJob, number: int) -> TaskResult:

@@ -14,6 +14,7 @@ from creepkit.discovery.regression import IsothermalEstimates, check_temperature
 from creepkit.discovery.temperature_law import TemperatureLaw, temperature_law_from_combinations
 from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.history_checks import suspect_frames_note, without_suspect_frames
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import identify
 from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE, reference_temperature, with_arrhenius
@@ -66,8 +67,9 @@ def discover(
     predictor = fits[0].predictor if using is None else resolve_predictor(using)
     if predictor is None:
         raise FitError("the identifications were loaded from files: give using=, the specimen they were made with")
-    tests = check_histories(histories)
-    return refit(temperature_law, tests, predictor, settings=settings or fits[0].settings, progress=progress)
+    settings = settings or fits[0].settings
+    tests = without_suspect_frames(check_histories(histories), settings)
+    return refit(temperature_law, tests, predictor, settings=settings, progress=progress)
 
 
 def candidate_forms_of(
@@ -148,7 +150,8 @@ def temperature_study(
         raise FitError(f"law '{law.name}' depends on temperature already; give it without: forms are what is sought")
     if not tests:
         raise FitError("there are no histories to study")
-    settings, histories, notes = settings or IdentificationSettings(), list(tests), []
+    settings = settings or IdentificationSettings()
+    histories, notes = without_suspect_frames(tests, settings), []
     moduli_fit = None
     if moduli:
         moduli_fit = identify_moduli(with_arrhenius(law, histories), histories, predictor, frames=FIRST_FRAMES)
@@ -156,7 +159,7 @@ def temperature_study(
             histories = [h.replace(elastic=moduli_fit.elastic) for h in histories]
     joint_fit = identify(with_arrhenius(law, histories), histories, predictor, settings=settings, progress=progress)
     isothermal_fits, failures = _isothermal_fits(law, histories, predictor, within, settings, progress)
-    notes += failures
+    notes += [*suspect_frames_note(histories), *failures]
     temperature_law = None
     try:
         check_temperatures([fit.reference.temperature for fit in isothermal_fits] or [reference_temperature(histories)])

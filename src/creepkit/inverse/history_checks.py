@@ -1,4 +1,4 @@
-"""Checks of histories before an identification: enough finite outputs, and creep beyond their noise."""
+"""Histories before an identification: suspect frames left out; enough finite outputs, creep beyond their noise."""
 
 from __future__ import annotations
 
@@ -10,11 +10,34 @@ from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs, predictor_for
 from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, ObservationVector, frames_with_data
 from creepkit.inverse.reference_conditions import detect_creep
+from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
+from creepkit.quality import exclude_suspect_frames
 from creepkit.records import History, Predictor
+
+SUSPECT_LABEL = "suspect"
+"""Label of a history that says which of its frames were left out, and why."""
+
 
 SIGNIFICANT_GROWTH = 5.0
 """Increase of an output, in units of its noise, that is creep."""
+
+
+def without_suspect_frames(histories: Sequence[History], settings: IdentificationSettings) -> list[History]:
+    """The histories with suspect frames unused, unless settings keep them; those with a label stay."""
+    if settings.suspect_frames == "keep":
+        return list(histories)
+    return [h if SUSPECT_LABEL in h.labels else exclude_suspect_frames([h])[0] for h in histories]
+
+
+def suspect_frames_note(histories: Sequence[History]) -> tuple[str, ...]:
+    """The tests of which suspect frames were left out, how many and why, in one sentence."""
+    described = [
+        f"{np.count_nonzero(~h.used)} of {h.used.size} of '{h.name}' ({h.labels[SUSPECT_LABEL]})"
+        for h in histories
+        if SUSPECT_LABEL in h.labels and not h.used.all()
+    ]
+    return (f"suspect frames were left out: {', '.join(described)}",) if described else ()
 
 
 def check_creep(observations: ObservationVector, histories: Sequence[History]) -> None:

@@ -21,6 +21,7 @@ from creepkit.inverse.composite_predictor import (
 )
 from creepkit.inverse.defect_correction import NumericalError, correct_defect, with_correction_at_frames
 from creepkit.inverse.goodness_of_fit import compare_rupture_times, pooled_errors, pooled_log_strain_rms, test_fits
+from creepkit.inverse.history_checks import suspect_frames_note
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_notes import domain_notes, fitted_ranges, identification_notes, provenance_of
 from creepkit.inverse.iterative_estimation import (
@@ -298,6 +299,7 @@ def _result(
         numerical_error=numerical_error,
         unmodelled=unmodelled_effects(problem, x, linear, noise_model, histories),
         notes=(
+            *suspect_frames_note(histories),
             *identification_notes(best, tests, nuisance_estimates),
             *domain_notes(prediction, histories),
             *([numerical_error.sentence] if numerical_error is not None else []),

@@ -1,4 +1,7 @@
-"""Settings of an identification, checked: all that a run can be repeated from."""
+"""Settings of an identification, checked: all that a run can be repeated from.
+
+Their defaults stand here alone: Python and the command line, identify, select, screen and discover take them from here.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,9 @@ TEST_LOSSES = ("gaussian", "student")
 
 
 WEIGHTINGS = ("noise", "likelihood", "equal", "paper")
+
+
+SUSPECT_FRAMES = ("exclude", "keep")
 
 
 OutputWeights = Literal["noise", "likelihood", "equal", "paper"] | Mapping[str, float]
@@ -44,16 +50,19 @@ class IdentificationSettings:
         (see inverse.goodness_of_fit); "equal" weights are Eq. (4) of the paper, "paper" its Eq. (S3) for measured
         histories, 0.99 on D_amp.
     test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its weight.
+    suspect_frames : "exclude": frames that unload, fall or lie apart (see quality.exclude_suspect_frames) are left out
+        when the public functions and commands are handed tests, and the notes of the result name them; or "keep".
     """
 
     starts: int = 8
     sobol_points: int = 64
-    frames: int = 40
+    frames: int = 60
     seed: int = 0
     loss: str = "linear"
     nuisances: tuple[Nuisance, ...] = (Nuisance("offset"), Nuisance("rate"))
     weights: OutputWeights = "noise"
     test_loss: str = "gaussian"
+    suspect_frames: Literal["exclude", "keep"] = "exclude"
 
     def __post_init__(self) -> None:
         for name, minimum in (("starts", 1), ("sobol_points", 1), ("frames", 2), ("seed", 0)):
@@ -64,6 +73,10 @@ class IdentificationSettings:
             raise FitError(f"loss '{self.loss}' is not known; allowed are {', '.join(LOSSES)}")
         if self.test_loss not in TEST_LOSSES:
             raise FitError(f"test_loss '{self.test_loss}' is not known; allowed are {' and '.join(TEST_LOSSES)}")
+        if self.suspect_frames not in SUSPECT_FRAMES:
+            raise FitError(
+                f"suspect_frames '{self.suspect_frames}' is not known; allowed are {' and '.join(SUSPECT_FRAMES)}"
+            )
         _check_weights(self.weights)
         if self.weights == "likelihood" and self.loss != "linear":
             raise FitError(

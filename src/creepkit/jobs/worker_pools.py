@@ -154,13 +154,14 @@ class ParallelExecution:
     workers : processes of this machine, by default one for each core; of a cluster, its threads that are used at once.
     cluster : address of a dask scheduler, tcp://host:port, whose workers simulate instead of processes of this machine.
     part : (k, n) simulates every n-th shard only, from the k-th on, for an array of jobs; a call without it merges.
-    shard_rows : samples of a shard, which is the unit of work that is kept.
+    shard_rows : samples of a shard, which is the unit of work that is kept; by default those of the shards that are
+        there already, else 256, or as many as are wanted where these are fewer.
     """
 
     workers: int | None = None
     cluster: str | None = None
     part: tuple[int, int] | None = None
-    shard_rows: int = SHARD_ROWS
+    shard_rows: int | None = None
 
     def start(self, job: ShardedJob) -> AbstractContextManager[Workers]:
         """The workers, which run in the context that is returned."""

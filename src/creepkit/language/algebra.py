@@ -80,6 +80,15 @@ def fix(law: Law, values: Mapping[str, float]) -> Law:
     return _substituted(law, replacements, f"{law.name}({description})", f"{law.title} with {description}")
 
 
+def with_bounds(law: Law, bounds: Mapping[str, tuple[float, float]]) -> Law:
+    """Change bounds of parameters; LawError for an unknown parameter and for what bounds cannot be."""
+    params = dict(law.params)
+    for name, limits in bounds.items():
+        symbol = law.symbol(name)
+        params[symbol] = replace(params[symbol], bounds=limits)
+    return replace(law, params=params) if bounds else law
+
+
 def with_temperature(law: Law, forms: Mapping[str, TemperatureForm]) -> Law:
     """Make parameters functions of temperature; the new parameters follow the one they belong to."""
     if not forms:

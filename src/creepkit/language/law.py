@@ -35,6 +35,10 @@ class CreepLaw(LawRecord):
         """The law with parameters at fixed numbers; m=0 makes strain hardening a power law."""
         return algebra.fix(self, values)
 
+    def with_bounds(self, **bounds: tuple[float, float]) -> CreepLaw:
+        """The law with other bounds of parameters, (low, high) each in the parameter's unit; n=(3, 8)."""
+        return algebra.with_bounds(self, bounds)
+
     def times(
         self,
         factor: Any,

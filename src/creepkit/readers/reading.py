@@ -56,7 +56,11 @@ def _existing_paths(paths: PathsLike) -> list[Path]:
     results: dict[Path, None] = {}
     for item in path_list:
         path = Path(item).expanduser()
-        matches = [path] if path.exists() else [Path(match) for match in sorted(glob(str(path)))]
+        matches = (
+            [path] if path.exists() else [Path(match) for match in sorted(glob(str(path))) if Path(match).exists()]
+        )
+        if not matches and path.is_symlink():
+            raise HistoryError(f"{path}: is a link to {path.readlink()}, which does not exist; name the file itself")
         if not matches:
             raise HistoryError(f"{path}: no such file or folder, and no file matches it as a pattern")
         results.update(dict.fromkeys(matches))
@@ -67,7 +71,13 @@ def _readable_paths(path: Path, readers: Sequence[Reader]) -> list[Path]:
     """The paths to read: the path itself, or the files in a folder that no reader accepts as a whole."""
     if path.is_file() or any(reader.accepts(path) for reader in readers):
         return [path]
-    files = [file for file in sorted(path.iterdir()) if file.is_file() and any(r.accepts(file) for r in readers)]
+    if not path.is_dir():
+        raise HistoryError(f"{path}: is no regular file but a device, a pipe or the like; name a file or a folder")
+    try:
+        entries = sorted(path.iterdir())
+    except OSError as error:
+        raise HistoryError(f"{path}: the folder cannot be read ({error.strerror}); name another one") from None
+    files = [file for file in entries if file.is_file() and any(r.accepts(file) for r in readers)]
     return files or [path]
 
 

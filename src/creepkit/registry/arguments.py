@@ -16,9 +16,12 @@ if TYPE_CHECKING:
 
 
 def resolve_law(law: CreepLaw | str) -> CreepLaw:
-    """The law itself, or the one of that name."""
+    """The law itself, or the one of that name; "norton+strain-hardening" names the sum of two."""
     if isinstance(law, str):
-        return default_registry().law(law)
+        registry = default_registry()
+        names = [law] if law in registry.laws() else [name.strip() for name in law.split("+")]
+        first, *others = (registry.law(name) for name in names)
+        return sum(others, start=first)
     if not hasattr(law, "terms"):
         raise LawError(f"a creep law or its name is needed, found {type(law).__name__}")
     return law

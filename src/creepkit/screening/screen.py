@@ -14,7 +14,7 @@ from typing import Literal
 
 from creepkit.errors import FitError, HistoryError
 from creepkit.inverse.composite_predictor import CompositePredictor
-from creepkit.inverse.selection.select import SELECTION_FRAMES
+from creepkit.inverse.history_checks import without_suspect_frames
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.penalties import ContributionPenalty, Subsets, check_penalty
 from creepkit.jobs.shard_progress import ProgressCallback, duration_text
@@ -60,7 +60,7 @@ class ScreeningOptions:
         a surrogate says that its prediction lies outside its domain.
     """
 
-    settings: IdentificationSettings = field(default_factory=lambda: IdentificationSettings(frames=SELECTION_FRAMES))
+    settings: IdentificationSettings = field(default_factory=IdentificationSettings)
     through: Predictor | None = None
     dense: CreepLaw | str | None = DENSE_LAW
     penalty: ContributionPenalty | Subsets | None = None
@@ -101,8 +101,9 @@ def screen(
 
     An alloy that cannot be identified is recorded with the reason, and the others go on.
     """
-    tests, composition_table = _resolve_tests(histories, compositions), resolve_compositions(compositions)
+    tests, composition_table = resolve_tests(histories, compositions), resolve_compositions(compositions)
     options, processes = options or ScreeningOptions(), process_count(workers, FitError)
+    tests = without_suspect_frames(tests, options.settings)
     predictors = resolve_predictors(using, tests)
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()) if to is None else to)
@@ -124,7 +125,7 @@ def screen(
     )
 
 
-def _resolve_tests(histories: Sequence[History] | str | Path, compositions: object) -> list[History]:
+def resolve_tests(histories: Sequence[History] | str | Path, compositions: object) -> list[History]:
     """The histories, or those in a folder, in which the file of compositions may lie too."""
     if isinstance(histories, (str, Path)):
         table = Path(compositions) if isinstance(compositions, (str, Path)) else None

@@ -11,6 +11,7 @@ import creepkit as ck
 from creepkit.api.identification import SettingChanges, change_settings
 from creepkit.cli.app import COMMANDS
 from creepkit.errors import FitError, HistoryError
+from helpers.command_line import creepkit
 
 SOURCES = Path(ck.__file__).parent
 FUNCTIONS = [name for name in ck.__all__ if inspect.isfunction(getattr(ck, name))]
@@ -73,16 +74,29 @@ def test_settings_are_changed_by_name() -> None:
     assert change_settings(settings, {"starts": 20, "sobol_points": 32}).sobol_points == 32
     with pytest.raises(FitError, match="have no 'start'; did you mean 'starts'"):
         change_settings(settings, {"start": 3})  # type: ignore[typeddict-unknown-key]
+    with pytest.raises(FitError, match="suspect_frames 'drop' is not known; allowed are exclude and keep"):
+        change_settings(settings, {"suspect_frames": "drop"})  # type: ignore[typeddict-item]
     with pytest.raises(FitError, match="have no 'tolerance'"):
         ck.identify("norton", [ck.History("a", np.ones(1), {}, ck.constant_stress(1.0), 300.0)], tolerance=1)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize("command", ["identify", "discover", "screen"])
+def test_the_command_line_has_no_defaults_of_its_own(command: str) -> None:
+    """What nothing is said of is None, which leaves the defaults of IdentificationSettings; help quotes them."""
+    parameters = inspect.signature(COMMANDS[command]).parameters
+    settings = {field.name: field.default for field in fields(ck.IdentificationSettings)}
+    shared = parameters.keys() & settings.keys()
+    assert {"starts", "seed", "frames", "suspect_frames"} <= shared
+    assert {parameters[name].default for name in shared} == {None}
+    help_text = " ".join(creepkit(command, "--help").stdout.split())
+    assert f"Frames of each test that are compared; {settings['frames']} by default." in help_text
+    assert f"{settings['suspect_frames']} by default." in help_text
+    assert "{settings" not in help_text
 
 
 @pytest.mark.parametrize(
     ("command", "options", "defaults"),
     [
-        ("identify", ("starts", "seed", "loss", "test_loss", "weights"), ck.IdentificationSettings()),
-        ("discover", ("starts", "seed"), ck.IdentificationSettings()),
-        ("screen", ("seed",), ck.IdentificationSettings()),
         ("screen", ("dense",), ck.ScreeningOptions()),
         ("generate", ("workers", "cluster", "part"), ck.ParallelExecution()),
     ],
@@ -91,6 +105,10 @@ def test_the_command_line_has_the_same_defaults(command: str, options: tuple[str
     parameters = inspect.signature(COMMANDS[command]).parameters
     for option in options:
         assert parameters[option].default == getattr(defaults, option), option
+
+
+def test_every_verb_has_the_same_settings() -> None:
+    assert ck.ScreeningOptions().settings == ck.IdentificationSettings()
 
 
 def test_the_temperature_study_has_the_same_defaults_on_the_command_line() -> None:

@@ -355,3 +355,26 @@ def test_a_point_is_loaded_by_components() -> None:
 )
 def test_a_simulation_that_makes_no_sense_is_one_line(words: tuple[str, ...], said: str) -> None:
     assert said in one_line(creepkit(*words))
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        (("--picture", "none/section.png"), "none/section.png: the plot cannot be written (there is no folder none)"),
+        (("--picture", "section.doc"), "section.doc: the plot cannot be written ('.doc' is no format of pictures)"),
+        (("--picture", "folder.png"), "folder.png: cannot be written: it is a folder"),
+        (
+            ("--to", "none/run.csv"),
+            "--to none/run.csv: none is no folder that can be written to; name a file elsewhere",
+        ),
+    ],
+)
+def test_a_file_that_cannot_be_written_is_said_before_the_simulation(
+    target: tuple[str, str], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def simulate(*args: object, **kwargs: object) -> None:
+        raise AssertionError("it was simulated")
+
+    monkeypatch.setattr(ck, "simulate", simulate)
+    Path("folder.png").mkdir()
+    assert message in one_line(creepkit(*DIMPLE, "--pressure", "8", *target))

@@ -281,3 +281,18 @@ def test_a_constraint_follows_its_parameter_into_temperature():
 def test_wrong_forms_are_explained(wrong, message):
     with pytest.raises(LawError, match=message):
         wrong()
+
+
+def test_bounds_are_changed_and_nothing_else() -> None:
+    law = HYPERBOLIC_SINE.with_bounds(n=(3, 6))
+
+    assert law.table["n"].bounds == (3, 6)
+    assert law.table["A"] == HYPERBOLIC_SINE.table["A"]
+    assert (law.name, law.fingerprint) == (HYPERBOLIC_SINE.name, HYPERBOLIC_SINE.fingerprint)
+    assert HYPERBOLIC_SINE.with_bounds() is HYPERBOLIC_SINE
+    with pytest.raises(LawError, match="has no parameter 'nn': did you mean 'n'"):
+        HYPERBOLIC_SINE.with_bounds(nn=(3, 6))
+    with pytest.raises(LawError, match="bounds are reversed or empty"):
+        HYPERBOLIC_SINE.with_bounds(n=(6, 3))
+    with pytest.raises(LawError, match="a log scale needs bounds above zero"):
+        HYPERBOLIC_SINE.with_bounds(A=(-1, 1))

@@ -1,5 +1,6 @@
 """Which reader gets which file, and what tests are called when they come together."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -132,3 +133,18 @@ def test_test_published_twice_is_found():
 )
 def test_like_tests_are_no_duplicates(other):
     assert duplicate_tests([planned("a"), other]) == []
+
+
+def test_what_is_no_file_is_one_sentence(tmp_path: Path) -> None:
+    """A pipe, a link to nothing, and a pattern that finds such a link alone."""
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "link.csv").symlink_to(tmp_path / "nothing.csv")
+
+    with pytest.raises(
+        HistoryError, match=r"pipe.csv: is no regular file but a device, a pipe or the like; name a file"
+    ):
+        read_histories(tmp_path / "pipe.csv", READERS)
+    with pytest.raises(HistoryError, match=r"link.csv: is a link to .*nothing.csv, which does not exist"):
+        read_histories(tmp_path / "link.csv", READERS)
+    with pytest.raises(HistoryError, match="no file matches it as a pattern"):
+        read_histories(tmp_path / "li*.csv", READERS)

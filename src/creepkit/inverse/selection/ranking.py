@@ -81,7 +81,7 @@ class Ranking(Presentable):
 
     @property
     def decisive(self) -> bool:
-        """Whether one law of several asked for explains the tests, has 95 % of the weight, and stands every challenge."""
+        """Whether a law that was asked for explains the tests, has 95 % of the weight, and stands every challenge."""
         return (
             len(self.laws) > 1
             and self.singled_out

@@ -63,10 +63,6 @@ def _distinct_laws(laws: Sequence[CreepLaw]) -> list[CreepLaw]:
     return list(by_fingerprint.values())
 
 
-SELECTION_FRAMES = 60
-"""Frames of a history that are compared, unless settings say otherwise."""
-
-
 RULED_OUT_EXCESS = 40.0
 """Criterion over the best from which a law is ruled out by a surrogate already: e^-20 of the weight, which the errors
 of a surrogate, some noise in chi-square, do not make up for."""
@@ -96,7 +92,7 @@ def select(
     by : "bic", "aicc", or "hold-out" (the last 30 % of each history predicted from a refit to the first 70 %).
     A law that cannot be identified is named in `failed`; FitError if none can.
     """
-    settings = replace(settings or IdentificationSettings(frames=SELECTION_FRAMES), weights="likelihood")
+    settings = replace(settings or IdentificationSettings(), weights="likelihood")
     if by not in CRITERIA:
         raise FitError(f"select(by={by!r}) is not known; allowed are {', '.join(CRITERIA)}")
     if not candidates:

@@ -1,0 +1,180 @@
+"""The same question through Python and the command line gives the same numbers, to the last digit."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import creepkit as ck
+from creepkit.cli.app import app
+from creepkit.language import Elastic
+from creepkit.records import History, Nuisance, PressureJump, constant_stress
+
+TEMPERATURES = (1023.15, 1073.15, 1123.15)
+RATES = (4e-18, 4e-17, 3e-16)
+"""A of Norton's law at these temperatures, 1/s, in dimples; a fifth of it in bars."""
+
+SPOILT = 14
+"""The frame that is spoilt, so that it matters whether suspect frames are left out."""
+
+QUICK = {"starts": 1, "frames": 14}
+QUICK_WORDS = ("--starts", "1", "--frames", "14")
+
+
+def command(*words):
+    result = CliRunner().invoke(app, [str(word) for word in words])
+    assert result.exit_code == 0, result.output
+    return result
+
+
+def curves(folder):
+    """Two bars at each temperature; one frame of the first lies apart."""
+    rng, times = np.random.default_rng(1), np.linspace(1e4, 4e5, 40)
+    for T, A in zip(TEMPERATURES, RATES, strict=True):
+        for stress in (80.0, 100.0):
+            strain = 0.2 * A * stress**5 * times + 1e-5 * rng.standard_normal(times.size)
+            if (T, stress) == (TEMPERATURES[0], 80.0):
+                strain[SPOILT] += 1e-3
+            test = History(f"bar-{T:.0f}-{stress:g}", times, {"strain": strain}, constant_stress(stress, "stress"), T)
+            ck.write_history(test, folder / f"{test.name}.csv")
+
+
+def dimples(folder):
+    """A simulated dimple at each temperature, by the surrogate."""
+    rng, times = np.random.default_rng(2), np.arange(600.0, 6 * 3600 + 1, 300.0)
+    for T, A in zip(TEMPERATURES, RATES, strict=True):
+        run = ck.simulate(
+            "norton",
+            ck.surrogate("dimple"),
+            {"A": A, "n": 5.0},
+            loading=PressureJump(8, 10, 3 * 3600),
+            times=times,
+            temperature=T,
+            elastic=Elastic(150e3),
+        )
+        noise = {"amplitude": 1.5e-3, "width": 0.02, "shape": 0.02}
+        outputs = {name: run.outputs[name] + sd * rng.standard_normal(times.size) for name, sd in noise.items()}
+        if T == TEMPERATURES[0]:
+            outputs["amplitude"][SPOILT] += 0.05
+        test = History(
+            f"dimple-{T:.0f}", times, outputs, run.loading, T, "bulge", elastic=run.elastic, geometry=run.geometry
+        )
+        ck.write_history(test, folder / f"{test.name}.csv")
+
+
+@pytest.fixture(scope="module", params=[curves, dimples])
+def tests_folder(request, tmp_path_factory):
+    """The folder of a kind of tests, and what predicts them: None, or the name of a surrogate."""
+    folder = tmp_path_factory.mktemp(request.param.__name__)
+    request.param(folder)
+    return folder, "dimple" if request.param is dimples else None
+
+
+def predictor(name):
+    return None if name is None else ck.surrogate(name)
+
+
+def surrogate_words(name):
+    return () if name is None else ("--surrogate", name)
+
+
+def isothermal(folder):
+    """The tests at the lowest temperature, the spoilt one among them."""
+    return ck.select_tests(ck.read_histories(folder), temperature=TEMPERATURES[0])
+
+
+def same(saved, fit):
+    """Whether a saved identification is that of Python, in every number."""
+    assert saved.values == fit.values
+    assert [(e.low, e.high) for e in saved.estimates] == [(e.low, e.high) for e in fit.estimates]
+    assert (saved.log_likelihood, repr(saved.rms)) == (fit.log_likelihood, repr(fit.rms))
+    assert (saved.settings, saved.notes) == (fit.settings, fit.notes)
+    return True
+
+
+ONE_TEMPERATURE = ("--only", "temperature=1023")
+
+
+@pytest.mark.parametrize(
+    ("words", "options", "excluded"),
+    [
+        ((), {}, True),
+        (
+            ("--seed", "3", "--frames", "12", "--starts", "2", "--suspect-frames", "keep", "--nuisance", "rate=0:0.2"),
+            {
+                "seed": 3,
+                "frames": 12,
+                "starts": 2,
+                "suspect_frames": "keep",
+                "nuisances": [Nuisance("offset"), Nuisance("rate", sd=0.2)],
+            },
+            False,
+        ),
+    ],
+)
+def test_identify(tests_folder, tmp_path, words, options, excluded):
+    folder, surrogate = tests_folder
+    fit = ck.identify("norton", isothermal(folder), predictor(surrogate), **options)
+    command(
+        "identify", folder, "--law", "norton", "--to", tmp_path, *ONE_TEMPERATURE, *surrogate_words(surrogate), *words
+    )
+    assert same(ck.load(tmp_path / "norton.json"), fit)
+    assert any("suspect frames were left out: 1 of" in note for note in fit.notes) == excluded
+
+
+@pytest.mark.parametrize(("words", "options"), [((), {}), (("--no-sums", "--seed", "2"), {"sums": False, "seed": 2})])
+def test_select(tests_folder, tmp_path, words, options):
+    folder, surrogate = tests_folder
+    tests, laws = ck.read_histories(folder), ("norton", "strain-hardening")
+    candidates = [ck.with_arrhenius(ck.law(name), tests) for name in laws]
+    ranking = ck.select(candidates, tests, predictor(surrogate), **QUICK, **options)
+    named = [word for name in laws for word in ("--law", name)]
+    result = command(
+        "identify", folder, *named, "--to", tmp_path, "--json", *surrogate_words(surrogate), *QUICK_WORDS, *words
+    )
+    answer = json.loads(result.stdout)
+    assert answer["verdict"] == ranking.verdict
+    assert [law["weight"] for law in answer["laws"]] == [ranked.weight for ranked in ranking.laws]
+    for ranked in ranking.laws:
+        assert same(ck.load(tmp_path / f"{ranked.fit.law.name.replace('*', '-')}.json"), ranked.fit)
+
+
+def test_screen(tests_folder, tmp_path):
+    folder, surrogate = tests_folder
+    settings = ck.IdentificationSettings(starts=1, sobol_points=64, frames=14)
+    options = ck.ScreeningOptions(settings=settings, dense=None, confirm=False)
+    tests = [test.replace(alloy="A") for test in ck.read_histories(folder)]
+    (tmp_path / "tests").mkdir()
+    for test in tests:
+        ck.write_history(test, tmp_path / "tests" / f"{test.name}.csv")
+    plate = ck.screen(tests, ["norton"], predictor(surrogate), options=options, workers=1)
+    words = ("--law", "norton", "--dense", "none", "--confirm", "never", "--workers", "1", *QUICK_WORDS)
+    command("screen", tmp_path / "tests", "--to", tmp_path / "out", *words, *surrogate_words(surrogate))
+    (result,) = plate.results
+    assert same(ck.load(tmp_path / "out" / "fits" / "A.json"), result.best)
+    assert any("suspect frames were left out: 1 of" in note for note in result.notes)
+
+
+@pytest.mark.parametrize(("words", "changes"), [((), {}), (("--seed", "5", "--suspect-frames", "keep"), {"seed": 5})])
+def test_discover(tests_folder, tmp_path, words, changes):
+    folder, surrogate = tests_folder
+    if words:
+        changes = {**changes, "suspect_frames": "keep"}
+    settings = ck.IdentificationSettings(**QUICK, **changes)
+    forms = {"A": ["arrhenius"], "n": ["constant", "linear"]}
+    study = ck.temperature_study(
+        "norton", ck.read_histories(folder), predictor(surrogate), settings=settings, forms=forms
+    )
+    form_words = ("--form", "A=arrhenius", "--form", "n=constant,linear")
+    command("discover", folder, "--to", tmp_path, *QUICK_WORDS, *form_words, *surrogate_words(surrogate), *words)
+    study.temperature_law.save(tmp_path / "python.json")
+    documents = [json.loads((tmp_path / name).read_text()) for name in ("temperature.json", "python.json")]
+    assert _without_dates(documents[0]) == _without_dates(documents[1])
+
+
+def _without_dates(value):
+    """A document without the moments at which identifications were made."""
+    if isinstance(value, dict):
+        return {name: _without_dates(item) for name, item in value.items() if name != "when"}
+    return [_without_dates(item) for item in value] if isinstance(value, list) else value
