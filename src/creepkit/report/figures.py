@@ -69,11 +69,11 @@ MANTISSAS = (
 """Labels within a decade of a logarithmic axis, the finest first."""
 
 
-PLAIN_NUMBERS = (1e-2, 9e4)
+PLAIN_NUMBERS = (1e-3, 9e4)
 """Between these, labels of a logarithmic axis are written out; others are powers of ten."""
 
 
-PLAIN_DECADES = (1e-2, 1e3)
+PLAIN_DECADES = (1e-3, 1e3)
 """The same of an axis with a label a decade: its numbers are powers of ten anyhow, and shorter as such."""
 
 
@@ -125,12 +125,13 @@ def _format_logarithmic(axis: Any, labels: Floats) -> None:
     decades = bool(np.allclose(labels[1:] / labels[:-1], 10.0))
     smallest, largest = PLAIN_DECADES if decades else PLAIN_NUMBERS
     plain = labels[0] >= smallest * (1 - 1e-9) and labels[-1] <= largest * (1 + 1e-9)
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}" if plain else _power_of_ten(value)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}" if plain else power_of_ten(value)))
     axis.set_minor_locator(LogLocator(subs=tuple(range(2, 10)), numticks=20) if decades else NullLocator())
     axis.set_minor_formatter(NullFormatter())
 
 
-def _power_of_ten(value: float) -> str:
+def power_of_ten(value: float) -> str:
+    """A number above zero as mantissa and power of ten."""
     exponent = int(np.floor(np.log10(value) + 1e-9))
     mantissa = value / 10.0**exponent
     return f"$10^{{{exponent}}}$" if abs(mantissa - 1.0) < 1e-6 else f"${mantissa:g}\\times10^{{{exponent}}}$"

@@ -44,8 +44,12 @@ PLOTTED_STRAIN_RATIO = 0.02
 """Residuals of strains are drawn where a test's strain exceeds this share of its last one; below, noise fills them."""
 
 
-MOST_COLUMNS = 4
-"""Panels of groups of tests side by side."""
+DOTS_ABOVE_LINES = 100
+"""Up to so many frames lie above the identified curve; more would hide it."""
+
+
+COLUMNS = (3, 4, 5)
+"""Panels of groups of tests side by side, whichever leaves the fewest places empty."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +58,8 @@ class TestCurve:
 
     hours : h. measured, identified, half_width : in the unit of the axis, offsets taken off where the axis is
     logarithmic; half_width : of the 95 % band, of the logarithm there. residuals : measured less identified, in
-    standard deviations of the noise, or in per cent of the identified one where the axis is logarithmic. noise : two
-    standard deviations of the frame noise in the same measure. residual_frames : which residuals are drawn.
+    standard deviations of the noise, or 100 times the difference of logarithms where the axis is logarithmic. noise :
+    two standard deviations of the frame noise in the same measure. residual_frames : which residuals are drawn.
     """
 
     __test__ = False  # not a test case, whatever its name says to pytest
@@ -103,9 +107,9 @@ def curve_of_test(fit: Identification, curves: FittedCurves, test: int, output: 
         measured,
         np.where(positive, identified, np.nan),
         np.where(positive, 100 * half_width / divisor, np.nan),
-        100 * (measured - identified) / divisor,
+        100 * np.log(np.where(measured > 0, measured, np.nan) / divisor),
         100 * 2 * 100 * noise / divisor,
-        positive & (measured > PLOTTED_STRAIN_RATIO * last),
+        positive & (measured > max(PLOTTED_STRAIN_RATIO * last, 0.0)),
         logarithmic=True,
     )
 
@@ -173,8 +177,7 @@ def _few_tests(fit: Identification, curves: FittedCurves) -> Figure:
                 continue
             axes = figure.add_subplot(grid[i, j])
             if kind == "curves":
-                _draw_curves(axes, fit, curves, output, leading[output], colours)
-                _finish_curves([axes], fit, curves, output, leading[output])
+                _draw_curves([axes], fit, curves, output, [leading[output]], colours)
                 axes.set_title(_curve_title(fit), fontsize=9)
             elif kind == "rates":
                 draw_rates(axes, fit, rates_of_tests(fit, curves.prediction))
@@ -208,7 +211,7 @@ def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:
         for output, tests in leading.items()
     }
     most = max(len(g) for g in groups.values())
-    columns = -(-most // -(-most // MOST_COLUMNS))
+    columns = min(COLUMNS, key=lambda count: (-most % count, -(-most // count))) if most > COLUMNS[0] else most
     row_counts = [-(-len(g) // columns) for g in groups.values()]
     width = 15.0
     figure = empty_figure(width, 2.9 * sum(row_counts) + 4.6 * -(-(len(leading) + 1 + has_ruptures) // 3) + 0.6)
@@ -220,10 +223,9 @@ def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:
     for part, (output, of_output), rows in zip(parts, groups.items(), row_counts, strict=False):
         panels = part.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
         used = list(panels.flat)[: len(of_output)]
-        for axes, (title, tests) in zip(used, of_output, strict=True):
-            _draw_curves(axes, fit, curves, output, tests, by_stress.colours)
+        _draw_curves(used, fit, curves, output, [tests for _, tests in of_output], by_stress.colours)
+        for axes, (title, _) in zip(used, of_output, strict=True):
             axes.set_title(title, fontsize=9)
-        _finish_curves(used, fit, curves, output, leading[output])
         for k, axes in enumerate(panels.flat):
             if k >= len(of_output):
                 axes.set_visible(False)
@@ -257,39 +259,58 @@ def _line_style(weight: float) -> str:
 
 def _curve_title(fit: Identification) -> str:
     """What is drawn, and what the bands include."""
-    included = "law and nuisances of the tests" if fit.nuisances else "law"
+    included = "the law and the nuisances of tests" if fit.nuisances else "the law"
     scatter = f", rates of tests differ by {100 * fit.noise_model.rate:.0f} %" if fit.noise_model.rate > 0 else ""
     return f"measured (dots), identified (lines) with 95 % band\nof {included}; not in it: noise{scatter}"
 
 
-def _draw_curves(
-    axes: Axes, fit: Identification, curves: FittedCurves, output: str, tests: Sequence[int], colours: Sequence[Any]
-) -> None:
-    for k in tests:
-        curve = curve_of_test(fit, curves, k, output)
+def draw_curve(axes: Axes, curve: TestCurve, colour: Any, style: str = "-", dots: Any = None) -> None:
+    """One output of one test: measured (in the colour of `dots`, if given), identified, and the 95 % band."""
+    if dots is not None:
         plotted = curve.measured > 0 if curve.logarithmic else np.isfinite(curve.measured)
-        axes.plot(curve.hours[plotted], curve.measured[plotted], ".", ms=3, color=colours[k], alpha=0.55)
-        axes.fill_between(curve.hours, *curve.band, color=colours[k], alpha=0.2, lw=0)
-        axes.plot(curve.hours, curve.identified, _line_style(fit.tests[k].weight), lw=1.2, color=colours[k])
+        above = int(plotted.sum()) <= DOTS_ABOVE_LINES
+        axes.plot(
+            *(curve.hours[plotted], curve.measured[plotted], "."),
+            ms=3,
+            color=dots,
+            alpha=0.55,
+            zorder=3 if above else 1,
+        )
+    axes.fill_between(curve.hours, *curve.band, color=colour, alpha=0.2, lw=0)
+    axes.plot(curve.hours, curve.identified, style, lw=1.2, color=colour)
 
 
-def _finish_curves(
-    panels: Sequence[Axes], fit: Identification, curves: FittedCurves, output: str, tests: Sequence[int]
+def _draw_curves(
+    panels: Sequence[Axes],
+    fit: Identification,
+    curves: FittedCurves,
+    output: str,
+    groups: Sequence[Sequence[int]],
+    colours: Sequence[Any],
 ) -> None:
-    drawn = [curve_of_test(fit, curves, k, output) for k in tests]
-    hours = np.concatenate([c.hours for c in drawn])
+    """The tests of each group in its panel; all panels have the same axes."""
+    drawn = []
+    for axes, tests in zip(panels, groups, strict=True):
+        for k in tests:
+            drawn.append(curve_of_test(fit, curves, k, output))
+            draw_curve(axes, drawn[-1], colours[k], _line_style(fit.tests[k].weight), dots=colours[k])
+    set_curve_ranges(panels, drawn, output)
+    for axes in panels:
+        axes.set(xlabel="time, h", ylabel=axis_label(output))
+
+
+def set_curve_ranges(panels: Sequence[Axes], drawn: Sequence[TestCurve], output: str) -> None:
+    """The same axes for all panels, from the measured and identified values of what is drawn of an output."""
     values = np.concatenate([v for c in drawn for v in (c.measured, c.identified)])
     values = values[np.isfinite(values)]
     largest = float(values.max(initial=0.0))
-    logarithmic = output in LOGARITHMIC_OUTPUTS
     for axes in panels:
-        if logarithmic:
-            lowest = max(float(values[values > 0].min(initial=largest)), SHOWN_STRAIN_RATIO * largest)
+        if output in LOGARITHMIC_OUTPUTS and largest > 0:
+            lowest = max(float(values[values > 0].min()), SHOWN_STRAIN_RATIO * largest)
             set_range(axes, "y", lowest, 1.1 * largest, logarithmic=True)
         else:
             set_range(axes, "y", min(float(values.min(initial=0.0)), 0.0), max(largest, 0.0))
-        _set_time_range(axes, hours, output)
-        axes.set(xlabel="time, h", ylabel=("creep " if logarithmic else "") + axis_label(output))
+        _set_time_range(axes, np.concatenate([c.hours for c in drawn]), output)
         axes.grid(alpha=0.25)
 
 
@@ -329,8 +350,9 @@ def _draw_residuals(
     set_range(axes, "y", min(float(low), -1.5 * noise), max(float(high), 1.5 * noise), most=6)
     if every.size:
         _set_time_range(axes, np.concatenate(hours), output)
-    measure = "%" if output in LOGARITHMIC_OUTPUTS else "noise sd"
-    axes.set(xlabel="time, h", ylabel=f"{output.replace('_', ' ')},\n{measure}")
+    name = output.replace("_", " ")
+    measure = f"100 ln (measured / identified {name}), ≈ %" if output in LOGARITHMIC_OUTPUTS else f"{name},\nnoise sd"
+    axes.set(xlabel="time, h", ylabel=measure)
     axes.set_title(_residual_title(fit, output, noise, output == fit.tests[tests[0]].outputs[0].output), fontsize=9)
     axes.grid(alpha=0.25)
 

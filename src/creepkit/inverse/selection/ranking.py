@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -29,6 +30,8 @@ from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from creepkit.inverse.selection.discrimination import EquivalentLaws
     from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 
@@ -102,6 +105,10 @@ class Ranking(Presentable):
     def further_tests(self) -> tuple[Any, ...]:
         """A DiscriminationDesign for each remaining law: tests that would tell it from the best (some seconds)."""
         return present(self, "further_tests")
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Misfits and weights of the laws, and the curves of the credible ones; written to `path` when given."""
+        return present(self, "plot", path)
 
 
 def rank(
