@@ -69,7 +69,7 @@ MANTISSAS = (
 """Labels within a decade of a logarithmic axis, the finest first."""
 
 
-PLAIN_NUMBERS = (1e-3, 9e4)
+PLAIN_NUMBERS = (1e-3, 1e5)
 """Between these, labels of a logarithmic axis are written out; others are powers of ten."""
 
 

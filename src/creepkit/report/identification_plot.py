@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.dataset.dataset import OUTPUT_UNITS
 from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, noise_standard_deviation, usable_frames
+from creepkit.inverse.reference_conditions import ISOTHERMAL_RANGE
 from creepkit.report.condition_colours import (
     MOST_NAMED_TESTS,
     condition_groups,
@@ -203,6 +204,7 @@ def _name_below(figure: Figure, fit: Identification, colours: Sequence[Any]) -> 
 def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:
     leading, has_ruptures = _leading_outputs(fit), bool(rupture_rows(fit))
     by_stress, by_temperature = stress_scale(fit.histories, fit.predictor), temperature_scale(fit.histories)
+    by_condition = by_temperature if np.ptp(by_temperature.values) > ISOTHERMAL_RANGE else by_stress
     groups = {
         output: [
             (title, [tests[k] for k in members])
@@ -239,11 +241,11 @@ def _many_tests(fit: Identification, curves: FittedCurves) -> Figure:
     by_panel = list(zip(panels.flat, bottom, strict=False))
     for axes, (kind, output) in by_panel:
         if kind == "residuals":
-            _draw_residuals(axes, fit, curves, output, leading[output], by_temperature.colours)
+            _draw_residuals(axes, fit, curves, output, leading[output], by_condition.colours)
         elif kind == "rates":
             draw_rates(axes, fit, rates_of_tests(fit, curves.prediction))
         else:
-            draw_ruptures(axes, fit, by_temperature.colours)
+            draw_ruptures(axes, fit, by_condition.colours)
     for axes in list(panels.flat)[len(bottom) :]:
         axes.set_visible(False)
     return figure
@@ -253,14 +255,14 @@ def _outputs_of(fit: Identification, tests: Sequence[int]) -> list[str]:
     return list(dict.fromkeys(one.output for k in tests for one in fit.tests[k].outputs))
 
 
-def _line_style(weight: float) -> str:
+def _line_style(weight: float) -> Literal["-", "--"]:
     return "--" if weight < DASHED_BELOW_WEIGHT else "-"
 
 
 def _curve_title(fit: Identification) -> str:
     """What is drawn, and what the bands include."""
     included = "the law and the nuisances of tests" if fit.nuisances else "the law"
-    scatter = f", rates of tests differ by {100 * fit.noise_model.rate:.0f} %" if fit.noise_model.rate > 0 else ""
+    scatter = f", rates of tests differ by {100 * fit.noise_model.rate:.0f} %" if fit.noise_model.rate >= 0.005 else ""
     return f"measured (dots), identified (lines) with 95 % band\nof {included}; not in it: noise{scatter}"
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from creepkit.inverse.observation_vector import frames_with_data
 from creepkit.inverse.reference_conditions import LOAD_TOLERANCE
 from creepkit.records import ZERO_CELSIUS, History, PointLoading, Program
-from creepkit.records.loading import loading_text
 
 SECONDS_PER_HOUR = 3600.0
 
@@ -36,14 +35,18 @@ def program_text(history: History) -> str:
 def load_text(history: History) -> str:
     """The load program over the frames of a test, such as "8 → 10 MPa at 4 h"."""
     loading = history.loading
+    last = _last_time(history)
     if isinstance(loading, PointLoading):
-        return loading_text(loading)
-    program, unit = loading.program(), " MPa"
-    tolerance = LOAD_TOLERANCE * float(np.abs(program.values).max())
+        parts = [f"stress {name} {_level_text(p, last, ' MPa')}" for name, p in loading.stress.items()]
+        return ", ".join(parts + [f"strain {name} {_level_text(p, last, '')}" for name, p in loading.strain.items()])
     if loading.quantity == "strain":
-        unit = ""
-    text = _holds_text(holds(program, _last_time(history), tolerance), unit, lambda v: f"{v:g}")
-    return f"strain {text}" if loading.quantity == "strain" else text
+        return f"strain {_level_text(loading.program(), last, '')}"
+    return _level_text(loading.program(), last, " MPa")
+
+
+def _level_text(program: Program, last: float, unit: str) -> str:
+    tolerance = LOAD_TOLERANCE * float(np.abs(program.values).max())
+    return _holds_text(holds(program, last, tolerance), unit, lambda v: f"{v:g}")
 
 
 def temperature_text(history: History) -> str:

@@ -95,7 +95,7 @@ class HoldRate:
     """The creep rate that one hold of one test shows, at the strain and time of the reference point.
 
     stress : MPa; temperature : K; rate : 1/s, the identified one times measured over identified growth of the output
-    that grows with creep, by least squares.
+    that grows with creep, the median over the hold.
     """
 
     test: int
@@ -141,8 +141,18 @@ def _levels(fit: Identification, history: History, output: str) -> list[tuple[fl
     return [(by_load[v], used & (history.times > start) & (history.times <= end)) for start, end, v in pieces]
 
 
+GROWTH_INTERVALS = 8
+"""Pieces of a hold over which growth is compared."""
+
+
 def _growth_ratio(measured: Floats, predicted: Floats) -> float:
-    """Slope of the line through measured over predicted values, by least squares; both (frames,)."""
-    deviation = predicted - predicted.mean()
-    square = float(deviation @ deviation)
-    return float(deviation @ (measured - measured.mean())) / square if square > 0 else 0.0
+    """Median of measured over predicted increments across an eighth of a hold's frames; both (frames,).
+
+    Increments of under 1 % of the predicted range are left out; without any, there is no growth and the ratio is 0.
+    """
+    stride = max(1, measured.size // GROWTH_INTERVALS)
+    increments = predicted[stride:] - predicted[:-stride]
+    large = np.abs(increments) > 0.01 * float(np.ptp(predicted))
+    if not large.any():
+        return 0.0
+    return float(np.median((measured[stride:] - measured[:-stride])[large] / increments[large]))

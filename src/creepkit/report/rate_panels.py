@@ -63,7 +63,7 @@ def draw_rates(axes: Axes, fit: Identification, rates: Sequence[HoldRate]) -> No
     place_legend_right(axes, "95 % band:\nlaw")
     reference = fit.reference
     axes.set_title(
-        f"rate at strain {reference.strain:.2g} and {reference.time / SECONDS_PER_HOUR:.3g} h\n"
+        f"rate at strain {reference.strain:.2g} and {reference.time / SECONDS_PER_HOUR:.4g} h\n"
         "tests: identified rate × measured / identified growth",
         fontsize=9,
     )
