@@ -46,15 +46,14 @@ def _unit_text(unit: str) -> str:
 def profile_figure(profile: ProfileLikelihood, path: str | Path | None = None) -> Figure:
     """The rise of chi-square over the quantity, its limit, and the parabola of Laplace's approximation."""
     figure, axes = _figure_and_axes(6.0, 4.2)
-    logarithmic = (
-        bool((profile.values > 0).all()) and float(profile.values.max() / profile.values.min()) > LOGARITHMIC_RATIO
-    )
-    curve, rise = _profile_curve(profile, logarithmic)
+    low, high = profile.laplace
+    positive = bool((profile.values > 0).all()) and low > 0
+    logarithmic = positive and float(profile.values.max() / profile.values.min()) > LOGARITHMIC_RATIO
+    curve, rise = _profile_curve(profile, positive)
     axes.plot(curve, rise, "-", color="C0", label="profile")
     axes.plot(profile.values, profile.chi_square, "o", ms=4, color="C0")
-    low, high = profile.laplace
-    scale = np.log if low > 0 and logarithmic else np.asarray
-    grid = np.geomspace(low, high, 80) if low > 0 and logarithmic else np.linspace(low, high, 80)
+    scale = np.log if positive else np.asarray
+    grid = np.geomspace(low, high, 80) if positive else np.linspace(low, high, 80)
     middle, half = 0.5 * (scale(low) + scale(high)), 0.5 * (scale(high) - scale(low))
     axes.plot(grid, profile.limit * ((scale(grid) - middle) / half) ** 2, "--", color="C1", label="Laplace")
     axes.axhline(profile.limit, color="black", lw=0.8, label=f"{100 * profile.level:g} %")
@@ -71,12 +70,12 @@ def profile_figure(profile: ProfileLikelihood, path: str | Path | None = None) -
     return save_figure(figure, path)
 
 
-def _profile_curve(profile: ProfileLikelihood, logarithmic: bool) -> tuple[Floats, Floats]:
+def _profile_curve(profile: ProfileLikelihood, positive: bool) -> tuple[Floats, Floats]:
     """(points,) values and rises of chi-square between those of a profile: its signed root is nearly straight."""
-    values = np.log(profile.values) if logarithmic else profile.values
+    values = np.log(profile.values) if positive else profile.values
     root = np.sqrt(np.maximum(profile.chi_square, 0.0)) * np.sign(profile.values - profile.best)
     grid = np.unique(np.concatenate([values, np.linspace(values[0], values[-1], 300)]))
-    return (np.exp(grid) if logarithmic else grid), np.interp(grid, values, root) ** 2
+    return (np.exp(grid) if positive else grid), np.interp(grid, values, root) ** 2
 
 
 def _with_margin(values: Floats, logarithmic: bool) -> tuple[float, float]:
