@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
-    """Write every law's JSON and plot, the plot of the ranking, and the best law as LaTeX and Python; returns the paths."""
+    """Write JSON and plot of every law, the ranking's plot, and the best law as LaTeX and Python; returns the paths."""
     import creepkit as ck
 
     folder.mkdir(parents=True, exist_ok=True)
