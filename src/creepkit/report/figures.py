@@ -147,3 +147,10 @@ def wrapped(text: str, figure_width: float, size: float = 10.0) -> str:
     """Lines of a text that fit a width in inches at a font size in points."""
     characters = max(30, int(figure_width * 72.0 / (0.55 * size)))
     return "\n".join(line for paragraph in text.splitlines() for line in wrap(paragraph, characters))
+
+
+def place_legend_below(figure: Figure, axes: Axes, *, columns: int = 3, size: float = 8.0) -> None:
+    """The legend of a panel below the figure, where it covers no data."""
+    handles, labels = axes.get_legend_handles_labels()
+    if labels:
+        figure.legend(handles, labels, loc="outside lower center", ncols=min(columns, len(labels)), fontsize=size)
