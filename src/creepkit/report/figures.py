@@ -149,8 +149,18 @@ def wrapped(text: str, figure_width: float, size: float = 10.0) -> str:
     return "\n".join(line for paragraph in text.splitlines() for line in wrap(paragraph, characters))
 
 
-def place_legend_below(figure: Figure, axes: Axes, *, columns: int = 3, size: float = 8.0) -> None:
+def place_legend_below(
+    figure: Figure, axes: Axes, *, columns: int = 3, size: float = 8.0, title: str | None = None
+) -> None:
     """The legend of a panel below the figure, where it covers no data."""
     handles, labels = axes.get_legend_handles_labels()
     if labels:
-        figure.legend(handles, labels, loc="outside lower center", ncols=min(columns, len(labels)), fontsize=size)
+        figure.legend(
+            handles,
+            labels,
+            loc="outside lower center",
+            ncols=min(columns, len(labels)),
+            fontsize=size,
+            title=title,
+            title_fontsize=size,
+        )

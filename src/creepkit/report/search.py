@@ -55,7 +55,7 @@ def _draw_costs(axes: Axes, trace: SearchTrace) -> None:
     axes.set(xlabel="iteration", xlim=(1, max(len(trace), 2)))
     refined = [] if trace.refined_cost is None else [trace.refined_cost]
     drawn = np.maximum(np.concatenate([best, np.ravel(trace.quartiles), refined]), SMALLEST_DRAWN_COST)
-    set_range(axes, "y", float(drawn.min()), float(drawn.max()), logarithmic=True)
+    set_range(axes, "y", 0.9 * float(drawn.min()), 1.1 * float(drawn.max()), logarithmic=True)
     axes.set_ylabel("cost (half of chi-square,\nbound penalties and penalty included)")
     axes.set_title(trace.search, fontsize=10)
     axes.grid(alpha=0.25)
