@@ -87,7 +87,13 @@ def outputs_figure(run: BulgeRun, path: str | Path | None = None) -> Figure:
         values = np.concatenate([line.get_ydata() for line in axes.lines])
         values = values[np.isfinite(values)]
         low = 0.0 if axes in (panels[0], panels[3]) else float(values.min(initial=np.inf))
-        set_range(axes, "y", min(low, float(values.max(initial=0.0))), float(values.max(initial=1e-9)), most=5)
+        set_range(
+            axes,
+            "y",
+            min(low, float(values.max(initial=0.0))),
+            (1.1 if axes is panels[3] else 1.0) * float(values.max(initial=1e-9)),
+            most=5,
+        )
         axes.grid(alpha=0.25)
     set_range(panels[3], "x", 0.0, float(knots[-1]) / 3600.0)
     ended = f", ended at {_duration(run.end_time)}: {run.reason}" if run.reason else ""

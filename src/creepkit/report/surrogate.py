@@ -89,8 +89,8 @@ def _draw_parity(axes: Axes, true: Any, predicted: Any) -> None:
         return
     limits = np.array([min(true.min(), predicted.min()), max(true.max(), predicted.max())])
     thinned = slice(None, None, -(-true.size // MOST_POINTS))
-    set_range(axes, "x", float(limits[0]), float(limits[1]), most=6)
-    set_range(axes, "y", float(limits[0]), float(limits[1]), most=6)
+    set_range(axes, "x", float(limits[0]), float(limits[1]), most=5)
+    set_range(axes, "y", float(limits[0]), float(limits[1]), most=5)
     axes.plot(limits, limits, "k-", lw=0.8)
     axes.plot(true[thinned], predicted[thinned], ".", ms=3, alpha=0.5)
     spread = ((true - true.mean()) ** 2).sum()
@@ -117,7 +117,8 @@ def worst_samples_figure(comparison: PredictionComparison, path: str | Path | No
         axes.grid(alpha=0.25)
     place_legend_below(figure, panels[0])
     name = comparison.outputs[0]
-    figure.supxlabel("time, h", fontsize=10)
+    for axes in panels[3:]:
+        axes.set_xlabel("time, h", fontsize=9)
     figure.supylabel(OUTPUT_LABELS.get(name, name), fontsize=10)
     return save_figure(figure, path, SurrogateError)
 
