@@ -55,12 +55,15 @@ COLUMNS = (3, 4, 5)
 
 @dataclass(frozen=True, eq=False)
 class TestCurve:
-    """One output of one test, as it is drawn: (frames,) each.
+    """One output of one test, as it is drawn.
 
-    hours : h. measured, identified, half_width : in the unit of the axis, offsets taken off where the axis is
-    logarithmic; half_width : of the 95 % band, of the logarithm there. residuals : measured less identified, in
-    standard deviations of the noise, or 100 times the difference of logarithms where the axis is logarithmic. noise :
-    two standard deviations of the frame noise in the same measure. residual_frames : which residuals are drawn.
+    hours : (frames,) h.
+    measured, identified : (frames,) in the unit of the axis, offsets taken off where the axis is logarithmic.
+    half_width : (frames,) of the 95 % band, in the same unit; of the logarithm where the axis is logarithmic.
+    residuals : (frames,) measured less identified, in standard deviations of the noise, or 100 times the difference of
+        their logarithms where the axis is logarithmic.
+    noise : (frames,) two standard deviations of the frame noise in the same measure.
+    residual_frames : (frames,) which residuals are drawn.
     """
 
     __test__ = False  # not a test case, whatever its name says to pytest
