@@ -45,6 +45,7 @@ PRESENTERS: dict[str, dict[str, str]] = {
     "SearchTrace": {"plot": "creepkit.report.search:search_figure"},
     "Ranking": {
         "text": "creepkit.report.ranking:ranking_text",
+        "plot": "creepkit.report.ranking_plot:ranking_figure",
         "further_tests": "creepkit.experiments.discriminating_experiments:further_tests",
     },
     "Sparsity": {"text": "creepkit.report.search:sparsity_text"},

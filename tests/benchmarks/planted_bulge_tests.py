@@ -219,9 +219,7 @@ def planted_test(alloy, number, design, using, rng):
         values = {**values, "Q": ACTIVATION_ENERGY}
         change = design.drift * rng.choice((-1.0, 1.0))
         temperature = ck.Program([0.0, TIMES[-1]], [TEST_TEMPERATURE, TEST_TEMPERATURE + change])
-    run = ck.simulate(
-        law, dimple, values, elastic=elastic, loading=loading, times=TIMES, temperature=temperature
-    )
+    run = ck.simulate(law, dimple, values, elastic=elastic, loading=loading, times=TIMES, temperature=temperature)
     amplitude = run.outputs["amplitude"]
     noises = {name: sd * rng.standard_normal(TIMES.size) for name, sd in NOISE.items()}
     standard_deviations = dict(NOISE)

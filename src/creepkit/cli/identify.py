@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
-    """Write every law's JSON and plot, and the best law as LaTeX and Python; returns the paths."""
+    """Write JSON and plot of every law, the ranking's plot, and the best law as LaTeX and Python; returns the paths."""
     import creepkit as ck
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -46,6 +46,8 @@ def write_ranking(ranking: Ranking, folder: Path) -> list[Path]:
         written.append(entry.fit.save(folder / f"{name}.json"))
         entry.fit.plot(folder / f"{name}.png")
         written.append(folder / f"{name}.png")
+    ranking.plot(folder / "ranking.png")
+    written.append(folder / "ranking.png")
     best = ranking.best
     for language, suffix in (("latex", ".tex"), ("python", ".py")):
         path = folder / f"{file_stem(best.law.name)}{suffix}"

@@ -11,7 +11,7 @@ import numpy as np
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.dataset.dataset import column_units, design_name, summary, summary_columns
 from creepkit.errors import DatasetError
-from creepkit.report.figures import empty_figure, make_folder, save_figure
+from creepkit.report.figures import empty_figure, make_folder, save_figure, set_range
 from creepkit.report.terminal import print_json
 
 if TYPE_CHECKING:
@@ -96,7 +96,14 @@ def history_figure(data: Dataset, path: str | Path | None = None, *, seed: int =
             axes.plot(data.times(row) / 3600.0, data.output(name)[row], lw=0.9, color=colour_map.to_rgba(load))
         axes.set(xlabel="time, h", ylabel=f"{name}{_unit_label(column_units(data)[f'last {name}'])}")
         axes.grid(alpha=0.25)
-    panels[0].set_ylim(bottom=0.0)
+    for axes in panels:
+        rows = [np.ravel(line.get_ydata()) for line in axes.lines]
+        values = np.concatenate([*rows, np.zeros(1)] if axes is panels[0] else rows or [np.zeros(1)])
+        finite = values[np.isfinite(values)]
+        if finite.size:
+            set_range(axes, "y", float(finite.min()), float(finite.max()))
+        longest = max((float(data.times(row)[-1]) for row in selected), default=3600.0)
+        set_range(axes, "x", 0.0, longest / 3600.0, most=6)
     figure.colorbar(colour_map, ax=panels, label="largest load, MPa", pad=0.01)
     figure.suptitle(
         f"{_dataset_title(data)}: {len(selected)} of {int((data.reasons == 0).sum())} accepted samples", fontsize=11

@@ -1,20 +1,29 @@
-"""Matplotlib figures that need no display, and the one way in which they are written to files."""
+"""Matplotlib figures that need no display, their axes, and the one way in which they are written to files."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
+from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError, FitError
 from creepkit.files.writing import check_target, replace_on_success
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
 RESOLUTION = 130
 """Dots per inch of figures that are written as pixels."""
+
+
+LARGEST_PIXELS = 4000
+"""Of the longer side of a figure that is written; the resolution of a larger one is lowered to it."""
 
 
 def empty_figure(width: float, height: float) -> Figure:
@@ -56,6 +65,118 @@ def save_figure(figure: Figure, path: str | Path | None, error_type: type[Creepk
     if path is not None:
         target = Path(path)
         check_figure_target(target, error_type)
+        resolution = min(RESOLUTION, LARGEST_PIXELS / max(figure.get_size_inches()))
         with replace_on_success(target, error_type) as temporary:
-            figure.savefig(temporary, dpi=RESOLUTION, format=target.suffix.lower().lstrip("."))
+            figure.savefig(temporary, dpi=resolution, format=target.suffix.lower().lstrip("."))
     return figure
+
+
+MOST_LABELS = 8
+"""Labels along an axis at most."""
+
+
+MANTISSAS = (
+    (1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0, 9.0),
+    (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0),
+    (1.0, 2.0, 5.0),
+    (1.0, 3.0),
+    (1.0,),
+)
+"""Labels within a decade of a logarithmic axis, the finest first."""
+
+
+PLAIN_NUMBERS = (1e-3, 1e5)
+"""Between these, labels of a logarithmic axis are written out; others are powers of ten."""
+
+
+PLAIN_DECADES = (1e-3, 1e3)
+"""The same of an axis with a label a decade: its numbers are powers of ten anyhow, and shorter as such."""
+
+
+OVERHANG = 0.03
+"""Of an axis: by so much data may lie beyond the last label."""
+
+
+def set_range(
+    axes: Axes, which: Literal["x", "y"], low: float, high: float, *, logarithmic: bool = False, most: int = MOST_LABELS
+) -> None:
+    """Extend the range of an axis beyond low and high to round numbers, so that it has a label at either end.
+
+    most : labels at most. The range of a logarithmic axis is above zero.
+    """
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    if logarithmic:
+        overhang = (high / low) ** OVERHANG
+        labels = logarithmic_labels(low * overhang, high / overhang, most)
+        (axes.set_xscale if which == "x" else axes.set_yscale)("log")
+        _format_logarithmic(axis, labels)
+    else:
+        from matplotlib.ticker import MaxNLocator
+
+        overhang = OVERHANG * (high - low)
+        locator = MaxNLocator(most - 1, steps=[1, 2, 2.5, 5, 10])
+        labels = np.asarray(locator.tick_values(low + overhang * (low != 0.0), high - overhang))
+    axis.set_ticks(list(labels))
+    ends = min(float(labels[0]), low), max(float(labels[-1]), high)
+    (axes.set_xlim if which == "x" else axes.set_ylim)(*ends)
+
+
+def logarithmic_labels(low: float, high: float, most: int = MOST_LABELS) -> Floats:
+    """(labels,) at most `most` round numbers from one at or below low to one at or above high, both above zero."""
+    first, last = int(np.floor(np.log10(low) + 1e-9)), int(np.ceil(np.log10(high) - 1e-9))
+    for mantissas in MANTISSAS:
+        candidates = np.array([m * 10.0**d for d in range(first, last + 1) for m in mantissas])
+        below, above = candidates <= low * (1 + 1e-9), candidates >= high * (1 - 1e-9)
+        labels = candidates[np.flatnonzero(below)[-1] : np.flatnonzero(above)[0] + 1]
+        if 2 <= labels.size <= most:
+            return np.asarray(labels)
+    stride = max(1, int(np.ceil((last - first) / (most - 1))))
+    return np.asarray(10.0 ** np.arange(first, max(last, first + 1) + stride, stride, dtype=float))
+
+
+def _format_logarithmic(axis: Any, labels: Floats) -> None:
+    """Numbers written out where they are of a usual size, powers of ten elsewhere; other ticks have no label."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
+
+    decades = bool(np.allclose(labels[1:] / labels[:-1], 10.0))
+    smallest, largest = PLAIN_DECADES if decades else PLAIN_NUMBERS
+    plain = labels[0] >= smallest * (1 - 1e-9) and labels[-1] <= largest * (1 + 1e-9)
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}" if plain else power_of_ten(value)))
+    axis.set_minor_locator(LogLocator(subs=tuple(range(2, 10)), numticks=20) if decades else NullLocator())
+    axis.set_minor_formatter(NullFormatter())
+
+
+def power_of_ten(value: float) -> str:
+    """A number above zero as mantissa and power of ten."""
+    exponent = int(np.floor(np.log10(value) + 1e-9))
+    mantissa = value / 10.0**exponent
+    return f"$10^{{{exponent}}}$" if abs(mantissa - 1.0) < 1e-6 else f"${mantissa:g}\\times10^{{{exponent}}}$"
+
+
+def place_legend_right(axes: Axes, title: str | None = None, size: float = 8.0) -> None:
+    """The legend of a panel to its right, where it covers no data."""
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(fontsize=size, title=title, title_fontsize=size, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def wrapped(text: str, figure_width: float, size: float = 10.0) -> str:
+    """Lines of a text that fit a width in inches at a font size in points."""
+    characters = max(30, int(figure_width * 72.0 / (0.55 * size)))
+    return "\n".join(line for paragraph in text.splitlines() for line in wrap(paragraph, characters))
+
+
+def place_legend_below(
+    figure: Figure, axes: Axes, *, columns: int = 3, size: float = 8.0, title: str | None = None
+) -> None:
+    """The legend of a panel below the figure, where it covers no data."""
+    handles, labels = axes.get_legend_handles_labels()
+    if labels:
+        figure.legend(
+            handles,
+            labels,
+            loc="outside lower center",
+            ncols=min(columns, len(labels)),
+            fontsize=size,
+            title=title,
+            title_fontsize=size,
+        )

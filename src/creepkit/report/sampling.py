@@ -9,7 +9,7 @@ import numpy as np
 
 from creepkit.arrays import Bools, Floats
 from creepkit.errors import DatasetError
-from creepkit.report.figures import empty_figure, save_figure
+from creepkit.report.figures import empty_figure, place_legend_below, save_figure
 from creepkit.report.terminal import print_json
 from creepkit.sampling.conditions import ROOM_TEMPERATURE
 from creepkit.sampling.criteria import RateLimit
@@ -43,6 +43,7 @@ def acceptance_figure(acceptance: Acceptance, path: str | Path | None = None) ->
     rates, strains = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
     _draw_rates(rates, acceptance)
     _draw_strains(strains, acceptance)
+    place_legend_below(figure, strains)
     design = acceptance.design
     figure.suptitle(
         f"{design.law.title or design.law.name}: {design.name} domain, {len(acceptance.draws)} draws", fontsize=11
@@ -128,8 +129,6 @@ def _draw_strains(axes: Axes, acceptance: Acceptance) -> None:
     axes.hist(columns, bins=list(bins), stacked=True, color=colours, label=list(groups))
     axes.axvspan(low, high, color=USEFUL_COLOUR, alpha=0.12, lw=0)
     axes.set(xlabel="log10 of (mean rate at the reference stress x duration)", ylabel="draws")
-    axes.set_ylim(top=1.3 * axes.get_ylim()[1])
-    axes.legend(fontsize=8, loc="upper right")
     axes.set_title("strain at the end; shaded: creep is visible and the test lasts", fontsize=10)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.inverse.observation_vector import usable_frames
-from creepkit.report.figures import empty_figure, make_folder, save_figure
+from creepkit.report.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
 from creepkit.report.terminal import print_json, print_table
 from creepkit.screening.files import COMPARISON_STRESS, confirmation_text, result_columns
 from creepkit.screening.results import AlloyResult, PredictedOutputs, mean_chi_square, mean_relative_squared_error
@@ -112,8 +112,8 @@ MISFIT_MEASURES = (
 )
 
 
-LOG_TICKS, MIN_LOG_RATIO = (1.0, 2.0, 5.0), 5.0
-"""Of logarithmic axes: where ticks are, and the ratio of their ends below which they are linear instead."""
+MIN_LOG_RATIO = 5.0
+"""Ratio of the ends of an axis below which it is linear."""
 
 
 class LegendLabels:
@@ -153,18 +153,12 @@ def plot_misfits(plate: ScreeningResult, results: list[AlloyResult]) -> Figure:
 
 def _finish_misfit(axes: Axes, limits: tuple[float, float]) -> None:
     """Equal axes, logarithmic where they span much."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    axes.plot(limits, limits, "k-", lw=0.7, alpha=0.6)
-    axes.set(xlim=limits, ylim=limits, xlabel="law without sparsity", ylabel="reduced law")
+    logarithmic = limits[1] >= MIN_LOG_RATIO * limits[0]
+    set_range(axes, "x", *limits, logarithmic=logarithmic, most=6)
+    set_range(axes, "y", *limits, logarithmic=logarithmic, most=6)
+    axes.plot(axes.get_xlim(), axes.get_xlim(), "k-", lw=0.7, alpha=0.6, scalex=False, scaley=False)
+    axes.set(xlabel="law without sparsity", ylabel="reduced law")
     axes.grid(alpha=0.25)
-    if limits[1] < MIN_LOG_RATIO * limits[0]:
-        return
-    axes.set(xscale="log", yscale="log")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(subs=LOG_TICKS))
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter(NullFormatter())
 
 
 def plot_law_fractions(plate: ScreeningResult) -> Figure:
@@ -216,7 +210,7 @@ def plot_histories(plate: ScreeningResult, results: list[AlloyResult]) -> Figure
         _plot_displacements(axes, test, result.predicted[test.name])
         axes.set_title(f"{result.alloy}, {name}: {result.best.law.name}", fontsize=9)
     panels[0].set_ylabel("displacement, mm")
-    panels[0].legend(fontsize=8, title="measured (dots), identified", title_fontsize=8)
+    place_legend_below(figure, panels[0], title="measured (dots), identified (lines)")
     return figure
 
 
@@ -232,7 +226,10 @@ def _plot_displacements(axes: Axes, test: History, predicted: PredictedOutputs) 
         axes.plot(
             hours, profile_displacement(profile_outputs, radius), "-", lw=1.2, color=f"C{k}", label=f"r = {radius:g} mm"
         )
-    axes.set(xlabel="time, h", ylim=(0, None))
+    drawn = np.concatenate([line.get_ydata() for line in axes.lines])
+    set_range(axes, "y", 0.0, float(np.nanmax(drawn, initial=1e-9)))
+    set_range(axes, "x", 0.0, float(test.times[-1]) / SECONDS_PER_HOUR, most=6)
+    axes.set(xlabel="time, h")
     axes.grid(alpha=0.25)
 
 
@@ -291,10 +288,11 @@ def _displacement_pairs(plate: ScreeningResult, result: AlloyResult, radius: flo
 
 
 def _finish_parity(upper: Axes, lower: Axes, radius: float, errors: Any, axis_limit: float) -> None:
+    set_range(upper, "y", 0.0, axis_limit, most=6)
+    set_range(upper, "x", 0.0, axis_limit, most=6)
     upper.plot([0, axis_limit], [0, axis_limit], "k-", lw=0.7, alpha=0.6)
     lower.axhline(0, color="black", lw=0.7, alpha=0.6)
     rms = f", rms {1e3 * float(np.sqrt(np.mean(errors**2))):.2g} um" if errors.size else ": not observed"
-    upper.set(xlim=(0, axis_limit), ylim=(0, axis_limit))
     upper.set_title(f"r = {radius:g} mm{rms}", fontsize=10)
     lower.set(xlabel="measured displacement, mm")
     for axes in (upper, lower):

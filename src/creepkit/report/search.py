@@ -9,7 +9,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.inverse.sparsity.result import LEAST_CONTRIBUTION
-from creepkit.report.figures import empty_figure, save_figure
+from creepkit.report.figures import empty_figure, place_legend_below, save_figure, set_range
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,6 +34,7 @@ def search_figure(trace: SearchTrace, path: str | Path | None = None) -> Figure:
     axes = figure.subplots()
     _draw_costs(axes, trace)
     _draw_evaluations(axes, trace)
+    place_legend_below(figure, axes)
     return save_figure(figure, path)
 
 
@@ -51,11 +52,13 @@ def _draw_costs(axes: Axes, trace: SearchTrace) -> None:
         axes.axhline(max(trace.refined_cost, SMALLEST_DRAWN_COST), color="black", lw=1.0, ls="--", label=label)
     for k, start in enumerate(trace.restarts):
         axes.axvline(start + 1, color="grey", lw=0.8, ls=":", label="restart" if k == 0 else None)
-    axes.set(xlabel="iteration", yscale="log", xlim=(1, max(len(trace), 2)))
-    axes.set_ylabel("cost (half of chi-square, bound penalties and penalty included)")
+    axes.set(xlabel="iteration", xlim=(1, max(len(trace), 2)))
+    refined = [] if trace.refined_cost is None else [trace.refined_cost]
+    drawn = np.maximum(np.concatenate([best, np.ravel(trace.quartiles), refined]), SMALLEST_DRAWN_COST)
+    set_range(axes, "y", 0.9 * float(drawn.min()), 1.1 * float(drawn.max()), logarithmic=True)
+    axes.set_ylabel("cost (half of chi-square,\nbound penalties and penalty included)")
     axes.set_title(trace.search, fontsize=10)
     axes.grid(alpha=0.25)
-    axes.legend(fontsize=8)
 
 
 def _draw_evaluations(axes: Axes, trace: SearchTrace) -> None:
@@ -118,7 +121,7 @@ def penalty_path_figure(path: PenaltyPath, file: str | Path | None = None) -> Fi
     _draw_ticks(axes, path, positions)
     axes.grid(alpha=0.25)
     _draw_chi_square(axes, path, positions)
-    axes.legend(fontsize=8, loc="center left")
+    place_legend_below(figure, axes, columns=4)
     axes.set_title(f"{path.penalty}: terms below 5 % (grey) are dropped", fontsize=10)
     return save_figure(figure, file)
 
@@ -139,4 +142,5 @@ def _draw_chi_square(axes: Axes, path: PenaltyPath, positions: Floats) -> None:
     right = axes.twinx()
     rise = np.maximum(path.chi_square - path.chi_square[0], SMALLEST_DRAWN_RISE)
     right.plot(positions, rise, "s--", color="grey", ms=3, lw=1.0)
-    right.set(yscale="log", ylabel="rise of chi-square (grey squares)")
+    set_range(right, "y", float(rise.min()), float(rise.max()), logarithmic=True)
+    right.set_ylabel("rise of chi-square (grey squares)")

@@ -11,7 +11,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, SIDES, outline, shape_functions
 from creepkit.records import Status
-from creepkit.report.figures import empty_figure, save_figure
+from creepkit.report.figures import empty_figure, save_figure, set_range
 from creepkit.specimens.bulge.reduced_order.deflection_curves import LOG_GROWTH, LOG_STRESS
 from creepkit.specimens.bulge.reduced_order.step_equations import growth_multiplier, redistribution_sizes
 from creepkit.specimens.bulge.reduced_order.tables import LOADS, ReducedOrderTables
@@ -83,10 +83,19 @@ def outputs_figure(run: BulgeRun, path: str | Path | None = None) -> Figure:
     knots = np.unique(np.concatenate([inside, [0.0, run.end_time]]))
     panels[3].plot(knots / 3600.0, program.at(knots), lw=1.5, color="tab:red")
     panels[3].set(ylabel="pressure, MPa", xlabel="time, h")
-    panels[0].set_ylim(bottom=0.0)
-    panels[3].set_ylim(0.0, 1.15 * max(float(program.values.max()), 1e-9))
     for axes in panels:
+        values = np.concatenate([line.get_ydata() for line in axes.lines])
+        values = values[np.isfinite(values)]
+        low = 0.0 if axes in (panels[0], panels[3]) else float(values.min(initial=np.inf))
+        set_range(
+            axes,
+            "y",
+            min(low, float(values.max(initial=0.0))),
+            (1.1 if axes is panels[3] else 1.0) * float(values.max(initial=1e-9)),
+            most=5,
+        )
         axes.grid(alpha=0.25)
+    set_range(panels[3], "x", 0.0, float(knots[-1]) / 3600.0)
     ended = f", ended at {_duration(run.end_time)}: {run.reason}" if run.reason else ""
     figure.suptitle(f"{run.name}{ended}", fontsize=10)
     figure.align_ylabels(panels)
@@ -197,11 +206,15 @@ def tables_figure(tables: ReducedOrderTables, path: str | Path | None = None) ->
     left.set(ylabel="k = $\\sigma^*$/P", title="stress of the reference point")
     middle.set(ylabel="$\\kappa$ = dD/d$\\epsilon^*$, mm", title="growth by its strain")
     for axes in (left, middle):
-        axes.set(xlabel="D, mm", xlim=(0, None), ylim=(0, None))
+        set_range(axes, "x", 0.0, float(tables.grid.points[-1]))
+        set_range(axes, "y", 0.0, max(float(np.max(line.get_ydata())) for line in axes.lines))
+        axes.set(xlabel="D, mm")
         axes.legend(frameon=False, fontsize=8)
     strains = np.geomspace(1e-3, 5.0, 80)
     for k, n in enumerate(_EXPONENTS):
         right.loglog(strains, growth_multiplier(strains, n, size=_first(tables)), color=f"C{k}", label=f"n = {n:g}")
+    set_range(right, "x", float(strains[0]), float(strains[-1]), logarithmic=True)
+    set_range(right, "y", 0.9, max(float(np.max(line.get_ydata())) for line in right.lines), logarithmic=True)
     right.axhline(1.0, color="0.7", lw=0.8)
     right.set(xlabel="$\\lambda$ = E $\\epsilon^*$/$\\sigma^*$", title="growth over steady growth at first")
     right.legend(frameon=False, fontsize=8)

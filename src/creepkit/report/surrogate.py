@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from creepkit.errors import SurrogateError
-from creepkit.report.figures import empty_figure, make_folder, save_figure
+from creepkit.report.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
 from creepkit.surrogates.evaluation import PredictionComparison, evaluate, worst_histories
 from creepkit.surrogates.recipe import SurrogateMetadata
 from creepkit.surrogates.training import SizeStudyResult
@@ -59,7 +59,10 @@ def training_curves(metadata: SurrogateMetadata, path: str | Path | None = None)
         axes.axvline(k + 1, color="grey", lw=0.8, ls=":", label="rate falls" if k == rate_drops[0] else None)
     axes.set(xlabel="epoch", ylabel="loss", yscale="log", title=f"{metadata.law.name}, {metadata.specimen.name}")
     axes.grid(alpha=0.25)
-    axes.legend(fontsize=8)
+    losses = np.concatenate([curves_by_name[name] for name in ("loss", "validation", "rse")])
+    losses = losses[np.isfinite(losses) & (losses > 0)]
+    set_range(axes, "y", float(losses.min()), float(losses.max()), logarithmic=True)
+    place_legend_below(figure, axes)
     return save_figure(figure, path, SurrogateError)
 
 
@@ -86,6 +89,8 @@ def _draw_parity(axes: Axes, true: Any, predicted: Any) -> None:
         return
     limits = np.array([min(true.min(), predicted.min()), max(true.max(), predicted.max())])
     thinned = slice(None, None, -(-true.size // MOST_POINTS))
+    set_range(axes, "x", float(limits[0]), float(limits[1]), most=5)
+    set_range(axes, "y", float(limits[0]), float(limits[1]), most=5)
     axes.plot(limits, limits, "k-", lw=0.8)
     axes.plot(true[thinned], predicted[thinned], ".", ms=3, alpha=0.5)
     spread = ((true - true.mean()) ** 2).sum()
@@ -110,9 +115,10 @@ def worst_samples_figure(comparison: PredictionComparison, path: str | Path | No
         axes.plot(hours[mask], comparison.predicted[k, mask, 0], "--", lw=1.4, color="tab:red", label="predicted")
         axes.set_title(f"sample {int(sample['index'])}: off by {sample['error']:.3g}", fontsize=9)
         axes.grid(alpha=0.25)
-    panels[0].legend(fontsize=8)
+    place_legend_below(figure, panels[0])
     name = comparison.outputs[0]
-    figure.supxlabel("time, h", fontsize=10)
+    for axes in panels[3:]:
+        axes.set_xlabel("time, h", fontsize=9)
     figure.supylabel(OUTPUT_LABELS.get(name, name), fontsize=10)
     return save_figure(figure, path, SurrogateError)
 
@@ -194,7 +200,6 @@ def size_study_rows(results: Sequence[SizeStudyResult]) -> tuple[tuple[str, ...]
 def size_study_figure(results: Sequence[SizeStudyResult], path: str | Path | None = None) -> Figure:
     """Loss over epochs of every training, and the lowest of each, the best on top."""
     from matplotlib import colormaps
-    from matplotlib.ticker import LogLocator, NullFormatter
 
     ordered = sorted(results, key=lambda e: e.loss)
     canvas = empty_figure(11.0, max(3.8, 0.28 * len(ordered) + 1.6))
@@ -212,12 +217,12 @@ def size_study_figure(results: Sequence[SizeStudyResult], path: str | Path | Non
         )
         right.plot(result.loss, position, "o", ms=6, color=shade, label="validation" if position == 0 else None)
     right.set(xscale="log", xlabel="loss at the best epoch", yticks=positions)
-    for axis in (left.yaxis, right.xaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter(NullFormatter())
+    drawn = np.concatenate([result.losses for result in ordered])
+    set_range(left, "y", float(drawn.min()), float(drawn.max()), logarithmic=True)
+    ends = [loss for result in ordered for loss in (result.training, result.loss)]
+    set_range(right, "x", min(ends), max(ends), logarithmic=True, most=6)
     right.set_yticklabels([result_entry.label for result_entry in ordered], fontsize=8)
     right.invert_yaxis()
     right.grid(alpha=0.25)
-    right.legend(fontsize=8)
+    place_legend_below(canvas, right)
     return save_figure(canvas, path, SurrogateError)

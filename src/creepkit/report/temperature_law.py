@@ -15,7 +15,7 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.uncertainty.laplace_approximation import delta_method, interval_quantile
 from creepkit.language import Param
 from creepkit.language.printing import expression_text
-from creepkit.report.figures import empty_figure, save_figure
+from creepkit.report.figures import empty_figure, place_legend_right, save_figure, set_range
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,7 +42,7 @@ def plot_temperature_law(temperature_law: TemperatureLaw, path: str | Path | Non
     names = temperature_law.isothermal_law.names
     columns = min(MAX_PANELS_PER_ROW, len(names))
     rows = -(-len(names) // columns)
-    figure = empty_figure(4.6 * columns, 3.7 * rows)
+    figure = empty_figure(5.2 * columns, 3.7 * rows)
     panels = figure.subplots(rows, columns, squeeze=False)
     for k, name in enumerate(names):
         _plot_parameter(panels.flat[k], temperature_law, coordinates, k)
@@ -102,9 +102,16 @@ def _plot_parameter(axes: Any, temperature_law: TemperatureLaw, coordinates: Coo
         min(1.2 * float(np.median(half_widths)), highest - lowest),
         0.02 * abs(highest) + 1e-9,
     )
-    axes.set(xlabel="temperature, K", ylim=(lowest - margin, highest + margin))
-    axes.legend(fontsize=7)
+    set_range(axes, "x", *_with_margin(temperature_law.temperature_range), most=6)
+    set_range(axes, "y", lowest - margin, highest + margin)
+    axes.set(xlabel="temperature, K")
+    place_legend_right(axes, "form, weight", size=7)
     axes.grid(alpha=0.25)
+
+
+def _with_margin(ends: tuple[float, float]) -> tuple[float, float]:
+    margin = 0.03 * (ends[1] - ends[0])
+    return ends[0] - margin, ends[1] + margin
 
 
 def _form_weight(temperature_law: TemperatureLaw, k: int, form: str) -> float:

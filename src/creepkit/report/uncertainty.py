@@ -11,7 +11,7 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
 from creepkit.records import ZERO_CELSIUS
-from creepkit.report.figures import empty_figure, save_figure
+from creepkit.report.figures import empty_figure, place_legend_right, save_figure, set_range, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,14 +45,15 @@ def _unit_text(unit: str) -> str:
 
 def profile_figure(profile: ProfileLikelihood, path: str | Path | None = None) -> Figure:
     """The rise of chi-square over the quantity, its limit, and the parabola of Laplace's approximation."""
-    figure, axes = _figure_and_axes(5.2, 4.2)
-    logarithmic = (
-        bool((profile.values > 0).all()) and float(profile.values.max() / profile.values.min()) > LOGARITHMIC_RATIO
-    )
-    axes.plot(profile.values, profile.chi_square, "o-", ms=4, color="C0", label="profile")
+    figure, axes = _figure_and_axes(6.0, 4.2)
     low, high = profile.laplace
-    scale = np.log if low > 0 and logarithmic else np.asarray
-    grid = np.geomspace(low, high, 80) if low > 0 and logarithmic else np.linspace(low, high, 80)
+    positive = bool((profile.values > 0).all()) and low > 0
+    logarithmic = positive and float(profile.values.max() / profile.values.min()) > LOGARITHMIC_RATIO
+    curve, rise = _profile_curve(profile, positive)
+    axes.plot(curve, rise, "-", color="C0", label="profile")
+    axes.plot(profile.values, profile.chi_square, "o", ms=4, color="C0")
+    scale = np.log if positive else np.asarray
+    grid = np.geomspace(low, high, 80) if positive else np.linspace(low, high, 80)
     middle, half = 0.5 * (scale(low) + scale(high)), 0.5 * (scale(high) - scale(low))
     axes.plot(grid, profile.limit * ((scale(grid) - middle) / half) ** 2, "--", color="C1", label="Laplace")
     axes.axhline(profile.limit, color="black", lw=0.8, label=f"{100 * profile.level:g} %")
@@ -63,15 +64,23 @@ def profile_figure(profile: ProfileLikelihood, path: str | Path | None = None) -
     axes.set_xlim(*_with_margin(profile.values, logarithmic))
     axes.set(xlabel=f"{profile.name}{unit}", ylabel="rise of chi-square", ylim=(0.0, 1.6 * profile.limit))
     if logarithmic:
-        axes.set_xscale("log")
-    axes.legend(fontsize=8)
+        set_range(axes, "x", *axes.get_xlim(), logarithmic=True, most=6)
+    place_legend_right(axes)
     axes.grid(alpha=0.25)
     return save_figure(figure, path)
 
 
+def _profile_curve(profile: ProfileLikelihood, positive: bool) -> tuple[Floats, Floats]:
+    """(points,) values and rises of chi-square between those of a profile: its signed root is nearly straight."""
+    values = np.log(profile.values) if positive else profile.values
+    root = np.sqrt(np.maximum(profile.chi_square, 0.0)) * np.sign(profile.values - profile.best)
+    grid = np.unique(np.concatenate([values, np.linspace(values[0], values[-1], 300)]))
+    return (np.exp(grid) if positive else grid), np.interp(grid, values, root) ** 2
+
+
 def _with_margin(values: Floats, logarithmic: bool) -> tuple[float, float]:
     ends = np.log(values[[0, -1]]) if logarithmic else values[[0, -1]]
-    margin = 0.08 * float(np.ptp(ends)) + 1e-12
+    margin = 0.08 * float(np.ptp(ends)) + 1e-12 * float(np.abs(ends).max())
     lower, upper = float(ends[0]) - margin, float(ends[1]) + margin
     return (float(np.exp(lower)), float(np.exp(upper))) if logarithmic else (lower, upper)
 
@@ -119,6 +128,8 @@ def _columns(samples: PosteriorSamples) -> dict[str, Floats]:
 def _draw_pair(
     axes: Axes, columns: dict[str, Floats], names: tuple[str, str], position: tuple[int, int], count: int
 ) -> None:
+    from matplotlib.ticker import MaxNLocator, NullLocator
+
     (first, second), (row, column) = names, position
     if column > row:
         axes.set_visible(False)
@@ -127,14 +138,17 @@ def _draw_pair(
         axes.hist(columns[first], bins=40, color="C0", alpha=0.7)
         for quantile in np.quantile(columns[first], (0.025, 0.5, 0.975)):
             axes.axvline(float(quantile), color="black", lw=0.8, ls=":")
-        axes.set_yticks([])
     else:
         axes.plot(columns[second], columns[first], ".", ms=1.5, color="C0", alpha=0.3, rasterized=True)
     if row == count - 1:
         axes.set_xlabel(second)
     if column == 0 and row > 0:
         axes.set_ylabel(first)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(3) if axis is axes.xaxis or row != column else NullLocator())
     axes.tick_params(labelsize=7)
+    axes.tick_params(axis="x", labelbottom=row == count - 1)
+    axes.tick_params(axis="y", labelleft=column == 0)
 
 
 def correlation_text(correlation: Correlation) -> str:
@@ -161,7 +175,7 @@ def correlation_figure(correlation: Correlation, path: str | Path | None = None)
             axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=8, color=colour)
     axes.set_xticks(range(count), correlation.names, rotation=45, ha="right")
     axes.set_yticks(range(count), correlation.names)
-    axes.set_title(correlation.title, fontsize=10)
+    axes.set_title(wrapped(correlation.title, 0.7 * float(figure.get_size_inches()[0])), fontsize=10)
     figure.colorbar(image, ax=axes, shrink=0.8, label="correlation")
     return save_figure(figure, path)
 
@@ -196,16 +210,21 @@ def rate_bands_figure(bands: Sequence[RateBand], path: str | Path | None = None)
     """Rates over stress with their bands: lighter with the temperature's uncertainty, darker without."""
     if not bands:
         raise FitError("there are no bands to draw")
-    figure, axes = _figure_and_axes(5.6, 4.6)
+    figure, axes = _figure_and_axes(6.6, 4.6)
     for k, band in enumerate(bands):
         colour = f"C{k % 10}"
         label = f"{band.temperature - ZERO_CELSIUS:.0f} $\\pm$ {band.temperature_uncertainty:g} °C"
         axes.fill_between(band.stress, band.low, band.high, color=colour, alpha=0.2, lw=0)
         axes.fill_between(band.stress, *band.parameter_band, color=colour, alpha=0.35, lw=0)
         axes.plot(band.stress, band.rate, color=colour, lw=1.4, label=label)
-    axes.set(xscale="log", yscale="log", xlabel="stress, MPa", ylabel="creep rate, 1/s")
-    axes.grid(alpha=0.25, which="both")
-    axes.legend(fontsize=8, title="95 %: law and temperature (dark: law alone)", title_fontsize=7)
+    stresses, rates = (
+        np.concatenate(v) for v in ([b.stress for b in bands], [r for b in bands for r in (b.low, b.high)])
+    )
+    set_range(axes, "x", float(stresses.min()), float(stresses.max()), logarithmic=True)
+    set_range(axes, "y", float(rates.min()), float(rates.max()), logarithmic=True)
+    axes.set(xlabel="stress, MPa", ylabel="creep rate, 1/s")
+    axes.grid(alpha=0.25)
+    place_legend_right(axes, "95 %: law and\ntemperature\n(dark: law alone)")
     axes.set_title("\n".join(dict.fromkeys(band.name for band in bands)), fontsize=9)
     return save_figure(figure, path)
 

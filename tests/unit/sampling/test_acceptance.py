@@ -45,7 +45,7 @@ def test_the_figure_is_written(tmp_path):
     found = acceptance(sampling_design(ck.law("combined"), DIMPLE, "paper"), draws=256)
     figure = found.plot(tmp_path / "rates.png")
     assert (tmp_path / "rates.png").stat().st_size > 10_000
-    legend = [text.get_text() for text in figure.axes[1].get_legend().get_texts()]
+    legend = [text.get_text() for text in figure.legends[0].get_texts()]
     assert legend[0] == f"in the useful window: {100 * found.useful.mean():.1f} %"
     with pytest.raises(DatasetError, match="cannot be written"):
         found.plot(tmp_path / "rates.nonsense")

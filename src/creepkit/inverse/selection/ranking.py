@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -34,6 +35,8 @@ from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.presentation import Presentable, present
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from creepkit.inverse.adequacy import Adequacy
     from creepkit.inverse.selection.challenges import Challenge
     from creepkit.inverse.selection.discrimination import EquivalentLaws
@@ -126,6 +129,10 @@ class Ranking(Presentable):
     def further_tests(self) -> tuple[Any, ...]:
         """A DiscriminationDesign for each remaining law: tests that would tell it from the best (some seconds)."""
         return present(self, "further_tests")
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Misfits and weights of the laws, and the curves of the credible ones; written to `path` when given."""
+        return present(self, "plot", path)
 
 
 def verdict_of(ranking: Ranking) -> str:

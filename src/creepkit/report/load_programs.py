@@ -1,0 +1,101 @@
+"""Labels of tests in plots: load and temperature programs as people say them, "8 → 10 MPa at 4 h, 793 °C"."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+
+from creepkit.inverse.observation_vector import frames_with_data
+from creepkit.inverse.reference_conditions import LOAD_TOLERANCE
+from creepkit.records import ZERO_CELSIUS, History, PointLoading, Program
+
+SECONDS_PER_HOUR = 3600.0
+
+
+MOST_HOLDS = 3
+"""Holds that are written one by one; of more, the first, the last and their number."""
+
+
+HELD_TEMPERATURE = 1.0
+"""K, within which a temperature is held."""
+
+
+def label_of(history: History) -> str:
+    """The name of a test, its load program and its temperature."""
+    return f"{history.name}: {program_text(history)}"
+
+
+def program_text(history: History) -> str:
+    """Load and temperature over the frames of a test, such as "8 → 10 MPa at 4 h, 793 °C"."""
+    return f"{load_text(history)}, {temperature_text(history)}"
+
+
+def load_text(history: History) -> str:
+    """The load program over the frames of a test, such as "8 → 10 MPa at 4 h"."""
+    loading = history.loading
+    last = _last_time(history)
+    if isinstance(loading, PointLoading):
+        parts = [f"stress {name} {_level_text(p, last, ' MPa')}" for name, p in loading.stress.items()]
+        return ", ".join(parts + [f"strain {name} {_level_text(p, last, '')}" for name, p in loading.strain.items()])
+    if loading.quantity == "strain":
+        return f"strain {_level_text(loading.program(), last, '')}"
+    return _level_text(loading.program(), last, " MPa")
+
+
+def _level_text(program: Program, last: float, unit: str) -> str:
+    tolerance = LOAD_TOLERANCE * float(np.abs(program.values).max())
+    return _holds_text(holds(program, last, tolerance), unit, lambda v: f"{v:g}")
+
+
+def temperature_text(history: History) -> str:
+    """The temperature over the frames of a test, such as "793 → 800 °C at 4 h"."""
+    program = history.temperature_program()
+    if float(np.ptp(program.values)) <= 2 * HELD_TEMPERATURE:
+        return f"{float(np.mean(program.values)) - ZERO_CELSIUS:.0f} °C"
+    steps = holds(program, _last_time(history), HELD_TEMPERATURE)
+    return _holds_text(steps, " °C", lambda v: f"{v - ZERO_CELSIUS:.0f}")
+
+
+def holds(program: Program, last: float, tolerance: float) -> list[tuple[float, float, float]]:
+    """(start, end, value) of the pieces, s, over which a program stays within a tolerance of their first value.
+
+    last : s, the end of what is looked at. Ramps are no holds; a program of ramps alone has none.
+    """
+    times = np.append(program.times, max(last, float(program.times[-1])))
+    values = np.append(program.values, program.values[-1])
+    pieces: list[tuple[float, float, float]] = []
+    for start, end, value, following in zip(times[:-1], times[1:], values[:-1], values[1:], strict=True):
+        if start >= last or end <= start or abs(following - value) > tolerance:
+            continue
+        if pieces and start <= pieces[-1][1] * (1 + 1e-12) and abs(value - pieces[-1][2]) <= tolerance:
+            pieces[-1] = (pieces[-1][0], float(end), pieces[-1][2])
+        else:
+            pieces.append((float(start), float(end), float(value)))
+    return pieces
+
+
+def _last_time(history: History) -> float:
+    frames = np.flatnonzero(history.used & frames_with_data(history))
+    return float(history.times[frames[-1] if frames.size else -1])
+
+
+def _holds_text(pieces: list[tuple[float, float, float]], unit: str, number: Callable[[float], str]) -> str:
+    """The values of holds, and when each but the first begins to be approached."""
+    if not pieces:
+        return f"ramps{unit}"
+    first = number(pieces[0][2])
+    if len(pieces) == 1:
+        return first + unit
+    if len(pieces) > MOST_HOLDS:
+        return f"{first} → … → {number(pieces[-1][2])}{unit}, {len(pieces)} steps"
+    text = first
+    for before, after in pairwise(pieces):
+        text += f" → {number(after[2])}{unit} at {hours_text(before[1])}"
+    return text
+
+
+def hours_text(time: float) -> str:
+    """A time in s, in hours."""
+    return f"{time / SECONDS_PER_HOUR:.3g} h"
