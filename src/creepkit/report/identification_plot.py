@@ -132,27 +132,6 @@ def axis_label(output: str) -> str:
 
 
 def identification_figure(fit: Identification, path: str | Path | None = None) -> Figure:
-<<<<<<< HEAD
-    """Draw the tests and what is left of them over time, an output each, rates with 95 % bands, and ruptures."""
-    if not fit.histories:
-        raise FitError(
-            "this identification was loaded without its histories: attach them with fit.with_histories(histories)"
-        )
-    outputs = list(dict.fromkeys(m.outputs[0].output for m in fit.tests))
-    ruptures = rupture_rows(fit)
-    ratios = (*(1.25, 1.0) * len(outputs), 1.0, *[1.0][: len(ruptures)])
-    figure = empty_figure(4.5 * len(ratios), 4.8)
-    panels = list(figure.subplots(1, len(ratios), width_ratios=ratios))
-    if ruptures:
-        draw_ruptures(panels.pop(), fit, _colours(fit.histories))
-    rates = panels.pop()
-    prediction, colours = fit.predict(), _colours(fit.histories)
-    for k, output in enumerate(outputs):
-        draw = _draw_strains if output in LOGARITHMIC_OUTPUTS else draw_linear
-        draw((panels[2 * k], panels[2 * k + 1]), fit, output, prediction, colours)
-    _draw_rates(rates, fit)
-    figure.suptitle(f"{fit.law.title or fit.law.name}   ({len(fit.histories)} tests)", fontsize=11)
-=======
     """Draw the tests over time with bands, their residuals, creep rates over stress, and times to rupture.
 
     Up to MOST_NAMED_TESTS tests are named below the panels; more have a panel for each group of conditions, and
@@ -165,7 +144,6 @@ def identification_figure(fit: Identification, path: str | Path | None = None) -
     adequacy = getattr(fit, "adequacy", None)
     title = headline if adequacy is None else f"{headline}\n{adequacy}"
     figure.suptitle(wrapped(title, float(figure.get_size_inches()[0])), fontsize=10)
->>>>>>> 032e715909ed8d2b5d90b45f8d4d8f55fd82e0eb
     return save_figure(figure, path)
 
 
@@ -384,39 +362,6 @@ def _draw_residuals(
     axes.grid(alpha=0.25)
 
 
-<<<<<<< HEAD
-def _draw_rates(axes: Axes, fit: Identification) -> None:
-    stresses = [v for h in fit.histories for v in reference_stresses(h, fit.predictor) if v > 0]
-    grid = np.geomspace(0.8 * min(stresses), 1.25 * max(stresses), 60)
-    temperatures = np.unique(np.round([float(np.mean(h.temperature_program().values)) for h in fit.histories], 0))
-    temperatures = temperatures[np.linspace(0, temperatures.size - 1, min(temperatures.size, 5)).round().astype(int)]
-    for T, colour in zip(temperatures, _shades(temperatures), strict=True):
-        rate, low, high = fit.rate(grid, np.full_like(grid, T), warn=False)
-        axes.fill_between(grid, low, high, color=colour, alpha=0.25, lw=0)
-        axes.plot(grid, rate, color=colour, lw=1.4, label=f"{T - ZERO_CELSIUS:.0f} C")
-    axes.set(xscale="log", yscale="log", xlabel="stress, MPa", ylabel="creep rate, 1/s")
-    axes.grid(alpha=0.25)
-    axes.legend(fontsize=8, title="identified, 95 % band", title_fontsize=8)
-    if grid[-1] < 10 * grid[0]:
-        for place in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
-            place("{x:g}")
-    axes.set_title(f"rate at strain {fit.reference.strain:.1e}, {fit.reference.time / 3600:.3g} h", fontsize=10)
-
-
-def _colours(histories: tuple[History, ...]) -> list[Any]:
-    from matplotlib import colormaps
-
-    temperatures = np.array([float(np.mean(h.temperature_program().values)) for h in histories])
-    use_cycle = np.ptp(temperatures) < 2.0 or len(histories) <= 10
-    return [colormaps["tab10"](k % 10) for k in range(len(histories))] if use_cycle else _shades(temperatures)
-
-
-def _shades(temperatures: Floats) -> list[Any]:
-    from matplotlib import colormaps
-
-    span = max(float(np.ptp(temperatures)), 1e-9)
-    return [colormaps[COLOUR_MAP](0.9 * float(v - np.min(temperatures)) / span) for v in temperatures]
-=======
 def _residual_title(fit: Identification, output: str, noise: float, first: bool) -> str:
     """Reduced chi-square, and what the grey band is."""
     if output in LOGARITHMIC_OUTPUTS:
@@ -427,4 +372,3 @@ def _residual_title(fit: Identification, output: str, noise: float, first: bool)
     chi_square = fit.errors[output].chi_square
     lead = "measured less identified, grey: ±2 sd of frame noise\n" if first else ""
     return f"{lead}{output.replace('_', ' ')}: noise sd {sd}, reduced chi-square {chi_square:.3g}"
->>>>>>> 032e715909ed8d2b5d90b45f8d4d8f55fd82e0eb
