@@ -23,12 +23,16 @@ FALSE_ALARM_PROBABILITY = 1e-3
 """Of a change of rate at any time of a group of tests whose scores are normal numbers."""
 
 
-OTHERS_THRESHOLD = 3.0
-"""Combined score, in standard deviations, that the tests without the one that says most must reach by themselves."""
+OTHERS_THRESHOLD = 2.33
+"""Combined score that the tests without the one that says most must reach by themselves: 1 % by chance."""
 
 
 SHOWN_THRESHOLD = 1.645
 """Standard deviations of ln of its factor from which a test is said to show a change known from all of them: 5 %."""
+
+
+ELASTIC_JUMP_THRESHOLD = 4.0
+"""Standard deviations from which a step of the value is believed beside a change of rate."""
 
 
 LEAST_FACTOR = 1.05
@@ -43,7 +47,7 @@ MOST_CHANGES, MOST_TIMES = 3, 300
 """Changes looked for in a group of tests, or in a part of one test; times at which changes of rate are sought."""
 
 
-SAME_TIMES_FRACTION = 0.5
+SAME_TIMES_FRACTION = 0.8
 """Fraction of the frames of two tests that were taken at the same times, if one clock is to be supposed."""
 
 
@@ -82,8 +86,8 @@ class CommonRateChange:
 
     @property
     def has_jump(self) -> bool:
-        """Whether the value steps as well, as it would elastically with a step of the load."""
-        return abs(self.jump) > OTHERS_THRESHOLD * self.jump_sd
+        """Whether the value steps as well, the way that the rate does, as it would with a step of the load."""
+        return np.sign(self.score) * self.jump > ELASTIC_JUMP_THRESHOLD * self.jump_sd
 
     @property
     def same_factor(self) -> bool:
@@ -156,7 +160,7 @@ def _same_clock(one: History, two: History) -> bool:
     a, b = (h.times[h.used] for h in (one, two))
     end = min(a[-1], b[-1])
     a, b = a[a <= end], b[b <= end]
-    nearest = np.abs(a[:, None] - b[None, :]).min(axis=1)
+    nearest = np.abs(a[:, None] - b[None, :]).min(axis=1, initial=np.inf)
     return bool((nearest < 1e-3 * end / max(a.size, b.size)).sum() >= SAME_TIMES_FRACTION * min(a.size, b.size))
 
 
@@ -200,27 +204,51 @@ def _clearest_change(parts: Sequence[_Part]) -> CommonRateChange | None:
         times = times[np.linspace(0, times.size - 1, MOST_TIMES).astype(int)]
     if not times.size:
         return None
-    scores, weights = (np.array(x) for x in zip(*(p.curve.slope_change_scores(times) for p in parts), strict=True))
+    scores, weights = _scores(parts, times)
     combined = _combined(scores, weights)
-    searched = np.isfinite(combined)
-    if not searched.any():
+    searched = int(np.isfinite(combined).sum())
+    if not searched:
         return None
-    spread = max(1.0, robust_spread(combined[searched]))
+    threshold = -float(ndtri(0.5 * FALSE_ALARM_PROBABILITY / searched))
+    best = int(np.nanargmax(np.abs(combined)))
+    if abs(combined[best]) < threshold:
+        return None
+    # How far scores spread by chance is seen when the change itself is part of the curves.
+    remaining, precisions = _scores([_with_change(part, float(times[best])) for part in parts], times)
+    spreads = np.array([max(1.0, robust_spread(row)) for row in remaining])[:, None]
+    spread = max(1.0, robust_spread(_combined(remaining / spreads, precisions / spreads)))
+    scores, weights = scores / (spreads * spread), weights / spreads
+    combined = _combined(scores, weights)
     best = int(np.nanargmax(np.abs(combined)))
     sign = float(np.sign(combined[best]))
     clearest = int(np.nanargmax(sign * scores[:, best] * weights[:, best]))
-    others = sign * _combined(*(np.delete(x, clearest, axis=0)[:, best : best + 1] for x in (scores, weights)))[0]
-    threshold = -float(ndtri(0.5 * FALSE_ALARM_PROBABILITY / int(searched.sum())))
-    # Where only two tests cover the time, the other one decides by itself.
-    if not np.isfinite(others):
-        others = sign * float(np.nansum(np.delete(scores[:, best], clearest)))
-    if abs(combined[best]) < threshold * spread or others < OTHERS_THRESHOLD * spread:
-        return None
-    as_good = np.nan_to_num(sign * combined / spread) > np.sqrt(
-        max((combined[best] / spread) ** 2 - TIME_UNCERTAINTY, 0)
+    others = np.isfinite(scores[:, best]) & (np.arange(len(parts)) != clearest)
+    score_of_others = (
+        sign * float((scores * weights)[others, best].sum()) / float(np.hypot.reduce(weights[others, best]))
     )
-    first, last = best - int(np.argmin(as_good[best::-1])) + 1, best + int(np.argmin(as_good[best:])) - 1
-    return _change_at(parts, times[[first, best, last]], float(combined[best] / spread))
+    if abs(combined[best]) < threshold or score_of_others < OTHERS_THRESHOLD:
+        return None
+    as_good = np.nan_to_num(sign * combined) ** 2 * (sign * combined > 0) > combined[best] ** 2 - TIME_UNCERTAINTY
+    as_good[[0, -1]] = False
+    first, last = best - int(np.argmin(as_good[best::-1])), best + int(np.argmin(as_good[best:]))
+    return _change_at(parts, times[[first, best, last]], float(combined[best]))
+
+
+def _scores(parts: Sequence[_Part], times: Floats) -> tuple[Floats, Floats]:
+    """(parts, times) scores of a change of the slope and the precisions of ln of its factor."""
+    scores, precisions = zip(*(part.curve.slope_change_scores(times) for part in parts), strict=True)
+    return np.array(scores), np.array(precisions)
+
+
+def _with_change(part: _Part, time: float) -> _Part:
+    curve = part.curve
+    if not curve.covers(np.array([time]))[0]:
+        return part
+    changes = (*curve.slope_changes, time)
+    return _Part(
+        part.test,
+        smooth_curve(curve.times, curve.values, curve.start, level_shifts=curve.level_shifts, slope_changes=changes),
+    )
 
 
 def _combined(scores: Floats, weights: Floats) -> Floats:

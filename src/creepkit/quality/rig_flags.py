@@ -35,7 +35,7 @@ def temperature_step(temperature: float, rate_factor: float, activation_energy: 
 def rate_change_flag(histories: Sequence[History], change: CommonRateChange, activation_energy: float) -> QualityFlag:
     """The flag of a change of rate in several tests."""
     factors = {histories[k].name: float(np.exp(change.steps[k].log_factor)) for k in change.shown}
-    errors = [change.steps[k].log_factor_sd for k in change.shown]
+    errors = {histories[k].name: float(np.exp(1.96 * change.steps[k].log_factor_sd)) for k in change.shown}
     steps = {
         histories[k].name: temperature_step(
             float(histories[k].temperature_program().at(change.time)), factors[histories[k].name], activation_energy
@@ -43,10 +43,7 @@ def rate_change_flag(histories: Sequence[History], change: CommonRateChange, act
         for k in change.shown
     }
     rises = next(iter(factors.values())) > 1
-    sizes = ", ".join(
-        f"{name} {factor if rises else 1 / factor:.2f} ({np.exp(1.96 * error):.2f})"
-        for (name, factor), error in zip(factors.items(), errors, strict=True)
-    )
+    sizes = ", ".join(f"{n} {f if rises else 1 / f:.2f} ({errors[n]:.2f})" for n, f in factors.items())
     unclear = [histories[k].name for k in change.steps if k not in change.shown]
     kelvin = np.abs(list(steps.values()))
     one = histories[change.shown[0]]
@@ -73,6 +70,7 @@ def rate_change_flag(histories: Sequence[History], change: CommonRateChange, act
         earliest=change.earliest,
         latest=change.latest,
         rate_factors=factors,
+        factor_errors=errors,
         temperature_steps=steps,
         jumps={histories[k].name: change.steps[k].jump for k in change.shown},
         proposal=f"cut the frames after {change.time:g} s, model it by the nuisance {nuisances} from then on, {scope}, "

@@ -1,8 +1,9 @@
 """A creep curve under one load as a smoothing spline with level shifts and changes of slope.
 
 The spline is of fifth order (thrice integrated white noise) in t, t^1/2 or ln t, whichever is likeliest; noise and
-stiffness are found by REML. A law that hardens, softens or drifts smoothly is followed by the spline. What happens
-between two frames is not, and is a fixed effect of the regression: a step of the value, or of the slope.
+stiffness are found by REML. A law that hardens, softens or drifts smoothly is followed by the spline, but for the sharp
+bend of primary creep just after a load. What happens between two frames is not, and is a fixed effect of the
+regression: a step of the value, or of the slope.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri, stdtr
 
-from creepkit.arrays import Floats
+from creepkit.arrays import Bools, Floats
 
 MOST_POINTS = 150
 """Points of a curve; longer ones are averaged over neighbouring frames."""
@@ -22,6 +23,10 @@ MOST_POINTS = 150
 
 FEWEST_POINTS_BESIDE = 5
 """Points that a curve must have on either side of a change, so that its slopes there are known."""
+
+
+FEWEST_POINTS_AFTER_LOAD = 12
+"""Points from a load to a change of slope: before, the bend of primary creep may look like one."""
 
 
 _STIFFNESS = np.concatenate([[0.0], 10.0 ** np.arange(-3.0, 12.1, 0.5)])
@@ -78,31 +83,30 @@ class SmoothCurve:
         first, last = (float(_CLOCKS[self.clock](self.times[k] - self.start)) for k in (0, -1))
         return np.asarray((_CLOCKS[self.clock](times - self.start) - first) / (last - first))
 
-    def covers(self, times: Floats) -> Floats:
-        """(...,) bool, whether enough points lie on either side of a time (s)."""
+    def covers(self, times: Floats) -> Bools:
+        """(...,) bool, whether enough points lie on either side of a time (s) for a change of slope to be seen."""
         count = np.searchsorted(self.times, times, side="right")
-        return np.asarray((count >= FEWEST_POINTS_BESIDE) & (self.times.size - count >= FEWEST_POINTS_BESIDE))
+        return np.asarray((count >= FEWEST_POINTS_AFTER_LOAD) & (self.times.size - count >= FEWEST_POINTS_BESIDE))
 
     def slope_change_scores(self, times: Floats) -> tuple[Floats, Floats]:
         """Scores of a step of the slope at each time (s), and the precision of ln of the factor on the rate.
 
         Both (times,), NaN and 0 at times that the curve does not cover. A score is the estimate over its standard
-        deviation, as a standard normal number, over the spread of the scores of this curve where that is above 1.
+        deviation, as a standard normal number.
         """
         covered = self.covers(times)
         scores, precisions = np.full(times.size, np.nan), np.zeros(times.size)
         if covered.any():
             estimate, sd, freedom = self._effects(self._ramps(times[covered]))
-            raw = _normal_score(estimate / sd, freedom)
-            spread = max(1.0, robust_spread(raw))
             rate = np.interp(self.position(times[covered]), self.position(self.times), self._slope(self._fitted()))
-            scores[covered], precisions[covered] = raw / spread, np.maximum(rate, 0.0) / (sd * spread)
+            scores[covered] = _normal_score(estimate / sd, freedom)
+            precisions[covered] = np.maximum(rate, 1e-3 * np.abs(rate).max() + 1e-300) / sd
         return scores, precisions
 
     def level_shift_scores(self) -> tuple[Floats, Floats, Floats]:
         """Times (s), scores and sizes of a step of the value in every gap between points, beside a step of the slope.
 
-        Each (gaps,); scores as in slope_change_scores.
+        Each (gaps,); scores as in slope_change_scores, over their own spread where that is above 1.
         """
         k = np.arange(FEWEST_POINTS_BESIDE, self.times.size - FEWEST_POINTS_BESIDE + 1)
         times = 0.5 * (self.times[k - 1] + self.times[k])
@@ -126,6 +130,9 @@ class SmoothCurve:
         seconds = 1e-6 * (self.times[-1] - self.times[0])
         per_second = float(self.position(one + seconds)[0] - position[0]) / seconds
         log_sd = float(change_sd) * abs(mean) / (first * second)
+        # The change may lie anywhere between two frames, which moves the value by the difference of the slopes.
+        gap = float(np.diff(self.times).max(where=_beside(self.times, time), initial=0.0)) * per_second
+        jump_sd = float(np.hypot(jump_sd, change * gap / 12**0.5))
         values = (first * per_second, second * per_second, np.log(second / first), log_sd, jump, jump_sd)
         return RateStep(*(float(value) for value in values))
 
@@ -198,8 +205,9 @@ def smooth_curve(
 
 
 def robust_spread(scores: Floats) -> float:
-    """Standard deviation of scores about zero by the median of their sizes."""
-    return float(1.4826 * np.median(np.abs(scores)))
+    """Standard deviation of scores about zero by the median of their sizes, without NaN; 0 of none."""
+    known = np.abs(scores[np.isfinite(scores)])
+    return float(1.4826 * np.median(known)) if known.size else 0.0
 
 
 def _fit(
@@ -225,6 +233,11 @@ def _fit(
         times, values, start, clock, float(noise[k] ** 0.5), shifts, changes, basis, variances, float(_STIFFNESS[k])
     )
     return float(likelihood[k]), curve
+
+
+def _beside(times: Floats, time: float) -> Bools:
+    """(points - 1,) which gaps between points touch a time."""
+    return np.asarray((times[:-1] <= time) & (times[1:] >= time))
 
 
 def _averaged(times: Floats, values: Floats) -> tuple[Floats, Floats]:

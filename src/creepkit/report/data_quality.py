@@ -32,6 +32,7 @@ def data_quality_to_json(quality: DataQuality) -> dict[str, Any]:
                 "earliest": flag.earliest,
                 "latest": flag.latest,
                 "rate_factors": dict(flag.rate_factors),
+                "factor_errors": dict(flag.factor_errors),
                 "temperature_steps": dict(flag.temperature_steps),
                 "jumps": dict(flag.jumps),
                 "proposal": flag.proposal,
