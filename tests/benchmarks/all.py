@@ -81,6 +81,7 @@ BENCHMARKS = {
     "measured_creep": Benchmark(90, needs=DATA),
     "whole_life": Benchmark(60, needs=DATA),
     "rupture_coverage": Benchmark(4),
+    "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "structure": Benchmark(0.1),
 }
 """{name of the program: what it costs and how it is run}."""

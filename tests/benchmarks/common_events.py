@@ -5,7 +5,7 @@
 Simulated plates of 3 to 9 tests, observed at the same times. Half are dimples (reduced-order model, 1.5 um of noise),
 half bars under 60 to 140 MPa (noise of 2e-5). The alloy of a plate follows one of eight kinds of law: sinh, Norton,
 strain hardening, time hardening, Norton with strain hardening, primary creep that fades (Norton with time hardening),
-n(t), and damage. At 120 MPa and 1050 K its rate is 10^-7.3 to 10^-5.7 /s; Q is 350 to 450 kJ/mol, tests run from 1013 to
+n(t), and damage. At 120 MPa and 1050 K its rate is 10^-7.3 to 10^-5.7 /s, Q is 350 to 450 kJ/mol; tests run at 1013 to
 1083 K. A third of the plates is under one load, a third is loaded higher, a third lower from half time on. Times are 96
 of 150 s or 48 of 900 s. Every second plate has, in the place of white noise, noise of which half the variance is common
 to all tests and the rest has an autocorrelation of 0.7 from frame to frame. Plates with a test that grows by less than

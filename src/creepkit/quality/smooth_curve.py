@@ -33,8 +33,8 @@ _STIFFNESS = np.concatenate([[0.0], 10.0 ** np.arange(-3.0, 12.1, 0.5)])
 """Variance of the spline's third derivative over that of the noise, for a curve of length 1."""
 
 
-_NOISE_FLOOR = 1e-5
-"""Least noise, as a fraction of the range of the values: numbers of a simulation are no better."""
+_NOISE_FLOOR = 5e-4
+"""Least noise, as a fraction of the range of the values: no spline follows a law more closely."""
 
 
 _CLOCKS: dict[str, Callable[[Floats], Floats]] = {
@@ -116,6 +116,16 @@ class SmoothCurve:
         scores = _normal_score(estimate / sd, freedom)
         return times, scores / max(1.0, robust_spread(scores)), estimate
 
+    def autocorrelation_inflation(self) -> float:
+        """Factor on standard deviations for noise that is correlated from point to point, at least 1.
+
+        ((1 + r) / (1 - r))^1/2 with r the first autocorrelation of what the curve leaves, as of an AR(1) process.
+        """
+        left = self.values - self._fitted()
+        variance = float((left**2).sum())
+        r = float((left[1:] * left[:-1]).sum()) / variance if variance > 0 else 0.0
+        return float(np.sqrt((1 + r) / (1 - r))) if 0 < r < 1 else 1.0
+
     def rate_step(self, time: float) -> RateStep:
         """The step of the slope at a time (s), with a step of the value fitted beside it."""
         one = np.array([time])
@@ -184,7 +194,13 @@ class SmoothCurve:
         return np.asarray(self.values - self._basis @ (u / (1.0 + self._stiffness * self._variances)))
 
     def _slope(self, values: Floats) -> Floats:
-        return np.asarray(np.gradient(values, self.position(self.times)))
+        """(points,) slope of a smooth curve; over a gap with a known step of the value, that of the gaps beside it."""
+        s = self.position(self.times)
+        slopes = np.diff(values) / np.diff(s)
+        for shift in self.level_shifts:
+            gap = int(np.clip(np.searchsorted(self.times, shift) - 1, 1, slopes.size - 2))
+            slopes[gap] = 0.5 * (slopes[gap - 1] + slopes[gap + 1])
+        return np.asarray(np.interp(s, 0.5 * (s[1:] + s[:-1]), slopes))
 
 
 def smooth_curve(

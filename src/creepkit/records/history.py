@@ -161,8 +161,8 @@ class History:
 
     @property
     def mean_temperature(self) -> float:
-        """Mean temperature over the breakpoints of the program, K."""
-        return float(np.mean(self.temperature_program().values))
+        """Mean temperature over the frames, K."""
+        return float(self.temperature_program().at(self.times).mean())
 
     @property
     def condition(self) -> str:
