@@ -30,7 +30,7 @@ class QualityFlag:
     tests : names of the histories. kind : what is wrong. frames : which frames of a single history, counted from 0;
     empty for a whole test, and for what began at a time. reason : a sentence with the numbers. time : s, when it
     happened; earliest, latest : s, times that are as likely. rate_factors : {test: factor on its creep rate};
-    factor_errors : {test: factor by which that one may be off either way, 95 %}.
+    factor_errors : {test: factor by which that one may be off either way, nominally 95 %}.
     temperature_steps : {test: K} that would make these factors at the activation energy assumed. jumps : {test: step of
     its leading output}, mm or strain. proposal : what may be done about it.
     """

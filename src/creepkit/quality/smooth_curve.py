@@ -221,7 +221,10 @@ def smooth_curve(
 
 
 def robust_spread(scores: Floats) -> float:
-    """Standard deviation of scores about zero by the median of their sizes, without NaN; 0 of none."""
+    """Standard deviation of scores about zero by the median of their sizes; 0 of none.
+
+    scores : (times,), those that are NaN left out.
+    """
     known = np.abs(scores[np.isfinite(scores)])
     return float(1.4826 * np.median(known)) if known.size else 0.0
 
