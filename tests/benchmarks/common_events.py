@@ -14,7 +14,7 @@ ten times the noise, or breaks, are drawn again.
 The first table counts plates without any event of the rig in which one is flagged, with 95 % binomial intervals, and
 the flags on measured tests. The second has a step of the furnace at a fifth to four fifths of the time that multiplies
 the rate at the mean temperature by the factor; a step is found where a flag is within one frame. Then: flags at other
-times, the share of single factors whose nominal 95 % error holds the planted one, and flags that see a step of the load.
+times, single factors whose nominal 95 % error holds the planted one, and flags that see a step of the load.
 """
 
 from __future__ import annotations

@@ -62,7 +62,8 @@ def rate_change_flag(histories: Sequence[History], change: CommonRateChange, act
         "rate change",
         (),
         f"at {change.time:g} s ({change.earliest:g} to {change.latest:g} s) the creep rate "
-        f"{'rises' if rises else 'falls'} at once by a factor (in brackets its nominal 95 % error, as a factor) of {sizes}; "
+        f"{'rises' if rises else 'falls'} at once by a factor (in brackets its nominal 95 % error, as a factor) of "
+        f"{sizes}; "
         f"{_kelvin_text(kelvin)} {'warmer' if rises else 'colder'} would do it at {activation_energy / 1e3:g} kJ/mol; "
         f"{step_text}; {abs(change.score):.1f} standard deviations"
         + (f"; not resolved in {', '.join(unclear)}" if unclear else ""),
