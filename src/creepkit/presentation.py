@@ -28,6 +28,7 @@ PRESENTERS: dict[str, dict[str, str]] = {
         "text": "creepkit.report.sampling:acceptance_text",
         "plot": "creepkit.report.sampling:acceptance_figure",
     },
+    "DataQuality": {"text": "creepkit.report.data_quality:data_quality_text"},
     "Dataset": {"text": "creepkit.report.dataset:dataset_text"},
     "Surrogate": {"text": "creepkit.report.surrogate:surrogate_text"},
     # inverse

@@ -83,6 +83,7 @@ BENCHMARKS = {
     "whole_life": Benchmark(60, needs=DATA),
     "rupture_coverage": Benchmark(4),
     "weights": Benchmark(8),
+    "common_events": Benchmark(4, (("--plates", "240", "--steps", "30"),)),
     "structure": Benchmark(0.1),
 }
 """{name of the program: what it costs and how it is run}."""

@@ -62,6 +62,14 @@ def test_data_describes_the_file(made):
     assert re.search(r"n +1 +\d", text)
 
 
+def test_data_checks_measured_tests():
+    folder = str(ck.example_data("planted bulge test"))
+    told = json.loads(creepkit("data", folder, "--json").stdout)
+    assert (told["tests"], told["flags"]) == (1, [])
+    assert creepkit("data", folder).stdout == "nothing suspect in 1 test\n"
+    assert creepkit("data", folder, "--plots", "pictures").exit_code == 2
+
+
 def test_data_draws_inputs_and_histories(made, tmp_path):
     to, _ = made
     assert creepkit("data", to, "--plots", tmp_path / "plots").exit_code == 0
@@ -127,7 +135,7 @@ def test_ranges_of_conditions_and_what_is_left_out_can_be_said():
         (("generate", "norton", "--to", "a.h5", "--unscreened"), "--unscreened belongs to --domain paper"),
         (("generate", "dorn", "--to", "a.h5", "--samples", 9), "or --range temperature=1000:1100"),
         (("data", "nowhere.h5"), "nowhere.h5: there is no such file"),
-        (("data", "."), "is a folder"),
+        (("data", "."), "no reader understands it"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_sentence(tmp_path, monkeypatch, words, message):

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from creepkit.jobs.shard_progress import ProgressCallback
     from creepkit.jobs.worker_pools import ParallelExecution
     from creepkit.language import CreepLaw, Elastic
-    from creepkit.quality import QualityFlag
+    from creepkit.quality import DataQuality
     from creepkit.sampling.domains import SamplingDesign
     from creepkit.surrogates.recipe import Training
     from creepkit.surrogates.surrogate import Recipe, Surrogate
@@ -75,15 +75,19 @@ def simulate(
 
 
 def check_data_quality(
-    histories: Sequence[History], specimen: Predictor | str | None = None
-) -> tuple[QualityFlag, ...]:
-    """Return what looks wrong in histories: unloading, falling amplitudes, outliers, tests far from others.
+    histories: Sequence[History], specimen: Predictor | str | None = None, *, activation_energy: float | None = None
+) -> DataQuality:
+    """Return what looks wrong: frames, tests far from others, and what happened in several tests at one time.
 
     specimen : what the first frames are compared with, which should show its elastic deflection; without it, none.
+    activation_energy : J/mol, with which a factor on the creep rate is put as a step of temperature; 400e3 by default.
     """
+    from creepkit.quality import ACTIVATION_ENERGY
     from creepkit.quality import check_data_quality as run
 
-    return run(check_histories(histories), None if specimen is None else resolve_predictor(specimen))
+    predictor = None if specimen is None else resolve_predictor(specimen)
+    energy = ACTIVATION_ENERGY if activation_energy is None else activation_energy
+    return run(check_histories(histories), predictor, activation_energy=energy)
 
 
 def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] | None = None) -> list[History]:

@@ -1,4 +1,4 @@
-"""`creepkit data`: what a data set holds."""
+"""`creepkit data`: what a data set holds, or what looks wrong in measured tests."""
 
 from __future__ import annotations
 
@@ -9,16 +9,41 @@ import typer
 
 from creepkit.report.terminal import print_json
 
+DATA_SET_SUFFIXES = (".h5", ".hdf5")
+"""Endings of data sets; everything else is read as measured tests."""
+
 
 def command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A data set that 'creepkit generate' wrote.")],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="A data set that 'creepkit generate' wrote, or measured files or a folder."
+        ),
+    ],
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     plots: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Draw inputs and a random handful of histories there.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Draw inputs and a random handful of histories of a data set there."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Which handful.")] = 0,
+    reader: Annotated[
+        str | None, typer.Option(help="Reader of measured tests; by default the one that accepts them.")
+    ] = None,
+    activation_energy: Annotated[
+        float | None,
+        typer.Option(metavar="J/MOL", help="To put a factor on the creep rate as a step of temperature [400e3]."),
+    ] = None,
 ) -> None:
-    """Describe a data set: counts, reasons, ranges."""
+    """Describe a data set: counts, reasons, ranges; or check measured tests: frames, tests, events of the rig."""
+    if file.suffix.lower() in DATA_SET_SUFFIXES:
+        _describe_data_set(file, as_json, plots, seed)
+    elif plots is not None:
+        raise typer.BadParameter(f"'{file}' is no data set (.h5); only those are drawn", param_hint="--plots")
+    else:
+        _check_measured_tests(file, as_json, reader, activation_energy)
+
+
+def _describe_data_set(file: Path, as_json: bool, plots: Path | None, seed: int) -> None:
     import creepkit as ck
     from creepkit.dataset.dataset import summary
 
@@ -32,3 +57,14 @@ def command(
 
         for path in write_dataset_figures(data, plots, seed):
             typer.echo(f"wrote {path}", err=as_json)
+
+
+def _check_measured_tests(file: Path, as_json: bool, reader: str | None, activation_energy: float | None) -> None:
+    import creepkit as ck
+    from creepkit.report.data_quality import data_quality_to_json
+
+    quality = ck.check_data_quality(ck.read_histories(file, reader=reader), activation_energy=activation_energy)
+    if as_json:
+        print_json(data_quality_to_json(quality))
+    else:
+        typer.echo(str(quality))

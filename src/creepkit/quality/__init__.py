@@ -1,58 +1,56 @@
 """Data quality: checks of measured histories, each flag stated with numbers; nothing is dropped unless asked for.
 
 Of frames: unloading, a creep output that decreases though its load does not, single outliers. Of tests: one far from
-its replicates or from the trend of the others, a modulus off the trend, a first frame that is not elastic.
+its replicates or from the trend of the others, a modulus off the trend, a first frame that is not elastic, a record of
+load or temperature that contradicts the stated program. Of the rig: a change of creep rate at one clock time in several
+tests, a jump of an output without a step of the load.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
 from creepkit.errors import HistoryError
+from creepkit.quality.common_changes import common_rate_changes, find_jumps
 from creepkit.quality.comparison import (
     first_frame_deviations,
     modulus_trend_outliers,
     replicate_deviations,
     temperature_trend_outliers,
 )
+from creepkit.quality.flags import DataQuality, FlagKind, QualityFlag, frame_ranges_text
 from creepkit.quality.frames import FlaggedFrames, decreasing_frames, outlier_frames, unloading_frames
+from creepkit.quality.rig_flags import ACTIVATION_ENERGY, jump_flags, rate_change_flag, record_flags
 from creepkit.records import History, Predictor
 
-FlagKind = Literal["unloading", "falling", "outlier", "replicate", "first frame", "temperature", "modulus"]
+__all__ = [
+    "ACTIVATION_ENERGY",
+    "FRAME_FLAG_KINDS",
+    "DataQuality",
+    "QualityFlag",
+    "check_data_quality",
+    "exclude_suspect_frames",
+]
 
 
 FRAME_FLAG_KINDS: tuple[FlagKind, ...] = ("unloading", "falling", "outlier")
 """Kinds that concern frames, which can be marked; the others question whole tests."""
 
 
-@dataclass(frozen=True)
-class QualityFlag:
-    """Something of a history that may be wrong and should perhaps not be fitted.
-
-    history : its name. kind : what is wrong. frames : which of its frames, counted from 0; empty for the whole test.
-    reason : a sentence with the numbers.
-    """
-
-    history: str
-    kind: FlagKind
-    frames: tuple[int, ...]
-    reason: str
-
-    def __str__(self) -> str:
-        which = f"{_frame_ranges_text(self.frames)}: " if self.frames else ""
-        return f"{self.history}: {self.kind}: {which}{self.reason}"
-
-
-def check_data_quality(histories: Sequence[History], specimen: Predictor | None = None) -> tuple[QualityFlag, ...]:
-    """Everything suspect in the histories, test by test.
+def check_data_quality(
+    histories: Sequence[History], specimen: Predictor | None = None, *, activation_energy: float = ACTIVATION_ENERGY
+) -> DataQuality:
+    """Everything suspect in the histories, test by test, and what happened in several of them at once.
 
     specimen : what predicts the elastic deflection of a first frame; without it first frames are not checked. Tests are
-    compared where they are of the same alloy and specimen and were loaded alike.
+    compared where they are of the same alloy and specimen and were loaded alike; one clock is supposed for tests of one
+    kind of specimen whose frames were taken at the same times. activation_energy : J/mol, of the creep rate.
     """
+    if not (np.isfinite(activation_energy) and activation_energy > 0):
+        raise HistoryError(f"an activation energy of {activation_energy:g} J/mol is not above zero; try 400e3")
     results = [[*_frame_flags(history, FRAME_FLAG_KINDS)] for history in histories]
     test_checks: list[tuple[FlagKind, dict[int, str]]] = [
         ("replicate", replicate_deviations(histories)),
@@ -64,8 +62,17 @@ def check_data_quality(histories: Sequence[History], specimen: Predictor | None 
     for kind, reasons in test_checks:
         for k, reason in reasons.items():
             frames = (int(np.argmax(histories[k].used)),) if kind == "first frame" else ()
-            results[k].append(QualityFlag(histories[k].name, kind, frames, reason))
-    return tuple(suspect for each in results for suspect in each)
+            results[k].append(QualityFlag((histories[k].name,), kind, frames, reason))
+    flags = [flag for each in results for flag in each]
+    flags += [flag for history in histories for flag in record_flags(history, activation_energy)]
+    sound = [
+        _with_frames_unused(h, [k for flag in each for k in flag.frames if flag.kind in FRAME_FLAG_KINDS])
+        for h, each in zip(histories, results, strict=True)
+    ]
+    jumps = find_jumps(sound)
+    flags += jump_flags(sound, jumps)
+    flags += [rate_change_flag(sound, change, activation_energy) for change in common_rate_changes(sound, jumps)]
+    return DataQuality(tuple(flags), len(histories))
 
 
 def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] = FRAME_FLAG_KINDS) -> list[History]:
@@ -90,7 +97,7 @@ def _frame_flags(history: History, kinds: Collection[str]) -> list[QualityFlag]:
         if kind in kinds:
             kind_findings = [(kind, finding) for finding in search(remaining)]
             result += [
-                QualityFlag(history.name, kind, finding.frames, finding.reason) for kind, finding in kind_findings
+                QualityFlag((history.name,), kind, finding.frames, finding.reason) for kind, finding in kind_findings
             ]
             remaining = _with_frames_unused(remaining, [k for _, finding in kind_findings for k in finding.frames])
     return result
@@ -106,17 +113,5 @@ def _with_flags_excluded(history: History, flags: Sequence[QualityFlag]) -> Hist
     frames = [k for suspect in flags for k in suspect.frames]
     if not frames:
         return history
-    description = "; ".join(f"{suspect.kind}, {_frame_ranges_text(suspect.frames)}" for suspect in flags)
+    description = "; ".join(f"{suspect.kind}, {frame_ranges_text(suspect.frames)}" for suspect in flags)
     return _with_frames_unused(history, frames).replace(labels={**history.labels, "suspect": description})
-
-
-def _frame_ranges_text(frames: Sequence[int]) -> str:
-    """Frames as people write them: 'frames 97-191, 193'."""
-    runs: list[list[int]] = []
-    for k in sorted(frames):
-        if runs and k == runs[-1][-1] + 1:
-            runs[-1] = [runs[-1][0], k]
-        else:
-            runs.append([k])
-    text = ", ".join("-".join(map(str, run)) for run in runs)
-    return f"frame{'s' if len(frames) > 1 else ''} {text}"

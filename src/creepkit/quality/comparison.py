@@ -109,7 +109,7 @@ def replicate_deviations(histories: Sequence[History]) -> dict[int, str]:
     for a, b in combinations(range(len(histories)), 2):
         one, two = histories[a], histories[b]
         end = _same_loading_until(one, two)
-        if abs(_mean_temperature(one) - _mean_temperature(two)) > REPLICATE_TEMPERATURE_TOLERANCE or end is None:
+        if abs(one.mean_temperature - two.mean_temperature) > REPLICATE_TEMPERATURE_TOLERANCE or end is None:
             continue
         ratio = _creep_ratio(one, two, end)
         if max(ratio, 1.0 / ratio) < REPLICATE_FACTOR.get(creep_output(one), max(REPLICATE_FACTOR.values())):
@@ -132,7 +132,7 @@ def _deviating_tests(histories: Sequence[History], a: int, b: int, end: float) -
     ]
     others = [k for k in others if _creep_increment(histories[k], end) > 0]
     if len(others) < FEWEST_TREND_TESTS or not _shows_trend(
-        np.array([_mean_temperature(histories[k]) for k in others]), 2
+        np.array([histories[k].mean_temperature for k in others]), 2
     ):
         return [(a, b), (b, a)]
     x, y = (np.array([_arrhenius_point(histories[k], end)[i] for k in (*others, *pair)]) for i in (0, 1))
@@ -169,7 +169,7 @@ def modulus_trend_outliers(histories: Sequence[History]) -> dict[int, str]:
         group = [k for k, h in enumerate(histories) if (h.alloy, h.specimen) == alloy and h.elastic is not None]
         if len(group) < FEWEST_TREND_TESTS:
             continue
-        x = np.array([_mean_temperature(histories[k]) for k in group])
+        x = np.array([histories[k].mean_temperature for k in group])
         y = np.array([np.log(_youngs_modulus(histories[k])) for k in group])
         for k, expected in _trend_outliers(x, y, degree=1, smallest_deviation=MODULUS_ERROR).items():
             results[group[k]] = (
@@ -230,7 +230,7 @@ def _comparable_groups(histories: Sequence[History]) -> list[tuple[list[int], fl
         members = [k for k in group if _creep_increment(histories[k], min(ends)) > 0]
         if (
             len(members) >= FEWEST_TREND_TESTS
-            and np.ptp([_mean_temperature(histories[k]) for k in members]) > REPLICATE_TEMPERATURE_TOLERANCE
+            and np.ptp([histories[k].mean_temperature for k in members]) > REPLICATE_TEMPERATURE_TOLERANCE
         ):
             groups_with_end.append((members, min(ends)))
     return groups_with_end
@@ -313,18 +313,13 @@ def _creep_increment(history: History, end: float) -> float:
 
 
 def _arrhenius_point(history: History, end: float) -> tuple[float, float]:
-    return 1.0 / _mean_temperature(history), float(np.log(_creep_increment(history, end)))
-
-
-def _mean_temperature(history: History) -> float:
-    """Mean temperature over the frames, K."""
-    return float(history.temperature_program().at(history.times).mean())
+    return 1.0 / history.mean_temperature, float(np.log(_creep_increment(history, end)))
 
 
 def _celsius_text(history: History) -> str:
-    return f"{_mean_temperature(history) - ZERO_CELSIUS:.1f} C"
+    return f"{history.mean_temperature - ZERO_CELSIUS:.1f} C"
 
 
 def _youngs_modulus(history: History) -> float:
     assert history.elastic is not None
-    return float(history.elastic.at(_mean_temperature(history)).E)
+    return float(history.elastic.at(history.mean_temperature).E)

@@ -47,7 +47,7 @@ def assemble_history(
         "strain_measure", ("engineering", "logarithmic"), required="strain" in outputs
     )
     elastic_included = conditions.take_choice("includes_elastic", ("yes", "no"), required="strain" in outputs)
-    loading = read_loading(conditions, frames)
+    loading, temperature = read_loading(conditions, frames), read_temperature(conditions, frames)
     used = _used_frames(conditions, frames)
     rupture_time, unruptured = _end_of_test(conditions, frames, used)
     _refuse_unread_columns(frames, {*outputs, loading.quantity, "temperature"}, columns)
@@ -56,7 +56,7 @@ def assemble_history(
         times=frames.times,
         outputs=outputs,
         loading=loading,
-        temperature=read_temperature(conditions, frames),
+        temperature=temperature,
         specimen=specimen,
         elastic=_elastic(conditions),
         strain_measure="engineering" if strain_measure == "engineering" else "logarithmic",
@@ -69,6 +69,7 @@ def assemble_history(
         source=source,
         rupture_time=rupture_time,
         unruptured=unruptured,
+        stated=conditions.stated,
         # Last: entries that nothing has used by now are refused.
         labels={**conditions.all_labels(), **column_means(table, vocabulary), **_merge_label(frames)},
     )

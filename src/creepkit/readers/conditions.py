@@ -12,8 +12,8 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
-from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError, HistoryError
+from creepkit.readers.recorded_programs import LOAD_RECORD_TOLERANCE, TEMPERATURE_RECORD_TOLERANCE, recorded_program
 from creepkit.readers.text_tables import Frames, SourceText
 from creepkit.readers.vocabulary import (
     COMPONENT_LOADING_KINDS,
@@ -70,6 +70,7 @@ class StatedConditions:
         self.location = location
         self.geometry: dict[str, float] = {}
         self.labels: dict[str, str] = {}
+        self.stated: dict[str, Program] = {}
         self._vocabulary = vocabulary
         self._kinds = vocabulary.condition_kinds
         self._end_of_test_terms = {**{word: word for word in END_OF_TEST_TERMS}, **vocabulary.end_of_test_terms}
@@ -286,8 +287,10 @@ def _pressure_loading(conditions: StatedConditions, frames: Frames) -> Loading |
         program = Program.steps(result) if isinstance(result, tuple) else result
         return RecordedLoading(program, "pressure")
     jump = _step_change(conditions, "pressure") if result is None else (result, result, float(frames.times[-1]))
-    if jump is None:
-        return None
+    return None if jump is None else _pressure_jump(conditions, jump)
+
+
+def _pressure_jump(conditions: StatedConditions, jump: tuple[float, float, float]) -> PressureJump:
     ramp = conditions.take_number("ramp")
     return PressureJump(*jump) if ramp is None else PressureJump(*jump, ramp=ramp.value)
 
@@ -318,41 +321,47 @@ def _required_number(conditions: StatedConditions, name: str, companion: StatedN
 def _stated_loading(
     conditions: StatedConditions, frames: Frames, quantity: str
 ) -> float | TimeValuePairs | Program | None:
-    """The value given for a quantity: a number, steps as (time, value), or a Program."""
+    """The value given for a quantity: a number, steps as (time, value), or a Program.
+
+    A column that differs from what is stated beside it is what was recorded, and is used; the rest is kept as stated.
+    """
     kind = LOADING_KINDS[quantity]
     number = conditions.take_number(quantity)
     steps = conditions.take_pairs(f"{quantity}_steps", kind)
     breakpoints = conditions.take_pairs(f"{quantity}_program", kind)
-    column = frames.values.get(quantity)
-    if column is not None and number is not None:
-        _check_agreement(frames, column, number)
-        column = None
-    forms = [form for form in (number, steps, breakpoints, column) if form is not None]
+    forms = [form for form in (number, steps, breakpoints) if form is not None]
     if len(forms) > 1:
         raise HistoryError(
-            f"{conditions.location}: the {quantity} is given {len(forms)} times over, as a number, {quantity}_steps, "
-            f"{quantity}_program or a column; keep one"
+            f"{conditions.location}: the {quantity} is given {len(forms)} times over, as a number, {quantity}_steps "
+            f"or {quantity}_program; keep one"
         )
+    stated: float | TimeValuePairs | Program | None = number.value if number is not None else steps
     if breakpoints is not None:
-        return Program(*np.array(breakpoints).T)
-    if column is not None:
-        return float(column[0]) if np.ptp(column) == 0.0 else _recorded_program(frames, column)
-    return steps if number is None else number.value
+        stated = Program(*np.array(breakpoints).T)
+    earlier = conditions.take_pairs(f"stated_{quantity}_program", kind)
+    if earlier is not None:
+        conditions.stated[quantity] = Program(*np.array(earlier).T)
+    column = frames.values.get(quantity)
+    if column is None or (number is not None and np.allclose(column, number.value, rtol=1e-9, atol=0.0)):
+        return stated
+    if stated is None:
+        jump = _step_change(conditions, quantity) if quantity != "temperature" else None
+        stated = None if jump is None else _jump_program(conditions, quantity, jump)
+    if stated is not None:
+        conditions.stated[quantity] = _as_program(stated)
+    is_temperature = quantity == "temperature"
+    tolerance = TEMPERATURE_RECORD_TOLERANCE if is_temperature else LOAD_RECORD_TOLERANCE * float(column.max())
+    return float(column[0]) if np.ptp(column) == 0.0 else recorded_program(frames.times, column, tolerance)
 
 
-def _check_agreement(frames: Frames, column: Floats, number: StatedNumber) -> None:
-    """Refuse a column that contradicts the number said of the whole test."""
-    differs = np.abs(column - number.value) > 1e-9 * abs(number.value)
-    if differs.any():
-        k = int(np.argmax(differs))
-        raise HistoryError(
-            f"{frames.location(k)}: the column holds {column[k]:g} where '{number.key}' ({number.location}) says "
-            f"{number.value:g}; keep the column or the number, or rename the number to 'label {number.key}'"
-        )
+def _jump_program(conditions: StatedConditions, quantity: str, jump: tuple[float, float, float]) -> Program:
+    """The program of a load that was stated as two values and the time between them."""
+    if quantity == "pressure":
+        return _pressure_jump(conditions, jump).program()
+    return Program.steps(((0.0, jump[0]), (jump[2], jump[1])))
 
 
-def _recorded_program(frames: Frames, column: Floats) -> Program:
-    """A column as a piecewise linear program; its first value is taken to hold from time zero."""
-    if frames.times[0] == 0.0:
-        return Program(frames.times, column)
-    return Program(np.append(0.0, frames.times), np.append(column[0], column))
+def _as_program(stated: float | TimeValuePairs | Program) -> Program:
+    if isinstance(stated, Program):
+        return stated
+    return Program.steps(stated) if isinstance(stated, tuple) else Program.constant(stated)

@@ -12,7 +12,8 @@
 Keys and columns carry their units (`words.py` lists them, `units.py` their units). A bulge test has the columns
 `time_s,amplitude_mm,width_mm,shape` and the keys pressure_1_MPa, pressure_2_MPa, jump_time_h. Anything imposed may
 change: `# stress_steps: 0 s 100 MPa; 1 h 120 MPa` jumps, `# temperature_program: 0 s 700 C; 2 h 720 C` is piecewise
-linear, and a column of that name was recorded. `_sd` names a standard deviation, `used` (0 or 1) marks frames,
+linear, and a column of that name was recorded: it is used, thinned to 0.25 K or 0.2 % of the load, and what is stated
+beside it is kept for the check of data quality. `_sd` names a standard deviation, `used` (0 or 1) marks frames,
 `# geometry apex_thickness_mm: 0.48` measures of the specimen, `# label heat: X7` and unknown keys are labels.
 """
 
@@ -94,6 +95,8 @@ def _header_lines(history: History) -> Iterator[tuple[str, str]]:
         yield "alloy", history.alloy
     yield from _loading_lines(history)
     yield from _temperature_lines(history)
+    units = {"temperature": "K"}
+    yield from ((f"stated_{q}_program", _program_text(p, units.get(q, "MPa"))) for q, p in history.stated.items())
     yield from _elastic_lines(history)
     yield "strain_measure", history.strain_measure
     yield "includes_elastic", "yes" if history.includes_elastic else "no"

@@ -189,6 +189,7 @@ TEXT_KEYS = frozenset(
         for q in (*LOADING_KINDS, *STRAIN_LOADING_KINDS, *COMPONENT_LOADING_KINDS)
         for form in ("steps", "program")
     ]
+    + [f"stated_{q}_program" for q in LOADING_KINDS]
     + ["name", "alloy", "specimen", "operator", "control", "strain_measure", "includes_elastic", "ended"]
 )
 """Words that stand once for a whole test; every other key becomes a label."""

@@ -44,6 +44,8 @@ class History:
     rupture_time : s, when the specimen broke; None where it did not, or where that is not known.
     unruptured : whether the test was stopped, at its last time, before the specimen broke. A test with neither says
         nothing of how it ended.
+    stated : {"temperature", "stress" or "pressure": program} that was stated of a quantity whose record is used, K and
+        MPa; a check of data quality compares them.
     """
 
     name: str
@@ -64,6 +66,7 @@ class History:
     source: str = ""
     rupture_time: float | None = None
     unruptured: bool = False
+    stated: Mapping[str, Program] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         origin = self.origin
@@ -98,6 +101,7 @@ class History:
         sd = {n: frozen(np.broadcast_to(np.asarray(v, float), times.shape)) for n, v in self.standard_deviation.items()}
         freeze(self, "standard_deviation", MappingProxyType(sd))
         freeze(self, "geometry", MappingProxyType(dict(self.geometry)))
+        freeze(self, "stated", MappingProxyType(dict(self.stated)))
         freeze(self, "labels", MappingProxyType(dict(self.labels)))
 
     def _check_end(self, origin: str) -> None:
@@ -157,8 +161,8 @@ class History:
 
     @property
     def mean_temperature(self) -> float:
-        """Mean temperature over the breakpoints of the program, K."""
-        return float(np.mean(self.temperature_program().values))
+        """Mean temperature over the frames, K."""
+        return float(self.temperature_program().at(self.times).mean())
 
     @property
     def condition(self) -> str:

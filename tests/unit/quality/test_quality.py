@@ -77,7 +77,8 @@ def test_verdict_on_the_nine_bulges(measured):
     unloaded = {(h.name, "unloading") for h in measured}
     high = {(f"test_{k:02d}", "first frame") for k in (1, 2, 6, 9)}
     others = {("test_11", "falling"), ("test_12", "replicate"), ("test_12", "first frame")}
-    assert kinds(found) == unloaded | high | others
+    single = [flag for flag in found if len(flag.tests) == 1]
+    assert kinds(single) == unloaded | high | others
     told = {(s.history, s.kind): str(s) for s in found}
     assert "above the elastic one" in told["test_01", "first frame"]
     assert "below the elastic one" in told["test_12", "first frame"]
@@ -123,7 +124,7 @@ def test_no_false_alarms_on_clean_bulges():
     tests = [
         bulge(rng, name=f"t{k}", celsius=720 + 90 * rng.random(), P2=10.0 if k % 4 == 0 else 8.0) for k in range(100)
     ]
-    assert check_data_quality(tests, ElasticDimple()) == ()
+    assert not list(check_data_quality(tests, ElasticDimple()))
     marked = exclude_suspect_frames(tests)
     assert all(a is b for a, b in zip(marked, tests, strict=True))
 
@@ -132,7 +133,7 @@ def test_no_false_alarms_on_clean_bars():
     rng = np.random.default_rng(1)
     for k in range(100):
         times = np.linspace(1e3, 1e6, 60) if k % 2 else None
-        assert check_data_quality([bar(rng, times=times, noise=10 ** rng.uniform(-6, -4))]) == ()
+        assert not list(check_data_quality([bar(rng, times=times, noise=10 ** rng.uniform(-6, -4))]))
 
 
 def test_no_false_alarm_without_creep_or_noise():
@@ -141,7 +142,7 @@ def test_no_false_alarm_without_creep_or_noise():
     constant = bulge(rng, amplitude=np.full(TIMES.size, 0.055), noise=0.0)
     exact = bulge(rng, noise=0.0)
     rounded = exact.replace(outputs={"amplitude": exact.outputs["amplitude"].round(3)})
-    assert [check_data_quality([test]) for test in (flat, constant, exact, rounded)] == [()] * 4
+    assert not [f for test in (flat, constant, exact, rounded) for f in check_data_quality([test])]
 
 
 @pytest.mark.parametrize("frames", [1, 3, 5])
@@ -175,7 +176,7 @@ def test_an_amplitude_that_falls_under_a_held_pressure():
 def test_a_fall_after_the_pressure_was_lowered_is_no_fault():
     rng = np.random.default_rng(6)
     amplitude = np.where(TIMES > 2 * HOUR, 0.2 - 0.05 * (TIMES - 2 * HOUR) / 2 / HOUR, 0.06 + 0.15 * TIMES / 2 / HOUR)
-    assert check_data_quality([bulge(rng, amplitude=amplitude, P2=4.0)]) == ()
+    assert not list(check_data_quality([bulge(rng, amplitude=amplitude, P2=4.0)]))
 
 
 @pytest.mark.parametrize("frame", [2, 40, 93])
@@ -205,7 +206,7 @@ def test_a_step_of_the_load_is_no_jump():
     times = np.linspace(1e3, 1e6, 60)
     test = bar(rng, times=times, steps=((0.0, 100.0), (5e5, 120.0)))
     strain = test.outputs["strain"] + np.where(times > 5e5, 2e-3, 0.0)
-    assert check_data_quality([test.replace(outputs={"strain": strain})]) == ()
+    assert not list(check_data_quality([test.replace(outputs={"strain": strain})]))
 
 
 def campaign(rng, **faults):
@@ -216,7 +217,7 @@ def campaign(rng, **faults):
 
 def test_a_twin_far_from_the_other():
     rng = np.random.default_rng(10)
-    assert check_data_quality(campaign(rng)) == ()
+    assert not list(check_data_quality(campaign(rng)))
     found = check_data_quality(campaign(rng, twin={"rate": 0.5}))
     assert ("twin", "replicate") in kinds(found)
     assert {s.history for s in found} == {"twin"}
@@ -227,8 +228,8 @@ def test_a_twin_far_from_the_other():
 def test_twins_have_one_alloy_and_one_load():
     rng = np.random.default_rng(11)
     one, two = campaign(rng, twin={"rate": 0.5})[-2:]
-    assert check_data_quality([one, two.replace(alloy="another")]) == ()
-    assert check_data_quality([one, two.replace(loading=PressureJump(6.0, 6.0, HOUR))]) == ()
+    assert not list(check_data_quality([one, two.replace(alloy="another")]))
+    assert not list(check_data_quality([one, two.replace(loading=PressureJump(6.0, 6.0, HOUR))]))
 
 
 def test_a_temperature_out_of_line():
@@ -255,7 +256,7 @@ def test_a_modulus_out_of_line():
 @pytest.mark.parametrize(("offset", "word"), [(0.014, "above"), (-0.014, "below")])
 def test_a_first_frame_off_the_elastic_one(offset, word):
     test = bulge(np.random.default_rng(14), celsius=730.0, offset=offset)
-    assert check_data_quality([test]) == ()
+    assert not list(check_data_quality([test]))
     (found,) = check_data_quality([test], ElasticDimple())
     assert (found.kind, found.frames) == ("first frame", (0,))
     assert word in found.reason
@@ -266,7 +267,7 @@ def test_a_first_frame_off_the_elastic_one(offset, word):
 
 def test_the_door():
     test = bulge(np.random.default_rng(15))
-    assert ck.check_data_quality([test]) == ()
+    assert not list(ck.check_data_quality([test]))
     (same,) = ck.exclude_suspect_frames([test])
     assert same is test
 
@@ -283,5 +284,5 @@ def test_kinds_that_cannot_be_marked():
 def test_histories_with_next_to_nothing():
     empty = History("few", np.array([1.0, 2.0]), {"strain": np.array([np.nan, 0.1])}, StressSteps(((0, 50.0),)), 900.0)
     silent = empty.replace(outputs={})
-    assert check_data_quality([empty, silent]) == ()
-    assert check_data_quality([]) == ()
+    assert not list(check_data_quality([empty, silent]))
+    assert not list(check_data_quality([]))

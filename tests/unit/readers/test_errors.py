@@ -85,11 +85,7 @@ CASES = {
     ),
     "two ways of stress": (
         HEAD + "# stress_steps: 0 s 60 MPa\n" + BODY,
-        "x.csv: the stress is given 2 times over, as a number, stress_steps, stress_program or a column; keep one",
-    ),
-    "column against key": (
-        HEAD + "time_s,strain,stress_MPa\n0,0,60\n1,0,61\n",
-        "x.csv:5: the column holds 61 where 'stress_MPa' .*x.csv:2.* says 60; keep the column or the number, or rename",
+        "x.csv: the stress is given 2 times over, as a number, stress_steps or stress_program; keep one",
     ),
     "stress and pressure": (
         HEAD + "# pressure_MPa: 8\n" + BODY,

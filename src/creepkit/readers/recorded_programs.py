@@ -1,0 +1,65 @@
+"""Recorded columns of load or temperature as programs of few straight pieces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from creepkit.arrays import Floats, Ints
+from creepkit.records import Program
+
+TEMPERATURE_RECORD_TOLERANCE, LOAD_RECORD_TOLERANCE = 0.25, 0.002
+"""K, and fraction of the largest load, by which a program may be off its record: 1 % of a creep rate at 400 kJ/mol and
+800 C, and for a stress exponent of 5."""
+
+
+NOISE_FACTOR = 3.0
+"""Standard deviations of the noise of a record that its program does not follow."""
+
+
+_MEDIAN_FRAMES = 5
+
+
+def recorded_program(times: Floats, values: Floats, tolerance: float) -> Program:
+    """The program of a record; its first value is taken to hold from time zero.
+
+    times : (frames,) s. values : (frames,) MPa or K. tolerance : in the same unit; where three standard deviations of
+    the record's noise are more, that is taken. Breakpoints are frames (Douglas and Peucker's choice), and where noise
+    decides their values are the least-squares ones of all frames.
+    """
+    noise = _noise(values)
+    noisy = NOISE_FACTOR * noise > tolerance and values.size > _MEDIAN_FRAMES
+    followed = _running_median(values) if noisy else values
+    kept = _breakpoints(times, followed, max(tolerance, NOISE_FACTOR * noise) if noisy else tolerance)
+    at_breakpoints: Floats = values[kept]
+    if noisy:
+        hats = np.stack([np.interp(times, times[kept], row) for row in np.eye(kept.size)], axis=1)
+        at_breakpoints = np.asarray(np.linalg.lstsq(hats, values, rcond=None)[0], dtype=float)
+    if times[0] == 0.0:
+        return Program(times[kept], at_breakpoints)
+    return Program(np.append(0.0, times[kept]), np.append(at_breakpoints[0], at_breakpoints))
+
+
+def _noise(values: Floats) -> float:
+    """Standard deviation of white noise by the median of second differences; 0 of fewer than three values."""
+    differences = np.abs(np.diff(values, 2))
+    return float(1.4826 * np.median(differences) / 6**0.5) if differences.size else 0.0
+
+
+def _running_median(values: Floats) -> Floats:
+    padded = np.pad(values, _MEDIAN_FRAMES // 2, mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, _MEDIAN_FRAMES), axis=-1))
+
+
+def _breakpoints(times: Floats, values: Floats, tolerance: float) -> Ints:
+    """Frames between which straight lines stay within the tolerance."""
+    kept, spans = {0, values.size - 1}, [(0, values.size - 1)]
+    while spans:
+        first, last = spans.pop()
+        ends = [first, last]
+        line = np.interp(times[first : last + 1], times[ends], values[ends])
+        distance = np.abs(values[first : last + 1] - line)
+        farthest = first + int(np.argmax(distance))
+        if distance[farthest - first] > tolerance:
+            kept.add(farthest)
+            spans += [(first, farthest), (farthest, last)]
+    return np.array(sorted(kept))

@@ -1,0 +1,42 @@
+"""Text and data of a check of data quality."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from creepkit.quality.flags import DataQuality
+
+
+def data_quality_text(quality: DataQuality) -> str:
+    """One line for each flag; one line that says so when there are none."""
+    tests = f"{quality.tests} test{'' if quality.tests == 1 else 's'}"
+    if not quality.flags:
+        return f"nothing suspect in {tests}"
+    count = len(quality.flags)
+    head = f"{count} flag{'' if count == 1 else 's'} in {tests}; nothing was dropped"
+    return "\n".join([head, *(f"  {flag}" for flag in quality.flags)])
+
+
+def data_quality_to_json(quality: DataQuality) -> dict[str, Any]:
+    """The flags with all their numbers, for JSON: times in s, steps of temperature in K, jumps in the output's unit."""
+    return {
+        "tests": quality.tests,
+        "flags": [
+            {
+                "tests": list(flag.tests),
+                "kind": flag.kind,
+                "frames": list(flag.frames),
+                "reason": flag.reason,
+                "time": flag.time,
+                "earliest": flag.earliest,
+                "latest": flag.latest,
+                "rate_factors": dict(flag.rate_factors),
+                "factor_errors": dict(flag.factor_errors),
+                "temperature_steps": dict(flag.temperature_steps),
+                "jumps": dict(flag.jumps),
+                "proposal": flag.proposal,
+            }
+            for flag in quality.flags
+        ],
+    }
