@@ -63,12 +63,14 @@ def identify(
         starts=4, nuisances=[Nuisance("offset")], weights="likelihood".
     """
     from creepkit.inverse.identify import identify as run
+    from creepkit.inverse.nuisance_parameters import check_nuisance_tests
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.inverse.sparsity.term_selection import identify_sparse
 
     histories, law = check_histories(histories), resolve_law(law)
     settings = change_settings(settings or IdentificationSettings(), changes)
     predictor = resolve_predictors(using, histories)
+    check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     surrogate = _resolve_surrogate(through, predictor, histories)
     if penalty is None:
         return run(law, histories, predictor, settings=settings, search=search, through=surrogate, progress=progress)
@@ -102,17 +104,20 @@ def select(
     by : the criterion; the result is a set of laws with weights, "decisive" only above 0.95.
     using, through, settings, changes : as for identify(), with 60 frames of each history; weights are "likelihood".
     """
+    from creepkit.inverse.nuisance_parameters import check_nuisance_tests
     from creepkit.inverse.selection.select import SELECTION_FRAMES
     from creepkit.inverse.selection.select import select as run
     from creepkit.inverse.settings import IdentificationSettings
 
     histories = check_histories(histories)
     predictor = resolve_predictors(using, histories)
+    settings = change_settings(settings or IdentificationSettings(frames=SELECTION_FRAMES), changes)
+    check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     return run(
         [resolve_law(law) for law in laws],
         histories,
         predictor,
-        settings=change_settings(settings or IdentificationSettings(frames=SELECTION_FRAMES), changes),
+        settings=settings,
         through=_resolve_surrogate(through, predictor, histories),
         sums=sums,
         by=by,

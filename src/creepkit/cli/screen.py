@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from creepkit.cli.options import parse_nuisances, penalty_named
+from creepkit.cli.options import NUISANCE_SYNTAX, parse_nuisances, penalty_named
 from creepkit.report.terminal import ProgressBar
 
 if TYPE_CHECKING:
@@ -45,7 +45,11 @@ def command(
     ] = "when-in-doubt",
     nuisance: Annotated[
         list[str] | None,
-        typer.Option(metavar="KIND[=MEAN[:SD]]", help="What differs between tests, such as thickness=0.4935:0.027."),
+        typer.Option(
+            metavar=NUISANCE_SYNTAX,
+            help="What differs between tests, beside offset and rate, such as thickness=0.4935:0.027; rate=none leaves "
+            "one out.",
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the search.")] = 0,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one for each core by default.")] = None,
