@@ -53,7 +53,7 @@ def _directions(problem: LeastSquaresProblem, residuals: Residuals) -> dict[str,
     settings, observations = problem.settings, problem.observations
     kinds = {n.kind for n in settings.nuisances}
     by_key = {"rate": residuals.log_rate_sensitivity} if "rate" in kinds else {}
-    tests_of = {"rate": range(len(residuals.values))}
+    tests_of = {"rate": list(range(len(residuals.values)))}
     nuisances = problem.nuisance_parameters
     if nuisances.size and residuals.jacobian is not None:
         columns = residuals.jacobian[..., -nuisances.size :]

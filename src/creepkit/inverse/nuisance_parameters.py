@@ -84,7 +84,7 @@ class NuisanceParameters:
             distinct_owners = list(dict.fromkeys(m for m, k in zip(owners_of_tests, offered, strict=True) if k))
             first = len(parameters)
             index = test_index.setdefault(nuisance.key, np.full(len(histories), -1, np.int64))
-            for test in np.flatnonzero(offered):
+            for test in map(int, np.flatnonzero(offered)):
                 if index[test] >= 0:
                     raise FitError(
                         f"test '{histories[test].name}' has the nuisance '{nuisance.key}' twice; let tests= of one of "
@@ -193,9 +193,10 @@ def check_nuisance_law(nuisances: Sequence[Nuisance], law: CreepLaw) -> None:
     """FitError where the temperature changes during a test and the law does not know it."""
     for kind in (n.kind for n in nuisances):
         if kind in ("temperature step", "temperature drift") and not law.uses(temperature):
+            like = kind.replace("temperature", "rate")
             raise FitError(
-                f"law '{law.name}' has no temperature and cannot follow a {kind}; take a '{kind.replace('temperature', 'rate')}', "
-                "or give the law one, such as law.times(arrhenius(T_ref=1073))"
+                f"law '{law.name}' has no temperature and cannot follow a {kind}; take a '{like}', or give the law "
+                "one, such as law.times(arrhenius(T_ref=1073))"
             )
 
 
@@ -226,8 +227,9 @@ def _bounds_of(nuisance: Nuisance, mean: float) -> tuple[float, float]:
 class NuisanceEstimate:
     """The estimate of one explicit nuisance of one test, alloy or all tests.
 
-    owner : name of the test or alloy, "all", or the group of tests. start : s, of a step. value, sd : estimate and its standard deviation, in the kind's unit.
-    prior_mean, prior_sd : of the prior, the latter as it was given or estimated.
+    owner : name of the test or alloy, "all", or the group of tests. value, sd : estimate and its standard deviation,
+    in the kind's unit. prior_mean, prior_sd : of the prior, the latter as it was given or estimated. start : s, of a
+    step.
     """
 
     kind: str

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Literal
 
 import numpy as np
 
@@ -21,7 +22,7 @@ SCALABLE_LOADS = ("stress", "pressure")
 
 
 def with_program_nuisances(history: History, values: Mapping[str, float]) -> History:
-    """The history as the rig made it; values : {key: value} of PROGRAM_NUISANCES and RATE_NUISANCES, others are ignored.
+    """The history as the rig made it; values : {key: value} of explicit nuisances, of which others do not count.
 
     A rate step changes no program; its breakpoints enter the temperature's, so that steps of an integration end there.
     """
@@ -31,8 +32,8 @@ def with_program_nuisances(history: History, values: Mapping[str, float]) -> His
         if kind == "load step":
             if history.loading.quantity not in SCALABLE_LOADS:
                 raise SolveError(
-                    f"{history.origin}: a load step changes a stress or a pressure, and here {history.loading.quantity} "
-                    "is prescribed; leave it out for this test"
+                    f"{history.origin}: a load step changes a stress or a pressure, and {history.loading.quantity} is "
+                    "prescribed here; leave it out for this test"
                 )
             program = load or history.loading.program()
             merged = _with_breakpoints(program, step_program(start))
@@ -46,7 +47,7 @@ def with_program_nuisances(history: History, values: Mapping[str, float]) -> His
             temperature = Program(merged.times, merged.values + change * shape.at(merged.times))
     if load is None:
         return history if temperature is history.temperature else history.replace(temperature=temperature)
-    control = getattr(history.loading, "control", "load")
+    control: Literal["load", "stress"] = getattr(history.loading, "control", "load")
     return history.replace(temperature=temperature, loading=RecordedLoading(load, history.loading.quantity, control))
 
 
