@@ -35,6 +35,7 @@ from .inverse.search.derivative_free import CmaEs as CmaEs
 from .inverse.search.derivative_free import ParticleSwarm as ParticleSwarm
 from .inverse.search.multistart import MultiStart as MultiStart
 from .inverse.settings import IdentificationSettings as IdentificationSettings
+from .inverse.settings import default_nuisances as default_nuisances
 from .inverse.sparsity.bootstrap import bootstrap_terms as bootstrap_terms
 from .inverse.sparsity.penalties import L2 as L2
 from .inverse.sparsity.penalties import GroupL2 as GroupL2

@@ -67,12 +67,14 @@ def identify(
     from creepkit.inverse.composite_predictor import through_for_law
     from creepkit.inverse.history_checks import without_suspect_frames
     from creepkit.inverse.identify import identify as run
+    from creepkit.inverse.nuisance_parameters import check_nuisance_tests
     from creepkit.inverse.settings import IdentificationSettings
     from creepkit.inverse.sparsity.term_selection import identify_sparse
 
     law, settings = resolve_law(law), change_settings(settings or IdentificationSettings(), changes)
     histories = without_suspect_frames(check_histories(histories), settings)
     predictor = resolve_predictors(using, histories)
+    check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     surrogate = _resolve_surrogate(through, predictor, histories)
     if through == "auto":
         surrogate = through_for_law(surrogate, law)
@@ -109,6 +111,7 @@ def select(
     using, through, settings, changes : as for identify(); weights are "likelihood".
     """
     from creepkit.inverse.history_checks import without_suspect_frames
+    from creepkit.inverse.nuisance_parameters import check_nuisance_tests
     from creepkit.inverse.selection.select import select as run
     from creepkit.inverse.settings import IdentificationSettings
 
@@ -120,6 +123,7 @@ def select(
         )
     histories = without_suspect_frames(check_histories(histories), settings)
     predictor = resolve_predictors(using, histories)
+    check_nuisance_tests(settings.nuisances, [h.name for h in histories])
     return run(
         [resolve_law(law) for law in laws],
         histories,

@@ -22,7 +22,7 @@ from creepkit.cli.identification_options import (
     setting_changes,
     surrogate_named,
 )
-from creepkit.cli.options import check_folder, parse_nuisances
+from creepkit.cli.options import NUISANCE_SYNTAX, check_folder, parse_nuisances
 from creepkit.report.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
@@ -55,7 +55,11 @@ def command(
     within: Annotated[float, typer.Option(min=0.0, help="K; tests so near are at one temperature.")] = 5.0,
     nuisance: Annotated[
         list[str] | None,
-        typer.Option(metavar="KIND[=MEAN[:SD]]", help="What differs between tests, such as thickness=0.4935:0.027."),
+        typer.Option(
+            metavar=NUISANCE_SYNTAX,
+            help="What differs between tests, beside offset and rate, such as thickness=0.4935:0.027; rate=none leaves "
+            "one out.",
+        ),
     ] = None,
     moduli: Annotated[
         bool, typer.Option("--moduli/--no-moduli", help="First find each test's modulus from its first 15 frames.")

@@ -23,7 +23,7 @@ from creepkit.cli.identification_options import (
     setting_changes,
     surrogate_named,
 )
-from creepkit.cli.options import check_folder, parse_nuisances, penalty_named, search_named
+from creepkit.cli.options import NUISANCE_SYNTAX, check_folder, parse_nuisances, penalty_named, search_named
 from creepkit.report.ranking import print_ranking, ranking_to_json
 from creepkit.report.terminal import ProgressBar, print_json
 
@@ -107,7 +107,11 @@ def command(
     ] = False,
     nuisance: Annotated[
         list[str] | None,
-        typer.Option(metavar="KIND[=MEAN[:SD]]", help="What differs between tests, such as thickness=0.4935:0.027."),
+        typer.Option(
+            metavar=NUISANCE_SYNTAX,
+            help="What differs between tests, beside offset and rate, such as thickness=0.4935:0.027; rate=none leaves "
+            "one out.",
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:

@@ -247,31 +247,49 @@ def parse_weights(text: str) -> Any:
         raise FitError(f"--weights {text} is not known; write {words}") from None
 
 
-def parse_nuisances(texts: Sequence[str] | None) -> list[Nuisance] | None:
-    """The usual offset and rate, and those named: temperature, thickness=0.4935 or thickness=0.4935:0.027."""
-    from typing import get_args
+NUISANCE_SYNTAX = "KIND[=MEAN[:SD]][@START][ for TESTS]"
+"""KIND=none leaves a default out; TESTS is test, alloy or all, or names with commas between them, which share one."""
 
-    from creepkit.errors import FitError
-    from creepkit.records import Nuisance
-    from creepkit.records.prediction import NuisanceKind
+
+def parse_nuisances(texts: Sequence[str] | None) -> tuple[Nuisance, ...] | None:
+    """The default nuisances and those named, such as thickness=0.4935:0.027 or "temperature step=0:30@8250 for all".
+
+    rate=none leaves the scatter of the rate out. None where nothing is named: the settings' own then hold.
+    """
+    from creepkit.inverse.settings import default_nuisances
 
     if not texts:
         return None
-    nuisances = [Nuisance("offset"), Nuisance("rate")]
-    for text in texts:
-        kind, _, numbers_text = text.partition("=")
-        mean, _, sd = numbers_text.partition(":")
-        try:
-            numbers = float(mean or 0.0), float(sd) if sd else None
-        except ValueError:
-            raise FitError(
-                f"--nuisance {text}: '{numbers_text}' is not MEAN or MEAN:SD, such as 0.4935:0.027"
-            ) from None
-        if not all(math.isfinite(number) for number in numbers if number is not None):
-            raise FitError(f"--nuisance {text}: '{numbers_text}' is not MEAN or MEAN:SD of finite numbers")
-        matching_kinds = [known_kind for known_kind in get_args(NuisanceKind) if known_kind == kind]
-        if not matching_kinds:
-            raise FitError(f"--nuisance {text}: '{kind}' is not known; allowed are {', '.join(get_args(NuisanceKind))}")
-        nuisances = [n for n in nuisances if n.kind != kind]
-        nuisances.append(Nuisance(matching_kinds[0], mean=numbers[0], sd=numbers[1]))
-    return nuisances
+    without = [kind.strip() for kind, _, value in (text.partition("=") for text in texts) if value.strip() == "none"]
+    further = [_nuisance(text) for text in texts if text.partition("=")[2].strip() != "none"]
+    return default_nuisances(*further, without=without)
+
+
+def _nuisance(text: str) -> Nuisance:
+    """One nuisance, from text of NUISANCE_SYNTAX."""
+    from creepkit.errors import FitError, SolveError
+    from creepkit.records import Nuisance
+
+    definition, _, whose = text.partition(" for ")
+    definition, _, start = definition.partition("@")
+    kind, _, numbers_text = definition.partition("=")
+    mean, _, sd = numbers_text.partition(":")
+    try:
+        numbers = float(mean or 0.0), float(sd) if sd else None, float(start or 0.0)
+    except ValueError:
+        raise FitError(f"--nuisance {text}: write {NUISANCE_SYNTAX}, such as thickness=0.4935:0.027") from None
+    if not all(math.isfinite(number) for number in numbers if number is not None):
+        raise FitError(f"--nuisance {text}: MEAN, SD and START must be finite numbers")
+    tests = [name.strip() for name in whose.split(",") if name.strip()]
+    scope: Any = tests[0] if tests in (["test"], ["alloy"], ["all"]) else "all" if tests else "test"
+    try:
+        return Nuisance(
+            kind.strip(),  # type: ignore[arg-type]
+            scope,
+            mean=numbers[0],
+            sd=numbers[1],
+            start=numbers[2],
+            tests=() if tests == [scope] else tuple(tests),
+        )
+    except SolveError as error:
+        raise FitError(f"--nuisance {text}: {error}") from None

@@ -21,7 +21,7 @@ from creepkit.cli.identification_options import (
     setting_changes,
     surrogate_named,
 )
-from creepkit.cli.options import parse_nuisances, penalty_named
+from creepkit.cli.options import NUISANCE_SYNTAX, parse_nuisances, penalty_named
 from creepkit.report.terminal import ProgressBar
 
 if TYPE_CHECKING:
@@ -59,7 +59,11 @@ def command(
     ] = "when-in-doubt",
     nuisance: Annotated[
         list[str] | None,
-        typer.Option(metavar="KIND[=MEAN[:SD]]", help="What differs between tests, such as thickness=0.4935:0.027."),
+        typer.Option(
+            metavar=NUISANCE_SYNTAX,
+            help="What differs between tests, beside offset and rate, such as thickness=0.4935:0.027; rate=none leaves "
+            "one out.",
+        ),
     ] = None,
     only: OnlyOption = None,
     fix: FixOption = None,

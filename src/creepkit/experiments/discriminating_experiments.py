@@ -135,7 +135,7 @@ class ModelDiscrimination:
             observations=whole.observations.of_tests(tests),
             evaluations=EvaluationCache(),
         ).with_nuisances(nuisances)
-        initial_values = {(nuisance.kind, nuisance.owner): nuisance.value for nuisance in alternative.nuisances}
+        initial_values = {(nuisance.key, nuisance.owner): nuisance.value for nuisance in alternative.nuisances}
         x = problem.bounds.clip(starting_point(nuisances, alternative.u, initial_values))
         residuals = replace(problem.residuals(x), present=problem.observations.present)
         return problem.with_covariance(cholesky_factors(residuals, self.noise_model)), x

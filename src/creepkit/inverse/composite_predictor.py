@@ -7,23 +7,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError, SolveError
+from creepkit.inverse.prediction_concatenation import concatenated_tests
+from creepkit.inverse.transformed_prediction import TRANSFORMING_NUISANCES, plain_prediction, predict_transformed
 from creepkit.language import CreepLaw
 from creepkit.records import (
     History,
     NuisanceValues,
     Prediction,
     Predictor,
-    Status,
     SupportsReducedOrderModel,
     SupportsRefinement,
     SupportsRupturePrediction,
     TimesToStrain,
+    kind_and_start,
 )
 
 
@@ -82,76 +83,7 @@ class CompositePredictor:
     @staticmethod
     def concatenate(groups: Sequence[tuple[list[int], Prediction]], histories: Sequence[History]) -> Prediction:
         """The predictions of groups as one."""
-        return _concatenated(groups, histories)
-
-
-def _concatenated(groups: Sequence[tuple[list[int], Prediction]], histories: Sequence[History]) -> Prediction:
-    """One prediction in the order of the histories, with the union of outputs."""
-    outputs = tuple(dict.fromkeys(name for _, found in groups for name in found.outputs))
-    candidates, longest = len(groups[0][1].values), max(h.times.size for h in histories)
-    shape = (candidates, len(histories), longest, len(outputs))
-    values, status = np.full(shape, np.nan), np.full(shape[:2], int(Status.COMPLETE))
-    end_times = np.full(shape[:2], np.inf)
-    differentiable = all(found.jacobian is not None for _, found in groups)
-    jacobian = None
-    kinds = {kind for _, found in groups for kind in found.nuisance_jacobian}
-    nuisance_jacobian = {kind: np.zeros(shape) for kind in kinds}
-    for tests, found in groups:
-        columns = [outputs.index(name) for name in found.outputs]
-        index = np.ix_(range(candidates), tests, range(found.values.shape[2]), columns)
-        values[index] = found.values
-        status[:, tests], end_times[:, tests] = found.status, found.end_times
-        for kind, sensitivity in found.nuisance_jacobian.items():
-            nuisance_jacobian[kind][index] = sensitivity
-        if differentiable and found.jacobian is not None:
-            jacobian = np.full((*shape, found.jacobian.shape[-1]), np.nan) if jacobian is None else jacobian
-            jacobian[index] = found.jacobian
-    lengths = np.array([h.times.size for h in histories], np.int64)
-    times = tuple(h.times for h in histories)
-    return Prediction(
-        values,
-        outputs,
-        lengths,
-        status,
-        end_times,
-        jacobian,
-        times,
-        nuisance_jacobian,
-        _concatenated_times(groups, shape),
-    )
-
-
-def _concatenated_times(groups: Sequence[tuple[list[int], Prediction]], shape: tuple[int, ...]) -> TimesToStrain | None:
-    """The times to strain of groups as one, if they have any; shape : (candidates, tests, times, outputs)."""
-    groups_with_times = [
-        (tests, prediction.times_to_strain) for tests, prediction in groups if prediction.times_to_strain is not None
-    ]
-    if len(groups_with_times) < len(groups):
-        return None
-
-    def gathered(name: str, axes: int, fill: float) -> Any:
-        arrays = [getattr(times_to_strain, name) for _, times_to_strain in groups_with_times]
-        if any(array is None for array in arrays):
-            return None
-        out = np.full((*shape[:axes], *arrays[0].shape[axes:]), fill)
-        for (tests, _), array in zip(groups_with_times, arrays, strict=True):
-            if axes == 3:
-                out[:, tests, : array.shape[2]] = array
-            else:
-                out[:, tests] = array
-        return out
-
-    horizon = np.zeros(shape[1])
-    for tests, times_to_strain in groups_with_times:
-        horizon[tests] = times_to_strain.horizon
-    return TimesToStrain(
-        gathered("times", 3, np.nan),
-        gathered("log_time_derivatives", 3, np.inf),
-        gathered("rupture_times", 2, np.nan),
-        horizon,
-        gathered("time_jacobian", 3, np.nan),
-        gathered("rupture_jacobian", 2, np.nan),
-    )
+        return concatenated_tests(groups, histories)
 
 
 def predict(
@@ -165,11 +97,20 @@ def predict(
 ) -> Prediction:
     """Predict, mentioning nuisances only where there are any: a closed form need not know of them.
 
-    theta : (candidates, parameters) internal values.
+    theta : (candidates, parameters) internal values. Nuisances of programs and rates, which the predictor does not
+    differentiate itself, become other histories, and a law with further parameters.
     """
-    if nuisances:
+    if isinstance(predictor, CompositePredictor):
         return predictor.predict(law, theta, histories, nuisances=nuisances, sensitivities=sensitivities)
-    return predictor.predict(law, theta, histories, sensitivities=sensitivities)
+    given, own_kinds = dict(nuisances or {}), getattr(predictor, "program_nuisances", ())
+    transformed = {
+        key: given.pop(key)
+        for key in list(given)
+        if kind_and_start(key)[0] in TRANSFORMING_NUISANCES and kind_and_start(key)[0] not in own_kinds
+    }
+    if transformed:
+        return predict_transformed(predictor, law, theta, histories, given, transformed, sensitivities)
+    return plain_prediction(predictor, law, theta, histories, given, sensitivities)
 
 
 def prediction_errors_of(predictor: Predictor) -> dict[str, float]:
@@ -181,9 +122,10 @@ def prediction_errors_of(predictor: Predictor) -> dict[str, float]:
     return largest
 
 
-def supports_nuisance(predictor: Predictor, kind: str) -> bool:
-    """Whether a predictor knows an explicit nuisance: it names those it does in `nuisances`."""
-    return kind in getattr(predictor, "nuisances", ())
+def supports_nuisance(predictor: Predictor, key: str) -> bool:
+    """Whether a predictor knows an explicit nuisance: it names those it does in `nuisances`; some all can follow."""
+    kind = kind_and_start(key)[0]
+    return kind in TRANSFORMING_NUISANCES or kind in getattr(predictor, "nuisances", ())
 
 
 def predicts_rupture(predictor: Predictor, history: History) -> bool:
@@ -272,8 +214,11 @@ RELATIVE_STEP = 1e-4
 """Of internal parameters (ln of a coefficient, an exponent), relative to the larger of their size and one."""
 
 
-NUISANCE_STEPS = {"thickness": 1e-3, "window": 1e-2, "modulus": 1e-3, "temperature": 0.1}
-"""mm, mm, relative, K: far above what the error of a solver's steps is, and bending outputs by under 1e-6 of them."""
+NUISANCE_STEPS = {
+    **{"thickness": 1e-3, "window": 1e-2, "modulus": 1e-3, "temperature": 0.1},
+    **{"temperature step": 1.0, "temperature drift": 1.0, "rate step": 0.02, "rate drift": 0.02, "load step": 5e-3},
+}
+"""mm, mm, relative, K, K, K, ln, ln, relative: of central differences, well above the error of a solver's steps."""
 
 
 def predict_with_sensitivities(
@@ -289,7 +234,7 @@ def predict_with_sensitivities(
     if not (numeric or kinds):
         return prediction
     steps = RELATIVE_STEP * np.maximum(np.abs(theta), 1.0) if numeric else np.zeros(0)
-    nuisance_steps = [NUISANCE_STEPS[kind] for kind in kinds]
+    nuisance_steps = [NUISANCE_STEPS[kind_and_start(key)[0]] for key in kinds]
     points, shifted_nuisances = _difference_points(theta, steps, nuisances, kinds, nuisance_steps)
     batch = predict(predictor, law, points, histories, nuisances=shifted_nuisances)
     count = len(points) // 2
@@ -312,7 +257,7 @@ def _difference_points(
     count = steps.size + len(kinds)
     points = np.tile(theta, (2 * count, 1))
     for sign, offset in ((1.0, 0), (-1.0, count)):
-        points[offset : offset + steps.size] += sign * np.diag(steps)
+        points[offset : offset + steps.size] += sign * np.eye(steps.size, theta.size) * steps[:, None]
     shifted_nuisances = {kind: np.tile(values, (2 * count, 1)) for kind, values in nuisances.items()}
     for k, kind in enumerate(kinds):
         shifted_nuisances[kind][steps.size + k] += nuisance_steps[k]

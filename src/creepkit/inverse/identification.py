@@ -246,19 +246,21 @@ class Identification(Presentable):
     def nuisance_values(
         self, histories: Sequence[History], *, own_nuisances: bool = True, using: Predictor | None = None
     ) -> dict[str, Floats]:
-        """{kind: (1, tests)} explicit nuisances of histories, as predictors take them."""
-        estimates = {(n.kind, n.owner): n.value for n in self.nuisances if own_nuisances or n.scope != "test"}
+        """{key: (1, tests)} explicit nuisances of histories, as predictors take them."""
+        estimates = {(n.key, n.owner): n.value for n in self.nuisances if own_nuisances or n.scope != "test"}
         using = using or self.predictor
 
         def of(n: Nuisance, history: History) -> float:
-            known = estimates.get((n.kind, owner_of(n, history)))
+            if not n.applies_to(history.name):
+                return 0.0
+            known = estimates.get((n.key, owner_of(n, history)))
             return known if known is not None else n.mean if using is None else prior_mean(n, history, using)
 
-        return {
-            n.kind: np.array([[of(n, h) for h in histories]])
-            for n in self.settings.nuisances
-            if n.kind in SIMULATED_NUISANCES
-        }
+        values: dict[str, Floats] = {}
+        for n in self.settings.nuisances:
+            if n.kind in SIMULATED_NUISANCES:  # groups of tests with a nuisance each: zero where it is another's
+                values[n.key] = values.get(n.key, 0.0) + np.array([[of(n, h) for h in histories]])
+        return values
 
     def with_histories(
         self, histories: Sequence[History], using: Predictor | str | Mapping[str, Predictor | str] | None = None

@@ -26,7 +26,7 @@ from creepkit.records import Nuisance
 
 IDENTIFICATION = DocumentFormat(
     "creepkit-identification",
-    5,
+    6,
     FileKind("an identification", FitError, "give a file that Identification.save wrote"),
     remedy="identify again",
 )

@@ -13,6 +13,7 @@ from creepkit import registry
 from creepkit.inverse.goodness_of_fit import TestFit
 from creepkit.inverse.iterative_estimation import EstimationResult
 from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS
+from creepkit.inverse.nuisance_correlation import nuisance_correlation_notes
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate
 from creepkit.inverse.observation_vector import usable_frames
 from creepkit.inverse.prediction_failures import tests_without_prediction
@@ -106,6 +107,7 @@ def identification_notes(
         note = likelihood_note if settings.weights == "likelihood" else assumption_note
         sentences.append(f"fewer than {MINIMUM_TESTS} tests: {note}")
     sentences += _large_strain_notes(histories)
+    sentences += nuisance_correlation_notes(problem, estimation.residuals)
     if (problem.bound_penalties.constraint_violations(estimation.minimum.x[: problem.parameter_count]) > 1e-3).any():
         sentences.append("a constraint of the law does not hold over the tests at these values")
     return (*sentences, *_test_notes(problem, tests, nuisances))
@@ -151,5 +153,5 @@ def _test_notes(
     nuisance_parameters = problem.nuisance_parameters
     for n, low, high in zip(nuisances, nuisance_parameters.low, nuisance_parameters.high, strict=True):
         if min(n.value - low, high - n.value) < 1e-4 * (high - low):
-            sentences.append(f"the {n.kind} of '{n.owner}' lies at its bound, {n.value:.4g}")
+            sentences.append(f"the {n.key} of '{n.owner}' lies at its bound, {n.value:.4g}")
     return sentences

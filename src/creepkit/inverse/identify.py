@@ -208,7 +208,7 @@ def _best_estimate(
     The predictor is corrected where the last estimate begins: at an end of its own, or near one that is known.
     """
     working_estimator = _working_estimator(problem)
-    known_values = {(n.kind, n.owner): n.value for n in start.nuisances}
+    known_values = {(n.key, n.owner): n.value for n in start.nuisances}
     starts = [starting_point(problem.nuisance_parameters, u, known_values) for u in search_outcome.starts]
     problem = replace(problem, loss=problem.settings.loss)
     limits, working_noise = IterationLimits(), None
@@ -344,7 +344,7 @@ def _uncertainty(
 
 def _nuisance_estimates(nuisance_parameters: NuisanceParameters, e: Floats, sd: Floats) -> tuple[NuisanceEstimate, ...]:
     return tuple(
-        NuisanceEstimate(n.kind, n.scope, member, float(value), float(s), float(mean), float(prior_sd))
+        NuisanceEstimate(n.kind, n.scope, member, float(value), float(s), float(mean), float(prior_sd), n.start)
         for n, member, value, s, mean, prior_sd in zip(
             nuisance_parameters.nuisances,
             nuisance_parameters.owners,

@@ -198,6 +198,6 @@ def _with_prior_sd(nuisance_parameters: NuisanceParameters, normal_matrix: Float
 def starting_point(
     nuisance_parameters: NuisanceParameters, u: Floats, known_values: Mapping[tuple[str, str], float]
 ) -> Floats:
-    """(unknowns,) x = (u, e), from u (parameters,); e is as known, {(kind, owner): value}, or at the prior means."""
+    """(unknowns,) x = (u, e), from u (parameters,); e is as known, {(key, owner): value}, or at the prior means."""
     parameters = zip(nuisance_parameters.nuisances, nuisance_parameters.owners, nuisance_parameters.mean, strict=True)
-    return np.concatenate([u, [known_values.get((n.kind, member), float(mean)) for n, member, mean in parameters]])
+    return np.concatenate([u, [known_values.get((n.key, member), float(mean)) for n, member, mean in parameters]])

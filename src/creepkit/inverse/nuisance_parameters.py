@@ -1,6 +1,7 @@
 """Explicit nuisance parameters of tests, estimated beside the parameters of the law under Gaussian priors.
 
-Each is of one test, of one alloy or of all tests: thickness, window, modulus, temperature.
+Each is of one test, of one alloy, or of all tests or a group of them: thickness, window, modulus, temperature, and what
+the rig did during the tests (steps and drifts of temperature, rate and load).
 """
 
 from __future__ import annotations
@@ -11,16 +12,34 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import FitError
+from creepkit.errors import FitError, nearest
 from creepkit.inverse.composite_predictor import predictor_for, supports_nuisance
 from creepkit.inverse.noise_model import Residuals
-from creepkit.records import LENGTH_NUISANCES, SIMULATED_NUISANCES, History, Nuisance, Predictor
+from creepkit.language import CreepLaw, temperature
+from creepkit.records import (
+    LENGTH_NUISANCES,
+    SCALABLE_LOADS,
+    SIMULATED_NUISANCES,
+    STEP_NUISANCES,
+    History,
+    Nuisance,
+    Predictor,
+    drift_duration,
+    nuisance_key,
+)
 
-INITIAL_PRIOR_SD = {"thickness": 0.03, "window": 0.3, "modulus": 0.05, "temperature": 5.0}
-"""Where the estimate of a prior standard deviation begins: mm, mm, relative, K."""
+INITIAL_PRIOR_SD = {
+    **{"thickness": 0.03, "window": 0.3, "modulus": 0.05, "temperature": 5.0},
+    **{"temperature step": 10.0, "temperature drift": 5.0, "rate step": 0.3, "rate drift": 0.3, "load step": 0.05},
+}
+"""Where the estimate of a prior standard deviation begins: mm, mm, relative, K, K, K, ln, ln, relative."""
 
 
-LIMITS = {"thickness": (0.3, 3.0), "window": (0.3, 3.0), "modulus": (-0.7, 2.0), "temperature": (-150.0, 150.0)}
+LIMITS = {
+    **{"thickness": (0.3, 3.0), "window": (0.3, 3.0), "modulus": (-0.7, 2.0), "temperature": (-150.0, 150.0)},
+    **{"temperature step": (-150.0, 150.0), "temperature drift": (-150.0, 150.0), "load step": (-0.7, 2.0)},
+    **{"rate step": (-5.0, 5.0), "rate drift": (-5.0, 5.0)},
+}
 """Limits of nuisance parameters; thickness and window as multiples of their mean."""
 
 
@@ -51,25 +70,30 @@ class NuisanceParameters:
     def from_histories(
         cls, nuisances: Sequence[Nuisance], histories: Sequence[History], predictor: Predictor
     ) -> NuisanceParameters:
-        """One for each test, alloy or all tests whose predictor knows the kind."""
+        """One for each test, alloy, group or all tests that it applies to and whose predictor knows the kind."""
         parameters: list[tuple[Nuisance, str]] = []
         test_index: dict[str, Ints] = {}
         for nuisance in (n for n in nuisances if n.kind in SIMULATED_NUISANCES):
-            offered = [supports_nuisance(predictor_for(predictor, h), nuisance.kind) for h in histories]
-            if not any(offered):
+            offered = [_takes_effect(nuisance, h, predictor) for h in histories]
+            named = any(nuisance.applies_to(h.name) for h in histories)
+            if named and not any(offered):
                 raise FitError(
-                    f"nuisance '{nuisance.kind}' means nothing to the predictor of these histories; leave it out"
+                    f"nuisance '{nuisance.key}' means nothing to the predictor of these histories; leave it out"
                 )
             owners_of_tests = [owner_of(nuisance, h) for h in histories]
             distinct_owners = list(dict.fromkeys(m for m, k in zip(owners_of_tests, offered, strict=True) if k))
             first = len(parameters)
-            test_index[nuisance.kind] = np.array(
-                [first + distinct_owners.index(m) if k else -1 for m, k in zip(owners_of_tests, offered, strict=True)],
-                np.int64,
-            )
-            if nuisance.sd is None and len(distinct_owners) < 2:
+            index = test_index.setdefault(nuisance.key, np.full(len(histories), -1, np.int64))
+            for test in map(int, np.flatnonzero(offered)):
+                if index[test] >= 0:
+                    raise FitError(
+                        f"test '{histories[test].name}' has the nuisance '{nuisance.key}' twice; let tests= of one of "
+                        "them leave it out"
+                    )
+                index[test] = first + distinct_owners.index(owners_of_tests[test])
+            if named and nuisance.sd is None and len(distinct_owners) < 2:
                 raise FitError(
-                    f"nuisance '{nuisance.kind}': a standard deviation cannot be estimated from a single value; "
+                    f"nuisance '{nuisance.key}': a standard deviation cannot be estimated from a single value; "
                     "give its sd="
                 )
             parameters += [(nuisance, member) for member in distinct_owners]
@@ -97,20 +121,20 @@ class NuisanceParameters:
         return 1.0 / self.sd[: self.size] ** 2
 
     def predictor_values(self, e: Floats) -> dict[str, Floats]:
-        """{kind: (1, tests)} as predictors take them, from e (nuisances,), in the unit of the kind."""
-        values = self.mean if self.fixed else e
-        return {kind: values[np.maximum(index, 0)][None] for kind, index in self.test_index.items()}
+        """{key: (1, tests)} as predictors take them, from e (nuisances,), in the unit of the kind; 0 where none is."""
+        values = np.append(self.mean if self.fixed else e, 0.0)
+        return {key: values[index][None] for key, index in self.test_index.items()}
 
     def jacobian(self, sensitivities: Mapping[str, Floats]) -> Floats:
         """(tests, observations, nuisances) derivatives.
 
-        sensitivities : {kind: (tests, observations)} to each test's own nuisance.
+        sensitivities : {key: (tests, observations)} to each test's own nuisance.
         """
         jacobian_matrix = np.zeros((*next(iter(sensitivities.values())).shape, self.size))
-        for kind, index in self.test_index.items():
+        for key, index in self.test_index.items():
             for test, position in enumerate(index):
                 if position >= 0:
-                    jacobian_matrix[test, :, position] = sensitivities[kind][test]
+                    jacobian_matrix[test, :, position] = sensitivities[key][test]
         return jacobian_matrix
 
     def integrate_out(self, residuals: Residuals, e: Floats) -> Residuals:
@@ -137,9 +161,43 @@ class NuisanceParameters:
         return replace(self, sd=sd)
 
 
+def _takes_effect(nuisance: Nuisance, history: History, predictor: Predictor) -> bool:
+    """Whether a nuisance applies to a test, its predictor knows it, and it begins before the last used frame."""
+    if not nuisance.applies_to(history.name) or not supports_nuisance(predictor_for(predictor, history), nuisance.kind):
+        return False
+    if nuisance.kind == "load step" and history.loading.quantity not in SCALABLE_LOADS:
+        return False
+    return nuisance.kind not in STEP_NUISANCES or nuisance.start < drift_duration(history)
+
+
 def owner_of(nuisance: Nuisance, history: History) -> str:
-    """Whose nuisance parameter a history has: the test, its alloy, or "all"."""
-    return {"test": history.name, "alloy": history.alloy, "all": "all"}[nuisance.scope]
+    """Whose nuisance parameter a history has: the test, its alloy, "all", or the group of tests that it names."""
+    return {"test": history.name, "alloy": history.alloy, "all": _group(nuisance.tests)}[nuisance.scope]
+
+
+def _group(tests: tuple[str, ...]) -> str:
+    if not tests:
+        return "all"
+    return tests[0] if len(tests) == 1 else f"{tests[0]} and {len(tests) - 1} more"
+
+
+def check_nuisance_tests(nuisances: Sequence[Nuisance], names: Sequence[str]) -> None:
+    """FitError for a nuisance of a test that is not among those of these names."""
+    for nuisance in nuisances:
+        for test in nuisance.tests:
+            if test not in names:
+                raise FitError(f"nuisance '{nuisance.key}': there is no test '{test}'; {nearest(test, names)}")
+
+
+def check_nuisance_law(nuisances: Sequence[Nuisance], law: CreepLaw) -> None:
+    """FitError where the temperature changes during a test and the law does not know it."""
+    for kind in (n.kind for n in nuisances):
+        if kind in ("temperature step", "temperature drift") and not law.uses(temperature):
+            like = kind.replace("temperature", "rate")
+            raise FitError(
+                f"law '{law.name}' has no temperature and cannot follow a {kind}; take a '{like}', or give the law "
+                "one, such as law.times(arrhenius(T_ref=1073))"
+            )
 
 
 def prior_mean(nuisance: Nuisance, history: History | None, using: Predictor) -> float:
@@ -169,8 +227,9 @@ def _bounds_of(nuisance: Nuisance, mean: float) -> tuple[float, float]:
 class NuisanceEstimate:
     """The estimate of one explicit nuisance of one test, alloy or all tests.
 
-    owner : name of the test or alloy, or "all". value, sd : estimate and its standard deviation, in the kind's unit.
-    prior_mean, prior_sd : of the prior, the latter as it was given or estimated.
+    owner : name of the test or alloy, "all", or the group of tests. value, sd : estimate and its standard deviation,
+    in the kind's unit. prior_mean, prior_sd : of the prior, the latter as it was given or estimated. start : s, of a
+    step.
     """
 
     kind: str
@@ -180,3 +239,9 @@ class NuisanceEstimate:
     sd: float
     prior_mean: float
     prior_sd: float
+    start: float = 0.0
+
+    @property
+    def key(self) -> str:
+        """The kind, of a step with its start; as Nuisance.key."""
+        return nuisance_key(self.kind, self.start)

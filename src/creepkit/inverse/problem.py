@@ -31,7 +31,7 @@ from creepkit.inverse.composite_predictor import (
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.history_checks import check_creep, check_explicit_nuisances, check_histories
 from creepkit.inverse.noise_model import Residuals, cholesky_factors, whiten
-from creepkit.inverse.nuisance_parameters import NuisanceParameters
+from creepkit.inverse.nuisance_parameters import NuisanceParameters, check_nuisance_law
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history
 from creepkit.inverse.prediction_failures import PredictionFailures
 from creepkit.inverse.reference_conditions import ReferencePoint, median_log_inverse_duration, median_log_strain_rate
@@ -132,6 +132,7 @@ class LeastSquaresProblem:
         tests = [thinned_history(h, settings.frames) for h in histories]
         coordinates = Coordinates(law, reference or ReferencePoint.from_histories(tests, predictor))
         observations = ObservationVector.from_histories(tests, predictor, histories)
+        check_nuisance_law(settings.nuisances, law)
         nuisances = NuisanceParameters.from_histories(settings.nuisances, tests, predictor)
         check_creep(observations, tests)
         check_explicit_nuisances([n.kind for n in nuisances.nuisances], observations, tests, predictor)

@@ -5,15 +5,20 @@ Their defaults stand here alone: Python and the command line, identify, select, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
-from creepkit.errors import FitError
+from creepkit.errors import FitError, nearest
 from creepkit.records import LENGTH_NUISANCES, SIMULATED_NUISANCES, Nuisance
+
+GROUPED_NUISANCES = tuple(kind for kind in SIMULATED_NUISANCES if kind not in LENGTH_NUISANCES)
+"""Kinds that some tests may have and others not: deviations, which are zero elsewhere."""
+
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
 
@@ -85,10 +90,28 @@ class IdentificationSettings:
             )
         for nuisance in self.nuisances:
             _check_nuisance(nuisance)
-        kinds = [(n.kind, n.output) for n in self.nuisances]
-        for kind, output in kinds:
-            if kinds.count((kind, output)) > 1:
-                raise FitError(f"nuisance '{kind}' is given twice; give one, with the scope that matters most")
+        for first, second in combinations(self.nuisances, 2):
+            same = (first.key, first.output) == (second.key, second.output)
+            disjoint = first.tests and second.tests and not {*first.tests} & {*second.tests}
+            if same and not disjoint:
+                raise FitError(
+                    f"nuisance '{first.key}' is given twice; give one, with the scope that matters most, or name the "
+                    "tests of each by tests="
+                )
+
+
+def default_nuisances(*further: Nuisance, without: Sequence[str] = ()) -> tuple[Nuisance, ...]:
+    """The default nuisances of an identification and `further` ones: what the command line makes of --nuisance.
+
+    A further nuisance of a default kind replaces it. without : kinds of the defaults to leave out, such as ["rate"].
+    """
+    usual = IdentificationSettings().nuisances
+    known = [n.kind for n in usual]
+    for kind in without:
+        if kind not in known:
+            raise FitError(f"'{kind}' is no default nuisance that could be left out; {nearest(kind, known)}")
+    replaced = {*without, *(n.kind for n in further)}
+    return (*(n for n in usual if n.kind not in replaced), *further)
 
 
 def _check_weights(weights: OutputWeights) -> None:
@@ -109,6 +132,8 @@ def _check_nuisance(nuisance: Nuisance) -> None:
     n, finite = nuisance, nuisance.sd is None or np.isfinite(nuisance.sd)
     if n.output and n.kind != "offset":
         raise FitError(f"nuisance '{n.kind}' acts on a whole test: it has no output, found output='{n.output}'")
+    if n.tests and n.kind not in GROUPED_NUISANCES:
+        raise FitError(f"nuisance '{n.kind}' belongs to every test; leave out tests=, which deviations alone can have")
     if n.kind not in SIMULATED_NUISANCES:
         if n.mean != 0 or np.isfinite(n.bounds).any() or n.scope != "test" or not finite:
             raise FitError(

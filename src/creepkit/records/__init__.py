@@ -23,14 +23,20 @@ from creepkit.records.loading import (
     constant_strain,
     constant_stress,
 )
+from creepkit.records.nuisance_programs import SCALABLE_LOADS, STEP_DURATION, drift_duration, with_program_nuisances
 from creepkit.records.prediction import (
     LENGTH_NUISANCES,
+    PROGRAM_NUISANCES,
+    RATE_NUISANCES,
     SIMULATED_NUISANCES,
+    STEP_NUISANCES,
     Nuisance,
     NuisanceValues,
     Prediction,
     Status,
     TimesToStrain,
+    kind_and_start,
+    nuisance_key,
 )
 from creepkit.records.prediction_assembly import (
     HistoryPrediction,
@@ -43,7 +49,12 @@ from creepkit.records.prediction_assembly import (
 __all__ = [
     "EVERY_FRAME",
     "LENGTH_NUISANCES",
+    "PROGRAM_NUISANCES",
+    "RATE_NUISANCES",
+    "SCALABLE_LOADS",
     "SIMULATED_NUISANCES",
+    "STEP_DURATION",
+    "STEP_NUISANCES",
     "TENSOR_COMPONENTS",
     "ZERO_CELSIUS",
     "Exporter",
@@ -74,6 +85,10 @@ __all__ = [
     "check_nuisances",
     "constant_strain",
     "constant_stress",
+    "drift_duration",
+    "kind_and_start",
+    "nuisance_key",
     "output_unit",
     "unpredicted",
+    "with_program_nuisances",
 ]

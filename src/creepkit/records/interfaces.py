@@ -71,6 +71,8 @@ class Predictor(Protocol):
 
     Optional attributes, looked for by name: `outputs`, the names of what is predicted, first the one that grows with
     creep; `nuisances`, the kinds of explicit nuisances that predict() understands (none without it);
+    `program_nuisances`, those of PROGRAM_NUISANCES that predict() takes and differentiates itself (without it they
+    become other programs of the histories);
     `reference_stress(history)`, the von Mises stress, MPa, that stands for the test (a number, or one for each level
     of its loading); `reduced_order_model()` and `refined()`, see SupportsReducedOrderModel and SupportsRefinement;
     `specimen`, that a surrogate stands for; `outside_class(law)`, why it does not know the class of a law, in a
@@ -90,7 +92,7 @@ class Predictor(Protocol):
 
         theta : (candidates, parameters) internal values in the order of law.names, see CreepLaw.to_internal: the
             natural logarithm where the scale is log, -inf for a coefficient that is off.
-        nuisances : {kind: (candidates or 1, tests)} of what differs from test to test, measured as Nuisance says. A
+        nuisances : {key: (candidates or 1, tests)} of what differs from test to test, measured as Nuisance says. A
             kind that the predictor does not know is a SolveError.
         sensitivities : whether the prediction has its derivatives with respect to theta, in `jacobian`, and to the
             kinds of nuisances given, in `nuisance_jacobian`.

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.errors import SolveError
+from creepkit.errors import SolveError, nearest
 
 NuisanceValues: TypeAlias = Mapping[str, Floats]
-"""{kind: (candidates or 1, tests)}: the value of an explicit nuisance in each test."""
+"""{key: (candidates or 1, tests)}: the value of an explicit nuisance in each test; the key is its kind, of a step with
+its start (see Nuisance.key)."""
 
 
 class Status(IntEnum):
@@ -77,8 +78,8 @@ class Prediction:
     status : (candidates, tests) Status of each row; end_times : (candidates, tests) s, where it ended.
     jacobian : (candidates, tests, times, outputs, parameters) or None: derivatives with respect to the law's
         *internal* parameters (the natural logarithm where the scale is log), in the law's order.
-    nuisance_jacobian : {kind: (candidates, tests, times, outputs)}: derivatives with respect to each test's own
-        nuisance, in the unit of that kind (see Nuisance); without the kinds that the predictor cannot differentiate.
+    nuisance_jacobian : {key: (candidates, tests, times, outputs)}: derivatives with respect to each test's own
+        nuisance, in the unit of its kind (see Nuisance); without those that the predictor cannot differentiate.
     times_to_strain : when measured strains and rupture are reached, where that was asked for (see TimesToStrain).
     reason : why nothing is predicted, in a sentence, where a predictor refuses the law.
     """
@@ -99,10 +100,41 @@ class Prediction:
         return np.asarray(self.values[candidate, test, : int(self.lengths[test])])
 
 
-NuisanceKind: TypeAlias = Literal["offset", "rate", "thickness", "modulus", "temperature", "window"]
+NuisanceKind: TypeAlias = Literal[
+    "offset",
+    "rate",
+    "thickness",
+    "modulus",
+    "temperature",
+    "window",
+    "temperature step",
+    "temperature drift",
+    "rate step",
+    "rate drift",
+    "load step",
+]
 
 
-SIMULATED_NUISANCES: tuple[NuisanceKind, ...] = ("thickness", "modulus", "temperature", "window")
+PROGRAM_NUISANCES: tuple[NuisanceKind, ...] = ("temperature step", "temperature drift", "load step")
+"""Kinds that change the programs of a history: every predictor follows them (see nuisance_programs)."""
+
+
+RATE_NUISANCES: tuple[NuisanceKind, ...] = ("rate step", "rate drift")
+"""Kinds that multiply every rate of the law by a function of time: every predictor that takes any law follows them."""
+
+
+STEP_NUISANCES: tuple[NuisanceKind, ...] = ("temperature step", "rate step", "load step")
+"""Kinds that begin at a time of the test."""
+
+
+SIMULATED_NUISANCES: tuple[NuisanceKind, ...] = (
+    "thickness",
+    "modulus",
+    "temperature",
+    "window",
+    *PROGRAM_NUISANCES,
+    *RATE_NUISANCES,
+)
 """Kinds that change the simulation; "offset" and "rate" only enter the covariance of its residuals."""
 
 
@@ -117,7 +149,10 @@ class Nuisance:
     kind : "offset" (added to an output, in its unit), "rate" (ln of a factor on this test's creep rate: heat-to-heat
         scatter), "thickness" (the apex thickness itself, mm), "window" (the radius within which the profile was
         observed, mm), "modulus" (relative change of Young's modulus: 0.05 makes it 5 % stiffer) or "temperature"
-        (K above what the history says).
+        (K above what the history says). What the rig did during the test: "temperature step" (K, from `start` on),
+        "temperature drift" (K gained linearly from the start of the test to its last used frame), "rate step" (ln of a
+        factor on every rate of the law, from `start` on), "rate drift" (such a factor's ln, gained linearly over the
+        test) or "load step" (relative change of stress or pressure, from `start` on).
     scope : one nuisance parameter for each "test", each "alloy", or for "all" tests together.
     output : to which output an offset belongs; "" stands for each output having its own.
     mean, sd : Gaussian prior, in the unit of the kind; sd = inf leaves it free, sd = None lets the fit estimate the
@@ -125,6 +160,9 @@ class Nuisance:
         sd=0.027)` says what was measured on such plates and replaces what histories and specimen say; without a mean
         a test's thickness is about what its history (or the specimen) says.
     bounds : hard limits, in the same unit.
+    start : s, when a step begins.
+    tests : names of the tests that it applies to; () stands for all. The other tests have a deviation of zero, or one
+        of their own by another nuisance of this kind: two groups of tests, each with scope "all".
     """
 
     kind: NuisanceKind
@@ -133,9 +171,48 @@ class Nuisance:
     mean: float = 0.0
     sd: float | None = None
     bounds: tuple[float, float] = (-np.inf, np.inf)
+    start: float = 0.0
+    tests: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if self.kind not in get_args(NuisanceKind):
+            raise SolveError(f"nuisance '{self.kind}' is not known; {nearest(self.kind, get_args(NuisanceKind))}")
+        if self.scope not in (scopes := ("test", "alloy", "all")):
+            raise SolveError(
+                f"nuisance '{self.kind}': scope '{self.scope}' is not known; {nearest(self.scope, scopes)}"
+            )
         if self.sd is not None and not self.sd > 0:
             raise SolveError(f"nuisance '{self.kind}': sd = {self.sd} must be above zero (or None to estimate it)")
         if not self.bounds[0] < self.bounds[1]:
             raise SolveError(f"nuisance '{self.kind}': bounds {self.bounds} are reversed")
+        if self.kind in STEP_NUISANCES and not 0.0 < self.start < np.inf:
+            raise SolveError(
+                f"nuisance '{self.kind}': start is {self.start:g} s; say when it begins, such as start=3600.0"
+            )
+        if self.kind not in STEP_NUISANCES and self.start != 0.0:
+            raise SolveError(f"nuisance '{self.kind}' has no start; only {', '.join(STEP_NUISANCES)} begin later")
+        names: object = self.tests
+        if isinstance(names, str):
+            raise SolveError(f"nuisance '{self.kind}': tests is '{self.tests}'; give names, such as ('{self.tests}',)")
+        object.__setattr__(self, "start", float(self.start))
+        object.__setattr__(self, "tests", tuple(self.tests))
+
+    @property
+    def key(self) -> str:
+        """What values and derivatives are filed under: the kind, of a step with its start, 'rate step@3600'."""
+        return nuisance_key(self.kind, self.start)
+
+    def applies_to(self, test: str) -> bool:
+        """Whether a test, by name, has this nuisance."""
+        return not self.tests or test in self.tests
+
+
+def nuisance_key(kind: str, start: float = 0.0) -> str:
+    """The key of a kind, of a step with its start in s."""
+    return f"{kind}@{start:.15g}" if kind in STEP_NUISANCES else kind
+
+
+def kind_and_start(key: str) -> tuple[str, float]:
+    """The kind, and the start in s (0 but for a step), of a key that `nuisance_key` made."""
+    kind, _, start = key.partition("@")
+    return kind, float(start or 0.0)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
 from creepkit.language.printing import expression_text, state_equations
+from creepkit.records import kind_and_start
 
 if TYPE_CHECKING:
     from creepkit.inverse.confirmation import Confirmation, ConfirmedOutput
@@ -23,7 +24,10 @@ LISTED_RUPTURES = 15
 """With more tests than this their rupture times are summed up alone."""
 
 
-UNITS = {"amplitude": "mm", "width": "mm", "thickness": "mm", "window": "mm", "temperature": "K"}
+UNITS = {
+    **{"amplitude": "mm", "width": "mm", "thickness": "mm", "window": "mm"},
+    **{"temperature": "K", "temperature step": "K", "temperature drift": "K"},
+}
 
 
 def identification_text(fit: Identification) -> str:
@@ -145,8 +149,8 @@ def _linear_outputs(fit: Identification) -> list[str]:
 def _table(fit: Identification) -> list[str]:
     """One line a test: its error, its offset and weight, and what was found of its nuisances."""
     linear_output_tests = [m for m in fit.tests if m.outputs and m.outputs[0].output != "strain"]
-    estimates_by_owner = {(n.kind, n.owner): n for n in fit.nuisances if n.scope == "test"}
-    kinds = list(dict.fromkeys(n.kind for n in fit.nuisances if n.scope == "test"))
+    estimates_by_owner = {(n.key, n.owner): n for n in fit.nuisances if n.scope == "test"}
+    kinds = list(dict.fromkeys(n.key for n in fit.nuisances if n.scope == "test"))
     if not (linear_output_tests or kinds):
         return _shared_nuisances(fit)
     width = max(len(m.name) for m in fit.tests)
@@ -167,14 +171,16 @@ def _table(fit: Identification) -> list[str]:
 def _shared_nuisances(fit: Identification) -> list[str]:
     """Nuisances that tests share, and spreads that were estimated."""
     lines = [
-        f"  {n.kind} of {n.owner or 'one alloy'}{_unit(n.kind)}: {_plus_minus(n)}"
+        f"  {n.key} of {n.owner or 'one alloy'}{_unit(n.key)}: {_plus_minus(n)}"
         for n in fit.nuisances
         if n.scope != "test"
     ]
     for nuisance in fit.settings.nuisances:
-        prior_sds = [n.prior_sd for n in fit.nuisances if n.kind == nuisance.kind]
+        prior_sds = [
+            n.prior_sd for n in fit.nuisances if n.key == nuisance.key and n.owner in (nuisance.tests or [n.owner])
+        ]
         if nuisance.sd is None and prior_sds:
-            lines.append(f"  {nuisance.kind}: spread estimated as {prior_sds[0]:.3g}{_unit(nuisance.kind)}")
+            lines.append(f"  {nuisance.key}: spread estimated as {prior_sds[0]:.3g}{_unit(nuisance.key)}")
     return lines
 
 
@@ -182,7 +188,8 @@ def _plus_minus(n: NuisanceEstimate) -> str:
     return f"{n.value:.4g} +- {n.sd:.2g}"
 
 
-def _unit(kind: str) -> str:
+def _unit(key: str) -> str:
+    kind = kind_and_start(key)[0]
     return f", {UNITS[kind]}" if kind in UNITS else ""
 
 

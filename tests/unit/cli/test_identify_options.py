@@ -1,9 +1,12 @@
 """Options of `creepkit identify`, from text."""
 
+from dataclasses import replace
+
 import pytest
 
 from creepkit.cli.options import parse_nuisances, parse_weights
 from creepkit.errors import FitError
+from creepkit.inverse.settings import default_nuisances
 from creepkit.records import Nuisance
 
 
@@ -19,14 +22,35 @@ def test_weights():
 
 def test_nuisances_are_added_to_the_usual_two():
     assert parse_nuisances(None) is None
-    usual = [Nuisance("offset"), Nuisance("rate")]
-    assert parse_nuisances(["thickness=0.4935:0.027"]) == [*usual, Nuisance("thickness", mean=0.4935, sd=0.027)]
-    assert parse_nuisances(["temperature", "rate=0:0.2"]) == [
-        usual[0],
-        Nuisance("temperature"),
-        Nuisance("rate", sd=0.2),
-    ]
-    with pytest.raises(FitError, match="'width' is not known; allowed are offset, rate, thickness"):
-        parse_nuisances(["width=3"])
-    with pytest.raises(FitError, match="'thin' is not MEAN or MEAN:SD"):
+    offset, rate = Nuisance("offset"), Nuisance("rate")
+    thickness = Nuisance("thickness", mean=0.4935, sd=0.027)
+    assert parse_nuisances(["thickness=0.4935:0.027"]) == default_nuisances(thickness) == (offset, rate, thickness)
+    assert parse_nuisances(["temperature", "rate=0:0.2"]) == (offset, Nuisance("temperature"), Nuisance("rate", sd=0.2))
+    assert parse_nuisances(["thickness=0.4935:0.027", "rate=none"]) == (offset, thickness)
+    assert parse_nuisances(["rate=none", "offset=none"]) == ()
+
+
+def test_steps_have_a_start_and_tests():
+    step = Nuisance("temperature step", sd=30.0, start=8250.0)
+    for text, scope, tests in (
+        ("", "test", ()),
+        (" for all", "all", ()),
+        (" for alloy", "alloy", ()),
+        (" for test_09, test_11", "all", ("test_09", "test_11")),
+    ):
+        assert parse_nuisances([f"temperature step=0:30@8250{text}"])[-1] == replace(step, scope=scope, tests=tests)
+
+
+def test_nuisances_that_cannot_be_read_are_refused():
+    with pytest.raises(FitError, match="--nuisance zero=3: nuisance 'zero' is not known; known: load step, modulus"):
+        parse_nuisances(["zero=3"])
+    with pytest.raises(FitError, match="nuisance 'thicknes' is not known; did you mean 'thickness'"):
+        parse_nuisances(["thicknes=0.5"])
+    with pytest.raises(FitError, match="'rat' is no default nuisance that could be left out; did you mean 'rate'"):
+        parse_nuisances(["rat=none"])
+    with pytest.raises(FitError, match="--nuisance thickness=thin: write KIND"):
         parse_nuisances(["thickness=thin"])
+    with pytest.raises(FitError, match="--nuisance rate step=0:1: nuisance 'rate step': start is 0 s; say when"):
+        parse_nuisances(["rate step=0:1"])
+    with pytest.raises(FitError, match="must be finite numbers"):
+        parse_nuisances(["temperature=nan"])

@@ -21,6 +21,7 @@ from creepkit.fem.mesh import GeometryDerivative, geometry_derivative
 from creepkit.fem.simulation import LoadHistory, Simulation, SurfaceSensitivities, sensitivities, simulate
 from creepkit.fem.step_record import SolverSettings
 from creepkit.records import (
+    PROGRAM_NUISANCES,
     History,
     HistoryPrediction,
     NuisanceValues,
@@ -30,6 +31,8 @@ from creepkit.records import (
     assemble_prediction,
     broadcast_candidates,
     check_nuisances,
+    kind_and_start,
+    with_program_nuisances,
 )
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import OBSERVED, Observation
@@ -64,8 +67,8 @@ class BulgeSetup:
 
 
 def set_up_test(specimen: BulgeSettings, history: History, nuisances: Mapping[str, float]) -> BulgeSetup:
-    """Prepare one test; nuisances : {kind: value} of its explicit nuisances."""
-    where = history.origin
+    """Prepare one test; nuisances : {key: value} of its explicit nuisances."""
+    history, where = with_program_nuisances(history, nuisances), history.origin
     if history.loading.quantity != "pressure":
         raise SolveError(
             f"{where}: a bulge specimen is loaded by pressure, found {history.loading.quantity}; use PressureJump"
@@ -151,16 +154,19 @@ def output_sensitivities(
     simulation: Simulation,
     profiles: Floats,
     names: Sequence[str],
+    programs: Mapping[str, Floats] | None = None,
 ) -> tuple[Floats, BulgeSensitivities]:
     """Outputs (times, 3) and their derivatives.
 
     theta : (parameters,) internal values. profiles : (times, nodes) mm, displacements of the top.
     names : "modulus" (relative), "temperature" (K), "thickness" (mm) and any length of the dimple, "window" (mm), and
-        the numbers of the loading, such as P1, P2 and Tj.
+        the numbers of the loading, such as P1, P2 and Tj. programs : {name: (segments, 10)} derivatives of the
+        segments of the load history, of further names.
     """
     loads = [n for n in names if n != "window" and not _is_dimension(n)]
     lengths = [n for n in names if _is_dimension(n)]
-    directions = np.array([_direction(setup, history, name) for name in loads]).reshape(
+    known = programs or {}
+    directions = np.array([known[n] if n in known else _direction(setup, history, n) for n in loads]).reshape(
         -1, *setup.load_history.segments.shape
     )
     velocities = [_velocity(setup.geometry, _dimension_name(name), setup) for name in lengths]
@@ -236,6 +242,23 @@ def _direction(setup: BulgeSetup, history: History, name: str) -> Floats:
     return np.asarray((up - down) / (2.0 * step))
 
 
+def program_directions(specimen: BulgeSettings, history: History, nuisances: Mapping[str, float]) -> dict[str, Floats]:
+    """{key: (segments, 10)} derivatives of the load history's segments to nuisances of programs: central differences.
+
+    nuisances : {key: value} of all explicit nuisances of the test. Programs are linear in these, but for the modulus.
+    """
+
+    def segments(key: str, step: float) -> Floats:
+        return set_up_test(specimen, history, {**nuisances, key: nuisances[key] + step}).load_history.segments
+
+    steps = {key: PROGRAM_STEPS.get(kind_and_start(key)[0], 0.0) for key in nuisances}
+    return {key: (segments(key, s) - segments(key, -s)) / (2.0 * s) for key, s in steps.items() if s}
+
+
+PROGRAM_STEPS = {"temperature step": 1.0, "temperature drift": 1.0, "load step": 1e-3}
+"""K, K and relative, of central differences of programs; without error where a program is linear in them."""
+
+
 _COLUMNS = {
     "modulus": np.array([0, 0, 0, 0, 0, 0, 1, 1, 0, 0.0]),
     "temperature": np.array([0, 0, 0, 0, 1, 1, 0, 0, 0, 0.0]),
@@ -298,7 +321,8 @@ def predict_bulge(
 
     theta : (candidates, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}.
     """
-    check_nuisances(nuisances, specimen.nuisances, "a bulge specimen")
+    known = (*specimen.nuisances, *PROGRAM_NUISANCES)
+    check_nuisances([kind_and_start(key)[0] for key in nuisances], known, "a bulge specimen")
     kernel = kernels.lower(law, "numba")
     theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
     tasks = list(product(range(len(theta)), range(len(histories))))
@@ -335,8 +359,9 @@ def simulate_and_observe(
     profiles = simulation.displacements[:, test_setup.model.top, 1]
     sensitivities = None
     if jacobian:
+        programs = program_directions(specimen, history, nuisances)
         outputs, sensitivities = output_sensitivities(
-            test_setup, kernel, theta, history, simulation, profiles, tuple(nuisances)
+            test_setup, kernel, theta, history, simulation, profiles, tuple(nuisances), programs
         )
     else:
         outputs = simulation.at(test_setup.observation.observe(test_setup.radii, profiles), history.times)

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from creepkit.arrays import Floats
 from creepkit.hookspecs import hookimpl
-from creepkit.records import History, NuisanceValues, Prediction, Predictor, Specimen
+from creepkit.records import PROGRAM_NUISANCES, History, NuisanceValues, Prediction, Predictor, Specimen
 from creepkit.specimens.bulge.observation import OBSERVED
 from creepkit.specimens.bulge.settings import BulgeSettings
 
@@ -29,6 +29,9 @@ class Bulge(BulgeSettings):
     name: str = field(default="bulge", init=False)
     title: str = field(default="Bulge test of a dimple under gas pressure, by finite elements", init=False)
     outputs: tuple[str, ...] = field(default=OBSERVED, init=False)
+
+    program_nuisances: ClassVar[tuple[str, ...]] = PROGRAM_NUISANCES
+    """Kinds of nuisances of a history's programs that predict() differentiates itself."""
 
     def predict(
         self,
