@@ -35,6 +35,7 @@ class SettingChanges(TypedDict, total=False):
     nuisances: Sequence[Nuisance] | None
     weights: OutputWeights
     test_loss: str
+    further_laws: int
     suspect_frames: Literal["exclude", "keep"]
 
 
@@ -98,7 +99,7 @@ def select(
     using: Predictor | str | Mapping[str, Predictor | str] | None = None,
     *,
     through: Predictor | Literal["auto"] | None = "auto",
-    sums: bool | None = False,
+    sums: bool | None = None,
     by: Literal["bic", "aicc", "hold-out"] = "bic",
     settings: IdentificationSettings | None = None,
     progress: Callable[[str, int, int], None] | None = None,
@@ -106,8 +107,10 @@ def select(
 ) -> Ranking:
     """Identify several laws from the same histories by likelihood, and rank them by how well they explain these.
 
-    laws : candidates; sums : also sums of two of them (None: where no single law goes down to the noise).
-    by : the criterion; the result is a set of laws with weights, "decisive" only above 0.95.
+    laws : candidates; sums : also sums of two of them: True, False, or None, with which sums of the best law and then
+        richer registered laws are tried where none explains the tests to their noise, at most `further_laws` of them.
+    by : the criterion; the result is a set of laws with weights, and a verdict: "decisive" only where one law of those
+        asked for explains the tests, has 95 % of the weight, and nothing that the tests allow stands against it.
     using, through, settings, changes : as for identify(); weights are "likelihood".
     """
     from creepkit.inverse.history_checks import without_suspect_frames

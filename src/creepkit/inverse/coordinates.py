@@ -101,7 +101,8 @@ def _compiled(law: CreepLaw, exponent: sympy.Expr, p: sympy.Symbol, others: list
     internal = {s: sympy.exp(s) if law.params[s].scale == "log" else s for s in others}
     a, b = a.subs(internal, simultaneous=True), b.subs(internal, simultaneous=True)
     parts = [a, b, *(sympy.diff(a, s) for s in others), *(sympy.diff(b, s) for s in others)]
-    function = sympy.lambdify((*POINT_VARIABLES, *others), parts, "numpy", cse=True)
+    smooth = [part.replace(sympy.DiracDelta, lambda *_: sympy.S.Zero) for part in parts]  # of a Max, off its corner
+    function = sympy.lambdify((*POINT_VARIABLES, *others), smooth, "numpy", cse=True)
     names = law.names
     return LocalExponent(names.index(p.name), tuple(names.index(s.name) for s in others), function)
 

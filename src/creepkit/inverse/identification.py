@@ -294,7 +294,8 @@ class Identification(Presentable):
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the problem, which holds compiled code and is set up again when it is needed."""
-        return {**self.__dict__, "problem": None}
+        state = {name: value for name, value in self.__dict__.items() if name != "least_squares_problem"}
+        return {**state, "problem": None}
 
     def profile(self, quantity: str | DerivedQuantity, *, level: float = 0.95) -> Any:
         """The ProfileLikelihood of a parameter, by name, or of another quantity (see uncertainty.quantities)."""

@@ -55,6 +55,7 @@ class IdentificationSettings:
         (see inverse.goodness_of_fit); "equal" weights are Eq. (4) of the paper, "paper" its Eq. (S3) for measured
         histories, 0.99 on D_amp.
     test_loss : of whole tests: "gaussian", or "student", with which a test far from the others loses its weight.
+    further_laws : that select() tries at most where no candidate explains the tests: sums, and registered laws.
     suspect_frames : "exclude": frames that unload, fall or lie apart (see quality.exclude_suspect_frames) are left out
         when the public functions and commands are handed tests, and the notes of the result name them; or "keep".
     """
@@ -68,9 +69,10 @@ class IdentificationSettings:
     weights: OutputWeights = "noise"
     test_loss: str = "gaussian"
     suspect_frames: Literal["exclude", "keep"] = "exclude"
+    further_laws: int = 6
 
     def __post_init__(self) -> None:
-        for name, minimum in (("starts", 1), ("sobol_points", 1), ("frames", 2), ("seed", 0)):
+        for name, minimum in (("starts", 1), ("sobol_points", 1), ("frames", 2), ("seed", 0), ("further_laws", 0)):
             value = getattr(self, name)
             if int(value) != value or value < minimum:
                 raise FitError(f"{name} is {value!r}; it must be a whole number of at least {minimum}")

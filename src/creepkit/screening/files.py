@@ -40,6 +40,7 @@ from creepkit.records import History
 from creepkit.screening.results import AlloyResult, PredictedOutputs, WeightedLaw, mean_relative_squared_error
 
 if TYPE_CHECKING:
+    from creepkit.inverse.adequacy import Adequacy
     from creepkit.screening.results import ScreeningResult
 
 
@@ -178,6 +179,7 @@ def result_columns(plate: ScreeningResult, result: AlloyResult) -> dict[str, Any
         "law": fit.law.name,
         "weight": _number_text(result.laws[0].weight),
         "decisive": "yes" if result.decisive else "no",
+        **_adequacy_columns(fit.adequacy),
         "not_ruled_out": "; ".join(result.credible_laws[1:]),
         "equivalents": "; ".join(result.equivalents),
         **_interval_columns("rate_100MPa", fit.rate(COMPARISON_STRESS, warn=False)),
@@ -203,6 +205,14 @@ def result_columns(plate: ScreeningResult, result: AlloyResult) -> dict[str, Any
         **columns,
         "notes": "; ".join([*result.notes, *(f"{law}: {why}" for law, why in result.failed_laws.items())]),
     }
+
+
+def _adequacy_columns(adequacy: Adequacy | None) -> dict[str, str]:
+    """Whether the best law explains the tests, and what it leaves of each output, in its unit."""
+    if adequacy is None:
+        return {}
+    left = {f"discrepancy_{o.output}": _number_text(o.discrepancy) for o in adequacy.outputs}
+    return {"adequacy": adequacy.verdict, "p_value": _number_text(adequacy.p_value), **left}
 
 
 def write_csv(plate: ScreeningResult, path: Path) -> Path:

@@ -101,6 +101,7 @@ def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
         laws=tuple(WeightedLaw(r.fit, r.excess, r.weight) for r in ranking.laws),
         failed_laws=dict(ranking.failed),
         verdict=ranking.verdict,
+        decisive=ranking.decisive,
         equivalents=tuple(str(pair) for pair in equivalent_laws(ranking)),
         dense_fit=dense,
         sparse_fit=sparse,

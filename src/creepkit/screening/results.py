@@ -14,7 +14,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import FitError, nearest
 from creepkit.inverse.confirmation import Confirmation
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.selection import CREDIBLE_WEIGHT, DECISIVE_WEIGHT
+from creepkit.inverse.selection import CREDIBLE_WEIGHT
 from creepkit.presentation import Presentable, present
 from creepkit.records import History, Predictor
 from creepkit.screening.alloys import UNKNOWN_CLASS, Alloy, Compositions
@@ -43,6 +43,7 @@ class AlloyResult:
     dense_fit, sparse_fit : the law without sparsity and what a penalty made of it, where they were requested.
     predicted : {test: {output: (frames,) mm or strain}} of the best law with the test's own nuisances and offsets, by
         the specimen where it was confirmed. cpu_seconds : CPU time of the identification.
+    decisive : whether the ranking of its laws is (see inverse.selection.ranking).
     """
 
     alloy: str
@@ -58,6 +59,7 @@ class AlloyResult:
     predicted: Mapping[str, PredictedOutputs] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     cpu_seconds: float = 0.0
+    decisive: bool = False
 
     @property
     def identified(self) -> bool:
@@ -70,11 +72,6 @@ class AlloyResult:
         if not self.laws:
             raise FitError(f"alloy '{self.alloy}' has no identified law: {self.failure}")
         return self.laws[0].fit
-
-    @property
-    def decisive(self) -> bool:
-        """Whether the best law has nearly all of the weight, in a choice of several."""
-        return len(self.laws) > 1 and self.laws[0].weight > DECISIVE_WEIGHT
 
     @property
     def credible_laws(self) -> tuple[str, ...]:

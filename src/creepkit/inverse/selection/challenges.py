@@ -1,22 +1,26 @@
 """Challenges of a verdict: what the tests allow beside the law that has nearly all the weight of those tried.
 
-A weight is relative to the laws tried, and an information criterion prefers the simplest of equals. Two questions are
-therefore asked before an answer is called decisive:
+A weight is relative to the laws tried, and an information criterion prefers the simplest of equals. Three questions
+are therefore asked before an answer is called decisive:
 
 1. May a share of the rate come from another law? The best law and each other law tried are added, the second carrying
    SHARE of the rate at the reference point, and the sum is fitted: where its chi-square is not larger by more than
    3.84 (95 %, one degree of freedom), the tests do not exclude it.
-2. Does the answer rest on something nobody measured? The laws are ranked again with each unmodelled effect (see
+2. May there be a threshold? The stress s in the terms of the best law is replaced by s - s_0, with s_0 THRESHOLD of
+   the reference stress, and judged likewise.
+3. Does the answer rest on something nobody measured? The laws are ranked again with each unmodelled effect (see
    inverse.unmodelled_effects) as a random effect of every test.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import sympy
 from scipy.stats import chi2
 
 from creepkit.arrays import Floats
@@ -28,11 +32,15 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.unmodelled_effects import UnmodelledEffect, with_random_effects
-from creepkit.language import CreepLaw
+from creepkit.language import CreepLaw, Param, stress
 from creepkit.records import Predictor
 
 SHARE = 0.3
 """Of the rate at the reference point, that must be excluded of other laws."""
+
+
+THRESHOLD = 0.2
+"""Of the reference stress, a threshold stress that must be excluded."""
 
 
 NOT_EXCLUDED = float(chi2.ppf(0.95, 1))
@@ -54,11 +62,12 @@ LAST_STEPS = Tolerances(max_steps=8, tolerance=1e-4)
 class Challenge:
     """Something that the tests allow, so that the law of most weight is not proved.
 
-    kind : "sum" of the best law with another, or an "unmodelled effect". subject : the name of the sum, or the effect.
+    kind : "sum" of the best law with another, a "threshold" stress of it, or an "unmodelled effect". subject : the name
+        of the law that is allowed, or the effect.
     sentence : for people, to follow "but".
     """
 
-    kind: Literal["sum", "unmodelled effect"]
+    kind: Literal["sum", "threshold", "unmodelled effect"]
     subject: str
     sentence: str
 
@@ -67,11 +76,11 @@ class Challenge:
 
 
 def challenges_of(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
-    """The challenges of the first of some identifications, best first; the first sum that is found ends the search."""
+    """The challenges of the first of some identifications, best first; the first law that is found ends the search."""
     best, *others = fits
-    sums = (compatible_sum(best, other) for other in others)
-    first_sum = next((challenge for challenge in sums if challenge is not None), None)
-    return (*([first_sum] if first_sum is not None else []), *decisive_effects(fits))
+    laws = itertools.chain((compatible_sum(best, other) for other in others), (compatible_threshold(best) for _ in "1"))
+    first_law = next((challenge for challenge in laws if challenge is not None), None)
+    return (*([first_law] if first_law is not None else []), *decisive_effects(fits))
 
 
 # ---- shares of other laws --------------------------------------------------------------------------------------------
@@ -102,43 +111,72 @@ class ShareResidual:
 def compatible_sum(best: Identification, other: Identification) -> Challenge | None:
     """The sum of the best law and another one that carries SHARE of the rate, if the tests do not exclude it."""
     single = best.least_squares_problem
-    if not (single.coordinates.term_rates and other.least_squares_problem.coordinates.term_rates):
+    own_terms = len(single.coordinates.term_rates)
+    if not (own_terms and other.least_squares_problem.coordinates.term_rates):
         return None
     try:
-        total = best.law + other.law
-        excess = _chi_square_of_sum(best, other, total) - _chi_square(single, best.x)
-    except CreepkitError:  # a sum that cannot be predicted is none that the tests allow
+        law = best.law + other.law
+        problem = _of_law(single, law)
+        own_rates, further_rates = (list(part) for part in np.split(problem.coordinates.term_rates, [own_terms]))
+        x = np.concatenate([best.u, other.u, best.x[best.u.size :]])
+        x[own_rates] += np.log(1.0 - SHARE)
+        x[further_rates] += np.log(SHARE)
+        share = ShareResidual(own_rates[0], further_rates[0], float(x[further_rates[0]] - x[own_rates[0]]))
+        excess = _least_chi_square(best, problem, x, share=share) - _chi_square(single, best.x)
+    except CreepkitError:  # a law that cannot be predicted is none that the tests allow
         return None
     if excess > NOT_EXCLUDED:
         return None
-    sentence = (
-        f"{total.name} with {100 * SHARE:.0f} % of the rate from {other.law.name} explains them as well (chi-square "
-        f"{excess:+.1f})"
-    )
-    return Challenge("sum", total.name, sentence)
+    percent = f"{100 * SHARE:.0f} % of the rate from {other.law.name}"
+    return Challenge("sum", law.name, f"{law.name} with {percent} explains them as well (chi-square {excess:+.1f})")
 
 
-def _chi_square_of_sum(best: Identification, other: Identification, law: CreepLaw) -> float:
-    """The least chi-square of the sum at its share: first by the reduced-order model, then by the predictor itself."""
-    single = best.least_squares_problem
+def compatible_threshold(best: Identification) -> Challenge | None:
+    """The best law above a threshold stress, if the tests do not exclude it."""
+    single, threshold = best.least_squares_problem, THRESHOLD * best.reference.stress
+    s_0 = sympy.Symbol("s_0_threshold", real=True)
+    terms = {label: term.subs(stress, sympy.Max(stress - s_0, 0)) for label, term in best.law.terms.items()}
+    param = Param("threshold stress", unit="MPa", bounds=(0.0, 2.0 * threshold))
+    try:
+        law = replace(
+            best.law, name=f"{best.law.name} above a threshold", terms=terms, params={**best.law.params, s_0: param}
+        )
+        problem = _of_law(single, law)
+        position = best.u.size
+        x = np.concatenate([best.u, [threshold], best.x[position:]])
+        excess = _least_chi_square(best, problem, x, fixed={position: threshold}) - _chi_square(single, best.x)
+    except CreepkitError:
+        return None
+    if excess > NOT_EXCLUDED:
+        return None
+    sentence = f"{law.name} of {threshold:.3g} MPa explains them as well (chi-square {excess:+.1f})"
+    return Challenge("threshold", law.name, sentence)
+
+
+def _of_law(single: LeastSquaresProblem, law: CreepLaw) -> LeastSquaresProblem:
+    """The problem of another law under the same covariance, with the same nuisances and correction."""
     problem = LeastSquaresProblem.from_histories(
-        law, best.histories, single.predictor, best.settings, single.coordinates.reference
+        law, single.histories, single.predictor, single.settings, single.coordinates.reference
     )
     problem = replace(problem, covariance_factor=single.covariance_factor, histories=single.histories)
-    problem = problem.with_nuisances(single.nuisance_parameters).with_correction(single.correction)
-    own_terms = len(single.coordinates.term_rates)
-    own_rates, further_rates = (list(part) for part in np.split(problem.coordinates.term_rates, [own_terms]))
-    x = np.concatenate([best.u, other.u, best.x[best.u.size :]])
-    x[own_rates] += np.log(1.0 - SHARE)
-    x[further_rates] += np.log(SHARE)
-    share = ShareResidual(own_rates[0], further_rates[0], float(x[further_rates[0]] - x[own_rates[0]]))
-    reduced = reduced_order_model_of(single.predictor)
+    return problem.with_nuisances(single.nuisance_parameters).with_correction(single.correction)
+
+
+def _least_chi_square(
+    best: Identification,
+    problem: LeastSquaresProblem,
+    x: Floats,
+    *,
+    share: ShareResidual | None = None,
+    fixed: Mapping[int, float] | None = None,
+) -> float:
+    """The least chi-square from x (unknowns,): first by the reduced-order model, then by the predictor itself."""
+    reduced = reduced_order_model_of(problem.predictor)
     if reduced is not None:
         cheap = problem.with_predictor(reduced)
-        cheap = cheap.with_correction(_difference(single, best.x, reduced))
-        x = cheap.minimise(x, additional=share, tolerances=APPROXIMATE_STEPS).x
-    x = problem.minimise(x, additional=share, tolerances=LAST_STEPS).x
-    return _chi_square(problem, x)
+        cheap = cheap.with_correction(_difference(best.least_squares_problem, best.x, reduced))
+        x = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS).x
+    return _chi_square(problem, problem.minimise(x, additional=share, fixed=fixed, tolerances=LAST_STEPS).x)
 
 
 def _difference(problem: LeastSquaresProblem, x: Floats, predictor: Predictor) -> Floats:

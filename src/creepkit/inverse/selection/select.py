@@ -17,12 +17,14 @@ from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import StartingEstimate, identify
+from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.selection.ranking import CRITERIA, Criterion, Ranking, challenged, rank, ranking_from_scores
 from creepkit.inverse.settings import IdentificationSettings
-from creepkit.language import CreepLaw
+from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.records import History, Predictor
+from creepkit.registry import default_registry
 
 
 def reductions(law: CreepLaw) -> list[CreepLaw]:
@@ -68,10 +70,6 @@ RULED_OUT_EXCESS = 40.0
 of a surrogate, some noise in chi-square, do not make up for."""
 
 
-FURTHER_LAWS = 8
-"""Laws that are tried, unless another number is asked for, where none of the candidates explains the tests."""
-
-
 def select(
     candidates: Sequence[CreepLaw],
     histories: Sequence[History],
@@ -81,14 +79,12 @@ def select(
     through: Predictor | None = None,
     sums: bool | None = None,
     by: Criterion = "bic",
-    further: Sequence[CreepLaw] = (),
     progress: IterationCallback | None = None,
 ) -> Ranking:
     """Identify every candidate from the same histories by likelihood, and rank them.
 
     sums : also sums of two candidates: True, False, or None for sums of the best law where it does not explain the
-        tests to their noise.
-    further : laws that are tried then, after the sums, up to FURTHER_LAWS of both together.
+        tests to their noise, and then richer registered laws, at most settings.further_laws of both together.
     by : "bic", "aicc", or "hold-out" (the last 30 % of each history predicted from a refit to the first 70 %).
     A law that cannot be identified is named in `failed`; FitError if none can.
     """
@@ -104,7 +100,7 @@ def select(
         pairs = sums_of_two([fit.law for fit in fits])
         fits += _identify_all(pairs, histories, using, settings, through, progress, failed)
     elif fits and sums is None:
-        richer = _richer_laws(rank(fits, challenge=False), further)
+        richer = _richer_laws(rank(fits, challenge=False), histories)[: settings.further_laws]
         fits += _identify_all(richer, histories, using, settings, through, progress, failed)
         tried_further = tuple(law.name for law in richer if law.name not in failed)
     if not fits:
@@ -118,15 +114,31 @@ def select(
     return replace(rank(fits, by, failed), further=tried_further)
 
 
-def _richer_laws(ranking: Ranking, further: Sequence[CreepLaw]) -> list[CreepLaw]:
-    """What is tried where no candidate explains the tests: sums of the best one with the others, then further laws."""
+def _richer_laws(ranking: Ranking, histories: Sequence[History]) -> list[CreepLaw]:
+    """What is tried where no candidate explains the tests: sums of the best one with the others, then other laws."""
     if ranking.adequacy is None or ranking.adequacy.verdict != "leaves a discrepancy":
         return []
     laws = [ranked.fit.law for ranked in ranking.laws]
-    sums = [laws[0] + other for other in laws[1:]] if laws[0].terms else []
     tried = {law.fingerprint for law in laws}
-    others = [law for law in _distinct_laws([*sums, *further]) if law.fingerprint not in tried]
-    return others[:FURTHER_LAWS]
+    richer = _distinct_laws([*(laws[0] + other for other in laws[1:]), *_registered_laws(laws, histories)])
+    return [law for law in richer if law.fingerprint not in tried]
+
+
+def _registered_laws(tried: Sequence[CreepLaw], histories: Sequence[History]) -> list[CreepLaw]:
+    """Registered laws without a temperature of their own; first those that depend on what none of the tried laws does.
+
+    A law counts as such where it has internal variables, or uses strain and time in a way that none of them does.
+    Within each kind those with the fewest parameters come first.
+    """
+
+    def memory(law: CreepLaw) -> tuple[bool, bool, bool]:
+        return law.uses(strain), law.uses(time), bool(law.states)
+
+    known = {memory(law) for law in tried}
+    laws = [one.value for one in default_registry().laws().values() if not one.value.uses(temperature)]
+    if any(law.uses(temperature) for law in tried):
+        laws = [with_arrhenius(law, histories) for law in laws]
+    return sorted(laws, key=lambda law: (memory(law) in known, len(law.params), law.name))
 
 
 def _identify_all(
