@@ -184,7 +184,7 @@ def adequacy_of(
         frames = sum(int(np.isfinite(h.outputs[name]).sum()) for h in histories if name in h.outputs)
         stated = bool(observations.stated[position])
         noise_freedom = np.inf if stated else FREEDOM_PER_FRAME * frames
-        p_value = _probability(reduced, freedom, noise_freedom)
+        p_value = chance_of_larger(reduced, freedom, noise_freedom)
         noise = max(float(observations.noise[position]), SMALLEST_NOISE * observations.transforms[position].floor)
         discrepancy = noise * float(np.sqrt(max(reduced - 1.0, 0.0))) if p_value < SIGNIFICANCE else 0.0
         outputs.append(
@@ -195,7 +195,7 @@ def adequacy_of(
         freedoms.append(noise_freedom)
     freedom = share_of_freedom * float(judged.sum())
     reduced = float(contributions[judged].sum()) / freedom
-    pooled = _probability(reduced, freedom, float(np.min(freedoms)))
+    pooled = chance_of_larger(reduced, freedom, float(np.min(freedoms)))
     p_values = [pooled, *(o.p_value for o in outputs)] if len(outputs) > 1 else [pooled]
     p_value = min(1.0, len(p_values) * min(p_values))
     return Adequacy(
@@ -268,8 +268,10 @@ def _freedom(linear: LinearisedProblem, solution: LinearSolution) -> float:
     return max(float(linear.residuals.present.sum()) - determined, 1.0)
 
 
-def _probability(reduced: float, freedom: float, noise_freedom: float) -> float:
-    """Of a larger reduced chi-square by chance, where the noise is known to `noise_freedom` degrees of freedom."""
+def chance_of_larger(reduced: float, freedom: float, noise_freedom: float) -> float:
+    """Probability of a larger reduced chi-square by chance, the noise known to `noise_freedom` degrees of freedom."""
+    if not (np.isfinite(reduced) and freedom > 0):
+        return float("nan")
     if np.isinf(noise_freedom):
         return float(chi2.sf(reduced * freedom, freedom))
     return float(f.sf(reduced, freedom, max(noise_freedom, 1.0)))

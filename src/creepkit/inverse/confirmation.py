@@ -9,6 +9,7 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.inverse.adequacy import FREEDOM_PER_FRAME, SIGNIFICANCE, chance_of_larger
 from creepkit.inverse.composite_predictor import CompositePredictor, outside_class
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, errors_of_output
 from creepkit.inverse.identification import Identification
@@ -21,7 +22,7 @@ AGREEMENT_LIMIT = 1.0
 
 
 ACCEPTABLE_CHI_SQUARE = 2.0
-"""Mean chi-square above which a law does not follow a test, whoever predicts it."""
+"""Mean chi-square above which a law does not follow a test, whoever predicts it, if chance does not explain it."""
 
 
 INCOMPLETE_STATUS = {
@@ -39,12 +40,14 @@ class ConfirmedOutput:
         it cannot predict.
     rms_difference : rms of simulated less fitted frames over their noise; NaN where the fit cannot predict or no noise
         is known.
+    p_value : of a larger chi-square of the simulation by chance, with the noise as uncertain as its estimate is.
     """
 
     output: str
     simulation_errors: OutputErrors
     fit_errors: OutputErrors | None
     rms_difference: float
+    p_value: float = float("nan")
 
     @property
     def noise_ratio(self) -> float:
@@ -98,7 +101,7 @@ class Confirmation(Presentable):
             )
         test_name, output = self._largest(lambda o: o.simulation_errors.chi_square)
         worst = self[test_name, output].simulation_errors.chi_square
-        if worst > ACCEPTABLE_CHI_SQUARE:
+        if worst > ACCEPTABLE_CHI_SQUARE and self[test_name, output].p_value < SIGNIFICANCE / self._comparisons:
             return (
                 f"confirmed, but the law does not follow the tests: chi-square {worst:.3g} in {output} of "
                 f"'{test_name}'; try another law"
@@ -114,6 +117,11 @@ class Confirmation(Presentable):
                 if (test.name, one.output) == place:
                     return one
         raise FitError(f"no output '{place[1]}' of a test '{place[0]}' was confirmed")
+
+    @property
+    def _comparisons(self) -> int:
+        """How many outputs of tests are compared, of which one may be off by chance (Bonferroni)."""
+        return max(sum(len(t.outputs) for t in self.tests), 1)
 
     @property
     def _incomplete_tests(self) -> list[ConfirmedTest]:
@@ -172,9 +180,14 @@ def _confirmed_output(
     used = usable_frames(history, name)
     sd = noise_standard_deviation(history, name)[used]
     simulation_errors = errors_of_output(history, name, simulated)
+    frames = simulation_errors.frames
+    noise_freedom = np.inf if name in history.standard_deviation else FREEDOM_PER_FRAME * frames
+    p_value = chance_of_larger(simulation_errors.chi_square, float(frames), noise_freedom)
     if fitted is None:
-        return ConfirmedOutput(name, simulation_errors, None if reported is None else reported.errors, float("nan"))
+        return ConfirmedOutput(
+            name, simulation_errors, None if reported is None else reported.errors, float("nan"), p_value
+        )
     known = sd > 0
     difference = ((simulated - fitted)[used] / np.where(known, sd, np.nan))[known]
     rms = float(np.sqrt(np.mean(difference**2))) if difference.size else float("nan")
-    return ConfirmedOutput(name, simulation_errors, errors_of_output(history, name, fitted), rms)
+    return ConfirmedOutput(name, simulation_errors, errors_of_output(history, name, fitted), rms, p_value)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from creepkit.inverse.search.global_search import SearchTrace
     from creepkit.inverse.sparsity.result import Sparsity
-    from creepkit.inverse.uncertainty.quantities import DerivedQuantity
+    from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity
     from creepkit.inverse.variance_components import LinearisedProblem
 
 
@@ -57,6 +57,8 @@ class Identification(Presentable):
     nuisances : estimates of explicit nuisances.
     adequacy : whether the law explains the tests to their noise. numerical_error : of the predictor at the optimum,
         which was corrected; None where there is no more exact one. unmodelled : effects that intervals do not include.
+    samples : (samples, parameters) conditioned coordinates drawn from the posterior, where some value lies at its bound
+        or is not determined (see uncertainty.importance_sampling); None elsewhere.
     ranges : {"stress", "temperature", "strain", "time": (low, high)} of the fitted frames; MPa, K, -, s.
     log_likelihood : of the fitted frames as if they were independent (working noise), with explicit nuisances
         integrated out; of identifications by likelihood the restricted one, but for a constant of the law.
@@ -87,6 +89,7 @@ class Identification(Presentable):
     adequacy: Adequacy | None = None
     numerical_error: NumericalError | None = None
     unmodelled: tuple[UnmodelledEffect, ...] = ()
+    samples: Floats | None = None
     converged: bool = True
     notes: tuple[str, ...] = ()
     histories: tuple[History, ...] = ()
@@ -155,9 +158,8 @@ class Identification(Presentable):
         if warn:
             point = {"stress": stress, "temperature": temperature, "strain": strain, "time": time}
             warn_of_extrapolation(self.ranges, point)
-        log_rate_value, sd = delta_method(function, self.u, self.covariance)
-        half_width = self._quantile * sd
-        return np.exp(log_rate_value), np.exp(log_rate_value - half_width), np.exp(log_rate_value + half_width)
+        log_rate_value, low, high = self.interval_of(function)
+        return np.exp(log_rate_value), np.exp(low), np.exp(high)
 
     def local_exponent(
         self,
@@ -179,9 +181,19 @@ class Identification(Presentable):
         if warn:
             point = {"stress": stress, "temperature": temperature, "strain": strain, "time": time}
             warn_of_extrapolation(self.ranges, point)
-        exponent, sd = delta_method(function, self.u, self.covariance)
-        half_width = self._quantile * sd
-        return exponent, exponent - half_width, exponent + half_width
+        return self.interval_of(function)
+
+    def interval_of(self, function: CoordinateFunction) -> tuple[Floats, Floats, Floats]:
+        """Value and 95 % interval, (...,) each, of a function of the coordinates: u (..., parameters) to (...,).
+
+        By the delta method; from samples of the posterior where a value lies at its bound or is not determined.
+        """
+        if self.samples is not None:
+            value, draws = function(self.u), function(self.samples)
+            low, high = np.quantile(draws, (0.025, 0.975), axis=0)
+            return value, np.minimum(low, value), np.maximum(high, value)
+        value, sd = delta_method(function, self.u, self.covariance)
+        return value, value - self._quantile * sd, value + self._quantile * sd
 
     def rupture_time(
         self,

@@ -12,6 +12,8 @@ from creepkit.errors import FitError
 from creepkit.files.json_documents import DocumentFormat, check_heading, read_json, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import NumberRange, RecordCodec, RecordError, ValueCodec
+from creepkit.inverse.adequacy import Adequacy, OutputAdequacy
+from creepkit.inverse.defect_correction import NumericalError
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, RuptureComparison, TestFit
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise
@@ -20,6 +22,7 @@ from creepkit.inverse.predictor_documents import predictor_documents, predictor_
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.result import FitStatistics, Sparsity
+from creepkit.inverse.unmodelled_effects import UnmodelledEffect
 from creepkit.language import CreepLaw
 from creepkit.language.law_codec import law_from_json, law_to_json
 from creepkit.records import Nuisance
@@ -54,15 +57,23 @@ LAW_CODEC = ValueCodec(law_to_json, law_from_json)
 
 
 CODEC = RecordCodec(
-    omitted={Identification: ("histories", "predictor", "search_trace", "linearised", "problem"), Sparsity: ("path",)},
+    omitted={
+        Identification: ("histories", "predictor", "search_trace", "linearised", "problem"),
+        Sparsity: ("path",),
+        UnmodelledEffect: ("residual_change",),
+    },
     ranges={
         Identification: {"rms": NOT_NEGATIVE_OR_NAN, "effective_frames": POSITIVE, "freedom": POSITIVE},
         ReferencePoint: dict.fromkeys(("stress", "strain", "time", "temperature"), POSITIVE),
-        NoiseModel: {"rate": NOT_NEGATIVE},
+        NoiseModel: {"rate": NOT_NEGATIVE, "discrepancy": NOT_NEGATIVE, "discrepancy_length": POSITIVE},
         OutputNoise: {
-            **dict.fromkeys(("noise", "misfit", "offset", "drift"), NOT_NEGATIVE),
+            **dict.fromkeys(("noise", "misfit", "offset", "drift", "stated"), NOT_NEGATIVE),
             "correlation_length": POSITIVE,
         },
+        Adequacy: dict.fromkeys(("chi_square", "freedom", "p_value", "correlation"), NOT_NEGATIVE_OR_NAN),
+        OutputAdequacy: {"frames": NOT_NEGATIVE, "noise": POSITIVE, "discrepancy": NOT_NEGATIVE},
+        NumericalError: {"noises": NOT_NEGATIVE, "shift": NOT_NEGATIVE_OR_NAN},
+        UnmodelledEffect: {"size": NOT_NEGATIVE, "rate_change": NOT_NEGATIVE_OR_NAN},
         OutputErrors: {
             "frames": NOT_NEGATIVE,
             "relative_squared_error": NOT_NEGATIVE_OR_NAN,

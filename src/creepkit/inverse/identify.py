@@ -50,13 +50,14 @@ from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.search.multistart import EQUAL_PREDICTIONS, EQUAL_REDUCED_ORDER_PREDICTIONS, MultiStart, distinct
 from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.uncertainty.importance_sampling import needs_samples, with_samples
 from creepkit.inverse.uncertainty.laplace_approximation import (
     interval_quantile,
     laplace_covariance,
     parameter_estimates,
     restricted_covariance,
 )
-from creepkit.inverse.unmodelled_effects import unmodelled_effects
+from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note
 from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_rupture_weight
 from creepkit.language import CreepLaw
@@ -130,7 +131,8 @@ def identify(
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
-        return _result(histories, best, search_outcome, numerical_error)
+        fit = _result(histories, best, search_outcome, numerical_error)
+        return with_samples(fit, through) if needs_samples(fit) else fit
 
 
 def _gradient(best: EstimationResult) -> Floats:
@@ -276,6 +278,7 @@ def _result(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance))[count:]
     )
     linear = best.linearised or linearised(problem, x, residuals)
+    unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories)
     adequacy = adequacy_of(problem, linear, noise_model, working_estimator.predictor_errors, histories)
     return Identification(
         law=law,
@@ -297,12 +300,13 @@ def _result(
         converged=best.minimum.converged,
         adequacy=adequacy,
         numerical_error=numerical_error,
-        unmodelled=unmodelled_effects(problem, x, linear, noise_model, histories),
+        unmodelled=unmodelled,
         notes=(
             *suspect_frames_note(histories),
             *identification_notes(best, tests, nuisance_estimates),
             *domain_notes(prediction, histories),
             *([numerical_error.sentence] if numerical_error is not None else []),
+            *unmodelled_note(unmodelled),
         ),
         histories=tuple(histories),
         predictor=problem.predictor,

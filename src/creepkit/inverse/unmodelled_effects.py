@@ -43,6 +43,17 @@ GAS_CONSTANT = 8.314462618
 """J/(mol K)."""
 
 
+DRIFT = "temperature drift"
+
+
+NOTEWORTHY_CHANGE = 0.01
+"""Of the rate, from which on an effect is named."""
+
+
+LIKE_HARDENING = 0.8
+"""Correlation from which on a drift looks like hardening."""
+
+
 CHECKED_DIMENSIONS = ("thickness",)
 """Nuisance parameters that are checked where the predictor states a tolerance of theirs."""
 
@@ -53,6 +64,8 @@ class UnmodelledEffect:
 
     kind : of the nuisance parameter that would stand for it. size : of one standard deviation, and its unit.
     rate_change : of ln of the rate at the reference point, by one standard deviation in each test.
+    like_hardening : the size, in the same unit, that looks most like the hardening of the law itself, NaN where it has
+        none, and hardening_correlation : how much like it, in the residuals, 1 for the same.
     residual_change : (tests, observations) -, of the residuals, by one standard deviation; not saved.
     """
 
@@ -60,12 +73,15 @@ class UnmodelledEffect:
     size: float
     unit: str
     rate_change: float
+    like_hardening: float = float("nan")
+    hardening_correlation: float = float("nan")
     residual_change: Floats = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
 
     @property
     def description(self) -> str:
         """What, and of which size."""
-        return f"a {self.kind} of {self.size:.2g} {self.unit}".strip()
+        article = "an" if self.kind[0] in "aeiou" else "a"
+        return f"{article} {self.kind} of {self.size:.2g} {self.unit}".strip()
 
 
 def unmodelled_effects(
@@ -82,7 +98,7 @@ def unmodelled_effects(
         changes += _dimension(problem, x, linear, kind)
     if "offset" not in kinds:
         changes += _offset(problem, linear)
-    drifting_kinds = {"temperature drift", "rate drift"}
+    drifting_kinds = {DRIFT, "rate drift"}
     if not kinds & drifting_kinds and not any(isinstance(h.temperature, Program) for h in full_histories):
         changes += _drift(problem, x, linear)
     if not changes:
@@ -98,8 +114,56 @@ def unmodelled_effects(
     effects = []
     for kind, size, unit, change in changes:
         by_test = np.einsum("tep,te->tp", solution.weighted_jacobian, change) @ solution.covariance @ row
-        effects.append(UnmodelledEffect(kind, size, unit, float(np.sqrt((by_test**2).sum())), change))
+        rate_change = float(np.sqrt((by_test**2).sum()))
+        likeness = _likeness_of_hardening(problem, x, linear, inverses, change) if kind == DRIFT else (np.nan, np.nan)
+        effects.append(UnmodelledEffect(kind, size, unit, rate_change, size * likeness[0], likeness[1], change))
     return tuple(effects)
+
+
+def unmodelled_note(effects: Sequence[UnmodelledEffect]) -> tuple[str, ...]:
+    """One sentence on what intervals do not include, with what it would do to the rate; none where that is little."""
+    parts = [f"{e.description} {100 * e.rate_change:.2g} %" for e in effects if e.rate_change > NOTEWORTHY_CHANGE]
+    sentences = []
+    if parts:
+        sentences.append(
+            f"intervals take for granted what no nuisance parameter models; the rate at the reference would change: by "
+            f"{', by '.join(parts)}"
+        )
+    for effect in effects:
+        if effect.hardening_correlation > LIKE_HARDENING:
+            sentences.append(
+                f"no temperature was recorded: a drift of {effect.like_hardening:+.2g} K over a test would look like "
+                f"the hardening of this law (correlation {effect.hardening_correlation:.2f})"
+            )
+    return tuple(sentences)
+
+
+def _likeness_of_hardening(
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, inverses: Floats, change: Floats
+) -> tuple[float, float]:
+    """(ratio, correlation) of an effect to what the law's hardening does, beside all other unknowns.
+
+    Hardening is what disappears where an exponent that may be off, such as m of strain, is zero.
+    """
+    law, jacobian = problem.law, linear.residuals.jacobian
+    assert jacobian is not None
+    theta = problem.coordinates.theta(x[: problem.parameter_count])
+    positions = [k for k, p in enumerate(law.params.values()) if p.off == 0.0 and p.scale != "log"]
+    positions = [k for k in positions if abs(theta[k]) > 0]
+    if not positions:
+        return float("nan"), float("nan")
+    hardening = np.einsum("tep,p->te", jacobian[..., positions], theta[positions])
+    factor = np.swapaxes(np.linalg.cholesky(inverses), 1, 2)
+    others = [k for k in range(jacobian.shape[-1]) if k not in positions]
+    columns = np.concatenate([hardening[..., None], change[..., None], jacobian[..., others]], axis=-1)
+    whitened = (factor @ columns)[linear.residuals.present]
+    basis, _ = np.linalg.qr(whitened[:, 2:] / np.maximum(np.linalg.norm(whitened[:, 2:], axis=0), 1e-300))
+    own, effect = (whitened[:, k] - basis @ (basis.T @ whitened[:, k]) for k in (0, 1))
+    sizes = float(np.linalg.norm(own)), float(np.linalg.norm(effect))
+    if min(sizes) == 0.0:
+        return float("nan"), float("nan")
+    product = float(own @ effect)
+    return product / sizes[1] ** 2, abs(product) / (sizes[0] * sizes[1])
 
 
 def _dimension(
@@ -157,7 +221,7 @@ def _drift(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -
                 continue
             times = observations.times[test, index]
             change[test, index] = _advance(history, times, predicted[test, index])
-    return [("temperature drift", USUAL_DRIFT, "K over a test", factor * change * residuals.offset_sensitivity)]
+    return [(DRIFT, USUAL_DRIFT, "K over a test", factor * change * residuals.offset_sensitivity)]
 
 
 def _advance(history: History, times: Floats, values: Floats) -> Floats:

@@ -26,6 +26,7 @@ from scipy.stats import chi2
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError
 from creepkit.inverse.composite_predictor import reduced_order_model_of
+from creepkit.inverse.defect_correction import difference_of_predictors
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT, bic_penalty, criterion_weights
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -33,7 +34,6 @@ from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.unmodelled_effects import UnmodelledEffect, with_random_effects
 from creepkit.language import CreepLaw, Param, stress
-from creepkit.records import Predictor
 
 SHARE = 0.3
 """Of the rate at the reference point, that must be excluded of other laws."""
@@ -173,20 +173,10 @@ def _least_chi_square(
     """The least chi-square from x (unknowns,): first by the reduced-order model, then by the predictor itself."""
     reduced = reduced_order_model_of(problem.predictor)
     if reduced is not None:
-        cheap = problem.with_predictor(reduced)
-        cheap = cheap.with_correction(_difference(best.least_squares_problem, best.x, reduced))
+        difference = difference_of_predictors(best.least_squares_problem, best.x, reduced)
+        cheap = problem.with_predictor(reduced).with_correction(difference)
         x = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS).x
     return _chi_square(problem, problem.minimise(x, additional=share, fixed=fixed, tolerances=LAST_STEPS).x)
-
-
-def _difference(problem: LeastSquaresProblem, x: Floats, predictor: Predictor) -> Floats:
-    """(tests, observations) what the problem predicts less what a cheaper predictor does, in the output's unit."""
-    observations = problem.observations
-    cheap = problem.with_predictor(predictor)
-    own, cheaper = (
-        observations.inverse(p.residuals(x).values + observations.transformed_values) for p in (problem, cheap)
-    )
-    return np.asarray(own - cheaper)
 
 
 def _chi_square(problem: LeastSquaresProblem, x: Floats) -> float:

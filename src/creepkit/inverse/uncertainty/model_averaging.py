@@ -24,7 +24,7 @@ from scipy.stats import t as student
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.uncertainty.laplace_approximation import delta_method
+from creepkit.inverse.uncertainty.laplace_approximation import delta_method, interval_quantile
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, local_exponent, log_rate
 from creepkit.language import temperature as TEMPERATURE
 from creepkit.presentation import Presentable, present
@@ -192,7 +192,11 @@ def degrees_of_freedom(fits: Sequence[Identification]) -> Floats:
 
 def _normal_under_law(fit: Identification, function: CoordinateFunction) -> tuple[Floats, Floats]:
     """Value and standard deviation under one law; never quite zero, so that a mixture of certainties has quantiles."""
-    middle, sd = delta_method(function, fit.u, fit.covariance)
+    if fit.samples is not None:
+        _, low, high = fit.interval_of(function)
+        middle, sd = 0.5 * (low + high), 0.5 * (high - low) / interval_quantile(fit.freedom)
+    else:
+        middle, sd = delta_method(function, fit.u, fit.covariance)
     return middle, np.maximum(sd, 1e-12 * np.maximum(np.abs(middle), 1.0))
 
 

@@ -1,0 +1,106 @@
+"""Samples of the posterior where Laplace's approximation fails: a value at its bound, or not determined by the tests.
+
+A Gaussian about a value at its bound puts half of its mass where no value may be, and is too narrow or too wide on the
+other side. Samples are drawn from a Student's t about it, weighted with the posterior (see uncertainty.posterior) over
+their density, and the proposal is moved to the weighted samples in a few rounds: population Monte Carlo (Cappe et al.
+(2004), J. Comput. Graph. Stat. 13, 907). The posterior is that of the problem through a cheaper predictor, corrected at
+the optimum by what it differs from the predictor there (see inverse.defect_correction).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2, multivariate_t, norm, qmc
+
+from creepkit.arrays import Floats
+from creepkit.inverse.composite_predictor import reduced_order_model_of
+from creepkit.inverse.defect_correction import with_cheaper_predictor
+from creepkit.inverse.identification import Identification
+from creepkit.inverse.uncertainty.posterior import Posterior
+from creepkit.records import Predictor
+
+ROUNDS = 4
+"""Of proposals."""
+
+
+DRAWS = 256
+"""In each round, a power of two for the Sobol sequence."""
+
+
+SAMPLES = 400
+"""Of equal weight, that are kept."""
+
+
+PROPOSAL_FREEDOM = 5.0
+"""Degrees of freedom of the proposal: tails heavier than those of a posterior."""
+
+
+LEAST_EFFECTIVE_SIZE = 40.0
+"""Effective number of samples below which they say nothing."""
+
+
+UNCERTAIN_VERDICTS = ("at its bound", "not determined")
+
+
+def needs_samples(fit: Identification) -> bool:
+    """Whether some value lies at its bound or is not determined."""
+    return any(estimate.verdict in UNCERTAIN_VERDICTS for estimate in fit.estimates)
+
+
+def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Identification:
+    """The identification with samples of its posterior for intervals of rates and local exponents, where they succeed.
+
+    cheaper : a predictor of the same tests that samples are drawn through, by default the reduced-order model.
+    """
+    problem = fit.least_squares_problem
+    cheaper = cheaper or reduced_order_model_of(problem.predictor)
+    if cheaper is not None:
+        problem = with_cheaper_predictor(problem, fit.x, cheaper)
+    samples = posterior_samples(replace(fit, problem=problem))
+    if samples is None:
+        note = (
+            "values lie at their bounds or are not determined, and their posterior could not be sampled: intervals of "
+        )
+        return replace(fit, notes=(*fit.notes, f"{note}rates may be too narrow"))
+    return replace(fit, samples=samples)
+
+
+def posterior_samples(fit: Identification, seed: int | None = None) -> Floats | None:
+    """(samples, parameters) conditioned coordinates of equal weight; None where too few of the draws count."""
+    posterior, size = Posterior.from_identification(fit), fit.u.size
+    seed = fit.settings.seed if seed is None else seed
+    centre, shape = np.array(fit.u), fit.covariance + 1e-12 * np.diag(np.diag(fit.covariance))
+    points, log_density = np.zeros((0, size)), np.zeros(0)
+    proposals: list[tuple[Floats, Floats]] = []
+    weights = np.zeros(0)
+    for k in range(ROUNDS):
+        proposals.append((centre, shape))
+        drawn = _drawn(centre, shape, seed + k)
+        points = np.concatenate([points, drawn])
+        log_density = np.concatenate([log_density, posterior(drawn)])
+        log_proposal = np.stack([multivariate_t.logpdf(points, m, s, df=PROPOSAL_FREEDOM) for m, s in proposals])
+        mixture = np.logaddexp.reduce(log_proposal, axis=0) - np.log(len(proposals))
+        log_weight = log_density - mixture
+        if not np.isfinite(log_weight).any():
+            return None
+        weights = np.exp(log_weight - log_weight.max())
+        weights /= weights.sum()
+        centre = weights @ points
+        deviation = points - centre
+        shape = (weights[:, None] * deviation).T @ deviation
+        shape += 1e-6 * np.diag(np.diag(fit.covariance))
+    if 1.0 / float((weights**2).sum()) < LEAST_EFFECTIVE_SIZE:
+        return None
+    positions = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    return np.asarray(points[np.searchsorted(np.cumsum(weights), positions).clip(max=len(points) - 1)])
+
+
+def _drawn(centre: Floats, shape: Floats, seed: int) -> Floats:
+    """(DRAWS, parameters) quasi-random draws of a multivariate Student's t."""
+    unit = qmc.Sobol(centre.size + 1, seed=seed).random(DRAWS)
+    unit = np.clip(unit, 1e-9, 1.0 - 1e-9)
+    normal = norm.ppf(unit[:, :-1]) @ np.linalg.cholesky(shape).T
+    mixing = chi2.ppf(unit[:, -1:], PROPOSAL_FREEDOM) / PROPOSAL_FREEDOM
+    return np.asarray(centre + normal / np.sqrt(mixing))
