@@ -96,6 +96,7 @@ class Adequacy:
     are missing. chi_square : of all of them, over `freedom`, its degrees of freedom. p_value : the least of all and of
     each, times their number. correlation : of what is left, as a share of the test (of outputs that span decades: the
     ln of a factor in time); NaN where nothing is. largest : where the law misses most; None if nothing is known.
+    remedies : unmodelled effects, such as "thickness", with any of which the law would explain the tests.
     """
 
     verdict: AdequacyVerdict
@@ -105,6 +106,7 @@ class Adequacy:
     p_value: float
     correlation: float
     largest: LargestDeviation | None
+    remedies: tuple[str, ...] = ()
 
     @property
     def explains(self) -> bool:
@@ -143,6 +145,7 @@ class Adequacy:
         ]
         p_text = f"p = {self.p_value:.1g}" if self.p_value > 1e-12 else "p < 1e-12"
         where = f"; most in {self.largest}" if self.largest is not None else ""
+        where += f"; with {' or '.join(self.remedies)} unknown it would explain them" if self.remedies else ""
         return (
             f"leaves {' and '.join(parts) or 'more than noise'} unexplained (reduced chi-square "
             f"{self.chi_square:.3g}, {p_text}){where}"

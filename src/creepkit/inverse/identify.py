@@ -57,7 +57,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     parameter_estimates,
     restricted_covariance,
 )
-from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note
+from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note, with_random_effects
 from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_rupture_weight
 from creepkit.language import CreepLaw
@@ -280,6 +280,18 @@ def _result(
     linear = best.linearised or linearised(problem, x, residuals)
     unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories)
     adequacy = adequacy_of(problem, linear, noise_model, working_estimator.predictor_errors, histories)
+    if adequacy.verdict == "leaves a discrepancy":
+        tried = {
+            effect.kind: adequacy_of(
+                problem,
+                with_random_effects(linear, [effect]),
+                noise_model,
+                working_estimator.predictor_errors,
+                histories,
+            )
+            for effect in unmodelled
+        }
+        adequacy = replace(adequacy, remedies=tuple(kind for kind, other in tried.items() if other.explains))
     return Identification(
         law=law,
         estimates=parameter_estimates(law, coordinates, u, law_covariance, interval_quantile(freedom)),

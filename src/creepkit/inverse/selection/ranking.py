@@ -153,6 +153,10 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
     weight = f"weight {ranking.laws[0].weight:.2f} of the laws tried"
     if adequacy is not None and adequacy.verdict == "leaves a discrepancy":
         others = "" if len(names) == 1 else f", not told apart from {' and '.join(names[1:])}"
+        remedied = [r.fit for r in ranking.laws if r.fit.adequacy is not None and r.fit.adequacy.remedies]
+        if remedied and not adequacy.remedies:
+            effect = " or ".join(remedied[0].adequacy.remedies) if remedied[0].adequacy is not None else ""
+            others += f"; with {effect} unknown, {remedied[0].law.name} would explain them"
         return f"none of {count} laws tried explains the tests; the best, {best} ({weight}{others}), {adequacy}"
     if best in ranking.further:
         asked, more = count - len(ranking.further), len(ranking.further)
