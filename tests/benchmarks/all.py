@@ -65,14 +65,7 @@ BENCHMARKS = {
     "identification_speed": Benchmark(1),
     "search_success": Benchmark(15, (("--specimens", "6", "--through", "surrogate", "--searches", "default", "cma"),)),
     "swarm_speed": Benchmark(1),
-    "law_recovery": Benchmark(
-        30,
-        (
-            ("--design", "jump", "--specimens", "60"),
-            ("--design", "thickness", "correlated", "--specimens", "60"),
-            ("--design", "dimples", "--specimens", "28"),
-        ),
-    ),
+    "law_recovery": Benchmark(90),
     "penalty_confusion": Benchmark(
         12, (("--specimens", "2", "--penalties", "L2", "GroupL2", "Sqrt", "Subsets", "paper"),)
     ),

@@ -111,8 +111,13 @@ def drawn_values(name, rng):
     return {"A": rate / (SIGMA**n * hardened), "n": n, "m": m}
 
 
-def drawn_outside(name, rng):
-    """A law that is not among the candidates, nor among their sums, and its values."""
+def drawn_other(name, rng):
+    """A law and its values that is not among the candidates, nor among their sums; or sinh at the bound of its n."""
+    if name == "sinh with n = 1":
+        local = rng.uniform(4.0, 8.0)
+        x = brentq(lambda x: x / np.tanh(x) - local, 1e-3, 60.0)
+        rate = 10.0 ** rng.uniform(-7.3, -5.7)
+        return ck.law("hyperbolic-sine"), {"A": rate / np.sinh(x), "n": 1.0, "B": SIGMA / x}
     if name == "threshold sinh":
         values, threshold = drawn_values("hyperbolic-sine", rng), rng.uniform(20.0, 60.0)
         x = np.arcsinh((values["A"] * np.sinh(SIGMA / values["B"]) ** values["n"] / values["A"]) ** (1 / values["n"]))
@@ -158,7 +163,7 @@ def _outside_laws():
 
 
 THRESHOLD_SINH, SOFTENING = _outside_laws()
-OUTSIDE = ("threshold sinh", "softening", "n(t)")
+OTHERS = ("threshold sinh", "softening", "n(t)", "sinh with n = 1")
 
 
 def drawn_sum(names, rng):
@@ -193,7 +198,7 @@ def specimen(k, names, design, using, seed=2026):
         if isinstance(name, tuple):
             law, values = drawn_sum(name, rng)
         else:
-            law, values = drawn_outside(name, rng) if name in OUTSIDE else (ck.law(name), drawn_values(name, rng))
+            law, values = drawn_other(name, rng) if name in OTHERS else (ck.law(name), drawn_values(name, rng))
         modulus = 150e3 * (1.0 + 0.1 * np.clip(rng.standard_normal(), -3, 3))
         try:
             law.values(values)
