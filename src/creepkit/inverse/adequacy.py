@@ -133,9 +133,11 @@ class Adequacy:
             )
         source = " and ".join(dict.fromkeys(o.noise_source for o in self.outputs))
         if self.explains:
+            slow = np.isfinite(self.correlation)
+            correlated = "; what is left is autocorrelated, noise or the law's own" if slow else ""
             return (
                 f"explains the tests to their {source} noise: reduced chi-square {self.chi_square:.3g}, "
-                f"p = {self.p_value:.2g}"
+                f"p = {self.p_value:.2g}{correlated}"
             )
         parts = [
             f"{o.discrepancy:.2g}{' ' + output_unit(o.output) if output_unit(o.output) else ''} of {o.output} "

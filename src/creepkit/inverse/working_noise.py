@@ -28,6 +28,7 @@ from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, RUPTURE_OUT
 from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.settings import PAPER_WEIGHTS, IdentificationSettings
 from creepkit.inverse.variance_components import (
+    LONGEST_DRIFT,
     LinearisedProblem,
     estimate_variance_components,
     restricted_log_likelihood,
@@ -152,7 +153,7 @@ class WorkingNoiseEstimator:
             return self._with_predictor_error(white[0])
         for drift, discrepancy in ((False, True), (True, False)):
             candidate = estimated(drift=drift, discrepancy=discrepancy)
-            if suffices(candidate, full):
+            if suffices(candidate, full) and not _is_at_longest_drift(candidate[0]):
                 return self._with_predictor_error(candidate[0])
         return self._with_predictor_error(full[0])
 
@@ -217,6 +218,14 @@ class WorkingNoiseEstimator:
             if self.relative_sd is not None:
                 working = working.with_output(name, misfit=sizes.misfit)
         return working
+
+
+def _is_at_longest_drift(noise_model: NoiseModel) -> bool:
+    """Whether a drift would last longer than the noise of an instrument may: then it is a discrepancy."""
+    return any(
+        components.drift > NEGLIGIBLE_DRIFT and components.correlation_length > 0.99 * LONGEST_DRIFT
+        for components in noise_model.outputs.values()
+    )
 
 
 def with_rupture_weight(working: NoiseModel, observations: ObservationVector) -> NoiseModel:
