@@ -18,6 +18,7 @@ from creepkit.errors import FitError, nearest
 from creepkit.files.json_documents import DocumentFormat, write_json
 from creepkit.files.reading import FileKind
 from creepkit.files.record_codec import RecordCodec, ValueCodec
+from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identification_document import LAW_CODEC, identification_from_json, identification_to_json
 from creepkit.inverse.uncertainty.laplace_approximation import Estimate
@@ -113,6 +114,11 @@ class CandidateLaw:
     criterion_difference: float
     weight: float
     fit: Identification | None = None
+
+    @property
+    def adequacy(self) -> Adequacy | None:
+        """Whether the law explains all tests to their noise, once it was refitted to them."""
+        return None if self.fit is None else self.fit.adequacy
 
     @property
     def forms(self) -> dict[str, str]:

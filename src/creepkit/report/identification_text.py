@@ -8,7 +8,7 @@ from dataclasses import asdict
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from creepkit.inverse.observation_vector import RUPTURE_OUTPUT
+from creepkit.inverse.observation_vector import RELATIVE_DISCREPANCY_UNIT, RUPTURE_OUTPUT
 from creepkit.language.printing import expression_text, state_equations
 from creepkit.records import kind_and_start
 
@@ -44,10 +44,16 @@ def identification_text(fit: Identification) -> str:
         *_ruptures(fit),
         *_linear_outputs(fit),
         *_table(fit),
+        *_adequacy(fit),
     ]
     lines += [f"  {fit.sparsity.verdict}"] if fit.sparsity is not None else []
     lines += [f"  note: {note}" for note in fit.notes]
     return "\n".join(lines)
+
+
+def _adequacy(fit: Identification) -> list[str]:
+    """Whether the law explains the tests, on a line of its own."""
+    return [] if fit.adequacy is None else ["", f"  the law {fit.adequacy}"]
 
 
 def _values(fit: Identification) -> list[str]:
@@ -85,8 +91,16 @@ def _strains(fit: Identification) -> list[str]:
         f"  {_tests(len(tests))}, {sum(m.frames for m in tests)} frames: {_rms_label(fit)} {fit.rms:.3g}",
         f"  scatter (one sd): rate between tests {100 * fit.noise_model.rate:.0f} %, "
         f"loading strain {noise.offset:.2g}, frame noise {noise.noise:.2g}, "
-        f"what the law cannot follow {100 * noise.drift:.1f} % of strain",
+        f"what the law cannot follow {_discrepancy_of_strain(fit):.1f} % of strain",
     ]
+
+
+def _discrepancy_of_strain(fit: Identification) -> float:
+    """Per cent of strain: model discrepancy, drift and independent misfit together."""
+    components = fit.noise_model["strain"]
+    return 100 * math.hypot(
+        RELATIVE_DISCREPANCY_UNIT * fit.noise_model.discrepancy, components.drift, components.misfit
+    )
 
 
 def _rms_label(fit: Identification) -> str:
@@ -211,7 +225,8 @@ def identification_comments(fit: Identification) -> list[str]:
         for name, e in fit.errors.items()
         if name != "strain"
     ]
-    return [*lines, "; ".join([*errors_text, rate_scatter]), *fit.notes]
+    adequacy_text = [] if fit.adequacy is None else [f"the law {fit.adequacy}"]
+    return [*lines, "; ".join([*errors_text, rate_scatter]), *adequacy_text, *fit.notes]
 
 
 def rupture_rows(fit: Identification) -> list[tuple[str, str, RuptureComparison]]:

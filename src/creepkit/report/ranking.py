@@ -21,11 +21,21 @@ _CRITERION_NAMES = {"bic": "BIC", "aicc": "AICc", "hold-out": "hold-out"}
 def ranking_text(ranking: Ranking) -> str:
     """The verdict, then a line for each law."""
     width = max(len(r.fit.law.name) for r in ranking.laws)
-    header = f"{'law':{width}}   weight  {_CRITERION_NAMES[ranking.criterion]} - best  chi-square"
-    rows = [f"{r.fit.law.name:{width}}   {r.weight:6.3f}  {r.excess:10.1f}  {r.chi_square:10.1f}" for r in ranking.laws]
+    header = f"{'law':{width}}   weight  {_CRITERION_NAMES[ranking.criterion]} - best  chi-square  explains the tests"
+    rows = [
+        f"{r.fit.law.name:{width}}   {r.weight:6.3f}  {r.excess:10.1f}  {r.chi_square:10.1f}  {_explains(r.fit)}"
+        for r in ranking.laws
+    ]
     failed = [f"{name}: {reason}" for name, reason in ranking.failed.items()]
     equivalent = [] if ranking.decisive else [f"- {pair}" for pair in _equivalents_among_remaining(ranking)]
     return "\n".join([ranking.verdict, *equivalent, "", header, *rows, *failed])
+
+
+def _explains(fit: Identification) -> str:
+    """Whether a law explains the tests to their noise, and what it leaves, in noises."""
+    if fit.adequacy is None or fit.adequacy.verdict == "cannot be judged":
+        return "?"
+    return "yes" if fit.adequacy.explains else f"no: leaves {fit.adequacy.discrepancy_in_noises:.2g} noises"
 
 
 def _equivalents_among_remaining(ranking: Ranking) -> list[EquivalentLaws]:
@@ -50,10 +60,11 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
             *_misfit_cells(entry.fit),
             f"{entry.excess:.1f}",
             f"{entry.weight:.3f}",
+            _explains(entry.fit),
         )
         for entry in ranking.laws
     ]
-    columns = ("law", "parameters", *_misfit_columns(ranking.best), "BIC - best", "weight")
+    columns = ("law", "parameters", *_misfit_columns(ranking.best), "BIC - best", "weight", "explains the tests")
     print_table(f"{test_count} tests", columns, rows)
     print(f"{ranking.verdict}\n\n{ranking.best}\n")
     for path in written:
@@ -62,19 +73,23 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
 
 def _misfit_columns(fit: Identification) -> tuple[str, ...]:
     output = next(iter(fit.errors))
-    return ("rms ln strain" if output == "strain" else f"error of {output}", "test to test", "not followed")
+    return ("rms ln strain" if output == "strain" else f"error of {output}", "test to test")
 
 
 def _misfit_cells(fit: Identification) -> tuple[str, ...]:
     output = next(iter(fit.errors))
     misfit = f"{fit.rms:.3f}" if output == "strain" else f"{fit.errors[output].relative_squared_error:.3g}"
-    return misfit, f"{100 * fit.noise_model.rate:.0f} %", f"{100 * fit.noise_model[output].drift:.0f} %"
+    return misfit, f"{100 * fit.noise_model.rate:.0f} %"
 
 
 def ranking_to_json(ranking: Ranking, written: Sequence[Path]) -> dict[str, Any]:
     """The same as JSON-able data."""
     return {
         "verdict": ranking.verdict,
+        "decisive": ranking.decisive,
+        "adequacy": ranking.adequacy,
+        "further": list(ranking.further),
+        "challenges": None if ranking.challenges is None else list(ranking.challenges),
         "laws": [
             {**_fit_to_json(ranked.fit), "bic_excess": ranked.excess, "weight": ranked.weight}
             for ranked in ranking.laws
@@ -92,6 +107,8 @@ def _fit_to_json(fit: Identification) -> dict[str, Any]:
             e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit, "verdict": e.verdict}
             for e in fit.estimates
         },
+        "adequacy": fit.adequacy,
+        "numerical_error": fit.numerical_error,
         "nuisances": list(fit.nuisances),
         "noise_model": fit.noise_model,
         "notes": list(fit.notes),

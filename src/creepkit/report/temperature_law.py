@@ -183,6 +183,7 @@ def temperature_law_text(temperature_law: TemperatureLaw) -> str:
             "",
             *_combination_lines(temperature_law),
             *_prior_lines(temperature_law),
+            *([] if temperature_law.adequacy is None else [f"  the law {temperature_law.adequacy}"]),
             *(f"  note: {note}" for note in temperature_law.notes),
         ]
     )
