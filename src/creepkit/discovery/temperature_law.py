@@ -116,11 +116,6 @@ class CandidateLaw:
     fit: Identification | None = None
 
     @property
-    def adequacy(self) -> Adequacy | None:
-        """Whether the law explains all tests to their noise, once it was refitted to them."""
-        return None if self.fit is None else self.fit.adequacy
-
-    @property
     def forms(self) -> dict[str, str]:
         """{parameter: name of its form}."""
         return {form.parameter: form.name for form in self.candidate_forms}
@@ -169,6 +164,11 @@ class TemperatureLaw(Presentable):
     def values(self) -> dict[str, float]:
         """{parameter: value} of `law`, in the author's units."""
         return {e.name: e.value for e in self.estimates}
+
+    @property
+    def adequacy(self) -> Adequacy | None:
+        """Whether the law explains all tests to their noise, once it was refitted to them."""
+        return None if self.fit is None else self.fit.adequacy
 
     @property
     def forms(self) -> dict[str, str]:

@@ -306,7 +306,7 @@ def _candidates_given(
 ) -> tuple[CandidateTest, ...]:
     """The candidates given, with names of their own; else variations of the tests that were made."""
     if candidates_or_histories is None:
-        return variations(fit.histories, float(fit.local_exponent(fit.reference.stress)[0]), fit.predictor)
+        return variations(fit.histories, float(fit.local_exponent(fit.reference.stress, warn=False)[0]), fit.predictor)
     candidates = (
         candidate if isinstance(candidate, CandidateTest) else CandidateTest(candidate.name, candidate)
         for candidate in candidates_or_histories

@@ -210,7 +210,7 @@ def adequacy_of(
         freedom,
         p_value,
         _correlation(noise_model),
-        _largest_deviation(observations, judged, linear.residuals, histories),
+        _largest_deviation(observations, judged, _white_part(residuals, solution, independent), histories),
     )
 
 
@@ -292,12 +292,16 @@ def _correlation(noise_model: NoiseModel) -> float:
     return noise_model.discrepancy_length / (1.0 if decades else LINEAR_COORDINATE_LENGTH)
 
 
+def _white_part(residuals: Residuals, solution: LinearSolution, noise_model: NoiseModel) -> Floats:
+    """(tests, observations) what is left in the output's unit once offsets and rates of tests are taken out."""
+    noise = noise_model.per_observation(residuals.output_index, "noise") * residuals.relative_noise
+    return np.asarray(noise**2 * residuals.offset_sensitivity * solution.weighted_residuals)
+
+
 def _largest_deviation(
-    observations: ObservationVector, judged: Bools, residuals: Residuals, histories: Sequence[History]
+    observations: ObservationVector, judged: Bools, deviation: Floats, histories: Sequence[History]
 ) -> LargestDeviation | None:
     """The mean deviation of a few neighbouring frames that is largest over its noise."""
-    sensitivity = np.maximum(np.abs(residuals.offset_sensitivity), 1e-300)
-    deviation = residuals.values / sensitivity
     noise = np.maximum(observations.per_observation(observations.noise) * observations.relative_noise, 1e-300)
     best: LargestDeviation | None = None
     for test, history in enumerate(histories):

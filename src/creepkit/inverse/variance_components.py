@@ -165,11 +165,13 @@ def estimate_variance_components(
     *,
     fixed: Sequence[str] = ("noise",),
     linearised: LinearisedProblem | None = None,
+    longest_drift: float = LONGEST_CORRELATION,
 ) -> NoiseModel:
     """The noise model of largest likelihood, beginning from `start`.
 
     Components at zero, named in `fixed` or with a given prior stay; by default the noise, which was measured.
     linearised : with it the likelihood is the restricted one, parameters of the law integrated out.
+    longest_drift : longest correlation of the drifts, in correlation time.
     """
     fixed_by_prior = components_fixed_by_priors(nuisances, list(start.outputs))
     free = [
@@ -186,7 +188,12 @@ def estimate_variance_components(
     if not free:
         return start
     likelihood = _Likelihood(residuals, start, free, linearised)
-    bounds = [_bounds(residuals, start, output, name) for output, name in free]
+    bounds = [
+        (float(np.log(SHORTEST_CORRELATION)), float(np.log(longest_drift)))
+        if name == "correlation_length"
+        else _bounds(residuals, start, output, name)
+        for output, name in free
+    ]
     x0 = np.array(
         [np.clip(np.log(_component(start, *component)), *b) for component, b in zip(free, bounds, strict=True)]
     )
@@ -306,8 +313,6 @@ def _component(noise_model: NoiseModel, output: str, name: str) -> float:
 
 def _bounds(residuals: Residuals, noise_model: NoiseModel, output: str, name: str) -> tuple[float, float]:
     """Bounds of the logarithm of a component: an offset up to the typical output itself."""
-    if name == "correlation_length":
-        return float(np.log(SHORTEST_CORRELATION)), float(np.log(LONGEST_DRIFT))
     if name == "discrepancy_length":
         return float(np.log(SHORTEST_DISCREPANCY)), float(np.log(LONGEST_CORRELATION))
     if name == "discrepancy":

@@ -140,7 +140,12 @@ class WorkingNoiseEstimator:
         def estimated(*, drift: bool, discrepancy: bool) -> tuple[NoiseModel, float]:
             start = self._initial_components(previous, drift=drift, discrepancy=discrepancy)
             noise_model = estimate_variance_components(
-                linearised.residuals, start, self.settings.nuisances, fixed=(), linearised=linearised
+                linearised.residuals,
+                start,
+                self.settings.nuisances,
+                fixed=(),
+                linearised=linearised,
+                longest_drift=LONGEST_DRIFT,
             )
             return noise_model, restricted_log_likelihood(linearised, noise_model)
 

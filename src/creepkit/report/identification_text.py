@@ -68,8 +68,8 @@ def _values(fit: Identification) -> list[str]:
 
 def _reference(fit: Identification) -> list[str]:
     r = fit.reference
-    rate, low, high = (float(v) for v in fit.rate(r.stress))
-    n, exponent_low, exponent_high = (float(v) for v in fit.local_exponent(r.stress))
+    rate, low, high = (float(v) for v in fit.rate(r.stress, warn=False))
+    n, exponent_low, exponent_high = (float(v) for v in fit.local_exponent(r.stress, warn=False))
     qualifier = " of virgin material" if fit.law.states else ""
     return [
         f"  rate{qualifier} at {r.stress:.4g} MPa, {r.temperature:.0f} K, strain {r.strain:.2g}, {r.time:.3g} s: "

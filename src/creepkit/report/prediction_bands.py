@@ -123,7 +123,7 @@ def rates_of_tests(fit: Identification, prediction: Prediction) -> list[HoldRate
                 continue
             ratio = _growth_ratio(history.outputs[output][frames], predicted[frames])
             if ratio > 0:
-                rate = ratio * float(fit.rate(stress, history.mean_temperature)[0])
+                rate = ratio * float(fit.rate(stress, history.mean_temperature, warn=False)[0])
                 rates.append(HoldRate(k, stress, history.mean_temperature, rate))
     return rates
 

@@ -69,8 +69,7 @@ def ranking_figure(ranking: Ranking, path: str | Path | None = None) -> Figure:
         for axes in panels[len(shown) :]:
             axes.set_visible(False)
         _name_laws(parts[1], credible, every_test=len(shown) == len(ranking.best.tests))
-    adequacy = getattr(ranking, "adequacy", None)
-    title = ranking.verdict if adequacy is None else f"{ranking.verdict}\n{adequacy}"
+    title = ranking.verdict
     figure.suptitle(wrapped(title, width), fontsize=10)
     return save_figure(figure, path)
 

@@ -38,7 +38,7 @@ def draw_rates(axes: Axes, fit: Identification, rates: Sequence[HoldRate]) -> No
     scale = temperature_scale(fit.histories)
     bounds: list[float] = []
     for celsius in _drawn_temperatures(scale):
-        rate, low, high = fit.rate(grid, np.full_like(grid, celsius + ZERO_CELSIUS))
+        rate, low, high = fit.rate(grid, np.full_like(grid, celsius + ZERO_CELSIUS), warn=False)
         axes.fill_between(grid, low, high, color=scale(celsius), alpha=0.25, lw=0)
         axes.plot(grid, rate, color=scale(celsius), lw=1.4, label=f"{celsius:.0f} °C")
         bounds += [float(rate.min()), float(rate.max()), float(low.min()), float(high.max())]

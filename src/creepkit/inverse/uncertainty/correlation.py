@@ -164,8 +164,8 @@ def _combination_text(weights: Floats, names: list[str]) -> str:
 def _determined_sentence(fit: Identification) -> str:
     """The rate and the local exponent in the middle of the tests, with what is known of them."""
     reference = fit.reference
-    rate, rate_low, rate_high = (float(v) for v in fit.rate(reference.stress))
-    exponent, exponent_low, exponent_high = (float(v) for v in fit.local_exponent(reference.stress))
+    rate, rate_low, rate_high = (float(v) for v in fit.rate(reference.stress, warn=False))
+    exponent, exponent_low, exponent_high = (float(v) for v in fit.local_exponent(reference.stress, warn=False))
     return (
         f"what the tests see at {reference.stress:.4g} MPa, {reference.temperature:.0f} K: the local exponent is "
         f"{exponent:.3g} "
