@@ -55,6 +55,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     interval_quantile,
     laplace_covariance,
     parameter_estimates,
+    positive_semidefinite,
     restricted_covariance,
 )
 from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note, with_random_effects
@@ -62,6 +63,10 @@ from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_rupture_weight
 from creepkit.language import CreepLaw
 from creepkit.records import History, Nuisance, Predictor
+
+MOST_CORRECTIONS, SMALL_SHIFT = 3, 0.5
+"""How often a predictor is corrected, and the shift of values, in standard deviations, up to which once is enough."""
+
 
 REFIT_ROUNDS = 2
 """Rounds of an estimate that begins near its end."""
@@ -233,9 +238,14 @@ def _best_estimate(
             return best, None
     else:
         x = starts[0]
-    corrected, numerical_error = correct_defect(problem, x)
-    estimator = _working_estimator(corrected, numerical_error)
-    return estimate_iteratively(corrected, x, estimator, limits, progress, working_noise), numerical_error
+    for _ in range(MOST_CORRECTIONS):
+        corrected, numerical_error = correct_defect(problem, x)
+        estimator = _working_estimator(corrected, numerical_error)
+        best = estimate_iteratively(corrected, x, estimator, limits, progress, working_noise)
+        x, working_noise = best.minimum.x, best.working_noise
+        if numerical_error is None or numerical_error.shift < SMALL_SHIFT:
+            break
+    return best, numerical_error
 
 
 def _working_estimator(
@@ -267,7 +277,7 @@ def _result(
     if not problem.observations.followed_to_rupture.any():
         problem.evaluations.failures.check(prediction, histories, law.name)
     prediction = with_correction_at_frames(problem, histories, prediction)
-    law_covariance = covariance[:count, :count]
+    law_covariance = positive_semidefinite(covariance[:count, :count])
     ruptures = compare_rupture_times(
         coordinates, u, law_covariance, noise_model, interval_quantile(freedom), histories, problem.predictor
     )

@@ -78,8 +78,14 @@ def creep_output(history: History) -> str:
     return next((name for name in ("strain", "amplitude") if name in history.outputs), next(iter(history.outputs), ""))
 
 
+GROWING_OUTPUTS = ("strain", "amplitude")
+"""Outputs that grow with creep under a load; the stress of a relaxing bar falls, and should."""
+
+
 def unloading_frames(history: History) -> Iterator[FlaggedFrames]:
     """Frames after the end of the test, and a sudden fall in its last used frames."""
+    if creep_output(history) not in GROWING_OUTPUTS:
+        return
     usable = np.flatnonzero(history.used & _has_value(history))
     later_frames = np.flatnonzero(~history.used)
     later_frames = later_frames[later_frames > usable[-1]] if usable.size else later_frames[:0]
@@ -123,6 +129,8 @@ def decreasing_frames(history: History) -> Iterator[FlaggedFrames]:
     They begin at the highest frame; after a raise of the load with the raise, for whatever makes a dimple or a bar fall
     under a larger load was there from then on.
     """
+    if creep_output(history) not in GROWING_OUTPUTS:
+        return
     for segment in load_segments(history):
         if segment.frames.size < FEWEST_FRAMES or not segment.load_increased:
             continue

@@ -89,7 +89,9 @@ def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
 
 def _identify_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:
     laws = [with_arrhenius(law, alloy.tests) for law in job.laws]
-    ranking = select(laws, alloy.tests, job.predictor, settings=job.settings, through=_surrogate_for(job, laws))
+    through = _surrogate_for(job, laws)
+    # A plate compares alloys by the same laws; what else might explain one of them is a question for select() itself.
+    ranking = select(laws, alloy.tests, job.predictor, settings=job.settings, through=through, sums=False)
     best, notes = ranking.best, list(limitations(alloy, job.predictor))
     dense = sparse = None
     if job.dense_law is not None:

@@ -353,7 +353,8 @@ def test_a_network_on_a_base_is_near_before_it_has_learnt_much(plates: Dataset) 
 def test_identify_with_a_network_finds_what_was_planted(learnt: Surrogate, tension: Dataset) -> None:
     truth, tests, noise = tension.values_of(7), [], np.random.default_rng(0)
     for k, row in enumerate((7, 8, 9, 10)):
-        shown = learnt.predict(tension.law, tension.law.to_internal(truth), [tension.planned_test(row)]).values[0, 0]
+        specimen, theta = learnt.specimen, tension.law.to_internal(truth)
+        shown = specimen.predict(tension.law, theta, [tension.planned_test(row)]).values[0, 0]
         tests.append(
             measured(
                 tension.planned_test(row), shown * (1 + 1e-3 * noise.normal(size=shown.shape)), ("strain",), f"t{k}"

@@ -249,7 +249,13 @@ def planted(model: RateSurrogate, values: dict[str, float], test: History) -> Hi
 
 def test_identify_with_it_finds_what_was_planted(guarded: RateSurrogate) -> None:
     truth = norton(5.0)
-    fit = ck.identify(NORTON, [planted(guarded, truth, dimple())], using=guarded, starts=2)
+    measured_test = measured(
+        dimple(),
+        guarded.specimen.predict(NORTON, NORTON.to_internal(truth), [dimple()]).values[0, 0],
+        guarded.outputs,
+        "planted",
+    )
+    fit = ck.identify(NORTON, [measured_test], using=guarded, starts=2)
     by_name = {e.name: e.value for e in fit.estimates}
     assert by_name["n"] == pytest.approx(5.0, abs=0.01)
     assert by_name["A"] * 120 ** by_name["n"] == pytest.approx(1e-7, rel=2e-3)

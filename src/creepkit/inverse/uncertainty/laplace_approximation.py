@@ -139,6 +139,20 @@ def interval_quantile(freedom: float) -> float:
     return float(student.ppf(0.975, max(freedom, 1.0)))
 
 
+def positive_semidefinite(covariance: Floats) -> Floats:
+    """The nearest covariance (unknowns, unknowns), in units of its standard deviations, without negative eigenvalues.
+
+    Rounding makes some where the data hardly determine a combination of unknowns.
+    """
+    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    scaled = covariance / np.outer(sd, sd)
+    values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    if values[0] >= 0.0:
+        return covariance
+    repaired = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    return np.asarray(repaired * np.outer(sd, sd))
+
+
 def laplace_covariance(
     residuals: Residuals,
     working_noise: NoiseModel,
