@@ -192,6 +192,8 @@ def _chi_square(problem: LeastSquaresProblem, x: Floats) -> float:
 
 def decisive_effects(fits: Sequence[Identification]) -> tuple[Challenge, ...]:
     """The unmodelled effects, one by one, with which the first law no longer has nearly all the weight."""
+    if any(fit.linearised is None for fit in fits):  # they were not made by likelihood
+        return ()
     kinds = dict.fromkeys(effect.kind for fit in fits for effect in fit.unmodelled)
     challenges = []
     for kind in kinds:

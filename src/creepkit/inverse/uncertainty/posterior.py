@@ -163,7 +163,10 @@ class Posterior:
         u : (candidates, parameters).
         """
         is_inside = np.asarray(((u >= self.lower) & (u <= self.upper)).all(axis=1))
-        theta, (lower, upper) = self.problem.coordinates.theta(u), self.parameter_bounds
+        lower, upper = self.parameter_bounds
+        # Candidates beyond the bounds of u may have no finite values: those within take their place.
+        with np.errstate(all="ignore"):
+            theta = self.problem.coordinates.theta(np.clip(u, self.lower, self.upper))
         tolerance = 1e-9 * (upper - lower)
         is_inside &= ((theta >= lower - tolerance) & (theta <= upper + tolerance)).all(axis=1)
         if self.problem.law.constraints:
