@@ -171,7 +171,8 @@ class Posterior:
         is_inside &= ((theta >= lower - tolerance) & (theta <= upper + tolerance)).all(axis=1)
         if self.problem.law.constraints:
             bound_penalties = self.problem.bound_penalties
-            is_inside &= np.array([not (bound_penalties.constraint_violations(candidate) > 0).any() for candidate in u])
+            for k in np.flatnonzero(is_inside):
+                is_inside[k] = not (bound_penalties.constraint_violations(u[k]) > 0).any()
         return np.asarray(is_inside)
 
 
