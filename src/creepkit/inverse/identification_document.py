@@ -73,7 +73,12 @@ CODEC = RecordCodec(
         Adequacy: dict.fromkeys(("chi_square", "freedom", "p_value", "correlation"), NOT_NEGATIVE_OR_NAN),
         OutputAdequacy: {"frames": NOT_NEGATIVE, "noise": POSITIVE, "discrepancy": NOT_NEGATIVE},
         NumericalError: {"noises": NOT_NEGATIVE, "shift": NOT_NEGATIVE_OR_NAN},
-        UnmodelledEffect: {"size": NOT_NEGATIVE, "rate_change": NOT_NEGATIVE_OR_NAN},
+        UnmodelledEffect: {
+            "size": NOT_NEGATIVE,
+            "rate_change": NOT_NEGATIVE_OR_NAN,
+            "like_hardening": NAN_ALLOWED,
+            "hardening_correlation": NOT_NEGATIVE_OR_NAN,
+        },
         OutputErrors: {
             "frames": NOT_NEGATIVE,
             "relative_squared_error": NOT_NEGATIVE_OR_NAN,

@@ -158,7 +158,7 @@ def test_outputs_inverted_one_by_one_are_the_whole_matrix_inverted():
 
 
 def test_a_discrepancy_is_not_taken_for_less_than_it_is():
-    """AR(1) of .9, a fifth of the test long, under a cubic: plain maximum likelihood finds too little of it, the restricted one does not.
+    """AR(1) of .9, a fifth of the test long, under a cubic: plain maximum likelihood finds too little of it.
 
     60 series of 48 frames; the mean of ln of the estimated variance of the process, to three standard errors.
     """
