@@ -28,6 +28,7 @@ from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, RUPTURE_OUT
 from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.settings import PAPER_WEIGHTS, IdentificationSettings
 from creepkit.inverse.variance_components import (
+    LONGEST_DRIFT,
     LinearisedProblem,
     estimate_variance_components,
     restricted_log_likelihood,
@@ -48,6 +49,10 @@ INITIAL_AUTOCORRELATION = 0.1
 
 INITIAL_DRIFT, INITIAL_DRIFT_LENGTH = 0.01, 0.2
 """Of the transformed output, and in correlation time, where the estimate of a drift begins."""
+
+
+LONGEST_TOLERANCE = 0.01
+"""Of the longest correlation of a drift, within which it is at its bound."""
 
 
 INITIAL_DISCREPANCY = 1.0
@@ -133,7 +138,8 @@ class WorkingNoiseEstimator:
 
         A drift is a variance at the edge of what it may be: estimated always, it is above zero half of the time where
         there is none, and widens every interval. Of the parts that are autocorrelated those stay that the others cannot
-        replace: a discrepancy of all outputs rather than drifts of each.
+        replace: a discrepancy of all outputs rather than drifts of each. A drift whose correlation is as long as may be
+        is no noise of an instrument: the discrepancy stays in its place.
         """
 
         def estimated(*, drift: bool, discrepancy: bool) -> tuple[NoiseModel, float]:
@@ -150,11 +156,12 @@ class WorkingNoiseEstimator:
         white, full = estimated(drift=False, discrepancy=False), estimated(drift=True, discrepancy=True)
         if suffices(white, full):
             return self._with_predictor_error(white[0])
-        for drift, discrepancy in ((False, True), (True, False)):
-            candidate = estimated(drift=drift, discrepancy=discrepancy)
-            if suffices(candidate, full):
-                return self._with_predictor_error(candidate[0])
-        return self._with_predictor_error(full[0])
+        discrepant = estimated(drift=False, discrepancy=True)
+        if suffices(discrepant, full):
+            return self._with_predictor_error(discrepant[0])
+        drifting = estimated(drift=True, discrepancy=False)
+        best = drifting if suffices(drifting, full) else full
+        return self._with_predictor_error((discrepant if _drifts_at_longest(best[0]) else best)[0])
 
     def _with_predictor_error(self, noise_model: NoiseModel) -> NoiseModel:
         """The same with the errors of the predictor as drift: they follow the curve, and do not average out."""
@@ -217,6 +224,12 @@ class WorkingNoiseEstimator:
             if self.relative_sd is not None:
                 working = working.with_output(name, misfit=sizes.misfit)
         return working
+
+
+def _drifts_at_longest(noise_model: NoiseModel) -> bool:
+    """Whether the drift of some output has the longest correlation that it may have."""
+    longest = (1.0 - LONGEST_TOLERANCE) * LONGEST_DRIFT
+    return any(o.drift > NEGLIGIBLE_DRIFT and o.correlation_length > longest for o in noise_model.outputs.values())
 
 
 def with_rupture_weight(working: NoiseModel, observations: ObservationVector) -> NoiseModel:
