@@ -31,6 +31,7 @@ from creepkit.inverse.variance_components import (
     LONGEST_DRIFT,
     LinearisedProblem,
     estimate_variance_components,
+    log_noise_prior,
     restricted_log_likelihood,
 )
 
@@ -51,8 +52,12 @@ INITIAL_DRIFT, INITIAL_DRIFT_LENGTH = 0.01, 0.2
 """Of the transformed output, and in correlation time, where the estimate of a drift begins."""
 
 
-LONGEST_TOLERANCE = 0.01
-"""Of the longest correlation of a drift, within which it is at its bound."""
+ALMOST = 0.99
+"""Of the longest correlation of a drift, from which on it is at its bound."""
+
+
+NEGLIGIBLE_SHARE = 0.5
+"""Of white noise, up to which a drift is small beside it and its correlation length means nothing."""
 
 
 INITIAL_DISCREPANCY = 1.0
@@ -147,7 +152,7 @@ class WorkingNoiseEstimator:
             noise_model = estimate_variance_components(
                 linearised.residuals, start, self.settings.nuisances, fixed=(), linearised=linearised
             )
-            return noise_model, restricted_log_likelihood(linearised, noise_model)
+            return noise_model, restricted_log_likelihood(linearised, noise_model) + log_noise_prior(noise_model)
 
         def suffices(simpler: tuple[NoiseModel, float], richer: tuple[NoiseModel, float]) -> bool:
             further = autocorrelated_components(richer[0]) - autocorrelated_components(simpler[0])
@@ -161,7 +166,8 @@ class WorkingNoiseEstimator:
             return self._with_predictor_error(discrepant[0])
         drifting = estimated(drift=True, discrepancy=False)
         best = drifting if suffices(drifting, full) else full
-        return self._with_predictor_error((discrepant if _drifts_at_longest(best[0]) else best)[0])
+        is_slow = _drifts_at_longest(best[0], linearised.residuals)
+        return self._with_predictor_error((discrepant if is_slow else best)[0])
 
     def _with_predictor_error(self, noise_model: NoiseModel) -> NoiseModel:
         """The same with the errors of the predictor as drift: they follow the curve, and do not average out."""
@@ -226,10 +232,14 @@ class WorkingNoiseEstimator:
         return working
 
 
-def _drifts_at_longest(noise_model: NoiseModel) -> bool:
-    """Whether the drift of some output has the longest correlation that it may have."""
-    longest = (1.0 - LONGEST_TOLERANCE) * LONGEST_DRIFT
-    return any(o.drift > NEGLIGIBLE_DRIFT and o.correlation_length > longest for o in noise_model.outputs.values())
+def _drifts_at_longest(noise_model: NoiseModel, residuals: Residuals) -> bool:
+    """Whether a drift that is not small beside white noise has the longest correlation that it may have."""
+    for position, components in enumerate(noise_model.outputs.values()):
+        mask = residuals.present & (residuals.output_index == position)
+        noise = components.noise * float(np.median(residuals.offset_sensitivity[mask])) if mask.any() else np.inf
+        if components.drift > NEGLIGIBLE_SHARE * noise and components.correlation_length > ALMOST * LONGEST_DRIFT:
+            return True
+    return False
 
 
 def with_rupture_weight(working: NoiseModel, observations: ObservationVector) -> NoiseModel:
