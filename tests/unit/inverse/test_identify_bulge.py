@@ -248,7 +248,7 @@ def test_round_trip_through_json(fit, tests, tmp_path):
 def test_files_of_the_first_version_are_refused(fit, tmp_path):
     path = tmp_path / "old.json"
     path.write_text(json.dumps({**identification_to_json(fit), "version": 1}))
-    with pytest.raises(FitError, match="in version 1 of the format; this one reads version 5: identify again"):
+    with pytest.raises(FitError, match="in version 1 of the format; this one reads version 6: identify again"):
         read_identification(path)
 
 

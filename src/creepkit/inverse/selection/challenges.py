@@ -102,7 +102,7 @@ class ShareResidual:
         return np.array([(x[self.second] - x[self.first] - self.log_ratio) / SHARE_TOLERANCE])
 
     def jacobian(self, x: Floats) -> Floats:
-        """(1, unknowns) derivatives."""
+        """(1, unknowns) derivatives at x (unknowns,)."""
         row = np.zeros((1, x.size))
         row[0, [self.first, self.second]] = -1.0 / SHARE_TOLERANCE, 1.0 / SHARE_TOLERANCE
         return row
