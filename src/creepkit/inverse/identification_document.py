@@ -137,6 +137,8 @@ def identification_from_json(data: Any, source: str = "identification") -> Ident
     size, names = len(fit.law.params), tuple(e.name for e in fit.estimates)
     if names != fit.law.names or fit.u.shape != (size,) or fit.covariance.reshape(-1).size != size**2:
         raise FitError(f"{source}: estimates, u and covariance do not belong to the {size} parameters of the law")
+    if fit.samples is not None and (fit.samples.ndim != 2 or fit.samples.shape[1] != size or not len(fit.samples)):
+        raise FitError(f"{source}: samples do not belong to the {size} parameters of the law; the file is damaged")
     covariance = fit.covariance.reshape(size, size)
     scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     correlation = covariance / np.maximum(np.outer(scale, scale), 1e-300)

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import sympy
 
 from creepkit.arrays import Floats
 from creepkit.inverse.composite_predictor import predict_with_sensitivities, predictor_for, supports_nuisance
@@ -24,7 +25,7 @@ from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.quantities import gradient, log_rate
 from creepkit.inverse.variance_components import LinearisedProblem, inverse_covariances
-from creepkit.language import temperature
+from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.records import History, Nuisance, Program, output_unit
 
 OFFSET_IN_NOISES = 3.0
@@ -143,13 +144,12 @@ def _likeness_of_hardening(
 ) -> tuple[float, float]:
     """(ratio, correlation) of an effect to what the law's hardening does, beside all other unknowns.
 
-    Hardening is what disappears where an exponent that may be off, such as m of strain, is zero.
+    Hardening is what disappears where an exponent of strain, of time or of an internal variable is zero.
     """
     law, jacobian = problem.law, linear.residuals.jacobian
     assert jacobian is not None
     theta = problem.coordinates.theta(x[: problem.parameter_count])
-    positions = [k for k, p in enumerate(law.params.values()) if p.off == 0.0 and p.scale != "log"]
-    positions = [k for k in positions if abs(theta[k]) > 0]
+    positions = [k for k in _hardening_exponents(law) if abs(theta[k]) > 0]
     if not positions:
         return float("nan"), float("nan")
     hardening = np.einsum("tep,p->te", jacobian[..., positions], theta[positions])
@@ -164,6 +164,22 @@ def _likeness_of_hardening(
         return float("nan"), float("nan")
     product = float(own @ effect)
     return product / sizes[1] ** 2, abs(product) / (sizes[0] * sizes[1])
+
+
+def _hardening_exponents(law: CreepLaw) -> list[int]:
+    """Positions of the parameters without which a term no longer depends on strain, time or an internal variable."""
+    memory = {strain, time, *law.states}
+
+    def hardens(parameter: sympy.Symbol) -> bool:
+        return any(
+            memory & term.free_symbols - term.subs(parameter, 0).free_symbols
+            for term in law.terms.values()
+            if parameter in term.free_symbols
+        )
+
+    return [
+        k for k, (symbol, p) in enumerate(law.params.items()) if p.off == 0.0 and p.scale != "log" and hardens(symbol)
+    ]
 
 
 def _dimension(

@@ -115,6 +115,17 @@ def restricted_log_likelihood(linearised: LinearisedProblem, noise_model: NoiseM
     return -0.5 * (log_det + unconstrained.log_det - priors + linearised.solve(inverses).chi_square)
 
 
+def log_noise_prior(noise_model: NoiseModel) -> float:
+    """ln of the prior of the white noise of outputs whose noise is stated, but for a constant."""
+    return -0.5 * sum(_log_excess_of_stated(noise_model, name, "noise") ** 2 for name in noise_model.outputs)
+
+
+def _log_excess_of_stated(noise_model: NoiseModel, output: str, name: str) -> float:
+    """ln of the noise over what was stated, in standard deviations of its prior; 0 of all else."""
+    stated = noise_model[output].stated if name == "noise" else 0.0
+    return float(np.log(noise_model[output].noise / stated)) / NOISE_PRIOR_SD if stated > 0 else 0.0
+
+
 def scaled_inverse(matrix: Floats) -> Floats:
     """Inverse (n, n) of a positive definite matrix (n, n) whose rows differ by orders of magnitude."""
     scale = np.sqrt(np.diag(matrix))
@@ -244,14 +255,8 @@ class _Likelihood:
         """Value and gradient."""
         value, projected, noise_model = self.gradient(x)
         derivative = np.array([self._derivative(projected, noise_model, output, name) for output, name in self.free])
-        excess = np.array([self._log_excess_of_stated(noise_model, *component) for component in self.free])
+        excess = np.array([_log_excess_of_stated(noise_model, *component) for component in self.free])
         return value + 0.5 * float((excess**2).sum()), derivative + excess / NOISE_PRIOR_SD
-
-    @staticmethod
-    def _log_excess_of_stated(noise_model: NoiseModel, output: str, name: str) -> float:
-        """ln of the noise over what was stated, in standard deviations of its prior; 0 of all else."""
-        stated = noise_model[output].stated if name == "noise" else 0.0
-        return float(np.log(noise_model[output].noise / stated)) / NOISE_PRIOR_SD if stated > 0 else 0.0
 
     def gradient(self, x: Floats) -> tuple[float, Floats, NoiseModel]:
         """-ln L, G of every test (tests, observations, observations), and the noise model."""

@@ -31,6 +31,7 @@ from creepkit.inverse.variance_components import (
     LONGEST_DRIFT,
     LinearisedProblem,
     estimate_variance_components,
+    log_noise_prior,
     restricted_log_likelihood,
 )
 
@@ -49,6 +50,14 @@ INITIAL_AUTOCORRELATION = 0.1
 
 INITIAL_DRIFT, INITIAL_DRIFT_LENGTH = 0.01, 0.2
 """Of the transformed output, and in correlation time, where the estimate of a drift begins."""
+
+
+ALMOST = 0.99
+"""Of the longest correlation of a drift, from which on it is at its bound."""
+
+
+NEGLIGIBLE_SHARE = 0.5
+"""Of white noise, up to which a drift is small beside it and its correlation length means nothing."""
 
 
 INITIAL_DISCREPANCY = 1.0
@@ -134,7 +143,8 @@ class WorkingNoiseEstimator:
 
         A drift is a variance at the edge of what it may be: estimated always, it is above zero half of the time where
         there is none, and widens every interval. Of the parts that are autocorrelated those stay that the others cannot
-        replace: a discrepancy of all outputs rather than drifts of each.
+        replace: a discrepancy of all outputs rather than drifts of each. A drift whose correlation is as long as may be
+        is no noise of an instrument: the discrepancy stays in its place.
         """
 
         def estimated(*, drift: bool, discrepancy: bool) -> tuple[NoiseModel, float]:
@@ -147,7 +157,7 @@ class WorkingNoiseEstimator:
                 linearised=linearised,
                 longest_drift=LONGEST_DRIFT,
             )
-            return noise_model, restricted_log_likelihood(linearised, noise_model)
+            return noise_model, restricted_log_likelihood(linearised, noise_model) + log_noise_prior(noise_model)
 
         def suffices(simpler: tuple[NoiseModel, float], richer: tuple[NoiseModel, float]) -> bool:
             further = autocorrelated_components(richer[0]) - autocorrelated_components(simpler[0])
@@ -156,11 +166,13 @@ class WorkingNoiseEstimator:
         white, full = estimated(drift=False, discrepancy=False), estimated(drift=True, discrepancy=True)
         if suffices(white, full):
             return self._with_predictor_error(white[0])
-        for drift, discrepancy in ((False, True), (True, False)):
-            candidate = estimated(drift=drift, discrepancy=discrepancy)
-            if suffices(candidate, full) and not _is_at_longest_drift(candidate[0]):
-                return self._with_predictor_error(candidate[0])
-        return self._with_predictor_error(full[0])
+        discrepant = estimated(drift=False, discrepancy=True)
+        if suffices(discrepant, full):
+            return self._with_predictor_error(discrepant[0])
+        drifting = estimated(drift=True, discrepancy=False)
+        best = drifting if suffices(drifting, full) else full
+        is_slow = _drifts_at_longest(best[0], linearised.residuals)
+        return self._with_predictor_error((discrepant if is_slow else best)[0])
 
     def _with_predictor_error(self, noise_model: NoiseModel) -> NoiseModel:
         """The same with the errors of the predictor as drift: they follow the curve, and do not average out."""
@@ -225,12 +237,14 @@ class WorkingNoiseEstimator:
         return working
 
 
-def _is_at_longest_drift(noise_model: NoiseModel) -> bool:
-    """Whether a drift would last longer than the noise of an instrument may: then it is a discrepancy."""
-    return any(
-        components.drift > NEGLIGIBLE_DRIFT and components.correlation_length > 0.99 * LONGEST_DRIFT
-        for components in noise_model.outputs.values()
-    )
+def _drifts_at_longest(noise_model: NoiseModel, residuals: Residuals) -> bool:
+    """Whether a drift that is not small beside white noise has the longest correlation that it may have."""
+    for position, components in enumerate(noise_model.outputs.values()):
+        mask = residuals.present & (residuals.output_index == position)
+        noise = components.noise * float(np.median(residuals.offset_sensitivity[mask])) if mask.any() else np.inf
+        if components.drift > NEGLIGIBLE_SHARE * noise and components.correlation_length > ALMOST * LONGEST_DRIFT:
+            return True
+    return False
 
 
 def with_rupture_weight(working: NoiseModel, observations: ObservationVector) -> NoiseModel:

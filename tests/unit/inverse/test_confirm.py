@@ -5,13 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2, f
 
 import creepkit as ck
 from creepkit.errors import FitError
-from creepkit.inverse.confirmation import confirm, outside_domain
+from creepkit.inverse.confirmation import Confirmation, ConfirmedTest, _confirmed_output, confirm, outside_domain
 from creepkit.inverse.identification_document import read_identification
 from creepkit.readers.history_csv import write_history
 from creepkit.records import Status
+from creepkit.records.history import EVERY_FRAME
 from helpers.command_line import creepkit, one_line
 from helpers.planted_alloys import bars
 
@@ -118,3 +120,44 @@ def test_confirm_command(fit, tmp_path):
     assert {t["name"] for t in answer["tests"]} == {h.name for h in TESTS}
     refused = creepkit("confirm", str(tmp_path / "none.json"), str(tmp_path / "*.csv"))
     assert "there is no such file" in one_line(refused)
+
+
+# ---- the uncertainty of the noise itself ---------------------------------------------------------------------------
+
+FRAMES = np.linspace(0.025, 1.0, 40) * 1e5
+
+
+def said_of(seed, misfit=0.0, *, stated=False, outputs=1):
+    """What is said of tests of 40 frames with white noise: the law's curve is known, with a wave of `misfit` noises."""
+    rng, tests = np.random.default_rng(seed), []
+    for k in range(outputs):
+        clean = 0.02 * FRAMES / FRAMES[-1]
+        noisy = clean + SD * rng.standard_normal(40)
+        sd = {"strain": np.full(40, SD)} if stated else {}
+        history = TESTS[0].replace(
+            name=f"bar {k}", times=FRAMES, outputs={"strain": noisy}, standard_deviation=sd, used=EVERY_FRAME
+        )
+        simulated = clean + misfit * SD * np.sin(2 * np.pi * FRAMES / FRAMES[-1])
+        one = _confirmed_output(history, "strain", simulated, simulated, None)
+        tests.append(ConfirmedTest(history.name, Status.COMPLETE, FRAMES[-1], (one,)))
+    return Confirmation("norton", "uniaxial", tuple(tests))
+
+
+@pytest.mark.parametrize(("stated", "outputs", "draws"), [(False, 1, 1000), (False, 6, 300), (True, 1, 500)])
+def test_a_true_law_with_white_noise_is_not_condemned(stated, outputs, draws):
+    """At most about one in a hundred, whether the noise is known or estimated from 40 frames, of one test or of six."""
+    condemned = sum("does not follow" in said_of(seed, stated=stated, outputs=outputs).verdict for seed in range(draws))
+    assert condemned <= 0.01 * draws + 2 * np.sqrt(0.01 * draws)
+
+
+@pytest.mark.parametrize("stated", [False, True])
+def test_a_law_that_is_wrong_by_a_few_noises_is_condemned(stated):
+    """A wave of six noises: its mean square is 18 beside the 1 of the noise."""
+    assert all("the law does not follow the tests" in said_of(seed, 6.0, stated=stated).verdict for seed in range(20))
+
+
+def test_the_probability_is_that_of_chi_square_or_of_f():
+    """40 frames; noise that was estimated from them is known to a fifth of their number of degrees of freedom."""
+    known, estimated = (said_of(3, 1.5, stated=s)["bar 0", "strain"] for s in (True, False))
+    assert known.p_value == pytest.approx(chi2.sf(40 * known.simulation_errors.chi_square, 40))
+    assert estimated.p_value == pytest.approx(f.sf(estimated.simulation_errors.chi_square, 40, 8))

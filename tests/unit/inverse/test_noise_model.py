@@ -10,6 +10,7 @@ from creepkit.inverse.noise_model import (
     NoiseModel,
     OutputNoise,
     Residuals,
+    autocorrelated_components,
     covariance,
     effective_sample_size,
     log_likelihood,
@@ -69,9 +70,9 @@ def test_absent_frames_do_not_count():
 
 def test_planted_scatter_is_found():
     """150 tests: the standard error of a standard deviation from 150 draws is 6 %, so 25 % is four of them."""
-    truth = sizes(noise=2e-5, offset=1e-4, rate=0.4, drift=0.1, correlation_length=1.5)
+    truth = sizes(noise=2e-5, offset=1e-4, rate=0.4, drift=0.1, correlation_length=0.45)
     residuals = made(150, 30, 2, truth)
-    found = estimate_variance_components(residuals, sizes(2e-5, 0, 3e-5, 0.5, 0.2, 2.0), BOTH)
+    found = estimate_variance_components(residuals, sizes(2e-5, 0, 3e-5, 0.5, 0.2, 0.2), BOTH)
     assert found["strain"].offset == pytest.approx(truth["strain"].offset, rel=0.25)
     assert found.rate == pytest.approx(truth.rate, rel=0.25)
     assert found["strain"].drift == pytest.approx(truth["strain"].drift, rel=0.25)
@@ -173,3 +174,103 @@ def test_slopes_of_the_likelihood_are_its_differences():
         likelihood.cost(x + d)[0] + log_likelihood(likelihood.residuals, likelihood.noise_model(x + d)) for d in (0, 1)
     ]
     assert ends[0] == pytest.approx(ends[1], rel=1e-12)
+
+
+# ---- model discrepancy ---------------------------------------------------------------------------------------------
+
+
+def with_discrepancy(seed=6):
+    """The residuals of two outputs, their units of discrepancy, and a noise model with a discrepancy."""
+    residuals, scatter = two_outputs()
+    unit = 0.5 + np.random.default_rng(seed).uniform(size=residuals.values.shape)
+    return replace(residuals, discrepancy_unit=unit), replace(scatter, discrepancy=1.3, discrepancy_length=0.8)
+
+
+def test_a_discrepancy_is_one_size_and_one_length_for_all_outputs():
+    """d^2 u_i u_j exp(-|lag| / l) within an output, nothing between outputs, beside all else."""
+    residuals, scatter = with_discrepancy()
+    clock, unit = residuals.correlation_coordinate, residuals.discrepancy_unit
+    without = covariance(residuals, replace(scatter, discrepancy=0.0))
+    for test, more in enumerate(covariance(residuals, scatter) - without):
+        lags = np.abs(clock[test][:, None] - clock[test][None, :])
+        expected = 1.3**2 * np.outer(unit[test], unit[test]) * np.exp(-lags / 0.8)
+        expected[:5, 5:] = expected[5:, :5] = 0.0
+        np.testing.assert_allclose(more, expected, rtol=1e-7, atol=1e-8)
+
+
+def test_the_likelihood_with_a_discrepancy_is_that_of_a_multivariate_normal():
+    residuals, scatter = with_discrepancy()
+    c = covariance(residuals, scatter)
+    truth = sum(multivariate_normal(np.zeros(10), c[k]).logpdf(residuals.values[k]) for k in range(2))
+    assert log_likelihood(residuals, scatter) == pytest.approx(truth, rel=1e-10)
+
+
+@pytest.mark.parametrize("restricted", [False, True])
+def test_slopes_to_a_discrepancy_and_to_stated_noise_are_differences(restricted):
+    """Plain and restricted; the noise of the first output is stated, a sixth below, which gives it a prior."""
+    from creepkit.inverse.variance_components import LinearisedProblem, _Likelihood
+
+    residuals, scatter = with_discrepancy()
+    scatter, linear = scatter.with_output("amplitude", stated=0.085), None
+    if restricted:
+        design = np.random.default_rng(7).normal(size=(2, 10, 3))
+        residuals = replace(residuals, jacobian=design)
+        bounds = np.array([[-np.inf], [np.inf]]) * np.ones(3)
+        linear = LinearisedProblem(residuals, np.full(3, 0.1), np.array([0.2, 0.0, -0.1]), np.ones(3, bool), bounds)
+    free = [("amplitude", "noise"), ("width", "noise"), ("", "discrepancy"), ("", "discrepancy_length")]
+    likelihood = _Likelihood(residuals.with_test_weights(np.array([1.0, 0.3])), scatter, free, linear)
+    x = np.log([0.1, 0.2, 1.3, 0.8])
+    slope = likelihood.cost(x)[1]
+    for k in range(x.size):
+        step = 1e-5 * np.eye(x.size)[k]
+        difference = (likelihood.cost(x + step)[0] - likelihood.cost(x - step)[0]) / 2e-5
+        assert slope[k] == pytest.approx(difference, rel=1e-5, abs=1e-7)
+
+
+def test_a_planted_discrepancy_of_two_outputs_is_found():
+    """300 series: 4 % of a standard deviation in one standard error; the outputs' noises differ by a factor of 20."""
+    rng, frames = np.random.default_rng(8), 24
+    clock = np.tile(np.linspace(0.2, 5.0, frames), (150, 2))
+    output = np.tile(np.repeat([0, 1], frames), (150, 1))
+    noise = np.where(output == 0, 0.02, 0.4)
+    ones = np.ones_like(clock)
+    shape = Residuals(0 * ones, ones, ones > 0, clock, None, 0 * ones, output, ones, np.ones(150),
+                      discrepancy_unit=noise)  # fmt: skip
+    parts = {"amplitude": OutputNoise(0.02), "width": OutputNoise(0.4)}
+    truth = NoiseModel(parts, discrepancy=2.0, discrepancy_length=1.2)
+    drawn = np.linalg.cholesky(covariance(shape, truth)) @ rng.normal(size=(*clock.shape, 1))
+    start = replace(truth, discrepancy=0.5, discrepancy_length=0.5)
+    found = estimate_variance_components(replace(shape, values=drawn[..., 0]), start, (), fixed=())
+    assert found.discrepancy == pytest.approx(2.0, rel=0.12)
+    assert found.discrepancy_length == pytest.approx(1.2, rel=0.3)
+    assert [found[name].noise for name in parts] == pytest.approx([0.02, 0.4], rel=0.1)
+
+
+@pytest.mark.parametrize(("actual", "stated"), [(0.3, 0.2), (0.1, 0.2), (0.21, 0.2)])
+def test_stated_noise_is_a_lower_bound_with_a_prior(actual, stated):
+    """White noise s of n frames: the least of n ln s + RSS / 2 s^2 + (ln(s / stated) / 0.2)^2 / 2 over s >= stated."""
+    values = actual * np.random.default_rng(9).normal(size=(1, 25))
+    ones = np.ones_like(values)
+    residuals = residuals_of(values, ones, ones > 0, np.linspace(1.0, 2.0, 25)[None], 0 * ones)
+    start = NoiseModel({"strain": OutputNoise(stated, stated=stated)})
+    found = estimate_variance_components(residuals, start, (), fixed=())["strain"].noise
+    s = stated * np.exp(np.linspace(0.0, 2.0, 200001))
+    cost = 25 * np.log(s) + 0.5 * (values**2).sum() / s**2 + 0.5 * (np.log(s / stated) / 0.2) ** 2
+    assert found == pytest.approx(s[np.argmin(cost)], rel=1e-3)
+    assert found >= stated * (1 - 1e-9)
+
+
+def test_noise_that_nobody_stated_may_be_smaller_than_its_estimate():
+    """The root mean square of the residuals, whatever the third differences said."""
+    values = 0.1 * np.random.default_rng(10).normal(size=(1, 400))
+    ones = np.ones_like(values)
+    residuals = residuals_of(values, ones, ones > 0, np.linspace(1.0, 2.0, 400)[None], 0 * ones)
+    found = estimate_variance_components(residuals, sizes(0.2), (), fixed=())["strain"].noise
+    assert found == pytest.approx(np.sqrt((values**2).mean()), rel=1e-3)
+
+
+def test_autocorrelated_parts_are_counted():
+    scatter = NoiseModel({"amplitude": OutputNoise(0.1, drift=0.2), "width": OutputNoise(0.1, drift=1e-4)})
+    assert autocorrelated_components(scatter) == 2
+    assert autocorrelated_components(replace(scatter, discrepancy=1.0)) == 4
+    assert autocorrelated_components(replace(scatter, discrepancy=0.01)) == 2

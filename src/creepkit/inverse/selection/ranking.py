@@ -139,7 +139,9 @@ def verdict_of(ranking: Ranking) -> str:
     """One sentence: what is known of the law, of how many tried, and what keeps it from being decisive."""
     names, count, adequacy = [r.fit.law.name for r in ranking.credible], len(ranking.laws), ranking.adequacy
     best = ranking.best.law.name
-    adequacy_text = f"it {adequacy}" if adequacy is not None else "whether it explains the tests is not known"
+    adequacy_text = "whether it explains the tests is not known"
+    if adequacy is not None:
+        adequacy_text = str(adequacy) if adequacy.verdict == "cannot be judged" else f"it {adequacy}"
     if count == 1:
         return f"only {best} was fitted; {adequacy_text}"
     if ranking.decisive:
@@ -161,7 +163,8 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
     if best in ranking.further:
         asked, more = count - len(ranking.further), len(ranking.further)
         found = f"of {more} more that were tried, {best} does ({weight})"
-        return f"none of the {asked} laws asked for explains the tests; {found}: plan tests that can refute it"
+        none = f"none of the {asked} laws asked for explains" if asked > 1 else "the law asked for does not explain"
+        return f"{none} the tests; {found}: plan tests that can refute it"
     if len(names) > 1:
         return f"of {count} laws tried these tests cannot tell apart {' and '.join(names)}; the best: {adequacy_text}"
     if ranking.challenges is None:

@@ -1,13 +1,19 @@
 """select: planted laws are chosen, sums when they are needed, and one failure does not take the others down."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+import sympy
 
 import creepkit as ck
 from creepkit.errors import FitError
+from creepkit.inverse.adequacy import Adequacy
 from creepkit.inverse.selection import rank
-from creepkit.inverse.selection.select import reductions, sums_of_two
-from creepkit.records import History
+from creepkit.inverse.selection.select import _richer_laws, reductions, sums_of_two
+from creepkit.language import Param, arrhenius, strain, temperature, time
+from creepkit.records import History, Program
 
 TIMES = np.geomspace(600.0, 4e5, 40)
 LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine")
@@ -22,7 +28,7 @@ def measured(law, values, stresses=(60.0, 85.0, 120.0), seed=0):
         strain = run.outputs["strain"] + NOISE * rng.standard_normal(TIMES.size)
         found.append(
             History(name=f"{stress:g} MPa", times=TIMES, outputs={"strain": strain}, loading=run.loading,
-                    temperature=293.15, standard_deviation={"strain": np.full(TIMES.size, NOISE)})
+                    temperature=Program.constant(293.15), standard_deviation={"strain": np.full(TIMES.size, NOISE)})
         )  # fmt: skip
     return found
 
@@ -36,7 +42,7 @@ def ranking():
 def test_the_planted_law_is_decisive(ranking):
     assert ranking.best.law.name == "strain-hardening"
     assert ranking.decisive
-    assert ranking.verdict.startswith("decisive: strain-hardening, of ")
+    assert ranking.verdict.startswith("decisive: strain-hardening, of 4 laws tried; it explains the tests to their ")
     assert ranking.laws[0].chi_square == pytest.approx(120 - 3, abs=3 * np.sqrt(2 * 120))
 
 
@@ -97,8 +103,6 @@ def test_sums_leave_out_what_is_there_already():
 
 
 def test_a_law_that_cannot_be_identified_is_named_and_the_others_go_on():
-    from dataclasses import replace
-
     norton = ck.law("norton")
     A, n = norton.params
     narrow = {A: replace(norton.params[A], bounds=(1e-40, 1e-30)), n: replace(norton.params[n], bounds=(1, 5))}
@@ -112,3 +116,84 @@ def test_a_law_that_cannot_be_identified_is_named_and_the_others_go_on():
         ck.select([hopeless], tests, "uniaxial", nuisances=[], starts=3)
     with pytest.raises(FitError, match="there are no candidate laws"):
         ck.select([], tests, "uniaxial")
+
+
+# ---- where no candidate explains the tests -------------------------------------------------------------------------
+
+NAN = float("nan")
+LEAVES = Adequacy("leaves a discrepancy", (), 5.0, 100.0, 1e-9, NAN, None)
+
+
+def tried(*adequacies, laws=("norton", "hyperbolic-sine")):
+    """A ranking of stand-ins: laws, best first, with what is known of their adequacy."""
+    ranked = [
+        SimpleNamespace(fit=SimpleNamespace(law=ck.law(name) if isinstance(name, str) else name, adequacy=adequacy))
+        for name, adequacy in zip(laws, adequacies, strict=True)
+    ]
+    return SimpleNamespace(laws=ranked)
+
+
+@pytest.mark.parametrize(
+    "adequacies",
+    [
+        (LEAVES, replace(LEAVES, verdict="explains")),
+        (replace(LEAVES, verdict="cannot be judged"), LEAVES),
+        (None, LEAVES),
+        (LEAVES, replace(LEAVES, remedies=("thickness",))),
+    ],
+    ids=["one explains", "one cannot be judged", "unknown", "an effect would explain"],
+)
+def test_nothing_further_is_tried_without_need(adequacies):
+    assert _richer_laws(tried(*adequacies), []) == []
+
+
+def test_sums_with_the_best_come_first_then_laws_with_a_memory_that_none_of_the_tried_has():
+    richer = _richer_laws(tried(LEAVES, LEAVES), [])
+    assert richer[0].fingerprint == (ck.law("norton") + ck.law("hyperbolic-sine")).fingerprint
+    prints = [law.fingerprint for law in richer]
+    assert len(set(prints)) == len(prints)
+    assert not {ck.law(name).fingerprint for name in ("norton", "hyperbolic-sine")} & set(prints)
+    has_memory = [bool(law.uses(strain) or law.uses(time) or law.states) for law in richer[1:]]
+    assert has_memory == sorted(has_memory, reverse=True)
+    assert has_memory[0]
+    assert not has_memory[-1]
+    assert not any(law.uses(temperature) for law in richer)
+    remembering = [len(law.params) for law in richer[1 : 1 + sum(has_memory)]]
+    assert remembering == sorted(remembering)
+
+
+def test_with_temperatures_all_of_them_have_one():
+    laws = [ck.law(name).times(arrhenius(T_ref=1000.0)) for name in ("norton", "strain-hardening")]
+    plain = measured("norton", {"A": 1e-16, "n": 4.2})
+    tests = [h.replace(temperature=T) for h, T in zip(plain, (950.0, 1000.0, 1050.0), strict=True)]
+    assert all(law.uses(temperature) for law in _richer_laws(tried(LEAVES, LEAVES, laws=laws), tests))
+
+
+def softening():
+    """Norton's law that is three times as fast at a strain of 4 %: none of the built-in laws of one term."""
+    k = sympy.Symbol("k", real=True)
+    terms = {label: term * (1 + k * strain) for label, term in ck.law("norton").terms.items()}
+    params = {**ck.law("norton").params, k: Param("softening", bounds=(0.0, 200.0))}
+    return replace(ck.law("norton"), name="softening", terms=terms, params=params)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_truth_outside_the_set_is_flagged_and_never_decisive(seed):
+    tests = measured(softening(), {"A": 6e-17, "n": 4.2, "k": 50.0}, seed=seed)
+    ranking = ck.select(LAWS, tests, "uniaxial", nuisances=[], starts=1, sobol_points=8, frames=24, further_laws=0)
+    assert not ranking.decisive
+    assert ranking.further == ()
+    assert ranking.adequacy.verdict == "leaves a discrepancy"
+    assert ranking.verdict.startswith("not decisive: none of 4 laws tried explains the tests; the best, ")
+
+
+def test_further_laws_are_tried_within_their_budget_and_are_proposals():
+    tests = measured(softening(), {"A": 6e-17, "n": 4.2, "k": 50.0})
+    ranking = ck.select(LAWS[:2], tests, "uniaxial", nuisances=[], starts=1, sobol_points=8, frames=24, further_laws=2)
+    assert 1 <= len(ranking.further) <= 2
+    assert len(ranking.laws) + len(ranking.failed) == 4
+    assert ranking.further[0] == "norton+strain-hardening" or ranking.further[0] == "strain-hardening+norton"
+    assert not ranking.decisive
+    single = ck.select(LAWS[:2], tests, "uniaxial", nuisances=[], starts=1, sobol_points=8, frames=24, sums=False)
+    assert single.further == ()
+    assert len(single.laws) == 2

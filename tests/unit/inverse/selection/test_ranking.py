@@ -1,0 +1,173 @@
+"""Verdicts: one sentence for each case, and decisive only where everything that decisiveness needs is there."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from creepkit.errors import FitError
+from creepkit.inverse.adequacy import Adequacy, LargestDeviation, OutputAdequacy
+from creepkit.inverse.selection.challenges import Challenge
+from creepkit.inverse.selection.ranking import RankedLaw, Ranking, challenged, rank, ranking_from_scores, verdict_of
+
+NAN = float("nan")
+STRAIN = OutputAdequacy("strain", 120, 2e-5, "stated", 1.02, 0.4, 0.0)
+EXPLAINS = Adequacy("explains", (STRAIN,), 1.02, 117.0, 0.4, NAN, None)
+LEAVES = Adequacy(
+    "leaves a discrepancy", (replace(STRAIN, chi_square=5.0, p_value=1e-20, discrepancy=4e-5),), 5.0, 117.0, 1e-20, 0.3,
+    LargestDeviation("bar 1", "strain", 5400.0, 4e-5, 2.0),
+)  # fmt: skip
+UNKNOWN = Adequacy("cannot be judged", (), NAN, 0.0, NAN, NAN, None)
+SUM = Challenge("sum", "norton+sinh", "norton+sinh with 30 % of the rate from sinh explains them as well")
+DRIFT = Challenge("unmodelled effect", "temperature drift", "a temperature drift would leave it a weight of 0.52")
+
+
+def fit(name, adequacy=EXPLAINS, **more):
+    values = {"predictor": None, "histories": (), **more}
+    return SimpleNamespace(law=SimpleNamespace(name=name), adequacy=adequacy, **values)
+
+
+def ranking(weights, adequacies=None, names=("norton", "sinh", "theta"), **more):
+    adequacies = adequacies or [EXPLAINS] * len(weights)
+    laws = [
+        RankedLaw(fit(name, adequacy), 0.0, weight)
+        for name, adequacy, weight in zip(names, adequacies, weights, strict=False)
+    ]
+    return Ranking(tuple(laws), **{"challenges": (), **more})
+
+
+def test_decisive_is_a_law_that_was_asked_for_explains_has_the_weight_and_stands_every_challenge():
+    best = ranking([0.97, 0.02, 0.01])
+    assert best.decisive
+    assert best.verdict == f"decisive: norton, of 3 laws tried; it {EXPLAINS}"
+
+
+@pytest.mark.parametrize(
+    "short",
+    [
+        ranking([0.95, 0.04, 0.01]),
+        ranking([0.97, 0.02, 0.01], [LEAVES, EXPLAINS, EXPLAINS]),
+        ranking([0.97, 0.02, 0.01], [UNKNOWN] * 3),
+        ranking([0.97, 0.02, 0.01], [None] * 3),
+        ranking([0.97, 0.02, 0.01], further=("norton",)),
+        ranking([0.97, 0.02, 0.01], challenges=None),
+        ranking([0.97, 0.02, 0.01], challenges=(DRIFT,)),
+        ranking([1.0]),
+    ],
+    ids=["weight", "adequacy", "no noise", "no adequacy", "not asked for", "unexamined", "challenge", "alone"],
+)
+def test_with_any_part_missing_it_is_not_decisive(short):
+    assert not short.decisive
+    assert not short.verdict.startswith("decisive")
+
+
+def test_singled_out_needs_adequacy_and_weight_but_no_challenge():
+    assert ranking([0.97, 0.03], challenges=None).singled_out
+    assert ranking([0.97, 0.03], further=("norton",)).singled_out
+    assert not ranking([0.9, 0.1]).singled_out
+    assert not ranking([0.97, 0.03], [LEAVES, EXPLAINS]).singled_out
+    assert not ranking([0.97, 0.03], [None, None]).singled_out
+
+
+def test_one_law_is_not_a_choice():
+    assert verdict_of(ranking([1.0])) == f"only norton was fitted; it {EXPLAINS}"
+    assert verdict_of(ranking([1.0], [None])) == "only norton was fitted; whether it explains the tests is not known"
+
+
+def test_where_no_law_explains_the_best_is_named_with_what_it_leaves():
+    found = verdict_of(ranking([1.0, 0.0, 0.0], [LEAVES] * 3))
+    assert found == (
+        "not decisive: none of 3 laws tried explains the tests; the best, norton (weight 1.00 of the laws tried), "
+        f"{LEAVES}"
+    )
+    assert "leaves 4e-05 of strain (2 times its stated noise) unexplained" in found
+    assert "most in strain of 'bar 1' about 5400 s, where it lies 4e-05 above what was measured" in found
+    two = verdict_of(ranking([0.6, 0.35, 0.05], [LEAVES] * 3))
+    assert "norton (weight 0.60 of the laws tried, not told apart from sinh), leaves" in two
+
+
+def test_an_effect_with_which_a_law_would_explain_is_named():
+    """Of the best law it stands in its adequacy; of another one it is said beside it."""
+    own = replace(LEAVES, remedies=("thickness",))
+    assert verdict_of(ranking([1.0, 0.0], [own, LEAVES])).endswith("with thickness unknown it would explain them")
+    other = verdict_of(ranking([1.0, 0.0], [LEAVES, replace(LEAVES, remedies=("thickness", "temperature drift"))]))
+    assert "; with thickness or temperature drift unknown, sinh would explain them)" in other
+
+
+def test_a_law_that_nobody_asked_for_is_a_proposal():
+    found = verdict_of(ranking([0.99, 0.01, 0.0], [EXPLAINS, LEAVES, LEAVES], further=("norton", "theta")))
+    assert found == (
+        "not decisive: the law asked for does not explain the tests; of 2 more that were tried, norton does (weight "
+        "0.99 of the laws tried): plan tests that can refute it"
+    )
+    two = verdict_of(ranking([0.99, 0.01, 0.0], [EXPLAINS, LEAVES, LEAVES], further=("norton",)))
+    assert two.startswith("not decisive: none of the 2 laws asked for explains the tests; of 1 more")
+
+
+def test_laws_that_cannot_be_told_apart_are_named():
+    found = verdict_of(ranking([0.5, 0.45, 0.05]))
+    assert found == (
+        f"not decisive: of 3 laws tried these tests cannot tell apart norton and sinh; the best: it {EXPLAINS}"
+    )
+
+
+def test_what_the_tests_allow_beside_it_is_said():
+    found = verdict_of(ranking([0.99, 0.01], challenges=(SUM, DRIFT)))
+    assert found == (
+        "not decisive: of 2 laws tried only norton explains the tests (weight 0.99 of the laws tried), but norton+sinh "
+        "with 30 % of the rate from sinh explains them as well; and a temperature drift would leave it a weight of 0.52"
+    )
+
+
+def test_a_ranking_that_was_not_challenged_says_so():
+    found = verdict_of(ranking([0.99, 0.01], challenges=None))
+    assert found.endswith(f"it {EXPLAINS}; what else the tests allow was not examined")
+
+
+def test_without_known_noise_nothing_is_decided():
+    found = verdict_of(ranking([0.99, 0.01], [UNKNOWN, UNKNOWN]))
+    assert found.startswith("not decisive: of 2 laws tried norton is best (weight 0.99 of the laws tried); whether it")
+    assert "cannot be judged: no noise is stated" in found
+
+
+def test_weights_are_of_the_laws_tried():
+    for one in (ranking([0.99, 0.01], challenges=(SUM,)), ranking([1.0, 0.0], [LEAVES] * 2)):
+        assert "of the laws tried" in one.verdict
+
+
+# ---- rankings ----------------------------------------------------------------------------------------------------
+
+
+def test_scores_are_ordered_and_weighted():
+    """exp(-excess / 2) over its sum."""
+    fits = [fit(name) for name in ("norton", "sinh", "theta")]
+    found = ranking_from_scores(fits, np.array([12.0, 10.0, 14.0]), "bic", independent_frames=40.0)
+    assert [r.fit.law.name for r in found.laws] == ["sinh", "norton", "theta"]
+    assert [r.excess for r in found.laws] == pytest.approx([0.0, 2.0, 4.0])
+    weights = np.exp([0.0, -1.0, -2.0])
+    assert [r.weight for r in found.laws] == pytest.approx(weights / weights.sum())
+    assert found.challenges is None
+    assert [r.fit.law.name for r in found.credible] == ["sinh", "norton", "theta"]
+
+
+def test_only_a_law_that_is_singled_out_and_can_be_predicted_is_challenged(monkeypatch):
+    monkeypatch.setattr("creepkit.inverse.selection.challenges.challenges_of", lambda fits: (SUM,))
+    at_hand = {"predictor": object(), "histories": (object(),)}
+    whole = Ranking(tuple(RankedLaw(fit(n, **at_hand), 0.0, w) for n, w in (("norton", 0.99), ("sinh", 0.01))))
+    assert challenged(whole).challenges == (SUM,)
+    assert not challenged(whole).decisive
+    from_file = Ranking(tuple(RankedLaw(fit(n), 0.0, w) for n, w in (("norton", 0.99), ("sinh", 0.01))))
+    undecided = Ranking(tuple(RankedLaw(fit(n, **at_hand), 0.0, 0.5) for n in ("norton", "sinh")))
+    alone = Ranking((RankedLaw(fit("norton", **at_hand), 0.0, 1.0),))
+    for other in (from_file, undecided, alone):
+        assert challenged(other) is other
+
+
+def test_what_cannot_be_ranked_is_refused():
+    with pytest.raises(FitError, match="there are no identifications to rank"):
+        rank([])
+    with pytest.raises(FitError, match=r"rank\(by='hold-out'\) is not known"):
+        rank([fit("norton")], "hold-out")
+    with pytest.raises(FitError, match="were made from different histories"):
+        rank([fit("norton", provenance={"data": "a"}), fit("sinh", provenance={"data": "b"})])

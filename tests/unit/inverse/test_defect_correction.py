@@ -1,0 +1,243 @@
+"""Defect correction: predictors that are wrong by known amounts, and what comes back with and without the exact one."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from creepkit.inverse.composite_predictor import CompositePredictor
+from creepkit.inverse.defect_correction import (
+    NumericalError,
+    correct_defect,
+    difference_of_predictors,
+    with_cheaper_predictor,
+    with_correction_at_frames,
+)
+from creepkit.inverse.identification_document import identification_from_json, identification_to_json
+from creepkit.inverse.identify import identify
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.language import CreepLaw
+from creepkit.laws.norton import NORTON
+from creepkit.records import History, Prediction, Predictor, Status
+from helpers.steady_rate_predictor import planted
+from helpers.two_outputs_predictor import TwoOutputs, with_two_outputs
+
+VALUES = {"A": 1e-15, "n": 4.0}
+THETA = NORTON.to_internal(VALUES)[0]
+NOISE = {"amplitude": 2e-3, "width": 2e-2}
+NONE = dict.fromkeys(NOISE, 0.0)
+BARS = planted(NORTON, VALUES, [(s, 1000.0) for s in (50.0, 70.0, 100.0)], seed=0, frames=24)
+SETTINGS = IdentificationSettings(starts=1, sobol_points=8, weights="likelihood", nuisances=())
+EXACT = TwoOutputs()
+
+
+def additive(values: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """0.02 mm of the amplitude, smooth in time."""
+    return values + np.stack([0.02 * np.sin(2.5 * share), 0.0 * share], axis=-1)
+
+
+def relative(values: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """A few per cent of the amplitude, which grow with time: the error depends on the values of the law."""
+    return values * np.stack([1.0 - 0.04 * share, 1.0 + 0.0 * share], axis=-1)
+
+
+@dataclass(frozen=True)
+class Coarse:
+    """Predicts what `TwoOutputs` does, with an error; refined() is without it, where it is offered."""
+
+    defect: Callable[[np.ndarray, np.ndarray], np.ndarray] = additive
+    status: Status = Status.COMPLETE
+    name: str = "coarse"
+    outputs: tuple[str, ...] = EXACT.outputs
+
+    def predict(
+        self, law: CreepLaw, theta: np.ndarray, histories: Sequence[History], *, sensitivities: bool = False
+    ) -> Prediction:
+        found = EXACT.predict(law, theta, histories, sensitivities=sensitivities)
+        values = np.array(found.values)
+        for k, h in enumerate(histories):
+            values[:, k, : h.times.size] = self.defect(values[:, k, : h.times.size], h.times / h.times[-1])
+        return replace(found, values=values)
+
+
+@dataclass(frozen=True)
+class Refinable(Coarse):
+    """The same, with the exact predictor; `status` is how that ends in the first test."""
+
+    def refined(self) -> Predictor:
+        return Stopping(self.status)
+
+
+@dataclass(frozen=True)
+class Stopping(TwoOutputs):
+    """The exact predictor, which says of the first test that it ended as `status`."""
+
+    status: Status = Status.COMPLETE
+
+    def predict(self, law, theta, histories, *, sensitivities=False):
+        found = EXACT.predict(law, theta, histories, sensitivities=sensitivities)
+        status = np.array(found.status)
+        status[:, 0] = int(self.status)
+        return replace(found, status=status)
+
+
+def measured(noise=NONE, seed=0):
+    """Tests that state the usual noise, and have `noise`."""
+    return [
+        h.replace(standard_deviation={name: np.full(h.times.size, sd) for name, sd in NOISE.items()})
+        for h in with_two_outputs(BARS, noise, seed=seed)
+    ]
+
+
+def problem_of(predictor, tests=None):
+    problem = LeastSquaresProblem.from_histories(NORTON, tests or measured(), predictor, SETTINGS)
+    return problem, problem.coordinates.u(THETA)
+
+
+# ---- identification ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def fits():
+    """Noise-free tests of the exact predictor, identified through the wrong one, with and without its correction."""
+    kinds = {"exact": EXACT, "plain": Coarse(), "corrected": Refinable(), "relative": Refinable(relative)}
+    return {name: identify(NORTON, measured(), one, settings=SETTINGS) for name, one in kinds.items()}
+
+
+def deviation(fit):
+    """Of n, in the standard deviations of a fit by the exact predictor."""
+    return abs(fit.values["n"] - VALUES["n"])
+
+
+def test_the_planted_values_come_back_with_the_correction_and_not_without(fits):
+    """An error of 0.02 mm that does not depend on the values: nothing of it is left."""
+    assert deviation(fits["exact"]) < 1e-5
+    assert deviation(fits["corrected"]) < 1e-4
+    true = VALUES["A"] * 70.0 ** VALUES["n"]
+    rates = {name: float(fit.rate(70.0, 1000.0)[0]) for name, fit in fits.items()}
+    assert np.log(rates["corrected"] / true) == pytest.approx(0.0, abs=1e-4)
+    assert np.log(rates["plain"] / true) < -0.015
+    _, low, high = fits["plain"].rate(70.0, 1000.0)
+    assert not low <= true <= high
+
+
+def test_an_error_that_depends_on_the_values_is_corrected_to_second_order(fits):
+    """4 % of the amplitude at an optimum that is 4 % off: a few thousandths of the rate are left."""
+    rate, _, _ = fits["relative"].rate(70.0, 1000.0)
+    plain = identify(NORTON, measured(), Coarse(relative), settings=SETTINGS).rate(70.0, 1000.0)[0]
+    true = VALUES["A"] * 70.0 ** VALUES["n"]
+    assert abs(np.log(plain / true)) > 0.015
+    assert abs(np.log(rate / true)) < 0.1 * abs(np.log(plain / true))
+
+
+def test_what_was_found_is_reported(fits):
+    found, plain = fits["corrected"].numerical_error, fits["plain"]
+    assert plain.numerical_error is None
+    assert fits["exact"].numerical_error is None
+    share = np.concatenate([h.times / h.times[-1] for h in BARS])
+    assert found.size["amplitude"] == pytest.approx(np.sqrt(((0.02 * np.sin(2.5 * share)) ** 2).mean()), rel=1e-6)
+    assert found.size["width"] == pytest.approx(0.0, abs=1e-12)
+    assert found.noises == pytest.approx(found.size["amplitude"] / NOISE["amplitude"])
+    assert found.remaining["amplitude"] == pytest.approx(0.1 * found.size["amplitude"])
+    assert found.incomplete == ()
+    assert found.sentence in fits["corrected"].notes
+    assert "at the optimum coarse differs from two outputs by 0.01" in found.sentence
+    assert fits["corrected"].noise_model["amplitude"].drift > 0
+
+
+def test_measured_and_predicted_frames_agree_after_the_correction(fits):
+    """The misfit that is reported is that of the corrected prediction."""
+    for test in fits["corrected"].tests:
+        assert test["amplitude"].errors.relative_rms_error < 1e-3
+    assert max(t["amplitude"].errors.relative_rms_error for t in fits["plain"].tests) > 0.01
+
+
+def test_a_loaded_identification_builds_the_corrected_problem_again(fits):
+    fit = fits["corrected"]
+    again = identification_from_json(identification_to_json(replace(fit, predictor=None)))
+    assert again.numerical_error == fit.numerical_error
+    attached = again.with_histories(measured(), Refinable())
+    np.testing.assert_allclose(
+        attached.least_squares_problem.correction, fit.least_squares_problem.correction, rtol=0.02, atol=1e-5
+    )
+
+
+# ---- corrections -------------------------------------------------------------------------------------------------
+
+
+def test_the_correction_is_the_difference_at_the_point():
+    problem, x = problem_of(Refinable())
+    corrected, _ = correct_defect(problem, x)
+    other, _ = problem_of(EXACT)
+    np.testing.assert_allclose(corrected.residuals(x).values, other.residuals(x).values, atol=1e-10)
+    far = x + np.array([0.3, -0.2])  # the error does not depend on the values
+    np.testing.assert_allclose(corrected.residuals(far).values, other.residuals(far).values, atol=1e-10)
+    again, error = correct_defect(corrected, x)
+    np.testing.assert_allclose(again.correction, corrected.correction, atol=1e-12)
+    assert error.size["amplitude"] > 0.01
+
+
+def test_the_shift_is_what_the_values_would_have_moved():
+    """To first order: the optimum of the corrected problem less that of the plain one, in standard deviations."""
+    problem, x = problem_of(Refinable())
+    corrected, error = correct_defect(problem, x)
+    ends = [one.minimise(x).x for one in (problem, corrected)]
+    jacobian = problem.jacobian(x)
+    sd = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+    assert error.shift == pytest.approx(np.abs((ends[0] - ends[1]) / sd).max(), rel=0.1)
+
+
+def test_a_test_that_the_exact_predictor_does_not_finish_is_not_corrected():
+    problem, x = problem_of(Refinable(status=Status.NOT_CONVERGED))
+    corrected, error = correct_defect(problem, x)
+    assert error.incomplete == (BARS[0].name,)
+    assert not corrected.correction[0].any()
+    assert np.abs(corrected.correction[1:]).max() == pytest.approx(0.02, rel=0.01)
+
+
+def test_a_predictor_without_a_more_exact_one_stays():
+    problem, x = problem_of(Coarse())
+    assert correct_defect(problem, x) == (problem, None)
+
+
+def test_of_several_predictors_those_are_refined_that_can_be():
+    both = CompositePredictor({"uniaxial": Refinable(), "other": EXACT})
+    tests = [h.replace(specimen="other") if k == 2 else h for k, h in enumerate(measured())]
+    problem, x = problem_of(both, tests)
+    corrected, _ = correct_defect(problem, x)
+    assert np.abs(corrected.correction[:2]).max() == pytest.approx(0.02, rel=0.01)
+    assert np.abs(corrected.correction[2]).max() < 1e-12
+
+
+def test_at_all_frames_the_correction_is_interpolated_in_time():
+    """Of 24 frames 12 are compared; between them the smooth error is interpolated to a tenth of itself."""
+    settings = replace(SETTINGS, frames=12)
+    problem = LeastSquaresProblem.from_histories(NORTON, measured(), Refinable(), settings)
+    x = problem.coordinates.u(THETA)
+    corrected, _ = correct_defect(problem, x)
+    plain = Coarse().predict(NORTON, THETA[None], BARS)
+    found = with_correction_at_frames(corrected, BARS, plain)
+    exact = EXACT.predict(NORTON, THETA[None], BARS)
+    assert np.nanmax(np.abs(found.values - exact.values)) < 0.1 * 0.02
+    assert with_correction_at_frames(problem, BARS, plain) is plain
+
+
+def test_a_cheaper_predictor_agrees_where_it_is_corrected():
+    problem, x = problem_of(EXACT)
+    cheap = with_cheaper_predictor(problem, x, Coarse(relative))
+    assert cheap.predictor == Coarse(relative)
+    np.testing.assert_allclose(cheap.residuals(x).values, problem.residuals(x).values, atol=1e-10)
+    difference = difference_of_predictors(problem, x, Coarse())
+    mask = problem.observations.output_index == 0
+    share = problem.observations.times / problem.observations.times.max(axis=1, keepdims=True)
+    np.testing.assert_allclose(difference[mask], -0.02 * np.sin(2.5 * share[mask]), atol=1e-10)
+
+
+def test_the_sentence_has_units():
+    error = NumericalError("surrogate", "bulge", {"amplitude": 5.5e-4, "strain": 1e-5}, 0.37, 0.21)
+    assert error.sentence == (
+        "at the optimum surrogate differs from bulge by 0.00055 mm in amplitude, 1e-05 in strain (rms; at most 0.37 "
+        "noises); this is corrected, and would have moved values by up to 0.21 of their standard deviations"
+    )

@@ -1,0 +1,242 @@
+"""Unmodelled effects: each against a simulation, or an identification, in which it is there."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from creepkit.inverse.composite_predictor import predict
+from creepkit.inverse.identify import identify
+from creepkit.inverse.iterative_estimation import linearised
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise
+from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.settings import IdentificationSettings
+from creepkit.inverse.unmodelled_effects import (
+    DRIFT,
+    OFFSET_IN_NOISES,
+    USUAL_ACTIVATION_ENERGY,
+    USUAL_DRIFT,
+    UnmodelledEffect,
+    _likeness_of_hardening,
+    unmodelled_effects,
+    unmodelled_note,
+    with_random_effects,
+)
+from creepkit.inverse.variance_components import inverse_covariances
+from creepkit.language import Elastic, arrhenius
+from creepkit.laws.norton import NORTON
+from creepkit.laws.strain_hardening import STRAIN_HARDENING
+from creepkit.records import History, Nuisance, PressureJump, StressSteps, constant_stress
+from creepkit.specimens.bulge.specimen import Bulge
+from creepkit.specimens.uniaxial import Uniaxial
+from helpers.steady_rate_predictor import Steady, planted
+
+T_REF, R = 1048.15, 8.314462618
+BAR = Uniaxial(tolerance=1e-9)
+NOISE = 1e-5
+END = 14400.0
+TIMES = np.linspace(120.0, END, 60)
+NORTON_AT = NORTON.times(arrhenius(T_ref=T_REF))
+HARDENING_AT = STRAIN_HARDENING.times(arrhenius(T_ref=T_REF))
+VALUES = {
+    NORTON_AT.name: {"A": 3e-16, "n": 4.5, "Q": 420e3},
+    HARDENING_AT.name: {"A": 1e-15, "n": 4.0, "m": -0.5, "Q": 420e3},
+}
+SETTINGS = IdentificationSettings(starts=1, sobol_points=8, weights="likelihood", nuisances=())
+HELD = constant_stress(90.0, "stress")
+STEP = StressSteps(((0.0, 80.0), (7200.0, 105.0)), "stress")
+
+
+def theta(law):
+    return law.to_internal(VALUES[law.name])[0]
+
+
+def bars(law, loadings=(HELD,), temperature=1040.0, seed=0):
+    """Simulated bars with little noise, which is stated."""
+    sd = {"strain": np.full(TIMES.size, NOISE)}
+    made = [
+        History(f"bar {k}", TIMES, {"strain": 0.0 * TIMES}, one, temperature, standard_deviation=sd)
+        for k, one in enumerate(loadings)
+    ]
+    rng, strain = np.random.default_rng(seed), BAR.predict(law, theta(law)[None], made).values[0, :, :, 0]
+    return [
+        h.replace(outputs={"strain": y + NOISE * rng.normal(size=y.size)}) for h, y in zip(made, strain, strict=True)
+    ]
+
+
+def at_the_truth(law, tests, predictor=BAR, settings=SETTINGS):
+    problem = LeastSquaresProblem.from_histories(law, tests, predictor, settings)
+    x = problem.coordinates.u(theta(law))
+    return problem, x, linearised(problem, x, problem.residuals(x))
+
+
+def effects_of(law, tests, predictor=BAR, settings=SETTINGS):
+    problem, x, linear = at_the_truth(law, tests, predictor, settings)
+    noise = NoiseModel({name: OutputNoise(sd) for name, sd in zip(problem.observations.outputs, [NOISE], strict=True)})
+    return {e.kind: e for e in unmodelled_effects(problem, x, linear, noise, tests)}, problem, linear
+
+
+# ---- drifts of the furnace ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", [NORTON_AT, HARDENING_AT], ids=["Norton", "strain hardening"])
+@pytest.mark.parametrize("loading", [HELD, STEP], ids=["constant", "step"])
+def test_the_clock_argument_is_a_simulation_with_a_program_of_temperature(law, loading):
+    """A hundredth of the drift, simulated, times a hundred: a few per cent of the largest effect."""
+    tests = bars(law, [loading])
+    effects, problem, linear = effects_of(law, tests)
+    up, down = (
+        predict(BAR, law, theta(law)[None], tests, nuisances={DRIFT: np.array([[sign * 0.05]])}).values[0, 0, :, 0]
+        for sign in (1.0, -1.0)
+    )
+    expected = (up - down) / 0.1 * USUAL_DRIFT
+    found = effects[DRIFT].residual_change[0] / linear.residuals.offset_sensitivity[0]
+    count = int(problem.observations.present[0].sum())
+    expected_there = np.interp(problem.observations.times[0, :count], TIMES, expected)
+    np.testing.assert_allclose(found[:count], expected_there, atol=0.04 * expected.max())
+    assert expected.max() > 20 * NOISE
+
+
+def test_a_law_without_temperature_has_the_usual_activation_energy():
+    """At constant stress the strain of a steady rate changes by rate x Q / R T^2 x 5 K x t^2 / 2 t_end."""
+    plain = NORTON_AT.fix(Q=420e3).at(1040.0)
+    VALUES[plain.name] = {name: value for name, value in VALUES[NORTON_AT.name].items() if name != "Q"}
+    tests = [h.replace(temperature=1040.0) for h in bars(plain)]
+    effects, problem, linear = effects_of(plain, tests)
+    rate = BAR.predict(plain, theta(plain)[None], tests).values[0, 0, -1, 0] / END
+    expected = rate * USUAL_ACTIVATION_ENERGY / (R * 1040.0**2) * USUAL_DRIFT * problem.observations.times**2 / 2 / END
+    found = effects[DRIFT].residual_change / linear.residuals.offset_sensitivity
+    np.testing.assert_allclose(found, expected, rtol=0.02, atol=1e-8)
+
+
+def test_a_recorded_temperature_leaves_no_drift_and_a_nuisance_neither():
+    tests = bars(NORTON_AT, [constant_stress(s, "stress") for s in (70.0, 90.0, 110.0)])
+    assert set(effects_of(NORTON_AT, tests)[0]) == {DRIFT, "offset of strain"}
+    recorded = [h.replace(temperature=h.temperature_program()) for h in tests]
+    assert set(effects_of(NORTON_AT, recorded)[0]) == {"offset of strain"}
+    modelled = replace(SETTINGS, nuisances=(Nuisance("offset"),))
+    assert set(effects_of(NORTON_AT, tests, settings=modelled)[0]) == {DRIFT}
+
+
+# ---- what an effect does to the rate ------------------------------------------------------------------------------
+
+
+def test_the_change_of_the_rate_is_that_of_an_identification_with_the_offset():
+    """Noise-free tests, identified as they are and with the offset in one of them; three tests in quadrature."""
+    noise, values = 2e-5, {"A": 1e-15, "n": 4.0}
+    clean = planted(NORTON, values, [(s, 1000.0) for s in (60.0, 70.0, 80.0)], seed=0)
+    tests = [h.replace(standard_deviation={"strain": np.full(h.times.size, noise)}) for h in clean]
+    fit = identify(NORTON, tests, Steady(), settings=SETTINGS)
+    effect = next(e for e in fit.unmodelled if e.kind == "offset of strain")
+    assert effect.size == pytest.approx(OFFSET_IN_NOISES * noise)
+    rate, changes = fit.rate(fit.reference.stress)[0], []
+    for k in range(3):
+        shifted = [h.replace(outputs={"strain": h.outputs["strain"] + effect.size * (k == j)})
+                   for j, h in enumerate(tests)]  # fmt: skip
+        problem = fit.least_squares_problem
+        moved = LeastSquaresProblem.from_histories(NORTON, shifted, Steady(), SETTINGS, fit.reference)
+        end = replace(moved, covariance_factor=problem.covariance_factor).minimise(fit.x).x
+        changes.append(np.log(replace(fit, u=end).rate(fit.reference.stress)[0] / rate))
+    assert effect.rate_change == pytest.approx(np.sqrt(np.sum(np.square(changes))), rel=0.05)
+
+
+# ---- lengths of the test piece ------------------------------------------------------------------------------------
+
+
+def test_the_effect_of_thickness_is_that_of_other_simulations():
+    """A dimple of half the mesh over 3 h, simulated 2 % thicker and thinner."""
+    law, dimple = NORTON_AT, Bulge(refinement=0.5)
+    blank = History("D1", np.linspace(900.0, 10800.0, 8), {}, PressureJump(8.0, 8.0, 9000.0), 1040.0, "bulge",
+                    elastic=Elastic(100e3))  # fmt: skip
+    run = dimple.predict(law, theta(law)[None], [blank])
+    sd = {"amplitude": np.full(8, 1.5e-3)}
+    test = blank.replace(outputs={"amplitude": run.of(0)[:, run.outputs.index("amplitude")]}, standard_deviation=sd)
+    problem, x, linear = at_the_truth(law, [test], dimple)
+    noise = NoiseModel({"amplitude": OutputNoise(1.5e-3)})
+    effects = {e.kind: e for e in unmodelled_effects(problem, x, linear, noise, [test])}
+    nominal = dimple.geometry.apex_thickness
+    up, down = (
+        dimple.replace(apex_thickness=nominal * factor).predict(law, theta(law)[None], [test])
+        for factor in (1.02, 0.98)
+    )
+    expected = 0.5 * (up.of(0) - down.of(0))[:, up.outputs.index("amplitude")]
+    found = (effects["thickness"].residual_change / linear.residuals.offset_sensitivity)[0]
+    assert effects["thickness"].size == pytest.approx(0.02 * nominal)
+    np.testing.assert_allclose(found, expected, atol=0.03 * np.abs(expected).max())
+
+
+@dataclass(frozen=True)
+class Toleranced(Steady):
+    """States a tolerance of a length that it does not know as a nuisance parameter."""
+
+    tolerances = {"thickness": 0.02}  # noqa: RUF012
+
+
+def test_a_predictor_that_does_not_know_a_length_has_no_effect_of_it():
+    tests = planted(NORTON, {"A": 1e-15, "n": 4.0}, [(60.0, 1000.0), (80.0, 1000.0)], seed=0, noise=1e-5)
+    fit = identify(NORTON, tests, Toleranced(), settings=SETTINGS)
+    assert "thickness" not in {e.kind for e in fit.unmodelled}
+
+
+# ---- likeness of hardening ----------------------------------------------------------------------------------------
+
+
+def test_a_change_that_is_the_hardening_itself_has_correlation_one():
+    """What disappears with m = 0, times minus a half: it takes minus two of it, and the correlation is one."""
+    loadings = [constant_stress(80.0, "stress"), STEP]
+    problem, x, linear = at_the_truth(HARDENING_AT, bars(HARDENING_AT, loadings))
+    position = HARDENING_AT.names.index("m")
+    hardening = VALUES[HARDENING_AT.name]["m"] * linear.residuals.jacobian[..., position]
+    inverses, _ = inverse_covariances(linear.residuals, NoiseModel({"strain": OutputNoise(NOISE)}))
+    ratio, correlation = _likeness_of_hardening(problem, x, linear, inverses, -0.5 * hardening)
+    assert ratio == pytest.approx(-2.0, rel=1e-6)
+    assert correlation == pytest.approx(1.0, rel=1e-9)
+    other = linear.residuals.jacobian[..., HARDENING_AT.names.index("A")]
+    assert _likeness_of_hardening(problem, x, linear, inverses, -0.5 * hardening + 7.0 * other)[1] == pytest.approx(1.0)
+
+
+def test_a_law_that_does_not_harden_is_like_no_drift():
+    problem, x, linear = at_the_truth(NORTON_AT, bars(NORTON_AT))
+    inverses, _ = inverse_covariances(linear.residuals, NoiseModel({"strain": OutputNoise(NOISE)}))
+    assert np.isnan(_likeness_of_hardening(problem, x, linear, inverses, np.ones_like(linear.residuals.values))).all()
+
+
+def test_cooling_looks_like_strain_hardening_and_is_said_with_its_sign():
+    """One test at one stress, the exponents and energy fixed: a furnace that cools slows creep as hardening does."""
+    law = HARDENING_AT.fix(n=4.0, Q=420e3)
+    VALUES[law.name] = {"A": 1e-15, "m": -0.1}
+    effects, _, _ = effects_of(law, bars(law))
+    drift = effects[DRIFT]
+    assert drift.like_hardening < 0
+    assert drift.hardening_correlation > 0.8
+    (sentence,) = (one for one in unmodelled_note([drift]) if "no temperature was recorded" in one)
+    assert f"a drift of {drift.like_hardening:+.2g} K over a test would look like the hardening of this law" in sentence
+
+
+# ---- random effects and sentences ---------------------------------------------------------------------------------
+
+
+def test_an_effect_in_the_covariance_is_a_rank_of_one_in_each_test():
+    tests = bars(NORTON_AT, [constant_stress(s, "stress") for s in (70.0, 90.0)])
+    effects, _, linear = effects_of(NORTON_AT, tests)
+    noise = NoiseModel({"strain": OutputNoise(NOISE)})
+    without, _ = inverse_covariances(linear.residuals, noise)
+    with_both = with_random_effects(linear, [*effects.values()])
+    found, _ = inverse_covariances(with_both.residuals, noise)
+    columns = np.stack([e.residual_change for e in effects.values()], axis=-1)
+    for k in range(2):
+        c = np.linalg.inv(without[k]) + columns[k] @ columns[k].T
+        np.testing.assert_allclose(found[k] @ c, np.eye(len(c)), atol=1e-5)
+    again = with_random_effects(with_both, [effects[DRIFT]])
+    assert again.residuals.random_effect_sensitivities.shape[-1] == 3
+
+
+def test_sentences_name_what_would_change_the_rate_by_more_than_a_hundredth():
+    thickness = UnmodelledEffect("thickness", 0.01, "mm", 0.083)
+    offset = UnmodelledEffect("offset of amplitude", 4.5e-3, "mm", 0.012)
+    assert unmodelled_note([thickness, offset, UnmodelledEffect(DRIFT, 5.0, "K over a test", 0.004)]) == (
+        "intervals take for granted what no nuisance parameter models; the rate at the reference would change: by a "
+        "thickness of 0.01 mm 8.3 %, by an offset of amplitude of 0.0045 mm 1.2 %",
+    )
+    assert unmodelled_note([]) == ()
+    assert unmodelled_note([replace(thickness, rate_change=0.001)]) == ()
