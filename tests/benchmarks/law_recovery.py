@@ -22,6 +22,7 @@ import json
 import multiprocessing
 import os
 import time
+import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -35,6 +36,7 @@ from proportions import share_with_interval
 
 import creepkit as ck
 from creepkit.cli import set_numba_cache
+from creepkit.errors import FitWarning
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
 from creepkit.inverse.variance_components import scaled_inverse
@@ -115,8 +117,10 @@ def summary(specimen, design, ranking, cpu_seconds):
 def quantities(fit, source):
     """(value, low, high) of the four quantities by a fit or an average of fits, rates as ln."""
     at = {"strain": fit.reference.strain, "time": fit.reference.time}
-    log_rates = [np.log(np.ravel(source.rate(planted.SIGMA * level, **at))) for level in STRESS_LEVELS]
-    return [*log_rates, np.ravel(source.local_exponent(planted.SIGMA, **at))]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FitWarning)  # the stresses are the same for all specimens
+        log_rates = [np.log(np.ravel(source.rate(planted.SIGMA * level, **at))) for level in STRESS_LEVELS]
+        return [*log_rates, np.ravel(source.local_exponent(planted.SIGMA, **at))]
 
 
 def true_quantities(specimen, fit):
