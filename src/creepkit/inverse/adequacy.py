@@ -7,7 +7,7 @@ frames show), of offsets and of scatter between tests,
 
 has chi-square's distribution with n less the estimated unknowns degrees of freedom if the law is right and the noise
 white; where the noise was estimated from nu frames, chi2 over its degrees of freedom has that of F. It is taken of all
-outputs together and of each, and the least probability times their number is the p-value (Bonferroni). Below 1 % the
+outputs together and of each, and the least probability times their number is the p-value (Bonferroni). Below 0.3 % the
 law leaves a model discrepancy: what must be added to the noise for the same chi-square.
 """
 
@@ -27,8 +27,8 @@ from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, inverse_covariances
 from creepkit.records import History, output_unit
 
-SIGNIFICANCE = 0.01
-"""p-value below which a law does not explain the tests."""
+SIGNIFICANCE = 0.003
+"""p-value below which a law does not explain the tests: three standard deviations of a normal one."""
 
 
 FREEDOM_PER_FRAME = 0.2
