@@ -66,7 +66,7 @@ def identify(
         starts=4, nuisances=[Nuisance("offset")], weights="likelihood".
     """
     from creepkit.inverse.composite_predictor import through_for_law
-    from creepkit.inverse.history_checks import without_suspect_frames
+    from creepkit.inverse.history_checks import rig_notes, without_suspect_frames
     from creepkit.inverse.identify import identify as run
     from creepkit.inverse.nuisance_parameters import check_nuisance_tests
     from creepkit.inverse.settings import IdentificationSettings
@@ -80,17 +80,19 @@ def identify(
     if through == "auto":
         surrogate = through_for_law(surrogate, law)
     if penalty is None:
-        return run(law, histories, predictor, settings=settings, search=search, through=surrogate, progress=progress)
-    return identify_sparse(
-        law,
-        histories,
-        predictor,
-        penalty=penalty,
-        search=search,
-        through=surrogate,
-        settings=settings,
-        progress=progress,
-    )
+        fit = run(law, histories, predictor, settings=settings, search=search, through=surrogate, progress=progress)
+    else:
+        fit = identify_sparse(
+            law,
+            histories,
+            predictor,
+            penalty=penalty,
+            search=search,
+            through=surrogate,
+            settings=settings,
+            progress=progress,
+        )
+    return replace(fit, notes=(*fit.notes, *rig_notes(histories, settings)))
 
 
 def select(
@@ -113,7 +115,7 @@ def select(
         asked for explains the tests, has 95 % of the weight, and nothing that the tests allow stands against it.
     using, through, settings, changes : as for identify(); weights are "likelihood".
     """
-    from creepkit.inverse.history_checks import without_suspect_frames
+    from creepkit.inverse.history_checks import rig_notes, without_suspect_frames
     from creepkit.inverse.nuisance_parameters import check_nuisance_tests
     from creepkit.inverse.selection.select import select as run
     from creepkit.inverse.settings import IdentificationSettings
@@ -127,7 +129,7 @@ def select(
     histories = without_suspect_frames(check_histories(histories), settings)
     predictor = resolve_predictors(using, histories)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
-    return run(
+    ranking = run(
         [resolve_law(law) for law in laws],
         histories,
         predictor,
@@ -137,6 +139,9 @@ def select(
         by=by,
         progress=progress,
     )
+    notes = rig_notes(histories, settings)
+    noted = (replace(one, fit=replace(one.fit, notes=(*one.fit.notes, *notes))) for one in ranking.laws)
+    return replace(ranking, laws=tuple(noted))
 
 
 def rank(fits: Sequence[Identification]) -> Ranking:

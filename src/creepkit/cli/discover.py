@@ -142,9 +142,12 @@ def parse_prior_odds(texts: Sequence[str] | None) -> dict[str, dict[str, float]]
         target, _, odds = text.partition("=")
         name, _, form = target.partition(":")
         try:
-            odds_by_parameter.setdefault(name.strip(), {})[form.strip()] = float(odds)
+            number = float(odds)
         except ValueError:
             raise FitError(f"--prior {text} is not known; write A:arrhenius=10") from None
+        if not (name.strip() and form.strip() and 0.0 < number < float("inf")):
+            raise FitError(f"--prior {text}: write PARAMETER:FORM=ODDS with finite odds above zero, A:arrhenius=10")
+        odds_by_parameter.setdefault(name.strip(), {})[form.strip()] = number
     return odds_by_parameter
 
 

@@ -181,6 +181,10 @@ def _truncate_at_strain(histories: list[History], limit: float) -> list[History]
     for history in truncated:
         if history not in retained:
             typer.echo(f"left out: {history.name} has no two frames below a strain of {limit:g}", err=True)
+    if not retained:
+        from creepkit.errors import FitError
+
+        raise FitError(f"no test has two frames below a strain of {limit:g}; raise --up-to")
     return retained
 
 

@@ -1,14 +1,15 @@
 """Adequacy: whether a law explains the tests to their noise, judged by noise that was not estimated from its misfit.
 
 With r the residuals at the optimum under C0, the covariance of the noise that histories state (or that neighbouring
-frames show), of offsets and of scatter between tests,
+frames of each test show), of offsets and of scatter between tests,
 
     chi2 = r' C0^-1 r
 
 has chi-square's distribution with n less the estimated unknowns degrees of freedom if the law is right and the noise
 white; where the noise was estimated from nu frames, chi2 over its degrees of freedom has that of F. It is taken of all
 outputs together and of each, and the least probability times their number is the p-value (Bonferroni). Below 0.3 % the
-law leaves a model discrepancy: what must be added to the noise for the same chi-square.
+law leaves a model discrepancy: what must be added to the noise for the same chi-square. Offsets and the scatter of
+rates were estimated from the same tests; a scatter beyond a factor of 2.7, or that bends over the stress, is misfit.
 """
 
 from __future__ import annotations
@@ -21,9 +22,16 @@ import numpy as np
 from scipy.stats import chi2, f
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
-from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, SMALLEST_NOISE, ObservationVector
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, predicted_random_effects
+from creepkit.inverse.observation_vector import (
+    RUPTURE_OUTPUT,
+    SMALLEST_NOISE,
+    ObservationVector,
+    frame_noise,
+    usable_frames,
+)
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, inverse_covariances
 from creepkit.records import History, output_unit
 
@@ -34,6 +42,26 @@ SIGNIFICANCE = 0.003
 FREEDOM_PER_FRAME = 0.2
 """Degrees of freedom that a frame gives to a noise estimated from third differences by a median: 0.21 to 0.22 for 40 to
 48 frames of one test (tests/unit/inverse/test_adequacy.py draws them)."""
+
+
+IMPLAUSIBLE_CHI_SQUARE = 0.05
+"""Reduced chi-square below which the noise that was stated is questioned: 4.5 times what the frames show."""
+
+
+LEAST_NOISE_FREEDOM = 6.0
+"""Degrees of freedom below which an estimated noise says too little to judge by: some 30 frames."""
+
+
+LARGEST_SCATTER = 1.0
+"""Of ln rate between tests, a factor of 2.7: more is no scatter of one alloy."""
+
+
+TREND_SIGNIFICANCE, FEWEST_TREND_TESTS = 0.01, 5
+"""p-value below which rates of tests bend over the stress, and the tests that it takes to see that."""
+
+
+FEWEST_HALF_FRAMES, NOTEWORTHY_GROWTH = 15, 1.4
+"""Frames of half a test whose noise can be estimated, and the growth of noise and output from which it is compared."""
 
 
 LOCAL_FRAMES = 5
@@ -98,6 +126,8 @@ class Adequacy:
     each, times their number. correlation : of what is left, as a share of the test (of outputs that span decades: the
     ln of a factor in time); NaN where nothing is. largest : where the law misses most; None if nothing is known.
     remedies : unmodelled effects, such as "thickness", with any of which the law would explain the tests.
+    rate_scatter : standard deviation of ln rate between tests, which was estimated from them, and rate_trend_p_value :
+        of a bend of these rates over stress, by which a law shows that it misses the dependence on stress.
     """
 
     verdict: AdequacyVerdict
@@ -108,6 +138,8 @@ class Adequacy:
     correlation: float
     largest: LargestDeviation | None
     remedies: tuple[str, ...] = ()
+    rate_scatter: float = 0.0
+    rate_trend_p_value: float = 1.0
 
     @property
     def explains(self) -> bool:
@@ -129,15 +161,20 @@ class Adequacy:
         """One sentence: the verdict, with what is left and where."""
         if self.verdict == "cannot be judged":
             return (
-                "whether it explains the tests cannot be judged: no noise is stated, and too few frames show it; give "
-                "standard_deviation"
+                "cannot be judged: no noise is stated, and too few frames show it (state it in a column such as "
+                "strain_sd, in Python as standard_deviation)"
             )
         source = " and ".join(dict.fromkeys(o.noise_source for o in self.outputs))
         if self.explains:
             slow = np.isfinite(self.correlation)
             correlated = "; what is left is autocorrelated, noise or the law's own" if slow else ""
+            scatter = ""
+            if self.rate_scatter > 0:
+                scatter = f", with rates of tests that scatter by {100 * self.rate_scatter:.2g} %"
+            if self.chi_square < IMPLAUSIBLE_CHI_SQUARE:
+                scatter += " (far larger than what the frames show: check its unit)"
             return (
-                f"explains the tests to their {source} noise: reduced chi-square {self.chi_square:.3g}, "
+                f"explains the tests to their {source} noise{scatter}: reduced chi-square {self.chi_square:.3g}, "
                 f"p = {self.p_value:.2g}{correlated}"
             )
         parts = [
@@ -146,6 +183,10 @@ class Adequacy:
             for o in sorted(self.outputs, key=lambda o: -o.discrepancy_in_noises)
             if o.discrepancy > 0
         ]
+        if self.rate_scatter > LARGEST_SCATTER:
+            parts.append(f"rates of tests that scatter by a factor of {np.exp(self.rate_scatter):.2g}")
+        elif self.rate_trend_p_value < TREND_SIGNIFICANCE:
+            parts.append(f"rates of tests that bend over the stress (p = {self.rate_trend_p_value:.1g})")
         p_text = f"p = {self.p_value:.1g}" if self.p_value > 1e-12 else "p < 1e-12"
         where = f"; most in {self.largest}" if self.largest is not None else ""
         where += f"; with {' or '.join(self.remedies)} unknown it would explain them" if self.remedies else ""
@@ -169,67 +210,160 @@ def adequacy_of(
     histories : with all frames.
     """
     observations = problem.observations
-    judged = _judged_observations(observations)
-    if not judged.any():
+    known = KnownNoise.of_histories(observations, histories)
+    if not known.judged.any():
         nan = float("nan")
         return Adequacy("cannot be judged", (), nan, 0.0, nan, nan, None)
-    residuals = _of_judged(linear.residuals, observations, judged)
-    independent = _independent_noise(observations, noise_model, predictor_errors)
+    residuals = _of_judged(linear.residuals, known)
+    independent = _independent_noise(observations, known, noise_model, predictor_errors)
     inverses, _ = inverse_covariances(residuals, independent)
     judged_problem = replace(linear, residuals=residuals)
     solution = _within_bounds(judged_problem, inverses)
-    share_of_freedom = _freedom(judged_problem, solution) / float(judged.sum())
+    share_of_freedom = _freedom(judged_problem, solution) / float(known.judged.sum())
     contributions = solution.residuals * solution.weighted_residuals
-    outputs, freedoms = [], []
+    outputs = []
     for position, name in enumerate(observations.outputs):
-        mask = judged & (observations.output_index == position)
+        mask = known.judged & (observations.output_index == position)
         if not mask.any():
             continue
         freedom = share_of_freedom * float(mask.sum())
         reduced = float(contributions[mask].sum()) / freedom
-        frames = sum(int(np.isfinite(h.outputs[name]).sum()) for h in histories if name in h.outputs)
-        stated = bool(observations.stated[position])
-        noise_freedom = np.inf if stated else FREEDOM_PER_FRAME * frames
-        p_value = chance_of_larger(reduced, freedom, noise_freedom)
-        noise = max(float(observations.noise[position]), SMALLEST_NOISE * observations.transforms[position].floor)
+        p_value = known.chance_of_larger(reduced, share_of_freedom, mask)
+        noise = float(np.median(known.sd[mask]))
         discrepancy = noise * float(np.sqrt(max(reduced - 1.0, 0.0))) if p_value < SIGNIFICANCE else 0.0
-        outputs.append(
-            OutputAdequacy(
-                name, int(mask.sum()), noise, "stated" if stated else "estimated", reduced, p_value, discrepancy
-            )
-        )
-        freedoms.append(noise_freedom)
-    freedom = share_of_freedom * float(judged.sum())
-    reduced = float(contributions[judged].sum()) / freedom
-    pooled = chance_of_larger(reduced, freedom, float(np.min(freedoms)))
+        source: Literal["stated", "estimated"] = "stated" if observations.stated[position] else "estimated"
+        outputs.append(OutputAdequacy(name, int(mask.sum()), noise, source, reduced, p_value, discrepancy))
+    freedom = share_of_freedom * float(known.judged.sum())
+    reduced = float(contributions[known.judged].sum()) / freedom
+    pooled = known.chance_of_larger(reduced, share_of_freedom, known.judged)
     p_values = [pooled, *(o.p_value for o in outputs)] if len(outputs) > 1 else [pooled]
     p_value = min(1.0, len(p_values) * min(p_values))
+    scatter, trend = _scatter_of_rates(problem, linear.residuals, noise_model)
+    explained = p_value >= SIGNIFICANCE and scatter <= LARGEST_SCATTER and not trend < TREND_SIGNIFICANCE
     return Adequacy(
-        "explains" if p_value >= SIGNIFICANCE else "leaves a discrepancy",
+        "explains" if explained else "leaves a discrepancy",
         tuple(outputs),
         reduced,
         freedom,
         p_value,
         _correlation(noise_model),
-        _largest_deviation(observations, judged, _white_part(residuals, solution, independent), histories),
+        _largest_deviation(observations, known, _white_part(residuals, solution, independent), histories),
+        rate_scatter=scatter,
+        rate_trend_p_value=trend,
     )
 
 
-def _judged_observations(observations: ObservationVector) -> Bools:
-    """(tests, observations) which are data of outputs whose noise is known."""
-    known = np.array(
-        [
-            name != RUPTURE_OUTPUT and (bool(stated) or noise > 0)
-            for name, stated, noise in zip(observations.outputs, observations.stated, observations.noise, strict=True)
+@dataclass(frozen=True, eq=False)
+class KnownNoise:
+    """The noise that is known without the law.
+
+    judged : (tests, observations) which are data of which it is known. sd : (tests, observations) in the output's unit.
+    freedom : (tests, observations) -, how well it is known: infinite where it is stated.
+    """
+
+    judged: Bools
+    sd: Floats
+    freedom: Floats
+
+    @classmethod
+    def of_histories(cls, observations: ObservationVector, histories: Sequence[History]) -> KnownNoise:
+        """The noise that histories state, and of others that of each test between neighbouring frames."""
+        sd = observations.per_observation(observations.noise) * observations.relative_noise
+        freedom = np.full(sd.shape, np.inf)
+        for test, history in enumerate(histories):
+            for position, name in enumerate(observations.outputs):
+                mask = observations.present[test] & (observations.output_index[test] == position)
+                if name == RUPTURE_OUTPUT or observations.stated[position] or not mask.any():
+                    continue
+                frames = int(usable_frames(history, name).sum())
+                floor = SMALLEST_NOISE * observations.transforms[position].floor
+                estimated = _estimated_noise(history, name, observations.values[test, mask])
+                sd[test, mask] = np.maximum(estimated, floor) if (estimated > 0).all() else 0.0
+                freedom[test, mask] = FREEDOM_PER_FRAME * frames
+        ruptures = observations.rupture_mask
+        judged = observations.present & ~ruptures & (sd > 0) & (freedom >= LEAST_NOISE_FREEDOM)
+        return cls(judged, np.where(judged, sd, 1.0), freedom)
+
+    def chance_of_larger(self, reduced: float, share_of_freedom: float, mask: Bools) -> float:
+        """The probability of a larger reduced chi-square of the masked observations, (tests, observations), by chance.
+
+        Each test has noise of its own. One test has the distribution of F; the sum over several is taken as the scaled
+        chi-square of the same mean and variance (Satterthwaite).
+        """
+        groups = [
+            (share_of_freedom * float((mask[k] & (self.freedom[k] == nu)).sum()), float(nu))
+            for k in range(len(mask))
+            for nu in np.unique(self.freedom[k][mask[k]])
         ]
-    )
-    return np.asarray(observations.present & known[observations.output_index])
+        total = sum(freedom for freedom, _ in groups)
+        if len(groups) == 1:
+            return chance_of_larger(reduced, total, groups[0][1])
+        mean = sum(freedom * (1.0 if np.isinf(nu) else nu / (nu - 2.0)) for freedom, nu in groups)
+        variance = sum(freedom**2 * _variance_of_f(freedom, nu) for freedom, nu in groups)
+        return float(chi2.sf(reduced * total * 2.0 * mean / variance, 2.0 * mean**2 / variance))
 
 
-def _of_judged(residuals: Residuals, observations: ObservationVector, judged: Bools) -> Residuals:
+def _estimated_noise(history: History, name: str, values: Floats) -> Floats:
+    """(frames,) noise of an output at its values (frames,): constant, or in proportion to the output where that fits.
+
+    Noise between neighbouring frames is estimated of the first and of the second half of the test; where the second is
+    larger as the output is, and by more than chance, it is in proportion.
+    """
+    usable = usable_frames(history, name)
+    measured = history.outputs[name][usable]
+    constant = np.full(values.shape, frame_noise(history, name))
+    if measured.size < 2 * FEWEST_HALF_FRAMES or measured.min() <= 0.0:
+        return constant
+    first, second = np.array_split(np.flatnonzero(usable), 2)
+    noises, sizes = [], []
+    for half in (first, second):
+        mask = np.zeros(usable.size, bool)
+        mask[half] = True
+        noises.append(frame_noise(history.replace(used=mask), name))
+        sizes.append(float(np.median(history.outputs[name][half])))
+    if min(noises) <= 0.0 or sizes[1] < NOTEWORTHY_GROWTH * sizes[0] or noises[1] < NOTEWORTHY_GROWTH * noises[0]:
+        return constant
+    exponent = float(np.clip(np.log(noises[1] / noises[0]) / np.log(sizes[1] / sizes[0]), 0.0, 1.0))
+    level = float(np.sqrt(np.prod(noises)) / np.sqrt(np.prod(sizes)) ** exponent)
+    return np.asarray(level * np.maximum(values, 1e-300) ** exponent)
+
+
+def _variance_of_f(freedom: float, noise_freedom: float) -> float:
+    """The variance of F, that of chi-square over its degrees of freedom where the noise is exactly known."""
+    if np.isinf(noise_freedom):
+        return 2.0 / freedom
+    nu = noise_freedom
+    return 2.0 * nu**2 * (freedom + nu - 2.0) / (freedom * (nu - 2.0) ** 2 * (nu - 4.0))
+
+
+def _scatter_of_rates(
+    problem: LeastSquaresProblem, residuals: Residuals, noise_model: NoiseModel
+) -> tuple[float, float]:
+    """Standard deviation of ln rate between tests, and the p-value of a bend of it over stress; 0 and 1 for none.
+
+    The scatter was estimated from the same tests: a law that misses the dependence on stress makes it, and it then
+    bends over the stress. The p-value is that of the square of ln stress in a regression (F test).
+    """
+    rates = predicted_random_effects(residuals, noise_model)[1]
+    stresses = np.log([float(np.median(reference_stresses(h, problem.predictor))) for h in problem.histories])
+    if not noise_model.rate > 0:
+        return 0.0, 1.0
+    if len(rates) < FEWEST_TREND_TESTS or np.unique(stresses.round(3)).size < 3:
+        return noise_model.rate, 1.0
+    x = stresses - stresses.mean()
+    squares = [
+        float(((rates - design @ np.linalg.lstsq(design, rates, rcond=None)[0]) ** 2).sum())
+        for design in (np.stack([x**k for k in range(degree + 1)], axis=1) for degree in (1, 2))
+    ]
+    freedom = len(rates) - 3
+    ratio = (squares[0] - squares[1]) / max(squares[1] / freedom, 1e-300)
+    return noise_model.rate, float(f.sf(ratio, 1.0, freedom))
+
+
+def _of_judged(residuals: Residuals, known: KnownNoise) -> Residuals:
     """The residuals of observations that are judged, tests of equal weight; the others are not there."""
     assert residuals.jacobian is not None
-    mask = judged & residuals.present
+    mask = known.judged & residuals.present
     return replace(
         residuals,
         values=np.where(mask, residuals.values, 0.0),
@@ -238,20 +372,19 @@ def _of_judged(residuals: Residuals, observations: ObservationVector, judged: Bo
         log_rate_sensitivity=np.where(mask, residuals.log_rate_sensitivity, 0.0),
         present=mask,
         test_weights=np.ones(len(mask)),
-        relative_noise=observations.relative_noise,
+        relative_noise=known.sd,
     )
 
 
 def _independent_noise(
-    observations: ObservationVector, noise_model: NoiseModel, predictor_errors: Mapping[str, float]
+    observations: ObservationVector, known: KnownNoise, noise_model: NoiseModel, predictor_errors: Mapping[str, float]
 ) -> NoiseModel:
-    """Stated or independently estimated noise, the error of the predictor, and offsets and scatter between tests."""
+    """Known noise (relative to one unit of the output), the predictor's error, and offsets and scatter of tests."""
     outputs = {}
-    for position, (name, transform) in enumerate(zip(observations.outputs, observations.transforms, strict=True)):
-        noise = max(float(observations.noise[position]), SMALLEST_NOISE * transform.floor)
+    for name, transform in zip(observations.outputs, observations.transforms, strict=True):
         scale = getattr(transform, "scale", None)
         drift = predictor_errors.get(name, 0.0) / scale if scale else 0.0
-        outputs[name] = OutputNoise(noise, offset=noise_model[name].offset, drift=drift, correlation_length=1.0)
+        outputs[name] = OutputNoise(1.0, offset=noise_model[name].offset, drift=drift, correlation_length=1.0)
     return NoiseModel(outputs, noise_model.rate)
 
 
@@ -300,10 +433,10 @@ def _white_part(residuals: Residuals, solution: LinearSolution, noise_model: Noi
 
 
 def _largest_deviation(
-    observations: ObservationVector, judged: Bools, deviation: Floats, histories: Sequence[History]
+    observations: ObservationVector, known: KnownNoise, deviation: Floats, histories: Sequence[History]
 ) -> LargestDeviation | None:
     """The mean deviation of a few neighbouring frames that is largest over its noise."""
-    noise = np.maximum(observations.per_observation(observations.noise) * observations.relative_noise, 1e-300)
+    judged, noise = known.judged, known.sd
     best: LargestDeviation | None = None
     for test, history in enumerate(histories):
         for position, name in enumerate(observations.outputs):

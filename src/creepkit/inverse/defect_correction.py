@@ -56,7 +56,8 @@ class NumericalError:
         return (
             f"at the optimum {self.predictor} differs from {self.refined} by {sizes} (rms; at most {self.noises:.2g} "
             f"noises); this is corrected, and would have moved values by up to {self.shift:.2g} of their standard "
-            "deviations"
+            + "deviations"
+            + (f"; {', '.join(self.incomplete)} could not be corrected" if self.incomplete else "")
         )
 
 
@@ -79,7 +80,7 @@ def correct_defect(problem: LeastSquaresProblem, x: Floats) -> tuple[LeastSquare
     known = observations.present & complete[:, None] & np.isfinite(exact) & np.isfinite(coarse)
     correction = np.where(known, exact - coarse, 0.0)
     incomplete = tuple(h.name for h, whole in zip(problem.histories, complete, strict=True) if not whole)
-    error = _numerical_error(problem, x, refined, correction, known)
+    error = _numerical_error(problem, refined, correction, known)
     return problem.with_correction(correction), NumericalError(**error, incomplete=incomplete)  # type: ignore[arg-type]
 
 
@@ -125,7 +126,7 @@ def _predicted(problem: LeastSquaresProblem, x: Floats) -> Floats:
 
 
 def _numerical_error(
-    problem: LeastSquaresProblem, x: Floats, refined: Predictor, correction: Floats, known: Bools
+    problem: LeastSquaresProblem, refined: Predictor, correction: Floats, known: Bools
 ) -> dict[str, object]:
     observations = problem.observations
     sizes, noises = {}, 0.0
@@ -136,10 +137,6 @@ def _numerical_error(
         sizes[name] = float(np.sqrt(np.mean(correction[mask] ** 2)))
         noise = float(observations.noise[position])
         noises = max(noises, sizes[name] / noise) if noise > 0 else noises
-    jacobian = problem.jacobian(x)
-    covariance = scaled_inverse(jacobian.T @ jacobian + np.diag(12.0 / problem.bounds.width**2))
-    defect = problem.whiten(problem.residuals(x).offset_sensitivity * correction)
-    shift = covariance @ (jacobian[: defect.size].T @ defect)
     return {
         "predictor": _name(problem.predictor),
         "refined": f"{_name(refined)} on a finer mesh"
@@ -147,8 +144,20 @@ def _numerical_error(
         else _name(refined),
         "size": sizes,
         "noises": noises,
-        "shift": float(np.abs(shift / np.sqrt(np.diag(covariance))).max()),
+        "shift": float("nan"),
     }
+
+
+def shift_of_values(problem: LeastSquaresProblem, x: Floats, change: Floats) -> float:
+    """By how much values at x (unknowns,) would move with another prediction: the largest, in standard deviations.
+
+    change : (tests, observations) of the prediction, in the output's unit. To first order, under its covariance.
+    """
+    jacobian = problem.jacobian(x)
+    covariance = scaled_inverse(jacobian.T @ jacobian + np.diag(12.0 / problem.bounds.width**2))
+    whitened = problem.whiten(problem.residuals(x).offset_sensitivity * change)
+    shift = covariance @ (jacobian[: whitened.size].T @ whitened)
+    return float(np.abs(shift / np.sqrt(np.diag(covariance))).max())
 
 
 def _name(predictor: Predictor) -> str:

@@ -70,7 +70,10 @@ CODEC = RecordCodec(
             **dict.fromkeys(("noise", "misfit", "offset", "drift", "stated"), NOT_NEGATIVE),
             "correlation_length": POSITIVE,
         },
-        Adequacy: dict.fromkeys(("chi_square", "freedom", "p_value", "correlation"), NOT_NEGATIVE_OR_NAN),
+        Adequacy: dict.fromkeys(
+            ("chi_square", "freedom", "p_value", "correlation", "rate_scatter", "rate_trend_p_value"),
+            NOT_NEGATIVE_OR_NAN,
+        ),
         OutputAdequacy: {"frames": NOT_NEGATIVE, "noise": POSITIVE, "discrepancy": NOT_NEGATIVE},
         NumericalError: {"noises": NOT_NEGATIVE, "shift": NOT_NEGATIVE_OR_NAN},
         UnmodelledEffect: {

@@ -19,7 +19,12 @@ from creepkit.inverse.composite_predictor import (
     reduced_order_model_of,
     refined_of,
 )
-from creepkit.inverse.defect_correction import NumericalError, correct_defect, with_correction_at_frames
+from creepkit.inverse.defect_correction import (
+    NumericalError,
+    correct_defect,
+    shift_of_values,
+    with_correction_at_frames,
+)
 from creepkit.inverse.goodness_of_fit import compare_rupture_times, pooled_errors, pooled_log_strain_rms, test_fits
 from creepkit.inverse.history_checks import suspect_frames_note
 from creepkit.inverse.identification import Identification
@@ -238,12 +243,23 @@ def _best_estimate(
             return best, None
     else:
         x = starts[0]
+    known: Floats | None = None
     for _ in range(MOST_CORRECTIONS):
-        corrected, numerical_error = correct_defect(problem, x)
-        estimator = _working_estimator(corrected, numerical_error)
+        corrected, error = correct_defect(problem, x)
+        if (
+            known is not None
+            and corrected.correction is not None
+            and shift_of_values(best.problem, x, corrected.correction - known) < SMALL_SHIFT
+        ):
+            break
+        numerical_error = error
+        estimator = _working_estimator(corrected, error)
         best = estimate_iteratively(corrected, x, estimator, limits, progress, working_noise)
-        x, working_noise = best.minimum.x, best.working_noise
-        if numerical_error is None or numerical_error.shift < SMALL_SHIFT:
+        x, working_noise, known = best.minimum.x, best.working_noise, corrected.correction
+        if error is None or known is None:
+            break
+        numerical_error = replace(error, shift=shift_of_values(best.problem, x, known))
+        if numerical_error.shift < SMALL_SHIFT:
             break
     return best, numerical_error
 
@@ -347,7 +363,7 @@ def _uncertainty(
     if best.linearised is not None:
         fixed = working_estimator.unestimated_drift_components(best.working_noise)
         return best.working_noise, *restricted_covariance(
-            best.linearised, best.working_noise, settings.nuisances, fixed
+            best.linearised, best.working_noise, settings.nuisances, fixed, problem.parameter_count
         )
     nuisances = _with_assumed_rate(settings.nuisances, tests)
     at_prior_means = problem.nuisance_parameters.integrate_out(best.residuals, x[problem.parameter_count :])

@@ -335,7 +335,10 @@ class ObservationVector:
 def _states_noise(histories: Sequence[History], name: str) -> bool:
     """Whether all of them state a standard deviation of this output."""
     stated = [np.asarray(h.standard_deviation.get(name, np.nan)) for h in histories]
-    return name != RUPTURE_OUTPUT and all((np.isfinite(sd) & (sd > 0)).any() for sd in stated)
+    return name != RUPTURE_OUTPUT and all(
+        sd.shape == h.times.shape and (np.isfinite(sd) & (sd > 0))[usable_frames(h, name)].all()
+        for h, sd in zip(histories, stated, strict=True)
+    )
 
 
 def _observed_outputs(history: History, predictor: Predictor) -> tuple[str, ...]:

@@ -211,13 +211,14 @@ def _offset(problem: LeastSquaresProblem, linear: LinearisedProblem) -> list[tup
     leading = observations.present & observations.leading_output
     if not leading.any():
         return []
-    position = int(observations.output_index[leading][0])
-    size = OFFSET_IN_NOISES * float(observations.noise[position])
-    if not size > 0:
-        return []
-    change = np.where(leading, residuals.offset_sensitivity * size, 0.0)
-    name = observations.outputs[position]
-    return [(f"offset of {name}", size, output_unit(name), change)]
+    offsets = []
+    for position in np.unique(observations.output_index[leading]):
+        size, name = OFFSET_IN_NOISES * float(observations.noise[position]), observations.outputs[position]
+        if size > 0:
+            mask = leading & (observations.output_index == position)
+            change = np.where(mask, residuals.offset_sensitivity * size, 0.0)
+            offsets.append((f"offset of {name}", size, output_unit(name), change))
+    return offsets
 
 
 def _drift(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -> list[tuple[str, float, str, Floats]]:
@@ -236,12 +237,16 @@ def _drift(problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem) -
             if index.size < 3 or observations.rupture_mask[test, index].any():
                 continue
             times = observations.times[test, index]
-            change[test, index] = _advance(history, times, predicted[test, index])
+            by_time = problem.law.uses(time)
+            change[test, index] = _advance(history, times, predicted[test, index], explicit_time=by_time)
     return [(DRIFT, USUAL_DRIFT, "K over a test", factor * change * residuals.offset_sensitivity)]
 
 
-def _advance(history: History, times: Floats, values: Floats) -> Floats:
-    """(frames,) change of an output by a clock that advances by t^2 / 2 t_end; values : (frames,) in its unit."""
+def _advance(history: History, times: Floats, values: Floats, *, explicit_time: bool = False) -> Floats:
+    """(frames,) change of an output by a clock that advances by t^2 / 2 t_end; values : (frames,) in its unit.
+
+    A law of explicit time has no clock of its own: each increment is multiplied by t / t_end.
+    """
     program = history.loading.program()
     levels = program.at(times)
     change, advance, last_slope = np.zeros_like(values), 0.0, 0.0
@@ -251,6 +256,12 @@ def _advance(history: History, times: Floats, values: Floats) -> Floats:
         if end - begin >= 2:
             slope = np.gradient(values[part], times[part])
             start = times[begin - 1] if begin else 0.0
+            if explicit_time:
+                increments = np.diff(values[part]) * 0.5 * (times[part][1:] + times[part][:-1]) / times[-1]
+                first = float(change[begin - 1]) if begin else 0.5 * float(slope[0]) * times[0] ** 2 / times[-1]
+                change[part] = first + np.concatenate([[0.0], np.cumsum(increments)])
+                begin = end
+                continue
             if begin and slope[0] != 0.0:
                 advance *= last_slope / slope[0]
             clock = advance + (times[part] ** 2 - start**2) / (2.0 * times[-1])
@@ -262,7 +273,7 @@ def _advance(history: History, times: Floats, values: Floats) -> Floats:
 def _log_rate_per_kelvin(problem: LeastSquaresProblem, x: Floats) -> float:
     """d ln rate / dT, 1/K, of the law; of one that knows no temperature by the usual activation energy."""
     T = problem.coordinates.reference.temperature
-    if not problem.law.uses(temperature) or T < 500.0:
+    if not problem.law.uses(temperature):
         return USUAL_ACTIVATION_ENERGY / (GAS_CONSTANT * max(T, 1000.0) ** 2)
     coordinates, u = problem.coordinates, x[: problem.parameter_count]
     up, down = (float(log_rate(coordinates, coordinates.reference.stress, T + s)(u)) for s in (1.0, -1.0))

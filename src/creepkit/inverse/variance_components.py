@@ -145,6 +145,10 @@ SHORTEST_CORRELATION, SHORTEST_DISCREPANCY = 0.05, 0.25
 """Shortest correlations of an instrument's noise and of a discrepancy: a hundredth and a twentieth of a test."""
 
 
+LARGEST_RATE_SCATTER = 1.0
+"""Of ln rate between tests, a factor of 2.7: a law that needs more misses what the tests differ in."""
+
+
 LARGEST_DISCREPANCY = 1e4
 """In noises."""
 
@@ -318,6 +322,8 @@ def _component(noise_model: NoiseModel, output: str, name: str) -> float:
 
 def _bounds(residuals: Residuals, noise_model: NoiseModel, output: str, name: str) -> tuple[float, float]:
     """Bounds of the logarithm of a component: an offset up to the typical output itself."""
+    if name == "rate":
+        return float(np.log(1e-4)), float(np.log(LARGEST_RATE_SCATTER))
     if name == "discrepancy_length":
         return float(np.log(SHORTEST_DISCREPANCY)), float(np.log(LONGEST_CORRELATION))
     if name == "discrepancy":

@@ -98,11 +98,24 @@ class History:
         if not isinstance(self.temperature, Program):
             freeze(self, "temperature", float(self.temperature))
         self._check_end(origin)
-        sd = {n: frozen(np.broadcast_to(np.asarray(v, float), times.shape)) for n, v in self.standard_deviation.items()}
+        sd = {n: self._checked_sd(origin, n, v, times.size) for n, v in self.standard_deviation.items()}
         freeze(self, "standard_deviation", MappingProxyType(sd))
         freeze(self, "geometry", MappingProxyType(dict(self.geometry)))
         freeze(self, "stated", MappingProxyType(dict(self.stated)))
         freeze(self, "labels", MappingProxyType(dict(self.labels)))
+
+    @staticmethod
+    def _checked_sd(origin: str, name: str, values: Floats, frames: int) -> Floats:
+        """(frames,) standard deviations of one output; HistoryError for what cannot be one."""
+        array = np.asarray(values, float)
+        if array.ndim > 1 or array.size not in (1, frames):
+            raise HistoryError(f"{origin}: standard_deviation of '{name}' has {array.size} values for {frames} times")
+        if np.isinf(array).any() or (array < 0).any():
+            raise HistoryError(
+                f"{origin}: a standard_deviation of '{name}' is negative or infinite; give numbers above zero, NaN "
+                "where it is not known"
+            )
+        return frozen(np.broadcast_to(array.ravel() if array.size == 1 else array, (frames,)))
 
     def _check_end(self, origin: str) -> None:
         """A specimen breaks once, and has no frames afterwards but for the rounding of the rupture time."""

@@ -26,6 +26,7 @@ LISTED_RUPTURES = 15
 
 UNITS = {
     **{"amplitude": "mm", "width": "mm", "thickness": "mm", "window": "mm"},
+    **{"rate step": "in ln", "rate drift": "in ln", "modulus": "relative", "load step": "relative"},
     **{"temperature": "K", "temperature step": "K", "temperature drift": "K"},
 }
 

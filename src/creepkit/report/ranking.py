@@ -66,7 +66,8 @@ def print_ranking(ranking: Ranking, written: Sequence[Path], test_count: int) ->
     ]
     columns = ("law", "parameters", *_misfit_columns(ranking.best), "BIC - best", "weight", "explains the tests")
     print_table(f"{test_count} tests", columns, rows)
-    print(f"{ranking.verdict}\n\n{ranking.best}\n")
+    equivalent = [] if ranking.decisive else [f"- {pair}" for pair in _equivalents_among_remaining(ranking)]
+    print("\n".join([ranking.verdict, *equivalent]) + f"\n\n{ranking.best}\n")
     for path in written:
         print(f"wrote {path}")
 

@@ -179,6 +179,7 @@ def result_columns(plate: ScreeningResult, result: AlloyResult) -> dict[str, Any
         "law": fit.law.name,
         "weight": _number_text(result.laws[0].weight),
         "decisive": "yes" if result.decisive else "no",
+        "verdict": result.verdict,
         **_adequacy_columns(fit.adequacy),
         "not_ruled_out": "; ".join(result.credible_laws[1:]),
         "equivalents": "; ".join(result.equivalents),

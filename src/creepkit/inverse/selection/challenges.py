@@ -30,9 +30,11 @@ from creepkit.inverse.defect_correction import difference_of_predictors
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import DECISIVE_WEIGHT, bic_penalty, criterion_weights
 from creepkit.inverse.problem import LeastSquaresProblem
+from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.search.local_refinement import Tolerances
 from creepkit.inverse.selection.discrimination import under_common_covariance
 from creepkit.inverse.unmodelled_effects import UnmodelledEffect, with_random_effects
+from creepkit.kernels import lower
 from creepkit.language import CreepLaw, Param, stress
 
 SHARE = 0.3
@@ -55,7 +57,11 @@ APPROXIMATE_STEPS = Tolerances(max_steps=15, tolerance=1e-3)
 """Of the reduced-order model, from which the last steps begin."""
 
 
-LAST_STEPS = Tolerances(max_steps=8, tolerance=1e-4)
+LAST_STEPS = Tolerances(max_steps=25, tolerance=1e-6)
+
+
+SAME_FUNCTION = 0.3
+"""Range of ln of the ratio of two rates over all conditions, within which they are one function."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +119,7 @@ def compatible_sum(best: Identification, other: Identification) -> Challenge | N
     single = best.least_squares_problem
     own_terms = len(single.coordinates.term_rates)
     if not (own_terms and other.least_squares_problem.coordinates.term_rates):
-        return None
+        return _unexamined("sum", f"a sum with {other.law.name}")
     try:
         law = best.law + other.law
         problem = _of_law(single, law)
@@ -122,13 +128,50 @@ def compatible_sum(best: Identification, other: Identification) -> Challenge | N
         x[own_rates] += np.log(1.0 - SHARE)
         x[further_rates] += np.log(SHARE)
         share = ShareResidual(own_rates[0], further_rates[0], float(x[further_rates[0]] - x[own_rates[0]]))
-        excess = _least_chi_square(best, problem, x, share=share) - _chi_square(single, best.x)
-    except CreepkitError:  # a law that cannot be predicted is none that the tests allow
-        return None
-    if excess > NOT_EXCLUDED:
+        least, x = _least_chi_square(best, problem, x, share=share)
+    except CreepkitError:
+        return _unexamined("sum", f"a sum with {other.law.name}")
+    excess = least - _chi_square(single, best.x)
+    if excess > NOT_EXCLUDED or _are_one_function(problem, x, own_terms):
         return None
     percent = f"{100 * SHARE:.0f} % of the rate from {other.law.name}"
-    return Challenge("sum", law.name, f"{law.name} with {percent} explains them as well (chi-square {excess:+.1f})")
+    return Challenge("sum", law.name, f"{law.name} with {percent} explains them as well {_change_text(excess)}")
+
+
+def _unexamined(kind: Literal["sum", "threshold"], name: str) -> Challenge:
+    return Challenge(kind, name, f"whether {name} explains them as well could not be examined")
+
+
+def _change_text(excess: float) -> str:
+    return f"(its chi-square is {abs(excess):.1f} {'higher' if excess > 0 else 'lower'})"
+
+
+def _are_one_function(problem: LeastSquaresProblem, x: Floats, own_terms: int) -> bool:
+    """Whether the further terms of a sum are, at x (unknowns,), multiples of the first ones over all conditions.
+
+    A power law with a hardening exponent of zero is a power law: its sum with another says nothing new.
+    """
+    law, reference = problem.law, problem.coordinates.reference
+    theta = dict(zip(law.names, problem.coordinates.theta(x[: problem.parameter_count]), strict=True))
+    end = max(float(h.times[-1]) for h in problem.histories)
+    stresses = np.array([v for h in problem.histories for v in reference_stresses(h, problem.predictor)])
+    grid = np.meshgrid(
+        np.geomspace(0.8 * stresses.min(), 1.25 * stresses.max(), 5),
+        reference.strain * np.array([0.1, 1.0, 10.0]),
+        np.geomspace(0.05 * end, end, 3),
+    )
+    point = [axis.ravel() for axis in grid]
+    rates = []
+    for label in law.terms:
+        term = law.only(label)
+        states = [z.initial for z in term.states.values()]
+        columns = [theta[name] for name in term.names]
+        T, s = np.full_like(point[0], reference.temperature), point[0]
+        with np.errstate(all="ignore"):
+            rates.append(lower(term, "numpy").internal_log_rate(*point, T, s, s / 3, *states, *columns) + 0.0 * s)
+    own, further = (np.logaddexp.reduce(np.array(part), axis=0) for part in (rates[:own_terms], rates[own_terms:]))
+    difference = own - further
+    return bool(np.isfinite(difference).all() and np.ptp(difference) < SAME_FUNCTION)
 
 
 def compatible_threshold(best: Identification) -> Challenge | None:
@@ -144,12 +187,13 @@ def compatible_threshold(best: Identification) -> Challenge | None:
         problem = _of_law(single, law)
         position = best.u.size
         x = np.concatenate([best.u, [threshold], best.x[position:]])
-        excess = _least_chi_square(best, problem, x, fixed={position: threshold}) - _chi_square(single, best.x)
+        least, _ = _least_chi_square(best, problem, x, fixed={position: threshold})
     except CreepkitError:
-        return None
+        return _unexamined("threshold", f"{best.law.name} above a threshold")
+    excess = least - _chi_square(single, best.x)
     if excess > NOT_EXCLUDED:
         return None
-    sentence = f"{law.name} of {threshold:.3g} MPa explains them as well (chi-square {excess:+.1f})"
+    sentence = f"{law.name} of {threshold:.3g} MPa explains them as well {_change_text(excess)}"
     return Challenge("threshold", law.name, sentence)
 
 
@@ -169,14 +213,15 @@ def _least_chi_square(
     *,
     share: ShareResidual | None = None,
     fixed: Mapping[int, float] | None = None,
-) -> float:
-    """The least chi-square from x (unknowns,): first by the reduced-order model, then by the predictor itself."""
+) -> tuple[float, Floats]:
+    """The least chi-square from x (unknowns,), and where: by the reduced-order model, then by the predictor itself."""
     reduced = reduced_order_model_of(problem.predictor)
     if reduced is not None:
         difference = difference_of_predictors(best.least_squares_problem, best.x, reduced)
         cheap = problem.with_predictor(reduced).with_correction(difference)
         x = cheap.minimise(x, additional=share, fixed=fixed, tolerances=APPROXIMATE_STEPS).x
-    return _chi_square(problem, problem.minimise(x, additional=share, fixed=fixed, tolerances=LAST_STEPS).x)
+    x = problem.minimise(x, additional=share, fixed=fixed, tolerances=LAST_STEPS).x
+    return _chi_square(problem, x), x
 
 
 def _chi_square(problem: LeastSquaresProblem, x: Floats) -> float:

@@ -172,7 +172,7 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
         return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}; {unexamined}"
     if ranking.challenges:
         but = "; and ".join(challenge.sentence for challenge in ranking.challenges)
-        return f"of {count} laws tried only {best} explains the tests ({weight}), but {but}"
+        return f"of {count} laws tried {best} has nearly all the weight ({weight}) and explains the tests, but {but}"
     return f"of {count} laws tried {best} is best ({weight}); {adequacy_text}"
 
 

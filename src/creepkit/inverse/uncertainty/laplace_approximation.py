@@ -43,10 +43,12 @@ def restricted_covariance(
     noise_model: NoiseModel,
     nuisances: Sequence[Nuisance],
     fixed: Collection[tuple[str, str]] = (),
+    parameter_count: int | None = None,
 ) -> tuple[Floats, float]:
     """Posterior covariance of x = (u, e), (unknowns, unknowns), and its degrees of freedom.
 
-    fixed : (output, component) that are known beside those that nuisances give.
+    fixed : (output, component) that are known beside those that nuisances give. parameter_count : of the law; the
+    degrees of freedom are the median over its parameters, by default over all unknowns.
     Unknowns at their bounds count here as all others: their intervals reach inwards.
     """
     unconstrained = replace(linearised, free=np.ones_like(linearised.free))
@@ -68,7 +70,10 @@ def restricted_covariance(
     variance_of_variance = np.einsum("pj,jk,pk->p", gradient, component_covariance, gradient)
     freedom = 2.0 * np.diag(solution.covariance) ** 2 / np.maximum(variance_of_variance, 1e-300)
     determined = (unconstrained.jacobian != 0).any(axis=(0, 1))
-    return solution.covariance, float(np.clip(np.median(freedom[determined]), MINIMUM_FREEDOM, 1e9))
+    if not determined[:parameter_count].any():
+        return solution.covariance, MINIMUM_FREEDOM
+    median = np.median(freedom[:parameter_count][determined[:parameter_count]])
+    return solution.covariance, float(np.clip(median, MINIMUM_FREEDOM, 1e9))
 
 
 def _information(

@@ -80,6 +80,8 @@ def set_up_test(specimen: BulgeSettings, history: History, nuisances: Mapping[st
     pressure = history.loading.program()
     if pressure.values.min() < 0.0:
         raise SolveError(f"{where}: the pressure falls to {pressure.values.min():g} MPa; it must not be negative")
+    if not pressure.values.max() > 0.0:
+        raise SolveError(f"{where}: the pressure is zero throughout; a bulge test needs one above zero")
     geometry = _geometry(specimen, history, nuisances)
     operator = Observation.from_text(history.operator) if history.operator else specimen.observation
     if "window" in nuisances:
