@@ -19,19 +19,15 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2, f
+from scipy.stats import f
 
-from creepkit.arrays import Bools, Floats
+from creepkit.arrays import Floats
+from creepkit.inverse.known_noise import KnownNoise
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, predicted_random_effects
-from creepkit.inverse.observation_vector import (
-    RUPTURE_OUTPUT,
-    SMALLEST_NOISE,
-    ObservationVector,
-    frame_noise,
-    usable_frames,
-)
+from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
+from creepkit.inverse.unmodelled_effects import UnmodelledEffect, with_random_effects
 from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, inverse_covariances
 from creepkit.records import History, output_unit
 
@@ -39,17 +35,8 @@ SIGNIFICANCE = 0.003
 """p-value below which a law does not explain the tests: three standard deviations of a normal one."""
 
 
-FREEDOM_PER_FRAME = 0.2
-"""Degrees of freedom that a frame gives to a noise estimated from third differences by a median: 0.21 to 0.22 for 40 to
-48 frames of one test (tests/unit/inverse/test_adequacy.py draws them)."""
-
-
 IMPLAUSIBLE_CHI_SQUARE = 0.05
 """Reduced chi-square below which the noise that was stated is questioned: 4.5 times what the frames show."""
-
-
-LEAST_NOISE_FREEDOM = 6.0
-"""Degrees of freedom below which an estimated noise says too little to judge by: some 30 frames."""
 
 
 LARGEST_SCATTER = 1.0
@@ -58,10 +45,6 @@ LARGEST_SCATTER = 1.0
 
 TREND_SIGNIFICANCE, FEWEST_TREND_TESTS = 0.01, 5
 """p-value below which rates of tests bend over the stress, and the tests that it takes to see that."""
-
-
-FEWEST_HALF_FRAMES, NOTEWORTHY_GROWTH = 15, 1.4
-"""Frames of half a test whose noise can be estimated, and the growth of noise and output from which it is compared."""
 
 
 LOCAL_FRAMES = 5
@@ -125,7 +108,7 @@ class Adequacy:
     are missing. chi_square : of all of them, over `freedom`, its degrees of freedom. p_value : the least of all and of
     each, times their number. correlation : of what is left, as a share of the test (of outputs that span decades: the
     ln of a factor in time); NaN where nothing is. largest : where the law misses most; None if nothing is known.
-    remedies : unmodelled effects, such as "thickness", with any of which the law would explain the tests.
+    remedies : unmodelled effects, such as "a thickness of 0.01 mm", with any of which the law would explain the tests.
     rate_scatter : standard deviation of ln rate between tests, which was estimated from them, and rate_trend_p_value :
         of a bend of these rates over stress, by which a law shows that it misses the dependence on stress.
     """
@@ -189,7 +172,8 @@ class Adequacy:
             parts.append(f"rates of tests that bend over the stress (p = {self.rate_trend_p_value:.1g})")
         p_text = f"p = {self.p_value:.1g}" if self.p_value > 1e-12 else "p < 1e-12"
         where = f"; most in {self.largest}" if self.largest is not None else ""
-        where += f"; with {' or '.join(self.remedies)} unknown it would explain them" if self.remedies else ""
+        if self.remedies:
+            where += f"; it would explain them with {' or with '.join(self.remedies)}, which nobody modelled"
         return (
             f"leaves {' and '.join(parts) or 'more than noise'} unexplained (reduced chi-square "
             f"{self.chi_square:.3g}, {p_text}){where}"
@@ -253,87 +237,26 @@ def adequacy_of(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class KnownNoise:
-    """The noise that is known without the law.
-
-    judged : (tests, observations) which are data of which it is known. sd : (tests, observations) in the output's unit.
-    freedom : (tests, observations) -, how well it is known: infinite where it is stated.
-    """
-
-    judged: Bools
-    sd: Floats
-    freedom: Floats
-
-    @classmethod
-    def of_histories(cls, observations: ObservationVector, histories: Sequence[History]) -> KnownNoise:
-        """The noise that histories state, and of others that of each test between neighbouring frames."""
-        sd = observations.per_observation(observations.noise) * observations.relative_noise
-        freedom = np.full(sd.shape, np.inf)
-        for test, history in enumerate(histories):
-            for position, name in enumerate(observations.outputs):
-                mask = observations.present[test] & (observations.output_index[test] == position)
-                if name == RUPTURE_OUTPUT or observations.stated[position] or not mask.any():
-                    continue
-                frames = int(usable_frames(history, name).sum())
-                floor = SMALLEST_NOISE * observations.transforms[position].floor
-                estimated = _estimated_noise(history, name, observations.values[test, mask])
-                sd[test, mask] = np.maximum(estimated, floor) if (estimated > 0).all() else 0.0
-                freedom[test, mask] = FREEDOM_PER_FRAME * frames
-        ruptures = observations.rupture_mask
-        judged = observations.present & ~ruptures & (sd > 0) & (freedom >= LEAST_NOISE_FREEDOM)
-        return cls(judged, np.where(judged, sd, 1.0), freedom)
-
-    def chance_of_larger(self, reduced: float, share_of_freedom: float, mask: Bools) -> float:
-        """The probability of a larger reduced chi-square of the masked observations, (tests, observations), by chance.
-
-        Each test has noise of its own. One test has the distribution of F; the sum over several is taken as the scaled
-        chi-square of the same mean and variance (Satterthwaite).
-        """
-        groups = [
-            (share_of_freedom * float((mask[k] & (self.freedom[k] == nu)).sum()), float(nu))
-            for k in range(len(mask))
-            for nu in np.unique(self.freedom[k][mask[k]])
-        ]
-        total = sum(freedom for freedom, _ in groups)
-        if len(groups) == 1:
-            return chance_of_larger(reduced, total, groups[0][1])
-        mean = sum(freedom * (1.0 if np.isinf(nu) else nu / (nu - 2.0)) for freedom, nu in groups)
-        variance = sum(freedom**2 * _variance_of_f(freedom, nu) for freedom, nu in groups)
-        return float(chi2.sf(reduced * total * 2.0 * mean / variance, 2.0 * mean**2 / variance))
-
-
-def _estimated_noise(history: History, name: str, values: Floats) -> Floats:
-    """(frames,) noise of an output at its values (frames,): constant, or in proportion to the output where that fits.
-
-    Noise between neighbouring frames is estimated of the first and of the second half of the test; where the second is
-    larger as the output is, and by more than chance, it is in proportion.
-    """
-    usable = usable_frames(history, name)
-    measured = history.outputs[name][usable]
-    constant = np.full(values.shape, frame_noise(history, name))
-    if measured.size < 2 * FEWEST_HALF_FRAMES or measured.min() <= 0.0:
-        return constant
-    first, second = np.array_split(np.flatnonzero(usable), 2)
-    noises, sizes = [], []
-    for half in (first, second):
-        mask = np.zeros(usable.size, bool)
-        mask[half] = True
-        noises.append(frame_noise(history.replace(used=mask), name))
-        sizes.append(float(np.median(history.outputs[name][half])))
-    if min(noises) <= 0.0 or sizes[1] < NOTEWORTHY_GROWTH * sizes[0] or noises[1] < NOTEWORTHY_GROWTH * noises[0]:
-        return constant
-    exponent = float(np.clip(np.log(noises[1] / noises[0]) / np.log(sizes[1] / sizes[0]), 0.0, 1.0))
-    level = float(np.sqrt(np.prod(noises)) / np.sqrt(np.prod(sizes)) ** exponent)
-    return np.asarray(level * np.maximum(values, 1e-300) ** exponent)
-
-
-def _variance_of_f(freedom: float, noise_freedom: float) -> float:
-    """The variance of F, that of chi-square over its degrees of freedom where the noise is exactly known."""
-    if np.isinf(noise_freedom):
-        return 2.0 / freedom
-    nu = noise_freedom
-    return 2.0 * nu**2 * (freedom + nu - 2.0) / (freedom * (nu - 2.0) ** 2 * (nu - 4.0))
+def adequacy_with_remedies(
+    problem: LeastSquaresProblem,
+    linear: LinearisedProblem,
+    noise_model: NoiseModel,
+    predictor_errors: Mapping[str, float],
+    histories: Sequence[History],
+    effects: Sequence[UnmodelledEffect],
+) -> Adequacy:
+    """The same, with those of the unmodelled effects named with which the law would explain the tests."""
+    adequacy = adequacy_of(problem, linear, noise_model, predictor_errors, histories)
+    if adequacy.verdict != "leaves a discrepancy":
+        return adequacy
+    remedies = [
+        effect.description
+        for effect in effects
+        if adequacy_of(
+            problem, with_random_effects(linear, [effect]), noise_model, predictor_errors, histories
+        ).explains
+    ]
+    return replace(adequacy, remedies=tuple(remedies))
 
 
 def _scatter_of_rates(
@@ -405,15 +328,6 @@ def _freedom(linear: LinearisedProblem, solution: LinearSolution) -> float:
     prior = linear.precision[linear.free]
     determined = prior.size - float((np.diag(solution.covariance) * prior).sum())
     return max(float(linear.residuals.present.sum()) - determined, 1.0)
-
-
-def chance_of_larger(reduced: float, freedom: float, noise_freedom: float) -> float:
-    """Probability of a larger reduced chi-square by chance, the noise known to `noise_freedom` degrees of freedom."""
-    if not (np.isfinite(reduced) and freedom > 0):
-        return float("nan")
-    if np.isinf(noise_freedom):
-        return float(chi2.sf(reduced * freedom, freedom))
-    return float(f.sf(reduced, freedom, max(noise_freedom, 1.0)))
 
 
 def _correlation(noise_model: NoiseModel) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import FitError
-from creepkit.inverse.adequacy import adequacy_of
+from creepkit.inverse.adequacy import adequacy_with_remedies
 from creepkit.inverse.bound_penalties import check_bounds
 from creepkit.inverse.composite_predictor import (
     predict,
@@ -48,7 +48,7 @@ from creepkit.inverse.noise_model import (
     predicted_random_effects,
     whiten,
 )
-from creepkit.inverse.nuisance_parameters import NuisanceEstimate, NuisanceParameters
+from creepkit.inverse.nuisance_parameters import NuisanceEstimate, nuisance_estimates_of
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
 from creepkit.inverse.search.global_search import GlobalSearch, SearchTrace
@@ -63,7 +63,7 @@ from creepkit.inverse.uncertainty.laplace_approximation import (
     positive_semidefinite,
     restricted_covariance,
 )
-from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note, with_random_effects
+from creepkit.inverse.unmodelled_effects import unmodelled_effects, unmodelled_note
 from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.inverse.working_noise import WorkingNoiseEstimator, with_rupture_weight
 from creepkit.language import CreepLaw
@@ -300,24 +300,14 @@ def _result(
     tests = test_fits(
         problem, residuals, predicted_random_effects(residuals, noise_model), histories, prediction, ruptures
     )
-    nuisance_estimates = _nuisance_estimates(
+    nuisance_estimates = nuisance_estimates_of(
         problem.nuisance_parameters, x[count:], np.sqrt(np.diag(covariance))[count:]
     )
     linear = best.linearised or linearised(problem, x, residuals)
     unmodelled = unmodelled_effects(problem, x, linear, noise_model, histories)
-    adequacy = adequacy_of(problem, linear, noise_model, working_estimator.predictor_errors, histories)
-    if adequacy.verdict == "leaves a discrepancy":
-        tried = {
-            effect.kind: adequacy_of(
-                problem,
-                with_random_effects(linear, [effect]),
-                noise_model,
-                working_estimator.predictor_errors,
-                histories,
-            )
-            for effect in unmodelled
-        }
-        adequacy = replace(adequacy, remedies=tuple(kind for kind, other in tried.items() if other.explains))
+    adequacy = adequacy_with_remedies(
+        problem, linear, noise_model, working_estimator.predictor_errors, histories, unmodelled
+    )
     return Identification(
         law=law,
         estimates=parameter_estimates(law, coordinates, u, law_covariance, interval_quantile(freedom)),
@@ -381,21 +371,6 @@ def _uncertainty(
         problem.bounds,
         problem.nuisance_parameters,
         rate_known=rate_is_given,
-    )
-
-
-def _nuisance_estimates(nuisance_parameters: NuisanceParameters, e: Floats, sd: Floats) -> tuple[NuisanceEstimate, ...]:
-    return tuple(
-        NuisanceEstimate(n.kind, n.scope, member, float(value), float(s), float(mean), float(prior_sd), n.start)
-        for n, member, value, s, mean, prior_sd in zip(
-            nuisance_parameters.nuisances,
-            nuisance_parameters.owners,
-            e,
-            sd,
-            nuisance_parameters.mean,
-            nuisance_parameters.sd,
-            strict=True,
-        )
     )
 
 

@@ -245,3 +245,21 @@ class NuisanceEstimate:
     def key(self) -> str:
         """The kind, of a step with its start; as Nuisance.key."""
         return nuisance_key(self.kind, self.start)
+
+
+def nuisance_estimates_of(
+    nuisance_parameters: NuisanceParameters, e: Floats, sd: Floats
+) -> tuple[NuisanceEstimate, ...]:
+    """The estimates of nuisance parameters from e (nuisances,) and their standard deviations sd (nuisances,)."""
+    return tuple(
+        NuisanceEstimate(n.kind, n.scope, member, float(value), float(s), float(mean), float(prior_sd), n.start)
+        for n, member, value, s, mean, prior_sd in zip(
+            nuisance_parameters.nuisances,
+            nuisance_parameters.owners,
+            e,
+            sd,
+            nuisance_parameters.mean,
+            nuisance_parameters.sd,
+            strict=True,
+        )
+    )

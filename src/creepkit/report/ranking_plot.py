@@ -11,8 +11,8 @@ import numpy as np
 from creepkit.arrays import Floats
 from creepkit.inverse.goodness_of_fit import TestFit
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
-from creepkit.report.condition_colours import distinct_colours
-from creepkit.report.figures import empty_figure, logarithmic_labels, save_figure, wrapped
+from creepkit.report.condition_colours import distinct_colours, temperatures_celsius
+from creepkit.report.figures import empty_figure, logarithmic_labels, power_of_ten, save_figure, wrapped
 from creepkit.report.identification_plot import axis_label, curve_of_test, draw_curve, set_curve_ranges
 from creepkit.report.load_programs import program_text
 from creepkit.report.prediction_bands import FittedCurves, fitted_curves
@@ -120,6 +120,60 @@ def _draw_misfits(part: Any, ranking: Ranking) -> None:
     bar.set_ticks(list(labels), labels=[_number(v) for v in labels])
     bar.ax.yaxis.set_minor_locator(NullLocator())
     heat.set_title(HEAT_TITLE, fontsize=9)
+    weights = [r.weight for r in ranking.laws]
+    bars.barh(range(len(weights)), weights, color=_law_colours(ranking), height=0.6)
+    for row, weight in enumerate(weights):
+        inside = weight > 0.7
+        place = (weight - 0.03, "right", "white") if inside else (weight + 0.03, "left", "black")
+        bars.text(place[0], row, f"{weight:.3f}", va="center", ha=place[1], color=place[2], fontsize=8)
+    bars.set(xlim=(0.0, 1.0), xticks=(0.0, 0.5, 1.0), xlabel="weight among the laws tried")
+    bars.xaxis.label.set_fontsize(9)
+    bars.tick_params(axis="y", labelleft=False)
+    bars.grid(axis="x", alpha=0.25)
+
+
+def _number(value: float) -> str:
+    """Two digits; large numbers as powers of ten."""
+    if not np.isfinite(value):
+        return "-"
+    return f"{value:.2g}" if value < 100 else f"{value:.0f}" if value < 9999.5 else power_of_ten(float(f"{value:.0e}"))
+
+
+def _law_name(ranked: RankedLaw) -> str:
+    return ranked.fit.law.name
+
+
+def _law_colours(ranking: Ranking) -> list[Any]:
+    """Those of the curves; grey for laws whose curves are not drawn."""
+    colours = distinct_colours(MOST_LAWS_DRAWN)
+    return [
+        colours[k] if r.weight > CREDIBLE_WEIGHT and k < MOST_LAWS_DRAWN else "0.6" for k, r in enumerate(ranking.laws)
+    ]
+
+
+def _columns(fit: Identification) -> list[int]:
+    """The tests from the coldest to the hottest, as they stand without histories."""
+    if not fit.histories:
+        return list(range(len(fit.tests)))
+    return [int(k) for k in np.argsort(np.round(temperatures_celsius(fit.histories)), kind="stable")]
+
+
+def _label_tests(axes: Axes, fit: Identification, order: Sequence[int]) -> None:
+    """Names of the tests; of many, the temperature of each run of equal ones."""
+    if len(order) <= MOST_TEST_NAMES or not fit.histories:
+        step = -(-len(order) // MOST_TEST_NAMES)
+        names = [fit.tests[k].name for k in order[::step]]
+        axes.set_xticks(range(0, len(order), step), names, rotation=35, ha="right", rotation_mode="anchor", fontsize=8)
+        return
+    celsius = np.round(temperatures_celsius(fit.histories))[list(order)]
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(celsius) > 0) + 1, [celsius.size]])
+    for edge in edges[1:-1]:
+        axes.axvline(edge - 0.5, color="black", lw=0.8)
+    centres = 0.5 * (edges[:-1] + edges[1:]) - 0.5
+    step = -(-centres.size // MOST_TEST_NAMES)
+    names = [f"{celsius[edge]:.0f}" for edge in edges[:-1:step]]
+    axes.set_xticks(list(centres[::step]), names, fontsize=8)
+    axes.set_xlabel(f"{len(order)} tests, by temperature, °C", fontsize=9)
 
 
 # ---- curves ----------------------------------------------------------------------------------------------------------

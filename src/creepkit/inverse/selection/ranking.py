@@ -158,7 +158,7 @@ def _reason(ranking: Ranking, names: Sequence[str], adequacy_text: str) -> str:
         remedied = [r.fit for r in ranking.laws if r.fit.adequacy is not None and r.fit.adequacy.remedies]
         if remedied and not adequacy.remedies:
             effect = " or ".join(remedied[0].adequacy.remedies) if remedied[0].adequacy is not None else ""
-            others += f"; with {effect} unknown, {remedied[0].law.name} would explain them"
+            others += f"; with {effect}, which nobody modelled, {remedied[0].law.name} would explain them"
         return f"none of {count} laws tried explains the tests; the best, {best} ({weight}{others}), {adequacy}"
     if best in ranking.further:
         asked, more = count - len(ranking.further), len(ranking.further)

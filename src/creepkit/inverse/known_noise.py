@@ -1,0 +1,123 @@
+"""Known noise: what histories state or neighbouring frames show, without any law, and chi-square judged by it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, f
+
+from creepkit.arrays import Bools, Floats
+from creepkit.inverse.observation_vector import (
+    RUPTURE_OUTPUT,
+    SMALLEST_NOISE,
+    ObservationVector,
+    frame_noise,
+    usable_frames,
+)
+from creepkit.records import History
+
+FREEDOM_PER_FRAME = 0.2
+"""Degrees of freedom that a frame gives to a noise estimated from third differences by a median: 0.21 to 0.22 for 40 to
+48 frames of one test (tests/unit/inverse/test_adequacy.py draws them)."""
+
+
+LEAST_NOISE_FREEDOM = 6.0
+"""Degrees of freedom below which an estimated noise says too little to judge by: some 30 frames."""
+
+
+FEWEST_HALF_FRAMES, NOTEWORTHY_GROWTH = 15, 1.4
+"""Frames of half a test whose noise can be estimated, and the growth of noise and output from which it is compared."""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownNoise:
+    """The noise that is known without the law.
+
+    judged : (tests, observations) which are data of which it is known. sd : (tests, observations) in the output's unit.
+    freedom : (tests, observations) -, how well it is known: infinite where it is stated.
+    """
+
+    judged: Bools
+    sd: Floats
+    freedom: Floats
+
+    @classmethod
+    def of_histories(cls, observations: ObservationVector, histories: Sequence[History]) -> KnownNoise:
+        """The noise that histories state, and of others that of each test between neighbouring frames."""
+        sd = observations.per_observation(observations.noise) * observations.relative_noise
+        freedom = np.full(sd.shape, np.inf)
+        for test, history in enumerate(histories):
+            for position, name in enumerate(observations.outputs):
+                mask = observations.present[test] & (observations.output_index[test] == position)
+                if name == RUPTURE_OUTPUT or observations.stated[position] or not mask.any():
+                    continue
+                frames = int(usable_frames(history, name).sum())
+                floor = SMALLEST_NOISE * observations.transforms[position].floor
+                estimated = _estimated_noise(history, name, observations.values[test, mask])
+                sd[test, mask] = np.maximum(estimated, floor) if (estimated > 0).all() else 0.0
+                freedom[test, mask] = FREEDOM_PER_FRAME * frames
+        ruptures = observations.rupture_mask
+        judged = observations.present & ~ruptures & (sd > 0) & (freedom >= LEAST_NOISE_FREEDOM)
+        return cls(judged, np.where(judged, sd, 1.0), freedom)
+
+    def chance_of_larger(self, reduced: float, share_of_freedom: float, mask: Bools) -> float:
+        """The probability of a larger reduced chi-square of the masked observations, (tests, observations), by chance.
+
+        Each test has noise of its own. One test has the distribution of F; the sum over several is taken as the scaled
+        chi-square of the same mean and variance (Satterthwaite).
+        """
+        groups = [
+            (share_of_freedom * float((mask[k] & (self.freedom[k] == nu)).sum()), float(nu))
+            for k in range(len(mask))
+            for nu in np.unique(self.freedom[k][mask[k]])
+        ]
+        total = sum(freedom for freedom, _ in groups)
+        if len(groups) == 1:
+            return chance_of_larger(reduced, total, groups[0][1])
+        mean = sum(freedom * (1.0 if np.isinf(nu) else nu / (nu - 2.0)) for freedom, nu in groups)
+        variance = sum(freedom**2 * _variance_of_f(freedom, nu) for freedom, nu in groups)
+        return float(chi2.sf(reduced * total * 2.0 * mean / variance, 2.0 * mean**2 / variance))
+
+
+def _estimated_noise(history: History, name: str, values: Floats) -> Floats:
+    """(frames,) noise of an output at its values (frames,): constant, or in proportion to the output where that fits.
+
+    Noise between neighbouring frames is estimated of the first and of the second half of the test; where the second is
+    larger as the output is, and by more than chance, it is in proportion.
+    """
+    usable = usable_frames(history, name)
+    measured = history.outputs[name][usable]
+    constant = np.full(values.shape, frame_noise(history, name))
+    if measured.size < 2 * FEWEST_HALF_FRAMES or measured.min() <= 0.0:
+        return constant
+    first, second = np.array_split(np.flatnonzero(usable), 2)
+    noises, sizes = [], []
+    for half in (first, second):
+        mask = np.zeros(usable.size, bool)
+        mask[half] = True
+        noises.append(frame_noise(history.replace(used=mask), name))
+        sizes.append(float(np.median(history.outputs[name][half])))
+    if min(noises) <= 0.0 or sizes[1] < NOTEWORTHY_GROWTH * sizes[0] or noises[1] < NOTEWORTHY_GROWTH * noises[0]:
+        return constant
+    exponent = float(np.clip(np.log(noises[1] / noises[0]) / np.log(sizes[1] / sizes[0]), 0.0, 1.0))
+    level = float(np.sqrt(np.prod(noises)) / np.sqrt(np.prod(sizes)) ** exponent)
+    return np.asarray(level * np.maximum(values, 1e-300) ** exponent)
+
+
+def _variance_of_f(freedom: float, noise_freedom: float) -> float:
+    """The variance of F, that of chi-square over its degrees of freedom where the noise is exactly known."""
+    if np.isinf(noise_freedom):
+        return 2.0 / freedom
+    nu = noise_freedom
+    return 2.0 * nu**2 * (freedom + nu - 2.0) / (freedom * (nu - 2.0) ** 2 * (nu - 4.0))
+
+
+def chance_of_larger(reduced: float, freedom: float, noise_freedom: float) -> float:
+    """Probability of a larger reduced chi-square by chance, the noise known to `noise_freedom` degrees of freedom."""
+    if not (np.isfinite(reduced) and freedom > 0):
+        return float("nan")
+    if np.isinf(noise_freedom):
+        return float(chi2.sf(reduced * freedom, freedom))
+    return float(f.sf(reduced, freedom, max(noise_freedom, 1.0)))
