@@ -58,14 +58,14 @@ class LocalExponent:
 
 def local_exponents(law: CreepLaw) -> tuple[LocalExponent, ...]:
     """Those of a law's terms that are worth a coordinate; none for terms that mention internal variables."""
-    key = (law.fingerprint, tuple(param.bounds for param in law.params.values()))
+    key = (law.fingerprint, law.names, tuple(param.bounds for param in law.params.values()))
     if key not in _CACHE:
         _CACHE[key] = _derived(law)
     return _CACHE[key]
 
 
-_CACHE: dict[tuple[str, tuple[tuple[float, float], ...]], tuple[LocalExponent, ...]] = {}
-"""What was derived in this process, by fingerprint and bounds."""
+_CACHE: dict[tuple[str, tuple[str, ...], tuple[tuple[float, float], ...]], tuple[LocalExponent, ...]] = {}
+"""What was derived in this process, by fingerprint, bounds, and the order of parameters: a + b is b + a but for that."""
 
 
 def _derived(law: CreepLaw) -> tuple[LocalExponent, ...]:
