@@ -65,7 +65,7 @@ def local_exponents(law: CreepLaw) -> tuple[LocalExponent, ...]:
 
 
 _CACHE: dict[tuple[str, tuple[str, ...], tuple[tuple[float, float], ...]], tuple[LocalExponent, ...]] = {}
-"""What was derived in this process, by fingerprint, bounds, and the order of parameters: a + b is b + a but for that."""
+"""What was derived in this process, by fingerprint, order of parameters (that of a sum may differ), and bounds."""
 
 
 def _derived(law: CreepLaw) -> tuple[LocalExponent, ...]:
