@@ -34,7 +34,7 @@ def command(
         typer.Option(metavar="J/MOL", help="To put a factor on the creep rate as a step of temperature [400e3]."),
     ] = None,
 ) -> None:
-    """Describe a data set, or check measured tests for what looks wrong."""
+    """Describe a data set, or check measured tests."""
     if file.suffix.lower() in DATA_SET_SUFFIXES:
         _describe_data_set(file, as_json, plots, seed)
     elif plots is not None:

@@ -9,7 +9,6 @@ import numpy as np
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
-from creepkit.inverse.adequacy import SIGNIFICANCE
 from creepkit.inverse.composite_predictor import CompositePredictor, outside_class
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, errors_of_output
 from creepkit.inverse.identification import Identification
@@ -24,6 +23,10 @@ AGREEMENT_LIMIT = 1.0
 
 ACCEPTABLE_CHI_SQUARE = 2.0
 """Mean chi-square above which a law does not follow a test, whoever predicts it, if chance does not explain it."""
+
+
+CONDEMNED = 0.01
+"""p-value, of all outputs of tests together, below which a law does not follow a test."""
 
 
 INCOMPLETE_STATUS = {
@@ -102,7 +105,7 @@ class Confirmation(Presentable):
             )
         test_name, output = self._largest(lambda o: o.simulation_errors.chi_square)
         worst = self[test_name, output].simulation_errors.chi_square
-        if worst > ACCEPTABLE_CHI_SQUARE and self[test_name, output].p_value < SIGNIFICANCE / self._comparisons:
+        if worst > ACCEPTABLE_CHI_SQUARE and self[test_name, output].p_value < CONDEMNED / self._comparisons:
             return (
                 f"confirmed, but the law does not follow the tests: chi-square {worst:.3g} in {output} of "
                 f"'{test_name}'; try another law"

@@ -9,6 +9,7 @@ from creepkit.kernels import lower
 from creepkit.language import arrhenius, linear
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
+from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON
 
 LAWS = [NORTON, DRIFTING_EXPONENT, COMBINED.times(arrhenius(T_ref=1073.15)).with_temperature(n_2=linear(T_ref=1073.15))]
@@ -51,3 +52,14 @@ def test_coordinate_is_the_log_rate_of_its_term_at_the_reference():
         single = law.only(label)
         log_rate = lower(single, "numpy").log_rate({n: values[n] for n in single.names}, **point)
         assert u[k] == pytest.approx(float(log_rate), rel=1e-12)
+
+
+def test_sums_in_either_order_have_the_coordinates_of_their_own_parameters():
+    """a + b and b + a share a fingerprint: what is derived for one must not be taken for the other."""
+    one, other = HYPERBOLIC_SINE + NORTON, NORTON + HYPERBOLIC_SINE
+    reference = ReferencePoint(stress=100.0, strain=0.01, time=1e5, temperature=1000.0)
+    first, second = Coordinates(one, reference), Coordinates(other, reference)
+    sinh, power = {"A": 1e-10, "n": 2.0, "B": 40.0}, {"A": 1e-17, "n": 5.0}
+    theta = [*HYPERBOLIC_SINE.to_internal(sinh)[0], *NORTON.to_internal(power)[0]]
+    u, v = first.u(np.array(theta)), second.u(np.array([*theta[3:], *theta[:3]]))
+    assert u == pytest.approx([*v[2:], *v[:2]])

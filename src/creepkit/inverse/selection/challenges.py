@@ -60,7 +60,7 @@ APPROXIMATE_STEPS = Tolerances(max_steps=15, tolerance=1e-3)
 LAST_STEPS = Tolerances(max_steps=25, tolerance=1e-6)
 
 
-SAME_FUNCTION = 0.3
+SAME_FUNCTION = 0.05
 """Range of ln of the ratio of two rates over all conditions, within which they are one function."""
 
 

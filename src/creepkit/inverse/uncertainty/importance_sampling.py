@@ -33,8 +33,8 @@ SAMPLES = 400
 """Of equal weight, that are kept."""
 
 
-PROPOSAL_FREEDOM = 3.0
-"""Degrees of freedom of the proposal: tails as heavy as those that a posterior may have."""
+PROPOSAL_FREEDOM = 5.0
+"""Degrees of freedom of the proposal: tails heavier than those of a posterior of many frames; bounds end both."""
 
 
 LEAST_EFFECTIVE_SIZE = 40.0

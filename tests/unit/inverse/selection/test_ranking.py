@@ -90,9 +90,11 @@ def test_where_no_law_explains_the_best_is_named_with_what_it_leaves():
 def test_an_effect_with_which_a_law_would_explain_is_named():
     """Of the best law it stands in its adequacy; of another one it is said beside it."""
     own = replace(LEAVES, remedies=("thickness",))
-    assert verdict_of(ranking([1.0, 0.0], [own, LEAVES])).endswith("with thickness unknown it would explain them")
+    assert verdict_of(ranking([1.0, 0.0], [own, LEAVES])).endswith(
+        "it would explain them with thickness, which nobody modelled"
+    )
     other = verdict_of(ranking([1.0, 0.0], [LEAVES, replace(LEAVES, remedies=("thickness", "temperature drift"))]))
-    assert "; with thickness or temperature drift unknown, sinh would explain them)" in other
+    assert "; with thickness or temperature drift, which nobody modelled, sinh would explain them)" in other
 
 
 def test_a_law_that_nobody_asked_for_is_a_proposal():
@@ -115,8 +117,9 @@ def test_laws_that_cannot_be_told_apart_are_named():
 def test_what_the_tests_allow_beside_it_is_said():
     found = verdict_of(ranking([0.99, 0.01], challenges=(SUM, DRIFT)))
     assert found == (
-        "not decisive: of 2 laws tried only norton explains the tests (weight 0.99 of the laws tried), but norton+sinh "
-        "with 30 % of the rate from sinh explains them as well; and a temperature drift would leave it a weight of 0.52"
+        "not decisive: of 2 laws tried norton has nearly all the weight (weight 0.99 of the laws tried) and explains "
+        "the tests, but norton+sinh with 30 % of the rate from sinh explains them as well; and a temperature drift would "
+        "leave it a weight of 0.52"
     )
 
 
@@ -127,7 +130,7 @@ def test_a_ranking_that_was_not_challenged_says_so():
 
 def test_without_known_noise_nothing_is_decided():
     found = verdict_of(ranking([0.99, 0.01], [UNKNOWN, UNKNOWN]))
-    assert found.startswith("not decisive: of 2 laws tried norton is best (weight 0.99 of the laws tried); whether it")
+    assert found.startswith("not decisive: of 2 laws tried norton is best (weight 0.99 of the laws tried); it cannot")
     assert "cannot be judged: no noise is stated" in found
 
 
