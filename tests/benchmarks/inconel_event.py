@@ -7,8 +7,8 @@ clocks, 8250 s, within a frame and without an elastic jump. Here that is a step 
 deviation 30 K), one for tests 01 to 08 and one for tests 09, 11 and 12, beside the nuisance parameters of the page
 [Inconel 625](inconel_625.md): the zero of each camera (standard deviation 12 um) and the thickness of each dimple
 (0.4935 mm, standard deviation 0.027 mm). Suspect frames are left out, as is the default. Laws are multiplied by
-Arrhenius' factor about 1050 K; n(t) is the drifting exponent without strain hardening. All three outputs are compared
-where nothing else is said, and whole tests are weighted by how far they lie from the others (Student).
+Arrhenius' factor about 1050 K; n(t) is the drifting exponent without strain hardening. All three outputs are compared,
+and whole tests are weighted by how far they lie from the others (Student).
 
 Finished rows are kept in the folder of --keep: stopped and started again, nothing is identified twice. Another version
 of creepkit needs another folder.
@@ -17,6 +17,7 @@ of creepkit needs another folder.
 from __future__ import annotations
 
 import json
+import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -100,18 +101,13 @@ class Runs:
 
     def row_of(self, fit: Identification) -> Row:
         """What tables need of an identification; JSON."""
-        prediction, quantile, adequacy = fit.predict(), interval_quantile(fit.freedom), fit.adequacy
+        quantile, adequacy = interval_quantile(fit.freedom), fit.adequacy
         assert adequacy is not None
-        column = prediction.outputs.index("amplitude")
-        used = [h.used for h in fit.histories]
-        measured = [h.outputs["amplitude"][u] for h, u in zip(fit.histories, used, strict=True)]
-        predicted = [prediction.of(k)[u, column] for k, u in enumerate(used)]
         steps = [n for n in fit.nuisances if n.kind == "temperature step"]
         return {
             "loss": fit.errors["amplitude"].relative_squared_error,
-            "own losses": [
-                ck.relative_squared_error([m], [p], about="test") for m, p in zip(measured, predicted, strict=True)
-            ],
+            "own losses": [test["amplitude"].errors.relative_squared_error for test in fit.tests],
+            "chi-square of the amplitude": fit.errors["amplitude"].chi_square,
             "chi-square": adequacy.chi_square,
             "discrepancies": {o.output: o.discrepancy for o in adequacy.outputs},
             "noises": {o.output: o.noise for o in adequacy.outputs},
@@ -167,17 +163,19 @@ def print_fits(page: Page, fits: Mapping[tuple[str, bool], Row], names: list[str
     """Misfit, parameters and steps of each law by finite elements and least squares."""
     page.heading("Misfit by finite elements")
     page.paragraph(
-        'Least squares, `ck.identify(law, tests, using="bulge", test_loss="student")`, as in the last row of the page '
+        'Least squares, `ck.identify(law, tests, using="bulge", test_loss="student")`, as in the last rows of the page '
         "[Inconel 625](inconel_625.md), whose columns these are: the pooled loss, and the loss of each test about "
         "its own mean, of the amplitude. Chi-square is that of `fit.adequacy`: reduced, of all outputs, with the noise "
-        "that neighbouring frames show, tests of equal weight; what is left is the standard deviation of the amplitude "
-        "beyond that noise. Steps have 95 % intervals. The losses of single tests are those of `fit.predict()`, "
-        "without the correction of discretisation error that the other figures have."
+        "that neighbouring frames show, tests of equal weight, at the linear optimum under that noise where this lies "
+        "within all bounds and else at the values listed, so that two rows need not compare; what is left is the "
+        "standard deviation of the amplitude beyond that noise. The chi-square of the amplitude is `fit.errors`, the "
+        "mean over all its frames at the values listed. Steps have 95 % intervals."
     )
-    page.table("law", *MISFIT_HEADS, *STEP_HEADS, *names)
+    page.table("law", *MISFIT_HEADS, "chi-square of the amplitude", *STEP_HEADS, *names)
     for (name, event), row in fits.items():
         own = (f"{value:.2g}" for value in row["own losses"])
-        page.row(with_event(name, event), *misfit_cells(row), *steps_cells(row), *own)
+        amplitude = f"{row['chi-square of the amplitude']:.3g}"
+        page.row(with_event(name, event), *misfit_cells(row), amplitude, *steps_cells(row), *own)
     page.paragraph("Parameters with 95 % intervals; * is not determined, or at its bound. Units: 1/s, s, J/mol, MPa.")
     page.table("law", "values")
     for (name, event), row in fits.items():
@@ -209,7 +207,7 @@ def print_held_out(page: Page, held_out: Mapping[tuple[str, bool], Row], names: 
     page.heading("Held-out prediction")
     page.paragraph(
         "Each test predicted from the other eight, by likelihood and through the surrogate, since ten times as many "
-        "identifications by finite elements take too long. Thickness is nominal, the offset zero, the step that which "
+        "identifications by finite elements take too long. Thickness is nominal, the offset zero, and the step is what "
         "the others of its group show. Relative squared errors of the amplitude. The hardening laws, which end at m = "
         "0, and the hyperbolic sine are left out."
     )
@@ -229,7 +227,16 @@ def print_conclusions(
     likely = {(law["name"], event): law for event in EVENTS for law in selections[event]["laws"]}
     others = [name for name in LAWS if name != "n(t)"]
     page.heading("What remains of the need for n(t)")
-    page.paragraph("Without, then with the event:")
+    least = min(
+        rows[name, True]["loss"] / rows["n(t)", True]["loss"]
+        for rows in (fits, likely)
+        for name in LAWS
+        if name != "n(t)"
+    )
+    page.paragraph(
+        f"The event {'does not take' if least > 1 else 'takes'} the place of n(t): with it the other laws leave at least "
+        f"{least:.1f} times the pooled loss of n(t)."
+    )
     for method, rows in (("least squares", fits), ("likelihood", likely)):
         without, with_it = rows["n(t)", False]["loss"], rows["n(t)", True]["loss"]
         best = [min(rows[name, event]["loss"] for name in others) for event in EVENTS]
@@ -239,6 +246,12 @@ def print_conclusions(
             f"to {best[1]:.2g}, {best[0] / without:.0f} and {best[1] / with_it:.0f} times that of n(t). "
             f"Steps with n(t): {' and '.join(steps_cells(rows['n(t)', True]))} K."
         )
+    weights = [f"{likely['n(t)', event]['weight']:.2g}" for event in EVENTS]
+    decisive = sum(not row["verdict"].startswith("not") for row in selections.values())
+    page.paragraph(
+        f"- Among the five laws n(t) has a weight of {weights[0]} without and {weights[1]} with the event; {decisive} of "
+        "the two verdicts are decisive."
+    )
     left = [f"{1e3 * d['amplitude']:.2g} um" for d in (likely["n(t)", e]["discrepancies"] for e in EVENTS)]
     noise = 1e3 * likely["n(t)", True]["noises"]["amplitude"]
     page.paragraph(
@@ -250,7 +263,7 @@ def print_conclusions(
         f"- Held out, the pooled error of the amplitude without and with the event is {' and '.join(held[0])} with "
         f"n(t) and {' and '.join(held[1])} with Norton."
     )
-    marked = [v.split()[0] for v in likely["n(t)", True]["values"].split(", ") if v.endswith("*")]
+    marked = re.findall(r"(\w+) [^\s]+ \[[^]]*\]\*", likely["n(t)", True]["values"])
     page.paragraph(
         f"- Not determined, or at their bounds, with the event by likelihood: {', '.join(marked) or 'none'}."
     )
