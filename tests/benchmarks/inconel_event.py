@@ -234,8 +234,8 @@ def print_conclusions(
         if name != "n(t)"
     )
     page.paragraph(
-        f"The event {'does not take' if least > 1 else 'takes'} the place of n(t): with it the other laws leave at least "
-        f"{least:.1f} times the pooled loss of n(t)."
+        f"The event {'does not take' if least > 1 else 'takes'} the place of n(t): with it the other laws leave at "
+        f"least {least:.1f} times the pooled loss of n(t)."
     )
     for method, rows in (("least squares", fits), ("likelihood", likely)):
         without, with_it = rows["n(t)", False]["loss"], rows["n(t)", True]["loss"]
@@ -249,8 +249,8 @@ def print_conclusions(
     weights = [f"{likely['n(t)', event]['weight']:.2g}" for event in EVENTS]
     decisive = sum(not row["verdict"].startswith("not") for row in selections.values())
     page.paragraph(
-        f"- Among the five laws n(t) has a weight of {weights[0]} without and {weights[1]} with the event; {decisive} of "
-        "the two verdicts are decisive."
+        f"- Among the five laws n(t) has a weight of {weights[0]} without and {weights[1]} with the event; {decisive} "
+        "of the two verdicts are decisive."
     )
     left = [f"{1e3 * d['amplitude']:.2g} um" for d in (likely["n(t)", e]["discrepancies"] for e in EVENTS)]
     noise = 1e3 * likely["n(t)", True]["noises"]["amplitude"]
