@@ -71,7 +71,7 @@ BENCHMARKS = {
     ),
     "plate_of_alloys": Benchmark(8),
     "temperature_forms": Benchmark(10, (("--through", "uniaxial", "--specimens", "2", "--max-forms", "2"),)),
-    "inconel_event": Benchmark(4, needs=DATA),
+    "inconel_event": Benchmark(15, needs=DATA),
     "inconel_temperature": Benchmark(4, needs=DATA),
     "measured_creep": Benchmark(90, needs=DATA),
     "whole_life": Benchmark(60, needs=DATA),
