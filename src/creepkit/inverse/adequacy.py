@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.optimize import lsq_linear
 from scipy.stats import f
 
 from creepkit.arrays import Floats
@@ -312,15 +313,22 @@ def _independent_noise(
 
 
 def _within_bounds(linear: LinearisedProblem, inverses: Floats) -> LinearSolution:
-    """The optimum of the linear problem; the point itself where the step would leave the bounds or gain nothing."""
-    solution = linear.solve(inverses)
-    low, high = linear.step_bounds[:, linear.free]
-    inside = bool(((solution.step >= low) & (solution.step <= high)).all())
-    weighted = (inverses @ linear.residuals.values[..., None])[..., 0]
-    at_point = float((linear.residuals.values * weighted).sum())
-    if inside and float((solution.residuals * solution.weighted_residuals).sum()) < at_point:
-        return solution
-    return replace(solution, residuals=linear.residuals.values, weighted_residuals=weighted)
+    """The optimum of the linear problem within its bounds, or the point itself where the step gains nothing."""
+    solution, residuals = linear.solve(inverses), linear.residuals
+    present = residuals.present
+    factor = np.swapaxes(np.linalg.cholesky(inverses), 1, 2)
+    columns = np.concatenate([linear.jacobian, residuals.values[..., None]], axis=-1)
+    whitened = (factor @ columns)[present]
+    root_prior = np.sqrt(linear.precision[linear.free])
+    matrix = np.concatenate([whitened[:, :-1], np.diag(root_prior)])
+    target = -np.concatenate([whitened[:, -1], root_prior * linear.prior_residual[linear.free]])
+    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
+    low, high = linear.step_bounds[:, linear.free] * scale
+    step = lsq_linear(matrix / scale, target, bounds=(np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x / scale
+    moved = residuals.values + linear.jacobian @ step
+    candidates = [(values, (inverses @ values[..., None])[..., 0]) for values in (moved, residuals.values)]
+    values, weighted = min(candidates, key=lambda pair: float((pair[0] * pair[1]).sum()))
+    return replace(solution, residuals=values, weighted_residuals=weighted)
 
 
 def _freedom(linear: LinearisedProblem, solution: LinearSolution) -> float:

@@ -63,8 +63,9 @@ class KnownNoise:
         return cls(judged, np.where(judged, sd, 1.0), freedom)
 
     def chance_of_larger(self, reduced: float, share_of_freedom: float, mask: Bools) -> float:
-        """The probability of a larger reduced chi-square of the masked observations, (tests, observations), by chance.
+        """The probability of a larger reduced chi-square by chance.
 
+        mask : (tests, observations) the observations that it is of. share_of_freedom : degrees of freedom of each.
         Each test has noise of its own. One test has the distribution of F; the sum over several is taken as the scaled
         chi-square of the same mean and variance (Satterthwaite).
         """

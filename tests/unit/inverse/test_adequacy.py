@@ -209,7 +209,7 @@ def test_without_any_noise_nothing_can_be_judged():
     assert not found.explains
     assert np.isnan(found.p_value)
     assert np.isnan(found.discrepancy_in_noises)
-    assert "give standard_deviation" in str(found)
+    assert "in Python as standard_deviation" in str(found)
 
 
 # ---- sentences ---------------------------------------------------------------------------------------------------

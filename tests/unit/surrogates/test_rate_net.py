@@ -251,7 +251,7 @@ def test_identify_with_it_finds_what_was_planted(guarded: RateSurrogate) -> None
     truth = norton(5.0)
     measured_test = measured(
         dimple(),
-        guarded.specimen.predict(NORTON, NORTON.to_internal(truth), [dimple()]).values[0, 0],
+        guarded.refined().predict(NORTON, NORTON.to_internal(truth), [dimple()]).values[0, 0],
         guarded.outputs,
         "planted",
     )
