@@ -223,8 +223,8 @@ def test_the_sentence_of_a_discrepancy_says_how_much_where_and_what_would_help()
     found = Adequacy("leaves a discrepancy", (WIDTH, AMPLITUDE), 4.1, 77.0, 3e-9, 0.3, WHERE, ("thickness",))
     assert str(found) == (
         "leaves 0.0037 mm of amplitude (2.5 times its stated noise) unexplained (reduced chi-square 4.1, p = 3e-09); "
-        "most in amplitude of 'D3' about 5400 s, where it lies 0.0041 mm below what was measured; with thickness "
-        "unknown it would explain them"
+        "most in amplitude of 'D3' about 5400 s, where it lies 0.0041 mm below what was measured; it would "
+        "explain them with thickness, which nobody modelled"
     )
     assert "p < 1e-12" in str(replace(found, p_value=0.0))
     with pytest.raises(KeyError):
