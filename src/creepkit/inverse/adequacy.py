@@ -24,7 +24,14 @@ from scipy.stats import f
 
 from creepkit.arrays import Floats
 from creepkit.inverse.known_noise import KnownNoise
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, predicted_random_effects
+from creepkit.inverse.noise_model import (
+    NoiseModel,
+    OutputNoise,
+    Residuals,
+    cholesky_factors,
+    predicted_random_effects,
+    whiten,
+)
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
@@ -203,7 +210,7 @@ def adequacy_of(
     independent = _independent_noise(observations, known, noise_model, predictor_errors)
     inverses, _ = inverse_covariances(residuals, independent)
     judged_problem = replace(linear, residuals=residuals)
-    solution = _within_bounds(judged_problem, inverses)
+    solution = _within_bounds(judged_problem, independent, inverses)
     share_of_freedom = _freedom(judged_problem, solution) / float(known.judged.sum())
     contributions = solution.residuals * solution.weighted_residuals
     outputs = []
@@ -312,13 +319,12 @@ def _independent_noise(
     return NoiseModel(outputs, noise_model.rate)
 
 
-def _within_bounds(linear: LinearisedProblem, inverses: Floats) -> LinearSolution:
+def _within_bounds(linear: LinearisedProblem, noise_model: NoiseModel, inverses: Floats) -> LinearSolution:
     """The optimum of the linear problem within its bounds, or the point itself where the step gains nothing."""
     solution, residuals = linear.solve(inverses), linear.residuals
     present = residuals.present
-    factor = np.swapaxes(np.linalg.cholesky(inverses), 1, 2)
     columns = np.concatenate([linear.jacobian, residuals.values[..., None]], axis=-1)
-    whitened = (factor @ columns)[present]
+    whitened = whiten(cholesky_factors(residuals, noise_model), columns)[present]
     root_prior = np.sqrt(linear.precision[linear.free])
     matrix = np.concatenate([whitened[:, :-1], np.diag(root_prior)])
     target = -np.concatenate([whitened[:, -1], root_prior * linear.prior_residual[linear.free]])
