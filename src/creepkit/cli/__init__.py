@@ -10,10 +10,12 @@ from __future__ import annotations
 import atexit
 import os
 import shutil
+import signal
 import sys
 import tempfile
 import zlib
 from pathlib import Path
+from types import FrameType
 
 _SOURCES = Path(__file__).parents[1]
 
@@ -62,8 +64,25 @@ def _remove_old_caches(folder: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
 
 
+POSTPONEMENT = 0.02
+"""s, after which an interrupt that came at a bad moment comes again."""
+
+
+def _interrupt(signum: int, frame: FrameType | None) -> None:
+    """Raise KeyboardInterrupt, but not within numba's dispatcher, which does not survive an exception there."""
+    while frame is not None:
+        if f"{os.sep}numba{os.sep}" in frame.f_code.co_filename:
+            signal.setitimer(signal.ITIMER_REAL, POSTPONEMENT)
+            return
+        frame = frame.f_back
+    raise KeyboardInterrupt
+
+
 def main() -> None:
     """Run the command line; the entry point of the script `creepkit`."""
+    if hasattr(signal, "setitimer"):  # not on Windows
+        signal.signal(signal.SIGINT, _interrupt)
+        signal.signal(signal.SIGALRM, _interrupt)
     try:
         from creepkit.cli.app import app
 
