@@ -65,7 +65,7 @@ BENCHMARKS = {
     "identification_speed": Benchmark(1),
     "search_success": Benchmark(15, (("--specimens", "6", "--through", "surrogate", "--searches", "default", "cma"),)),
     "swarm_speed": Benchmark(1),
-    "law_recovery": Benchmark(90),
+    "law_recovery": Benchmark(45, (("--specimens", "24", "--others", "10"),)),
     "penalty_confusion": Benchmark(
         12, (("--specimens", "2", "--penalties", "L2", "GroupL2", "Sqrt", "Subsets", "paper"),)
     ),
