@@ -52,3 +52,7 @@ def address(array: np.ndarray) -> ctypes.c_void_p:
     if array.dtype not in (np.float64, np.int64) or not array.flags.c_contiguous:
         raise TypeError(f"the core takes contiguous arrays of float64 or int64, found {array.dtype}")
     return ctypes.c_void_p(array.ctypes.data)
+
+
+class CoreStructure(ctypes.Structure):
+    """A record that the core reads: numbers, and addresses of arrays that the caller keeps alive."""

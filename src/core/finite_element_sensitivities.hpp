@@ -1,0 +1,196 @@
+// The linear equations of a stage's sensitivities in finite elements: exact tangent, right-hand sides, solution.
+#pragma once
+
+#include "finite_elements.hpp"
+#include "sensitivities.hpp"
+
+namespace creepkit {
+
+class FiniteElementSensitivities {
+public:
+    void take(Workspace& memory, const FiniteElements& system, int64_t padded) {
+        matrix = memory.doubles(2 * system.shape.numbers() + 1);
+        right = memory.doubles(system.shape.rows() * padded);
+        places = memory.array<int32_t>(system.model.elements * 16 * 16);
+        places_known = false;
+    }
+
+    void clear(const FiniteElements& system) {
+        if (!places_known) set_places(system);
+        memset(matrix, 0, sizeof(double) * size_t(2 * system.shape.numbers() + 1));
+        right_is_clear = false;
+    }
+
+    // Add the tangent A (25, 8 points), which carries the weights, of a pair of elements.
+    void add_tangent(const FiniteElements& system, int64_t pair, const double A[25][EIGHT]) {
+        for (int half = 0; half < 2; ++half) {
+            const int64_t element = 2 * pair + half;
+            Eight products[4][10];
+            for (int g = 0; g < 4; ++g) {
+                const int64_t row = (4 * element + g) * EIGHT;
+                const int lane = 4 * half + g;
+                const Eight x = load(system.model.by_radius + row), y = load(system.model.by_height + row);
+                const Eight h = load(system.model.over_radius + row);
+                for (int j = 0; j < 5; ++j) {
+                    products[g][j] = A[5 * j][lane] * x + A[5 * j + 1][lane] * y + A[5 * j + 4][lane] * h;
+                    products[g][5 + j] = A[5 * j + 2][lane] * x + A[5 * j + 3][lane] * y;
+                }
+            }
+            const int32_t* place = places + element * 256;
+            for (int a = 0; a < EIGHT; ++a) {
+                Eight rr(0.0), rz(0.0), zr(0.0), zz(0.0);
+                for (int g = 0; g < 4; ++g) {
+                    const int64_t row = (4 * element + g) * EIGHT + a;
+                    const double x = system.model.by_radius[row], y = system.model.by_height[row];
+                    const double h = system.model.over_radius[row];
+                    const Eight* p = products[g];
+                    rr += x * p[0] + y * p[1] + h * p[4];
+                    rz += x * p[5] + y * p[6] + h * p[9];
+                    zr += x * p[2] + y * p[3];
+                    zz += x * p[7] + y * p[8];
+                }
+                for (int b = 0; b < EIGHT; ++b) {
+                    matrix[place[(2 * a) * 16 + 2 * b]] += rr[b];
+                    matrix[place[(2 * a) * 16 + 2 * b + 1]] += rz[b];
+                    matrix[place[(2 * a + 1) * 16 + 2 * b]] += zr[b];
+                    matrix[place[(2 * a + 1) * 16 + 2 * b + 1]] += zz[b];
+                }
+            }
+        }
+    }
+
+    // Subtract the nodal forces of the stresses (8 points, 5, padded), which carry the weights, of a pair of elements.
+    void subtract_forces(const FiniteElements& system, int64_t pair, const double* stresses, int64_t padded) {
+        if (!right_is_clear) clear_right(system, padded);
+        for (int half = 0; half < 2; ++half) {
+            const int64_t element = 2 * pair + half;
+            const int64_t* nodes = system.model.connectivity + EIGHT * element;
+            for (int a = 0; a < EIGHT; ++a) {
+                const int64_t r = system.model.equations[2 * nodes[a]], z = system.model.equations[2 * nodes[a] + 1];
+                for (int64_t block = 0; block < padded; block += EIGHT) {
+                    Eight radial(0.0), axial(0.0);
+                    for (int g = 0; g < 4; ++g) {
+                        const int64_t row = (4 * element + g) * EIGHT + a;
+                        const double* P = stresses + (4 * half + g) * 5 * padded + block;
+                        const double x = system.model.by_radius[row], y = system.model.by_height[row];
+                        radial += x * load(P) + y * load(P + padded) + system.model.over_radius[row] * load(P + 4 * padded);
+                        axial += x * load(P + 2 * padded) + y * load(P + 3 * padded);
+                    }
+                    if (r >= 0) store(right + r * padded + block, load(right + r * padded + block) - radial);
+                    if (z >= 0) store(right + z * padded + block, load(right + z * padded + block) - axial);
+                }
+            }
+        }
+    }
+
+    // The pressure's exact load stiffness, and its forces in the columns that change it or move the surface.
+    void press(const FiniteElements& system, double pressure, const double* u, const SensitivityDirections& directions,
+               const double* inputs, int64_t parameters, int64_t padded) {
+        const FiniteElementModel& model = system.model;
+        for (int64_t side = 0; side < model.pressed_sides; ++side) {
+            const int64_t* nodes = model.pressed + 3 * side;
+            double r[3], z[3], force[2][3], stiffness[4][3][3];
+            for (int a = 0; a < 3; ++a) {
+                r[a] = model.coordinates[2 * nodes[a]] + u[2 * nodes[a]];
+                z[a] = model.coordinates[2 * nodes[a] + 1] + u[2 * nodes[a] + 1];
+            }
+            side_force(system.quadrature, r, z, force);
+            side_stiffness(system.quadrature, r, z, stiffness);
+            for (int a = 0; a < 3; ++a)
+                for (int i = 0; i < 2; ++i) {
+                    const int64_t row = model.equations[2 * nodes[a] + i];
+                    if (row < 0) continue;
+                    double* columns = right + row * padded + parameters;
+                    for (int64_t d = 0; d < directions.directions; ++d)
+                        columns[d] += inputs[BY_PRESSURE * directions.directions + d] * force[i][a];
+                    for (int b = 0; b < 3; ++b)
+                        for (int j = 0; j < 2; ++j) {
+                            const double slope = pressure * stiffness[2 * i + j][a][b];
+                            for (int64_t g = 0; g < directions.geometries; ++g)
+                                columns[directions.directions + g] +=
+                                    slope * directions.velocities[g * 2 * model.nodes + 2 * nodes[b] + j];
+                            const int64_t column = model.equations[2 * nodes[b] + j];
+                            if (column >= 0) matrix[place(system, row, column)] -= slope;
+                        }
+                }
+        }
+    }
+
+    // The solutions, left in the right-hand sides; false when the tangent is singular.
+    bool solve(const FiniteElements& system, int64_t padded) {
+        double* upper = matrix + system.shape.numbers();
+        if (!factorize_general(system.shape, matrix, upper)) return false;
+        solve_general(system.shape, matrix, upper, right, padded);
+        return true;
+    }
+
+    // Changes (8 points, 5, padded) of the deformation gradient of a pair of elements.
+    void gradient_changes(const FiniteElements& system, int64_t pair, double* gradients, int64_t padded) const {
+        for (int half = 0; half < 2; ++half) {
+            const int64_t element = 2 * pair + half;
+            const int64_t* nodes = system.model.connectivity + EIGHT * element;
+            for (int64_t block = 0; block < padded; block += EIGHT) {
+                Eight F[4][5];
+                for (int g = 0; g < 4; ++g)
+                    for (int c = 0; c < 5; ++c) F[g][c] = Eight(0.0);
+                for (int a = 0; a < EIGHT; ++a) {
+                    const int64_t r = system.model.equations[2 * nodes[a]], z = system.model.equations[2 * nodes[a] + 1];
+                    const Eight u = r >= 0 ? load(right + r * padded + block) : Eight(0.0);
+                    const Eight w = z >= 0 ? load(right + z * padded + block) : Eight(0.0);
+                    for (int g = 0; g < 4; ++g) {
+                        const int64_t row = (4 * element + g) * EIGHT + a;
+                        const double x = system.model.by_radius[row], y = system.model.by_height[row];
+                        F[g][0] += x * u;
+                        F[g][1] += y * u;
+                        F[g][2] += x * w;
+                        F[g][3] += y * w;
+                        F[g][4] += system.model.over_radius[row] * u;
+                    }
+                }
+                for (int g = 0; g < 4; ++g)
+                    for (int c = 0; c < 5; ++c) store(gradients + ((4 * half + g) * 5 + c) * padded + block, F[g][c]);
+            }
+        }
+    }
+
+    // Changes (observed, columns) of u_z of the observed nodes.
+    void write_surface(const FiniteElements& system, double* surface, int64_t columns, int64_t padded) const {
+        for (int64_t k = 0; k < system.model.observed_nodes; ++k) {
+            const int64_t equation = system.model.equations[2 * system.model.observed[k] + 1];
+            for (int64_t c = 0; c < columns; ++c)
+                surface[k * columns + c] = equation >= 0 ? right[equation * padded + c] : 0.0;
+        }
+    }
+
+private:
+    double *matrix = nullptr, *right = nullptr;  // lower and upper triangle and one place behind; (rows, padded)
+    int32_t* places = nullptr;                   // (elements, 16, 16) of the tangent of an element, r and z in turn
+    bool places_known = false, right_is_clear = false;
+
+    void clear_right(const FiniteElements& system, int64_t padded) {
+        memset(right, 0, sizeof(double) * size_t(system.shape.rows() * padded));
+        right_is_clear = true;
+    }
+
+    static int64_t place(const FiniteElements& system, int64_t row, int64_t column) {
+        const BandShape& shape = system.shape;
+        const bool below = row / EIGHT >= column / EIGHT;  // diagonal tiles lie whole in the lower triangle
+        return below ? shape.place(row, column) : shape.numbers() + shape.place(column, row);
+    }
+
+    void set_places(const FiniteElements& system) {
+        const FiniteElementModel& model = system.model;
+        const int64_t nowhere = 2 * system.shape.numbers();
+        for (int64_t e = 0; e < model.elements; ++e)
+            for (int p = 0; p < 16; ++p)
+                for (int q = 0; q < 16; ++q) {
+                    const int64_t row = model.equations[2 * model.connectivity[EIGHT * e + p / 2] + p % 2];
+                    const int64_t column = model.equations[2 * model.connectivity[EIGHT * e + q / 2] + q % 2];
+                    places[(e * 16 + p) * 16 + q] =
+                        int32_t(row >= 0 && column >= 0 ? place(system, row, column) : nowhere);
+                }
+        places_known = true;
+    }
+};
+
+}  // namespace creepkit

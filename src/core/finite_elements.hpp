@@ -1,0 +1,243 @@
+// Out-of-balance forces and tangent of a mesh, and the estimate of a step's error in its displacements.
+//
+// This is a system that the time integration of time_integration.hpp drives; the reduced-order model is another.
+#pragma once
+
+#include "banded_matrix.hpp"
+#include "finite_element_model.hpp"
+#include "material_point.hpp"
+#include "pressure.hpp"
+#include "workspace.hpp"
+
+namespace creepkit {
+
+// The same number for the four points of each of two elements.
+CREEPKIT_INLINE Eight of_two_elements(double first, double second) {
+    Eight r;
+    for (int i = 0; i < VECTORS; ++i) {
+        const Vector a = Vector{} + first, b = Vector{} + second;
+        if (LANES == EIGHT) {
+            Integers upper{};
+            for (int k = 0; k < LANES; ++k) upper[k] = k >= 4 ? -1 : 0;
+            r.part[i] = upper ? b : a;
+        } else {
+            r.part[i] = i * LANES < 4 ? a : b;
+        }
+    }
+    return r;
+}
+
+class FiniteElementSensitivities;
+
+class FiniteElements {
+public:
+    using SensitivityMemory = FiniteElementSensitivities;
+
+    explicit FiniteElements(const FiniteElementModel& model)
+        : model(model), shape(BandShape::of(model.size, model.half_bandwidth)), quadrature(side_quadrature()) {}
+
+    const FiniteElementModel& model;
+    const BandShape shape;
+    const SideQuadrature quadrature;
+    double *tangent = nullptr, *residual = nullptr;  // the lower triangle in tiles, one place behind it; (shape.rows(),)
+
+    void take(Workspace& memory) {
+        tangent = memory.doubles(shape.numbers() + 1);
+        residual = memory.doubles(shape.rows());
+    }
+
+    int64_t point_count() const { return 4 * model.elements; }
+    int64_t displacement_count() const { return 2 * model.nodes; }
+    int64_t observed_count() const { return model.observed_nodes; }
+    Eight weights(int64_t pair) const { return load(model.weights + EIGHT * pair); }
+
+    // Deformation gradient of the points of a pair of elements.
+    CREEPKIT_INLINE void deform(int64_t pair, const double* u, Kinematics& at) const {
+        const int64_t *one = model.connectivity + 16 * pair, *other = one + EIGHT;
+        const double* shapes = model.points_first + pair * 3 * EIGHT * EIGHT;
+        at.f11 = at.f22 = at.f33 = Eight(1.0);
+        at.f12 = at.f21 = Eight(0.0);
+        for (int a = 0; a < EIGHT; ++a) {
+            const Eight u_r = of_two_elements(u[2 * one[a]], u[2 * other[a]]);
+            const Eight u_z = of_two_elements(u[2 * one[a] + 1], u[2 * other[a] + 1]);
+            const double* at_node = shapes + 3 * EIGHT * a;
+            const Eight by_r = load(at_node), by_z = load(at_node + EIGHT), over_r = load(at_node + 2 * EIGHT);
+            at.f11 += by_r * u_r;
+            at.f12 += by_z * u_r;
+            at.f33 += over_r * u_r;
+            at.f21 += by_r * u_z;
+            at.f22 += by_z * u_z;
+        }
+    }
+
+    // Out-of-balance forces into `residual`; if STIFF the tangent, made symmetric, into `tangent`.
+    template <bool STIFF>
+    PointFlag assemble(const PointLaw& law, const StageConditions& stage, const double* u, PointStates& points,
+                       double tolerance) {
+        clear(residual, shape.rows());
+        if (STIFF) clear(tangent, shape.numbers() + 1);
+        alignas(64) double P[5][EIGHT], A[25][EIGHT];
+        for (int64_t pair = 0; pair < model.elements / 2; ++pair) {
+            Kinematics at;
+            deform(pair, u, at);
+            Eight stress[5], moduli[25];
+            const PointFlag flag =
+                update_points<STIFF>(law, stage, points, EIGHT * pair, at, tolerance, stress, moduli);
+            if (flag != POINTS_SOLVED) return flag;
+            const Eight weight = load(model.weights + EIGHT * pair);
+            for (int i = 0; i < 5; ++i) store(P[i], stress[i] * weight);
+            if (STIFF)
+                for (int i = 0; i < 25; ++i) store(A[i], moduli[i] * weight);
+            for (int half = 0; half < 2; ++half) {
+                add_forces(2 * pair + half, 4 * half, P);
+                if (STIFF) add_stiffness(2 * pair + half, 4 * half, A);
+            }
+        }
+        press<STIFF>(stage.pressure, u);
+        return POINTS_SOLVED;
+    }
+
+    // Out-of-balance forces of a change of all creep strains by the sum of weights_i slopes_i, into `residual`.
+    void error_forces(const double* u, const PointStates& points, const double weights[STAGES]) {
+        clear(residual, shape.rows());
+        const int64_t stride = points.values * points.count;
+        alignas(64) double P[5][EIGHT];
+        for (int64_t pair = 0; pair < model.elements / 2; ++pair) {
+            Kinematics at;
+            deform(pair, u, at);
+            if (!set_strains(at)) continue;  // never: the stage has just converged here
+            const int64_t k = EIGHT * pair;
+            Eight change[3], stress[5];
+            for (int v = 0; v < CREEP_COMPONENTS; ++v)
+                change[v] = weights[0] * load(points.slopes + v * points.count + k) +
+                            weights[1] * load(points.slopes + stride + v * points.count + k);
+            stress_of_creep_change(points, k, at, change, stress);
+            const Eight weight = load(model.weights + k);
+            for (int i = 0; i < 5; ++i) store(P[i], stress[i] * weight);
+            for (int half = 0; half < 2; ++half) add_forces(2 * pair + half, 4 * half, P);
+        }
+    }
+
+    bool factorize() { return factorize_symmetric(shape, tangent); }
+    void solve() { solve_symmetric(shape, tangent, residual); }
+
+    // Largest displacement, mm, that the numbers in `residual` stand for; NaN or infinite where one is.
+    double largest_correction() const {
+        double worst = 0.0;
+        for (int64_t k = 0; k < model.size; ++k) {
+            const double size = fabs(residual[k]);
+            if (!(size <= 1e300)) return size;
+            if (size > worst) worst = size;
+        }
+        return worst;
+    }
+
+    // u less `factor` times the correction in `residual`.
+    void correct(double* u, double factor) const {
+        for (int64_t k = 0; k < 2 * model.nodes; ++k)
+            if (model.equations[k] >= 0) u[k] -= factor * residual[model.equations[k]];
+    }
+
+    // Largest displacement of the observed surface, or of the whole body if none is observed, mm.
+    double largest_displacement(const double* u) const {
+        double worst = 0.0;
+        for (int64_t k = 0; k < model.observed_nodes; ++k) worst = fmax(worst, fabs(u[2 * model.observed[k] + 1]));
+        for (int64_t k = 0; model.observed_nodes == 0 && k < 2 * model.nodes; ++k) worst = fmax(worst, fabs(u[k]));
+        return worst;
+    }
+
+    // Put held nodes where the motion takes them; pattern : (2 nodes,) mm for a unit of motion.
+    void prescribe(const double* pattern, double motion, double* u) const {
+        for (int64_t k = 0; k < 2 * model.nodes; ++k)
+            if (model.equations[k] < 0) u[k] = motion * pattern[k];
+    }
+
+private:
+    static void clear(double* values, int64_t count) { memset(values, 0, sizeof(double) * size_t(count)); }
+
+    // Nodal forces of an element whose points are the four lanes from `first` on; P carries the weights.
+    CREEPKIT_INLINE void add_forces(int64_t element, int first, const double P[5][EIGHT]) {
+        Eight radial(0.0), axial(0.0);
+        for (int g = 0; g < 4; ++g) {
+            const int64_t row = (4 * element + g) * EIGHT;
+            const int lane = first + g;
+            const Eight x = load(model.by_radius + row), y = load(model.by_height + row);
+            radial += x * P[0][lane] + y * P[1][lane] + load(model.over_radius + row) * P[4][lane];
+            axial += x * P[2][lane] + y * P[3][lane];
+        }
+        const int64_t* nodes = model.connectivity + EIGHT * element;
+        for (int a = 0; a < EIGHT; ++a) {
+            const int64_t r = model.equations[2 * nodes[a]], z = model.equations[2 * nodes[a] + 1];
+            if (r >= 0) residual[r] += radial[a];
+            if (z >= 0) residual[z] += axial[a];
+        }
+    }
+
+    // Blocks rr, rz, zz of an element into the tangent; A carries the weights.
+    CREEPKIT_INLINE void add_stiffness(int64_t element, int first, const double A[25][EIGHT]) {
+        Eight products[4][8];  // tangent times shape gradients of a point, by node
+        const double *by_r = model.by_radius + 4 * element * EIGHT, *by_z = model.by_height + 4 * element * EIGHT;
+        const double* over_r = model.over_radius + 4 * element * EIGHT;
+        for (int g = 0; g < 4; ++g) {
+            const int lane = first + g;
+            const auto a = [&](int i, int j) { return A[5 * i + j][lane]; };
+            const Eight x = load(by_r + EIGHT * g), y = load(by_z + EIGHT * g), h = load(over_r + EIGHT * g);
+            Eight* p = products[g];
+            p[0] = a(0, 0) * x + a(0, 1) * y + a(0, 4) * h;
+            p[1] = a(1, 0) * x + a(1, 1) * y + a(1, 4) * h;
+            p[2] = a(4, 0) * x + a(4, 1) * y + a(4, 4) * h;
+            p[3] = a(0, 2) * x + a(0, 3) * y;
+            p[4] = a(1, 2) * x + a(1, 3) * y;
+            p[5] = a(4, 2) * x + a(4, 3) * y;
+            p[6] = a(2, 2) * x + a(2, 3) * y;
+            p[7] = a(3, 2) * x + a(3, 3) * y;
+        }
+        const int64_t* places = model.places + 192 * element;
+        for (int a = 0; a < EIGHT; ++a) {
+            Eight rr(0.0), rz(0.0), zz(0.0);
+            for (int g = 0; g < 4; ++g) {
+                const double x = by_r[EIGHT * g + a], y = by_z[EIGHT * g + a], h = over_r[EIGHT * g + a];
+                const Eight* p = products[g];
+                rr += x * p[0] + y * p[1] + h * p[2];
+                rz += x * p[3] + y * p[4] + h * p[5];
+                zz += x * p[6] + y * p[7];
+            }
+            for (int b = a; b < EIGHT; ++b) {
+                tangent[places[EIGHT * a + b]] += rr[b];
+                tangent[places[128 + EIGHT * a + b]] += zz[b];
+            }
+            for (int b = 0; b < EIGHT; ++b) tangent[places[64 + EIGHT * a + b]] += rz[b];
+        }
+    }
+
+    // Take the pressure's force off the internal one, and its stiffness (made symmetric) off the tangent.
+    template <bool STIFF>
+    void press(double pressure, const double* u) {
+        if (pressure == 0.0) return;
+        for (int64_t side = 0; side < model.pressed_sides; ++side) {
+            const int64_t* nodes = model.pressed + 3 * side;
+            double r[3], z[3], force[2][3];
+            for (int a = 0; a < 3; ++a) {
+                r[a] = model.coordinates[2 * nodes[a]] + u[2 * nodes[a]];
+                z[a] = model.coordinates[2 * nodes[a] + 1] + u[2 * nodes[a] + 1];
+            }
+            side_force(quadrature, r, z, force);
+            for (int a = 0; a < 3; ++a)
+                for (int i = 0; i < 2; ++i) {
+                    const int64_t equation = model.equations[2 * nodes[a] + i];
+                    if (equation >= 0) residual[equation] -= pressure * force[i][a];
+                }
+            if (!STIFF) continue;
+            double k[4][3][3];
+            side_stiffness(quadrature, r, z, k);
+            const int64_t* places = model.pressed_places + 27 * side;
+            for (int a = 0; a < 3; ++a) {
+                for (int b = a; b < 3; ++b) tangent[places[3 * a + b]] -= 0.5 * pressure * (k[0][a][b] + k[0][b][a]);
+                for (int b = 0; b < 3; ++b)
+                    tangent[places[9 + 3 * a + b]] -= 0.5 * pressure * (k[1][a][b] + k[2][b][a]);
+            }
+        }
+    }
+};
+
+}  // namespace creepkit

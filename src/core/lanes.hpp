@@ -1,0 +1,179 @@
+// Eight numbers side by side: eight points of two elements, eight nodes of an element, or eight columns of a matrix.
+//
+// They are kept in the vectors of the processor, CREEPKIT_LANES numbers each: 8 (AVX-512), 4 (AVX2) or 2 (SSE2, NEON),
+// by the vector extensions that GCC and Clang share. A source that includes this header is compiled once for each
+// width, in a namespace of its own, so that no function of one width is linked in place of another.
+#pragma once
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifndef CREEPKIT_LANES
+#define CREEPKIT_LANES 2
+#endif
+
+#define CREEPKIT_INLINE inline __attribute__((always_inline))
+
+namespace creepkit {
+
+constexpr int LANES = CREEPKIT_LANES, EIGHT = 8, VECTORS = EIGHT / LANES;
+
+typedef double Vector __attribute__((vector_size(8 * LANES)));
+typedef int64_t Integers __attribute__((vector_size(8 * LANES)));
+
+// Truth values of eight comparisons: all bits set where true.
+struct Mask {
+    Integers part[VECTORS];
+};
+
+struct Eight {
+    Vector part[VECTORS];
+
+    Eight() = default;
+    CREEPKIT_INLINE Eight(double value) {
+        for (int i = 0; i < VECTORS; ++i) part[i] = Vector{} + value;
+    }
+    CREEPKIT_INLINE double operator[](int k) const { return part[k / LANES][k % LANES]; }
+    CREEPKIT_INLINE void set(int k, double value) { part[k / LANES][k % LANES] = value; }
+};
+
+CREEPKIT_INLINE Eight load(const double* from) {
+    Eight r;
+    memcpy(r.part, from, sizeof r.part);
+    return r;
+}
+
+CREEPKIT_INLINE void store(double* to, const Eight& x) { memcpy(to, x.part, sizeof x.part); }
+
+#define CREEPKIT_OPERATOR(sign)                                                                  \
+    CREEPKIT_INLINE Eight operator sign(const Eight& a, const Eight& b) {                        \
+        Eight r;                                                                                 \
+        for (int i = 0; i < VECTORS; ++i) r.part[i] = a.part[i] sign b.part[i];                  \
+        return r;                                                                                \
+    }                                                                                            \
+    CREEPKIT_INLINE Eight operator sign(const Eight& a, double b) {                              \
+        Eight r;                                                                                 \
+        for (int i = 0; i < VECTORS; ++i) r.part[i] = a.part[i] sign b;                          \
+        return r;                                                                                \
+    }                                                                                            \
+    CREEPKIT_INLINE Eight operator sign(double a, const Eight& b) {                              \
+        Eight r;                                                                                 \
+        for (int i = 0; i < VECTORS; ++i) r.part[i] = a sign b.part[i];                          \
+        return r;                                                                                \
+    }
+CREEPKIT_OPERATOR(+)
+CREEPKIT_OPERATOR(-)
+CREEPKIT_OPERATOR(*)
+CREEPKIT_OPERATOR(/)
+#undef CREEPKIT_OPERATOR
+
+#define CREEPKIT_COMPARISON(sign)                                                                \
+    CREEPKIT_INLINE Mask operator sign(const Eight& a, const Eight& b) {                         \
+        Mask r;                                                                                  \
+        for (int i = 0; i < VECTORS; ++i) r.part[i] = a.part[i] sign b.part[i];                  \
+        return r;                                                                                \
+    }
+CREEPKIT_COMPARISON(<)
+CREEPKIT_COMPARISON(>)
+CREEPKIT_COMPARISON(<=)
+CREEPKIT_COMPARISON(>=)
+#undef CREEPKIT_COMPARISON
+
+#define CREEPKIT_LOGICAL(sign)                                                                   \
+    CREEPKIT_INLINE Mask operator sign(const Mask& a, const Mask& b) {                           \
+        Mask r;                                                                                  \
+        for (int i = 0; i < VECTORS; ++i) r.part[i] = a.part[i] sign b.part[i];                  \
+        return r;                                                                                \
+    }
+CREEPKIT_LOGICAL(&)
+CREEPKIT_LOGICAL(|)
+#undef CREEPKIT_LOGICAL
+
+CREEPKIT_INLINE Eight operator-(const Eight& a) { return 0.0 - a; }
+CREEPKIT_INLINE Eight& operator+=(Eight& a, const Eight& b) { return a = a + b; }
+CREEPKIT_INLINE Eight& operator-=(Eight& a, const Eight& b) { return a = a - b; }
+
+CREEPKIT_INLINE Mask operator!(const Mask& a) {
+    Mask r;
+    for (int i = 0; i < VECTORS; ++i) r.part[i] = ~a.part[i];
+    return r;
+}
+
+CREEPKIT_INLINE Eight select(const Mask& where, const Eight& a, const Eight& b) {
+    Eight r;
+    for (int i = 0; i < VECTORS; ++i) r.part[i] = where.part[i] ? a.part[i] : b.part[i];
+    return r;
+}
+
+CREEPKIT_INLINE bool any(const Mask& a) {
+    Integers sum = a.part[0];
+    for (int i = 1; i < VECTORS; ++i) sum |= a.part[i];
+    int64_t total = 0;
+    for (int k = 0; k < LANES; ++k) total |= sum[k];
+    return total != 0;
+}
+
+CREEPKIT_INLINE bool is_set(const Mask& a, int k) { return a.part[k / LANES][k % LANES] != 0; }
+
+CREEPKIT_INLINE Eight larger(const Eight& a, const Eight& b) { return select(a > b, a, b); }
+CREEPKIT_INLINE Eight smaller(const Eight& a, const Eight& b) { return select(a < b, a, b); }
+CREEPKIT_INLINE Eight magnitude(const Eight& a) { return larger(a, -a); }
+
+CREEPKIT_INLINE Eight square_root(const Eight& a) {
+    Eight r;
+    for (int i = 0; i < VECTORS; ++i)
+        for (int k = 0; k < LANES; ++k) r.part[i][k] = __builtin_sqrt(a.part[i][k]);
+    return r;
+}
+
+// The sum of the first and of the second four.
+CREEPKIT_INLINE double sum(const Eight& a) {
+    double total = 0.0;
+    for (int k = 0; k < EIGHT; ++k) total += a[k];
+    return total;
+}
+
+// exp(x) by x = k ln 2 + r, |r| <= ln(2)/2, and a polynomial of degree 12 for exp(r): 1e-15 relative. Arguments are
+// cut to 700 on both sides.
+CREEPKIT_INLINE Eight exponential(const Eight& argument) {
+    constexpr double ROUND = 6755399441055744.0;  // 1.5 2^52: adding it rounds to a whole number
+    const double coefficients[] = {1.0 / 39916800.0, 1.0 / 3628800.0, 1.0 / 362880.0, 1.0 / 40320.0, 1.0 / 5040.0,
+                                   1.0 / 720.0,      1.0 / 120.0,     1.0 / 24.0,     1.0 / 6.0,     0.5,
+                                   1.0,              1.0};
+    Eight result;
+    for (int i = 0; i < VECTORS; ++i) {
+        Vector x = argument.part[i];
+        x = x < 700.0 ? x : Vector{} + 700.0;
+        x = x > -700.0 ? x : Vector{} - 700.0;
+        const Vector shifted = x * 1.4426950408889634 + ROUND, k = shifted - ROUND;
+        const Vector r = (x - k * 0.693147180369123816490) - k * 1.90821492927058770002e-10;
+        Vector p = Vector{} + 1.0 / 479001600.0;
+        for (double c : coefficients) p = p * r + c;
+        const Integers power = ((Integers)shifted + 1023) << 52;  // the low bits of `shifted` hold k
+        result.part[i] = p * (Vector)power;
+    }
+    return result;
+}
+
+// ln(x), x > 0 and normal, by x = 2^k m, m in [sqrt(1/2), sqrt(2)], and ln m = 2 artanh((m - 1)/(m + 1)): 4e-16.
+CREEPKIT_INLINE Eight logarithm(const Eight& argument) {
+    const double coefficients[] = {2.0 / 17.0, 2.0 / 15.0, 2.0 / 13.0, 2.0 / 11.0, 2.0 / 9.0,
+                                   2.0 / 7.0,  2.0 / 5.0,  2.0 / 3.0,  2.0};
+    Eight result;
+    for (int i = 0; i < VECTORS; ++i) {
+        const Integers bits = (Integers)argument.part[i];
+        // subtracting the bits of sqrt(1/2) puts the mantissa between sqrt(1/2) and sqrt(2)
+        const Integers k = (bits - 0x3fe6a09e667f3bcdL) >> 52;
+        const Vector m = (Vector)(bits - (k << 52));
+        const Vector s = (m - 1.0) / (m + 1.0), z = s * s;
+        Vector p = Vector{} + 2.0 / 19.0;
+        for (double c : coefficients) p = p * z + c;
+        // k as a double, through the bits of 1.5 2^52 + k
+        const Vector number = (Vector)(k + 0x4338000000000000L) - 6755399441055744.0;
+        result.part[i] = number * 0.6931471805599453 + p * s;
+    }
+    return result;
+}
+
+}  // namespace creepkit

@@ -1,0 +1,361 @@
+// The material points of a finite element: Hencky elasticity, von Mises creep by the Cauchy stress, eight at a time.
+//
+// w = (E33 - tr E/3, E11 - E22, 2 E12) less the creep components of the same form is the elastic deviator, and
+// e^2 = w1^2 + (w2^2 + w3^2)/3. The trial stress 3G e/J and the creep increment D give the von Mises stress
+// 3G (e - D)/J of the Cauchy stress, J = det F, at which the law is evaluated: the stage problem of stage_problem.hpp.
+// Creep flows along w/e.
+#pragma once
+
+#include "kinematics.hpp"
+#include "law.hpp"
+#include "stage_problem.hpp"
+#include "stage_solver.hpp"
+
+namespace creepkit {
+
+constexpr int CREEP_COMPONENTS = 3, EQUIVALENT_STRAIN = 3, STAGES = 2;
+
+// What all points of a stage share: weight gamma h dt/ds in s (0 for a purely elastic change) and its logarithm, time
+// s, temperature K, bulk and shear modulus MPa, pressure MPa.
+struct StageConditions {
+    double weight, log_weight, time, temperature, bulk, shear, pressure;
+};
+
+// A law with its parameters (internal values) and its number of states S.
+struct PointLaw {
+    LawEntry update, sensitivity;
+    const double* theta;
+    int64_t parameters, states;
+};
+
+// The state of all points. An array of several quantities has one after the other, `count` numbers each; count is a
+// multiple of eight, the last points may be copies of no weight. V = 3 + 1 + S.
+//
+// value : (V, count) creep components, equivalent creep strain, states, at the start of the step.
+// base : (V, count) history of the stage. increments : (count,) D. states : (S, count) at the end of the stage.
+// slopes : (STAGES, V, count) d value/ds. mises : (count,) von Mises stress of the Cauchy stress, MPa.
+// directions : (3, count) w/e. deviator : (6, count) derivatives of the stress components y that are conjugate to w,
+//     from the last tangent: 11, 22, 33, 12, 13, 23. trials : (count,) trial stress at which D was found last, MPa
+//     (negative: none in this stage). by_trial : (count,) dD/d(trial stress) of the last tangent.
+struct PointStates {
+    int64_t count, states, values;
+    double *value, *base, *increments, *state, *slopes, *mises, *directions, *deviator, *trials, *by_trial;
+
+    template <class Memory>
+    void take(Memory& memory, int64_t points, int64_t state_count) {
+        count = points;
+        states = state_count;
+        values = EQUIVALENT_STRAIN + 1 + state_count;
+        value = memory.doubles(values * count);
+        base = memory.doubles(values * count);
+        increments = memory.doubles(count);
+        state = memory.doubles(states * count);
+        slopes = memory.doubles(STAGES * values * count);
+        mises = memory.doubles(count);
+        directions = memory.doubles(CREEP_COMPONENTS * count);
+        deviator = memory.doubles(6 * count);
+        trials = memory.doubles(count);
+        by_trial = memory.doubles(count);
+    }
+};
+
+// The elastic predictor: w, its size e and 1/e (0 where it is 0), tr E, J, mean Cauchy stress in MPa, and the largest
+// principal value of the unit deviator over its von Mises stress.
+struct ElasticPredictor {
+    Eight hoop, difference, shear, equivalent, inverse, trace, volume, mean, top;
+};
+
+// Derivatives of D to the trial stress, and to shifts of the largest principal and of the mean stress.
+struct CreepDerivatives {
+    Eight by_trial, by_principal, by_mean;
+};
+
+// base : (3, stride) creep components of these points.
+CREEPKIT_INLINE ElasticPredictor elastic_predictor(const StageConditions& stage, const Kinematics& at,
+                                                   const double* base, int64_t stride) {
+    ElasticPredictor p;
+    p.trace = at.strain[SUM] + at.strain[HOOP];
+    p.hoop = at.strain[HOOP] - p.trace * (1.0 / 3.0) - load(base);
+    p.difference = at.strain[DIFFERENCE] - load(base + stride);
+    p.shear = at.strain[SHEAR] - load(base + 2 * stride);
+    const Eight radius2 = p.difference * p.difference + p.shear * p.shear;
+    p.equivalent = square_root(p.hoop * p.hoop + radius2 * (1.0 / 3.0));
+    p.inverse = select(p.equivalent > Eight(0.0), 1.0 / p.equivalent, Eight(0.0));
+    p.volume = at.volume;
+    p.mean = stage.bulk * p.trace / at.volume;
+    p.top = larger(2.0 * p.hoop, square_root(radius2) - p.hoop) * p.inverse * (1.0 / 3.0);
+    return p;
+}
+
+// The log-conjugate stress.
+CREEPKIT_INLINE void log_stress(const StageConditions& stage, const ElasticPredictor& p, const Eight& increment,
+                                Eight stress[4]) {
+    const Eight left = 1.0 - increment * p.inverse, pressure = stage.bulk * p.trace, shear = stage.shear * left;
+    const Eight hoop = shear * p.hoop;
+    stress[SUM] = pressure - hoop;
+    stress[DIFFERENCE] = shear * p.difference;
+    stress[HOOP] = pressure + 2.0 * hoop;
+    stress[SHEAR] = shear * p.shear;
+}
+
+// Derivatives (4,) of what depends on trial, largest principal and mean stress to w (three) and to tr E.
+//
+// The largest principal Cauchy stress is the mean plus top times the von Mises stress.
+CREEPKIT_INLINE void strain_derivatives(const StageConditions& stage, const ElasticPredictor& p, const Eight& increment,
+                                        const CreepDerivatives& by, Eight follow[4]) {
+    const Eight stiffness = 3.0 * stage.shear / p.volume, stress = stiffness * (p.equivalent - increment);
+    const Eight along = by.by_trial * stiffness * p.inverse;
+    follow[0] = along * p.hoop;
+    follow[1] = along * p.difference * (1.0 / 3.0);
+    follow[2] = along * p.shear * (1.0 / 3.0);
+    follow[3] = -(by.by_trial * stress);
+    const Eight zero(0.0);
+    if (!any((by.by_principal < zero) | (by.by_principal > zero) | (by.by_mean < zero) | (by.by_mean > zero))) return;
+    const Eight radius = square_root(p.difference * p.difference + p.shear * p.shear);
+    const Eight turned = by.by_principal * stress * p.inverse * (1.0 / 3.0);
+    const Eight shrink = by.by_principal * stress * p.top * p.inverse * p.inverse;
+    const Mask hoop_is_largest = 2.0 * p.hoop > radius - p.hoop;
+    const Eight over_radius = select(radius > zero, 1.0 / radius, zero);
+    follow[0] += select(hoop_is_largest, 2.0 * turned, -turned) - shrink * p.hoop;
+    follow[1] += select(hoop_is_largest, zero, turned * p.difference * over_radius) - shrink * p.difference * (1.0 / 3.0);
+    follow[2] += select(hoop_is_largest, zero, turned * p.shear * over_radius) - shrink * p.shear * (1.0 / 3.0);
+    follow[3] += (by.by_mean + by.by_principal) * (stage.bulk / p.volume - p.mean);
+}
+
+// Consistent tangent dT/dE, exact or its symmetric part, and the derivatives dy/dw of the stresses conjugate to w.
+//
+// follow : derivatives of D to w and to tr E. y_i = 3G (1 - D/e) g_i w_i is conjugate to w_i, g = (1, 1/3, 1/3), and
+// dy_i = 3G (1 - D/e) g_i dw_i + g_i w_i (v_j dw_j + v_t dtr).
+template <bool SYMMETRIC>
+CREEPKIT_INLINE void tangent_moduli(const StageConditions& stage, const ElasticPredictor& p, const Eight& increment,
+                                    const Eight follow[4], Eight moduli[4][4], Eight by_w[3][3]) {
+    const double shear3 = 3.0 * stage.shear, third = 1.0 / 3.0, bulk = stage.bulk;
+    const Eight left = 1.0 - increment * p.inverse, factor = shear3 * p.inverse;
+    const Eight d[3] = {p.hoop, p.difference * third, p.shear * third};
+    const Eight bend = factor * increment * p.inverse * p.inverse, vt = -(factor * follow[3]);
+    const Eight stiffness[3] = {shear3 * left, stage.shear * left, stage.shear * left};
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) by_w[i][j] = d[i] * (bend * d[j] - factor * follow[j]);
+        by_w[i][i] += stiffness[i];
+    }
+    if (SYMMETRIC)
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < i; ++j) by_w[i][j] = by_w[j][i] = 0.5 * (by_w[i][j] + by_w[j][i]);
+    const Eight t0 = d[0] * vt, t1 = d[1] * vt, t2 = d[2] * vt;
+    // w1 changes by -1/3 with E11 + E22 and by 2/3 with E33; the trace by one with both
+    const Eight s = t0 - third * by_w[0][0], h = t0 + 2.0 * third * by_w[0][0];
+    moduli[SUM][SUM] = bulk - third * s;
+    moduli[SUM][HOOP] = bulk - third * h;
+    moduli[HOOP][SUM] = bulk + 2.0 * third * s;
+    moduli[HOOP][HOOP] = bulk + 2.0 * third * h;
+    moduli[SUM][DIFFERENCE] = -third * by_w[0][1];
+    moduli[HOOP][DIFFERENCE] = 2.0 * third * by_w[0][1];
+    moduli[SUM][SHEAR] = -third * by_w[0][2];
+    moduli[HOOP][SHEAR] = 2.0 * third * by_w[0][2];
+    moduli[DIFFERENCE][SUM] = t1 - third * by_w[1][0];
+    moduli[DIFFERENCE][HOOP] = t1 + 2.0 * third * by_w[1][0];
+    moduli[SHEAR][SUM] = t2 - third * by_w[2][0];
+    moduli[SHEAR][HOOP] = t2 + 2.0 * third * by_w[2][0];
+    moduli[DIFFERENCE][DIFFERENCE] = by_w[1][1];
+    moduli[DIFFERENCE][SHEAR] = by_w[1][2];
+    moduli[SHEAR][DIFFERENCE] = by_w[2][1];
+    moduli[SHEAR][SHEAR] = by_w[2][2];
+    if (SYMMETRIC)
+        for (int i = 0; i < 4; ++i)
+            for (int j = 0; j < i; ++j) moduli[i][j] = moduli[j][i] = 0.5 * (moduli[i][j] + moduli[j][i]);
+}
+
+enum PointFlag { POINTS_SOLVED, INVERTED, POINT_FAILED, RATE_UNDEFINED };
+
+// One point of the eight by the solver for any guess and any law; writes D, the states and the law's output there.
+//
+// out : (1 + S) (7 + S) numbers of the last evaluation.
+inline PointFlag solve_point(const PointLaw& law, const StageConditions& stage, const ElasticPredictor& p, int lane,
+                             PointStates& points, int64_t k, double tolerance, double* out) {
+    double row[POINT_SIZE + MAX_STATES], history[MAX_STATES];
+    row[TIME] = stage.time;
+    row[TEMPERATURE] = stage.temperature;
+    for (int64_t i = 0; i < law.states; ++i) {
+        row[POINT_SIZE + i] = points.state[i * points.count + k];
+        history[i] = points.base[(EQUIVALENT_STRAIN + 1 + i) * points.count + k];
+    }
+    const double stiffness = 3.0 * stage.shear / p.volume[lane];
+    const Axes axes = {p.mean[lane], p.top[lane], p.mean[lane], 0.0};
+    const StageProblem problem = {stiffness * p.equivalent[lane], stiffness, 0.0, stage.weight,
+                                  points.base[EQUIVALENT_STRAIN * points.count + k]};
+    double guess = points.increments[k];
+    if (!(guess > 0.0)) guess = 1e-6 * problem.trial / stiffness;
+    const StageSolution solution = solve_stage(law.update, law.theta, axes, problem, history, law.states, row, out,
+                                               guess, tolerance);
+    if (solution.flag != SOLVED) return solution.flag == NOT_FINITE ? RATE_UNDEFINED : POINT_FAILED;
+    points.increments[k] = solution.increment;
+    for (int64_t i = 0; i < law.states; ++i) points.state[i * points.count + k] = row[POINT_SIZE + i];
+    return POINTS_SOLVED;
+}
+
+// Creep increments of eight points of a law without states, and the derivatives of D.
+//
+// Newton's method in ln[D/(1 - k D/trial)], on all eight side by side; a point that leaves its range or does not settle
+// is solved alone.
+inline PointFlag creep_increments(const PointLaw& law, const StageConditions& stage, const ElasticPredictor& p,
+                                  PointStates& points, int64_t k, double tolerance, Eight& increment,
+                                  CreepDerivatives& by) {
+    constexpr int ITERATIONS = 12;
+    constexpr double LONGEST = 3.0;  // correction of ln[D/(1 - k D/trial)]
+    alignas(64) double x[POINT_SIZE * EIGHT], out[(1 + POINT_SIZE) * EIGHT];
+    store(x + TIME * EIGHT, Eight(stage.time));
+    store(x + TEMPERATURE * EIGHT, Eight(stage.temperature));
+    const Eight zero(0.0), one(1.0);
+    const Mask resting = !(p.equivalent > zero);
+    const Eight equivalent = select(resting, one, p.equivalent), stiffness = 3.0 * stage.shear / p.volume;
+    const Eight trial = stiffness * equivalent, mean = p.mean, top = p.top;
+    const Eight strain = load(points.base + EQUIVALENT_STRAIN * points.count + k);
+    // first guess: the last increment, moved along the last tangent with the trial stress
+    const Eight last = load(points.increments + k), before = load(points.trials + k);
+    const Eight moved = last + load(points.by_trial + k) * (trial - before);
+    Eight guess = select((before >= zero) & (moved > zero), moved, last);
+    guess = select(guess > zero, guess, 1e-6 * equivalent);
+    Eight share = smaller(guess / equivalent, Eight(0.9999));
+    share = select((share > Eight(1e-280)) & !resting, share, Eight(1e-6));
+    Eight by_stress(0.0), by_principal(0.0), by_mean(0.0), by_strain(0.0);
+    bool settled = !any(!resting);
+    for (int iteration = 0; iteration < ITERATIONS && !settled; ++iteration) {
+        const Eight left = 1.0 - share, stress = trial * left;
+        increment = equivalent * share;
+        store(x + STRESS * EIGHT, stress);
+        store(x + STRAIN * EIGHT, strain + increment);
+        store(x + PRINCIPAL_STRESS * EIGHT, mean + top * stress);
+        store(x + MEAN_STRESS * EIGHT, mean);
+        law.update(EIGHT, x, law.theta, out);
+        by_principal = load(out + (1 + PRINCIPAL_STRESS) * EIGHT);
+        by_mean = load(out + (1 + MEAN_STRESS) * EIGHT);
+        by_strain = load(out + (1 + STRAIN) * EIGHT);
+        by_stress = load(out + (1 + STRESS) * EIGHT) + top * by_principal;
+        const Eight rate = load(out), residual = logarithm(increment) - stage.log_weight - rate;
+        const Eight slope = left * (1.0 - increment * by_strain) + share * stress * by_stress;
+        Eight step = -(residual / slope);
+        if (any(!(resting | ((slope > zero) & (rate > Eight(NO_RATE)) & (magnitude(step) < Eight(1e3)))))) break;
+        step = select(resting, zero, larger(Eight(-LONGEST), smaller(Eight(LONGEST), step)));
+        const Eight ratio = share / left * exponential(step);
+        share = larger(Eight(1e-290), smaller(Eight(1.0 - 1e-9), ratio / (1.0 + ratio)));
+        settled = !any(magnitude(step) > Eight(tolerance));
+    }
+    if (settled) {
+        increment = select(resting, zero, equivalent * share);
+        store(points.increments + k, increment);
+    } else {
+        store(points.increments + k, guess);
+        for (int lane = 0; lane < EIGHT; ++lane) {
+            double alone[1 + POINT_SIZE] = {};
+            if (is_set(resting, lane)) {
+                points.increments[k + lane] = 0.0;
+            } else {
+                const PointFlag flag = solve_point(law, stage, p, lane, points, k + lane, tolerance, alone);
+                if (flag != POINTS_SOLVED) return flag;
+            }
+            by_principal.set(lane, alone[1 + PRINCIPAL_STRESS]);
+            by_mean.set(lane, alone[1 + MEAN_STRESS]);
+            by_strain.set(lane, alone[1 + STRAIN]);
+            by_stress.set(lane, alone[1 + STRESS] + p.top[lane] * alone[1 + PRINCIPAL_STRESS]);
+        }
+        increment = load(points.increments + k);
+    }
+    const Mask creeps = increment > zero;
+    const Eight along = increment * by_stress, divisor = 1.0 / (1.0 + along * stiffness - increment * by_strain);
+    by.by_trial = select(creeps, along * divisor, zero);
+    by.by_principal = select(creeps, increment * by_principal * divisor, zero);
+    by.by_mean = select(creeps, increment * by_mean * divisor, zero);
+    return POINTS_SOLVED;
+}
+
+// The same for a law with states, one point after another.
+inline PointFlag creep_increments_with_states(const PointLaw& law, const StageConditions& stage,
+                                              const ElasticPredictor& p, PointStates& points, int64_t k,
+                                              double tolerance, Eight& increment, CreepDerivatives& by) {
+    double out[(1 + MAX_STATES) * (7 + MAX_STATES)], gradient[(1 + MAX_STATES) * (POINT_SIZE + MAX_STATES)];
+    double matrix[(1 + MAX_STATES) * (1 + MAX_STATES)], response[(1 + MAX_STATES) * (INPUTS + MAX_STATES)];
+    by.by_trial = by.by_principal = by.by_mean = Eight(0.0);
+    for (int lane = 0; lane < EIGHT; ++lane) {
+        const int64_t point = k + lane;
+        if (!(p.equivalent[lane] > 0.0)) {
+            points.increments[point] = 0.0;
+            continue;
+        }
+        const double stiffness = 3.0 * stage.shear / p.volume[lane], trial = stiffness * p.equivalent[lane];
+        if (points.trials[point] >= 0.0) {
+            const double guess = points.increments[point] + points.by_trial[point] * (trial - points.trials[point]);
+            if (guess > 0.0) points.increments[point] = guess;
+        }
+        const PointFlag flag = solve_point(law, stage, p, lane, points, point, tolerance, out);
+        if (flag != POINTS_SOLVED) return flag;
+        const double creep = points.increments[point];
+        if (!(creep > 0.0)) continue;
+        const Axes axes = {p.mean[lane], p.top[lane], p.mean[lane], 0.0};
+        const StageProblem problem = {trial, stiffness, 0.0, stage.weight, 0.0};
+        gradient_of_update(out, problem, creep, gradient, law.states);
+        if (!differentiate_stage(axes, problem, creep, trial - stiffness * creep, out + 1, gradient, matrix, response,
+                                 law.states, 0))
+            continue;
+        by.by_trial.set(lane, response[BY_TRIAL]);
+        by.by_principal.set(lane, response[BY_PRINCIPAL]);
+        by.by_mean.set(lane, response[BY_MEAN]);
+    }
+    increment = load(points.increments + k);
+    return POINTS_SOLVED;
+}
+
+// From the deformation gradient of eight points to P and, if STIFF, to A = dP/dF (symmetric); keeps what their states
+// become. at : with f11 ... f33 set. tolerance : on the last Newton correction of ln D; the error left is its square.
+template <bool STIFF>
+CREEPKIT_INLINE PointFlag update_points(const PointLaw& law, const StageConditions& stage, PointStates& points,
+                                        int64_t k, Kinematics& at, double tolerance, Eight P[5], Eight A[25]) {
+    if (!set_strains(at)) return INVERTED;
+    const ElasticPredictor p = elastic_predictor(stage, at, points.base + k, points.count);
+    Eight increment(0.0);
+    CreepDerivatives by = {Eight(0.0), Eight(0.0), Eight(0.0)};
+    if (stage.weight > 0.0) {
+        const PointFlag flag =
+            law.states == 0 ? creep_increments(law, stage, p, points, k, tolerance, increment, by)
+                            : creep_increments_with_states(law, stage, p, points, k, tolerance, increment, by);
+        if (flag != POINTS_SOLVED) return flag;
+    } else {
+        store(points.increments + k, increment);
+    }
+    const Eight stiffness = 3.0 * stage.shear / p.volume, trial = stiffness * p.equivalent;
+    store(points.trials + k, trial);
+    store(points.mises + k, trial - stiffness * increment);
+    store(points.directions + k, p.hoop * p.inverse);
+    store(points.directions + points.count + k, p.difference * p.inverse);
+    store(points.directions + 2 * points.count + k, p.shear * p.inverse);
+    Eight stress[4];
+    log_stress(stage, p, increment, stress);
+    piola_stress(at, stress, P);
+    if (!STIFF) return POINTS_SOLVED;
+    store(points.by_trial + k, by.by_trial);
+    Eight follow[4], moduli[4][4], by_w[3][3];
+    strain_derivatives(stage, p, increment, by, follow);
+    tangent_moduli<true>(stage, p, increment, follow, moduli, by_w);
+    double* kept = points.deviator + k;
+    store(kept, 1.5 * (moduli[HOOP][HOOP] - moduli[HOOP][SUM]));
+    store(kept + points.count, moduli[DIFFERENCE][DIFFERENCE]);
+    store(kept + 2 * points.count, moduli[SHEAR][SHEAR]);
+    store(kept + 3 * points.count, moduli[DIFFERENCE][HOOP] - moduli[DIFFERENCE][SUM]);
+    store(kept + 4 * points.count, moduli[SHEAR][HOOP] - moduli[SHEAR][SUM]);
+    store(kept + 5 * points.count, moduli[DIFFERENCE][SHEAR]);
+    piola_tangent(at, moduli, stress, A);
+    return POINTS_SOLVED;
+}
+
+// Stress P of eight points for a change of their creep strains by `change`, through the tangent of the stage, which
+// damps what the stage would damp. at : with strains set. change : (3,) of the creep components.
+CREEPKIT_INLINE void stress_of_creep_change(const PointStates& points, int64_t k, const Kinematics& at,
+                                            const Eight change[3], Eight P[5]) {
+    Eight kept[6];
+    for (int i = 0; i < 6; ++i) kept[i] = load(points.deviator + i * points.count + k);
+    const Eight first = kept[0] * change[0] + kept[3] * change[1] + kept[4] * change[2];
+    const Eight stress[4] = {first * (1.0 / 3.0), -(kept[3] * change[0] + kept[1] * change[1] + kept[5] * change[2]),
+                             first * (-2.0 / 3.0), -(kept[4] * change[0] + kept[5] * change[1] + kept[2] * change[2])};
+    piola_stress(at, stress, P);
+}
+
+}  // namespace creepkit

@@ -1,0 +1,149 @@
+"""The finite element model of a mesh: equation numbers, and what the compiled core reads of it."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from creepkit.arrays import Floats, Ints
+from creepkit.core import CoreStructure, address
+from creepkit.errors import SolveError
+from creepkit.fem.mesh import Mesh, discretize
+
+TILE = 8
+"""Side of the tiles in which the core keeps banded matrices."""
+
+
+@dataclass(frozen=True, eq=False)
+class FiniteElementModel:
+    """A mesh ready to be simulated; displacements are kept as (2 nodes,) numbers, u_r and u_z in turn.
+
+    nodes : (nodes, 2) mm. elements : (elements, 8). by_radius, by_height, over_radius : (elements, 4, 8), weights :
+        (elements, 4), as in `fem.mesh`.
+    equations : (2 nodes,) number of the equation of a displacement, -1 where it is held.
+    size, width : number of equations, half-bandwidth.
+    pressed : (edges, 3) nodes. top : (top,) nodes of the observed surface.
+    """
+
+    nodes: Floats
+    elements: Ints
+    by_radius: Floats
+    by_height: Floats
+    over_radius: Floats
+    weights: Floats
+    equations: Ints
+    size: int
+    width: int
+    pressed: Ints
+    top: Ints
+
+    @cached_property
+    def compiled(self) -> CompiledModel:
+        """The model as the core reads it; made once."""
+        return CompiledModel(self)
+
+
+def finite_element_model(mesh: Mesh) -> FiniteElementModel:
+    """Prepare a mesh; refuse one that nothing holds or that is inverted."""
+    at = discretize(mesh)
+    free = ~mesh.held.ravel()
+    if free.all() or not mesh.held[:, 1].any():
+        raise SolveError("nothing holds the mesh along its axis; hold u_z somewhere")
+    equations = np.where(free, np.cumsum(free) - 1, -1)
+    numbers = equations[np.stack([2 * mesh.elements, 2 * mesh.elements + 1], axis=1)]
+    return FiniteElementModel(
+        nodes=mesh.nodes,
+        elements=mesh.elements,
+        by_radius=at.by_radius,
+        by_height=at.by_height,
+        over_radius=np.ascontiguousarray(at.over_radius),
+        weights=np.ascontiguousarray(at.weights),
+        equations=equations,
+        size=int(free.sum()),
+        width=_half_bandwidth(numbers.reshape(len(numbers), 16)),
+        pressed=mesh.pressed,
+        top=mesh.top,
+    )
+
+
+class _ModelStructure(CoreStructure):
+    """Mirrors FiniteElementModel of src/core/finite_element_model.hpp."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("elements", "nodes", "size", "half_bandwidth", "pressed", "observed")),
+        *((name, ctypes.c_void_p) for name in (
+            "coordinates", "by_radius", "by_height", "over_radius", "weights", "points_first", "connectivity",
+            "equations", "places", "pressed_nodes", "pressed_places", "observed_nodes",
+        )),
+    )  # fmt: skip
+
+
+class CompiledModel:
+    """Arrays of a model in the order of the core; elements in pairs, an odd last one followed by a copy of no weight.
+
+    elements : number of them, the copy included. structure : for calls of the core.
+    """
+
+    def __init__(self, model: FiniteElementModel) -> None:
+        pad = len(model.elements) % 2
+        self.elements = len(model.elements) + pad
+        by_radius, by_height, over_radius = (
+            self.padded(a) for a in (model.by_radius, model.by_height, model.over_radius)
+        )
+        shapes = np.stack([by_radius, by_height, over_radius])  # (3, elements, points, nodes)
+        paired = shapes.reshape(3, -1, 8, 8).transpose(1, 3, 0, 2)  # (pairs, nodes, 3, points)
+        weights = self.padded(model.weights).copy()
+        weights[len(model.elements) :] = 0.0
+        connectivity = self.padded(model.elements)
+        numbers = model.equations[np.stack([2 * connectivity, 2 * connectivity + 1], axis=1)]
+        sides = model.equations[np.stack([2 * model.pressed, 2 * model.pressed + 1], axis=1)]
+        self._kept = {
+            "coordinates": model.nodes,
+            "by_radius": by_radius,
+            "by_height": by_height,
+            "over_radius": over_radius,
+            "weights": weights,
+            "points_first": paired,
+            "connectivity": connectivity,
+            "equations": model.equations,
+            "places": _places(numbers, model.size, model.width),
+            "pressed_nodes": model.pressed,
+            "pressed_places": _places(sides, model.size, model.width),
+            "observed_nodes": model.top,
+        }
+        self._kept = {name: np.ascontiguousarray(array) for name, array in self._kept.items()}
+        self.structure = _ModelStructure(
+            self.elements, len(model.nodes), model.size, model.width, len(model.pressed), len(model.top),
+            *(address(array) for array in self._kept.values()),
+        )  # fmt: skip
+
+    def padded(self, values: Floats) -> Floats:
+        """Values (elements, ...) of the elements, with those of the copy."""
+        return np.concatenate([values, values[-1:]]) if len(values) < self.elements else values
+
+
+def _half_bandwidth(numbers: Ints) -> int:
+    """Largest distance between two equations of one element; numbers : (elements, unknowns)."""
+    high = numbers.max(axis=1)
+    low = np.where(numbers >= 0, numbers, np.iinfo(np.int64).max).min(axis=1)
+    return int(np.max(np.where(high >= 0, high - low, 0), initial=0))
+
+
+def _places(numbers: Ints, size: int, width: int) -> Ints:
+    """Places of the blocks rr, rz, zz in the lower triangle in tiles (see banded_matrix.hpp of the core).
+
+    numbers : (elements, 2, nodes) of the equations. What belongs to held displacements goes to the place behind the
+    last.
+    """
+    blocks, diagonals = -(-size // TILE), -(-width // TILE) + 1
+    nobody = (blocks + diagonals) * diagonals * TILE**2
+    result = []
+    for i, j in ((0, 0), (0, 1), (1, 1)):
+        one, other = numbers[:, i, :, None], numbers[:, j, None, :]
+        column, row = np.minimum(one, other), np.maximum(one, other)
+        tile = (column // TILE) * diagonals + row // TILE - column // TILE
+        result.append(np.where(column >= 0, tile * TILE**2 + (column % TILE) * TILE + row % TILE, nobody))
+    return np.stack(result, axis=1)

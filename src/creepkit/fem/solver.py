@@ -1,0 +1,224 @@
+"""Calls of the finite element solver in the compiled core: its records, mirrored field by field."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from creepkit.arrays import Floats, Ints
+from creepkit.core import CoreStructure, address, function, lanes
+from creepkit.errors import SolveError
+from creepkit.fem.finite_element_model import FiniteElementModel
+from creepkit.kernels.interface import CompiledLaw
+
+(
+    REACHED_END, DEFLECTION_LIMIT, STRAIN_LIMIT, STATE_LIMIT, LIMIT_LOAD, LOST_CONVERGENCE, TOO_MANY_STEPS, LAW_FAILED,
+    SINGULAR_TANGENT, INTERRUPTED, OUT_OF_MEMORY,
+) = range(11)  # fmt: skip
+"""Codes of an ending; whatever it is, the history so far is kept."""
+
+
+START, END, PRESSURE = range(3)
+"""The first columns of a segment: times s, and the pressure at its start, MPa. Then follow, each at both ends, pressure,
+temperature K, modulus MPa, and motion of held nodes."""
+
+
+CREEP_COMPONENTS, EQUIVALENT_STRAIN, MAX_STATES = 3, 3, 16
+"""Creep components of a point, and the place of its equivalent creep strain; the most states of a law."""
+
+
+class SolverSettings(NamedTuple):
+    """How accurately, and how far, to simulate.
+
+    tolerance : estimated error of a step's displacements over (0.01 mm + the largest of them).
+    newton : last correction of equilibrium over the same.
+    first : s, the first step after a change of load. growth : by which the time since then may grow in a step.
+    deflection_limit : mm, displacement of the observed surface at which the body has burst.
+    strain_limit : creep strain at which a point has burst. max_steps : cap on steps, accepted and rejected.
+    """
+
+    tolerance: float = 1e-2
+    newton: float = 1e-4
+    first: float = 10.0
+    growth: float = 2.0
+    deflection_limit: float = 3.0
+    strain_limit: float = 1.0
+    max_steps: int = 1000
+
+
+class StepRecord(NamedTuple):
+    """Accepted steps of a simulation, from rest at 0 s on.
+
+    times : (steps,) s. segments : (steps,) of each. displacements : (steps, 2 nodes) mm.
+    values : (steps, points, 4 + S) or None. mises : (steps, points) MPa, or None.
+    positions : (steps, 2) where a step began in its segment, and its length, in the transformed time.
+    counts : (4,) accepted and rejected steps; equilibrium passes with and without a new tangent.
+    code, time : how it ended, and when, s.
+    surface : (steps, top, C) derivatives of u_z of the observed nodes, moments : (steps, D) those of the times, s; or
+        None.
+    """
+
+    times: Floats
+    segments: Ints
+    displacements: Floats
+    values: Floats | None
+    mises: Floats | None
+    positions: Floats
+    counts: Ints
+    code: int
+    time: float
+    surface: Floats | None
+    moments: Floats | None
+
+
+@dataclass(frozen=True, eq=False)
+class SensitivityDirections:
+    """What is differentiated to beside the P parameters of the law: C = P + D + G columns.
+
+    segments : (D, segments, 10) change of the load history's segments.
+    gradients, hoops : (G, elements, 4, 2, 2) and (G, elements, 4), see fem.mesh.GeometryDerivative.
+    velocities : (G, 2 nodes) mm.
+    """
+
+    segments: Floats
+    gradients: Floats
+    hoops: Floats
+    velocities: Floats
+
+
+def solve(
+    law: CompiledLaw,
+    theta: Floats,
+    model: FiniteElementModel,
+    program: LoadProgram,
+    settings: SolverSettings,
+    *,
+    keep_points: bool = False,
+    directions: SensitivityDirections | None = None,
+) -> StepRecord:
+    """Simulate a body; theta : (P,) internal parameters. directions : None for no derivatives."""
+    theta = _contiguous(theta)
+    if law.states > MAX_STATES:
+        raise SolveError(f"the law has {law.states} internal variables; finite elements take up to {MAX_STATES}")
+    if theta.shape != (len(law.names),):
+        raise SolveError(f"theta has the shape {theta.shape}; expected ({len(law.names)},)")
+    compiled, segments = model.compiled, _contiguous(program.segments)
+    rows, points = settings.max_steps + len(segments) + 2, 4 * len(model.elements)
+    initial, limits, script = (_contiguous(a) for a in (law.initial, law.limits, program.script))
+    times, positions, counts = np.zeros(rows), np.zeros((rows, 2)), np.zeros(4, np.int64)
+    numbers = np.zeros(rows, np.int64)
+    displacements = np.zeros((rows, model.equations.size))
+    values = np.zeros((rows, points, 4 + law.states)) if keep_points else None
+    mises = np.zeros((rows, points)) if keep_points else None
+    pattern = _contiguous(program.pattern)
+    record = _Record(
+        rows, address(times), address(numbers), address(displacements), _optional(values), _optional(mises),
+        address(positions), address(counts), points,
+    )  # fmt: skip
+    entries = _Law(law.update.address, law.sensitivity.address, address(theta), theta.size, law.states)
+    given = _Input(
+        program.beta, program.poisson, len(segments), address(segments), address(pattern), address(initial),
+        address(limits), len(script), address(script), None,
+    )  # fmt: skip
+    surface = moments = None
+    along, derivatives, kept = None, None, ()
+    if directions is not None:
+        kept = (
+            _contiguous(directions.segments),
+            *(
+                np.ascontiguousarray([compiled.padded(a) for a in values])
+                for values in (directions.gradients, directions.hoops)
+            ),
+            _contiguous(directions.velocities),
+        )
+        columns = theta.size + len(directions.segments) + len(directions.velocities)
+        surface = np.zeros((rows, len(model.top), columns))
+        moments = np.zeros((rows, len(directions.segments)))
+        along = _Directions(len(directions.segments), len(directions.velocities), *map(address, kept))
+        derivatives = _Derivatives(address(surface), address(moments))
+    ended = _Termination()
+    function(f"creepkit_simulate_{lanes()}", None)(
+        *(ctypes.byref(s) for s in (compiled.structure, entries, given, _Settings(*settings), record)),
+        None if along is None else ctypes.byref(along),
+        None if derivatives is None else ctypes.byref(derivatives),
+        ctypes.byref(ended),
+    )
+    if ended.code == OUT_OF_MEMORY:
+        raise MemoryError("no memory for a finite element simulation")
+    n = ended.records
+    return StepRecord(
+        times[:n].copy(), numbers[:n].copy(), displacements[:n].copy(), None if values is None else values[:n].copy(),
+        None if mises is None else mises[:n].copy(), positions[:n].copy(), counts, ended.code, ended.time,
+        None if surface is None else surface[:n], None if moments is None else moments[:n],
+    )  # fmt: skip
+
+
+class LoadProgram(NamedTuple):
+    """The load history as the solver takes it.
+
+    beta : exponent of the time transformation. segments : (segments, 10). pattern : (2 nodes,) displacement of held
+    nodes for a unit of motion, mm. script : (steps, 2) positions of another simulation, to make the very same steps;
+    (0, 2) for steps by error control.
+    """
+
+    beta: float
+    poisson: float
+    segments: Floats
+    pattern: Floats
+    script: Floats
+
+
+def _contiguous(values: Floats) -> Floats:
+    return np.ascontiguousarray(values, dtype=float)
+
+
+def _optional(array: Floats | None) -> ctypes.c_void_p | None:
+    return None if array is None else address(array)
+
+
+_NUMBER, _REAL, _ARRAY = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+
+
+class _Law(CoreStructure):
+    _fields_ = (
+        ("update", _ARRAY), ("sensitivity", _ARRAY), ("theta", _ARRAY), ("parameters", _NUMBER), ("states", _NUMBER),
+    )  # fmt: skip
+
+
+class _Input(CoreStructure):
+    _fields_ = (
+        ("beta", _REAL), ("poisson", _REAL), ("segment_count", _NUMBER), ("segments", _ARRAY), ("pattern", _ARRAY),
+        ("initial", _ARRAY), ("limits", _ARRAY), ("script_steps", _NUMBER), ("script", _ARRAY), ("stop", _ARRAY),
+    )  # fmt: skip
+
+
+class _Settings(CoreStructure):
+    _fields_ = (
+        ("tolerance", _REAL), ("newton", _REAL), ("first", _REAL), ("growth", _REAL), ("deflection_limit", _REAL),
+        ("strain_limit", _REAL), ("max_steps", _NUMBER),
+    )  # fmt: skip
+
+
+class _Record(CoreStructure):
+    _fields_ = (
+        ("rows", _NUMBER), ("times", _ARRAY), ("segments", _ARRAY), ("displacements", _ARRAY), ("values", _ARRAY),
+        ("mises", _ARRAY), ("places", _ARRAY), ("counts", _ARRAY), ("points", _NUMBER),
+    )  # fmt: skip
+
+
+class _Directions(CoreStructure):
+    _fields_ = (
+        ("directions", _NUMBER), ("geometries", _NUMBER), ("segments", _ARRAY), ("gradients", _ARRAY),
+        ("hoops", _ARRAY), ("velocities", _ARRAY),
+    )  # fmt: skip
+
+
+class _Derivatives(CoreStructure):
+    _fields_ = (("surface", _ARRAY), ("times", _ARRAY))
+
+
+class _Termination(CoreStructure):
+    _fields_ = (("records", _NUMBER), ("code", _NUMBER), ("time", _REAL))
