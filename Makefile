@@ -2,19 +2,22 @@
 # make verify-export   exported laws in a CalculiX built from Debian's source, beside our solver: a table
 # make surrogate   remake the surrogate that ships: 8,000 simulations, 300 epochs; some 20 minutes of CPU
 # make docs   build the documentation into build/docs; needs no network once .venv is set up
+# make core   compile the core (src/core) again where its sources changed; 'make test' does it first
+# make sanitize   tests of the core with checks of addresses and of undefined behaviour; needs g++ and its libasan
 # make demo   set up .venv, then identify laws from measured creep curves and a simulated bulge test; plots in demo/
 #
 # The first make demo with an empty cache of compiled code takes 148 s of CPU after the packages are installed: 91 s
 # compilation of the solver at set-up, 30 s compilation of the laws and of creep under constant load, 27 s computation
 # (six identifications, plots, imports). A second one takes the computation alone.
-# Both need make and Python alone; tests that need a compiler are skipped without it. PYTEST_OPTIONS goes to pytest.
+# Both need make and Python alone; tests that need a compiler are skipped without it. The core is compiled by the
+# machine's C++ compiler, else by the one in the package ziglang (400 MB in .venv). PYTEST_OPTIONS goes to pytest.
 # TORCH chooses another build of torch: make test TORCH='torch==2.13.0' on a machine with a GPU.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := test
-.PHONY: test demo docs verify-export surrogate clean
+.PHONY: test core sanitize demo docs verify-export surrogate clean
 
 PYTHONS := python3.11 python3.12 python3.13
 BIN := .venv/bin
@@ -29,7 +32,10 @@ CPU_WHEELS := https://download.pytorch.org/whl/cpu
 # Two threads of torch on one busy core are far slower than one; pytest runs two workers instead.
 export OMP_NUM_THREADS := 1
 
-test: .venv/.ok
+# What 'make sanitize' runs: code that is slow with sanitizers, and compiles its laws anew, so a part of the tests.
+SANITIZED_TESTS := tests/verification/test_fem_homogeneous.py tests/unit/fem tests/unit/core tests/unit/specimens/bulge
+
+test: core
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
@@ -38,18 +44,29 @@ test: .venv/.ok
 	    for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q); done
 	$(BIN)/pytest -q -n 2 $(PYTEST_OPTIONS)
 
-demo: .venv/.ok
+core: .venv/.ok
+	@$(BIN)/python src/core/compile.py >/dev/null
+
+# The libraries of the sanitizer, and the C++ one whose exceptions it watches, come first into the process.
+sanitize: core
+	$(BIN)/python src/core/compile.py --sanitize
+	@export NUMBA_CACHE_DIR=$$($(BIN)/python -c '$(COMPILED)'); \
+	    CREEPKIT_CORE=$(CURDIR)/build/sanitize/libcreepkit_core.so ASAN_OPTIONS=detect_leaks=0 \
+	    LD_PRELOAD="$$($(CXX) -print-file-name=libasan.so) $$($(CXX) -print-file-name=libstdc++.so)" \
+	    $(BIN)/python -m pytest -q $(PYTEST_OPTIONS) $(SANITIZED_TESTS)
+
+demo: core
 	$(BIN)/creepkit demo --to demo
 
-docs: .venv/.ok
+docs: core
 	@export NUMBA_CACHE_DIR=$$($(BIN)/python -c '$(COMPILED)'); \
 	    $(BIN)/sphinx-build --fail-on-warning --keep-going --quiet --jobs 2 docs build/docs
 	@echo "the documentation: build/docs/index.html"
 
-verify-export: .venv/.ok
+verify-export: core
 	$(BIN)/python -u tests/benchmarks/verify_export.py
 
-surrogate: .venv/.ok
+surrogate: core
 	mkdir -p build
 	$(BIN)/creepkit generate rate-family --samples 8000 --seed 1 --to build/rates.h5
 	$(BIN)/creepkit train build/rates.h5 --recipe rate-net --epochs 300 --seed 0 --to build/dimple.safetensors
@@ -69,10 +86,14 @@ else
 	    || $(PIP) '$(TORCH_ANY)'
 endif
 	@echo "set-up 3/5: creepkit and what it needs"
-	@$(PIP) --editable '.[dev]'
+	@tools=$$($(BIN)/python src/core/compile.py --requirements); \
+	    $(PIP) 'hatchling>=1.26' 'editables>=0.5' $$tools || { echo "the core of creepkit cannot be compiled: this" \
+	    "machine lacks" $$tools "and pip cannot get it; install a C++ compiler and CMake, or make PyPI reachable" >&2; \
+	    exit 1; }
+	@$(PIP) --no-build-isolation --editable '.[dev]'
 	@echo "set-up 4/5: plugins"
 	@for plugin in $(PLUGINS); do $(PIP) --no-build-isolation --editable $$plugin; done
-	@echo "set-up 5/5: compile the solver"
+	@echo "set-up 5/5: compile the solver"  # what numba compiles; nearly nothing once all solvers are in the core
 	@$(BIN)/python -c 'from creepkit.cli import set_numba_cache; set_numba_cache(); from creepkit.cli.demo import compile_kernels; compile_kernels()'
 	@touch $@
 

@@ -1,0 +1,151 @@
+"""Compile the core: `python src/core/compile.py`, which needs nothing but Python and what it asks for.
+
+The compiler is CXX, or else the first of c++, g++ and clang++ that the machine has, or else the one in the package
+`ziglang`. CMake and Ninja come from the packages of their names where the machine has none. `--requirements` prints
+those packages that are wanted, and missing from the machine.
+
+`hatch_build.py` calls this file when pip installs creepkit or builds a wheel of it, `make core` when sources changed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import importlib.util
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+SOURCES = Path(__file__).parent
+ROOT = SOURCES.parents[1]
+IN_PLACE = SOURCES.parent / "creepkit" / "core"
+COMPILERS = ("c++", "g++", "clang++")
+LIBRARY_NAMES = {"darwin": "libcreepkit_core.dylib", "win32": "creepkit_core.dll"}
+LIBRARY_NAME = LIBRARY_NAMES.get(sys.platform, "libcreepkit_core.so")
+
+
+class CompilationError(Exception):
+    """The core cannot be compiled; the message is one sentence that says what is missing and what to do."""
+
+
+def requirements() -> list[str]:
+    """The packages to install before the core can be compiled, beside what the machine has."""
+    wanted = []
+    if system_compiler() is None:
+        wanted.append("ziglang>=0.13")
+    if shutil.which("cmake") is None:
+        wanted.append("cmake>=3.20")
+    if shutil.which("make") is None and shutil.which("ninja") is None:
+        wanted.append("ninja>=1.10")
+    return wanted
+
+
+def system_compiler() -> list[str] | None:
+    """Command of the machine's C++ compiler; None where there is none."""
+    if os.environ.get("CXX"):
+        return shlex.split(os.environ["CXX"])
+    paths = filter(None, map(shutil.which, COMPILERS))
+    return next(([path] for path in paths), None)
+
+
+def compile_core(build: Path, output: Path = IN_PLACE, sanitize: bool = False) -> Path:
+    """Compile what changed since the last time and return the library's path.
+
+    build : folder of object files, made if needed. output : folder of the library.
+    sanitize : with checks of addresses and of undefined behaviour.
+    """
+    cmake, compiler = _tool("cmake"), system_compiler()
+    for name in ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"):
+        os.environ.setdefault(name, str(build.resolve() / "zig"))
+    generator = ["Unix Makefiles"]
+    if shutil.which("make") is None or sys.platform == "win32":
+        generator = ["Ninja", f"-DCMAKE_MAKE_PROGRAM={_tool('ninja')}"]
+    options = ["-G", *generator]
+    options += [
+        f"-DCMAKE_CXX_COMPILER={';'.join(compiler or _zig())}",
+        f"-DCREEPKIT_OUTPUT={output.resolve().as_posix()}",
+        f"-DCREEPKIT_SANITIZE={'ON' if sanitize else 'OFF'}",
+        "-DCMAKE_BUILD_TYPE=Release",
+    ]
+    _remove_other_configuration(build, generator[0], (compiler or _zig())[0])
+    _run([cmake, "-S", str(SOURCES), "-B", str(build), *options])
+    _run([cmake, "--build", str(build), "--parallel", str(os.cpu_count() or 1)])
+    return output / LIBRARY_NAME
+
+
+def _remove_other_configuration(build: Path, generator: str, compiler: str) -> None:
+    """Remove a folder that was configured for another generator or compiler: CMake can change neither."""
+    cache = build / "CMakeCache.txt"
+    if cache.is_file():
+        lines = cache.read_text(encoding="utf-8", errors="replace").splitlines()
+        values = dict(line.split("=", 1) for line in lines if "=" in line and not line.startswith(("#", "//")))
+        entries = {name.partition(":")[0]: value for name, value in values.items()}
+        used = shutil.which(entries.get("CMAKE_CXX_COMPILER", ""))
+        if entries.get("CMAKE_GENERATOR") != generator or used is None or not os.path.samefile(used, compiler):
+            shutil.rmtree(build)
+
+
+def _tool(name: str) -> str:
+    """Path of cmake or ninja: the machine's, or the one in the package of that name."""
+    path = shutil.which(name) or shutil.which(name, path=str(Path(sys.executable).parent))
+    if path is None and importlib.util.find_spec(name):
+        package = importlib.import_module(name)
+        folder = package.CMAKE_BIN_DIR if name == "cmake" else package.BIN_DIR
+        path = shutil.which(name, path=folder)
+    if path is None:
+        raise CompilationError(
+            f"the core of creepkit cannot be compiled: {name} is missing; install it, or run 'pip install {name}'"
+        )
+    return path
+
+
+def _zig() -> list[str]:
+    """Command of the compiler in the package `ziglang`: C++ without its standard library, for any such processor."""
+    package = importlib.util.find_spec("ziglang")
+    if package is None or package.origin is None:
+        raise CompilationError(
+            f"the core of creepkit cannot be compiled: no C++ compiler ({', '.join(COMPILERS)}) is installed, nor the "
+            "Python package ziglang, which has one; install a compiler, run 'pip install ziglang', or install "
+            "creepkit from a wheel"
+        )
+    name = "zig.exe" if sys.platform == "win32" else "zig"
+    return [str(Path(package.origin).with_name(name)), "cc", "-mcpu=baseline"]
+
+
+def _run(command: list[str]) -> None:
+    """Run it; what it printed is shown when it fails."""
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
+    if done.returncode:
+        sys.stderr.write(done.stdout)
+        raise CompilationError(
+            f"the core of creepkit cannot be compiled: '{' '.join(command[:3])} ...' failed as printed above; it needs "
+            "a compiler of C++17, GCC or Clang, or none at all and 'pip install ziglang'"
+        )
+    if "warning" in done.stdout:
+        sys.stderr.write(done.stdout)
+
+
+def main() -> int:
+    """Compile, or print what is required."""
+    parser = argparse.ArgumentParser(description="compile the core of creepkit")
+    parser.add_argument("--requirements", action="store_true", help="print the packages that compiling needs")
+    parser.add_argument("--sanitize", action="store_true", help="with checks at run time, into build/sanitize")
+    arguments = parser.parse_args()
+    try:
+        if arguments.requirements:
+            print("\n".join(requirements()))
+        elif arguments.sanitize:
+            print(compile_core(ROOT / "build" / "sanitize", ROOT / "build" / "sanitize", sanitize=True))
+        else:
+            print(compile_core(ROOT / "build" / "core"))
+    except CompilationError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
