@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 
 from creepkit import kernels
-from creepkit.fem.banded_system import finite_element_model
+from creepkit.fem.finite_element_model import finite_element_model
 from creepkit.fem.mesh import Mesh, StripMesh, discretize, strip_mesh
 from creepkit.fem.simulation import LoadHistory, Simulation, simulate
-from creepkit.fem.step_record import SolverSettings
+from creepkit.fem.solver import SolverSettings
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.language import CreepLaw
 from creepkit.laws.norton import NORTON

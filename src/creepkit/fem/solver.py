@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
-from creepkit.core import CoreStructure, address, function, lanes
+from creepkit.core import CoreStructure, address, function
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.kernels.interface import CompiledLaw
@@ -140,7 +140,7 @@ def solve(
         along = _Directions(len(directions.segments), len(directions.velocities), *map(address, kept))
         derivatives = _Derivatives(address(surface), address(moments))
     ended = _Termination()
-    function(f"creepkit_simulate_{lanes()}", None)(
+    function("creepkit_simulate", None)(
         *(ctypes.byref(s) for s in (compiled.structure, entries, given, _Settings(*settings), record)),
         None if along is None else ctypes.byref(along),
         None if derivatives is None else ctypes.byref(derivatives),

@@ -7,7 +7,7 @@ import pytest
 
 import creepkit as ck
 from creepkit import kernels
-from creepkit.fem.banded_system import finite_element_model
+from creepkit.fem.finite_element_model import finite_element_model
 from creepkit.fem.simulation import LoadHistory, simulate
 from creepkit.fem.step_record import TimeInterpolation
 from creepkit.fem.time_integration import SolverSettings

@@ -13,7 +13,7 @@ from creepkit.fem.assembly import (
     side_stiffness,
     virgin_points,
 )
-from creepkit.fem.banded_system import FiniteElementModel, finite_element_model
+from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.material_point import StageConditions
 from creepkit.laws.norton import NORTON
 from creepkit.specimens.bulge.geometry import DimpleGeometry

@@ -16,10 +16,16 @@ import numpy as np
 from creepkit import kernels
 from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
-from creepkit.fem.banded_system import FiniteElementModel, finite_element_model
+from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import GeometryDerivative, geometry_derivative
-from creepkit.fem.simulation import LoadHistory, Simulation, SurfaceSensitivities, sensitivities, simulate
-from creepkit.fem.step_record import SolverSettings
+from creepkit.fem.simulation import (
+    LoadHistory,
+    Simulation,
+    SurfaceSensitivities,
+    sensitivity_directions,
+    simulate,
+)
+from creepkit.fem.solver import SensitivityDirections, SolverSettings
 from creepkit.records import (
     PROGRAM_NUISANCES,
     History,
@@ -148,38 +154,52 @@ class BulgeSensitivities:
     nuisances: Mapping[str, Floats]
 
 
+def sensitivity_directions_of(
+    setup: BulgeSetup, history: History, names: Sequence[str], programs: Mapping[str, Floats] | None = None
+) -> SensitivityDirections:
+    """What a test is differentiated to beside the law's parameters.
+
+    names : "modulus" (relative), "temperature" (K), "thickness" (mm) and any length of the dimple, "window" (mm), and
+        the numbers of the loading, such as P1, P2 and Tj. programs : {name: (segments, 10)} derivatives of the
+        segments of the load history, of further names.
+    """
+    loads, lengths = _loads_and_lengths(names)
+    known = programs or {}
+    segments = np.array([known[n] if n in known else _direction(setup, history, n) for n in loads]).reshape(
+        -1, *setup.load_history.segments.shape
+    )
+    velocities = [_velocity(setup.geometry, _dimension_name(name), setup) for name in lengths]
+    return sensitivity_directions(setup.model, setup.load_history, segments, velocities)
+
+
+def _loads_and_lengths(names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Names of what changes the load history, and of what moves the nodes."""
+    loads = [n for n in names if n != "window" and not _is_dimension(n)]
+    return loads, [n for n in names if _is_dimension(n)]
+
+
 def output_sensitivities(
     setup: BulgeSetup,
-    kernel: CompiledLaw,
     theta: Floats,
     history: History,
     simulation: Simulation,
     profiles: Floats,
     names: Sequence[str],
-    programs: Mapping[str, Floats] | None = None,
+    directions: SensitivityDirections,
 ) -> tuple[Floats, BulgeSensitivities]:
-    """Outputs (times, 3) and their derivatives.
+    """Outputs (times, 3) and their derivatives, from a simulation that was differentiated to `directions`.
 
-    theta : (parameters,) internal values. profiles : (times, nodes) mm, displacements of the top.
-    names : "modulus" (relative), "temperature" (K), "thickness" (mm) and any length of the dimple, "window" (mm), and
-        the numbers of the loading, such as P1, P2 and Tj. programs : {name: (segments, 10)} derivatives of the
-        segments of the load history, of further names.
+    theta : (parameters,) internal values. profiles : (times, nodes) mm, displacements of the top. names : those that
+        the directions were made of.
     """
-    loads = [n for n in names if n != "window" and not _is_dimension(n)]
-    lengths = [n for n in names if _is_dimension(n)]
-    known = programs or {}
-    directions = np.array([known[n] if n in known else _direction(setup, history, n) for n in loads]).reshape(
-        -1, *setup.load_history.segments.shape
-    )
-    velocities = [_velocity(setup.geometry, _dimension_name(name), setup) for name in lengths]
-    change = sensitivities(
-        kernel, theta, setup.model, setup.load_history, simulation, directions=directions, velocities=velocities
-    )
+    change = simulation.sensitivities
+    assert change is not None
+    loads, lengths = _loads_and_lengths(names)
     outputs, output_derivatives = setup.observation.observe_with_derivatives(setup.radii, profiles)
     output_columns = output_derivatives @ change.surface
     output_columns[0, 1:] = output_columns[1, 1:] if len(output_columns) > 1 else 0.0
-    for k, (_, velocity) in enumerate(velocities):
-        radial_velocity = velocity[setup.model.top, 0]
+    velocities = directions.velocities.reshape(len(lengths), -1, 2)
+    for k, radial_velocity in enumerate(velocities[:, setup.model.top, 0]):
         output_columns[:, :, theta.size + len(loads) + k] += setup.observation.node_derivatives(
             setup.radii, profiles, radial_velocity
         )
@@ -187,7 +207,7 @@ def output_sensitivities(
     nuisances = {}
     for k, name in enumerate(loads):
         nuisances[name] = along[..., theta.size + k] + _step_time_derivative(
-            simulation, change, directions, k, outputs, history.times
+            simulation, change, directions.segments, k, outputs, history.times
         )
     for k, name in enumerate(lengths):
         nuisances[name] = along[..., theta.size + len(loads) + k]
@@ -355,15 +375,18 @@ def simulate_and_observe(
     """Simulate one test and observe it at the times of its history; theta : (parameters,) internal values."""
     test_setup = set_up_test(specimen, history, nuisances)
     settings = solver_settings(specimen, exact=jacobian)
+    names, directions = tuple(nuisances), None
+    if jacobian:
+        programs = program_directions(specimen, history, nuisances)
+        directions = sensitivity_directions_of(test_setup, history, names, programs)
     simulation = simulate(
-        kernel, theta, test_setup.model, test_setup.load_history, settings=settings, keep_stages=jacobian
+        kernel, theta, test_setup.model, test_setup.load_history, settings=settings, directions=directions
     )
     profiles = simulation.displacements[:, test_setup.model.top, 1]
     sensitivities = None
-    if jacobian:
-        programs = program_directions(specimen, history, nuisances)
+    if directions is not None:
         outputs, sensitivities = output_sensitivities(
-            test_setup, kernel, theta, history, simulation, profiles, tuple(nuisances), programs
+            test_setup, theta, history, simulation, profiles, names, directions
         )
     else:
         outputs = simulation.at(test_setup.observation.observe(test_setup.radii, profiles), history.times)

@@ -12,9 +12,9 @@ import numpy as np
 from creepkit import kernels
 from creepkit.arrays import ArrayLike, Floats
 from creepkit.errors import SolveError, nearest
-from creepkit.fem.material_point import EQUIVALENT_STRAIN
 from creepkit.fem.mesh import GAUSS_POINTS, shape_functions, surface_interpolation
 from creepkit.fem.simulation import Simulation, simulate
+from creepkit.fem.solver import EQUIVALENT_STRAIN
 from creepkit.kernels.interface import (
     MEAN_STRESS,
     POINT_SIZE,

@@ -15,7 +15,7 @@ from sympy import exp
 
 from creepkit import kernels
 from creepkit.arrays import Floats
-from creepkit.fem.banded_system import finite_element_model
+from creepkit.fem.finite_element_model import finite_element_model
 from creepkit.fem.mesh import geometry_derivative
 from creepkit.fem.simulation import Simulation, sensitivities, simulate
 from creepkit.kernels.interface import CompiledLaw

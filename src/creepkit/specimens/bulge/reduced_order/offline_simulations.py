@@ -10,9 +10,9 @@ import numpy as np
 
 from creepkit import kernels
 from creepkit.arrays import Floats
-from creepkit.fem.banded_system import FiniteElementModel, finite_element_model
+from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.simulation import LoadHistory, simulate
-from creepkit.fem.step_record import SolverSettings
+from creepkit.fem.solver import SolverSettings
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.records import Program
 from creepkit.specimens.bulge.geometry import DimpleGeometry
