@@ -45,6 +45,10 @@ class FiniteElementModel:
         """The model as the core reads it; made once."""
         return CompiledModel(self)
 
+    def __getstate__(self) -> dict[str, object]:
+        """All but the addresses for the core, which another process makes for itself."""
+        return {name: value for name, value in self.__dict__.items() if name != "compiled"}
+
 
 def finite_element_model(mesh: Mesh) -> FiniteElementModel:
     """Prepare a mesh; refuse one that nothing holds or that is inverted."""

@@ -53,7 +53,7 @@ class StepRecord(NamedTuple):
     """Accepted steps of a simulation, from rest at 0 s on.
 
     times : (steps,) s. segments : (steps,) of each. displacements : (steps, 2 nodes) mm.
-    values : (steps, points, 4 + S) or None. mises : (steps, points) MPa, or None.
+    values : (steps, points, 4 + S) or None. mises : (steps, points) MPa.
     positions : (steps, 2) where a step began in its segment, and its length, in the transformed time.
     counts : (4,) accepted and rejected steps; equilibrium passes with and without a new tangent.
     code, time : how it ended, and when, s.
@@ -65,7 +65,7 @@ class StepRecord(NamedTuple):
     segments: Ints
     displacements: Floats
     values: Floats | None
-    mises: Floats | None
+    mises: Floats
     positions: Floats
     counts: Ints
     code: int
@@ -112,10 +112,10 @@ def solve(
     numbers = np.zeros(rows, np.int64)
     displacements = np.zeros((rows, model.equations.size))
     values = np.zeros((rows, points, 4 + law.states)) if keep_points else None
-    mises = np.zeros((rows, points)) if keep_points else None
+    mises = np.zeros((rows, points))
     pattern = _contiguous(program.pattern)
     record = _Record(
-        rows, address(times), address(numbers), address(displacements), _optional(values), _optional(mises),
+        rows, address(times), address(numbers), address(displacements), _optional(values), address(mises),
         address(positions), address(counts), points,
     )  # fmt: skip
     entries = _Law(law.update.address, law.sensitivity.address, address(theta), theta.size, law.states)
@@ -151,9 +151,47 @@ def solve(
     n = ended.records
     return StepRecord(
         times[:n].copy(), numbers[:n].copy(), displacements[:n].copy(), None if values is None else values[:n].copy(),
-        None if mises is None else mises[:n].copy(), positions[:n].copy(), counts, ended.code, ended.time,
+        mises[:n].copy(), positions[:n].copy(), counts, ended.code, ended.time,
         None if surface is None else surface[:n], None if moments is None else moments[:n],
     )  # fmt: skip
+
+
+def assemble(
+    law: CompiledLaw, theta: Floats, model: FiniteElementModel, stage: StageConditions, displacement: Floats
+) -> tuple[Floats, Floats]:
+    """Out-of-balance forces (size,), N/rad, and tangent (size, size), N/(rad mm), of a virgin body.
+
+    theta : (P,) internal parameters. displacement : (2 nodes,) mm. The tangent is made symmetric, as Newton's method
+    takes it. SolveError where a point has no stress.
+    """
+    theta, displacement = _contiguous(theta), _contiguous(displacement)
+    history = np.zeros((4 * model.compiled.elements, 4 + law.states))
+    history[:, 4:] = law.initial
+    residual, tangent = np.zeros(model.size), np.zeros((model.size, model.size))
+    entries = _Law(law.update.address, law.sensitivity.address, address(theta), theta.size, law.states)
+    flag = function("creepkit_assemble")(
+        ctypes.byref(model.compiled.structure), ctypes.byref(entries), ctypes.byref(_Stage(*stage)),
+        *map(address, (history, displacement, residual, tangent)),
+    )  # fmt: skip
+    if flag != 0:
+        raise SolveError("a point of the body has no stress at these displacements")
+    return residual, tangent
+
+
+class StageConditions(NamedTuple):
+    """What all points of a stage share.
+
+    weight : s, of the creep rate; 0 for a purely elastic change. log_weight : its logarithm. time : s. temperature : K.
+    bulk, shear : K and G, MPa. pressure : MPa.
+    """
+
+    weight: float
+    log_weight: float
+    time: float
+    temperature: float
+    bulk: float
+    shear: float
+    pressure: float
 
 
 class LoadProgram(NamedTuple):
@@ -186,6 +224,10 @@ class _Law(CoreStructure):
     _fields_ = (
         ("update", _ARRAY), ("sensitivity", _ARRAY), ("theta", _ARRAY), ("parameters", _NUMBER), ("states", _NUMBER),
     )  # fmt: skip
+
+
+class _Stage(CoreStructure):
+    _fields_ = tuple((name, _REAL) for name in StageConditions._fields)
 
 
 class _Input(CoreStructure):
