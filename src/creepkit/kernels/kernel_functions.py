@@ -2,7 +2,7 @@
 
 A class states its partial derivatives, one for each argument, and `plain`, the same function in ordinary sympy. Printed
 names (exp, log_floor, larger, choose ...) are defined once a target in numpy_functions, torch_functions and
-numba_functions.
+llvm_functions, and for exported Python code in scalar_functions.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from sympy.printing.pycode import PythonCodePrinter
 from creepkit.errors import LawError
 
 if TYPE_CHECKING:
+    from creepkit.kernels.symbolic_kernel import KernelFunction
     from creepkit.language.law import CreepLaw
 
 
@@ -252,6 +253,14 @@ def expression_source(expression: sympy.Basic) -> str:
 def assignment_lines(steps: Iterable[tuple[sympy.Symbol, sympy.Expr]], indent: str) -> list[str]:
     """Steps as lines of text."""
     return [f"{indent}{symbol} = {expression_source(expression)}" for symbol, expression in steps]
+
+
+def array_function_source(entry: KernelFunction) -> str:
+    """An entry as a function that returns a tuple."""
+    arguments = ", ".join(s.name for s in entry.inputs)
+    lines = [f"def {entry.name}({arguments}):", *assignment_lines((*entry.constants, *entry.steps), "    ")]
+    outputs = "".join(f"        {expression_source(output)},\n" for output in entry.outputs)
+    return "\n".join(lines) + f"\n    return (\n{outputs}    )\n"
 
 
 def law_comments(law: CreepLaw) -> list[str]:

@@ -24,8 +24,6 @@ _RESERVED_NAMES = (
     *keyword.kwlist,
     *TARGET_FUNCTIONS,
     *("rate", "log_rate", "update", "sensitivity", "log_sensitivity", "exponents"),
-    *("COEFFICIENTS", "SIGNATURE", "cfunc", "isfinite", "range"),
-    *("rows", "row", "x", "theta", "out", "flags"),
 )
 
 
