@@ -25,7 +25,7 @@ import numpy as np
 
 from creepkit.arrays import Floats, frozen
 from creepkit.kernels.interface import CompiledLaw, Entry
-from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, array_function_source, expression_source, law_comments
+from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, expression_source, law_comments
 from creepkit.kernels.llvm_code import Module, add_entry
 from creepkit.kernels.log_form import leading_exponents
 from creepkit.kernels.machine_code import LoadedCode, object_code, processor
@@ -162,7 +162,7 @@ ENTRIES = ("rate", "update", "sensitivity")
 
 def module_source(lowered: SymbolicKernel) -> str:
     """The generated module of a law: its entries as functions of a point's variables and theta."""
-    functions = "\n\n".join(array_function_source(getattr(lowered, entry)) for entry in ENTRIES)
+    functions = "\n\n".join(getattr(lowered, entry).source for entry in ENTRIES)
     parameters = len(lowered.names.theta)
     header = _MODULE_HEADER.format(
         terms="\n".join(law_comments(lowered.law)),

@@ -26,6 +26,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numba.experimental.function_type  # noqa: F401 - numba knows the type of an Entry only with it
 import numpy as np
 from numba import types
 from numba.extending import intrinsic

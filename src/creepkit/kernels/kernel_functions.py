@@ -18,7 +18,6 @@ from sympy.printing.pycode import PythonCodePrinter
 from creepkit.errors import LawError
 
 if TYPE_CHECKING:
-    from creepkit.kernels.symbolic_kernel import KernelFunction
     from creepkit.language.law import CreepLaw
 
 
@@ -253,14 +252,6 @@ def expression_source(expression: sympy.Basic) -> str:
 def assignment_lines(steps: Iterable[tuple[sympy.Symbol, sympy.Expr]], indent: str) -> list[str]:
     """Steps as lines of text."""
     return [f"{indent}{symbol} = {expression_source(expression)}" for symbol, expression in steps]
-
-
-def array_function_source(entry: KernelFunction) -> str:
-    """An entry as a function that returns a tuple."""
-    arguments = ", ".join(s.name for s in entry.inputs)
-    lines = [f"def {entry.name}({arguments}):", *assignment_lines((*entry.constants, *entry.steps), "    ")]
-    outputs = "".join(f"        {expression_source(output)},\n" for output in entry.outputs)
-    return "\n".join(lines) + f"\n    return (\n{outputs}    )\n"
 
 
 def law_comments(law: CreepLaw) -> list[str]:

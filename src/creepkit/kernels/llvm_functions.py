@@ -295,7 +295,7 @@ _ARTANH_SERIES = [2.0 / (2 * k + 3) for k in range(10)]
 """2 artanh(s) = 2 s + s^3 (2/3 + 2/5 s^2 + ...)."""
 
 
-def _log_of_normal(x: Value, lowered: Any = 0.0, correction: Any = None) -> Value:
+def _log_of_normal(x: Value, lowered: Any = 0.0, correction: Any = None) -> Any:
     """ln x for a normal x > 0, less `lowered` times ln 2, plus a correction that is small against x, relative to x."""
     position = operation("sub", bits(x), _SQRT_HALF_BITS, INTEGER)
     e = operation("ashr", position, 52, INTEGER)

@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from creepkit.errors import LawError, nearest
-from creepkit.kernels.kernel_functions import array_function_source, law_comments
+from creepkit.kernels.kernel_functions import law_comments
 from creepkit.kernels.symbolic_kernel import SymbolicKernel, symbolic_kernel
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES
@@ -76,7 +76,7 @@ class ArrayKernel:
         law = lowered.law
         printed = (lowered.rate, lowered.log_rate, lowered.sensitivity, lowered.log_sensitivity)
         self.law = law
-        self.source = "\n".join([*law_comments(law), "\n", *map(array_function_source, printed)])
+        self.source = "\n".join([*law_comments(law), "\n", *(entry.source for entry in printed)])
         self._target = target
         self._entries = target.broadcast_functions(self._execute_source(), len(lowered.names.inputs) - len(law.params))
         self._states = [s.name for s in law.states]

@@ -1,5 +1,8 @@
 """The compiled interface: layout, rows, flags, and what is off."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from numba import float64, int64, njit
@@ -129,6 +132,14 @@ def test_update_is_the_logarithm_of_the_rate(law_: CreepLaw) -> None:
             assert np.exp(update[0]) == pytest.approx(sensitivity[0], rel=1e-12)
             slopes = sensitivity[inner : inner + x.size] / sensitivity[0]
             np.testing.assert_allclose(update[inner : inner + x.size], slopes, rtol=1e-10)
+
+
+def test_numba_knows_the_type_of_an_entry() -> None:
+    """In an interpreter that has done nothing else."""
+    program = "import creepkit, numba; print(numba.typeof(creepkit.lower(creepkit.law('norton'), 'numba').update))"
+    found = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+
+    assert found.stdout.strip() == str(ENTRY_TYPE)
 
 
 def test_code_compiled_once_takes_any_law() -> None:
