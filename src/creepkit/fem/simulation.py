@@ -25,11 +25,11 @@ from creepkit.fem.step_record import (
     TOO_MANY_STEPS,
     SolverSettings,
     StepRecord,
-    TimeInterpolation,
     solver_workspace,
 )
 from creepkit.fem.time_integration import DONE, integrate_program
 from creepkit.fem.time_integration import differentiate_program as replay
+from creepkit.fem.time_interpolation import TimeInterpolation
 from creepkit.integration.time_discretisation import SDIRK2, merge_programs
 from creepkit.kernels.interface import CompiledLaw
 from creepkit.records import Program, Status

@@ -366,7 +366,9 @@ def simulate_and_observe(
             test_setup, kernel, theta, history, simulation, profiles, tuple(nuisances), programs
         )
     else:
-        outputs = simulation.at(test_setup.observation.observe(test_setup.radii, profiles), history.times)
+        outputs = test_setup.observation.observe_at_times(
+            test_setup.radii, profiles, simulation.timeline, history.times
+        )
     return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
 
 
