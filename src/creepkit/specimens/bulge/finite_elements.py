@@ -389,7 +389,9 @@ def simulate_and_observe(
             test_setup, theta, history, simulation, profiles, names, directions
         )
     else:
-        outputs = simulation.at(test_setup.observation.observe(test_setup.radii, profiles), history.times)
+        outputs = test_setup.observation.observe_at_times(
+            test_setup.radii, profiles, simulation.timeline, history.times
+        )
     return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
 
 
