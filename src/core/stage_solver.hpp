@@ -1,0 +1,180 @@
+// Newton's method for the implicit stage of one material point, without and with internal variables.
+//
+// The problem and its unknown x are those of stage_problem.hpp. A law is called with one row at a time:
+// theta : (P,); states : (S,) z0, S at most MAX_STATES;
+// row   : (6 + S,) in: time and temperature of the stage, and a guess of the states; out: the solution;
+// out   : ((1 + S)(7 + S),) room for the law's output;
+// guess : of the increment, any positive number will do;
+// tolerance : on the last Newton correction of ln D (and of the states, relative); the error left is its square.
+#pragma once
+
+#include <math.h>
+#include <stdint.h>
+
+#include "law.hpp"
+#include "stage_problem.hpp"
+
+namespace creepkit {
+
+// The increment D of creep strain, and a StageFlag; D is 0 unless solved.
+struct StageSolution {
+    double increment;
+    int64_t flag;
+};
+
+// Newton's method in x, bracketed: it cannot fail where the rate falls with strain and rises with stress.
+inline StageSolution solve_scalar_stage(LawEntry update, const double* theta, const Axes& axes,
+                                        const StageProblem& problem, double* row, double* out, double guess,
+                                        double tolerance) {
+    constexpr int ITERATIONS = 80;
+    double x = unknown_of_increment(problem, guess), low = -INFINITY, high = INFINITY, before = INFINITY;
+    const double log_weight = log(problem.weight);
+    for (int iteration = 0; iteration < ITERATIONS; ++iteration) {
+        StageIterate now = increment_and_stress(problem, x);
+        write_point(row, axes, now.stress, problem.strain + now.increment);
+        update(1, row, theta, out);
+        const bool nothing = out[0] < NO_RATE;
+        if (nothing && now.stress > 0.99 * problem.trial) {
+            write_point(row, axes, problem.trial, problem.strain);
+            return {0.0, SOLVED};
+        }
+        const double residual = nothing ? INFINITY : now.log_increment - log_weight - out[0];
+        if (!isfinite(residual) && !nothing) return {0.0, NOT_FINITE};
+        // d(ln D - ln w - ln f)/dx: between 1 and the stress exponent for a hardening law under prescribed strain
+        const double slope = nothing ? 1.0
+                                     : now.increment_slope - now.increment * now.increment_slope * out[1 + STRAIN] -
+                                           now.stress * now.stress_slope * stress_derivative(out, 1, axes);
+        (residual > 0.0 ? high : low) = x;
+        const bool closed = isfinite(low) && isfinite(high);
+        if (!(slope > 0.0) && !closed) return {0.0, NO_SOLUTION};
+        double step = slope > 0.0 ? -residual / slope : INFINITY;
+        if (fabs(step) <= tolerance) {
+            now = increment_and_stress(problem, x + step);
+            write_point(row, axes, now.stress, problem.strain + now.increment);
+            return {now.increment, SOLVED};
+        }
+        if (!(low < x + step && x + step < high) || fabs(step) > 0.5 * before) {
+            // Bisect a closed bracket; in an open one Newton's step is kept, but not beyond 60 in ln D.
+            step = closed ? 0.5 * (low + high) - x : (step < -60.0 ? -60.0 : step > 60.0 ? 60.0 : step);
+        }
+        before = fabs(step);
+        x += step;
+    }
+    return {0.0, TOO_MANY};
+}
+
+// As `solve_stage`, for a law without states under k > 0, from a good guess: no bracket and half of the logarithms.
+//
+// TOO_MANY when the guess was not good enough. A finite element asks for little else, nearly always from next to the
+// answer.
+inline StageSolution solve_stage_near_guess(LawEntry update, const double* theta, const Axes& axes,
+                                            const StageProblem& problem, double* row, double* out, double guess,
+                                            double tolerance) {
+    constexpr int ITERATIONS = 4;
+    double increment = guess, share = problem.stiffness * increment / problem.trial;
+    const double log_weight = log(problem.weight);
+    for (int iteration = 0; iteration < ITERATIONS; ++iteration) {
+        if (!(1e-280 < share && share < 0.9999)) break;
+        const double elastic = 1.0 - share, stress = problem.trial * elastic;
+        write_point(row, axes, stress, problem.strain + increment);
+        update(1, row, theta, out);
+        if (out[0] < NO_RATE) break;
+        const double residual = log(increment) - log_weight - out[0];
+        const double slope =
+            elastic * (1.0 - increment * out[1 + STRAIN]) + share * stress * stress_derivative(out, 1, axes);
+        const double step = -residual / slope;
+        if (!(slope > 0.0 && fabs(step) < 1.0)) break;
+        const double ratio = share / elastic * exp(step);
+        share = ratio / (1.0 + ratio);
+        increment = problem.trial / problem.stiffness * share;
+        if (fabs(step) <= tolerance) {
+            write_point(row, axes, problem.trial * (1.0 - share), problem.strain + increment);
+            return {increment, SOLVED};
+        }
+    }
+    return {0.0, TOO_MANY};
+}
+
+// Jacobian and minus the residual of [ln D - ln w - ln f, z - z0 - w g] in (x, z), at a law's `row` and `out`.
+//
+// matrix : (1 + S, 1 + S); right : (1 + S,). creeps : whether there is an increment to solve for.
+inline void stage_newton_system(const Axes& axes, const StageProblem& problem, const double* states,
+                                int64_t state_count, const double* row, const double* out, const StageIterate& now,
+                                bool creeps, double* matrix, double* right) {
+    const int64_t size = 1 + state_count, width = POINT_SIZE + state_count;
+    for (int64_t i = 0; i < size; ++i) {
+        const int64_t start = size + i * width;
+        const double factor = i > 0 ? problem.weight : creeps ? 1.0 : 0.0;
+        const double by_strain = now.increment * now.increment_slope * out[start + STRAIN];
+        const double by_stress = now.stress * now.stress_slope * stress_derivative(out, start, axes);
+        matrix[i * size] = creeps ? -factor * (by_strain + by_stress) : 0.0;
+        for (int64_t j = 1; j < size; ++j) {
+            matrix[i * size + j] = factor > 0.0 ? -factor * out[start + POINT_SIZE + j - 1] : 0.0;
+        }
+        matrix[i * size + i] += i > 0 || !creeps ? 1.0 : now.increment_slope;
+        if (i > 0) right[i] = states[i - 1] + problem.weight * out[i] - row[POINT_SIZE + i - 1];
+    }
+    right[0] = creeps ? log(problem.weight) + out[0] - now.log_increment : 0.0;
+}
+
+// Damped Newton's method in (x, z) for laws with internal variables.
+inline StageSolution solve_stage_with_states(LawEntry update, const double* theta, const Axes& axes,
+                                             const StageProblem& problem, const double* states, int64_t state_count,
+                                             double* row, double* out, double guess, double tolerance) {
+    constexpr int ITERATIONS = 80, MOST_HALVINGS = 12;
+    constexpr double LONGEST_CORRECTION = 5.0;
+    if (!(problem.trial >= 0.0) || state_count > MAX_STATES) return {0.0, NO_SOLUTION};
+    const int64_t size = 1 + state_count;
+    double matrix[(1 + MAX_STATES) * (1 + MAX_STATES)], step[1 + MAX_STATES], last[1 + MAX_STATES] = {};
+    bool creeps = problem.trial > 0.0;
+    double x = creeps ? unknown_of_increment(problem, guess) : 0.0;
+    int halvings = 0;
+    for (int iteration = 0; iteration < ITERATIONS; ++iteration) {
+        StageIterate now = creeps ? increment_and_stress(problem, x) : StageIterate{};
+        write_point(row, axes, now.stress, problem.strain + now.increment);
+        update(1, row, theta, out);
+        creeps = creeps && !(out[0] < NO_RATE);
+        double sum = 0.0;  // finite if all that Newton's method needs of the law is
+        for (int64_t i = creeps ? 0 : 1; i < size; ++i) sum += out[i];
+        if (!isfinite(sum)) {
+            if (++halvings > MOST_HALVINGS) return {0.0, NOT_FINITE};
+            for (int64_t i = 1; i < size; ++i) row[POINT_SIZE + i - 1] -= 0.5 * last[i];
+            x -= 0.5 * last[0];
+            for (int64_t i = 0; i < size; ++i) last[i] *= 0.5;
+            continue;
+        }
+        stage_newton_system(axes, problem, states, state_count, row, out, now, creeps, matrix, step);
+        if (!solve_dense(matrix, step, size, 1)) return {0.0, NO_SOLUTION};
+        const double damping = fmin(1.0, LONGEST_CORRECTION / fmax(fabs(step[0]), 1e-300));
+        for (int64_t i = 0; i < size; ++i) last[i] = damping * step[i];
+        for (int64_t i = 1; i < size; ++i) row[POINT_SIZE + i - 1] += last[i];
+        x += last[0];
+        halvings = 0;
+        bool small = !(fabs(last[0]) > tolerance);
+        for (int64_t i = 1; i < size && small; ++i) {
+            small = !(fabs(last[i]) > tolerance * fmax(fabs(row[POINT_SIZE + i - 1]), 1e-12));
+        }
+        if (small) {
+            if (creeps) now = increment_and_stress(problem, x);
+            write_point(row, axes, now.stress, problem.strain + now.increment);
+            return {now.increment, SOLVED};
+        }
+    }
+    return {0.0, TOO_MANY};
+}
+
+// Solve a stage.
+inline StageSolution solve_stage(LawEntry update, const double* theta, const Axes& axes, const StageProblem& problem,
+                                 const double* states, int64_t state_count, double* row, double* out, double guess,
+                                 double tolerance) {
+    if (state_count > 0) {
+        return solve_stage_with_states(update, theta, axes, problem, states, state_count, row, out, guess, tolerance);
+    }
+    if (!(problem.trial > 0.0)) {
+        write_point(row, axes, 0.0, problem.strain);
+        return {0.0, problem.trial == 0.0 ? SOLVED : NO_SOLUTION};
+    }
+    return solve_scalar_stage(update, theta, axes, problem, row, out, guess, tolerance);
+}
+
+}  // namespace creepkit
