@@ -1,0 +1,61 @@
+// Singly diagonally implicit Runge-Kutta methods whose last stage is the end of the step.
+//
+// The numbers come from the caller (creepkit.integration.time_discretisation names their sources).
+#pragma once
+
+#include <stdint.h>
+
+namespace creepkit {
+
+constexpr int64_t MAX_STAGES = 8, MAX_DEGREE = 8;
+
+// a     : (stages, stages) lower triangular, constant diagonal; its last row holds the weights
+// c     : (stages,) places of the stages in the step
+// error : (stages,) weights less the embedded weights: error = h sum error_i k_i
+// dense : (stages, degree) b_i(x) = sum_q dense_iq x^(q+1), the weights up to the share x of the step
+// error_order : of the embedded solution
+struct Tableau {
+    int64_t stages, degree, error_order;
+    const double *a, *c, *error, *dense;
+
+    bool valid() const { return stages >= 1 && stages <= MAX_STAGES && degree >= 1 && degree <= MAX_DEGREE; }
+    double diagonal(int64_t i) const { return a[i * stages + i]; }
+};
+
+// The dense output of one unknown over one step: value + h sum_q coefficients_q x^(q+1) at the share x of the step.
+struct DenseOutput {
+    double value, h, coefficients[MAX_DEGREE];
+    int64_t degree;
+
+    // value : at the start of the step; slopes : k_i of the unknown at every stage, `stride` apart.
+    DenseOutput(const Tableau& tableau, double start, double step, const double* slopes, int64_t stride)
+        : value(start), h(step), degree(tableau.degree) {
+        for (int64_t q = 0; q < degree; ++q) {
+            double total = 0.0;
+            for (int64_t i = 0; i < tableau.stages; ++i) total += tableau.dense[i * degree + q] * slopes[i * stride];
+            coefficients[q] = total;
+        }
+    }
+
+    double at(double x) const {
+        double total = 0.0;
+        for (int64_t q = degree - 1; q >= 0; --q) total = (total + coefficients[q]) * x;
+        return value + h * total;
+    }
+
+    // Derivative to the position, d/ds = 1/h d/dx.
+    double slope(double x) const {
+        double total = 0.0;
+        for (int64_t q = degree - 1; q >= 0; --q) total = total * x + double(q + 1) * coefficients[q];
+        return total;
+    }
+};
+
+// Weight of stage i up to the share x of the step.
+inline double dense_weight(const Tableau& tableau, int64_t i, double x) {
+    double total = 0.0;
+    for (int64_t q = tableau.degree - 1; q >= 0; --q) total = (total + tableau.dense[i * tableau.degree + q]) * x;
+    return total;
+}
+
+}  // namespace creepkit
