@@ -93,6 +93,8 @@ private:
         double s = 0.0, h = smaller(settings.first, first);
         double slope = beginning.rate > 0.0 ? beginning.rate * clock.at(1e-12).pace : NAN, steep = slope;
         bool growing = true;
+        const bool from_virgin = clock.transformation.tau == 0.0;
+        FirstStepControl first_step;
         AcceptedStep before = {0.0, 1.0};
         int64_t near = -1;  // the unknown that is about to pass its limit
         const auto end = [&](Ending code, double place) {
@@ -107,9 +109,9 @@ private:
                 if (code != STEP_TOO_SMALL && record.jacobian) steep_end(clock, s, near > 0 ? near : 0, steep);
                 return end(code, s);
             }
-            const double error = attempt(segment, clock, s, h, slope, first);
+            const double error = attempt(segment, clock, s, h, slope, first, before);
             if (!(error <= 1.0)) {
-                h *= step_factor(tableau, error, false);
+                h *= s == 0.0 && from_virgin ? first_step.factor(h, error) : step_factor(tableau, error, false);
                 growing = false;
                 ++progress.rejected;
                 continue;
@@ -151,10 +153,11 @@ private:
 
     // Try a step; return its error over what is allowed, infinite when a stage has no solution.
     double attempt(const Segment& segment, const SegmentClock& clock, double s, double h, double slope,
-                   double first) const {
-        const double guess = slope > 0.0 ? slope : 1e-6;
-        if (advance(candidate.law, test.drive, segment, clock, tableau, work, s, h, guess,
-                    newton_tolerance(settings)) != SOLVED) {
+                   double first, const AcceptedStep& before) const {
+        const double negligible = test.drive.stiffness > 0.0 ? 0.0 : 1e-3 * settings.rtol * (work.value[0] + settings.smallest);
+        const SlopePredictor predictor(tableau, slope, work.past_slopes, before.length / h, 1);
+        if (advance(candidate.law, test.drive, segment, clock, tableau, predictor, work, s, h,
+                    newton_tolerance(settings), negligible) != SOLVED) {
             return INFINITY;
         }
         const double ahead = larger(1.0, first / (s + h));
@@ -172,6 +175,7 @@ private:
     // Make the end of the step the start of the next.
     void accept() const {
         for (int64_t v = 0; v < work.unknowns(); ++v) work.value[v] = work.new_value[v];
+        for (int64_t i = 0; i < work.stages; ++i) work.past_slopes[i] = work.slopes[i * work.unknowns()];
         if (!record.jacobian) return;
         for (int64_t k = 0; k < work.unknowns() * work.parameters; ++k) work.change[k] = work.new_change[k];
     }

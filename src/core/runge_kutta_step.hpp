@@ -51,6 +51,7 @@ struct LawCall {
 // slopes, slope_changes : (stages, V), (stages, V, P) d/ds at the stages
 // base, base_change     : (stages, V), (V, P) history of the stages, and of the stage at hand
 // problems, times       : (stages,) what each stage was solved for, and when, s
+// past_slopes           : (stages,) of strain in the step before
 // row, out, full        : input and outputs of the law
 // gradient, matrix, response : for differentiate_stage
 // clock_change          : (2, P) of beta and tau
@@ -58,7 +59,7 @@ struct LawCall {
 struct StepWorkspace {
     int64_t states, parameters, stages;
     double *value, *change, *new_value, *new_change, *slopes, *slope_changes, *base, *base_change;
-    double *times, *row, *out, *full, *gradient, *matrix, *response, *clock_change, *nudged, *nudged_value;
+    double *times, *past_slopes, *row, *out, *full, *gradient, *matrix, *response, *clock_change, *nudged, *nudged_value;
     StageProblem* problems;
 
     StepWorkspace(Workspace& memory, int64_t states, int64_t parameters, int64_t stages)
@@ -73,6 +74,7 @@ struct StepWorkspace {
         base = memory.doubles(stages * size);
         base_change = memory.doubles(size * parameters);
         times = memory.doubles(stages);
+        past_slopes = memory.doubles(stages);
         row = memory.doubles(width);
         out = memory.doubles(size * (1 + width));
         full = memory.doubles(size * (1 + width + parameters));
@@ -113,10 +115,13 @@ inline StageProblem set_stage(const StressControl& drive, const Segment& segment
     return work.problems[i] = {trial, drive.stiffness, drive.load, tableau.diagonal(i) * h * now.pace, strain};
 }
 
-// Solve all stages from position s to s + h; `slope` is a guess of dp/ds. Returns the flag of a stage.
+// Solve all stages from position s to s + h. Returns the flag of a stage.
+//
+// predictor : with what is known before the step; tolerance, negligible : of the stage's solution.
 inline int64_t advance(const LawCall& law, const StressControl& drive, const Segment& segment,
-                       const SegmentClock& clock, const Tableau& tableau, StepWorkspace& work, double s, double h,
-                       double slope, double tolerance) {
+                       const SegmentClock& clock, const Tableau& tableau, SlopePredictor predictor,
+                       StepWorkspace& work, double s, double h, double tolerance, double negligible) {
+    constexpr double FIRST_SLOPE = 1e-6;
     const int64_t size = work.unknowns();
     for (int64_t i = 0; i < tableau.stages; ++i) {
         const StageProblem problem = set_stage(drive, segment, clock, tableau, work, s, h, i);
@@ -124,11 +129,14 @@ inline int64_t advance(const LawCall& law, const StressControl& drive, const Seg
         const double *base = work.base + i * size, *before = i > 0 ? work.slopes + (i - 1) * size : nullptr;
         double* slopes = work.slopes + i * size;
         for (int64_t v = 1; v < size; ++v) work.row[POINT_SIZE + v - 1] = base[v] + (before ? share * before[v] : 0.0);
+        double guess = predictor.slope(i);
+        if (!(guess > 0.0)) guess = before ? before[0] : FIRST_SLOPE;
         const StageSolution answer =
             solve_stage(law.update, law.theta, drive.axes, problem, base + 1, work.states, work.row, work.out,
-                        share * (before ? before[0] : slope), tolerance);
+                        share * guess, tolerance, negligible);
         if (answer.flag != SOLVED) return answer.flag;
         slopes[0] = answer.increment / share;
+        predictor.add_stage(i, slopes[0]);
         work.new_value[0] = base[0] + answer.increment;
         for (int64_t v = 1; v < size; ++v) {
             work.new_value[v] = work.row[POINT_SIZE + v - 1];

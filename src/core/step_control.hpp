@@ -94,6 +94,27 @@ inline double step_factor(const Tableau& tableau, double error, bool growing) {
     return factor < LEAST_STEP_FACTOR ? LEAST_STEP_FACTOR : factor > most ? most : factor;
 }
 
+// The first step from a virgin state: on a sum of broken powers of s the error falls about as the step itself.
+//
+// Each rejection tells with the one before what power of the step the error follows.
+class FirstStepControl {
+public:
+    // Factor on the first step after an error.
+    double factor(double h, double error) {
+        if (!isfinite(error)) return LEAST_STEP_FACTOR;
+        double order = 1.0;
+        if (length_ > 0.0) order = log(error_ / error) / log(length_ / h);
+        order = order > LEAST_ORDER ? smaller(MOST_ORDER, order) : LEAST_ORDER;
+        length_ = h;
+        error_ = error;
+        return larger(LEAST_FACTOR, STEP_SAFETY * pow(error, -1.0 / order));
+    }
+
+private:
+    static constexpr double LEAST_ORDER = 0.25, MOST_ORDER = 4.0, LEAST_FACTOR = 1e-4;
+    double length_ = 0.0, error_ = 0.0;
+};
+
 // The last accepted step: its length (0: none yet), and its error over what was allowed.
 struct AcceptedStep {
     double length, error;

@@ -3,6 +3,7 @@
 // The numbers come from the caller (creepkit.integration.time_discretisation names their sources).
 #pragma once
 
+#include <math.h>
 #include <stdint.h>
 
 namespace creepkit {
@@ -20,6 +21,63 @@ struct Tableau {
 
     bool valid() const { return stages >= 1 && stages <= MAX_STAGES && degree >= 1 && degree <= MAX_DEGREE; }
     double diagonal(int64_t i) const { return a[i * stages + i]; }
+};
+
+// Guesses of the slope at a stage from those known before it: at the stages of the step before, at the start of the
+// step, and at the stages before. A polynomial goes through the slopes at the POINTS places nearest to the stage.
+class SlopePredictor {
+public:
+    // start : slope where the step begins, NaN when there is none.
+    // before : slopes of the step before, `stride` apart, whose length was `length` times that of this one, or 0.
+    SlopePredictor(const Tableau& tableau, double start, const double* before, double length, int64_t stride)
+        : tableau_(tableau) {
+        if (!isnan(start)) add(0.0, start);
+        for (int64_t i = 0; length > 0.0 && i < tableau.stages - 1; ++i) {
+            add((tableau.c[i] - 1.0) * length, before[i * stride]);
+        }
+    }
+
+    // The slope that stage i has turned out to have.
+    void add_stage(int64_t i, double slope) { add(tableau_.c[i], slope); }
+
+    // The guess at stage i, NaN when nothing is known.
+    double slope(int64_t i) const {
+        const double at = tableau_.c[i];
+        int64_t chosen[POINTS];
+        int64_t count = 0;
+        for (; count < POINTS && count < known_; ++count) {
+            double least = INFINITY;
+            for (int64_t j = 0; j < known_; ++j) {
+                bool taken = false;
+                for (int64_t k = 0; k < count; ++k) taken = taken || chosen[k] == j;
+                const double distance = fabs(places_[j] - at);
+                if (!taken && distance < least) {
+                    least = distance;
+                    chosen[count] = j;
+                }
+            }
+        }
+        double total = count > 0 ? 0.0 : NAN;
+        for (int64_t k = 0; k < count; ++k) {
+            double weight = 1.0;
+            for (int64_t j = 0; j < count; ++j) {
+                if (j != k) weight *= (at - places_[chosen[j]]) / (places_[chosen[k]] - places_[chosen[j]]);
+            }
+            total += weight * slopes_[chosen[k]];
+        }
+        return total;
+    }
+
+private:
+    static constexpr int64_t POINTS = 3;
+    const Tableau& tableau_;
+    int64_t known_ = 0;
+    double places_[2 * MAX_STAGES + 1], slopes_[2 * MAX_STAGES + 1];
+
+    void add(double place, double slope) {
+        places_[known_] = place;
+        slopes_[known_++] = slope;
+    }
 };
 
 // The dense output of one unknown over one step: value + h sum_q coefficients_q x^(q+1) at the share x of the step.
