@@ -55,6 +55,7 @@ CREEPKIT_API int64_t creepkit_integrate_batch(const BatchIntegration* batch) {
     if (!memory.allocate()) return BATCH_OUT_OF_MEMORY;
     StepWorkspace work(memory, batch->states, P, batch->tableau.stages);
     const int64_t F = batch->time_offsets[K], L = batch->level_offsets[K];
+    const SlopePredictor predictor(batch->tableau);
     const bool exact = batch->with_sensitivities != 0;
     for (int64_t c = 0; c < batch->candidates; ++c) {
         const Candidate candidate = {{batch->update, batch->sensitivity, batch->theta + c * P},
@@ -74,7 +75,8 @@ CREEPKIT_API int64_t creepkit_integrate_batch(const BatchIntegration* batch) {
                                          batch->arrivals + c * L + level, batch->arrival_slopes + c * L + level,
                                          exact ? batch->arrival_jacobian + (c * L + level) * P : nullptr,
                                          exact ? batch->end_jacobian + (c * K + k) * P : nullptr}};
-            const PointIntegration integration = {candidate, test, record, batch->settings, batch->tableau, work};
+            const PointIntegration integration = {candidate, test, record, batch->settings, batch->tableau,
+                                                  predictor, work};
             const IntegrationProgress progress = integration.run();
             batch->endings[c * K + k] = progress.code;
             batch->end_times[c * K + k] = progress.time;

@@ -14,6 +14,10 @@ constexpr double SMALLEST_STEP = 1e-13;        // of the position
 constexpr double SMALLEST_FIRST_STEP = 1e-60;
 constexpr double NEGLIGIBLE = 0.01;            // share of the tolerance within which a time need not be known better
 
+// Share of a step's tolerance that the increment of a stage may err by. The weights of the methods add up the errors of
+// the stages some thirty times at most.
+constexpr double NEGLIGIBLE_STAGE_ERROR = 1e-3;
+
 // One candidate's numbers: the law with its parameters; beta, the leading exponent of time; its limits.
 struct Candidate {
     LawCall law;
@@ -51,6 +55,7 @@ struct PointIntegration {
     const PointRecord& record;
     const IntegrationSettings& settings;
     const Tableau& tableau;
+    const SlopePredictor& predictor;
     StepWorkspace& work;
 
     // Integrate from time zero, up to the end reached.
@@ -154,10 +159,11 @@ private:
     // Try a step; return its error over what is allowed, infinite when a stage has no solution.
     double attempt(const Segment& segment, const SegmentClock& clock, double s, double h, double slope,
                    double first, const AcceptedStep& before) const {
-        const double negligible = test.drive.stiffness > 0.0 ? 0.0 : 1e-3 * settings.rtol * (work.value[0] + settings.smallest);
-        const SlopePredictor predictor(tableau, slope, work.past_slopes, before.length / h, 1);
-        if (advance(candidate.law, test.drive, segment, clock, tableau, predictor, work, s, h,
-                    newton_tolerance(settings), negligible) != SOLVED) {
+        // Under prescribed strain the stress counts as well: there Newton's tolerance alone decides.
+        const double negligible = test.drive.stiffness > 0.0 ? 0.0 : work.value[0] + settings.smallest;
+        const StepStart start = {slope, before.length, newton_tolerance(settings),
+                                 NEGLIGIBLE_STAGE_ERROR * settings.rtol * negligible};
+        if (advance(candidate.law, test.drive, segment, clock, tableau, predictor, work, s, h, start) != SOLVED) {
             return INFINITY;
         }
         const double ahead = larger(1.0, first / (s + h));

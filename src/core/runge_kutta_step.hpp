@@ -115,12 +115,19 @@ inline StageProblem set_stage(const StressControl& drive, const Segment& segment
     return work.problems[i] = {trial, drive.stiffness, drive.load, tableau.diagonal(i) * h * now.pace, strain};
 }
 
-// Solve all stages from position s to s + h. Returns the flag of a stage.
+// What the stages of a step are guessed from, and how well they are to be solved.
 //
-// predictor : with what is known before the step; tolerance, negligible : of the stage's solution.
+// slope  : dp/ds where the step begins, NaN where it is not known
+// length : of the step before, 0 if there is none
+// tolerance, negligible : see stage_solver.hpp
+struct StepStart {
+    double slope, length, tolerance, negligible;
+};
+
+// Solve all stages from position s to s + h. Returns the flag of a stage.
 inline int64_t advance(const LawCall& law, const StressControl& drive, const Segment& segment,
-                       const SegmentClock& clock, const Tableau& tableau, SlopePredictor predictor,
-                       StepWorkspace& work, double s, double h, double tolerance, double negligible) {
+                       const SegmentClock& clock, const Tableau& tableau, const SlopePredictor& predictor,
+                       StepWorkspace& work, double s, double h, const StepStart& start) {
     constexpr double FIRST_SLOPE = 1e-6;
     const int64_t size = work.unknowns();
     for (int64_t i = 0; i < tableau.stages; ++i) {
@@ -129,14 +136,19 @@ inline int64_t advance(const LawCall& law, const StressControl& drive, const Seg
         const double *base = work.base + i * size, *before = i > 0 ? work.slopes + (i - 1) * size : nullptr;
         double* slopes = work.slopes + i * size;
         for (int64_t v = 1; v < size; ++v) work.row[POINT_SIZE + v - 1] = base[v] + (before ? share * before[v] : 0.0);
-        double guess = predictor.slope(i);
+        double guess = predictor.slope(i, start.slope, work.slopes, size, work.past_slopes, start.length / h);
         if (!(guess > 0.0)) guess = before ? before[0] : FIRST_SLOPE;
-        const StageSolution answer =
-            solve_stage(law.update, law.theta, drive.axes, problem, base + 1, work.states, work.row, work.out,
-                        share * guess, tolerance, negligible);
+        StageSolution answer = {0.0, TOO_MANY};
+        if (size == 1 && problem.trial > 0.0) {
+            answer = solve_stage_near_guess(law.update, law.theta, drive.axes, problem, work.row, work.out,
+                                            share * guess, start.tolerance, start.negligible);
+        }
+        if (answer.flag != SOLVED) {
+            answer = solve_stage(law.update, law.theta, drive.axes, problem, base + 1, work.states, work.row, work.out,
+                                 share * guess, start.tolerance, start.negligible);
+        }
         if (answer.flag != SOLVED) return answer.flag;
         slopes[0] = answer.increment / share;
-        predictor.add_stage(i, slopes[0]);
         work.new_value[0] = base[0] + answer.increment;
         for (int64_t v = 1; v < size; ++v) {
             work.new_value[v] = work.row[POINT_SIZE + v - 1];

@@ -80,32 +80,47 @@ inline StageSolution solve_scalar_stage(LawEntry update, const double* theta, co
     return {0.0, TOO_MANY};
 }
 
-// As `solve_stage`, for a law without states under k > 0, from a good guess: no bracket and half of the logarithms.
+// As `solve_stage`, for a law without states and a trial stress above zero, from a good guess: no bracket and half of
+// the logarithms.
 //
-// TOO_MANY when the guess was not good enough. A finite element asks for little else, nearly always from next to the
-// answer.
+// TOO_MANY when the guess was not good enough. Finite elements and integrators ask for little else, nearly always from
+// next to the answer. negligible : error of D that need not be removed, beside the tolerance.
 inline StageSolution solve_stage_near_guess(LawEntry update, const double* theta, const Axes& axes,
                                             const StageProblem& problem, double* row, double* out, double guess,
-                                            double tolerance) {
+                                            double tolerance, double negligible = 0.0) {
     constexpr int ITERATIONS = 4;
-    double increment = guess, share = problem.stiffness * increment / problem.trial;
-    const double log_weight = log(problem.weight);
+    constexpr double SMALL = 0.3;  // corrections so small let `error_left` be trusted
+    const bool relaxes = problem.stiffness > 0.0;
+    double increment = guess, share = relaxes ? problem.stiffness * increment / problem.trial : 0.0;
     for (int iteration = 0; iteration < ITERATIONS; ++iteration) {
-        if (!(1e-280 < share && share < 0.9999)) break;
-        const double elastic = 1.0 - share, stress = problem.trial * elastic;
+        if (!(relaxes ? 1e-280 < share && share < 0.9999 : 1e-280 < increment && increment < 1e3)) break;
+        const double elastic = 1.0 - share;
+        double stress = problem.trial * elastic;
+        if (problem.load > 0.0) stress *= exp(problem.load * increment);
         write_point(row, axes, stress, problem.strain + increment);
         update(1, row, theta, out);
-        if (out[0] < NO_RATE) break;
-        const double residual = log(increment) - log_weight - out[0];
-        const double slope =
-            elastic * (1.0 - increment * out[1 + STRAIN]) + share * stress * stress_derivative(out, 1, axes);
-        const double step = -residual / slope;
+        if (!(out[0] >= NO_RATE)) break;
+        const double residual = log(increment / problem.weight) - out[0];
+        const double stress_slope = problem.load > 0.0 ? problem.load * increment : -share;
+        const double by_strain = increment * elastic * out[1 + STRAIN];
+        const double by_stress = stress * stress_slope * stress_derivative(out, 1, axes);
+        const double slope = elastic - by_strain - by_stress, step = -residual / slope;
         if (!(slope > 0.0 && fabs(step) < 1.0)) break;
-        const double ratio = share / elastic * exp(step);
-        share = ratio / (1.0 + ratio);
-        increment = problem.trial / problem.stiffness * share;
-        if (fabs(step) <= tolerance) {
-            write_point(row, axes, problem.trial * (1.0 - share), problem.strain + increment);
+        const StageIterate now = {increment, 0.0, stress, elastic, stress_slope};
+        const bool enough =
+            fabs(step) <= tolerance ||
+            (fabs(step) < SMALL && increment * error_left(now, problem, by_strain, by_stress, slope, step) < negligible);
+        if (relaxes) {
+            const double ratio = share / elastic * exp(step);
+            share = ratio / (1.0 + ratio);
+            increment = problem.trial / problem.stiffness * share;
+        } else {
+            increment *= exp(step);
+        }
+        if (enough) {
+            stress = problem.trial * (1.0 - share);
+            if (problem.load > 0.0) stress *= exp(problem.load * increment);
+            write_point(row, axes, stress, problem.strain + increment);
             return {increment, SOLVED};
         }
     }

@@ -23,61 +23,76 @@ struct Tableau {
     double diagonal(int64_t i) const { return a[i * stages + i]; }
 };
 
-// Guesses of the slope at a stage from those known before it: at the stages of the step before, at the start of the
-// step, and at the stages before. A polynomial goes through the slopes at the POINTS places nearest to the stage.
+// The value at `place` of the parabola through three points.
+inline double parabola(const double* places, const double* values, double place) {
+    const double a = place - places[0], b = place - places[1], c = place - places[2];
+    const double ab = places[0] - places[1], bc = places[1] - places[2], ca = places[2] - places[0];
+    return -(values[0] * b * c * bc + values[1] * c * a * ca + values[2] * a * b * ab) / (ab * bc * ca);
+}
+
+// Guesses of the slope at a stage from those known before it.
+//
+// The first stage, and the second, follow the parabola through the start of the step and what is nearest to it before
+// and after; from the third on the weights of the earlier stages and of the start are fixed.
 class SlopePredictor {
 public:
-    // start : slope where the step begins, NaN when there is none.
-    // before : slopes of the step before, `stride` apart, whose length was `length` times that of this one, or 0.
-    SlopePredictor(const Tableau& tableau, double start, const double* before, double length, int64_t stride)
-        : tableau_(tableau) {
-        if (!isnan(start)) add(0.0, start);
-        for (int64_t i = 0; length > 0.0 && i < tableau.stages - 1; ++i) {
-            add((tableau.c[i] - 1.0) * length, before[i * stride]);
+    explicit SlopePredictor(const Tableau& tableau) : tableau_(tableau) {
+        const auto place = [&](int64_t j) { return j > 0 ? tableau.c[j - 1] : 0.0; };
+        for (int64_t i = 2; i < tableau.stages; ++i) {
+            int64_t chosen[3];
+            for (int64_t n = 0; n < 3; ++n) {
+                double least = INFINITY;
+                for (int64_t j = 0; j <= i; ++j) {
+                    const bool taken = (n > 0 && chosen[0] == j) || (n > 1 && chosen[1] == j);
+                    const double distance = fabs(place(j) - tableau.c[i]);
+                    if (taken || !(distance < least)) continue;
+                    least = distance;
+                    chosen[n] = j;
+                }
+            }
+            const double places[3] = {place(chosen[0]), place(chosen[1]), place(chosen[2])};
+            for (int64_t j = 0; j <= i; ++j) {
+                const double unit[3] = {chosen[0] == j ? 1.0 : 0.0, chosen[1] == j ? 1.0 : 0.0,
+                                        chosen[2] == j ? 1.0 : 0.0};
+                weights_[i][j] = parabola(places, unit, tableau.c[i]);
+            }
+        }
+        for (int64_t i = 0; i + 1 < tableau.stages; ++i) {
+            if (last_ < 0 || tableau.c[i] > tableau.c[last_]) last_ = i;
+        }
+        for (int64_t i = 0; i + 1 < tableau.stages; ++i) {
+            if (i != last_ && (next_ < 0 || tableau.c[i] > tableau.c[next_])) next_ = i;
         }
     }
 
-    // The slope that stage i has turned out to have.
-    void add_stage(int64_t i, double slope) { add(tableau_.c[i], slope); }
-
     // The guess at stage i, NaN when nothing is known.
-    double slope(int64_t i) const {
-        const double at = tableau_.c[i];
-        int64_t chosen[POINTS];
-        int64_t count = 0;
-        for (; count < POINTS && count < known_; ++count) {
-            double least = INFINITY;
-            for (int64_t j = 0; j < known_; ++j) {
-                bool taken = false;
-                for (int64_t k = 0; k < count; ++k) taken = taken || chosen[k] == j;
-                const double distance = fabs(places_[j] - at);
-                if (!taken && distance < least) {
-                    least = distance;
-                    chosen[count] = j;
-                }
-            }
+    //
+    // start : slope where the step begins, NaN when there is none; slopes : of the stages, `stride` apart.
+    // before : (stages,) slopes of the step before, whose length was `length` times that of this one, or 0.
+    double slope(int64_t i, double start, const double* slopes, int64_t stride, const double* before,
+                 double length) const {
+        const double last = i > 0 ? slopes[(i - 1) * stride] : start;
+        if (isnan(start)) return last;
+        if (i >= 2) {
+            double total = weights_[i][0] * start;
+            for (int64_t j = 0; j < i; ++j) total += weights_[i][1 + j] * slopes[j * stride];
+            return total;
         }
-        double total = count > 0 ? 0.0 : NAN;
-        for (int64_t k = 0; k < count; ++k) {
-            double weight = 1.0;
-            for (int64_t j = 0; j < count; ++j) {
-                if (j != k) weight *= (at - places_[chosen[j]]) / (places_[chosen[k]] - places_[chosen[j]]);
-            }
-            total += weight * slopes_[chosen[k]];
+        if (!(length > 0.0) || last_ < 0 || (i == 0 && next_ < 0)) return last;
+        const double past = (tableau_.c[last_] - 1.0) * length;
+        if (i == 1) {
+            const double places[3] = {tableau_.c[0], 0.0, past}, values[3] = {slopes[0], start, before[last_]};
+            return parabola(places, values, tableau_.c[1]);
         }
-        return total;
+        const double places[3] = {0.0, past, (tableau_.c[next_] - 1.0) * length};
+        const double values[3] = {start, before[last_], before[next_]};
+        return parabola(places, values, tableau_.c[0]);
     }
 
 private:
-    static constexpr int64_t POINTS = 3;
     const Tableau& tableau_;
-    int64_t known_ = 0;
-    double places_[2 * MAX_STAGES + 1], slopes_[2 * MAX_STAGES + 1];
-
-    void add(double place, double slope) {
-        places_[known_] = place;
-        slopes_[known_++] = slope;
-    }
+    double weights_[MAX_STAGES][1 + MAX_STAGES] = {};
+    int64_t last_ = -1, next_ = -1;  // the two stages nearest to the end of a step, beside its last
 };
 
 // The dense output of one unknown over one step: value + h sum_q coefficients_q x^(q+1) at the share x of the step.
