@@ -1,0 +1,64 @@
+// Single stages for Python: tests, and whoever wants to look at one.
+#include <stdint.h>
+
+#include "export.hpp"
+#include "stage_problem.hpp"
+#include "stage_solver.hpp"
+#include "workspace.hpp"
+
+namespace creepkit {
+
+// A stage and the axes of its stress, as Python hands them over.
+struct StageOfPython {
+    StageProblem problem;
+    Axes axes;
+};
+
+}  // namespace creepkit
+
+using namespace creepkit;
+
+// Flag of the stage; row (6 + S,) goes in and out, increment comes out. -1 when memory runs out.
+CREEPKIT_API int64_t creepkit_solve_stage(LawEntry update, const double* theta, const StageOfPython* stage,
+                                          const double* states, int64_t state_count, double* row, double guess,
+                                          double tolerance, double* increment) {
+    Workspace memory;
+    memory.doubles((1 + state_count) * (7 + state_count));
+    if (!memory.allocate()) return -1;
+    double* out = memory.doubles((1 + state_count) * (7 + state_count));
+    const StageSolution solution = solve_stage(update, theta, stage->axes, stage->problem, states, state_count, row,
+                                               out, guess, tolerance);
+    *increment = solution.increment;
+    return solution.flag;
+}
+
+// Derivatives at a solution `row`, (6 + S,); entry is the law's sensitivity, or its update with no parameters.
+//
+// response : (1 + S, 7 + S + parameters). 1; 0 when the stage is singular, -1 when memory runs out.
+CREEPKIT_API int64_t creepkit_differentiate_stage(LawEntry entry, const double* theta, const StageOfPython* stage,
+                                                  const double* row, int64_t states, int64_t parameters,
+                                                  double increment, double* response) {
+    const int64_t size = 1 + states, width = POINT_SIZE + states, columns = INPUTS + states + parameters;
+    Workspace memory;
+    memory.doubles(size * (1 + width + parameters));
+    memory.doubles(size * width);
+    memory.doubles(size * size);
+    if (!memory.allocate()) return -1;
+    double* full = memory.doubles(size * (1 + width + parameters));
+    double* gradient = memory.doubles(size * width);
+    double* matrix = memory.doubles(size * size);
+    entry(1, row, theta, full);
+    if (parameters == 0) {
+        gradient_of_update(full, stage->problem, increment, gradient, states);
+    } else {
+        gradient_of_sensitivity(full, stage->problem, increment, gradient, states);
+    }
+    const double* by_parameter = full + size + size * width;
+    for (int64_t v = 0; v < size; ++v) {
+        for (int64_t p = 0; p < parameters; ++p) {
+            response[v * columns + INPUTS + states + p] = stage->problem.weight * by_parameter[v * parameters + p];
+        }
+    }
+    return differentiate_stage(stage->axes, stage->problem, increment, row[STRESS], full + 1, gradient, matrix, response,
+                               states, parameters);
+}
