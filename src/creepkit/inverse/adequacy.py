@@ -188,15 +188,16 @@ def adequacy_of(
     noise_model: NoiseModel,
     predictor_errors: Mapping[str, float],
     histories: Sequence[History],
+    known: KnownNoise | None = None,
 ) -> Adequacy:
     """The adequacy of a law at the optimum of a problem.
 
     linear : the problem made linear there. noise_model : of its estimate, for offsets and scatter between tests.
     predictor_errors : {output: standard deviation} of what the predictor is wrong by, in the output's unit.
-    histories : with all frames.
+    histories : with all frames. known : the noise that these show, where it was found before.
     """
     observations = problem.observations
-    known = KnownNoise.of_histories(observations, histories)
+    known = known or KnownNoise.of_histories(observations, histories)
     if not known.judged.any():
         nan = float("nan")
         return Adequacy("cannot be judged", (), nan, 0.0, nan, nan, None)
@@ -247,14 +248,15 @@ def adequacy_with_remedies(
     effects: Sequence[UnmodelledEffect],
 ) -> Adequacy:
     """The same, with those of the unmodelled effects named with which the law would explain the tests."""
-    adequacy = adequacy_of(problem, linear, noise_model, predictor_errors, histories)
+    known = KnownNoise.of_histories(problem.observations, histories)
+    adequacy = adequacy_of(problem, linear, noise_model, predictor_errors, histories, known)
     if adequacy.verdict != "leaves a discrepancy":
         return adequacy
     remedies = [
         effect.description
         for effect in effects
         if adequacy_of(
-            problem, with_random_effects(linear, [effect]), noise_model, predictor_errors, histories
+            problem, with_random_effects(linear, [effect]), noise_model, predictor_errors, histories, known
         ).explains
     ]
     return replace(adequacy, remedies=tuple(remedies))

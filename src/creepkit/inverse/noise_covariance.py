@@ -109,29 +109,38 @@ class CovarianceFactor:
 class NoiseLikelihood:
     """-ln L, but for a constant, of residuals that are linear in unknowns, as a function of the noise's components.
 
-    With unknowns it is the restricted likelihood, in which they are integrated out.
+    With unknowns it is the restricted likelihood, in which they are integrated out. One thread at a time may call it.
     """
 
-    def __init__(self, series: ObservationSeries, values: Floats, precision: Floats, prior_residual: Floats) -> None:
+    def __init__(
+        self,
+        series: ObservationSeries,
+        values: Floats,
+        precision: Floats,
+        prior_residual: Floats,
+        components: Floats,
+    ) -> None:
         """values : (tests, observations, 1 + unknowns) residuals and their derivatives to the unknowns.
 
-        precision, prior_residual : (unknowns,) of their priors, and the distance from their means.
+        precision, prior_residual : (unknowns,) of their priors, and the distance from their means. components : those
+        of a noise model, as NoiseModel.components has them.
         """
-        priors = (np.ascontiguousarray(prior, float) for prior in (precision, prior_residual))
-        self._series, self._arrays = series, (series.rows(values), *priors)
+        rows, unknowns = series.rows(values), values.shape[-1] - 1
+        self._components, self._value, self._gradient = components.copy(), np.zeros(1), np.zeros(components.size)
+        priors = [np.ascontiguousarray(prior, float) for prior in (precision, prior_residual)]
+        arrays = [rows, *priors, self._value, self._gradient]
+        self._kept_alive = series, arrays
+        self._arguments = (
+            *series.arguments(self._components),
+            ctypes.c_int64(unknowns),
+            *(address(array) for array in arrays),
+        )
 
     def __call__(self, components: Floats) -> tuple[float, Floats]:
-        """Value, and gradient to the logarithms of the components; both (components,) as NoiseModel.components."""
-        value, gradient = np.zeros(1), np.zeros(components.size)
-        values, precision, prior_residual = self._arrays
-        _check(
-            function("creepkit_restricted_likelihood")(
-                *self._series.arguments(components),
-                ctypes.c_int64(values.shape[1] - 1),
-                *(address(array) for array in (values, precision, prior_residual, value, gradient)),
-            )
-        )
-        return float(value[0]), gradient
+        """Value, and gradient to the logarithms of the components; both (components,)."""
+        self._components[:] = components
+        _check(function("creepkit_restricted_likelihood")(*self._arguments))
+        return float(self._value[0]), self._gradient.copy()
 
 
 def log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:

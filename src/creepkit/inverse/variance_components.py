@@ -207,7 +207,7 @@ class _Likelihood:
             self.fixed_cost = 0.5 * float((priors[0] * priors[1] ** 2)[~linear.free].sum())
             priors = priors[:, linear.free]
         self.restricted = linear is not None
-        self.likelihood = NoiseLikelihood(residuals.series, values, *priors)
+        self.likelihood = NoiseLikelihood(residuals.series, values, *priors, self.components)
 
     def components_at(self, x: Floats) -> Floats:
         """Those of a noise model with these logarithms of the free components, (components,)."""
