@@ -113,12 +113,7 @@ class NoiseLikelihood:
     """
 
     def __init__(
-        self,
-        series: ObservationSeries,
-        values: Floats,
-        precision: Floats,
-        prior_residual: Floats,
-        components: Floats,
+        self, series: ObservationSeries, values: Floats, precision: Floats, prior_residual: Floats, components: Floats
     ) -> None:
         """values : (tests, observations, 1 + unknowns) residuals and their derivatives to the unknowns.
 

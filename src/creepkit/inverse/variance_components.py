@@ -198,16 +198,13 @@ class _Likelihood:
         stated = [start[output].stated if name == "noise" else 0.0 for output, name in free]
         self.has_prior = np.array(stated) > 0
         self.log_stated = np.log(np.where(self.has_prior, stated, 1.0))
-        if linear is None:
-            values, priors = residuals.values[..., None], np.zeros((2, 0))
-            self.fixed_cost = 0.0
-        else:
+        self.restricted, self.fixed_cost = linear is not None, 0.0
+        values, precision, prior_residual = residuals.values[..., None], np.zeros(0), np.zeros(0)
+        if linear is not None:
             values = np.concatenate([linear.residuals.values[..., None], linear.jacobian], axis=-1)
-            priors = np.stack([linear.precision, linear.prior_residual])
-            self.fixed_cost = 0.5 * float((priors[0] * priors[1] ** 2)[~linear.free].sum())
-            priors = priors[:, linear.free]
-        self.restricted = linear is not None
-        self.likelihood = NoiseLikelihood(residuals.series, values, *priors, self.components)
+            precision, prior_residual = linear.precision[linear.free], linear.prior_residual[linear.free]
+            self.fixed_cost = 0.5 * float((linear.precision * linear.prior_residual**2)[~linear.free].sum())
+        self.likelihood = NoiseLikelihood(residuals.series, values, precision, prior_residual, self.components)
 
     def components_at(self, x: Floats) -> Floats:
         """Those of a noise model with these logarithms of the free components, (components,)."""

@@ -74,9 +74,16 @@ def likelihood_of(residuals, noise, precision=(0.1, 0.0, 2.0), prior_residual=(0
 def exact_covariance(residuals, sizes, test):
     """The covariance of the data of one test, entry by entry; sizes : {(output, component): number}."""
     r, index = residuals, np.flatnonzero(residuals.present[test])
-    number = {name: [mpmath.mpf(float(v)) for v in getattr(r, name)[test]] for name in (
-        "offset_sensitivity", "log_rate_sensitivity", "correlation_coordinate", "relative_noise", "discrepancy_unit")}  # fmt: skip
-    s, d, t, w, u = number.values()
+    s, d, t, w, u = (
+        [mpmath.mpf(float(v)) for v in array[test]]
+        for array in (
+            r.offset_sensitivity,
+            r.log_rate_sensitivity,
+            r.correlation_coordinate,
+            r.relative_noise,
+            r.discrepancy_unit,
+        )
+    )
     effects = mpmath.matrix(r.random_effect_sensitivities[test].tolist())
     c = mpmath.zeros(index.size)
     for a, i in enumerate(index):

@@ -187,22 +187,18 @@ def test_a_change_that_is_the_hardening_itself_has_correlation_one():
     problem, x, linear = at_the_truth(HARDENING_AT, bars(HARDENING_AT, loadings))
     position = HARDENING_AT.names.index("m")
     hardening = VALUES[HARDENING_AT.name]["m"] * linear.residuals.jacobian[..., position]
-    noise_model = NoiseModel({"strain": OutputNoise(NOISE)})
-    ratio, correlation = _likeness_of_hardening(problem, x, linear, noise_model, -0.5 * hardening)
+    factor = CovarianceFactor.of_residuals(linear.residuals, NoiseModel({"strain": OutputNoise(NOISE)}))
+    ratio, correlation = _likeness_of_hardening(problem, x, linear, factor, -0.5 * hardening)
     assert ratio == pytest.approx(-2.0, rel=1e-6)
     assert correlation == pytest.approx(1.0, rel=1e-9)
     other = linear.residuals.jacobian[..., HARDENING_AT.names.index("A")]
-    assert _likeness_of_hardening(problem, x, linear, noise_model, -0.5 * hardening + 7.0 * other)[1] == pytest.approx(
-        1.0
-    )
+    assert _likeness_of_hardening(problem, x, linear, factor, -0.5 * hardening + 7.0 * other)[1] == pytest.approx(1.0)
 
 
 def test_a_law_that_does_not_harden_is_like_no_drift():
     problem, x, linear = at_the_truth(NORTON_AT, bars(NORTON_AT))
-    noise_model = NoiseModel({"strain": OutputNoise(NOISE)})
-    assert np.isnan(
-        _likeness_of_hardening(problem, x, linear, noise_model, np.ones_like(linear.residuals.values))
-    ).all()
+    factor = CovarianceFactor.of_residuals(linear.residuals, NoiseModel({"strain": OutputNoise(NOISE)}))
+    assert np.isnan(_likeness_of_hardening(problem, x, linear, factor, np.ones_like(linear.residuals.values))).all()
 
 
 def test_cooling_looks_like_strain_hardening_and_is_said_with_its_sign():
