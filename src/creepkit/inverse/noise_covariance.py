@@ -39,7 +39,7 @@ def _check(code: int) -> None:
 class CovarianceFactor:
     """The covariance C = L L' of every test; L^-1 r is white.
 
-    series : of the observations. components : of the noise model, as NoiseModel.components has them. counts : (tests,
+    series : of the observations. components : (5 outputs + 3,) as NoiseModel.components has them. counts : (tests,
     observations) how often the square of each whitened value counts, or None for once.
     """
 
@@ -117,8 +117,8 @@ class NoiseLikelihood:
     ) -> None:
         """values : (tests, observations, 1 + unknowns) residuals and their derivatives to the unknowns.
 
-        precision, prior_residual : (unknowns,) of their priors, and the distance from their means. components : those
-        of a noise model, as NoiseModel.components has them.
+        precision, prior_residual : (unknowns,) of their priors, and the distance from their means.
+        components : (5 outputs + 3,) of a noise model, as NoiseModel.components has them.
         """
         rows, unknowns = series.rows(values), values.shape[-1] - 1
         self._components, self._value, self._gradient = components.copy(), np.zeros(1), np.zeros(components.size)
@@ -132,7 +132,10 @@ class NoiseLikelihood:
         )
 
     def __call__(self, components: Floats) -> tuple[float, Floats]:
-        """Value, and gradient to the logarithms of the components; both (components,)."""
+        """Value, and gradient to the logarithms of the components.
+
+        components : (5 outputs + 3,), as the gradient.
+        """
         self._components[:] = components
         _check(function("creepkit_restricted_likelihood")(*self._arguments))
         return float(self._value[0]), self._gradient.copy()

@@ -58,7 +58,18 @@ class Residuals:
     @cached_property
     def series(self) -> ObservationSeries:
         """The same as the compiled covariance takes it."""
-        return ObservationSeries.of_residuals(self)
+        unit, further = self.discrepancy_unit, self.random_effect_sensitivities
+        effects = [
+            self.relative_noise * self.offset_sensitivity,
+            self.offset_sensitivity,
+            np.zeros_like(self.values) if unit is None else unit,
+            self.log_rate_sensitivity,
+        ]
+        stacked = np.stack(effects, axis=-1)
+        stacked = stacked if further is None else np.concatenate([stacked, further], axis=-1)
+        return ObservationSeries.of_observations(
+            self.present, self.output_index, self.correlation_coordinate, stacked, self.test_weights
+        )
 
 
 MINIMUM_TESTS = 3
@@ -129,7 +140,10 @@ class NoiseModel:
         return own * list(self.outputs).index(output) + OUTPUT_COMPONENTS.index(component)
 
     def with_components(self, components: Floats) -> NoiseModel:
-        """The same with other components, in the order of `components`."""
+        """The same with other components.
+
+        components : (5 outputs + 3,) in the order of the property.
+        """
         own = np.split(components, range(len(OUTPUT_COMPONENTS), components.size, len(OUTPUT_COMPONENTS)))
         outputs = {
             name: replace(output, **dict(zip(OUTPUT_COMPONENTS, values.tolist(), strict=True)))

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from creepkit.arrays import Floats, Ints
+from creepkit.arrays import Bools, Floats, Ints
 from creepkit.core import address
-
-if TYPE_CHECKING:
-    from creepkit.inverse.noise_model import Residuals
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,33 +31,25 @@ class ObservationSeries:
     root_weights: Floats
 
     @classmethod
-    def of_residuals(cls, residuals: Residuals) -> ObservationSeries:
-        """The series of residuals."""
-        tests, observations = residuals.values.shape
-        places = np.flatnonzero(residuals.present)
-        test, output = places // max(observations, 1), residuals.output_index.ravel()[places]
-        time = residuals.correlation_coordinate.ravel()[places]
-        order = np.lexsort((time, output, test))
-        places, test, output, time = places[order], test[order], output[order], time[order]
+    def of_observations(
+        cls, present: Bools, output_index: Ints, time: Floats, effects: Floats, test_weights: Floats
+    ) -> ObservationSeries:
+        """The series of observations.
+
+        present, output_index, time : (tests, observations) which are data, of which output, and correlation time.
+        effects : (tests, observations, 4 + effects) the columns of the loadings behind the lag.
+        test_weights : (tests,) -.
+        """
+        tests, observations = present.shape
+        places = np.flatnonzero(present)
+        test, output, times = places // max(observations, 1), output_index.ravel()[places], time.ravel()[places]
+        order = np.lexsort((times, output, test))
+        places, test, output, times = places[order], test[order], output[order], times[order]
         follows = np.zeros(places.size, bool)
         follows[1:] = (np.diff(test) == 0) & (np.diff(output) == 0)
-        lag = np.where(follows, np.diff(time, prepend=0.0), -1.0)
-        unit, effects = residuals.discrepancy_unit, residuals.random_effect_sensitivities
-        columns = [
-            residuals.relative_noise * residuals.offset_sensitivity,
-            residuals.offset_sensitivity,
-            np.zeros_like(residuals.values) if unit is None else unit,
-            residuals.log_rate_sensitivity,
-        ]
-        loadings = np.concatenate(
-            [
-                lag[:, None],
-                *(np.asarray(column, float).reshape(-1, 1)[places] for column in columns),
-                *([] if effects is None else [effects.reshape(residuals.values.size, -1)[places]]),
-            ],
-            axis=1,
-        )
-        weights = np.ascontiguousarray(residuals.test_weights, float)
+        lags = np.where(follows, np.diff(times, prepend=0.0), -1.0)
+        loadings = np.concatenate([lags[:, None], effects.reshape(present.size, -1)[places]], axis=1)
+        weights = np.ascontiguousarray(test_weights, float)
         starts = np.searchsorted(test, np.arange(tests + 1)).astype(np.int64)
         root_weights = np.sqrt(weights)[test][:, None]
         return cls((tests, observations), places, starts, output.astype(np.int64), loadings, weights, root_weights)
@@ -70,9 +59,9 @@ class ObservationSeries:
         return np.ascontiguousarray(values.reshape(self.shape[0] * self.shape[1], -1)[self.places] * self.root_weights)
 
     def arguments(self, components: Floats) -> tuple[Any, ...]:
-        """The first arguments of functions of the core, under components as NoiseModel.components has them.
+        """The first arguments of functions of the core; the caller keeps the series and the components alive.
 
-        The caller keeps the series and the components alive.
+        components : (5 outputs + 3,) as NoiseModel.components has them.
         """
         outputs, effects = (components.size - 3) // 5, self.loadings.shape[1] - 5
         arrays = (self.starts, self.output, self.loadings, self.test_weights, components)
