@@ -1,11 +1,7 @@
 // The simulation of a finite element model, compiled once for each width of the processor's vectors.
-#define CREEPKIT_JOIN_(a, b) a##b
-#define CREEPKIT_JOIN(a, b) CREEPKIT_JOIN_(a, b)
-// a namespace of its own for each width: no inline function compiled for one processor is linked in place of another
-#define creepkit CREEPKIT_JOIN(creepkit_lanes_, CREEPKIT_LANES)
-
 #include "../finite_element_sensitivities.hpp"
 #include "../finite_elements.hpp"
+#include "../lane_functions.hpp"
 #include "../sensitivities.hpp"
 #include "../time_integration.hpp"
 
@@ -32,7 +28,7 @@ Termination integrate(FiniteElements& system, const PointLaw& law, const Simulat
 }  // namespace creepkit
 
 // Simulate a body under its load history, with sensitivities unless `directions` is null.
-extern "C" void CREEPKIT_JOIN(creepkit_simulate_, CREEPKIT_LANES)(
+extern "C" void LANE_FUNCTION(creepkit_simulate)(
     const creepkit::FiniteElementModel* model, const creepkit::PointLaw* law, const creepkit::SimulationInput* input,
     const creepkit::SolverSettings* settings, creepkit::StepRecord* record,
     const creepkit::SensitivityDirections* directions, creepkit::SensitivityRecord* derivatives,
@@ -53,7 +49,7 @@ extern "C" void CREEPKIT_JOIN(creepkit_simulate_, CREEPKIT_LANES)(
 //
 // history : (points, 4 + S) creep components, equivalent creep strain and states at the start of the stage. Returns a
 // PointFlag, or -1 when there is no memory.
-extern "C" int64_t CREEPKIT_JOIN(creepkit_assemble_, CREEPKIT_LANES)(
+extern "C" int64_t LANE_FUNCTION(creepkit_assemble)(
     const creepkit::FiniteElementModel* model, const creepkit::PointLaw* law, const creepkit::StageConditions* stage,
     const double* history, const double* displacement, double* residual, double* tangent) {
     using namespace creepkit;
