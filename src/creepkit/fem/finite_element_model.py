@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -124,7 +125,7 @@ class CompiledModel:
             *(address(array) for array in self._kept.values()),
         )  # fmt: skip
 
-    def padded(self, values: Floats) -> Floats:
+    def padded(self, values: Any) -> Any:
         """Values (elements, ...) of the elements, with those of the copy."""
         return np.concatenate([values, values[-1:]]) if len(values) < self.elements else values
 

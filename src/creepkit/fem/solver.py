@@ -22,8 +22,8 @@ from creepkit.kernels.interface import CompiledLaw
 
 
 START, END, PRESSURE = range(3)
-"""The first columns of a segment: times s, and the pressure at its start, MPa. Then follow, each at both ends, pressure,
-temperature K, modulus MPa, and motion of held nodes."""
+"""The first columns of a segment: times s, and the pressure at its start, MPa; at its end, and temperature K, modulus
+MPa and motion of held nodes at both ends follow."""
 
 
 CREEP_COMPONENTS, EQUIVALENT_STRAIN, MAX_STATES = 3, 3, 16
@@ -124,7 +124,8 @@ def solve(
         address(limits), len(script), address(script), None,
     )  # fmt: skip
     surface = moments = None
-    along, derivatives, kept = None, None, ()
+    along = derivatives = None
+    kept: tuple[Floats, ...] = ()
     if directions is not None:
         kept = (
             _contiguous(directions.segments),

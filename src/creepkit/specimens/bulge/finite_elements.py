@@ -18,13 +18,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import GeometryDerivative, geometry_derivative
-from creepkit.fem.simulation import (
-    LoadHistory,
-    Simulation,
-    SurfaceSensitivities,
-    sensitivity_directions,
-    simulate,
-)
+from creepkit.fem.simulation import LoadHistory, Simulation, SurfaceSensitivities, sensitivity_directions, simulate
 from creepkit.fem.solver import SensitivityDirections, SolverSettings
 from creepkit.records import (
     PROGRAM_NUISANCES,

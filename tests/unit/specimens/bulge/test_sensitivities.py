@@ -144,7 +144,13 @@ def test_displacements_on_a_mesh_that_moves(base) -> None:
     way = base.made.load_history
     directions = sensitivity_directions(base.made.model, way, velocities=velocities)
     found = simulate(
-        base.kernel, base.theta, base.made.model, way, settings=SETTINGS, same_steps_as=base.found, directions=directions
+        base.kernel,
+        base.theta,
+        base.made.model,
+        way,
+        settings=SETTINGS,
+        same_steps_as=base.found,
+        directions=directions,
     )
     change = found.sensitivities
     assert change is not None
