@@ -66,7 +66,7 @@ inline AngularFactor angular_factor(const PolarGrid& grid, double p, int64_t j) 
 // q at the distance `far` = ln(r/S).
 inline Vector exponent(Vector far, double p, double g) {
     const Vector farthest = Vector{} + FARTHEST, power = p * far;
-    return g * exponential(power < farthest ? power : farthest);
+    return g * exponential(power > farthest ? farthest : power);
 }
 
 // D of the least squares at given ln S and ln p; D is linear. y: (size,) the profile.
