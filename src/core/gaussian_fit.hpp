@@ -187,7 +187,8 @@ inline double fallen(const PolarGrid& grid, const double* y) {
     return 0.0;
 }
 
-// Minimise from ln S and ln p in x; true when a strict minimum was reached that the grid can see. `normal` is that of x.
+// Minimise from ln S and ln p in x; true when a strict minimum was reached that the grid can see. `normal` is that of
+// x.
 inline bool descend(const PolarGrid& grid, const double* y, double* x, NormalEquations& normal) {
     double step[3], trial[3];
     x[0] = best_amplitude(grid, y, x);

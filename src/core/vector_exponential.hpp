@@ -30,7 +30,8 @@ inline double sum(Vector v) {
 // Count rounded up to whole vectors.
 inline int64_t padded(int64_t count) { return (count + CREEPKIT_LANES - 1) / CREEPKIT_LANES * CREEPKIT_LANES; }
 
-// exp(x) within 2e-16 of itself, for x up to 700; below -708, where it is 3e-308, it stays what it is there. NaN is kept.
+// exp(x) within 2e-16 of itself, for x up to 700; below -708, where it is 3e-308, it stays what it is there. NaN is
+// kept.
 //
 // x = k ln 2 + r with whole k and |r| < 0.35; Taylor's series of exp(r) to the 13th power leaves 4e-18; 2^k is written
 // into the exponent of the number. ln 2 is taken off in two parts, of which the first times k has no rounding.
