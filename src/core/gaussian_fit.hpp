@@ -66,7 +66,7 @@ inline AngularFactor angular_factor(const PolarGrid& grid, double p, int64_t j) 
 // q at the distance `far` = ln(r/S).
 inline Vector exponent(Vector far, double p, double g) {
     const Vector farthest = Vector{} + FARTHEST, power = p * far;
-    return g * exponential(power < farthest ? power : farthest);
+    return g * exponential(power > farthest ? farthest : power);
 }
 
 // D of the least squares at given ln S and ln p; D is linear. y: (size,) the profile.
@@ -187,7 +187,8 @@ inline double fallen(const PolarGrid& grid, const double* y) {
     return 0.0;
 }
 
-// Minimise from ln S and ln p in x; true when a strict minimum was reached that the grid can see. `normal` is that of x.
+// Minimise from ln S and ln p in x; true when a strict minimum was reached that the grid can see. `normal` is that of
+// x.
 inline bool descend(const PolarGrid& grid, const double* y, double* x, NormalEquations& normal) {
     double step[3], trial[3];
     x[0] = best_amplitude(grid, y, x);

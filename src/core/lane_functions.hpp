@@ -1,13 +1,13 @@
 // Functions that are compiled once for each width of vectors, and the choice among them.
 //
-// A source in lanes/ gives a function the name LANE_FUNCTION(name): name_2, name_4 or name_8, with C linkage. Its caller
-// declares and chooses them with
+// A source in lanes/ gives a function the name LANE_FUNCTION(name): name_2, name_4 or name_8, with C linkage. Its
+// caller declares and chooses them with
 //
 //     CREEPKIT_LANE_FUNCTIONS(name, result type, (parameters))
 //     ... CHOOSE_LANE_FUNCTION(name)(arguments)
 //
-// Inline functions are compiled with each width's instructions too, and the linker must not take one for another: within
-// lanes/ the namespace `creepkit` is therefore `creepkit_lanes_2` and so on, by a definition in CMakeLists.txt.
+// Inline functions are compiled with each width's instructions too, and the linker must not take one for another:
+// within lanes/ the namespace `creepkit` is therefore `creepkit_lanes_2` and so on, by a definition in CMakeLists.txt.
 #pragma once
 
 #include "processor.hpp"

@@ -1,6 +1,6 @@
 // Intel, Software Developer's Manual, vol. 1, 14.3 and 15.2: the processor must have the instructions (cpuid), and the
-// operating system must keep their registers (xgetbv). The compiler's own test of this needs its run-time library, which
-// not every compiler has.
+// operating system must keep their registers (xgetbv). The compiler's own test of this needs its run-time library,
+// which not every compiler has.
 #include "processor.hpp"
 
 #include <stdlib.h>

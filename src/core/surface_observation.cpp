@@ -5,8 +5,9 @@
 
 using namespace creepkit;
 
-// Observe profiles (frames, nodes), mm; the surface as SurfaceObservation describes it. outputs: (frames, 3) D mm, S mm, p. to_radii: (frames, 3, radii) their
-// derivatives to the displacements at the radii of the grid; null: left out. Returns an InterpolationError.
+// Observe profiles (frames, nodes), mm; the surface as SurfaceObservation describes it. outputs: (frames, 3) D mm, S
+// mm, p. to_radii: (frames, 3, radii) their derivatives to the displacements at the radii of the grid; null: left out.
+// Returns an InterpolationError.
 CREEPKIT_API int64_t creepkit_observe(const int64_t* counts, const double* places, const double* interpolation,
                                       double window, int64_t frames, const double* profiles, double* outputs,
                                       double* to_radii) {
@@ -20,8 +21,8 @@ CREEPKIT_API int64_t creepkit_observe(const int64_t* counts, const double* place
 }
 
 // Observe profiles (steps, nodes), mm, of accepted steps, as `creepkit_interpolate_in_time` takes them, at the times
-// asked (count,) s: outputs (count, 3) and, with columns > 0, derivatives (count, 3, columns) from those of the profiles,
-// changes (steps, nodes, columns). Returns an InterpolationError.
+// asked (count,) s: outputs (count, 3) and, with columns > 0, derivatives (count, 3, columns) from those of the
+// profiles, changes (steps, nodes, columns). Returns an InterpolationError.
 CREEPKIT_API int64_t creepkit_observe_at_times(const int64_t* counts, const double* places, const double* interpolation,
                                                double window, int64_t steps, int64_t segments, const double* times,
                                                const double* starts, const int64_t* rows, const double* origins,

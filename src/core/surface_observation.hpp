@@ -19,8 +19,8 @@ namespace creepkit {
 constexpr int OBSERVED = 3;  // D, S, p
 
 // What observes a surface. counts: (3,) radii and angles of the grid, nodes of the surface. places: of the grid, as
-// `fit_frames` takes them. interpolation: (radii, nodes) from displacements of the nodes to those at the radii; few in a
-// row are not zero. window: mm.
+// `fit_frames` takes them. interpolation: (radii, nodes) from displacements of the nodes to those at the radii; few in
+// a row are not zero. window: mm.
 struct SurfaceObservation {
     const int64_t* counts;
     const double *places, *interpolation;
@@ -98,7 +98,8 @@ inline void fill_frames_at_rest(int64_t frames, int64_t radii, const int64_t* st
 }
 
 // Observe profiles (frames, nodes), mm: outputs (frames, 3), and their derivatives to_radii (frames, 3, radii) to the
-// displacements at the radii; null: they are left out. NaN where a profile has no fit. Returns INTERPOLATED or NO_MEMORY.
+// displacements at the radii; null: they are left out. NaN where a profile has no fit. Returns INTERPOLATED or
+// NO_MEMORY.
 inline int64_t observe_profiles(const SurfaceObservation& surface, int64_t frames, const double* profiles,
                              const ObservationWorkspace& work, double* outputs, double* to_radii) {
     const int64_t radii = surface.radii();

@@ -40,7 +40,8 @@ inline SplineWorkspace spline_workspace(Workspace& memory, int64_t knots, int64_
             memory.doubles(knots * columns)};
 }
 
-// Derivatives `slopes` (knots, columns) of the not-a-knot splines through values (rows of `knots`, columns) at `places`.
+// Derivatives `slopes` (knots, columns) of the not-a-knot splines through values (rows of `knots`, columns) at
+// `places`.
 //
 // With h the lengths of the intervals and d the divided differences, s has to meet, between the ends,
 //     h[i] s[i-1] + 2 (h[i-1] + h[i]) s[i] + h[i-1] s[i+1] = 3 (h[i] d[i-1] + h[i-1] d[i])

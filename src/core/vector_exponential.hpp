@@ -11,7 +11,7 @@
 namespace creepkit {
 
 typedef double Vector __attribute__((vector_size(8 * CREEPKIT_LANES)));
-typedef int64_t IntegerVector __attribute__((vector_size(8 * CREEPKIT_LANES)));
+typedef uint64_t BitVector __attribute__((vector_size(8 * CREEPKIT_LANES)));
 
 inline Vector load(const double* from) {
     Vector v;
@@ -30,7 +30,8 @@ inline double sum(Vector v) {
 // Count rounded up to whole vectors.
 inline int64_t padded(int64_t count) { return (count + CREEPKIT_LANES - 1) / CREEPKIT_LANES * CREEPKIT_LANES; }
 
-// exp(x) within 2e-16 of itself or so, for x up to 700; below -708, where it is 1e-308, it stays what it is there.
+// exp(x) within 2e-16 of itself, for x up to 700; below -708, where it is 3e-308, it stays what it is there. NaN is
+// kept.
 //
 // x = k ln 2 + r with whole k and |r| < 0.35; Taylor's series of exp(r) to the 13th power leaves 4e-18; 2^k is written
 // into the exponent of the number. ln 2 is taken off in two parts, of which the first times k has no rounding.
@@ -39,7 +40,7 @@ inline Vector exponential(Vector x) {
     constexpr double LN2_HIGH = 6.93147180369123816490e-01, LN2_LOW = 1.90821492927058770002e-10;
     constexpr double LOG2_E = 1.44269504088896338700, LEAST = -708.0;
     const Vector floor = Vector{} + LEAST;
-    x = x > floor ? x : floor;
+    x = x < floor ? floor : x;
     const Vector shifted = x * LOG2_E + ROUNDING, k = shifted - ROUNDING;
     const Vector r = (x - k * LN2_HIGH) - k * LN2_LOW;
     constexpr double INVERSE_FACTORIAL[] = {1.0 / 6227020800.0, 1.0 / 479001600.0, 1.0 / 39916800.0, 1.0 / 3628800.0,
@@ -48,7 +49,7 @@ inline Vector exponential(Vector x) {
     Vector series = Vector{} + INVERSE_FACTORIAL[0];
     for (int i = 1; i < 12; ++i) series = series * r + INVERSE_FACTORIAL[i];
     series = 1.0 + (r + r * r * series);
-    IntegerVector bits, power;
+    BitVector bits, power;
     memcpy(&power, &shifted, sizeof power);
     memcpy(&bits, &series, sizeof bits);
     bits += power << 52;
