@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdint.h>
 
+#include "comparison.hpp"
 #include "event_location.hpp"
 #include "runge_kutta_step.hpp"
 #include "step_control.hpp"

@@ -59,7 +59,8 @@ struct LawCall {
 struct StepWorkspace {
     int64_t states, parameters, stages;
     double *value, *change, *new_value, *new_change, *slopes, *slope_changes, *base, *base_change;
-    double *times, *past_slopes, *row, *out, *full, *gradient, *matrix, *response, *clock_change, *nudged, *nudged_value;
+    double *times, *past_slopes, *row, *out, *full, *gradient, *matrix, *response;
+    double *clock_change, *nudged, *nudged_value;
     StageProblem* problems;
 
     StepWorkspace(Workspace& memory, int64_t states, int64_t parameters, int64_t stages)

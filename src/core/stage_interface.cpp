@@ -1,9 +1,10 @@
-// Single stages for Python: tests, and whoever wants to look at one.
+// Single stages and time transformations for Python: tests, and whoever wants to look at one.
 #include <stdint.h>
 
 #include "export.hpp"
 #include "stage_problem.hpp"
 #include "stage_solver.hpp"
+#include "time_transformation.hpp"
 #include "workspace.hpp"
 
 namespace creepkit {
@@ -59,6 +60,36 @@ CREEPKIT_API int64_t creepkit_differentiate_stage(LawEntry entry, const double* 
             response[v * columns + INPUTS + states + p] = stage->problem.weight * by_parameter[v * parameters + p];
         }
     }
-    return differentiate_stage(stage->axes, stage->problem, increment, row[STRESS], full + 1, gradient, matrix, response,
-                               states, parameters);
+    return differentiate_stage(stage->axes, stage->problem, increment, row[STRESS], full + 1, gradient, matrix,
+                               response, states, parameters);
+}
+
+// A time transformation at positions s, (count,) above 0, for Python: out (count, 7) is time, s, and ln(dt/ds) there,
+// their derivatives to beta and then to tau, and the position of that time.
+CREEPKIT_API void creepkit_transformed_times(const TimeTransformation* clock, int64_t count, const double* s,
+                                             double* out) {
+    const SegmentClock segment_clock(*clock);
+    for (int64_t k = 0; k < count; ++k) {
+        const TimeAndPace now = segment_clock.at(s[k]);
+        const TransformationDerivatives moved = transformation_derivatives(segment_clock, s[k]);
+        const double row[7] = {now.time,
+                               log(now.pace),
+                               moved.by_beta.time,
+                               moved.by_beta.log_pace,
+                               moved.by_tau.time,
+                               moved.by_tau.log_pace,
+                               segment_clock.position(now.time)};
+        for (int64_t j = 0; j < 7; ++j) out[7 * k + j] = row[j];
+    }
+}
+
+// The transformation of a segment that begins after some creep, (4,) start, length, beta, tau, from r in p'' = r p' and
+// the rate of r; and from a virgin state, with beta the leading exponent of time.
+CREEPKIT_API void creepkit_shifted_power_law_time(double start, double length, double bend, double bend_rate,
+                                                  TimeTransformation* clock) {
+    *clock = shifted_power_law_time(start, length, bend, bend_rate);
+}
+
+CREEPKIT_API void creepkit_power_law_time(double start, double length, double beta, TimeTransformation* clock) {
+    *clock = power_law_time(start, length, beta);
 }

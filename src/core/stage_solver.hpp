@@ -107,9 +107,8 @@ inline StageSolution solve_stage_near_guess(LawEntry update, const double* theta
         const double slope = elastic - by_strain - by_stress, step = -residual / slope;
         if (!(slope > 0.0 && fabs(step) < 1.0)) break;
         const StageIterate now = {increment, 0.0, stress, elastic, stress_slope};
-        const bool enough =
-            fabs(step) <= tolerance ||
-            (fabs(step) < SMALL && increment * error_left(now, problem, by_strain, by_stress, slope, step) < negligible);
+        const double left = increment * error_left(now, problem, by_strain, by_stress, slope, step);
+        const bool enough = fabs(step) <= tolerance || (fabs(step) < SMALL && left < negligible);
         if (relaxes) {
             const double ratio = share / elastic * exp(step);
             share = ratio / (1.0 + ratio);

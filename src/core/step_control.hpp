@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdint.h>
 
+#include "comparison.hpp"
 #include "runge_kutta_step.hpp"
 
 namespace creepkit {
@@ -26,10 +27,6 @@ inline double newton_tolerance(const IntegrationSettings& settings) {
     return tolerance < 1e-3 ? tolerance : 1e-3;
 }
 
-// The larger of two numbers; the first when the second is NaN.
-inline double larger(double a, double b) { return b > a ? b : a; }
-inline double smaller(double a, double b) { return b < a ? b : a; }
-
 // Largest local error of the step and of its dense output over what is allowed.
 //
 // Infinite when creep strain falls, which it never does. Under prescribed strain the stress counts as well.
@@ -49,13 +46,12 @@ inline double strain_error(const Tableau& tableau, const StressControl& drive, c
         const double hermite =
             0.5 * (work.value[0] + work.new_value[0] + 0.25 * h * (slope - work.last_slope(0)));
         const double off = fabs(work.dense(tableau, h, 0).at(0.5) - hermite);
-        if (!(off <= worst)) worst = off;
+        worst = worse(worst, off);
     }
     worst /= settings.rtol * (reach + settings.smallest);
     for (int64_t v = 1; v < work.unknowns(); ++v) {
         const double state = larger(fabs(work.value[v]), fabs(work.new_value[v])) + settings.smallest;
-        const double error = local_error(tableau, work, h, v) / (settings.rtol * state);
-        if (!(error <= worst)) worst = error;
+        worst = worse(worst, local_error(tableau, work, h, v) / (settings.rtol * state));
     }
     return isfinite(worst) ? worst : INFINITY;
 }
@@ -74,8 +70,7 @@ inline double sensitivity_error(const Tableau& tableau, const StepWorkspace& wor
     for (int64_t p = 0; p < work.parameters; ++p) {
         double total = 0.0;
         for (int64_t i = 0; i < tableau.stages; ++i) total += tableau.error[i] * work.slope_changes[i * stride + p];
-        const double error = fabs(h * total) / (settings.rtol * larger(reach, fabs(work.new_change[p])));
-        if (!(error <= worst)) worst = error;
+        worst = worse(worst, fabs(h * total) / (settings.rtol * larger(reach, fabs(work.new_change[p]))));
     }
     return isfinite(worst) ? worst : INFINITY;
 }

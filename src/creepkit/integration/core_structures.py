@@ -56,6 +56,22 @@ class BatchStructure(ctypes.Structure):
     ]
 
 
+class TensorStructure(ctypes.Structure):
+    """TensorIntegration of `tensor_integration.cpp`, where every field's shape is given."""
+
+    _fields_ = [
+        ("update", _POINTER),
+        *((name, _COUNT) for name in ("states", "segment_count", "output_count")),
+        *((name, _POINTER) for name in ("theta", "initial", "limits", "held", "segments", "outputs")),
+        *((name, _NUMBER) for name in ("modulus", "ratio", "beta")),
+        ("settings", SettingsStructure),
+        ("tableau", TableauStructure),
+        ("history", _POINTER),
+        *((name, _COUNT) for name in ("reached", "ending", "steps")),
+        ("end_time", _NUMBER),
+    ]
+
+
 def axes_structure(axes: Axes) -> AxesStructure:
     """Axes as the core reads them."""
     return AxesStructure(*axes)
