@@ -253,3 +253,20 @@ def test_one_structure_is_compiled_once() -> None:
     assert lower(other, "numba").fingerprint == lower(NORTON, "numba").fingerprint
     assert lower(other, "numba").rate is lower(NORTON, "numba").rate
     assert lower(linear, "numba").fingerprint != lower(NORTON, "numba").fingerprint
+
+
+# ---- every kind of equation ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+def test_equations_of_every_kind_give_what_the_arrays_give(name: str) -> None:
+    """Branches, functions of the C library, states: a vector of eight points and one point more."""
+    law_ = EQUATIONS[name]
+    compiled, arrays, drawn = lower(law_, "numba"), lower(law_, "numpy"), draw_samples(law_, 16, seed=6)
+    x, theta = drawn.points[:9], drawn.theta[0]
+    with np.errstate(all="ignore"):
+        expected = np.stack(np.broadcast_arrays(*arrays.internal_rates(*x.T, *theta)), -1)
+
+    found, _ = call_entry(compiled, "rate", x, theta)
+
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-190)
