@@ -36,8 +36,8 @@ enum SharedComponent { RATE, DISCREPANCY, DISCREPANCY_LENGTH, SHARED_COMPONENTS 
 // Observations of all tests, those of a test by output and in order of time.
 //
 // starts : (tests + 1,) first observation of each test. output : (observations,) position of its output. loadings :
-// (observations, 5 + effects) see Loading. test_weights : (tests,) -, by which the covariance of a test is divided; used
-// for the determinant only, values are given times the root of it.
+// (observations, 5 + effects) see Loading. test_weights : (tests,) -, by which the covariance of a test is divided; it
+// is used for the determinant only, values are given times the root of it.
 struct NoiseObservations {
     int64_t tests, outputs, effects;
     const int64_t* starts;
@@ -119,10 +119,10 @@ public:
 };
 
 // What the filter leaves of the observations of one test, with m states and C columns of values:
-// loading, transition, added : (n, m) z, phi, q. covariance : (n, m, m) of the states before each observation. gain :
-// (n, m). variance : (n,) S of the innovations. state : (n, m, C) expected before each observation. innovation : (n, C).
-// Without `keeps_states` covariance and state are those of the last observation alone, (m, m) and (m, C), and the caller
-// gives the memory of the innovations.
+// loading, transition, added : (n, m) z, phi, q. covariance : (n, m, m) of the states before each observation, and
+// state : (n, m, C) their expectations; gain : (n, m). variance : (n,) S of the innovations; innovation : (n, C).
+// Without `keeps_states` covariance and state are those of the last observation alone, (m, m) and (m, C), and the
+// caller gives the memory of the innovations.
 struct FilteredTest {
     int64_t states, columns;
     bool keeps_states;
