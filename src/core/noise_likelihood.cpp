@@ -13,11 +13,12 @@ constexpr double LEAST_PIVOT = 1e-15;
 
 bool has_valid_counts(const NoiseObservations& observations) {
     if (observations.tests < 0 || observations.outputs < 1 || observations.effects < 0) return false;
+    if (observations.starts[0] != 0) return false;
     for (int64_t t = 0; t < observations.tests; ++t)
         if (observations.starts[t + 1] < observations.starts[t]) return false;
     for (int64_t i = 0; i < observations.count(); ++i)
         if (observations.output[i] < 0 || observations.output[i] >= observations.outputs) return false;
-    return observations.starts[0] == 0;
+    return true;
 }
 
 int64_t longest_test(const NoiseObservations& observations) {
@@ -120,7 +121,7 @@ struct LinearProblem {
     }
 };
 
-// The columns of values (n, 1 + unknowns) that matter to a test: the first, and those of the unknowns on which it depends.
+// The columns of values (n, 1 + unknowns) that matter to a test: the first, and those of unknowns that it depends on.
 int64_t columns_of_test(const double* values, int64_t n, int64_t width, int64_t* columns) {
     int64_t count = 0;
     columns[count++] = 0;
@@ -169,7 +170,8 @@ void add_gradient(const NoiseObservations& observations, const NoiseStates& mode
     for (int64_t j = 0; j < m * C; ++j) r[j] = 0.0;
     for (int64_t i = n - 1; i >= 0; --i) {
         const double *z = test.loading + i * m, *phi = test.transition + i * m, *q = test.added + i * m;
-        const double *P = test.covariance + i * m * m, *k = test.gain + i * m, inverse_variance = 1.0 / test.variance[i];
+        const double *P = test.covariance + i * m * m, *k = test.gain + i * m;
+        const double inverse_variance = 1.0 / test.variance[i];
         mixed(test.innovation + i * C, scratch.mix, 1, C, scratch.innovation);
         mixed(test.state + i * m * C, scratch.mix, m, C, scratch.state);
         for (int64_t c = 0; c < C; ++c) u[c] = scratch.innovation[c] * inverse_variance;
@@ -233,7 +235,7 @@ struct LikelihoodMemory {
         backwards.take(memory, m, p + 1);
         for (int64_t t = 0; t < observations.tests; ++t) {
             FilteredTest test;
-            test.take(memory, observations.starts[t + 1] - observations.starts[t], m, column_counts[t]);
+            test.take(memory, observations.starts[t + 1] - observations.starts[t], m, column_counts[t], true);
             if (filtered) filtered[t] = test;
         }
     }
@@ -244,8 +246,8 @@ struct LikelihoodMemory {
 // Whitens the values (observations, columns), in place: L^-1 y with C = L L', or, where `inverse`, C^-1 y.
 //
 // Observations as NoiseObservations has them; components : (5 outputs + 3,) see OutputComponent, SharedComponent.
-// log_determinant : ln|C| over all tests. Returns 0; 1 where C is not positive definite, 2 without memory, 3 where counts
-// contradict each other.
+// log_determinant : ln|C| over all tests. Returns 0; 1 where C is not positive definite, 2 without memory, 3 where
+// counts contradict each other.
 CREEPKIT_API int64_t creepkit_noise_whiten(int64_t tests, int64_t outputs, int64_t effects, const int64_t* starts,
                                            const int64_t* output, const double* loadings, const double* test_weights,
                                            const double* components, int64_t columns, int64_t inverse, double* values,
@@ -260,7 +262,7 @@ CREEPKIT_API int64_t creepkit_noise_whiten(int64_t tests, int64_t outputs, int64
     for (int turn = 0; turn < 2; ++turn) {
         states = memory.array<NoiseState>(most_states);
         derivative = memory.doubles(most_states * columns);
-        test.take(memory, longest, most_states, columns);
+        test.take(memory, longest, most_states, columns, false);
         if (turn == 0 && !memory.allocate()) return NO_MEMORY;
     }
     const NoiseStates model(observations, components, states);

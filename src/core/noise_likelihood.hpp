@@ -35,9 +35,9 @@ enum SharedComponent { RATE, DISCREPANCY, DISCREPANCY_LENGTH, SHARED_COMPONENTS 
 
 // Observations of all tests, those of a test by output and in order of time.
 //
-// starts : (tests + 1,) first observation of each test. output : (observations,). loadings : (observations, 5 + effects)
-// see Loading. test_weights : (tests,) -, by which the covariance of a test is divided; used for the determinant only,
-// values are given times the root of it.
+// starts : (tests + 1,) first observation of each test. output : (observations,) position of its output. loadings :
+// (observations, 5 + effects) see Loading. test_weights : (tests,) -, by which the covariance of a test is divided; it
+// is used for the determinant only, values are given times the root of it.
 struct NoiseObservations {
     int64_t tests, outputs, effects;
     const int64_t* starts;
@@ -119,24 +119,29 @@ public:
 };
 
 // What the filter leaves of the observations of one test, with m states and C columns of values:
-// loading, transition, added : (n, m) z, phi, q. covariance : (n, m, m) of the states before each observation, gain :
-// (n, m). variance : (n,) S of the innovations. state : (n, m, C) expected before each observation, innovation : (n, C).
+// loading, transition, added : (n, m) z, phi, q. covariance : (n, m, m) of the states before each observation, and
+// state : (n, m, C) their expectations; gain : (n, m). variance : (n,) S of the innovations; innovation : (n, C).
+// Without `keeps_states` covariance and state are those of the last observation alone, (m, m) and (m, C), and the
+// caller gives the memory of the innovations.
 struct FilteredTest {
     int64_t states, columns;
+    bool keeps_states;
     double *loading, *transition, *added, *covariance, *gain, *variance, *state, *innovation;
 
     // Take the arrays for n observations.
-    void take(Workspace& memory, int64_t n, int64_t m, int64_t C) {
+    void take(Workspace& memory, int64_t n, int64_t m, int64_t C, bool keep) {
         states = m;
         columns = C;
+        keeps_states = keep;
+        const int64_t kept = keep ? n : 1;
         loading = memory.doubles(n * m);
         transition = memory.doubles(n * m);
         added = memory.doubles(n * m);
-        covariance = memory.doubles(n * m * m);
+        covariance = memory.doubles(kept * m * m);
         gain = memory.doubles(n * m);
         variance = memory.doubles(n);
-        state = memory.doubles(n * m * C);
-        innovation = memory.doubles(n * C);
+        state = memory.doubles(kept * m * C);
+        innovation = keep ? memory.doubles(n * C) : nullptr;
     }
 };
 
@@ -147,14 +152,16 @@ inline bool filter(const NoiseObservations& observations, const NoiseStates& mod
     const int64_t m = out.states, C = out.columns;
     for (int64_t i = 0; i < last - first; ++i) {
         double *z = out.loading + i * m, *phi = out.transition + i * m, *q = out.added + i * m;
-        double *P = out.covariance + i * m * m, *a = out.state + i * m * C, *k = out.gain + i * m;
+        const int64_t place = out.keeps_states ? i : 0;
+        double *P = out.covariance + place * m * m, *a = out.state + place * m * C, *k = out.gain + i * m;
         double* v = out.innovation + i * C;
         double S = model.observe(observations, first + i, i == 0, z, phi, q);
         if (i == 0) {
             for (int64_t j = 0; j < m * m; ++j) P[j] = 0.0;
             for (int64_t j = 0; j < m * C; ++j) a[j] = 0.0;
         } else {
-            const double *P0 = P - m * m, *a0 = a - m * C, *k0 = k - m, *v0 = v - C, S0 = out.variance[i - 1];
+            const double *P0 = out.keeps_states ? P - m * m : P, *a0 = out.keeps_states ? a - m * C : a;
+            const double *k0 = k - m, *v0 = v - C, S0 = out.variance[i - 1];
             for (int64_t j = 0; j < m; ++j) {
                 for (int64_t l = 0; l < m; ++l) P[j * m + l] = phi[j] * phi[l] * (P0[j * m + l] - S0 * k0[j] * k0[l]);
                 for (int64_t c = 0; c < C; ++c) a[j * C + c] = phi[j] * (a0[j * C + c] + k0[j] * v0[c]);

@@ -134,7 +134,7 @@ class NoiseLikelihood:
     def __call__(self, components: Floats) -> tuple[float, Floats]:
         """Value, and gradient to the logarithms of the components.
 
-        components : (5 outputs + 3,), as the gradient.
+        components : (5 outputs + 3,). Returns the value and (5 outputs + 3,) derivatives.
         """
         self._components[:] = components
         _check(function("creepkit_restricted_likelihood")(*self._arguments))
