@@ -44,7 +44,7 @@ def constitutive_response(
     temperature: float,
     weight: float,
 ) -> ConstitutiveResponse | None:
-    """What follows from a strain, (6,), at the end of a stage that starts from `base`, (7 + S,); None without a solution.
+    """What follows from a strain, (6,), at the end of a stage that starts from `base`, (7 + S,); None: no solution.
 
     elastic : E, MPa, and nu. time, s, and temperature, K, at the end; weight of the stage, s.
     """

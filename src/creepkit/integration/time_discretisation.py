@@ -18,6 +18,27 @@ from creepkit.integration.time_transformation import SMALLEST_EXPONENT, TimeTran
 from creepkit.records import Program
 
 
+__all__ = [
+    "SDIRK2",
+    "SDIRK4",
+    "SMALLEST_EXPONENT",
+    "Segment",
+    "Tableau",
+    "TimeTransformation",
+    "TransformedTime",
+    "linear_time",
+    "merge_programs",
+    "position",
+    "power_law_time",
+    "segment_from_row",
+    "shifted_power_law_time",
+    "stress_rate",
+    "temperature_rate",
+    "transformation_derivatives",
+    "transformed_time",
+]
+
+
 class Tableau(NamedTuple):
     """A singly diagonally implicit Runge-Kutta method whose last stage is the end of the step.
 
