@@ -136,7 +136,7 @@ def integrate_tensor_point(
 def _elastic_response(
     elastic: tuple[float, float], held: Bools, imposed: Floats, creep: Floats
 ) -> tuple[Floats, Floats]:
-    """Stress and strain, (times, 6), when creep strains are known; `imposed` holds strains where `held`, else stresses."""
+    """Stress and strain, (times, 6), of known creep strains; `imposed` holds strains where `held`, else stresses."""
     (E, nu), free = elastic, ~held
     unit = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
     shear, bulk = E / (2 * (1 + nu)), E / (3 * (1 - 2 * nu))

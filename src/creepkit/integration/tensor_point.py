@@ -34,25 +34,19 @@ class ConstitutiveResponse(NamedTuple):
     tangent: Floats
 
 
-class StageConditions(NamedTuple):
-    """When a stage is solved, s, at which temperature, K, and its weight, s."""
-
-    time: float
-    temperature: float
-    weight: float
-
-
 def constitutive_response(
     law: CompiledLaw,
     theta: Floats,
     elastic: tuple[float, float],
     strain: Floats,
     base: Floats,
-    conditions: StageConditions,
+    time: float,
+    temperature: float,
+    weight: float,
 ) -> ConstitutiveResponse | None:
-    """What follows from a strain, (6,), at the end of a stage from the vector `base`, (7 + S,); None without a solution.
+    """What follows from a strain, (6,), at the end of a stage that starts from `base`, (7 + S,); None: no solution.
 
-    elastic : E, MPa, and nu.
+    elastic : E, MPa, and nu. time, s, and temperature, K, at the end; weight of the stage, s.
     """
     theta, strain, base = (np.array(values, dtype=float) for values in (theta, strain, base))
     material = TensorStructure(update=law.update.address, states=law.states, modulus=elastic[0], ratio=elastic[1])
@@ -62,7 +56,7 @@ def constitutive_response(
         ctypes.byref(material),
         address(strain),
         address(base),
-        *(ctypes.c_double(number) for number in conditions),
+        *(ctypes.c_double(number) for number in (time, temperature, weight)),
         *(address(array) for array in found),
     )
     return found if solved == 1 else None
