@@ -192,7 +192,7 @@ def output_sensitivities(
     outputs, output_derivatives = setup.observation.observe_with_derivatives(setup.radii, profiles)
     output_columns = output_derivatives @ change.surface
     output_columns[0, 1:] = output_columns[1, 1:] if len(output_columns) > 1 else 0.0
-    velocities = directions.velocities.reshape(len(lengths), -1, 2)
+    velocities = directions.velocities.reshape(len(lengths), len(setup.model.nodes), 2)
     for k, radial_velocity in enumerate(velocities[:, setup.model.top, 0]):
         output_columns[:, :, theta.size + len(loads) + k] += setup.observation.node_derivatives(
             setup.radii, profiles, radial_velocity
