@@ -164,17 +164,23 @@ def block_of(values: Sequence[Any]) -> Block | None:
     return next((block for block in blocks if block.outer is not None), blocks[0] if blocks else None)
 
 
+def _common_block(values: Sequence[Any]) -> Block:
+    """The innermost block of some values, one of which at least is a Value."""
+    block = block_of(values)
+    if block is None:
+        raise TypeError(f"an instruction of constants only: {values}")
+    return block
+
+
 def operation(instruction: str, a: Any, b: Any, kind: str = DOUBLE) -> Value:
     """An instruction with two operands, and a result, of one kind; one of the operands at least is a Value."""
-    block = block_of((a, b))
-    assert block is not None
+    block = _common_block((a, b))
     return block.write(f"{instruction} {block.type_of(kind)} {block.text_of(a, kind)}, {block.text_of(b, kind)}", kind)
 
 
 def comparison(relation: str, a: Any, b: Any) -> Value:
     """A comparison of two doubles, `relation` as LLVM names it."""
-    block = block_of((a, b))
-    assert block is not None
+    block = _common_block((a, b))
     operands = f"{block.text_of(a, DOUBLE)}, {block.text_of(b, DOUBLE)}"
     return block.write(f"fcmp {relation} {block.type_of(DOUBLE)} {operands}", CONDITION)
 
@@ -183,8 +189,7 @@ def select(condition: Value | bool, a: Any, b: Any) -> Any:
     """Return a where the condition holds, else b."""
     if not isinstance(condition, Value):
         return a if condition else b
-    block = block_of((condition, a, b))
-    assert block is not None
+    block = _common_block((condition, a, b))
     operands = [
         f"{block.type_of(kind)} {block.text_of(value, kind)}"
         for value, kind in ((condition, CONDITION), (a, DOUBLE), (b, DOUBLE))
@@ -209,22 +214,19 @@ def _cast(instruction: str, value: Value, kind: str) -> Value:
 
 def call_intrinsic(name: str, *arguments: Any) -> Value:
     """An LLVM intrinsic of doubles."""
-    block = block_of(arguments)
-    assert block is not None
+    block = _common_block(arguments)
     return _call(block, block.module.intrinsic(name, block, len(arguments)), arguments)
 
 
 def call_formula(formula: Callable[..., Any], *arguments: Any) -> Value:
     """A call of a formula's function, which is defined where it is not yet."""
-    block = block_of(arguments)
-    assert block is not None
+    block = _common_block(arguments)
     return _call(block, block.module.function(formula, block, len(arguments)), arguments)
 
 
 def call_libm(name: str, *arguments: Any) -> Value:
     """A function of the C library, lane by lane."""
-    block = block_of(arguments)
-    assert block is not None
+    block = _common_block(arguments)
     declared = ", ".join([DOUBLE] * len(arguments))
     block.module.add(name, f"declare {DOUBLE} @{name}({declared}) {FUNCTION_ATTRIBUTES}")
     if block.lanes == 1:
