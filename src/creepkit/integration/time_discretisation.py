@@ -17,7 +17,6 @@ from creepkit.arrays import Floats
 from creepkit.integration.time_transformation import SMALLEST_EXPONENT, TimeTransformation, TransformedTime
 from creepkit.records import Program
 
-
 __all__ = [
     "SDIRK2",
     "SDIRK4",
