@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
+from creepkit.errors import SolveError
 from creepkit.fem import solver
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.mesh import GeometryDerivative
@@ -150,6 +151,10 @@ def simulate(
     directions : differentiate the accepted steps to the law's parameters and to these (`sensitivity_directions`).
     """
     theta = np.ascontiguousarray(theta, dtype=float)
+    if theta.shape != (len(law.names),):
+        raise SolveError(
+            f"theta has the shape {theta.shape}, but the law needs {len(law.names)} numbers: {', '.join(law.names)}"
+        )
     beta = float(np.asarray(law.leading_exponent(theta))) if same_steps_as is None else same_steps_as.beta
     script = np.zeros((0, 2)) if same_steps_as is None else same_steps_as.positions
     pattern = np.zeros(model.equations.size) if load_history.pattern is None else np.ravel(load_history.pattern)
