@@ -164,13 +164,13 @@ def growth(page: Page, repeats: int) -> None:
     for what, rows in sizes.items():
         for value, cost in rows:
             page.row(what, value, f"{cost:.2f}", f"{cost / rows[0][1]:.1f}")
-    case, cores = Case("combined"), len(os.sched_getaffinity(0))
+    case, cores, first = Case("combined"), len(os.sched_getaffinity(0)), 0.0
     for threads in sorted({1, cores}):
         with ThreadPoolExecutor(threads) as pool:
             start = time.perf_counter()
             list(pool.map(lambda _: case.predict(), range(40)))
             wall = 1e3 * (time.perf_counter() - start) / 40
-        first = wall if threads == 1 else first
+        first = first or wall
         page.row("threads: wall time a prediction, of 40", threads, f"{wall:.2f}", f"{wall / first:.2f}")
 
 
