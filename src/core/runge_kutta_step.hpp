@@ -59,8 +59,9 @@ struct LawCall {
 struct StepWorkspace {
     int64_t states, parameters, stages;
     double *value, *change, *new_value, *new_change, *slopes, *slope_changes, *base, *base_change;
-    double *times, *past_slopes, *row, *out, *full, *gradient, *matrix, *response;
+    double *past_slopes, *row, *out, *full, *gradient, *matrix, *response;
     double *clock_change, *nudged, *nudged_value;
+    TimeAndPace* times;
     StageProblem* problems;
 
     StepWorkspace(Workspace& memory, int64_t states, int64_t parameters, int64_t stages)
@@ -74,7 +75,7 @@ struct StepWorkspace {
         slope_changes = memory.doubles(stages * size * parameters);
         base = memory.doubles(stages * size);
         base_change = memory.doubles(size * parameters);
-        times = memory.doubles(stages);
+        times = memory.array<TimeAndPace>(stages);
         past_slopes = memory.doubles(stages);
         row = memory.doubles(width);
         out = memory.doubles(size * (1 + width));
@@ -110,7 +111,8 @@ inline StageProblem set_stage(const StressControl& drive, const Segment& segment
     const TimeAndPace now = clock.at(s + tableau.c[i] * h);
     const double elapsed = now.time - segment.start, strain = base[0] > 0.0 ? base[0] : 0.0;
     const double driving = segment.stress + segment.stress_rate * elapsed - drive.stiffness * strain;
-    work.times[i] = work.row[TIME] = now.time;
+    work.times[i] = now;
+    work.row[TIME] = now.time;
     work.row[TEMPERATURE] = segment.temperature + segment.temperature_rate * elapsed;
     const double trial = drive.load != 0.0 ? driving * exp(drive.load * strain) : driving;
     return work.problems[i] = {trial, drive.stiffness, drive.load, tableau.diagonal(i) * h * now.pace, strain};
@@ -170,7 +172,7 @@ inline void chain_stage_response(const StressControl& drive, const Segment& segm
         for (int64_t k = 0; k < size * count; ++k) work.base_change[k] += weight * changes[k];
     }
     const StageProblem& problem = work.problems[i];
-    const TransformationDerivatives moved = transformation_derivatives(clock, s + tableau.c[i] * h);
+    const TransformationDerivatives moved = clock.derivatives(s + tableau.c[i] * h, work.times[i]);
     const double growth = drive.load != 0.0 ? exp(drive.load * problem.strain) : 1.0;
     const double trial_by_strain = drive.load * problem.trial - drive.stiffness * growth;
     const double trial_by_time = segment.stress_rate * growth, share = tableau.diagonal(i) * h;
@@ -201,8 +203,9 @@ inline int64_t differentiate(const LawCall& law, const StressControl& drive, con
     for (int64_t i = 0; i < tableau.stages; ++i) {
         const StageProblem& problem = work.problems[i];
         const double share = tableau.diagonal(i) * h, increment = share * work.slopes[i * size];
-        work.row[TIME] = work.times[i];
-        work.row[TEMPERATURE] = segment.temperature + segment.temperature_rate * (work.times[i] - segment.start);
+        const double time = work.times[i].time;
+        work.row[TIME] = time;
+        work.row[TEMPERATURE] = segment.temperature + segment.temperature_rate * (time - segment.start);
         for (int64_t v = 1; v < size; ++v) {
             work.row[POINT_SIZE + v - 1] = work.base[i * size + v] + share * work.slopes[i * size + v];
         }
@@ -252,8 +255,9 @@ inline void dense_sensitivity(const SegmentClock& clock, const Tableau& tableau,
         const double* changes = work.slope_changes + (i * size + v) * count;
         for (int64_t p = 0; p < count; ++p) change[p] += weight * changes[p];
     }
-    const TransformationDerivatives moved = transformation_derivatives(clock, place);
-    const double rate = slope / clock.at(place).pace;
+    const TimeAndPace now = clock.at(place);
+    const TransformationDerivatives moved = clock.derivatives(place, now);
+    const double rate = slope / now.pace;
     const double by_beta = rate * moved.by_beta.time, by_tau = rate * moved.by_tau.time;
     for (int64_t p = 0; p < count; ++p) {
         change[p] -= by_beta * work.clock_change[p] + by_tau * work.clock_change[count + p];
