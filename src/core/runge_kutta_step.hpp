@@ -51,7 +51,7 @@ struct LawCall {
 // slopes, slope_changes : (stages, V), (stages, V, P) d/ds at the stages
 // base, base_change     : (stages, V), (V, P) history of the stages, and of the stage at hand
 // problems, times       : (stages,) what each stage was solved for, and when, s
-// past_slopes           : (stages,) of strain in the step before
+// past_slopes           : (stages, V) of the step before
 // row, out, full        : input and outputs of the law
 // gradient, matrix, response : for differentiate_stage
 // clock_change          : (2, P) of beta and tau
@@ -76,7 +76,7 @@ struct StepWorkspace {
         base = memory.doubles(stages * size);
         base_change = memory.doubles(size * parameters);
         times = memory.array<TimeAndPace>(stages);
-        past_slopes = memory.doubles(stages);
+        past_slopes = memory.doubles(stages * size);
         row = memory.doubles(width);
         out = memory.doubles(size * (1 + width));
         full = memory.doubles(size * (1 + width + parameters));
@@ -138,9 +138,14 @@ inline int64_t advance(const LawCall& law, const StressControl& drive, const Seg
         const double share = tableau.diagonal(i) * h;
         const double *base = work.base + i * size, *before = i > 0 ? work.slopes + (i - 1) * size : nullptr;
         double* slopes = work.slopes + i * size;
-        for (int64_t v = 1; v < size; ++v) work.row[POINT_SIZE + v - 1] = base[v] + (before ? share * before[v] : 0.0);
         double guess = predictor.slope(i, start.slope, work.slopes, size, work.past_slopes, start.length / h);
         if (!(guess > 0.0)) guess = before ? before[0] : FIRST_SLOPE;
+        for (int64_t v = 1; v < size; ++v) {
+            const double first = start.length > 0.0 ? work.past_slopes[(work.stages - 1) * size + v] : NAN;
+            const double state_slope =
+                predictor.slope(i, first, work.slopes + v, size, work.past_slopes + v, start.length / h);
+            work.row[POINT_SIZE + v - 1] = base[v] + (isfinite(state_slope) ? share * state_slope : 0.0);
+        }
         StageSolution answer = {0.0, TOO_MANY};
         if (size == 1 && problem.trial > 0.0) {
             answer = solve_stage_near_guess(law.update, law.theta, drive.axes, problem, work.row, work.out,
