@@ -182,7 +182,7 @@ private:
     // Make the end of the step the start of the next.
     void accept() const {
         for (int64_t v = 0; v < work.unknowns(); ++v) work.value[v] = work.new_value[v];
-        for (int64_t i = 0; i < work.stages; ++i) work.past_slopes[i] = work.slopes[i * work.unknowns()];
+        for (int64_t k = 0; k < work.stages * work.unknowns(); ++k) work.past_slopes[k] = work.slopes[k];
         if (!record.jacobian) return;
         for (int64_t k = 0; k < work.unknowns() * work.parameters; ++k) work.change[k] = work.new_change[k];
     }
