@@ -22,14 +22,4 @@ constexpr int LAW_ROWS = 8;  // points of one call, beside single ones
 
 enum LawInput { STRESS, STRAIN, TIME, TEMPERATURE, PRINCIPAL_STRESS, MEAN_STRESS, POINT_SIZE };
 
-inline int64_t call_eight(LawEntry entry, const double* x, const double* theta, double* out, int width, int columns) {
-    for (int l = 0; l < 8; ++l) {
-        double row[32], result[512];
-        for (int j = 0; j < width; ++j) row[j] = x[8 * j + l];
-        entry(1, row, theta, result);
-        for (int j = 0; j < columns; ++j) out[8 * j + l] = result[j];
-    }
-    return 0;
-}
-
 }  // namespace creepkit

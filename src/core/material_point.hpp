@@ -226,7 +226,7 @@ inline PointFlag creep_increments(const PointLaw& law, const StageConditions& st
         store(x + STRAIN * EIGHT, strain + increment);
         store(x + PRINCIPAL_STRESS * EIGHT, mean + top * stress);
         store(x + MEAN_STRESS * EIGHT, mean);
-        call_eight(law.update, x, law.theta, out, 6, 7);
+        law.update(EIGHT, x, law.theta, out);
         by_principal = load(out + (1 + PRINCIPAL_STRESS) * EIGHT);
         by_mean = load(out + (1 + MEAN_STRESS) * EIGHT);
         by_strain = load(out + (1 + STRAIN) * EIGHT);

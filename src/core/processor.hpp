@@ -1,44 +1,15 @@
-// How many numbers of double the widest vectors of this processor hold, out of those that the core is compiled for.
-//
-// Intel, Software Developer's Manual, vol. 1, 14.3 and 15.2: the processor must have the instructions (cpuid), and the
-// operating system must keep their registers (xgetbv). The compiler's own test of this needs its run-time library, which
-// not every compiler has.
+// How many numbers of double the vectors hold that the core calculates with on this processor.
 #pragma once
 
 #include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#if defined(CREEPKIT_HAS_X86_LANES)
-#include <cpuid.h>
-#endif
 
 namespace creepkit {
 
-// 8 with AVX-512 F, DQ and VL, 4 with AVX2 and FMA, else 2.
-inline int64_t processor_lanes() {
-#if defined(CREEPKIT_HAS_X86_LANES)
-    constexpr uint32_t FMA = 1u << 12, OSXSAVE = 1u << 27, AVX = 1u << 28;                // leaf 1, ecx
-    constexpr uint32_t AVX2 = 1u << 5, AVX512 = 1u << 16 | 1u << 17 | 1u << 31;           // leaf 7, ebx: F, DQ, VL
-    constexpr uint32_t YMM = 1u << 1 | 1u << 2, ZMM = YMM | 1u << 5 | 1u << 6 | 1u << 7;  // xcr0
-    uint32_t a, b, c, d, features, kept, upper;
-    if (!__get_cpuid(1, &a, &b, &c, &d) || (c & (FMA | OSXSAVE | AVX)) != (FMA | OSXSAVE | AVX)) return 2;
-    if (!__get_cpuid_count(7, 0, &a, &features, &c, &d)) return 2;
-    __asm__ volatile("xgetbv" : "=a"(kept), "=d"(upper) : "c"(0));
-    if ((kept & YMM) != YMM || !(features & AVX2)) return 2;
-    return (kept & ZMM) == ZMM && (features & AVX512) == AVX512 ? 8 : 4;
-#else
-    return 2;
-#endif
-}
+// Of those that the core is compiled for, the most that the processor has: 8 with AVX-512 F, DQ and VL, 4 with AVX2 and
+// FMA, else 2.
+int64_t processor_lanes();
 
 // Those of the processor, or the fewer that the environment variable CREEPKIT_LANES asks for: 2, 4 or 8.
-inline int64_t chosen_lanes() {
-    const int64_t most = processor_lanes();
-    const char* wanted = getenv("CREEPKIT_LANES");
-    if (!wanted || strlen(wanted) != 1) return most;
-    const int64_t lanes = wanted[0] - '0';
-    return (lanes == 2 || lanes == 4 || lanes == 8) && lanes <= most ? lanes : most;
-}
+int64_t chosen_lanes();
 
 }  // namespace creepkit

@@ -257,7 +257,7 @@ private:
             store(law_input + (POINT_SIZE + z) * EIGHT,
                   load(history + EIGHT * v) + share * load(points.slopes + (i * points.values + v) * points.count + k));
         }
-        call_eight(law.sensitivity, law_input, law.theta, law_output, int(6 + states), int(unknowns * (1 + POINT_SIZE + states + law.parameters)));
+        law.sensitivity(EIGHT, law_input, law.theta, law_output);
         if (states == 0) {
             const Eight weight = select(increment > zero, Eight(stage.weight), zero);
             const auto slope = [&](int64_t column) {

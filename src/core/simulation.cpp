@@ -1,36 +1,28 @@
-// The simulation of a body, in finite elements or in a reduced-order model, for the vectors that this processor has;
-// see lanes/simulation.cpp for its arguments.
+// Simulations in finite elements and in reduced-order models, for the vectors that this processor has; the files of
+// lanes/ describe the arguments.
 #include "export.hpp"
-#include "processor.hpp"
+#include "lane_functions.hpp"
 
-using Simulate = void(const void*, const void*, const void*, const void*, void*, const void*, void*, void*);
-
-extern "C" {
-Simulate creepkit_simulate_2, creepkit_simulate_reduced_2;
-#if defined(CREEPKIT_HAS_X86_LANES)
-Simulate creepkit_simulate_4, creepkit_simulate_8, creepkit_simulate_reduced_4, creepkit_simulate_reduced_8;
-#endif
-}
+CREEPKIT_LANE_FUNCTIONS(creepkit_simulate, void,
+                        (const void*, const void*, const void*, const void*, void*, const void*, void*, void*));
+CREEPKIT_LANE_FUNCTIONS(creepkit_simulate_reduced, void,
+                        (const void*, const void*, const void*, const void*, void*, const void*, void*, void*));
+CREEPKIT_LANE_FUNCTIONS(creepkit_assemble, int64_t,
+                        (const void*, const void*, const void*, const double*, const double*, double*, double*));
 
 CREEPKIT_API void creepkit_simulate(const void* model, const void* law, const void* input, const void* settings,
                                     void* record, const void* directions, void* derivatives, void* ended) {
-    Simulate* simulate = creepkit_simulate_2;
-#if defined(CREEPKIT_HAS_X86_LANES)
-    const int64_t lanes = creepkit::chosen_lanes();
-    simulate = lanes == 8 ? creepkit_simulate_8 : lanes == 4 ? creepkit_simulate_4 : creepkit_simulate_2;
-#endif
-    simulate(model, law, input, settings, record, directions, derivatives, ended);
+    CHOOSE_LANE_FUNCTION(creepkit_simulate)(model, law, input, settings, record, directions, derivatives, ended);
 }
 
 CREEPKIT_API void creepkit_simulate_reduced(const void* model, const void* law, const void* input,
                                             const void* settings, void* record, const void* directions,
                                             void* derivatives, void* ended) {
-    Simulate* simulate = creepkit_simulate_reduced_2;
-#if defined(CREEPKIT_HAS_X86_LANES)
-    const int64_t lanes = creepkit::chosen_lanes();
-    simulate = lanes == 8   ? creepkit_simulate_reduced_8
-               : lanes == 4 ? creepkit_simulate_reduced_4
-                            : creepkit_simulate_reduced_2;
-#endif
-    simulate(model, law, input, settings, record, directions, derivatives, ended);
+    CHOOSE_LANE_FUNCTION(creepkit_simulate_reduced)
+    (model, law, input, settings, record, directions, derivatives, ended);
+}
+
+CREEPKIT_API int64_t creepkit_assemble(const void* model, const void* law, const void* stage, const double* history,
+                                       const double* displacement, double* residual, double* tangent) {
+    return CHOOSE_LANE_FUNCTION(creepkit_assemble)(model, law, stage, history, displacement, residual, tangent);
 }

@@ -22,11 +22,26 @@ struct StageSolution {
     int64_t flag;
 };
 
+// Bound of the error of D that a Newton correction of `step` leaves, relative to D.
+//
+// That error is curvature/2 step^2 with the curvature of ln D - ln w - ln f in x. Strain, where it enters at all, is
+// taken to enter as powers and sums of powers with exponents up to some four, stress as a power.
+inline double error_left(const StageIterate& now, const StageProblem& problem, double by_strain, double by_stress,
+                         double slope, double step) {
+    const double share = now.increment / (problem.strain + now.increment);
+    const double curvature = 4.0 * fabs(by_strain) + (by_strain != 0.0 ? share * share : 0.0) + 2.0 * fabs(by_stress) +
+                             now.increment_slope * (1.0 - now.increment_slope);
+    return curvature / slope * step * step;
+}
+
 // Newton's method in x, bracketed: it cannot fail where the rate falls with strain and rises with stress.
+//
+// negligible : error of D that need not be removed, beside the tolerance.
 inline StageSolution solve_scalar_stage(LawEntry update, const double* theta, const Axes& axes,
                                         const StageProblem& problem, double* row, double* out, double guess,
-                                        double tolerance) {
+                                        double tolerance, double negligible = 0.0) {
     constexpr int ITERATIONS = 80;
+    constexpr double SMALL = 0.3;  // corrections so small let `error_left` be trusted
     double x = unknown_of_increment(problem, guess), low = -INFINITY, high = INFINITY, before = INFINITY;
     const double log_weight = log(problem.weight);
     for (int iteration = 0; iteration < ITERATIONS; ++iteration) {
@@ -41,14 +56,16 @@ inline StageSolution solve_scalar_stage(LawEntry update, const double* theta, co
         const double residual = nothing ? INFINITY : now.log_increment - log_weight - out[0];
         if (!isfinite(residual) && !nothing) return {0.0, NOT_FINITE};
         // d(ln D - ln w - ln f)/dx: between 1 and the stress exponent for a hardening law under prescribed strain
-        const double slope = nothing ? 1.0
-                                     : now.increment_slope - now.increment * now.increment_slope * out[1 + STRAIN] -
-                                           now.stress * now.stress_slope * stress_derivative(out, 1, axes);
+        const double by_strain = nothing ? 0.0 : now.increment * now.increment_slope * out[1 + STRAIN];
+        const double by_stress = nothing ? 0.0 : now.stress * now.stress_slope * stress_derivative(out, 1, axes);
+        const double slope = nothing ? 1.0 : now.increment_slope - by_strain - by_stress;
         (residual > 0.0 ? high : low) = x;
         const bool closed = isfinite(low) && isfinite(high);
         if (!(slope > 0.0) && !closed) return {0.0, NO_SOLUTION};
         double step = slope > 0.0 ? -residual / slope : INFINITY;
-        if (fabs(step) <= tolerance) {
+        if (fabs(step) <= tolerance ||
+            (fabs(step) < SMALL &&
+             now.increment * error_left(now, problem, by_strain, by_stress, slope, step) < negligible)) {
             now = increment_and_stress(problem, x + step);
             write_point(row, axes, now.stress, problem.strain + now.increment);
             return {now.increment, SOLVED};
@@ -63,32 +80,46 @@ inline StageSolution solve_scalar_stage(LawEntry update, const double* theta, co
     return {0.0, TOO_MANY};
 }
 
-// As `solve_stage`, for a law without states under k > 0, from a good guess: no bracket and half of the logarithms.
+// As `solve_stage`, for a law without states and a trial stress above zero, from a good guess: no bracket and half of
+// the logarithms.
 //
-// TOO_MANY when the guess was not good enough. A finite element asks for little else, nearly always from next to the
-// answer.
+// TOO_MANY when the guess was not good enough. Finite elements and integrators ask for little else, nearly always from
+// next to the answer. negligible : error of D that need not be removed, beside the tolerance.
 inline StageSolution solve_stage_near_guess(LawEntry update, const double* theta, const Axes& axes,
                                             const StageProblem& problem, double* row, double* out, double guess,
-                                            double tolerance) {
+                                            double tolerance, double negligible = 0.0) {
     constexpr int ITERATIONS = 4;
-    double increment = guess, share = problem.stiffness * increment / problem.trial;
-    const double log_weight = log(problem.weight);
+    constexpr double SMALL = 0.3;  // corrections so small let `error_left` be trusted
+    const bool relaxes = problem.stiffness > 0.0;
+    double increment = guess, share = relaxes ? problem.stiffness * increment / problem.trial : 0.0;
     for (int iteration = 0; iteration < ITERATIONS; ++iteration) {
-        if (!(1e-280 < share && share < 0.9999)) break;
-        const double elastic = 1.0 - share, stress = problem.trial * elastic;
+        if (!(relaxes ? 1e-280 < share && share < 0.9999 : 1e-280 < increment && increment < 1e3)) break;
+        const double elastic = 1.0 - share;
+        double stress = problem.trial * elastic;
+        if (problem.load > 0.0) stress *= exp(problem.load * increment);
         write_point(row, axes, stress, problem.strain + increment);
         update(1, row, theta, out);
-        if (out[0] < NO_RATE) break;
-        const double residual = log(increment) - log_weight - out[0];
-        const double slope =
-            elastic * (1.0 - increment * out[1 + STRAIN]) + share * stress * stress_derivative(out, 1, axes);
-        const double step = -residual / slope;
+        if (!(out[0] >= NO_RATE)) break;
+        const double residual = log(increment / problem.weight) - out[0];
+        const double stress_slope = problem.load > 0.0 ? problem.load * increment : -share;
+        const double by_strain = increment * elastic * out[1 + STRAIN];
+        const double by_stress = stress * stress_slope * stress_derivative(out, 1, axes);
+        const double slope = elastic - by_strain - by_stress, step = -residual / slope;
         if (!(slope > 0.0 && fabs(step) < 1.0)) break;
-        const double ratio = share / elastic * exp(step);
-        share = ratio / (1.0 + ratio);
-        increment = problem.trial / problem.stiffness * share;
-        if (fabs(step) <= tolerance) {
-            write_point(row, axes, problem.trial * (1.0 - share), problem.strain + increment);
+        const StageIterate now = {increment, 0.0, stress, elastic, stress_slope};
+        const double left = increment * error_left(now, problem, by_strain, by_stress, slope, step);
+        const bool enough = fabs(step) <= tolerance || (fabs(step) < SMALL && left < negligible);
+        if (relaxes) {
+            const double ratio = share / elastic * exp(step);
+            share = ratio / (1.0 + ratio);
+            increment = problem.trial / problem.stiffness * share;
+        } else {
+            increment *= exp(step);
+        }
+        if (enough) {
+            stress = problem.trial * (1.0 - share);
+            if (problem.load > 0.0) stress *= exp(problem.load * increment);
+            write_point(row, axes, stress, problem.strain + increment);
             return {increment, SOLVED};
         }
     }
@@ -166,7 +197,7 @@ inline StageSolution solve_stage_with_states(LawEntry update, const double* thet
 // Solve a stage.
 inline StageSolution solve_stage(LawEntry update, const double* theta, const Axes& axes, const StageProblem& problem,
                                  const double* states, int64_t state_count, double* row, double* out, double guess,
-                                 double tolerance) {
+                                 double tolerance, double negligible = 0.0) {
     if (state_count > 0) {
         return solve_stage_with_states(update, theta, axes, problem, states, state_count, row, out, guess, tolerance);
     }
@@ -174,7 +205,7 @@ inline StageSolution solve_stage(LawEntry update, const double* theta, const Axe
         write_point(row, axes, 0.0, problem.strain);
         return {0.0, problem.trial == 0.0 ? SOLVED : NO_SOLUTION};
     }
-    return solve_scalar_stage(update, theta, axes, problem, row, out, guess, tolerance);
+    return solve_scalar_stage(update, theta, axes, problem, row, out, guess, tolerance, negligible);
 }
 
 }  // namespace creepkit

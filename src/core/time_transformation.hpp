@@ -48,4 +48,85 @@ inline TimeTransformation power_law_time(double start, double length, double bet
     return {start, length, fmin(fmax(beta, SMALLEST_EXPONENT), 1.0), 0.0};
 }
 
+constexpr double LARGEST_POWER = 12.0;   // bound of |beta| ln(1 + L/tau): (1 + y/tau)^beta keeps ten digits next to 1
+constexpr double LONGEST_SHIFT = 1e6;    // a shift so much longer than the segment bends nothing within it
+constexpr double SHORTEST_SHIFT = 1e-30;  // nor can one so much shorter be told from none
+
+// Of a segment that begins after some creep.
+//
+// With p'' = r p', a curve (1 + y/tau)^beta has r = (beta - 1)/(tau + y), so r = bend and its rate give beta and tau.
+inline TimeTransformation shifted_power_law_time(double start, double length, double bend, double bend_rate) {
+    if (!(isfinite(bend) && isfinite(bend_rate)) || bend >= 0.0 || bend_rate <= 0.0) return linear_time(start, length);
+    const double tau = -bend / bend_rate;
+    if (!(SHORTEST_SHIFT * length < tau && tau < LONGEST_SHIFT * length)) return linear_time(start, length);
+    const double bound = LARGEST_POWER / log1p(length / tau), free = 1.0 + bend * tau;
+    const double beta = free < -bound ? -bound : free > bound ? bound : free;
+    return {start, length, fabs(beta) < 1e-3 ? 1e-3 : beta, tau};
+}
+
+// A time, s, and dt/ds there.
+struct TimeAndPace {
+    double time, pace;
+};
+
+// A transformation with all that is constant over its segment worked out.
+struct SegmentClock {
+    TimeTransformation transformation;
+    double reach;  // (1 + L/tau)^beta - 1, where tau > 0
+    bool linear;   // s is proportional to time
+
+    explicit SegmentClock(const TimeTransformation& clock)
+        : transformation(clock),
+          reach(clock.tau == 0.0 ? 0.0 : expm1(clock.beta * log1p(clock.length / clock.tau))),
+          linear(clock.beta == 1.0) {}
+
+    // Time and pace at position s > 0, with one logarithm and one exponential.
+    TimeAndPace at(double s) const {
+        const TimeTransformation& clock = transformation;
+        if (linear) return {clock.start + clock.length * s, clock.length};
+        if (clock.tau == 0.0) {
+            const double elapsed = clock.length * exp(log(s) / clock.beta);
+            return {clock.start + elapsed, elapsed / (clock.beta * s)};
+        }
+        const double growth = s * reach, elapsed = clock.tau * expm1(log1p(growth) / clock.beta);
+        return {clock.start + elapsed, (clock.tau + elapsed) * reach / (clock.beta * (1.0 + growth))};
+    }
+
+    // Position of a time in the segment.
+    double position(double time) const {
+        const TimeTransformation& clock = transformation;
+        const double elapsed = time - clock.start;
+        if (elapsed <= 0.0) return 0.0;
+        if (linear) return elapsed / clock.length;
+        if (clock.tau == 0.0) return exp(clock.beta * log(elapsed / clock.length));
+        return expm1(clock.beta * log1p(elapsed / clock.tau)) / reach;
+    }
+};
+
+// Derivatives of time and of ln(dt/ds) to beta and to tau at a fixed position.
+struct TransformationDerivatives {
+    TransformedTime by_beta, by_tau;
+};
+
+inline TransformationDerivatives transformation_derivatives(const SegmentClock& segment_clock, double s) {
+    const double beta = segment_clock.transformation.beta, tau = segment_clock.transformation.tau;
+    const double length = segment_clock.transformation.length, reach = segment_clock.reach;
+    if (tau == 0.0) {
+        const double logarithm = log(s), slope = -logarithm / (beta * beta);
+        return {{length * exp(logarithm / beta) * slope, slope - 1.0 / beta}, {0.0, 0.0}};
+    }
+    const double ratio = log1p(length / tau), inner = 1.0 + s * reach, power = log1p(s * reach) / beta;
+    const double grown = exp(power);
+    // What goes through `reach`, which changes by `change`.
+    const auto through = [=](double change) -> TransformedTime {
+        const double rise = s * change / (beta * inner);
+        return {tau * grown * rise, rise + change / reach - s * change / inner};
+    };
+    const TransformedTime by_beta = through(ratio * (1.0 + reach));
+    const TransformedTime by_tau = through(-beta * (1.0 + reach) * length / (tau * (tau + length)));
+    const double shrink = power / beta;
+    return {{by_beta.time - tau * grown * shrink, by_beta.log_pace - shrink - 1.0 / beta},
+            {by_tau.time + expm1(power), by_tau.log_pace + 1.0 / tau}};
+}
+
 }  // namespace creepkit

@@ -7,6 +7,9 @@ Kernel and hand-written code run alternately on the same points (20,000 rows by 
 "derivatives" the rate with its derivatives to stress, strain, time and every parameter. Compiled functions (numba) are
 called for all rows at once, torch runs on one thread. A call of a kernel costs some 10 us more than its arithmetic in
 NumPy and some 50 us in torch, which a few thousand rows make small.
+
+The second table calls compiled entries from compiled code, for one point and for a vector of eight, as the solvers do;
+the least of the repeats.
 """
 
 from __future__ import annotations
@@ -16,17 +19,17 @@ import math
 import statistics
 import time
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 import torch
 from hand_written_laws import LAWS
 from measured import Page, arguments
-from numba import njit
+from numba import float64, int64, njit
 
 import creepkit as ck
-from creepkit.kernels.interface import CompiledLaw
+from creepkit.kernels.interface import ENTRY_TYPE, CompiledLaw, Entry, data_pointer
 from creepkit.language import CreepLaw
 
 REPEATS = 31
@@ -57,6 +60,15 @@ def main() -> None:
             (rate, rate_seconds), (all_, all_seconds) = compare_with_hand(ck.law(name), target, options.rows)
             times = (f"{1e9 * seconds / options.rows:.1f}" for seconds in (rate_seconds, all_seconds))
             page.row(name, target, f"{rate:.2f}", f"{all_:.2f}", *times)
+    page.table(
+        "law", *(f"{entry}, ns a point: {n}" for entry in ("update", "sensitivity") for n in ("1", "8", "1 over 8"))
+    )
+    for name in options.laws:
+        cells: list[str] = []
+        for entry in ("update", "sensitivity"):
+            one, eight = (nanoseconds_a_point(ck.law(name), entry, rows) for rows in (1, 8))
+            cells += [f"{one:.1f}", f"{eight:.2f}", f"{one / eight:.1f}"]
+        page.row(name, *cells)
     if options.write:
         page.write()
 
@@ -117,17 +129,21 @@ def array_runs(
 
 def numba_runs(law: CreepLaw, points: Any, values: dict[str, float]) -> list[tuple[Run, Run]]:
     """Compiled loops over rows."""
-    compiled = ck.lower(law, "numba")
-    x = np.column_stack([points, np.ones(len(points)), points[:, 0], points[:, 0] / 3])
+    compiled, x = ck.lower(law, "numba"), all_variables(points)
     theta, given = law.to_internal(values)[0], tuple(values.values())
     rate, derivatives = (
         loop_by_hand(f, several) for f, several in zip(LAWS[law.name](math), (False, True), strict=True)
     )
-    one, many = np.empty((len(x), 1)), np.empty((len(x), 7 + theta.size))
+    one, many, by_column = np.empty((len(x), 1)), np.empty((len(x), 7 + theta.size)), np.ascontiguousarray(x.T)
     return [
-        (partial(rate, x, given, one), entry_call(compiled, "rate", x, theta, one)),
-        (partial(derivatives, x, given, many), entry_call(compiled, "sensitivity", x, theta, many)),
+        (partial(rate, x, given, one), entry_call(compiled, "rate", by_column, theta, one)),
+        (partial(derivatives, x, given, many), entry_call(compiled, "sensitivity", by_column, theta, many)),
     ]
+
+
+def all_variables(points: Any) -> Any:
+    """Points (points, 6) from stress, strain and time, (points, 3)."""
+    return np.column_stack([points, np.ones(len(points)), points[:, 0], points[:, 0] / 3])
 
 
 def loop_by_hand(function: Callable[..., Any], several: bool) -> Callable[..., Any]:
@@ -150,13 +166,41 @@ def loop_by_hand(function: Callable[..., Any], several: bool) -> Callable[..., A
 
 
 def entry_call(compiled: CompiledLaw, entry: str, x: Any, theta: Any, out: Any) -> Run:
-    """A call of a compiled entry through its C pointer."""
+    """A call of a compiled entry through its C pointer; x (6, points)."""
     double = ctypes.POINTER(ctypes.c_double)
     function = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, double, double, double)(
         getattr(compiled, entry).address
     )
     pointers = [array.ctypes.data_as(double) for array in (x, theta, out)]
-    return lambda: function(len(x), *pointers)
+    return lambda: function(x.shape[1], *pointers)
+
+
+BLOCKS, CALLS = 64, 20_000
+"""Different groups of points, and calls that one measurement takes."""
+
+
+def nanoseconds_a_point(law: CreepLaw, entry: str, rows: int) -> float:
+    """CPU time of an entry that compiled code calls for so many points at once."""
+    compiled, theta = ck.lower(law, "numba"), law.to_internal(law.center())[0]
+    points = np.random.default_rng(1).uniform([20.0, 1e-4, 1e2], [200.0, 1e-1, 1e5], (BLOCKS * rows, 3))
+    x = np.ascontiguousarray(all_variables(points).reshape(BLOCKS, rows, 6).transpose(0, 2, 1))
+    out = np.empty((7 + theta.size) * rows)
+    run = partial(repeated_calls(), getattr(compiled, entry), rows, x.reshape(BLOCKS, -1), theta, out)
+    return 1e9 * min(cpu_seconds(run, 1) for _ in range(REPEATS)) / (CALLS * rows)
+
+
+@cache
+def repeated_calls() -> Callable[[Entry, int, Any, Any, Any], int]:
+    """A compiled loop that calls an entry for one group of points after the other, x (groups, 6 rows)."""
+
+    @njit(int64(ENTRY_TYPE, int64, float64[:, ::1], float64[::1], float64[::1]))
+    def run(entry, rows, x, theta, out):
+        flags = 0
+        for call in range(CALLS):
+            flags |= entry(rows, data_pointer(x[call % BLOCKS]), data_pointer(theta), data_pointer(out))
+        return flags
+
+    return run
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import creepkit
 ROOT = Path(creepkit.__file__).parent
 EXEMPT = ("fem/", "integration/", "specimens/bulge/reduced_order/", "example_data/")
 """Rebuilt by a later issue, or data."""
-GENERATED = ("kernels/numpy_functions.py", "kernels/numba_functions.py", "kernels/torch_functions.py")
+GENERATED = tuple(f"kernels/{kind}_functions.py" for kind in ("llvm", "numpy", "scalar", "torch"))
 """Functions that generated code calls, element by element."""
 
 ARRAY = re.compile(r"\b(Floats|Ints|Bools|NDArray|ndarray|ArrayLike|Tensor)\b")

@@ -1,19 +1,51 @@
 // The simulation of a finite element model, compiled once for each width of the processor's vectors.
-#define CREEPKIT_JOIN_(a, b) a##b
-#define CREEPKIT_JOIN(a, b) CREEPKIT_JOIN_(a, b)
-// a namespace of its own for each width: no inline function compiled for one processor is linked in place of another
-#define creepkit CREEPKIT_JOIN(creepkit_lanes_, CREEPKIT_LANES)
-
 #include "../finite_element_sensitivities.hpp"
 #include "../finite_elements.hpp"
+#include "../lane_functions.hpp"
 #include "../run_simulation.hpp"
 
 // Simulate a body under its load history, with sensitivities unless `directions` is null.
-extern "C" void CREEPKIT_JOIN(creepkit_simulate_, CREEPKIT_LANES)(
+extern "C" void LANE_FUNCTION(creepkit_simulate)(
     const creepkit::FiniteElementModel* model, const creepkit::PointLaw* law, const creepkit::SimulationInput* input,
     const creepkit::SolverSettings* settings, creepkit::StepRecord* record,
     const creepkit::SensitivityDirections* directions, creepkit::SensitivityRecord* derivatives,
     creepkit::Termination* ended) {
     creepkit::FiniteElements system(*model);
     *ended = creepkit::simulate(system, *law, *input, *settings, *record, directions, derivatives);
+}
+
+// Out-of-balance forces (size,) and, unless null, the tangent made symmetric (size, size), of given displacements.
+//
+// history : (points, 4 + S) creep components, equivalent creep strain and states at the start of the stage. Returns a
+// PointFlag, or -1 when there is no memory.
+extern "C" int64_t LANE_FUNCTION(creepkit_assemble)(
+    const creepkit::FiniteElementModel* model, const creepkit::PointLaw* law, const creepkit::StageConditions* stage,
+    const double* history, const double* displacement, double* residual, double* tangent) {
+    using namespace creepkit;
+    Workspace memory;
+    FiniteElements system(*model);
+    PointStates points;
+    const auto take = [&] {
+        system.take(memory);
+        points.take(memory, system.point_count(), law->states);
+    };
+    take();
+    if (!memory.allocate()) return -1;
+    take();
+    for (int64_t k = 0; k < points.count; ++k) {
+        points.trials[k] = -1.0;
+        for (int64_t v = 0; v < points.values; ++v) points.base[v * points.count + k] = history[k * points.values + v];
+        for (int64_t i = 0; i < points.states; ++i)
+            points.state[i * points.count + k] = history[k * points.values + EQUIVALENT_STRAIN + 1 + i];
+    }
+    const PointFlag flag = system.assemble<true>(*law, *stage, displacement, points, 1e-9);
+    if (flag != POINTS_SOLVED) return flag;
+    memcpy(residual, system.residual, sizeof(double) * size_t(model->size));
+    for (int64_t i = 0; tangent && i < model->size; ++i)
+        for (int64_t j = 0; j <= i; ++j) {
+            const bool inside = i / EIGHT - j / EIGHT < system.shape.diagonals;
+            tangent[i * model->size + j] = tangent[j * model->size + i] =
+                inside ? system.tangent[system.shape.place(i, j)] : 0.0;
+        }
+    return flag;
 }

@@ -83,7 +83,10 @@ def function(name: str, result: Any = ctypes.c_int64) -> Callable[..., Any]:
 
 
 def address(array: np.ndarray) -> ctypes.c_void_p:
-    """Address of the first number of a contiguous array of double or int64; the caller keeps the array alive."""
+    """Address of the first number of a contiguous array; the caller keeps it alive.
+
+    array : (...,) of float64 or int64.
+    """
     if array.dtype not in (np.float64, np.int64) or not array.flags.c_contiguous:
         raise TypeError(f"the core takes contiguous arrays of float64 or int64, found {array.dtype}")
     return ctypes.c_void_p(array.ctypes.data)

@@ -23,7 +23,8 @@ from creepkit.inverse.composite_predictor import compared_outputs, predict, pred
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import CREDIBLE_WEIGHT
 from creepkit.inverse.iterative_estimation import starting_point
-from creepkit.inverse.noise_model import NoiseModel, cholesky_factors
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history, usable_frames
 from creepkit.inverse.problem import EvaluationCache, LeastSquaresProblem
@@ -104,7 +105,7 @@ class ModelDiscrimination:
                 median_log_inverse_duration(made),
             ).with_nuisances(nuisances),
             settings=alternative.settings,
-            covariance_factor=cholesky_factors(residuals_at_measured_values(observations), noise_model),
+            covariance_factor=CovarianceFactor.of_residuals(residuals_at_measured_values(observations), noise_model),
         )
         return cls(problem, len(measured), tuple(d for d, _ in usable), alternative, noise_model)
 
@@ -138,7 +139,7 @@ class ModelDiscrimination:
         initial_values = {(nuisance.key, nuisance.owner): nuisance.value for nuisance in alternative.nuisances}
         x = problem.bounds.clip(starting_point(nuisances, alternative.u, initial_values))
         residuals = replace(problem.residuals(x), present=problem.observations.present)
-        return problem.with_covariance(cholesky_factors(residuals, self.noise_model)), x
+        return problem.with_covariance(CovarianceFactor.of_residuals(residuals, self.noise_model)), x
 
 
 def _without_rupture(history: History) -> History:

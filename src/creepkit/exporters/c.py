@@ -84,7 +84,7 @@ STABLE_FUNCTIONS: dict[str, tuple[tuple[str, ...], str]] = {
         "value >= other ? -exp(value) * expm1(other - value) : exp(other) * expm1(value - other)",
     ),
 }
-"""{name: (arguments, result)}, each after those it calls; the formulas are those of kernels.numba_functions."""
+"""{name: (arguments, result)}, each after those it calls; the formulas are those of kernels.scalar_functions."""
 
 
 STABLE_FUNCTION_NAMES = frozenset((*TARGET_FUNCTIONS, *STABLE_FUNCTIONS, "value", "other", "least"))

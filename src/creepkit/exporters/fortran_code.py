@@ -224,7 +224,7 @@ _FUNCTION_BODIES: dict[str, tuple[str, str, tuple[str, ...]]] = {
         ),
     ),
 }
-"""{name: (arguments, local variables, statements)}; the formulas are those of kernels.numba_functions.
+"""{name: (arguments, local variables, statements)}; the formulas are those of kernels.scalar_functions.
 
 Fortran has neither log1p nor expm1: 2 artanh(a/(2 + a)) and 2 sinh(a/2) exp(a/2) keep all digits near zero, whatever
 an optimiser does to sums.

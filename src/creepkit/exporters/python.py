@@ -286,7 +286,7 @@ def _scalar_dialect() -> PythonDialect:
     """One number at a time."""
     return PythonDialect(
         printer=_ScalarPrinter({"standard": "python3"}),
-        helpers=kernel_functions("numba_functions.py"),
+        helpers=kernel_functions("scalar_functions.py"),
         import_lines=_math_imports,
         log_expression=lambda name: f"log({name}) if {name} != 0.0 else -inf",
         context_manager="",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -84,6 +84,10 @@ class FiniteElementModel:
         )
         return gradients, hoops, directions.velocities
 
+    def __getstate__(self) -> dict[str, object]:
+        """All but the addresses for the core, which another process makes for itself."""
+        return {name: value for name, value in self.__dict__.items() if name != "compiled"}
+
 
 def finite_element_model(mesh: Mesh) -> FiniteElementModel:
     """Prepare a mesh; refuse one that nothing holds or that is inverted."""
@@ -159,7 +163,7 @@ class CompiledModel:
             *(address(array) for array in self._kept.values()),
         )  # fmt: skip
 
-    def padded(self, values: Floats) -> Floats:
+    def padded(self, values: Any) -> Any:
         """Values (elements, ...) of the elements, with those of the copy."""
         return np.concatenate([values, values[-1:]]) if len(values) < self.elements else values
 

@@ -83,7 +83,7 @@ class Simulation:
 
     times : (steps,) s, from rest at 0 on.
     displacements : (steps, nodes, 2) mm, u_r and u_z.
-    mises : (steps, points) MPa, von Mises stress of the Cauchy stress, or None if not kept.
+    mises : (steps, points) MPa, von Mises stress of the Cauchy stress.
     values : (steps, points, 4 + S) creep components, equivalent creep strain and states, or None if not kept.
     status, end_time, reason : how it ended; s.
     iterations : (4,) accepted and rejected steps; equilibrium iterations with and without a new tangent.
@@ -95,7 +95,7 @@ class Simulation:
 
     times: Floats
     displacements: Floats
-    mises: Floats | None
+    mises: Floats
     values: Floats | None
     status: Status
     end_time: float
@@ -145,7 +145,7 @@ def simulate(
 ) -> Simulation:
     """Simulate one body under its load history; theta : (P,) internal parameters.
 
-    keep_points : keep stresses, strains and states of all points.
+    keep_points : keep strains and states of all points.
     same_steps_as : make the very steps of another simulation, so that the two may be differenced.
     directions : differentiate the accepted steps to the law's parameters and to these (`sensitivity_directions`).
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from creepkit.arrays import Floats, Ints
 from creepkit.core import CoreStructure, address, function
 from creepkit.errors import SolveError
 from creepkit.kernels.interface import CompiledLaw
+
+if TYPE_CHECKING:
+    from creepkit.fem.finite_element_model import FiniteElementModel
 
 (
     REACHED_END, DEFLECTION_LIMIT, STRAIN_LIMIT, STATE_LIMIT, LIMIT_LOAD, LOST_CONVERGENCE, TOO_MANY_STEPS, LAW_FAILED,
@@ -21,8 +24,8 @@ from creepkit.kernels.interface import CompiledLaw
 
 
 START, END, PRESSURE = range(3)
-"""The first columns of a segment: times s, and the pressure at its start, MPa. Then follow, each at both ends, pressure,
-temperature K, modulus MPa, and motion of held nodes."""
+"""The first columns of a segment: times s, and the pressure at its start, MPa; at its end, and temperature K, modulus
+MPa and motion of held nodes at both ends follow."""
 
 
 CREEP_COMPONENTS, EQUIVALENT_STRAIN, MAX_STATES = 3, 3, 16
@@ -52,7 +55,7 @@ class StepRecord(NamedTuple):
     """Accepted steps of a simulation, from rest at 0 s on.
 
     times : (steps,) s. segments : (steps,) of each. displacements : (steps, 2 nodes) mm.
-    values : (steps, points, 4 + S) or None. mises : (steps, points) MPa, or None.
+    values : (steps, points, 4 + S) or None. mises : (steps, points) MPa.
     positions : (steps, 2) where a step began in its segment, and its length, in the transformed time.
     counts : (4,) accepted and rejected steps; equilibrium passes with and without a new tangent.
     code, time : how it ended, and when, s.
@@ -64,7 +67,7 @@ class StepRecord(NamedTuple):
     segments: Ints
     displacements: Floats
     values: Floats | None
-    mises: Floats | None
+    mises: Floats
     positions: Floats
     counts: Ints
     code: int
@@ -137,10 +140,10 @@ def solve(
     numbers = np.zeros(rows, np.int64)
     displacements = np.zeros((rows, model.displacement_count))
     values = np.zeros((rows, points, 4 + law.states)) if keep_points else None
-    mises = np.zeros((rows, points)) if keep_points else None
+    mises = np.zeros((rows, points))
     pattern = _contiguous(program.pattern)
     record = _Record(
-        rows, address(times), address(numbers), address(displacements), _optional(values), _optional(mises),
+        rows, address(times), address(numbers), address(displacements), _optional(values), address(mises),
         address(positions), address(counts), points,
     )  # fmt: skip
     entries = _Law(law.update.address, law.sensitivity.address, address(theta), theta.size, law.states)
@@ -149,7 +152,8 @@ def solve(
         address(limits), len(script), address(script), None,
     )  # fmt: skip
     surface = moments = None
-    along, derivatives, kept = None, None, ()
+    along = derivatives = None
+    kept: tuple[Floats, ...] = ()
     if directions is not None:
         kept = tuple(map(_contiguous, (directions.segments, *model.core_directions(directions))))
         columns = theta.size + len(directions.segments) + len(directions.velocities)
@@ -169,9 +173,47 @@ def solve(
     n = ended.records
     return StepRecord(
         times[:n].copy(), numbers[:n].copy(), displacements[:n].copy(), None if values is None else values[:n].copy(),
-        None if mises is None else mises[:n].copy(), positions[:n].copy(), counts, ended.code, ended.time,
+        mises[:n].copy(), positions[:n].copy(), counts, ended.code, ended.time,
         None if surface is None else surface[:n], None if moments is None else moments[:n],
     )  # fmt: skip
+
+
+def assemble(
+    law: CompiledLaw, theta: Floats, model: FiniteElementModel, stage: StageConditions, displacement: Floats
+) -> tuple[Floats, Floats]:
+    """Out-of-balance forces (size,), N/rad, and tangent (size, size), N/(rad mm), of a virgin body.
+
+    theta : (P,) internal parameters. displacement : (2 nodes,) mm. The tangent is made symmetric, as Newton's method
+    takes it. SolveError where a point has no stress.
+    """
+    theta, displacement = _contiguous(theta), _contiguous(displacement)
+    history = np.zeros((4 * model.compiled.elements, 4 + law.states))
+    history[:, 4:] = law.initial
+    residual, tangent = np.zeros(model.size), np.zeros((model.size, model.size))
+    entries = _Law(law.update.address, law.sensitivity.address, address(theta), theta.size, law.states)
+    flag = function("creepkit_assemble")(
+        ctypes.byref(model.compiled.structure), ctypes.byref(entries), ctypes.byref(_Stage(*stage)),
+        *map(address, (history, displacement, residual, tangent)),
+    )  # fmt: skip
+    if flag != 0:
+        raise SolveError("a point of the body has no stress at these displacements")
+    return residual, tangent
+
+
+class StageConditions(NamedTuple):
+    """What all points of a stage share.
+
+    weight : s, of the creep rate; 0 for a purely elastic change. log_weight : its logarithm. time : s. temperature : K.
+    bulk, shear : K and G, MPa. pressure : MPa.
+    """
+
+    weight: float
+    log_weight: float
+    time: float
+    temperature: float
+    bulk: float
+    shear: float
+    pressure: float
 
 
 class LoadProgram(NamedTuple):
@@ -204,6 +246,10 @@ class _Law(CoreStructure):
     _fields_ = (
         ("update", _ARRAY), ("sensitivity", _ARRAY), ("theta", _ARRAY), ("parameters", _NUMBER), ("states", _NUMBER),
     )  # fmt: skip
+
+
+class _Stage(CoreStructure):
+    _fields_ = tuple((name, _REAL) for name in StageConditions._fields)
 
 
 class _Input(CoreStructure):

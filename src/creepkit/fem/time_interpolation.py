@@ -1,22 +1,21 @@
-"""Interpolation in time between the accepted steps of a simulation."""
+"""Interpolation in time between the accepted steps of a simulation: splines that the core calculates."""
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
-from creepkit.arrays import Bools, Floats, Ints
+from creepkit import core
+from creepkit.arrays import ArrayLike, Floats, Ints
+from creepkit.errors import SolveError
 from creepkit.fem.solver import PRESSURE, START
 from creepkit.integration.time_discretisation import SMALLEST_EXPONENT
 
 OFFSET = 20.0
-"""s; twice the first step after a change of load."""
-
-
-SHORT = 0.2
-"""A last step this much shorter than the one before does not count for the spline."""
+"""s; twice the first step after a change of load. As in src/core/time_interpolation.hpp."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,47 +49,54 @@ class TimeInterpolation:
         exponents = np.where(young, max(beta, SMALLEST_EXPONENT), 1.0)
         return cls(np.array(times), starts, tuple(rows), np.where(young, 0.0, starts), exponents)
 
-    def interpolate(self, values: Floats, times: Floats) -> Floats:
+    def interpolate(self, values: Floats, times: ArrayLike) -> Floats:
         """Values (steps, ...) at other times, (times, ...); NaN after the last step.
 
-        At the time of a jump it is the value before it; at time zero the one after.
+        Each segment has a cubic spline with not-a-knot ends in ln(1 + (y / 20 s)^beta); a segment of one step has a
+        straight line. At the time of a jump it is the value before it; at time zero the one after.
         """
-        times = np.atleast_1d(np.asarray(times, float))
-        out = np.full((times.size, *values.shape[1:]), np.nan)
-        which = np.maximum(np.searchsorted(self.starts, times, side="left") - 1, 0)
-        for n, (first, last) in enumerate(self.rows):
-            mine = (which == n) & (times <= self.times[-1] * (1 + 1e-12))
-            if mine.any():
-                before, after = self._variable(n, self.times[first : last + 1]), self._variable(n, times[mine])
-                kept = _spline_knots(before)
-                out[mine] = _spline(before[kept], values[first : last + 1][kept], after)
+        asked = np.ascontiguousarray(np.atleast_1d(np.asarray(times, float)))
+        given = np.ascontiguousarray(values, dtype=float)
+        if len(given) != self.times.size:
+            raise ValueError(f"{len(given)} rows of values for {self.times.size} steps")
+        out = np.empty((asked.size, *given.shape[1:]))
+        check_interpolation(
+            core.function("creepkit_interpolate_in_time")(
+                *self.core_arguments, ctypes.c_int64(given[0].size), core.address(given), ctypes.c_int64(asked.size),
+                core.address(asked), core.address(out),
+            )
+        )  # fmt: skip
         return out
+
+    @property
+    def core_arguments(self) -> tuple[ctypes.c_int64 | ctypes.c_void_p, ...]:
+        """Steps, segments, times, starts, rows, origins and exponents, as functions of the core take them."""
+        counts = ctypes.c_int64(self.times.size), ctypes.c_int64(self.starts.size)
+        return *counts, *map(core.address, self._core_arrays)
+
+    @cached_property
+    def _core_arrays(self) -> tuple[Floats | Ints, ...]:
+        """What `core_arguments` point to."""
+        times, starts, origins, exponents = (
+            np.ascontiguousarray(array, dtype=float)
+            for array in (self.times, self.starts, self.origins, self.exponents)
+        )
+        return times, starts, np.array(self.rows, np.int64), origins, exponents
 
     def moved(self, times: Floats, starts: Floats) -> TimeInterpolation:
         """The same steps at other times, the segments beginning at others too."""
         origins = np.where(self.origins == self.starts, self.origins + starts, self.origins)
         return replace(self, times=self.times + times, starts=self.starts + starts, origins=origins)
 
-    def _variable(self, n: int, times: Floats) -> Floats:
-        """What the values of segment `n` are smooth in."""
-        first, last = self.rows[n]
-        elapsed = np.maximum(times - self.origins[n], 0.0)
-        if last - first == 1:  # a single step: the few seconds of a ramp, elastic and so straight
-            return np.asarray(elapsed)
-        return np.asarray(np.log1p((elapsed / OFFSET) ** self.exponents[n]))
+
+_INTERPOLATED, _NOT_INCREASING, _NO_MEMORY = 0, 2, 3
 
 
-def _spline_knots(places: Floats) -> Bools:
-    """All knots, less the last but one where a short last step, cut off by the end, would make a slope of its error."""
-    kept = np.ones(places.size, bool)
-    if places.size > 3:
-        before, final = np.diff(places[-3:])
-        kept[-2] = final > SHORT * before
-    return kept
-
-
-def _spline(before: Floats, values: Floats, after: Floats) -> Floats:
-    """Values at places `after` from those at `before`."""
-    if before.size == 1:
-        return np.repeat(values, after.size, axis=0)
-    return np.asarray(CubicSpline(before, values)(after))
+def check_interpolation(code: int) -> None:
+    """Raise what a function of the core that interpolates in time has returned."""
+    if code == _NO_MEMORY:
+        raise MemoryError("no memory for the splines between the steps of a simulation")
+    if code == _NOT_INCREASING:
+        raise SolveError("the accepted steps of a simulation do not increase in time; they cannot be interpolated")
+    if code != _INTERPOLATED:
+        raise ValueError("the steps of a simulation and the segments of its load program do not belong together")

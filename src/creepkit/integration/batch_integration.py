@@ -1,17 +1,26 @@
-"""Integration of many candidates over many tests in one call of compiled code."""
+"""Integration of many candidates over many tests in one call of the core."""
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from creepkit.arrays import Floats, Ints, frozen
+from creepkit.core import function
 from creepkit.errors import SolveError
+from creepkit.integration.core_structures import (
+    BatchStructure,
+    axes_structure,
+    refusal,
+    settings_structure,
+    tableau_structure,
+    write_addresses,
+)
 from creepkit.integration.event_location import (
     DIVERGED,
     REACHED_END,
@@ -19,12 +28,8 @@ from creepkit.integration.event_location import (
     STEP_TOO_SMALL,
     STRAIN_LIMIT,
     TOO_MANY_STEPS,
-    LevelEvents,
-    TerminationLimits,
 )
-from creepkit.integration.point_integration import CandidateParameters, integrate_point
-from creepkit.integration.runge_kutta_step import StressControl, step_workspace
-from creepkit.integration.stage_problem import UNIAXIAL, Axes
+from creepkit.integration.implicit_stage import UNIAXIAL, Axes
 from creepkit.integration.step_control import IntegrationSettings
 from creepkit.integration.time_discretisation import SDIRK4, Tableau, merge_programs
 from creepkit.kernels.interface import CompiledLaw
@@ -139,124 +144,74 @@ def integrate(
 ) -> Integration:
     """Integrate every candidate, theta (candidates, P) in internal form, over every test."""
     theta = np.array(theta, dtype=float, order="C", ndmin=2)
-    candidates, parameters = theta.shape
-    segments = [t.segments for t in tests]
-    starts = np.concatenate([[0], np.cumsum([t.times.size for t in tests], dtype=np.int64)])
-    level_offsets = np.concatenate([[0], np.cumsum([t.levels.size for t in tests], dtype=np.int64)])
-    segment_offsets = np.concatenate([[0], np.cumsum([s.shape[0] for s in segments], dtype=np.int64)])
-    frames, rows = int(starts[-1]), candidates if jacobian else 0
-    strain = np.full((candidates, frames), np.nan)
-    jacobian_values = np.full((rows, frames, parameters), np.nan)
-    terminations = np.zeros((candidates, len(tests)), dtype=np.int64)
-    end_times = np.zeros((candidates, len(tests)))
-    steps = np.zeros((candidates, len(tests), 2), dtype=np.int64)
-    end_jacobian = np.full((rows, len(tests), parameters), np.nan)
-    levels = int(level_offsets[-1])
-    level_times, level_rates = (np.full((candidates, levels), np.nan) for _ in range(2))
-    level_time_jacobian = np.full((rows, levels, parameters), np.nan)
-    stress_controls = np.array([[t.stiffness, float(t.constant_load)] for t in tests]).reshape(-1, 2)
-    integrate_batch(
-        law.update,
-        law.sensitivity,
-        theta,
-        np.array(law.leading_exponent(theta), dtype=float).reshape(candidates),
-        np.array(law.initial),
-        np.array(law.limits),
-        stress_controls,
-        axes,
-        np.concatenate([*segments, np.zeros((0, 6))]),
-        segment_offsets,
-        np.concatenate([*(t.times for t in tests), np.zeros(0)]),
-        starts,
-        settings or IntegrationSettings(),
-        tableau,
-        strain,
-        jacobian_values,
-        terminations,
-        end_times,
-        steps,
-        end_jacobian,
-        np.concatenate([*(t.levels for t in tests), np.zeros(0)]),
-        level_offsets,
-        level_times,
-        level_rates,
-        level_time_jacobian,
+    if sentence := refusal(law, theta):
+        raise SolveError(sentence)
+    result, inputs = _unfilled(theta, tests, jacobian), _inputs(law, theta, tests)
+    batch = BatchStructure(
+        update=law.update.address,
+        sensitivity=law.sensitivity.address,
+        candidates=theta.shape[0],
+        tests=len(tests),
+        parameters=theta.shape[1],
+        states=law.states,
+        with_sensitivities=int(jacobian),
+        axes=axes_structure(axes),
+        settings=settings_structure(settings or IntegrationSettings()),
+        tableau=tableau_structure(tableau),
     )
-    if not jacobian:
-        return Integration(strain, starts, None, terminations, end_times, steps, None, level_times, level_rates, None)
+    write_addresses(batch, {**inputs, **result})
+    if function("creepkit_integrate_batch")(ctypes.byref(batch)) != 0:
+        raise SolveError("the integration of creep found no memory for its working arrays")
     return Integration(
-        strain,
-        starts,
-        jacobian_values,
-        terminations,
-        end_times,
-        steps,
-        end_jacobian,
-        level_times,
-        level_rates,
-        level_time_jacobian,
+        strain=result["strain"],
+        starts=inputs["time_offsets"],
+        jacobian=result["jacobian"] if jacobian else None,
+        terminations=result["endings"],
+        end_times=result["end_times"],
+        steps=result["steps"],
+        end_jacobian=result["end_jacobian"] if jacobian else None,
+        level_times=result["arrivals"],
+        level_rates=result["arrival_slopes"],
+        level_time_jacobian=result["arrival_jacobian"] if jacobian else None,
     )
 
 
-@njit(cache=True, error_model="numpy")
-def integrate_batch(
-    update: Any,
-    sensitivity: Any,
-    theta: Floats,
-    beta: Floats,
-    initial: Floats,
-    limits: Floats,
-    stress_controls: Floats,
-    axes: Axes,
-    segments: Floats,
-    segment_offsets: Ints,
-    times: Floats,
-    starts: Ints,
-    settings: IntegrationSettings,
-    tableau: Tableau,
-    strain: Floats,
-    jacobian: Floats,
-    endings: Ints,
-    end_times: Floats,
-    steps: Ints,
-    end_jacobian: Floats,
-    levels: Floats,
-    level_offsets: Ints,
-    arrivals: Floats,
-    arrival_slopes: Floats,
-    arrival_jacobian: Floats,
-) -> None:
-    """Integrate candidates x tests without returning to Python; arrays as in Integration, tests laid end to end."""
-    work = step_workspace(initial.size, theta.shape[1], tableau.c.size)
-    nothing, unused = np.zeros((0, theta.shape[1])), np.zeros(theta.shape[1])
-    for c in range(theta.shape[0]):
-        kernel = CandidateParameters(theta[c], beta[c], TerminationLimits(settings.strain_limit, initial, limits))
-        for k in range(stress_controls.shape[0]):
-            drive = StressControl(stress_controls[k, 0], stress_controls[k, 1], axes)
-            first, last = starts[k], starts[k + 1]
-            low, high = level_offsets[k], level_offsets[k + 1]
-            exact = jacobian.shape[0] > 0
-            changes = jacobian[c, first:last] if exact else nothing
-            goal = LevelEvents(
-                levels[low:high],
-                arrivals[c, low:high],
-                arrival_slopes[c, low:high],
-                arrival_jacobian[c, low:high] if exact else nothing,
-                end_jacobian[c, k] if exact else unused,
-            )
-            ending = integrate_point(
-                update,
-                sensitivity,
-                kernel,
-                drive,
-                segments[segment_offsets[k] : segment_offsets[k + 1]],
-                times[first:last],
-                settings,
-                tableau,
-                work,
-                strain[c, first:last],
-                changes,
-                goal,
-            )
-            endings[c, k], end_times[c, k] = ending.code, ending.time
-            steps[c, k, 0], steps[c, k, 1] = ending.steps, ending.rejected
+def _inputs(law: CompiledLaw, theta: Floats, tests: Sequence[PointTest]) -> dict[str, Any]:
+    """The arrays that the core reads, by the names of its fields; tests laid end to end."""
+    segments = [test.segments for test in tests]
+    return {
+        "theta": theta,
+        "beta": np.array(law.leading_exponent(theta), dtype=float).reshape(theta.shape[0]),
+        "initial": np.array(law.initial, dtype=float),
+        "limits": np.array(law.limits, dtype=float),
+        "stress_controls": np.array([[t.stiffness, float(t.constant_load)] for t in tests]).reshape(-1, 2),
+        "segments": np.concatenate([*segments, np.zeros((0, 6))]),
+        "segment_offsets": _offsets([s.shape[0] for s in segments]),
+        "times": np.concatenate([*(t.times for t in tests), np.zeros(0)]),
+        "time_offsets": _offsets([t.times.size for t in tests]),
+        "levels": np.concatenate([*(t.levels for t in tests), np.zeros(0)]),
+        "level_offsets": _offsets([t.levels.size for t in tests]),
+    }
+
+
+def _offsets(sizes: list[int]) -> Ints:
+    """Where each of several arrays begins when they are laid end to end, and where the last ends."""
+    return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
+
+
+def _unfilled(theta: Floats, tests: Sequence[PointTest], jacobian: bool) -> dict[str, Any]:
+    """The arrays that the core writes, by the names of its fields, NaN so far; derivatives only where wanted."""
+    candidates, parameters = theta.shape
+    frames, levels, count = sum(t.times.size for t in tests), sum(t.levels.size for t in tests), len(tests)
+    rows = candidates if jacobian else 0
+    return {
+        "strain": np.full((candidates, frames), np.nan),
+        "jacobian": np.full((rows, frames, parameters), np.nan),
+        "endings": np.zeros((candidates, count), dtype=np.int64),
+        "end_times": np.zeros((candidates, count)),
+        "steps": np.zeros((candidates, count, 2), dtype=np.int64),
+        "end_jacobian": np.full((rows, count, parameters), np.nan),
+        "arrivals": np.full((candidates, levels), np.nan),
+        "arrival_slopes": np.full((candidates, levels), np.nan),
+        "arrival_jacobian": np.full((rows, levels, parameters), np.nan),
+    }

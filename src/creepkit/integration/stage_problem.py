@@ -12,37 +12,56 @@ from typing import NamedTuple
 from numba import njit
 
 from creepkit.arrays import Floats
+from creepkit.integration.implicit_stage import (
+    BY_LOG_WEIGHT,
+    BY_MEAN,
+    BY_PRINCIPAL,
+    BY_STRAIN,
+    BY_TEMPERATURE,
+    BY_TIME,
+    BY_TRIAL,
+    INPUTS,
+    NO_SOLUTION,
+    NOT_FINITE,
+    SOLVED,
+    TOO_MANY,
+    UNIAXIAL,
+    Axes,
+    StageProblem,
+)
 from creepkit.kernels.interface import MEAN_STRESS, POINT_SIZE, PRINCIPAL_STRESS, STRAIN, STRESS, TEMPERATURE, TIME
 
-SOLVED, NOT_FINITE, NO_SOLUTION, TOO_MANY = range(4)
-"""Flags of a stage: solved; the rate is not finite; no increment satisfies the equation; iterations used up."""
+__all__ = [
+    "BY_LOG_WEIGHT",
+    "BY_MEAN",
+    "BY_PRINCIPAL",
+    "BY_STRAIN",
+    "BY_TEMPERATURE",
+    "BY_TIME",
+    "BY_TRIAL",
+    "INPUTS",
+    "NOT_FINITE",
+    "NO_RATE",
+    "NO_SOLUTION",
+    "SOLVED",
+    "TOO_MANY",
+    "UNIAXIAL",
+    "Axes",
+    "StageIterate",
+    "StageProblem",
+    "differentiate_stage",
+    "gradient_of_sensitivity",
+    "gradient_of_update",
+    "increment_and_stress",
+    "solve_dense",
+    "stress_derivative",
+    "unknown_of_increment",
+    "write_point",
+]
 
 
 NO_RATE = -600.0
 """ln of a rate, 1/s, below which nothing creeps (a law whose terms are off, or a stress of zero)."""
-
-
-class Axes(NamedTuple):
-    """Largest principal and mean stress as straight lines in the equivalent stress: offset + slope sigma, MPa."""
-
-    principal: float
-    principal_slope: float
-    mean: float
-    mean_slope: float
-
-
-UNIAXIAL = Axes(0.0, 1.0, 0.0, 1.0 / 3.0)
-"""Uniaxial tension: the largest principal stress is the stress, the mean stress a third of it."""
-
-
-class StageProblem(NamedTuple):
-    """What a stage is solved for: trial stress and k in MPa, load 0 or 1, weight w in s, strain p0 so far."""
-
-    trial: float
-    stiffness: float
-    load: float
-    weight: float
-    strain: float
 
 
 class StageIterate(NamedTuple):
@@ -137,13 +156,6 @@ def _subtract(rows: Floats, i: int, factor: float, k: int) -> None:
 def _swap(rows: Floats, i: int, k: int) -> None:
     for j in range(rows.shape[1]):
         rows[i, j], rows[k, j] = rows[k, j], rows[i, j]
-
-
-INPUTS = 7
-
-
-BY_TRIAL, BY_STRAIN, BY_TIME, BY_TEMPERATURE, BY_LOG_WEIGHT, BY_PRINCIPAL, BY_MEAN = range(INPUTS)
-"""Columns of a response; those of the S initial states z0 and of the P parameters follow."""
 
 
 @njit(cache=True, error_model="numpy")

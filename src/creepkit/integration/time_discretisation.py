@@ -14,7 +14,28 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats
+from creepkit.integration.time_transformation import SMALLEST_EXPONENT, TimeTransformation, TransformedTime
 from creepkit.records import Program
+
+__all__ = [
+    "SDIRK2",
+    "SDIRK4",
+    "SMALLEST_EXPONENT",
+    "Segment",
+    "Tableau",
+    "TimeTransformation",
+    "TransformedTime",
+    "linear_time",
+    "merge_programs",
+    "position",
+    "power_law_time",
+    "segment_from_row",
+    "shifted_power_law_time",
+    "stress_rate",
+    "temperature_rate",
+    "transformation_derivatives",
+    "transformed_time",
+]
 
 
 class Tableau(NamedTuple):
@@ -150,32 +171,12 @@ def _just_before(program: Program, times: Floats) -> Floats:
     return np.asarray(values[before] + np.minimum(share, 1.0) * (values[after] - values[before]))
 
 
-SMALLEST_EXPONENT = 0.05
-"""Exponents of time are not taken below this: t^m with m = -0.95, where the laws' bounds stop."""
-
-
 _LARGEST_POWER = 12.0
 """Bound of |beta| ln(1 + L/tau): (1 + y/tau)^beta keeps some ten digits next to 1."""
 
 
 _LONGEST_TAU = 1e6
 """A shift this much longer than the segment bends nothing within it."""
-
-
-class TimeTransformation(NamedTuple):
-    """start and length of the segment, s; beta, and tau in s (0: from a virgin state)."""
-
-    start: float
-    length: float
-    beta: float
-    tau: float
-
-
-class TransformedTime(NamedTuple):
-    """A time, s, and ln(dt/ds) there."""
-
-    time: float
-    log_pace: float
 
 
 @njit(cache=True, error_model="numpy")

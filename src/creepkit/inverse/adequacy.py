@@ -24,19 +24,13 @@ from scipy.stats import f
 
 from creepkit.arrays import Floats
 from creepkit.inverse.known_noise import KnownNoise
-from creepkit.inverse.noise_model import (
-    NoiseModel,
-    OutputNoise,
-    Residuals,
-    cholesky_factors,
-    predicted_random_effects,
-    whiten,
-)
+from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
 from creepkit.inverse.observation_vector import ObservationVector
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import reference_stresses
 from creepkit.inverse.unmodelled_effects import UnmodelledEffect, with_random_effects
-from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, inverse_covariances
+from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution
 from creepkit.records import History, output_unit
 
 SIGNIFICANCE = 0.003
@@ -194,23 +188,23 @@ def adequacy_of(
     noise_model: NoiseModel,
     predictor_errors: Mapping[str, float],
     histories: Sequence[History],
+    known: KnownNoise | None = None,
 ) -> Adequacy:
     """The adequacy of a law at the optimum of a problem.
 
     linear : the problem made linear there. noise_model : of its estimate, for offsets and scatter between tests.
     predictor_errors : {output: standard deviation} of what the predictor is wrong by, in the output's unit.
-    histories : with all frames.
+    histories : with all frames. known : the noise that these show, where it was found before.
     """
     observations = problem.observations
-    known = KnownNoise.of_histories(observations, histories)
+    known = known or KnownNoise.of_histories(observations, histories)
     if not known.judged.any():
         nan = float("nan")
         return Adequacy("cannot be judged", (), nan, 0.0, nan, nan, None)
     residuals = _of_judged(linear.residuals, known)
     independent = _independent_noise(observations, known, noise_model, predictor_errors)
-    inverses, _ = inverse_covariances(residuals, independent)
     judged_problem = replace(linear, residuals=residuals)
-    solution = _within_bounds(judged_problem, independent, inverses)
+    solution = _within_bounds(judged_problem, CovarianceFactor.of_residuals(residuals, independent))
     share_of_freedom = _freedom(judged_problem, solution) / float(known.judged.sum())
     contributions = solution.residuals * solution.weighted_residuals
     outputs = []
@@ -254,14 +248,15 @@ def adequacy_with_remedies(
     effects: Sequence[UnmodelledEffect],
 ) -> Adequacy:
     """The same, with those of the unmodelled effects named with which the law would explain the tests."""
-    adequacy = adequacy_of(problem, linear, noise_model, predictor_errors, histories)
+    known = KnownNoise.of_histories(problem.observations, histories)
+    adequacy = adequacy_of(problem, linear, noise_model, predictor_errors, histories, known)
     if adequacy.verdict != "leaves a discrepancy":
         return adequacy
     remedies = [
         effect.description
         for effect in effects
         if adequacy_of(
-            problem, with_random_effects(linear, [effect]), noise_model, predictor_errors, histories
+            problem, with_random_effects(linear, [effect]), noise_model, predictor_errors, histories, known
         ).explains
     ]
     return replace(adequacy, remedies=tuple(remedies))
@@ -319,12 +314,12 @@ def _independent_noise(
     return NoiseModel(outputs, noise_model.rate)
 
 
-def _within_bounds(linear: LinearisedProblem, noise_model: NoiseModel, inverses: Floats) -> LinearSolution:
+def _within_bounds(linear: LinearisedProblem, factor: CovarianceFactor) -> LinearSolution:
     """The optimum of the linear problem within its bounds, or the point itself where the step gains nothing."""
-    solution, residuals = linear.solve(inverses), linear.residuals
+    solution, residuals = linear.solve(factor), linear.residuals
     present = residuals.present
     columns = np.concatenate([linear.jacobian, residuals.values[..., None]], axis=-1)
-    whitened = whiten(cholesky_factors(residuals, noise_model), columns)[present]
+    whitened = factor.whiten(columns)[present]
     root_prior = np.sqrt(linear.precision[linear.free])
     matrix = np.concatenate([whitened[:, :-1], np.diag(root_prior)])
     target = -np.concatenate([whitened[:, -1], root_prior * linear.prior_residual[linear.free]])
@@ -332,7 +327,7 @@ def _within_bounds(linear: LinearisedProblem, noise_model: NoiseModel, inverses:
     low, high = linear.step_bounds[:, linear.free] * scale
     step = lsq_linear(matrix / scale, target, bounds=(np.minimum(low, -1e-12), np.maximum(high, 1e-12))).x / scale
     moved = residuals.values + linear.jacobian @ step
-    candidates = [(values, (inverses @ values[..., None])[..., 0]) for values in (moved, residuals.values)]
+    candidates = [(values, factor.inverse_times(values)) for values in (moved, residuals.values)]
     values, weighted = min(candidates, key=lambda pair: float((pair[0] * pair[1]).sum()))
     return replace(solution, residuals=values, weighted_residuals=weighted)
 

@@ -23,10 +23,10 @@ from creepkit.inverse.composite_predictor import compared_outputs, predict_to_ru
 from creepkit.inverse.goodness_of_fit import OutputErrors, errors_of_output, relative_squared_error
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.identify import refit
+from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.observation_vector import usable_frames
 from creepkit.inverse.search.local_refinement import IterationCallback
-from creepkit.inverse.variance_components import inverse_covariances
 from creepkit.language import CreepLaw
 from creepkit.presentation import Presentable
 from creepkit.records import History, Prediction, Predictor, Status
@@ -181,8 +181,8 @@ def _first_part(history: History, fitted_fraction: float) -> History:
 
 def _deviance(residuals: Residuals, noise_model: NoiseModel) -> float:
     """r' C^-1 r + ln|C|."""
-    inverses, log_det = inverse_covariances(residuals, noise_model)
-    return float(np.einsum("te,tef,tf->", residuals.values, inverses, residuals.values) + log_det)
+    factor = CovarianceFactor.of_residuals(residuals, noise_model)
+    return float((factor.whiten(residuals.values) ** 2).sum() + factor.log_determinant)
 
 
 def prediction_errors(fit: Identification, history: History) -> dict[str, OutputErrors]:

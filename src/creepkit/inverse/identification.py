@@ -18,7 +18,8 @@ from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.defect_correction import NumericalError, correct_defect
 from creepkit.inverse.extrapolation import warn_of_extrapolation
 from creepkit.inverse.goodness_of_fit import OutputErrors, OutputFit, TestFit
-from creepkit.inverse.noise_model import NoiseModel, Residuals, cholesky_factors
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate, owner_of, prior_mean
 from creepkit.inverse.predictor_documents import PredictorDocument, missing_predictor
 from creepkit.inverse.problem import LeastSquaresProblem
@@ -131,7 +132,7 @@ class Identification(Presentable):
             problem = problem.with_nuisances(replace(nuisances, sd=prior_sd))
         if self.numerical_error is not None:
             problem, _ = correct_defect(problem, self.x)
-        return problem.with_covariance(cholesky_factors(self.residuals_of(problem), self.noise_model))
+        return problem.with_covariance(CovarianceFactor.of_residuals(self.residuals_of(problem), self.noise_model))
 
     def residuals_of(self, problem: LeastSquaresProblem) -> Residuals:
         """Residuals of a problem of these tests at the optimum, with the weights of tests."""

@@ -38,16 +38,8 @@ from creepkit.inverse.iterative_estimation import (
     linearised,
     starting_point,
 )
-from creepkit.inverse.noise_model import (
-    ASSUMED_RATE_SD,
-    MINIMUM_TESTS,
-    NoiseModel,
-    cholesky_factors,
-    effective_sample_size,
-    initial_noise_model,
-    predicted_random_effects,
-    whiten,
-)
+from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size, predicted_random_effects
+from creepkit.inverse.noise_model import ASSUMED_RATE_SD, MINIMUM_TESTS, NoiseModel, initial_noise_model
 from creepkit.inverse.nuisance_parameters import NuisanceEstimate, nuisance_estimates_of
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.reference_conditions import ReferencePoint
@@ -149,9 +141,8 @@ def _gradient(best: EstimationResult) -> Floats:
     """(unknowns,) derivative of half the chi-square of the data to x."""
     residuals = best.residuals
     assert residuals.jacobian is not None
-    covariance_factor = cholesky_factors(residuals, best.working_noise)
-    whitened = whiten(covariance_factor, np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1))
-    return np.asarray(np.einsum("te,tep->p", whitened[..., 0], whitened[..., 1:]))
+    factor = CovarianceFactor.of_residuals(residuals, best.working_noise)
+    return np.asarray(np.einsum("te,tep->p", factor.inverse_times(residuals.values), residuals.jacobian))
 
 
 class SearchOutcome(NamedTuple):
@@ -340,7 +331,9 @@ def _result(
         predictor=problem.predictor,
         search_trace=search_outcome.trace,
         linearised=best.linearised,
-        problem=replace(problem, covariance_factor=cholesky_factors(residuals, noise_model), loss="linear"),
+        problem=replace(
+            problem, covariance_factor=CovarianceFactor.of_residuals(residuals, noise_model), loss="linear"
+        ),
     )
 
 

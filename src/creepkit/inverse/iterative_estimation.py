@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from creepkit.arrays import Floats
-from creepkit.inverse.noise_model import NoiseModel, Residuals, cholesky_factors, log_likelihood
+from creepkit.inverse.noise_covariance import CovarianceFactor, log_likelihood
+from creepkit.inverse.noise_model import NoiseModel, Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Minimum, Tolerances
@@ -16,7 +17,6 @@ from creepkit.inverse.uncertainty.laplace_approximation import marginal_log_like
 from creepkit.inverse.variance_components import (
     BOUND_TOLERANCE,
     LinearisedProblem,
-    inverse_covariances,
     restricted_log_likelihood,
     scaled_inverse,
 )
@@ -117,22 +117,21 @@ def _covariance_factor(
     residuals: Residuals,
     working_noise: NoiseModel,
     working_estimator: WorkingNoiseEstimator,
-) -> Floats:
-    """(tests, observations, observations) Cholesky factors under which the values of a round are found."""
+) -> CovarianceFactor:
+    """The covariance under which the values of a round are found."""
     fitting_noise = (
         working_noise if working_estimator.by_likelihood else with_rupture_weight(working_noise, problem.observations)
     )
     # A stopped test that says nothing here may say something a step further.
-    return cholesky_factors(replace(residuals, present=problem.observations.present), fitting_noise)
+    return CovarianceFactor.of_residuals(replace(residuals, present=problem.observations.present), fitting_noise)
 
 
 def _expected_gain(linear: LinearisedProblem, working_noise: NoiseModel) -> float:
     """Growth of the log-likelihood, to first order, if the values moved to the optimum under this noise."""
     residuals = linear.residuals
-    inverses, _ = inverse_covariances(residuals, working_noise)
-    chi_square = np.einsum("te,tef,tf->", residuals.values, inverses, residuals.values)
-    chi_square += (linear.precision * linear.prior_residual**2).sum()
-    return 0.5 * float(chi_square - linear.solve(inverses).chi_square)
+    factor = CovarianceFactor.of_residuals(residuals, working_noise)
+    chi_square = (factor.whiten(residuals.values) ** 2).sum() + (linear.precision * linear.prior_residual**2).sum()
+    return 0.5 * float(chi_square - linear.solve(factor).chi_square)
 
 
 def linearised(problem: LeastSquaresProblem, x: Floats, residuals: Residuals) -> LinearisedProblem:

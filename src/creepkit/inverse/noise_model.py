@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from creepkit.arrays import Bools, Floats, Ints
+from creepkit.inverse.observation_series import ObservationSeries
 from creepkit.inverse.observation_vector import RUPTURE_OUTPUT, ObservationVector
 from creepkit.records import Nuisance
 
@@ -53,6 +55,22 @@ class Residuals:
         """The same with other weights of tests."""
         return replace(self, test_weights=test_weights)
 
+    @cached_property
+    def series(self) -> ObservationSeries:
+        """The same as the compiled covariance takes it."""
+        unit, further = self.discrepancy_unit, self.random_effect_sensitivities
+        effects = [
+            self.relative_noise * self.offset_sensitivity,
+            self.offset_sensitivity,
+            np.zeros_like(self.values) if unit is None else unit,
+            self.log_rate_sensitivity,
+        ]
+        stacked = np.stack(effects, axis=-1)
+        stacked = stacked if further is None else np.concatenate([stacked, further], axis=-1)
+        return ObservationSeries.of_observations(
+            self.present, self.output_index, self.correlation_coordinate, stacked, self.test_weights
+        )
+
 
 MINIMUM_TESTS = 3
 """Below this many tests the scatter between them cannot be estimated."""
@@ -80,6 +98,13 @@ class OutputNoise:
     stated: float = 0.0
 
 
+OUTPUT_COMPONENTS = ("noise", "misfit", "offset", "drift", "correlation_length")
+
+
+SHARED_COMPONENTS = ("rate", "discrepancy", "discrepancy_length")
+"""Components that outputs share; they belong to the output ""."""
+
+
 @dataclass(frozen=True)
 class NoiseModel:
     """Standard deviations of the sources of scatter, such as noise_model["strain"].offset and noise_model.rate.
@@ -100,6 +125,32 @@ class NoiseModel:
     def per_observation(self, output_index: Ints, component: str) -> Floats:
         """(tests, observations) one component at each observation; output_index : (tests, observations)."""
         return np.asarray(np.array([getattr(s, component) for s in self.outputs.values()])[output_index])
+
+    @property
+    def components(self) -> Floats:
+        """(5 outputs + 3,) OUTPUT_COMPONENTS of each output, then SHARED_COMPONENTS."""
+        own = [getattr(s, name) for s in self.outputs.values() for name in OUTPUT_COMPONENTS]
+        return np.array([*own, *(getattr(self, name) for name in SHARED_COMPONENTS)], float)
+
+    def position(self, output: str, component: str) -> int:
+        """The position of a component among `components`; "" is the output of shared ones."""
+        own = len(OUTPUT_COMPONENTS)
+        if not output:
+            return own * len(self.outputs) + SHARED_COMPONENTS.index(component)
+        return own * list(self.outputs).index(output) + OUTPUT_COMPONENTS.index(component)
+
+    def with_components(self, components: Floats) -> NoiseModel:
+        """The same with other components.
+
+        components : (5 outputs + 3,) in the order of the property.
+        """
+        own = np.split(components, range(len(OUTPUT_COMPONENTS), components.size, len(OUTPUT_COMPONENTS)))
+        outputs = {
+            name: replace(output, **dict(zip(OUTPUT_COMPONENTS, values.tolist(), strict=True)))
+            for (name, output), values in zip(self.outputs.items(), own, strict=False)
+        }
+        shared = components[-len(SHARED_COMPONENTS) :].tolist()
+        return NoiseModel(outputs, **dict(zip(SHARED_COMPONENTS, shared, strict=True)))
 
     def with_output(self, output: str, **components: float) -> NoiseModel:
         """The same with other components of one output."""
@@ -144,7 +195,8 @@ def components_fixed_by_priors(nuisances: Sequence[Nuisance], outputs: Sequence[
     return fixed
 
 
-_JITTER = 1e-10
+ABSOLUTE_JITTER, RELATIVE_JITTER = 1e-10, 1e-9
+"""Added to variances, so that a covariance stays positive definite: absolute, and of the correlated variance."""
 
 
 def covariance(residuals: Residuals, noise_model: NoiseModel) -> Floats:
@@ -156,90 +208,29 @@ def covariance(residuals: Residuals, noise_model: NoiseModel) -> Floats:
         residuals.output_index,
     )
     drift, offset = noise_model.per_observation(output, "drift"), noise_model.per_observation(output, "offset") * s
-    c = (drift**2)[:, :, None] * np.exp(
-        -correlation_lags(residuals) / noise_model.per_observation(output, "correlation_length")[:, :, None]
-    )
+    lags = np.abs(residuals.correlation_coordinate[:, :, None] - residuals.correlation_coordinate[:, None, :])
+    c = (drift**2)[:, :, None] * np.exp(-lags / noise_model.per_observation(output, "correlation_length")[:, :, None])
     if noise_model.discrepancy > 0:
         assert residuals.discrepancy_unit is not None
         unit = noise_model.discrepancy * residuals.discrepancy_unit
-        c += unit[:, :, None] * unit[:, None, :] * np.exp(-correlation_lags(residuals) / noise_model.discrepancy_length)
+        c += unit[:, :, None] * unit[:, None, :] * np.exp(-lags / noise_model.discrepancy_length)
     c += offset[:, :, None] * offset[:, None, :]
-    c = np.where(same_output(residuals), c, 0.0) if len(noise_model.outputs) > 1 else c
+    c = np.where(output[:, :, None] == output[:, None, :], c, 0.0) if len(noise_model.outputs) > 1 else c
     c += noise_model.rate**2 * d[:, :, None] * d[:, None, :]
     if residuals.random_effect_sensitivities is not None:
         c += residuals.random_effect_sensitivities @ np.swapaxes(residuals.random_effect_sensitivities, 1, 2)
     k = np.arange(s.shape[1])
     noise = noise_model.per_observation(output, "noise") * residuals.relative_noise
     c[:, k, k] = (
-        c[:, k, k] * (1 + 1e-9) + (noise * s) ** 2 + noise_model.per_observation(output, "misfit") ** 2 + _JITTER
+        c[:, k, k] * (1 + RELATIVE_JITTER)
+        + (noise * s) ** 2
+        + noise_model.per_observation(output, "misfit") ** 2
+        + ABSOLUTE_JITTER
     )
     present_pairs = present[:, :, None] & present[:, None, :]
     c = np.where(present_pairs, c / residuals.test_weights[:, None, None], 0.0)
     c[:, k, k] = np.where(present, c[:, k, k], 1.0)
     return np.asarray(c)
-
-
-def correlation_lags(residuals: Residuals) -> Floats:
-    """(tests, observations, observations) differences of correlation time."""
-    t = residuals.correlation_coordinate
-    return np.abs(t[:, :, None] - t[:, None, :])
-
-
-def same_output(residuals: Residuals) -> Bools:
-    """(tests, observations, observations) whether two observations are of one output."""
-    return np.asarray(residuals.output_index[:, :, None] == residuals.output_index[:, None, :])
-
-
-def cholesky_factors(residuals: Residuals, noise_model: NoiseModel) -> Floats:
-    """Lower Cholesky factors L of the covariance, (tests, observations, observations); L^-1 r is white."""
-    return np.asarray(np.linalg.cholesky(covariance(residuals, noise_model)))
-
-
-def whiten(covariance_factor: Floats, values: Floats) -> Floats:
-    """L^-1 v, whose covariance is the identity where that of v is L L'.
-
-    covariance_factor : (tests, observations, observations) Cholesky factors L.
-    values : (tests, observations[, columns]) residuals, derivatives, or both. Returns (tests, observations[, columns]).
-    """
-    if values.ndim == 2:
-        return np.asarray(np.linalg.solve(covariance_factor, values[..., None])[..., 0])
-    return np.asarray(np.linalg.solve(covariance_factor, values))
-
-
-def log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:
-    """Gaussian log-likelihood of the residuals under a noise model."""
-    covariance_factor = cholesky_factors(residuals, noise_model)
-    whitened = whiten(covariance_factor, residuals.values)
-    k = np.arange(covariance_factor.shape[1])
-    log_det = 2.0 * np.log(covariance_factor[:, k, k]).sum()
-    count = int(residuals.present.sum())
-    return float(-0.5 * ((whitened**2).sum() + log_det + count * np.log(2 * np.pi)))
-
-
-def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> tuple[Floats, Floats]:
-    """Best linear prediction of each test's offsets, (tests, outputs) in their units, and ln rate factor, (tests,)."""
-    unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
-    weighted = np.linalg.solve(covariance(unweighted, noise_model), -residuals.values[..., None])[..., 0]
-    weighted_sensitivity = residuals.offset_sensitivity * weighted
-    offsets = [
-        s.offset**2 * np.where(residuals.output_index == k, weighted_sensitivity, 0.0).sum(axis=1)
-        for k, s in enumerate(noise_model.outputs.values())
-    ]
-    return np.stack(offsets, axis=1), noise_model.rate**2 * (residuals.log_rate_sensitivity * weighted).sum(axis=1)
-
-
-def effective_sample_size(residuals: Residuals, noise_model: NoiseModel) -> float:
-    """Number of independent observations that carry the same information on a common mean as all frames together."""
-    without_offset = noise_model
-    for output in noise_model.outputs:
-        without_offset = without_offset.with_output(output, offset=0.0)
-    c = covariance(residuals, without_offset)
-    k = np.arange(c.shape[1])
-    sd = np.sqrt(c[:, k, k])
-    correlation = c / (sd[:, :, None] * sd[:, None, :])
-    ones = residuals.present.astype(float)
-    weights = np.linalg.solve(correlation, ones[..., None])[..., 0]
-    return float(np.clip((ones * weights).sum(), len(ones), ones.sum()))
 
 
 NEGLIGIBLE_DRIFT = 1e-3

@@ -30,7 +30,8 @@ from creepkit.inverse.composite_predictor import (
 )
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.history_checks import check_creep, check_explicit_nuisances, check_histories
-from creepkit.inverse.noise_model import Residuals, cholesky_factors, whiten
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import Residuals
 from creepkit.inverse.nuisance_parameters import NuisanceParameters, check_nuisance_law
 from creepkit.inverse.observation_vector import ObservationVector, thinned_history
 from creepkit.inverse.prediction_failures import PredictionFailures
@@ -94,8 +95,8 @@ class LeastSquaresProblem:
     """A law against histories under a covariance; the unknowns are x = (u, e).
 
     histories : the tests at the frames that are compared. coordinates : of the law, u to its internal parameters.
-    bounds : (unknowns,) of x. covariance_factor : (tests, observations, observations) Cholesky factors, in transformed
-        outputs. loss : of the whitened residuals, as scipy names it. penalty : what is added to half the chi-square.
+    bounds : (unknowns,) of x. covariance_factor : of the residuals, in transformed outputs. loss : of the whitened
+        residuals, as scipy names it. penalty : what is added to half the chi-square.
     correction : (tests, observations) in the output's unit, what is added to predictions: the defect of the predictor
         against a more exact one (see inverse.defect_correction), or None.
     evaluations : the last residuals, shared by the problems that differ in covariance, priors or penalty alone.
@@ -108,7 +109,7 @@ class LeastSquaresProblem:
     nuisance_parameters: NuisanceParameters
     bounds: Bounds
     settings: IdentificationSettings
-    covariance_factor: Floats
+    covariance_factor: CovarianceFactor
     loss: str = "linear"
     penalty: Penalty | None = None
     correction: Floats | None = None
@@ -139,7 +140,7 @@ class LeastSquaresProblem:
         log_rate, log_internal_rate = median_log_strain_rate(tests, predictor), median_log_inverse_duration(tests)
         bounds = Bounds.from_law(law, coordinates, log_rate, log_internal_rate).with_nuisances(nuisances)
         noise = WorkingNoiseEstimator(settings, observations, prediction_errors_of(predictor)).initial()
-        covariance_factor = cholesky_factors(
+        covariance_factor = CovarianceFactor.of_residuals(
             residuals_at_measured_values(observations), with_rupture_weight(noise, observations)
         )
         return cls(tuple(tests), predictor, coordinates, observations, nuisances, bounds, settings, covariance_factor)
@@ -165,8 +166,8 @@ class LeastSquaresProblem:
         """The same with a correction (tests, observations), in the output's unit, added to predictions."""
         return replace(self, correction=correction, evaluations=EvaluationCache())
 
-    def with_covariance(self, covariance_factor: Floats) -> LeastSquaresProblem:
-        """The same under another covariance: (tests, observations, observations) Cholesky factors."""
+    def with_covariance(self, covariance_factor: CovarianceFactor) -> LeastSquaresProblem:
+        """The same under another covariance."""
         return replace(self, covariance_factor=covariance_factor)
 
     def with_nuisances(self, nuisance_parameters: NuisanceParameters) -> LeastSquaresProblem:
@@ -277,7 +278,7 @@ class LeastSquaresProblem:
 
     def whiten(self, values: Floats) -> Floats:
         """(data[, columns]) whitened rows of the data, of values (tests, observations[, columns])."""
-        return np.asarray(whiten(self.covariance_factor, values)[self.observations.present])
+        return self.covariance_factor.whiten(values)[self.observations.present]
 
     def whitened(self, x: Floats) -> Floats:
         """(data + penalties,) - at x (unknowns,): whitened residuals of the data, then of bound and prior penalties."""

@@ -20,11 +20,12 @@ import sympy
 
 from creepkit.arrays import Floats
 from creepkit.inverse.composite_predictor import predict_with_sensitivities, predictor_for, supports_nuisance
-from creepkit.inverse.noise_model import NoiseModel, cholesky_factors, whiten
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel
 from creepkit.inverse.nuisance_parameters import prior_mean
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.quantities import gradient, log_rate
-from creepkit.inverse.variance_components import LinearisedProblem, inverse_covariances
+from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import CreepLaw, strain, temperature, time
 from creepkit.records import History, Nuisance, Program, output_unit
 
@@ -104,8 +105,8 @@ def unmodelled_effects(
         changes += _drift(problem, x, linear)
     if not changes:
         return ()
-    inverses, _ = inverse_covariances(linear.residuals, noise_model)
-    solution = linear.solve(inverses)
+    factor = CovarianceFactor.of_residuals(linear.residuals, noise_model)
+    solution = linear.solve(factor)
     coordinates, count = problem.coordinates, problem.parameter_count
     scale = np.sqrt(np.diag(solution.covariance))
     free_parameters = np.flatnonzero(linear.free[:count])
@@ -116,9 +117,7 @@ def unmodelled_effects(
     for kind, size, unit, change in changes:
         by_test = np.einsum("tep,te->tp", solution.weighted_jacobian, change) @ solution.covariance @ row
         rate_change = float(np.sqrt((by_test**2).sum()))
-        likeness = (
-            _likeness_of_hardening(problem, x, linear, noise_model, change) if kind == DRIFT else (np.nan, np.nan)
-        )
+        likeness = _likeness_of_hardening(problem, x, linear, factor, change) if kind == DRIFT else (np.nan, np.nan)
         effects.append(UnmodelledEffect(kind, size, unit, rate_change, size * likeness[0], likeness[1], change))
     return tuple(effects)
 
@@ -142,7 +141,7 @@ def unmodelled_note(effects: Sequence[UnmodelledEffect]) -> tuple[str, ...]:
 
 
 def _likeness_of_hardening(
-    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, noise_model: NoiseModel, change: Floats
+    problem: LeastSquaresProblem, x: Floats, linear: LinearisedProblem, factor: CovarianceFactor, change: Floats
 ) -> tuple[float, float]:
     """(ratio, correlation) of an effect to what the law's hardening does, beside all other unknowns.
 
@@ -157,7 +156,7 @@ def _likeness_of_hardening(
     hardening = np.einsum("tep,p->te", jacobian[..., positions], theta[positions])
     others = [k for k in range(jacobian.shape[-1]) if k not in positions]
     columns = np.concatenate([hardening[..., None], change[..., None], jacobian[..., others]], axis=-1)
-    whitened = whiten(cholesky_factors(linear.residuals, noise_model), columns)[linear.residuals.present]
+    whitened = factor.whiten(columns)[linear.residuals.present]
     basis, _ = np.linalg.qr(whitened[:, 2:] / np.maximum(np.linalg.norm(whitened[:, 2:], axis=0), 1e-300))
     own, effect = (whitened[:, k] - basis @ (basis.T @ whitened[:, k]) for k in (0, 1))
     sizes = float(np.linalg.norm(own)), float(np.linalg.norm(effect))

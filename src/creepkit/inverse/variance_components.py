@@ -9,14 +9,8 @@ import numpy as np
 from scipy.optimize import OptimizeResult, minimize
 
 from creepkit.arrays import Bools, Floats
-from creepkit.inverse.noise_model import (
-    NoiseModel,
-    Residuals,
-    components_fixed_by_priors,
-    correlation_lags,
-    covariance,
-    same_output,
-)
+from creepkit.inverse.noise_covariance import CovarianceFactor, NoiseLikelihood
+from creepkit.inverse.noise_model import OUTPUT_COMPONENTS, NoiseModel, Residuals, components_fixed_by_priors
 from creepkit.records import Nuisance
 
 BOUND_TOLERANCE = 1e-6
@@ -44,29 +38,20 @@ class LinearisedProblem:
         assert self.residuals.jacobian is not None
         return self.residuals.jacobian[..., self.free]
 
-    def solve(self, inverses: Floats) -> LinearSolution:
-        """The optimum under covariances of given inverses (tests, observations, observations)."""
+    def solve(self, factor: CovarianceFactor) -> LinearSolution:
+        """The optimum under a covariance."""
         J, p = self.jacobian, self.precision[self.free]
-        weighted_jacobian = inverses @ J
-        normal_matrix = np.einsum("tep,teq->pq", J, weighted_jacobian) + np.diag(p)
+        weighted = factor.inverse_times(np.concatenate([self.residuals.values[..., None], J], axis=-1))
+        normal_matrix = np.einsum("tep,teq->pq", J, weighted[..., 1:]) + np.diag(p)
         covariance = scaled_inverse(normal_matrix)
         prior_residual = self.prior_residual.copy()
-        step = -covariance @ (
-            np.einsum("tep,te->p", weighted_jacobian, self.residuals.values) + p * prior_residual[self.free]
-        )
+        step = -covariance @ (np.einsum("tep,te->p", J, weighted[..., 0]) + p * prior_residual[self.free])
         prior_residual[self.free] += step
         residuals = self.residuals.values + J @ step
-        weighted_residuals = (inverses @ residuals[..., None])[..., 0]
+        weighted_residuals = factor.inverse_times(residuals)
         chi2 = float((residuals * weighted_residuals).sum() + (self.precision * prior_residual**2).sum())
-        return LinearSolution(
-            step,
-            residuals,
-            weighted_residuals,
-            weighted_jacobian,
-            covariance,
-            chi2,
-            -float(np.linalg.slogdet(covariance)[1]),
-        )
+        log_det = -float(np.linalg.slogdet(covariance)[1])
+        return LinearSolution(step, residuals, weighted_residuals, weighted[..., 1:], covariance, chi2, log_det)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,43 +72,21 @@ class LinearSolution:
     log_det: float
 
 
-def inverse_covariances(residuals: Residuals, noise_model: NoiseModel) -> tuple[Floats, float]:
-    """C^-1 of every test, (tests, observations, observations), and ln|C| over all of them.
-
-    Outputs that share nothing are inverted one by one.
-    """
-    c = covariance(residuals, noise_model)
-    if noise_model.rate > 0 or residuals.random_effect_sensitivities is not None:
-        return np.asarray(np.linalg.inv(c)), float(np.linalg.slogdet(c)[1].sum())
-    out, log_det = np.zeros_like(c), 0.0
-    for test, (present, output) in enumerate(zip(residuals.present, residuals.output_index, strict=True)):
-        out[test][np.diag_indices_from(out[test])] = 1.0
-        for position in np.unique(output[present]):
-            indices = np.flatnonzero(present & (output == position))
-            block = np.ix_(indices, indices)
-            inverse_factor = np.linalg.inv(np.linalg.cholesky(c[test][block]))
-            out[test][block] = inverse_factor.T @ inverse_factor
-            log_det -= 2.0 * float(np.log(np.diag(inverse_factor)).sum())
-    return out, log_det
-
-
 def restricted_log_likelihood(linearised: LinearisedProblem, noise_model: NoiseModel) -> float:
     """ln L but for a constant; ln|A| over all unknowns, so that it does not jump where one meets its bound."""
-    inverses, log_det = inverse_covariances(linearised.residuals, noise_model)
-    unconstrained = replace(linearised, free=np.ones_like(linearised.free)).solve(inverses)
+    factor = CovarianceFactor.of_residuals(linearised.residuals, noise_model)
+    solution = linearised.solve(factor)
+    unconstrained = solution
+    if not linearised.free.all():
+        unconstrained = replace(linearised, free=np.ones_like(linearised.free)).solve(factor)
     priors = float(np.log(linearised.precision[linearised.precision > 0]).sum())
-    return -0.5 * (log_det + unconstrained.log_det - priors + linearised.solve(inverses).chi_square)
+    return -0.5 * (factor.log_determinant + unconstrained.log_det - priors + solution.chi_square)
 
 
 def log_noise_prior(noise_model: NoiseModel) -> float:
     """ln of the prior of the white noise of outputs whose noise is stated, but for a constant."""
-    return -0.5 * sum(_log_excess_of_stated(noise_model, name, "noise") ** 2 for name in noise_model.outputs)
-
-
-def _log_excess_of_stated(noise_model: NoiseModel, output: str, name: str) -> float:
-    """ln of the noise over what was stated, in standard deviations of its prior; 0 of all else."""
-    stated = noise_model[output].stated if name == "noise" else 0.0
-    return float(np.log(noise_model[output].noise / stated)) / NOISE_PRIOR_SD if stated > 0 else 0.0
+    stated = [components for components in noise_model.outputs.values() if components.stated > 0]
+    return -0.5 * sum((float(np.log(s.noise / s.stated)) / NOISE_PRIOR_SD) ** 2 for s in stated)
 
 
 def scaled_inverse(matrix: Floats) -> Floats:
@@ -166,13 +129,6 @@ OVERSHOOT = float(np.log(30.0))
 search is repeated from half way."""
 
 
-NOISE_COMPONENTS = ("noise", "misfit", "offset", "drift", "correlation_length")
-
-
-SHARED_COMPONENTS = ("rate", "discrepancy", "discrepancy_length")
-"""Components that outputs share; they belong to the output ""."""
-
-
 def estimate_variance_components(
     residuals: Residuals,
     start: NoiseModel,
@@ -191,7 +147,7 @@ def estimate_variance_components(
     fixed_by_prior = components_fixed_by_priors(nuisances, list(start.outputs))
     free = [
         (o, n)
-        for n in NOISE_COMPONENTS
+        for n in OUTPUT_COMPONENTS
         for o, components in start.outputs.items()
         if getattr(components, n) > 0
         and (o, n) not in fixed_by_prior
@@ -209,9 +165,7 @@ def estimate_variance_components(
         else _bounds(residuals, start, output, name)
         for output, name in free
     ]
-    x0 = np.array(
-        [np.clip(np.log(_component(start, *component)), *b) for component, b in zip(free, bounds, strict=True)]
-    )
+    x0 = np.clip(np.log(likelihood.components[likelihood.positions]), *np.transpose(bounds))
     optimum = _minimised(likelihood, x0, bounds)
     overshot = optimum.x < x0 - OVERSHOOT
     if overshot.any() and linearised is None:
@@ -225,7 +179,7 @@ def estimate_variance_components(
 
 def _minimised(likelihood: _Likelihood, x0: Floats, bounds: Sequence[tuple[float, float]]) -> OptimizeResult:
     inside = np.clip(x0, [low for low, _ in bounds], [high for _, high in bounds])
-    options = {"maxiter": 60, "ftol": 1e-9 if likelihood.linear is None else 1e-7}
+    options = {"maxiter": 60, "ftol": 1e-7 if likelihood.restricted else 1e-9}
     return minimize(likelihood.cost, inside, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
 
 
@@ -237,87 +191,39 @@ class _Likelihood:
         residuals: Residuals,
         start: NoiseModel,
         free: Sequence[tuple[str, str]],
-        linearised: LinearisedProblem | None = None,
+        linear: LinearisedProblem | None = None,
     ) -> None:
-        self.residuals, self.start, self.free, self.linear = residuals, start, free, linearised
-        self.names, self.time_lags = list(start.outputs), correlation_lags(residuals)
-        present = residuals.present[:, :, None] & residuals.present[:, None, :]
-        self.same_output = same_output(residuals) & present
+        self.start, self.components = start, start.components
+        self.positions = [start.position(*component) for component in free]
+        stated = [start[output].stated if name == "noise" else 0.0 for output, name in free]
+        self.has_prior = np.array(stated) > 0
+        self.log_stated = np.log(np.where(self.has_prior, stated, 1.0))
+        self.restricted, self.fixed_cost = linear is not None, 0.0
+        values, precision, prior_residual = residuals.values[..., None], np.zeros(0), np.zeros(0)
+        if linear is not None:
+            values = np.concatenate([linear.residuals.values[..., None], linear.jacobian], axis=-1)
+            precision, prior_residual = linear.precision[linear.free], linear.prior_residual[linear.free]
+            self.fixed_cost = 0.5 * float((linear.precision * linear.prior_residual**2)[~linear.free].sum())
+        self.likelihood = NoiseLikelihood(residuals.series, values, precision, prior_residual, self.components)
+
+    def components_at(self, x: Floats) -> Floats:
+        """Those of a noise model with these logarithms of the free components, (components,)."""
+        components = self.components.copy()
+        components[self.positions] = np.exp(x)
+        return components
 
     def noise_model(self, x: Floats) -> NoiseModel:
         """The noise model with these logarithms of the free components, (components,)."""
-        noise_model = self.start
-        for (output, name), value in zip(self.free, np.exp(x), strict=True):
-            noise_model = (
-                replace(noise_model, **{name: float(value)})  # type: ignore[arg-type]
-                if not output
-                else noise_model.with_output(output, **{name: float(value)})
-            )
-        return noise_model
+        return self.start.with_components(self.components_at(x))
 
     def cost(self, x: Floats) -> tuple[float, Floats]:
         """Value and gradient."""
-        value, projected, noise_model = self.gradient(x)
-        derivative = np.array([self._derivative(projected, noise_model, output, name) for output, name in self.free])
-        excess = np.array([_log_excess_of_stated(noise_model, *component) for component in self.free])
-        return value + 0.5 * float((excess**2).sum()), derivative + excess / NOISE_PRIOR_SD
-
-    def gradient(self, x: Floats) -> tuple[float, Floats, NoiseModel]:
-        """-ln L, G of every test (tests, observations, observations), and the noise model."""
-        r, noise_model = self.residuals, self.noise_model(x)
-        inverse, log_det = inverse_covariances(r, noise_model)
-        if self.linear is None:
-            weighted_residuals = (inverse @ r.values[..., None])[..., 0]
-            value = 0.5 * (float((r.values * weighted_residuals).sum()) + log_det)
-        else:
-            solved = self.linear.solve(inverse)
-            weighted_residuals = solved.weighted_residuals
-            value = 0.5 * (log_det + solved.log_det + solved.chi_square)
-            inverse = inverse - solved.weighted_jacobian @ solved.covariance @ np.swapaxes(
-                solved.weighted_jacobian, 1, 2
-            )
+        value, gradient = self.likelihood(self.components_at(x))
+        excess = np.where(self.has_prior, x - self.log_stated, 0.0) / NOISE_PRIOR_SD
         return (
-            value,
-            (inverse - weighted_residuals[:, :, None] * weighted_residuals[:, None, :]) / r.test_weights[:, None, None],
-            noise_model,
+            value + self.fixed_cost + 0.5 * float((excess**2).sum()),
+            gradient[self.positions] + excess / NOISE_PRIOR_SD,
         )
-
-    def _derivative(self, G: Floats, noise_model: NoiseModel, output: str, name: str) -> float:
-        """tr(G dC / d ln size) / 2."""
-        r = self.residuals
-        if name in ("discrepancy", "discrepancy_length"):
-            assert r.discrepancy_unit is not None
-            unit = noise_model.discrepancy * r.discrepancy_unit
-            weighted = G * np.exp(-self.time_lags / noise_model.discrepancy_length) * self.same_output
-            if name == "discrepancy":
-                return float(np.einsum("ti,tij,tj->", unit, weighted, unit))
-            return (
-                0.5
-                * float(np.einsum("ti,tij,tj->", unit, weighted * self.time_lags, unit))
-                / (noise_model.discrepancy_length)
-            )
-        if not output:
-            d = r.log_rate_sensitivity
-            return noise_model.rate**2 * float(np.einsum("ti,tij,tj->", d, G, d))
-        components, mask = noise_model[output], r.present & (r.output_index == self.names.index(output))
-        if name == "noise":
-            noise_variance = (components.noise * r.relative_noise * r.offset_sensitivity) ** 2
-            return float((np.einsum("tii->ti", G) * noise_variance)[mask].sum())
-        if name == "misfit":
-            return components.misfit**2 * float(np.einsum("tii->ti", G)[mask].sum())
-        if name == "offset":
-            s = np.where(mask, r.offset_sensitivity, 0.0)
-            return components.offset**2 * float(np.einsum("ti,tij,tj->", s, G, s))
-        correlation = np.exp(-self.time_lags / components.correlation_length) * (self.same_output & mask[:, :, None])
-        if name == "drift":
-            return components.drift**2 * float((G * correlation).sum())
-        return (
-            0.5 * components.drift**2 * float((G * correlation * self.time_lags).sum()) / components.correlation_length
-        )
-
-
-def _component(noise_model: NoiseModel, output: str, name: str) -> float:
-    return float(getattr(noise_model[output] if output else noise_model, name))
 
 
 def _bounds(residuals: Residuals, noise_model: NoiseModel, output: str, name: str) -> tuple[float, float]:

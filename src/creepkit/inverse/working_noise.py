@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from creepkit.arrays import Floats
 from creepkit.errors import FitError
+from creepkit.inverse.noise_covariance import CovarianceFactor, predicted_random_effects
 from creepkit.inverse.noise_model import (
     ASSUMED_RATE_SD,
     MINIMUM_TESTS,
@@ -18,11 +19,8 @@ from creepkit.inverse.noise_model import (
     OutputNoise,
     Residuals,
     autocorrelated_components,
-    cholesky_factors,
     initial_sd,
     initial_working_noise,
-    predicted_random_effects,
-    whiten,
 )
 from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, RUPTURE_OUTPUT, SMALLEST_NOISE, ObservationVector
 from creepkit.inverse.output_transforms import LinearTransform
@@ -288,7 +286,7 @@ def robust_test_weights(residuals: Residuals, working: NoiseModel) -> Floats:
     scatter as Student's t does: one like the others weighs one, one of ten times their error a twentieth.
     """
     unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
-    whitened = whiten(cholesky_factors(unweighted, working), unweighted.values)
+    whitened = CovarianceFactor.of_residuals(unweighted, working).whiten(unweighted.values)
     largest_ratio = np.zeros(len(whitened))
     for position in range(len(working.outputs)):
         mask = unweighted.present & (unweighted.output_index == position)

@@ -1,9 +1,9 @@
-"""The numba target: a law as C functions, generated, compiled once and kept on disk with checksums.
+"""The compiled target: a law as C functions, generated, compiled once and kept on disk with checksums.
 
-Each generated module has a folder of its own, named after the hash of all that it was made from, with the source,
-numba's machine code and the SHA-256 of every file. A folder is built under a temporary name and renamed into place
-whole; one whose checksums do not match is built anew. Machine code from the cache is executed: keep the folder writable
-for yourself alone, as it is by default.
+Each generated module has a folder of its own, named after the hash of all that it was made from, with the source, the
+machine code and the SHA-256 of both. A folder is built under a temporary name and renamed into place whole; one whose
+checksums do not match is built anew. Machine code from the cache is executed: keep the folder writable for yourself
+alone, as it is by default.
 """
 
 from __future__ import annotations
@@ -15,24 +15,21 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import cache, lru_cache, partial
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-import numba
 import numpy as np
-import sympy
-from numba.core import config
-from numba.core.registry import cpu_target
 
 from creepkit.arrays import Floats, frozen
-from creepkit.kernels.interface import POINT_SIZE, CompiledLaw
-from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, assignment_lines, expression_source, law_comments
+from creepkit.kernels.interface import CompiledLaw, Entry
+from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, expression_source, law_comments
+from creepkit.kernels.llvm_code import Module, add_entry
 from creepkit.kernels.log_form import leading_exponents
-from creepkit.kernels.symbolic_kernel import KernelFunction, SymbolicKernel
+from creepkit.kernels.machine_code import LoadedCode, object_code, processor
+from creepkit.kernels.symbolic_kernel import SymbolicKernel
 from creepkit.language import symbols
 from creepkit.language.law_record import structure_of
 
@@ -40,22 +37,19 @@ if TYPE_CHECKING:
     from creepkit.language.law import CreepLaw
 
 
-SOURCE_FILE, CHECKSUM_FILE = "law.py", "SHA256SUMS"
+SOURCE_FILE, CODE_FILE, CHECKSUM_FILE = "law.py", "law.o", "SHA256SUMS"
 
 
 _loaded_modules: dict[str, ModuleType] = {}
 
 
-_numba_settings: Any = config
-
-
 def load_module(key: str, source: Callable[[], str]) -> ModuleType:
-    """Return the module of `key`: from memory, from disk, or made from text() now."""
+    """Return the module of `key`: from memory, from disk, or made from source() now."""
     if key not in _loaded_modules:
         folder = _module_folder(f"law_{key}")
-        _loaded_modules[key] = (
-            _execute_module(key, folder / SOURCE_FILE) if is_intact(folder) else _build_module(key, folder, source())
-        )
+        if not is_intact(folder):
+            _build_module(folder, source())
+        _loaded_modules[key] = _execute_module(key, folder)
     return _loaded_modules[key]
 
 
@@ -78,14 +72,9 @@ def is_intact(folder: Path) -> bool:
 
 
 def _module_folder(name: str) -> Path:
-    """Where a module belongs: in the cache folder, or in a private one when that cannot be written."""
+    """Where a module is or belongs: in the cache folder, or in a private one when that cannot be written."""
     folder = cache_folder()
-    if _writable(folder):
-        return folder / name
-    private = _private_folder() / name
-    if is_intact(folder / name) and not private.exists():
-        shutil.copytree(folder / name, private)  # numba must be able to write beside the source
-    return private
+    return (folder if is_intact(folder / name) or _writable(folder) else _private_folder()) / name
 
 
 def _writable(folder: Path) -> bool:
@@ -108,17 +97,16 @@ def _private_folder() -> Path:
 # ---- making and loading --------------------------------------------------------------------------------------------
 
 
-def _build_module(key: str, folder: Path, source: str) -> ModuleType:
+def _build_module(folder: Path, source: str) -> None:
     """Write, compile and seal a module in a temporary folder, then put the folder into its place."""
     temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f"new_{folder.name}_"))
     try:
         (temporary / SOURCE_FILE).write_text(source, encoding="utf-8", newline="\n")
-        module = _execute_module(key, temporary / SOURCE_FILE)
+        (temporary / CODE_FILE).write_bytes(object_code(assembly(source)))
         (temporary / CHECKSUM_FILE).write_text(_checksums(temporary), encoding="utf-8", newline="\n")
         _install_folder(temporary, folder)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-    return module
 
 
 def _install_folder(temporary: Path, folder: Path) -> None:
@@ -143,25 +131,13 @@ def _remove_folder(folder: Path) -> None:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _execute_module(key: str, path: Path) -> ModuleType:
-    source = path.read_text(encoding="utf-8")
+def _execute_module(key: str, folder: Path) -> ModuleType:
+    """Run the source of a module and load its machine code, the entries of which become COMPILED."""
+    source, code = (folder / SOURCE_FILE).read_text(encoding="utf-8"), LoadedCode((folder / CODE_FILE).read_bytes())
     module = ModuleType(f"creepkit_kernel_{key}")
-    module.__file__, module.__dict__["SOURCE"] = str(path), source
-    sys.modules[module.__name__] = module  # numba finds the functions of cached machine code through their module
-    with _machine_code_in_module_folder():
-        exec(compile(source, str(path), "exec"), module.__dict__)
+    exec(compile(source, str(folder / SOURCE_FILE), "exec"), module.__dict__)
+    module.__dict__.update(SOURCE=source, COMPILED={entry: Entry(code.address(entry), code) for entry in ENTRIES})
     return module
-
-
-@contextmanager
-def _machine_code_in_module_folder() -> Iterator[None]:
-    """Overrule NUMBA_CACHE_DIR: the seal has to cover the machine code, and the folder moves as a whole."""
-    previous = _numba_settings.CACHE_DIR
-    _numba_settings.CACHE_DIR = ""
-    try:
-        yield
-    finally:
-        _numba_settings.CACHE_DIR = previous
 
 
 def _checksums(folder: Path) -> str:
@@ -173,27 +149,39 @@ def _checksums(folder: Path) -> str:
 _MODULE_HEADER = """# Kernel of a creep law; generated, do not edit.
 {terms}
 
-from math import isfinite
+from creepkit.kernels.llvm_functions import {functions}
 
-from numba import cfunc
-
-from creepkit.kernels.interface import SIGNATURE
-from creepkit.kernels.numba_functions import {functions}
-
+VARIABLES, PARAMETERS, RATES = {sizes}
 COEFFICIENTS = {coefficients}
 
 """
 
 
+ENTRIES = ("rate", "update", "sensitivity")
+
+
 def module_source(lowered: SymbolicKernel) -> str:
-    """The generated module of a law."""
-    functions = "\n\n".join(_function_source(e, lowered) for e in (lowered.rate, lowered.update, lowered.sensitivity))
+    """The generated module of a law: its entries as functions of a point's variables and theta."""
+    functions = "\n\n".join(getattr(lowered, entry).source for entry in ENTRIES)
+    parameters = len(lowered.names.theta)
     header = _MODULE_HEADER.format(
         terms="\n".join(law_comments(lowered.law)),
         functions=", ".join(_called_functions(functions)),
+        sizes=f"{len(lowered.names.inputs) - parameters}, {parameters}, {1 + len(lowered.law.states)}",
         coefficients=repr(lowered.form.coefficients),
     )
     return f"{header}{_exponents_source(lowered)}\n\n{functions}"
+
+
+def assembly(source: str) -> str:
+    """The entries of a generated module in LLVM assembly."""
+    namespace: dict[str, Any] = {}
+    exec(source, namespace)
+    module = Module()
+    for entry in ENTRIES:
+        sizes = (namespace["VARIABLES"], namespace["PARAMETERS"])
+        add_entry(module, entry, namespace[entry], sizes, namespace["RATES"])
+    return str(module)
 
 
 def _called_functions(text: str) -> list[str]:
@@ -212,49 +200,6 @@ def _exponents_source(lowered: SymbolicKernel) -> str:
     return "\n".join([*lines, f"    return (\n{rows}    )\n"])
 
 
-def _function_source(entry: KernelFunction, lowered: SymbolicKernel) -> str:
-    """One C function; what depends on theta alone is done before the loop over rows."""
-    states = len(lowered.law.states)
-    width, size = POINT_SIZE + states, len(entry.outputs)
-    point, theta = entry.inputs[:width], entry.inputs[width:]
-    lines = [
-        '@cfunc(SIGNATURE, cache=True, error_model="numpy")',
-        f"def {entry.name}(rows, x, theta, out):",
-        *(f"    {s} = theta[{k}]" for k, s in enumerate(theta) if s in entry.used_inputs),
-        *assignment_lines(entry.constants, "    "),
-        "    flags = 0",
-        "    for row in range(rows):",
-        *(f"        {s} = x[{width} * row + {k}]" for k, s in enumerate(point) if s in entry.used_inputs),
-        *assignment_lines(entry.steps, "        "),
-        *assignment_lines(_nonconstant_outputs(entry.outputs), "        "),
-        *(f"        out[{size} * row + {k}] = {_output_text(k, e)}" for k, e in enumerate(entry.outputs)),
-        *_finite_test(entry.outputs, range(1 + states), 1),
-        *_finite_test(entry.outputs, range(1 + states, size), 2),
-        "    return flags\n",
-    ]
-    return "\n".join(lines)
-
-
-def _nonconstant_outputs(outputs: tuple[sympy.Expr, ...]) -> list[tuple[sympy.Symbol, sympy.Expr]]:
-    return [(sympy.Symbol(f"y{k}"), e) for k, e in enumerate(outputs) if not e.is_number]
-
-
-def _output_text(k: int, output: sympy.Expr) -> str:
-    return expression_source(output) if output.is_number else f"y{k}"
-
-
-def _finite_test(outputs: tuple[sympy.Expr, ...], columns: range, flag: int) -> list[str]:
-    """Set a flag when an output is not finite: y - y is 0 for what is finite, NaN for what is not."""
-    numbers = [f"y{k}" for k in columns if not outputs[k].is_number]
-    if not numbers:
-        return []
-    if len(numbers) == 1:
-        test = f"not isfinite({numbers[0]})"
-    else:
-        test = f"{' + '.join(f'({y} - {y})' for y in numbers)} != 0.0"
-    return [f"        if {test}:", f"            flags |= {flag}"]
-
-
 _REFERENCE_POINT = (100.0, 0.0, 0.0, 1000.0, 100.0, 100.0 / 3.0)
 """Where exponents that vary with stress or temperature are taken unless a point is given."""
 
@@ -265,9 +210,7 @@ def compile_law(law: CreepLaw) -> CompiledLaw:
     module = load_module(key, partial(_module_source, law))
     initial = frozen([state.initial for state in law.states.values()])
     return CompiledLaw(
-        rate=module.rate,
-        update=module.update,
-        sensitivity=module.sensitivity,
+        **module.COMPILED,
         names=law.names,
         initial=initial,
         limits=frozen([np.inf if state.limit is None else state.limit for state in law.states.values()]),
@@ -295,8 +238,7 @@ def _code_fingerprint() -> str:
     digest = hashlib.sha256()
     for path in (*sorted(Path(__file__).parent.glob("*.py")), Path(str(symbols.__file__))):
         digest.update(path.read_bytes())
-    machine = cpu_target.target_context.codegen().magic_tuple()
-    for item in (sys.version, numba.__version__, *machine):
+    for item in (sys.version, *processor()):
         digest.update(item.encode())
     return digest.hexdigest()
 

@@ -2,7 +2,7 @@
 
 A class states its partial derivatives, one for each argument, and `plain`, the same function in ordinary sympy. Printed
 names (exp, log_floor, larger, choose ...) are defined once a target in numpy_functions, torch_functions and
-numba_functions.
+llvm_functions, and for exported Python code in scalar_functions.
 """
 
 from __future__ import annotations

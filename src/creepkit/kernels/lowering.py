@@ -12,18 +12,13 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from creepkit.errors import LawError, nearest
-from creepkit.kernels.kernel_functions import assignment_lines, expression_source, law_comments
+from creepkit.kernels.kernel_functions import law_comments
 from creepkit.kernels.symbolic_kernel import SymbolicKernel, symbolic_kernel
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES
 
 if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
-
-
-if TYPE_CHECKING:
-    from creepkit.kernels.symbolic_kernel import KernelFunction
-    from creepkit.language.law import CreepLaw
 
 
 KernelTarget = Literal["numpy", "torch", "numba"]
@@ -81,7 +76,7 @@ class ArrayKernel:
         law = lowered.law
         printed = (lowered.rate, lowered.log_rate, lowered.sensitivity, lowered.log_sensitivity)
         self.law = law
-        self.source = "\n".join([*law_comments(law), "\n", *map(array_function_source, printed)])
+        self.source = "\n".join([*law_comments(law), "\n", *(entry.source for entry in printed)])
         self._target = target
         self._entries = target.broadcast_functions(self._execute_source(), len(lowered.names.inputs) - len(law.params))
         self._states = [s.name for s in law.states]
@@ -161,11 +156,3 @@ class ArrayKernel:
 @lru_cache(maxsize=256)
 def _array_kernel(law: CreepLaw, target: KernelTarget) -> ArrayKernel:
     return ArrayKernel(symbolic_kernel(law), import_module(f"creepkit.kernels.{target}_functions"))
-
-
-def array_function_source(entry: KernelFunction) -> str:
-    """An entry as a function of arrays or tensors that returns a tuple."""
-    arguments = ", ".join(s.name for s in entry.inputs)
-    lines = [f"def {entry.name}({arguments}):", *assignment_lines((*entry.constants, *entry.steps), "    ")]
-    outputs = "".join(f"        {expression_source(output)},\n" for output in entry.outputs)
-    return "\n".join(lines) + f"\n    return (\n{outputs}    )\n"

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import sympy
 
-from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, Floored, LogFloor
+from creepkit.kernels.kernel_functions import TARGET_FUNCTIONS, Floored, LogFloor, assignment_lines, expression_source
 from creepkit.kernels.log_form import FLOOR, LogForm, floor_of, log_form, with_all_exponential_differences
 from creepkit.language.law import CreepLaw
 from creepkit.language.symbols import POINT_VARIABLES
@@ -24,8 +24,6 @@ _RESERVED_NAMES = (
     *keyword.kwlist,
     *TARGET_FUNCTIONS,
     *("rate", "log_rate", "update", "sensitivity", "log_sensitivity", "exponents"),
-    *("COEFFICIENTS", "SIGNATURE", "cfunc", "isfinite", "range"),
-    *("rows", "row", "x", "theta", "out", "flags"),
 )
 
 
@@ -118,6 +116,14 @@ class KernelFunction:
         """The inputs that matter."""
         expressions = [*self.outputs, *(e for _, e in (*self.constants, *self.steps))]
         return set().union(*(e.free_symbols for e in expressions)) & set(self.inputs)
+
+    @property
+    def source(self) -> str:
+        """The function as text: it takes its inputs one by one and returns a tuple."""
+        arguments = ", ".join(s.name for s in self.inputs)
+        lines = [f"def {self.name}({arguments}):", *assignment_lines((*self.constants, *self.steps), "    ")]
+        outputs = "".join(f"        {expression_source(output)},\n" for output in self.outputs)
+        return "\n".join(lines) + f"\n    return (\n{outputs}    )\n"
 
 
 class SymbolicKernel:

@@ -9,8 +9,8 @@ import creepkit as ck
 from creepkit import kernels
 from creepkit.fem.finite_element_model import finite_element_model
 from creepkit.fem.simulation import LoadHistory, simulate
-from creepkit.fem.step_record import TimeInterpolation
-from creepkit.fem.time_integration import SolverSettings
+from creepkit.fem.solver import SolverSettings
+from creepkit.fem.time_interpolation import TimeInterpolation
 from creepkit.records import Program
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 

@@ -4,17 +4,9 @@ import numpy as np
 import pytest
 
 from creepkit import kernels
-from creepkit.fem.assembly import (
-    BALANCED,
-    assemble,
-    force_workspace,
-    point_workspace,
-    side_force,
-    side_stiffness,
-    virgin_points,
-)
+from creepkit.core import address, function
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
-from creepkit.fem.material_point import StageConditions
+from creepkit.fem.solver import StageConditions, assemble
 from creepkit.laws.norton import NORTON
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 
@@ -26,16 +18,18 @@ CURVED = np.array([[1.0, 1.6, 2.0], [0.5, 0.7, 1.5]])
 
 
 def force(ends: np.ndarray) -> np.ndarray:
-    out = np.empty((2, 3))
-    side_force(ends[0], ends[1], out)
-    return out
+    return side_pressure(ends)[0]
 
 
 def stiffness(ends: np.ndarray) -> np.ndarray:
     """Derivatives (2, 3, 2, 3) of `force`."""
-    out = np.empty((4, 3, 3))
-    side_stiffness(ends[0], ends[1], out)
-    return out.reshape(2, 2, 3, 3).transpose(0, 2, 1, 3)
+    return side_pressure(ends)[1].reshape(2, 2, 3, 3).transpose(0, 2, 1, 3)
+
+
+def side_pressure(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    ends, out, slopes = np.ascontiguousarray(ends), np.empty((2, 3)), np.empty((4, 3, 3))
+    function("creepkit_side_pressure", None)(*map(address, (ends, out, slopes)))
+    return out, slopes
 
 
 def deformed(geometry: DimpleGeometry) -> tuple[FiniteElementModel, np.ndarray]:
@@ -102,18 +96,12 @@ def tangents(geometry: DimpleGeometry) -> tuple[FiniteElementModel, np.ndarray, 
     body, u = deformed(geometry)
     kernel = kernels.lower(NORTON, "numba")
     theta = NORTON.to_internal({"A": 1e-15, "n": 4.0})[0]
-    stage = StageConditions(0.0, 0.0, 300.0, E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU)), PRESSURE)
-    points, room, forces = virgin_points(4 * len(body.elements), 0, 2), point_workspace(0, 0), force_workspace(body)
+    stage = StageConditions(0.0, 0.0, 0.0, 300.0, E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU)), PRESSURE)
 
-    def residual(moved: np.ndarray, stiff: bool = False) -> np.ndarray:
-        assert assemble(kernel.update, theta, body, stage, moved, points, room, forces, stiff, 1e-3) == BALANCED
-        return forces.residual[: body.size].copy()
+    def residual(moved: np.ndarray) -> np.ndarray:
+        return assemble(kernel, theta, body, stage, moved)[0]
 
-    residual(u, stiff=True)
-    tangent = np.zeros((body.size, body.size))
-    for i in range(body.size):
-        width = min(body.width + 1, body.size - i)
-        tangent[i, i : i + width] = tangent[i : i + width, i] = forces.band[i, :width]
+    tangent = assemble(kernel, theta, body, stage, u)[1]
     slopes = np.empty_like(tangent)
     for place in np.flatnonzero(body.equations >= 0):
         move = np.zeros_like(u)

@@ -7,7 +7,7 @@ import sympy
 from creepkit import kernels
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.simulation import REASONS, LoadHistory, Simulation, simulate
-from creepkit.fem.step_record import DEFLECTION_LIMIT, LIMIT_LOAD, STRAIN_LIMIT, TOO_MANY_STEPS, SolverSettings
+from creepkit.fem.solver import DEFLECTION_LIMIT, LIMIT_LOAD, STRAIN_LIMIT, TOO_MANY_STEPS, SolverSettings
 from creepkit.language import CreepLaw, Elastic, strain, stress, time
 from creepkit.laws.hyperbolic_sine import HYPERBOLIC_SINE
 from creepkit.laws.norton import NORTON

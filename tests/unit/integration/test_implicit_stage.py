@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numba import njit
 from scipy.stats import qmc
 
-from creepkit.integration.stage_problem import (
+from creepkit.integration.implicit_stage import (
     BY_LOG_WEIGHT,
     BY_MEAN,
     BY_PRINCIPAL,
@@ -20,13 +19,11 @@ from creepkit.integration.stage_problem import (
     UNIAXIAL,
     Axes,
     StageProblem,
-    differentiate_stage,
-    gradient_of_sensitivity,
-    gradient_of_update,
+    solve_stage,
+    stage_response,
 )
-from creepkit.integration.stage_solver import solve_stage
 from creepkit.kernels import lower
-from creepkit.kernels.interface import MEAN_STRESS, PRINCIPAL_STRESS, STRAIN, STRESS, TIME, data_pointer
+from creepkit.kernels.interface import MEAN_STRESS, PRINCIPAL_STRESS, STRAIN, STRESS, TIME, call_entry
 from creepkit.language import Param, mean_stress, parameters, principal_stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
@@ -38,19 +35,16 @@ MULTIAXIAL_DAMAGE = kachanov(
 )
 
 
-@njit
-def call(entry, row, theta, out):
-    return entry(1, data_pointer(row), data_pointer(theta), data_pointer(out))
+def update_at(kernel, theta, row):
+    """The law's update at one point: [ln rate, rates of the states], then their derivatives."""
+    return call_entry(kernel, "update", row[None], theta)[0][0]
 
 
 def solved(kernel, theta, problem, z0=(), axes=UNIAXIAL, time=1e3, guess=1e-6, tolerance=1e-7):
-    """Solve one stage; return increment, flag, the kernel's row and room for its output."""
-    z0 = np.array(z0, dtype=float)
-    row = np.zeros(6 + z0.size)
+    """Solve one stage; return increment, flag, and the law's row."""
+    row = np.zeros(6 + len(z0))
     row[TIME], row[3], row[6:] = time, 1000.0, z0
-    out = np.zeros((1 + z0.size) * (7 + z0.size))
-    increment, flag = solve_stage(kernel.update, theta, axes, problem, z0, row, out, guess, tolerance)
-    return increment, flag, row, out
+    return solve_stage(kernel, theta, problem, row, axes=axes, guess=guess, tolerance=tolerance)
 
 
 def samples(count: int) -> np.ndarray:
@@ -67,11 +61,11 @@ def test_the_stage_equation_holds_over_the_bounds_of_the_combined_law(stiffness:
         theta = low + u[:9] * (high - low)
         start = 0.0 if u[9] < 0.3 else 10 ** (-9 + 8 * u[9])
         problem = StageProblem(10 ** (1 + 1.5 * u[10]), stiffness, 0.0, 10 ** (-3 + 8 * u[11]), start)
-        increment, flag, row, out = solved(kernel, theta, problem, guess=10 ** (-12 + 11 * u[2]))
+        increment, flag, row = solved(kernel, theta, problem, guess=10 ** (-12 + 11 * u[2]))
         assert flag == SOLVED
         if not 1e-25 < increment < 1e10:
             continue
-        call(kernel.update, row, theta, out)
+        out = update_at(kernel, theta, row)
         assert np.log(increment / problem.weight) == pytest.approx(out[0], abs=1e-10 * max(1.0, abs(out[0])))
         assert row[STRAIN] == pytest.approx(start + increment, rel=1e-14)
         assert row[STRESS] + stiffness * increment == pytest.approx(problem.trial, rel=1e-12)
@@ -83,7 +77,7 @@ def test_any_guess_leads_to_the_closed_form(guess: float) -> None:
     kernel = lower(NORTON, "numba")
     theta = NORTON.to_internal({"A": 1e-9, "n": 1.0})[0]
     for weight in (1e-6, 1.0, 1e5, 1e12):
-        increment, flag, _, _ = solved(kernel, theta, StageProblem(100.0, 1e5, 0.0, weight, 0.0), guess=guess)
+        increment, flag, _ = solved(kernel, theta, StageProblem(100.0, 1e5, 0.0, weight, 0.0), guess=guess)
         assert flag == SOLVED
         assert increment == pytest.approx(weight * 1e-9 * 100 / (1 + weight * 1e-9 * 1e5), rel=1e-12)
 
@@ -93,7 +87,7 @@ def test_constant_load_has_a_solution_only_up_to_the_turning_point() -> None:
     kernel = lower(NORTON, "numba")
     theta = NORTON.to_internal({"A": 1e-9, "n": 4.0})[0]
     last = 1 / (4 * np.e) / (1e-9 * 50.0**4)
-    increment, flag, _, _ = solved(kernel, theta, StageProblem(50.0, 0.0, 1.0, 0.9 * last, 0.0))
+    increment, flag, _ = solved(kernel, theta, StageProblem(50.0, 0.0, 1.0, 0.9 * last, 0.0))
     assert flag == SOLVED
     assert increment == pytest.approx(0.9 * last * 1e-9 * 50**4 * np.exp(4 * increment), rel=1e-10)
     assert solved(kernel, theta, StageProblem(50.0, 0.0, 1.0, 1.1 * last, 0.0))[1] != SOLVED
@@ -116,9 +110,9 @@ def test_states_satisfy_their_equations(problem: StageProblem) -> None:
     kernel = lower(MULTIAXIAL_DAMAGE, "numba")
     theta = MULTIAXIAL_DAMAGE.to_internal(DAMAGE_VALUES)[0]
     axes = Axes(30.0, 0.7, 40.0, 0.0)
-    increment, flag, row, out = solved(kernel, theta, problem, (0.1,), axes)
+    increment, flag, row = solved(kernel, theta, problem, (0.1,), axes)
     assert flag == SOLVED
-    call(kernel.update, row, theta, out)
+    out = update_at(kernel, theta, row)
     assert increment == pytest.approx(problem.weight * np.exp(out[0]), rel=1e-10)
     assert row[6] == pytest.approx(0.1 + problem.weight * out[1], rel=1e-10)
     assert row[PRINCIPAL_STRESS] == pytest.approx(30 + 0.7 * row[STRESS])
@@ -133,20 +127,9 @@ def test_damage_beyond_the_last_solution_is_refused() -> None:
 
 def responses(kernel, theta, problem, z0, axes, entry):
     """All derivatives of the solution, from `update` or from `sensitivity`."""
-    increment, _, row, out = solved(kernel, theta, problem, z0, axes, tolerance=1e-10)
-    size, width, count = 1 + len(z0), 6 + len(z0), theta.size
-    gradient = np.zeros((size, width))
-    response = np.zeros((size, INPUTS + len(z0) + count))
-    call(kernel.update, row, theta, out)
-    rates = out[1:size].copy()
-    if entry == "update":
-        gradient_of_update(out, problem, increment, gradient)
-    else:
-        full = np.zeros(size * (1 + width + count))
-        call(kernel.sensitivity, row, theta, full)
-        gradient_of_sensitivity(full, problem, increment, gradient)
-        response[:, INPUTS + len(z0) :] = problem.weight * full[size + size * width :].reshape(size, count)
-    assert differentiate_stage(axes, problem, increment, row[STRESS], rates, gradient, np.zeros((size, size)), response)
+    solution = solved(kernel, theta, problem, z0, axes, tolerance=1e-10)
+    response = stage_response(kernel, theta, problem, solution, axes=axes, entry=entry)
+    assert response is not None
     return response
 
 
@@ -168,7 +151,7 @@ def test_responses_are_the_derivatives_of_the_solution(problem: StageProblem, en
 
     def solution(**change):
         place = {"problem": problem, "axes": axes, "z0": z0, "theta": theta, **change}
-        increment, flag, row, _ = solved(
+        increment, flag, row = solved(
             kernel, place["theta"], place["problem"], place["z0"], place["axes"], time, tolerance=1e-10
         )
         assert flag == SOLVED

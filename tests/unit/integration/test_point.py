@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from creepkit.integration import IntegrationSettings, PointTest, integrate
 from creepkit.integration.event_location import DIVERGED, REACHED_END, STATE_LIMIT, STRAIN_LIMIT, TOO_MANY_STEPS
 from creepkit.integration.time_discretisation import SDIRK2
 from creepkit.kernels import lower
-from creepkit.language import CreepLaw, Param, State, parameters, stress
+from creepkit.language import CreepLaw, Param, State, parameters, states, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -195,3 +197,45 @@ def test_times_that_make_no_sense_are_refused(times: list[float]) -> None:
 def test_stiffness_goes_with_prescribed_strain_only() -> None:
     with pytest.raises(SolveError, match="stiffness must not be negative"):
         PointTest(Program.constant(100.0), ROOM, np.array([1.0]), stiffness=1e5, constant_load=True)
+
+
+def test_derivatives_without_output_times() -> None:
+    """Norton: p = A s^n t, so that ln t at a strain, and at the strain limit, falls by 1 a ln A and by ln s an n."""
+    kernel, theta = lower(NORTON, "numba"), NORTON.to_internal({"A": 1e-12, "n": 3.0})
+    test = PointTest(Program.constant(100.0), ROOM, np.zeros(0), levels=np.array([1e-3, 0.1]), until=1e9)
+    result = integrate(kernel, theta, [test], jacobian=True)
+    expected = [-1.0, -np.log(100.0)]
+    assert result.terminations[0, 0] == STRAIN_LIMIT
+    np.testing.assert_allclose(result.level_times[0], [1e3, 1e5], rtol=1e-9)
+    np.testing.assert_allclose(result.level_time_jacobian[0], [expected, expected], rtol=1e-9)
+    np.testing.assert_allclose(result.end_jacobian[0, 0], expected, rtol=1e-9)
+
+
+def test_threads_and_single_calls_agree_to_the_last_digit() -> None:
+    """A call keeps nothing: batches in four threads are the batch of one thread and the candidates one by one."""
+    kernel, theta = (
+        lower(COMBINED, "numba"),
+        COMBINED.to_internal(VALUES)[0] + np.linspace(-0.5, 0.5, 64)[:, None] * 0.1,
+    )
+    test = PointTest(Program.constant(100.0), ROOM, np.linspace(0.0, 1e5, 50))
+
+    def strain(rows: slice) -> np.ndarray:
+        return integrate(kernel, theta[rows], [test], jacobian=True).jacobian
+
+    whole, quarters = strain(slice(None)), [slice(k, k + 16) for k in range(0, 64, 16)]
+    with ThreadPoolExecutor(4) as pool:
+        np.testing.assert_array_equal(np.concatenate(list(pool.map(strain, quarters))), whole)
+    np.testing.assert_array_equal(strain(slice(5, 6)), whole[5:6])
+
+
+def test_too_many_states_are_refused() -> None:
+    counted = states(" ".join(f"counted_{k}" for k in range(17)))
+    law = CreepLaw(
+        "many states",
+        {"creep": A * stress**n},
+        {k: KACHANOV.params[k] for k in (A, n)},
+        states={state: State(0.0, A * stress) for state in counted},
+    )
+    test = PointTest(Program.constant(100.0), ROOM, np.ones(1))
+    with pytest.raises(SolveError, match="a law may have 16 internal variables, but this one has 17"):
+        integrate(lower(law, "numba"), law.to_internal({"A": 1e-12, "n": 3.0}), [test])

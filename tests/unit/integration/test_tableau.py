@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
 import pytest
 
-from creepkit.integration.runge_kutta_step import StressControl, advance, dense_value, step_workspace
-from creepkit.integration.stage_problem import SOLVED, UNIAXIAL
-from creepkit.integration.time_discretisation import SDIRK2, SDIRK4, Segment, Tableau, linear_time
+from creepkit.core import address, function
+from creepkit.integration.core_structures import tableau_structure
+from creepkit.integration.implicit_stage import SOLVED
+from creepkit.integration.time_discretisation import SDIRK2, SDIRK4, Tableau
 from creepkit.kernels import lower
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
 
@@ -67,30 +70,37 @@ def test_the_method_is_stiffly_accurate_and_l_stable(tableau: Tableau) -> None:
     assert abs(1 + far * tableau.a[-1] @ np.linalg.solve(identity - far * tableau.a, one)) < 1e-7
 
 
+def in_equal_steps(theta: np.ndarray, tableau: Tableau, steps: int, segment: list[float], start: float) -> np.ndarray:
+    """Strain at the end of a segment and at 0.3 of the first step, from `start`; strain hardening."""
+    out, program = np.zeros(2), np.array(segment)
+    flag = function("creepkit_integrate_in_equal_steps")(
+        ctypes.c_void_p(lower(STRAIN_HARDENING, "numba").update.address),
+        address(theta),
+        ctypes.byref(tableau_structure(tableau)),
+        address(program),
+        ctypes.c_double(start),
+        ctypes.c_int64(steps),
+        ctypes.c_double(1e-9),
+        ctypes.c_double(0.3),
+        address(out),
+    )
+    assert flag == SOLVED
+    return out
+
+
 @TABLEAUX
 def test_measured_order_of_step_and_dense_output(tableau: Tableau) -> None:
     """p' = A s^n p^m under constant true stress from p(0) = p0: p^(1-m) is a straight line in time."""
     A, n, m, stress, start, length = 1e-12, 3.0, -0.6, 100.0, 0.2, 2e5
-    kernel = lower(STRAIN_HARDENING, "numba")
     theta = STRAIN_HARDENING.to_internal({"A": A, "n": n, "m": m})[0]
-    segment, drive = Segment(0.0, length, stress, stress, 1000.0, 1000.0), StressControl(0.0, 0.0, UNIAXIAL)
 
-    def exact(time: float) -> float:
-        return float((start ** (1 - m) + (1 - m) * A * stress**n * time) ** (1 / (1 - m)))
+    def exact(times: np.ndarray) -> np.ndarray:
+        return np.asarray((start ** (1 - m) + (1 - m) * A * stress**n * times) ** (1 / (1 - m)))
 
     errors = []
     for steps in (16, 32):
-        work = step_workspace(0, 3, tableau.stages)
-        work.value[0], h, dense = start, 1.0 / steps, 0.0
-        for k in range(steps):
-            flag = advance(
-                kernel.update, theta, drive, segment, linear_time(0.0, length), tableau, work, k * h, h, 1e-2, 1e-9
-            )
-            assert flag == SOLVED
-            if k == 0:
-                dense = abs(dense_value(tableau, work, h, 0.3, 0) - exact(0.3 * h * length))
-            work.value[:] = work.new_value
-        errors.append((abs(work.value[0] - exact(length)), dense))
-    slope, dense_slope = np.log2(np.array(errors[0]) / np.array(errors[1]))
+        found = in_equal_steps(theta, tableau, steps, [0.0, length, stress, stress, 1000.0, 1000.0], start)
+        errors.append(np.abs(found - exact(length * np.array([1.0, 0.3 / steps]))))
+    slope, dense_slope = np.log2(errors[0] / errors[1])
     assert slope == pytest.approx(tableau.order, abs=0.2)
     assert dense_slope == pytest.approx(tableau.dense_order + 1, abs=0.35)

@@ -6,16 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from creepkit.inverse.noise_model import (
-    NoiseModel,
-    OutputNoise,
-    Residuals,
-    autocorrelated_components,
-    covariance,
-    effective_sample_size,
-    log_likelihood,
-    predicted_random_effects,
-)
+from creepkit.inverse.noise_covariance import effective_sample_size, log_likelihood, predicted_random_effects
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, autocorrelated_components, covariance
 from creepkit.inverse.variance_components import estimate_variance_components
 from creepkit.records import Nuisance
 
@@ -162,7 +154,8 @@ def test_slopes_of_the_likelihood_are_its_differences():
     free = [(o, n) for o in scatter.outputs for n in ("misfit", "offset", "drift", "correlation_length")] + [
         ("", "rate")
     ]
-    likelihood = _Likelihood(residuals.with_test_weights(np.array([1.0, 0.3])), scatter, free)
+    residuals = residuals.with_test_weights(np.array([1.0, 0.3]))
+    likelihood = _Likelihood(residuals, scatter, free)
     x = np.log([*(getattr(scatter[o], n) for o, n in free[:-1]), scatter.rate])
     slope = likelihood.cost(x)[1]
     for k in range(x.size):
@@ -170,9 +163,7 @@ def test_slopes_of_the_likelihood_are_its_differences():
         step[k] = 1e-5
         difference = (likelihood.cost(x + step)[0] - likelihood.cost(x - step)[0]) / 2e-5
         assert slope[k] == pytest.approx(difference, rel=1e-5, abs=1e-7)
-    ends = [
-        likelihood.cost(x + d)[0] + log_likelihood(likelihood.residuals, likelihood.noise_model(x + d)) for d in (0, 1)
-    ]
+    ends = [likelihood.cost(x + d)[0] + log_likelihood(residuals, likelihood.noise_model(x + d)) for d in (0, 1)]
     assert ends[0] == pytest.approx(ends[1], rel=1e-12)
 
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, Residuals, covariance
 from creepkit.inverse.output_transforms import LinearTransform
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.uncertainty.laplace_approximation import restricted_covariance
 from creepkit.inverse.variance_components import (
     LinearisedProblem,
     estimate_variance_components,
-    inverse_covariances,
     restricted_log_likelihood,
 )
 from creepkit.inverse.working_noise import WorkingNoiseEstimator
@@ -107,7 +107,9 @@ def test_a_spread_that_explains_no_more_is_not_more_likely():
 def test_a_prior_counts_where_its_unknown_stands_at_its_bound():
     linear = linear_model(np.zeros((1, 10)), polynomial(10, 0))
     held = replace(linear, precision=np.array([4.0]), prior_residual=np.array([1.5]), free=np.zeros(1, bool))
-    assert held.solve(inverse_covariances(held.residuals, white(0.5))[0]).chi_square == pytest.approx(9.0, rel=1e-12)
+    assert held.solve(CovarianceFactor.of_residuals(held.residuals, white(0.5))).chi_square == pytest.approx(
+        9.0, rel=1e-12
+    )
 
 
 def test_noise_that_was_given_leaves_no_doubt_about_itself():
@@ -130,7 +132,7 @@ def test_the_likelihood_is_that_of_contrasts_that_know_nothing_of_the_values():
     mine, textbook = [], []
     for scatter in scatters:
         linear = linear_model(values, design)
-        c = np.linalg.inv(inverse_covariances(linear.residuals, scatter)[0][0])
+        c = covariance(linear.residuals, scatter)[0]
         mine.append(restricted_log_likelihood(linear, scatter))
         textbook.append(multivariate_normal(np.zeros(9), contrasts.T @ c @ contrasts).logpdf(contrasts.T @ values[0]))
     assert np.diff(mine) == pytest.approx(np.diff(textbook), rel=1e-6)
@@ -140,21 +142,12 @@ def test_the_optimum_is_generalised_least_squares():
     rng, design = np.random.default_rng(3), polynomial(20, 1, tests=2)
     values, scatter = rng.normal(size=(2, 20)), white(0.1, drift=1.0, correlation_length=0.7)
     linear = linear_model(values, design)
-    inverses, _ = inverse_covariances(linear.residuals, scatter)
+    inverses = np.linalg.inv(covariance(linear.residuals, scatter))
     A = sum(x.T @ c @ x for x, c in zip(design, inverses, strict=True))
     b = sum(x.T @ c @ y for x, c, y in zip(design, inverses, values, strict=True))
-    assert linear.solve(inverses).step == pytest.approx(-np.linalg.solve(A, b), rel=1e-9)
-
-
-def test_outputs_inverted_one_by_one_are_the_whole_matrix_inverted():
-    rng = np.random.default_rng(4)
-    linear = linear_model(rng.normal(size=(2, 20)), polynomial(20, 1, tests=2), outputs=2)
-    scatter = white(0.3, ("amplitude", "width"), drift=0.5, correlation_length=0.3)
-    blocks, log_det = inverse_covariances(linear.residuals, scatter)
-    shared = replace(linear.residuals, random_effect_sensitivities=np.zeros((2, 20, 1)))
-    whole, same = inverse_covariances(shared, scatter)
-    assert blocks == pytest.approx(whole, rel=1e-9, abs=1e-9)
-    assert log_det == pytest.approx(same, rel=1e-12)
+    assert linear.solve(CovarianceFactor.of_residuals(linear.residuals, scatter)).step == pytest.approx(
+        -np.linalg.solve(A, b), rel=1e-9
+    )
 
 
 def test_a_discrepancy_is_not_taken_for_less_than_it_is():

@@ -8,7 +8,8 @@ import pytest
 from creepkit.inverse.composite_predictor import predict
 from creepkit.inverse.identify import identify
 from creepkit.inverse.iterative_estimation import linearised
-from creepkit.inverse.noise_model import NoiseModel, OutputNoise
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.unmodelled_effects import (
@@ -22,7 +23,6 @@ from creepkit.inverse.unmodelled_effects import (
     unmodelled_note,
     with_random_effects,
 )
-from creepkit.inverse.variance_components import inverse_covariances
 from creepkit.language import Elastic, arrhenius
 from creepkit.laws.norton import NORTON
 from creepkit.laws.strain_hardening import STRAIN_HARDENING
@@ -187,22 +187,18 @@ def test_a_change_that_is_the_hardening_itself_has_correlation_one():
     problem, x, linear = at_the_truth(HARDENING_AT, bars(HARDENING_AT, loadings))
     position = HARDENING_AT.names.index("m")
     hardening = VALUES[HARDENING_AT.name]["m"] * linear.residuals.jacobian[..., position]
-    noise_model = NoiseModel({"strain": OutputNoise(NOISE)})
-    ratio, correlation = _likeness_of_hardening(problem, x, linear, noise_model, -0.5 * hardening)
+    factor = CovarianceFactor.of_residuals(linear.residuals, NoiseModel({"strain": OutputNoise(NOISE)}))
+    ratio, correlation = _likeness_of_hardening(problem, x, linear, factor, -0.5 * hardening)
     assert ratio == pytest.approx(-2.0, rel=1e-6)
     assert correlation == pytest.approx(1.0, rel=1e-9)
     other = linear.residuals.jacobian[..., HARDENING_AT.names.index("A")]
-    assert _likeness_of_hardening(problem, x, linear, noise_model, -0.5 * hardening + 7.0 * other)[1] == pytest.approx(
-        1.0
-    )
+    assert _likeness_of_hardening(problem, x, linear, factor, -0.5 * hardening + 7.0 * other)[1] == pytest.approx(1.0)
 
 
 def test_a_law_that_does_not_harden_is_like_no_drift():
     problem, x, linear = at_the_truth(NORTON_AT, bars(NORTON_AT))
-    noise_model = NoiseModel({"strain": OutputNoise(NOISE)})
-    assert np.isnan(
-        _likeness_of_hardening(problem, x, linear, noise_model, np.ones_like(linear.residuals.values))
-    ).all()
+    factor = CovarianceFactor.of_residuals(linear.residuals, NoiseModel({"strain": OutputNoise(NOISE)}))
+    assert np.isnan(_likeness_of_hardening(problem, x, linear, factor, np.ones_like(linear.residuals.values))).all()
 
 
 def test_cooling_looks_like_strain_hardening_and_is_said_with_its_sign():
@@ -224,13 +220,11 @@ def test_an_effect_in_the_covariance_is_a_rank_of_one_in_each_test():
     tests = bars(NORTON_AT, [constant_stress(s, "stress") for s in (70.0, 90.0)])
     effects, _, linear = effects_of(NORTON_AT, tests)
     noise = NoiseModel({"strain": OutputNoise(NOISE)})
-    without, _ = inverse_covariances(linear.residuals, noise)
     with_both = with_random_effects(linear, [*effects.values()])
-    found, _ = inverse_covariances(with_both.residuals, noise)
     columns = np.stack([e.residual_change for e in effects.values()], axis=-1)
-    for k in range(2):
-        c = np.linalg.inv(without[k]) + columns[k] @ columns[k].T
-        np.testing.assert_allclose(found[k] @ c, np.eye(len(c)), atol=1e-5)
+    expected = covariance(linear.residuals, noise) + columns @ np.swapaxes(columns, 1, 2)
+    found = CovarianceFactor.of_residuals(with_both.residuals, noise).inverse_times(expected)
+    np.testing.assert_allclose(found, np.broadcast_to(np.eye(len(expected[0])), found.shape), atol=1e-5)
     again = with_random_effects(with_both, [effects[DRIFT]])
     assert again.residuals.random_effect_sensitivities.shape[-1] == 3
 

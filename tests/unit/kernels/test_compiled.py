@@ -1,12 +1,22 @@
 """The compiled interface: layout, rows, flags, and what is off."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from numba import float64, int64, njit
 
 from creepkit.arrays import Floats
 from creepkit.kernels import CompiledLaw, lower
-from creepkit.kernels.interface import DERIVATIVE_NOT_FINITE, ENTRY_TYPE, RATE_NOT_FINITE, call_entry, data_pointer
+from creepkit.kernels.interface import (
+    DERIVATIVE_NOT_FINITE,
+    ENTRY_TYPE,
+    RATE_NOT_FINITE,
+    EntryName,
+    call_entry,
+    data_pointer,
+)
 from creepkit.language import CreepLaw, strain, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
@@ -69,14 +79,47 @@ def test_damage_comes_after_the_rate_row_by_row() -> None:
 
 @each_law
 @pytest.mark.parametrize("entry", ["rate", "update", "sensitivity"])
-def test_rows_together_are_rows_one_by_one(law_: CreepLaw, entry: str) -> None:
-    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 16, seed=2)
+def test_rows_are_taken_by_eight_and_the_rest_one_by_one(law_: CreepLaw, entry: EntryName) -> None:
+    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 32, seed=2)
+    x, theta = drawn.points[:19], drawn.theta[0]
+    parts = [x[:8], x[8:16], x[16:17], x[17:18], x[18:]]
+
+    together, _ = call_entry(compiled, entry, x, theta)
+
+    np.testing.assert_array_equal(together, np.vstack([call_entry(compiled, entry, p, theta)[0] for p in parts]))
+
+
+@each_law
+@pytest.mark.parametrize("entry", ["rate", "update", "sensitivity"])
+def test_eight_points_together_are_the_points_alone(law_: CreepLaw, entry: EntryName) -> None:
+    """They round differently; exponents of 50 make a hundred units of the last place of that."""
+    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 64, seed=3)
     theta = drawn.theta[0]
 
-    together, _ = call_entry(compiled, entry, drawn.points, theta)  # type: ignore[arg-type]
-    alone = np.vstack([call_entry(compiled, entry, row[None], theta)[0] for row in drawn.points])  # type: ignore[arg-type]
+    together, _ = call_entry(compiled, entry, drawn.points, theta)
+    alone = np.vstack([call_entry(compiled, entry, row[None], theta)[0] for row in drawn.points])
 
-    np.testing.assert_array_equal(together, alone)
+    np.testing.assert_allclose(together, alone, rtol=1e-12, atol=1e-290)
+
+
+@each_law
+@pytest.mark.parametrize("column", range(6))
+@pytest.mark.parametrize("bad", [0.0, -1.0, -1e300, 5e-324, 1e300, np.inf, -np.inf, np.nan])
+def test_hostile_points_give_what_the_arrays_give(law_: CreepLaw, column: int, bad: float) -> None:
+    """One such point among seven good ones, and alone: the values of the NumPy kernel, and the flags they ask for."""
+    compiled, arrays, drawn = lower(law_, "numba"), lower(law_, "numpy"), draw_samples(law_, 8, seed=5)
+    x, theta = drawn.points.copy(), drawn.theta[0]
+    x[3, column] = bad
+    with np.errstate(all="ignore"):
+        expected = np.stack(np.broadcast_arrays(*arrays.internal_rates(*x.T, *theta)), -1)
+
+    together, found = call_entry(compiled, "rate", x, theta)
+    alone, found_alone = call_entry(compiled, "rate", x[3:4], theta)
+
+    np.testing.assert_allclose(together, expected, rtol=1e-11, atol=1e-290)
+    np.testing.assert_allclose(alone, expected[3:4], rtol=1e-11, atol=1e-290)
+    assert found == (0 if np.isfinite(expected).all() else RATE_NOT_FINITE)
+    assert found_alone == (0 if np.isfinite(expected[3]).all() else RATE_NOT_FINITE)
 
 
 @each_law
@@ -89,6 +132,14 @@ def test_update_is_the_logarithm_of_the_rate(law_: CreepLaw) -> None:
             assert np.exp(update[0]) == pytest.approx(sensitivity[0], rel=1e-12)
             slopes = sensitivity[inner : inner + x.size] / sensitivity[0]
             np.testing.assert_allclose(update[inner : inner + x.size], slopes, rtol=1e-10)
+
+
+def test_numba_knows_the_type_of_an_entry() -> None:
+    """In an interpreter that has done nothing else."""
+    program = "import creepkit, numba; print(numba.typeof(creepkit.lower(creepkit.law('norton'), 'numba').update))"
+    found = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+
+    assert found.stdout.strip() == str(ENTRY_TYPE)
 
 
 def test_code_compiled_once_takes_any_law() -> None:
@@ -106,8 +157,8 @@ def test_code_compiled_once_takes_any_law() -> None:
 # ---- flags and off -------------------------------------------------------------------------------------------------
 
 
-def flags(compiled: CompiledLaw, entry: str, x: Floats, theta: Floats) -> int:
-    return call_entry(compiled, entry, x, theta)[1]  # type: ignore[arg-type]
+def flags(compiled: CompiledLaw, entry: EntryName, x: Floats, theta: Floats) -> int:
+    return call_entry(compiled, entry, x, theta)[1]
 
 
 def test_a_rate_beyond_float64_is_flagged_but_not_its_logarithm() -> None:
@@ -202,3 +253,20 @@ def test_one_structure_is_compiled_once() -> None:
     assert lower(other, "numba").fingerprint == lower(NORTON, "numba").fingerprint
     assert lower(other, "numba").rate is lower(NORTON, "numba").rate
     assert lower(linear, "numba").fingerprint != lower(NORTON, "numba").fingerprint
+
+
+# ---- every kind of equation ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+def test_equations_of_every_kind_give_what_the_arrays_give(name: str) -> None:
+    """Branches, functions of the C library, states: a vector of eight points and one point more."""
+    law_ = EQUATIONS[name]
+    compiled, arrays, drawn = lower(law_, "numba"), lower(law_, "numpy"), draw_samples(law_, 16, seed=6)
+    x, theta = drawn.points[:9], drawn.theta[0]
+    with np.errstate(all="ignore"):
+        expected = np.stack(np.broadcast_arrays(*arrays.internal_rates(*x.T, *theta)), -1)
+
+    found, _ = call_entry(compiled, "rate", x, theta)
+
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-190)

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 import sympy
 import torch
-from numba import njit
 from sympy import Piecewise, exp, gamma, sinh
 
 from creepkit.errors import LawError
-from creepkit.kernels import kernel_functions, numba_functions, numpy_functions, torch_functions
+from creepkit.kernels import kernel_functions, llvm_functions, numpy_functions, scalar_functions, torch_functions
 from creepkit.kernels.kernel_functions import (
     TARGET_FUNCTION_NAMES,
     ExpDifference,
@@ -23,6 +22,7 @@ from creepkit.kernels.kernel_functions import (
 )
 from creepkit.kernels.log_form import COMPOSITE_FLOOR, FLOOR, log_form, with_exponential_differences
 from creepkit.language import parameters, strain, stress, time
+from helpers.compiled_functions import compiled_function
 from helpers.literature_laws import POWER, RATE, A, B, law, m, n, number, r, s_0, scale
 
 x, y = sympy.symbols("x y", real=True)
@@ -39,9 +39,11 @@ def evaluated(function: type[StableFunction], value: float, target: str) -> floa
     name = TARGET_FUNCTION_NAMES[function.__name__]
     if target == "torch":
         return float(getattr(torch_functions, name)(torch.tensor(value, dtype=torch.float64)))
-    if target == "numba":
-        inner = getattr(numba_functions, name)
-        return float(njit(lambda v: inner(v))(value))
+    if target == "scalar":
+        return float(getattr(scalar_functions, name)(value))
+    if target.startswith("llvm"):
+        count = 8 if target == "llvm vectors" else 1
+        return float(compiled_function(getattr(llvm_functions, name))(np.full(count, value))[0])
     return float(getattr(numpy_functions, name)(np.float64(value)))
 
 
@@ -61,7 +63,7 @@ def test_slopes_are_those_of_the_plain_forms(function: type[StableFunction], at:
         assert abs(slope.evalf(60, subs=values) / plain.evalf(60, subs=values) - 1) < 1e-14
 
 
-@pytest.mark.parametrize("target", ["numpy", "torch", "numba"])
+@pytest.mark.parametrize("target", ["numpy", "torch", "scalar", "llvm", "llvm vectors"])
 @pytest.mark.parametrize("function", ONE_ARGUMENT, ids=lambda f: f.__name__)
 def test_values_keep_their_digits_from_tiny_to_huge_arguments(function: type[StableFunction], target: str) -> None:
     with mpmath.workdps(400):
@@ -72,7 +74,7 @@ def test_values_keep_their_digits_from_tiny_to_huge_arguments(function: type[Sta
             assert abs(mpmath.mpf(got) / true - 1) < (1e-14 if near_zero else 2e-15), value
 
 
-@pytest.mark.parametrize("functions", [numpy_functions, torch_functions, numba_functions], ids=lambda f: f.__name__)
+@pytest.mark.parametrize("functions", [numpy_functions, torch_functions, scalar_functions], ids=lambda f: f.__name__)
 @pytest.mark.parametrize(("a", "b"), [(-1e-9, -3e-9), (-2.0, -2.0), (-1.0, -1000.0), (-1000.0, -1.0), (3.0, 2.999)])
 def test_exp_difference_keeps_its_digits(functions: Any, a: float, b: float) -> None:
     given = torch.tensor([a, b], dtype=torch.float64) if functions is torch_functions else (a, b)

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from creepkit.kernels import lower
-from creepkit.kernels.compilation import module_source
+from creepkit.kernels.compilation import assembly, module_source
 from creepkit.kernels.symbolic_kernel import symbolic_kernel
 from creepkit.language import CreepLaw, parameters, stress
 from creepkit.laws.combined import COMBINED
@@ -31,14 +31,13 @@ def test_norton_is_one_line_on_every_target() -> None:
     assert line in lower(NORTON, "numba").source
 
 
-def test_what_needs_no_point_is_done_before_the_loop() -> None:
-    """Functions of parameters alone, such as exp(-r) of Liu-Murakami, are not called again for every row."""
+def test_what_needs_no_point_is_done_once_for_all_eight() -> None:
+    """Functions of parameters alone, such as exp(-r) of Liu-Murakami, are called for one number, not for a vector."""
     for law_ in (COMBINED, EQUATIONS["Liu-Murakami"]):
-        for function in module_source(symbolic_kernel(law_)).split("@cfunc")[1:]:
-            before, _, loop = function.partition("for row in range(rows):")
-            theta = set(re.findall(r"(\w+) = ", before))
-            for arguments in re.findall(r"\b(?:exp|expm1|log|log_floor|sqrt)\(([^()]*)\)", loop):
-                assert set(re.findall(r"[A-Za-z_]\w*", arguments)) - theta
+        for function in assembly(module_source(symbolic_kernel(law_))).split("define internal i64 ")[1:]:
+            numbers_in_every_lane = set(re.findall(r"(%\w+) = shufflevector", function))
+            for arguments in re.findall(r"= call <8 x double> @\w[\w.]*\((.*)\)", function):
+                assert set(re.findall(r"%\w+", arguments)) - numbers_in_every_lane
 
 
 @pytest.mark.parametrize("name", ["names of Python", "names of kernels"])

@@ -25,10 +25,11 @@ from creepkit.arrays import Floats
 from creepkit.errors import LawError
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import bic_penalty
-from creepkit.inverse.noise_model import Residuals, autocorrelated_components, effective_sample_size
+from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
+from creepkit.inverse.noise_model import Residuals, autocorrelated_components
 from creepkit.inverse.uncertainty.model_averaging import WeightedLaws
 from creepkit.inverse.uncertainty.quantities import local_exponent
-from creepkit.inverse.variance_components import LinearisedProblem, inverse_covariances
+from creepkit.inverse.variance_components import LinearisedProblem
 from creepkit.language import CreepLaw, strain, time
 
 
@@ -58,7 +59,7 @@ def under_common_covariance(fits: Sequence[Identification]) -> CommonCovarianceF
     results = [
         _optimum_under(
             linear,
-            inverse_covariances(_with_covariance_of(reference_residuals, linear.residuals), noise_model)[0],
+            CovarianceFactor.of_residuals(_with_covariance_of(reference_residuals, linear.residuals), noise_model),
             len(identification.u),
         )
         for linear, identification in zip(linearised, fits, strict=True)
@@ -97,16 +98,15 @@ def _score_under_own_covariance(fit: Identification, linearised: LinearisedProbl
 
     A law that needs a drift for what another follows must not set the covariance.
     """
-    inverses, log_det = inverse_covariances(linearised.residuals, fit.noise_model)
+    factor = CovarianceFactor.of_residuals(linearised.residuals, fit.noise_model)
     independent_frames = effective_sample_size(linearised.residuals, fit.noise_model)
     parameter_count = len(fit.u) + len(fit.noise_model.outputs) + autocorrelated_components(fit.noise_model)
-    return (
-        log_det + _optimum_under(linearised, inverses, len(fit.u))[0] + bic_penalty(parameter_count, independent_frames)
-    )
+    chi_square, _, _ = _optimum_under(linearised, factor, len(fit.u))
+    return factor.log_determinant + chi_square + bic_penalty(parameter_count, independent_frames)
 
 
 def _optimum_under(
-    linearised: LinearisedProblem, inverses: Floats, parameter_count: int
+    linearised: LinearisedProblem, factor: CovarianceFactor, parameter_count: int
 ) -> tuple[float, float, Floats]:
     """Chi-square with priors at the optimum within the bounds, log determinant of nuisances, whitened residuals.
 
@@ -116,30 +116,28 @@ def _optimum_under(
     precision[:parameter_count] = 1e-9 * precision[:parameter_count]
     without_parameter_priors = replace(linearised, precision=precision)
     newton_step = np.zeros(precision.size)
-    newton_step[linearised.free] = without_parameter_priors.solve(inverses).step
+    newton_step[linearised.free] = without_parameter_priors.solve(factor).step
     newton_step = np.clip(newton_step, *linearised.step_bounds)
     best = min(
         (
-            _chi_square(without_parameter_priors, inverses, candidate_step)
+            _chi_square(without_parameter_priors, factor, candidate_step)
             for candidate_step in (newton_step, np.zeros_like(newton_step))
         ),
         key=lambda pair: pair[0],
     )
-    return best[0], _nuisance_log_determinant(linearised, inverses, parameter_count), best[1]
+    return best[0], _nuisance_log_determinant(linearised, factor, parameter_count), best[1]
 
 
-def _chi_square(linearised: LinearisedProblem, inverses: Floats, step: Floats) -> tuple[float, Floats]:
+def _chi_square(linearised: LinearisedProblem, factor: CovarianceFactor, step: Floats) -> tuple[float, Floats]:
     residuals = linearised.residuals
     assert residuals.jacobian is not None
-    remaining = residuals.values + residuals.jacobian @ step
+    whitened = factor.whiten(residuals.values + residuals.jacobian @ step)
     prior_deviation = linearised.prior_residual + step
-    total = np.einsum("te,tef,tf->", remaining, inverses, remaining) + (linearised.precision * prior_deviation**2).sum()
-    factor = np.linalg.cholesky(inverses)
-    whitened = (np.swapaxes(factor, 1, 2) @ remaining[..., None])[..., 0]
+    total = (whitened**2).sum() + (linearised.precision * prior_deviation**2).sum()
     return float(total), np.where(residuals.present, whitened, 0.0).ravel()
 
 
-def _nuisance_log_determinant(linearised: LinearisedProblem, inverses: Floats, parameter_count: int) -> float:
+def _nuisance_log_determinant(linearised: LinearisedProblem, factor: CovarianceFactor, parameter_count: int) -> float:
     """ln det(1 + S J'C^-1 J S) of the nuisance parameters, S their prior standard deviations."""
     assert linearised.residuals.jacobian is not None
     jacobian = linearised.residuals.jacobian[..., parameter_count:]
@@ -147,7 +145,8 @@ def _nuisance_log_determinant(linearised: LinearisedProblem, inverses: Floats, p
         return 0.0
     sd = 1.0 / np.sqrt(np.maximum(linearised.precision[parameter_count:], 1e-300))
     sd = np.minimum(sd, np.diff(linearised.step_bounds, axis=0)[0, parameter_count:] / np.sqrt(12.0))
-    information = np.einsum("tep,tef,tfq->pq", jacobian, inverses, jacobian, optimize=True) * np.outer(sd, sd)
+    whitened = factor.whiten(jacobian * sd)
+    information = np.einsum("tep,teq->pq", whitened, whitened)
     return float(np.linalg.slogdet(information + np.eye(len(sd)))[1])
 
 

@@ -90,7 +90,7 @@ def selection_frequencies(
 
 def with_weights(problem: TermProblem, weights: Floats) -> TermProblem:
     """The problem with squares of whitened residuals counted weights (tests, observations) times."""
-    covariance_factor = problem.problem.covariance_factor / np.sqrt(np.maximum(weights, ZERO_WEIGHT))[:, None, :]
+    covariance_factor = problem.problem.covariance_factor.with_counts(np.maximum(weights, ZERO_WEIGHT))
     return replace(problem, problem=problem.problem.with_covariance(covariance_factor))
 
 

@@ -14,19 +14,17 @@ from scipy.stats import t as student
 from creepkit.arrays import Floats
 from creepkit.inverse.bounds import Bounds
 from creepkit.inverse.coordinates import Coordinates
+from creepkit.inverse.noise_covariance import CovarianceFactor, effective_sample_size
 from creepkit.inverse.noise_model import (
     NEGLIGIBLE_DISCREPANCY,
     NEGLIGIBLE_DRIFT,
     NoiseModel,
     Residuals,
-    cholesky_factors,
     components_fixed_by_priors,
     covariance,
-    effective_sample_size,
-    whiten,
 )
 from creepkit.inverse.nuisance_parameters import NuisanceParameters
-from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, inverse_covariances, scaled_inverse
+from creepkit.inverse.variance_components import LinearisedProblem, LinearSolution, scaled_inverse
 from creepkit.language import CreepLaw
 from creepkit.records import Nuisance
 
@@ -52,8 +50,8 @@ def restricted_covariance(
     Unknowns at their bounds count here as all others: their intervals reach inwards.
     """
     unconstrained = replace(linearised, free=np.ones_like(linearised.free))
-    inverses, _ = inverse_covariances(linearised.residuals, noise_model)
-    solution = unconstrained.solve(inverses)
+    factor = CovarianceFactor.of_residuals(linearised.residuals, noise_model)
+    solution = unconstrained.solve(factor)
     components = [component for component in _estimated_components(noise_model, nuisances) if component not in fixed]
     if not components:
         return solution.covariance, 1e9
@@ -62,7 +60,7 @@ def restricted_covariance(
         np.einsum("tep,tef,tfq->pq", solution.weighted_jacobian, s, solution.weighted_jacobian, optimize=True)
         for s in covariance_derivatives
     ]
-    information = _information(solution, inverses, covariance_derivatives, projected)
+    information = _information(solution, factor, covariance_derivatives, projected)
     gradient = np.stack([np.diag(solution.covariance @ p @ solution.covariance) for p in projected], axis=1)
     component_covariance = scaled_inverse(
         information + 1e-9 * np.diag(np.diag(information)) + 1e-12 * np.eye(len(components))
@@ -77,13 +75,16 @@ def restricted_covariance(
 
 
 def _information(
-    solution: LinearSolution, inverses: Floats, covariance_derivatives: Sequence[Floats], projected: Sequence[Floats]
+    solution: LinearSolution,
+    factor: CovarianceFactor,
+    covariance_derivatives: Sequence[Floats],
+    projected: Sequence[Floats],
 ) -> Floats:
     """I_ij = tr(Q C_i Q C_j) / 2 with Q = C^-1 - B M B', B = C^-1 J: the values that tests share tie them together.
 
     covariance_derivatives : C_i, (tests, observations, observations) each; projected : B' C_i B, (unknowns, unknowns).
     """
-    weighted = [inverses @ slope for slope in covariance_derivatives]
+    weighted = [factor.inverse_times(slope) for slope in covariance_derivatives]
     left_products = [
         np.einsum("tep,tef->tpf", solution.weighted_jacobian, slope, optimize=True) for slope in covariance_derivatives
     ]
@@ -173,11 +174,9 @@ def laplace_covariance(
     """
     assert residuals.jacobian is not None
     count, tests = bounds.width.size - nuisance_parameters.size, len(residuals.values)
-    covariance_factor = cholesky_factors(residuals, working_noise)
-    whitened = whiten(covariance_factor, residuals.jacobian)
-    weighted = np.linalg.solve(np.swapaxes(covariance_factor, 1, 2), whitened)
+    weighted = CovarianceFactor.of_residuals(residuals, working_noise).inverse_times(residuals.jacobian)
     prior = np.diag(np.concatenate([12.0 / bounds.width[:count] ** 2, nuisance_parameters.precision]))
-    inverse_normal_matrix = scaled_inverse(np.einsum("tfp,tfq->pq", whitened, whitened) + prior)
+    inverse_normal_matrix = scaled_inverse(np.einsum("tfp,tfq->pq", residuals.jacobian, weighted) + prior)
 
     def meat(source: NoiseModel) -> Floats:
         c = covariance(residuals, source)
@@ -202,7 +201,7 @@ def laplace_covariance(
 def normal_matrix(residuals: Residuals, working_noise: NoiseModel) -> Floats:
     """J' W J of x = (u, e), (unknowns, unknowns)."""
     assert residuals.jacobian is not None
-    whitened = whiten(cholesky_factors(residuals, working_noise), residuals.jacobian)
+    whitened = CovarianceFactor.of_residuals(residuals, working_noise).whiten(residuals.jacobian)
     return np.asarray(np.einsum("tfp,tfq->pq", whitened, whitened))
 
 

@@ -29,7 +29,8 @@ from creepkit.inverse.composite_predictor import predictor_for_law
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.information_criteria import determined_parameters
-from creepkit.inverse.noise_model import MINIMUM_TESTS, NoiseModel, cholesky_factors
+from creepkit.inverse.noise_covariance import CovarianceFactor
+from creepkit.inverse.noise_model import MINIMUM_TESTS, NoiseModel
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.search.local_refinement import IterationCallback, Tolerances
 from creepkit.inverse.uncertainty.model_averaging import INTERVAL_PROBABILITIES
@@ -67,9 +68,9 @@ class Posterior:
     """ln p, but for a constant, of candidates u.
 
     problem : with nuisance parameters fixed at their estimates. rate_sd : standard deviation of ln rate between tests.
-    test_weights : (tests,) -. whitening : (tests, observations, observations) inverses of the Cholesky factors of the
-    covariance without the scatter of rates. rate_effect : (tests, observations) -, at the optimum, what one standard
-    deviation of a test's own rate does. parameter_bounds : (2, parameters) of the internal parameters.
+    test_weights : (tests,) -. covariance_factor : without the scatter of rates. rate_effect : (tests, observations) -,
+    at the optimum, what one standard deviation of a test's own rate does. parameter_bounds : (2, parameters) of the
+    internal parameters.
     nuisance_basis : (data + nuisances, nuisances) Q. prior_residuals : (nuisances,) - of the priors, at the estimates.
     degrees_of_freedom : nu; least_chi_square : at the optimum.
     """
@@ -77,7 +78,7 @@ class Posterior:
     problem: LeastSquaresProblem
     rate_sd: float
     test_weights: Floats
-    whitening: Floats
+    covariance_factor: CovarianceFactor
     rate_effect: Floats
     parameter_bounds: Floats
     nuisance_basis: Floats
@@ -92,17 +93,17 @@ class Posterior:
         residuals, nuisances, count = fit.residuals_of(problem), problem.nuisance_parameters, fit.u.size
         assert residuals.jacobian is not None
         e = fit.x[count:]
-        whitening = np.asarray(np.linalg.inv(cholesky_factors(residuals, replace(noise_model, rate=0.0))), float)
+        factor = CovarianceFactor.of_residuals(residuals, replace(noise_model, rate=0.0))
         rate_effect = residuals.log_rate_sensitivity * noise_model.rate / np.sqrt(residuals.test_weights)[:, None]
         root_precision = np.diag(np.sqrt(nuisances.precision))
-        nuisance_jacobian = _whitened(whitening, rate_effect, np.moveaxis(residuals.jacobian[..., count:], -1, 0))
+        nuisance_jacobian = _whitened(factor, rate_effect, np.moveaxis(residuals.jacobian[..., count:], -1, 0))
         nuisance_rows = nuisance_jacobian[:, problem.observations.present].T
-        whole = problem.with_covariance(cholesky_factors(residuals, noise_model))
+        whole = problem.with_covariance(CovarianceFactor.of_residuals(residuals, noise_model))
         return cls(
             problem=problem.with_fixed_nuisances(e),
             rate_sd=noise_model.rate,
             test_weights=residuals.test_weights,
-            whitening=whitening,
+            covariance_factor=factor,
             rate_effect=rate_effect,
             parameter_bounds=fit.law.internal_bounds,
             nuisance_basis=np.linalg.qr(np.concatenate([nuisance_rows, root_precision]))[0],
@@ -134,7 +135,7 @@ class Posterior:
     def chi_square(self, u: Floats) -> Floats:
         """(candidates,) least sum of squares that any values of the nuisances leave; u : (candidates, parameters)."""
         residuals, rate_effect = self._residuals(u)
-        whitened = _whitened(self.whitening, rate_effect, residuals)[:, self.problem.observations.present]
+        whitened = _whitened(self.covariance_factor, rate_effect, residuals)[:, self.problem.observations.present]
         rows = np.concatenate(
             [whitened, np.broadcast_to(self.prior_residuals, (len(u), self.prior_residuals.size))], axis=1
         )
@@ -176,14 +177,19 @@ class Posterior:
         return np.asarray(is_inside)
 
 
-def _whitened(whitening: Floats, rate_effect: Floats, values: Floats) -> Floats:
+def _whitened_each(factor: CovarianceFactor, values: Floats) -> Floats:
+    """L^-1 v of each of (..., tests, observations)."""
+    columns = np.moveaxis(values.reshape(-1, *values.shape[-2:]), 0, -1)
+    return np.moveaxis(factor.whiten(columns), -1, 0).reshape(values.shape)
+
+
+def _whitened(factor: CovarianceFactor, rate_effect: Floats, values: Floats) -> Floats:
     """Residuals (..., tests, observations) over their scatter, with a random effect (..., tests, observations) beside.
 
-    With v = W effect the covariance is W^-1 (I + v v') W^-T, and its inverse root (I - b v v') W,
-    b = (1 - 1 / sqrt(1 + v'v)) / v'v.
+    With W the whitening of the factor and v = W effect the covariance is W^-1 (I + v v') W^-T, and its inverse root
+    (I - b v v') W, b = (1 - 1 / sqrt(1 + v'v)) / v'v.
     """
-    whitened = np.einsum("tij,...tj->...ti", whitening, values, optimize=True)
-    whitened_effect = np.einsum("tij,...tj->...ti", whitening, rate_effect, optimize=True)
+    whitened, whitened_effect = (_whitened_each(factor, each) for each in (values, rate_effect))
     squared_norm = np.maximum((whitened_effect**2).sum(axis=-1, keepdims=True), 1e-300)
     correction = (1.0 - 1.0 / np.sqrt(1.0 + squared_norm)) / squared_norm
     return np.asarray(

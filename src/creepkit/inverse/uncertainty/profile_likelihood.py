@@ -27,7 +27,7 @@ from scipy.stats import t as student
 from creepkit.arrays import Floats, single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.noise_model import cholesky_factors
+from creepkit.inverse.noise_covariance import CovarianceFactor
 from creepkit.inverse.problem import LeastSquaresProblem
 from creepkit.inverse.uncertainty.posterior import REFIT_TOLERANCES, interval_noise_model
 from creepkit.inverse.uncertainty.quantities import CoordinateFunction, DerivedQuantity, gradient, quantity_of
@@ -117,7 +117,7 @@ class _ProfileTrace:
     def __init__(self, fit: Identification, quantity: DerivedQuantity, root: float) -> None:
         self.root, self.size, self.noise_model = root, fit.u.size, interval_noise_model(fit)
         self.residuals = fit.residuals_of(fit.least_squares_problem)
-        covariance_factor = cholesky_factors(self.residuals, self.noise_model)
+        covariance_factor = CovarianceFactor.of_residuals(self.residuals, self.noise_model)
         self.problem = fit.least_squares_problem.with_covariance(covariance_factor)
         self.function, self.covariance = quantity.function(fit.coordinates), fit.covariance
         quantity_gradient = gradient(self.function, fit.u, np.sqrt(np.diag(fit.covariance)))
@@ -174,7 +174,7 @@ class _ProfileTrace:
         """The problem with what a test's own rate does taken half way between the optimum and x."""
         rate_effect = 0.5 * (self.residuals.log_rate_sensitivity + self.problem.residuals(x).log_rate_sensitivity)
         residuals = replace(self.residuals, log_rate_sensitivity=rate_effect)
-        return self.problem.with_covariance(cholesky_factors(residuals, self.noise_model))
+        return self.problem.with_covariance(CovarianceFactor.of_residuals(residuals, self.noise_model))
 
     def _chi_square(self, x: Floats) -> float:
         """Of the data and the priors, without the penalties of bounds, at which a value is still possible."""

@@ -18,13 +18,7 @@ from creepkit.arrays import Floats
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import GeometryDerivative, geometry_derivative
-from creepkit.fem.simulation import (
-    LoadHistory,
-    Simulation,
-    SurfaceSensitivities,
-    sensitivity_directions,
-    simulate,
-)
+from creepkit.fem.simulation import LoadHistory, Simulation, SurfaceSensitivities, sensitivity_directions, simulate
 from creepkit.fem.solver import SensitivityDirections, SolverSettings
 from creepkit.records import (
     PROGRAM_NUISANCES,
@@ -198,7 +192,7 @@ def output_sensitivities(
     outputs, output_derivatives = setup.observation.observe_with_derivatives(setup.radii, profiles)
     output_columns = output_derivatives @ change.surface
     output_columns[0, 1:] = output_columns[1, 1:] if len(output_columns) > 1 else 0.0
-    velocities = directions.velocities.reshape(len(lengths), -1, 2)
+    velocities = directions.velocities.reshape(len(lengths), len(setup.model.nodes), 2)
     for k, radial_velocity in enumerate(velocities[:, setup.model.top, 0]):
         output_columns[:, :, theta.size + len(loads) + k] += setup.observation.node_derivatives(
             setup.radii, profiles, radial_velocity
@@ -389,7 +383,9 @@ def simulate_and_observe(
             test_setup, theta, history, simulation, profiles, names, directions
         )
     else:
-        outputs = simulation.at(test_setup.observation.observe(test_setup.radii, profiles), history.times)
+        outputs = test_setup.observation.observe_at_times(
+            test_setup.radii, profiles, simulation.timeline, history.times
+        )
     return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
 
 

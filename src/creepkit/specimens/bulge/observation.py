@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from creepkit.arrays import ArrayLike, Floats, Ints, frozen
+from creepkit.arrays import ArrayLike, Floats, frozen
 from creepkit.errors import FitError, SolveError, nearest
 from creepkit.fem.mesh import SurfaceInterpolation, checked_surface_radii, surface_interpolation_with_slopes
 
-if TYPE_CHECKING:
-    from creepkit.specimens.bulge.gaussian_fit import PolarGrid
-
+if TYPE_CHECKING:  # heavy, and a list of specimens needs none of it
+    from creepkit.fem.time_interpolation import TimeInterpolation
+    from creepkit.specimens.bulge.gaussian_fit import GaussianFit
 
 OBSERVED = ("amplitude", "width", "shape")
 """Columns of what is observed: D_amp in mm, S_d in mm, S_p."""
@@ -48,12 +48,12 @@ class ProfileSampling(NamedTuple):
     """What follows from a form, a window and a set of nodes.
 
     shares : (radii,) the radii that are sampled, as shares of the window. nodes : interpolation from the nodes to them.
-    grid : of the fit.
+    fit : to the displacements there.
     """
 
     shares: Floats
     nodes: SurfaceInterpolation
-    grid: PolarGrid
+    fit: GaussianFit
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,18 @@ class Observation:
         the last one: at t = 0 they stand for the limit of what follows. A frame without a fit worth the name is NaN.
         """
         sampling = self._sampling(radii)
-        return self._fit(sampling, _frames(profiles, sampling), slopes=False)[0]
+        return sampling.fit.observe(_frames(profiles, sampling), derivatives=False)[0]
+
+    def observe_at_times(
+        self, radii: ArrayLike, profiles: ArrayLike, steps: TimeInterpolation, times: ArrayLike
+    ) -> Floats:
+        """As `observe` of the accepted steps of a simulation, interpolated to `times`: (times, 3).
+
+        radii : (nodes,) mm at rest. profiles : (steps, nodes) mm. times : (times,) s.
+        """
+        sampling = self._sampling(radii)
+        asked = np.atleast_1d(np.asarray(times, dtype=float))
+        return sampling.fit.observe_at_times(_frames(profiles, sampling), steps, asked)[0]
 
     def observe_with_derivatives(self, radii: ArrayLike, profiles: ArrayLike) -> tuple[Floats, Floats]:
         """As `observe`, and the exact derivatives (frames, 3, nodes); radii (nodes,) mm, profiles (frames, nodes) mm.
@@ -126,7 +137,7 @@ class Observation:
         profile), S and p have none and are given zeros.
         """
         sampling = self._sampling(radii)
-        outputs, derivatives = self._fit(sampling, _frames(profiles, sampling), slopes=True)
+        outputs, derivatives = sampling.fit.observe(_frames(profiles, sampling), derivatives=True)
         return outputs, derivatives @ sampling.nodes.values
 
     def window_derivatives(self, radii: ArrayLike, profiles: ArrayLike) -> Floats:
@@ -136,7 +147,7 @@ class Observation:
         """
         sampling = self._sampling(radii)
         frames = _frames(profiles, sampling)
-        outputs, derivatives = self._fit(sampling, frames, slopes=True)
+        outputs, derivatives = sampling.fit.observe(frames, derivatives=True)
         slopes = self._chain(derivatives, frames @ sampling.nodes.slopes.T * sampling.shares)
         slopes[:, 1] += outputs[:, 1] / self.window
         return slopes
@@ -149,28 +160,12 @@ class Observation:
         """
         sampling = self._sampling(radii)
         frames = _frames(profiles, sampling)
-        _, derivatives = self._fit(sampling, frames, slopes=True)
+        _, derivatives = sampling.fit.observe(frames, derivatives=True)
         moved = sampling.nodes.values @ np.asarray(shift, dtype=float)
         return self._chain(derivatives, -(frames @ sampling.nodes.slopes.T) * moved)
 
     def _sampling(self, radii: ArrayLike) -> ProfileSampling:
         return _sampling_of(self, np.asarray(radii, dtype=float).tobytes())
-
-    def _fit(self, sampling: ProfileSampling, frames: Floats, slopes: bool) -> tuple[Floats, Floats]:
-        """What is observed (frames, 3), and its derivatives (frames, 3, radii) to the profile at the radii."""
-        from creepkit.specimens.bulge import gaussian_fit
-
-        with np.errstate(invalid="ignore"):  # a profile that is not finite becomes NaN, and so do its outputs
-            samples = frames @ sampling.nodes.values.T
-        fits, states = np.empty((len(samples), 3)), np.empty(len(samples), dtype=np.int64)
-        derivatives = np.full((len(samples) if slopes else 0, 3, samples.shape[1]), np.nan)
-        gaussian_fit.fit_frames(sampling.grid, samples, fits, states, derivatives)
-        fits[:, 1] *= self.window
-        derivatives[:, 1] *= self.window
-        _fill_rest_shapes(
-            fits, derivatives, np.flatnonzero(states == gaussian_fit.AT_REST), states == gaussian_fit.FITTED
-        )
-        return fits, derivatives
 
     @staticmethod
     def _chain(derivatives: Floats, change: Floats) -> Floats:
@@ -192,23 +187,10 @@ def _frames(profiles: ArrayLike, sampling: ProfileSampling) -> Floats:
     return frames
 
 
-def _fill_rest_shapes(fits: Floats, derivatives: Floats, resting: Ints, fitted: np.ndarray) -> None:
-    """Give frames at rest no amplitude and the shape of the next frame that was fitted, else of the last one."""
-    fits[resting, 0] = 0.0
-    source_frames = np.flatnonzero(fitted)
-    if not (resting.size and source_frames.size):
-        return
-    source = source_frames[np.minimum(np.searchsorted(source_frames, resting), source_frames.size - 1)]
-    fits[resting, 1:] = fits[source, 1:]
-    if len(derivatives):
-        derivatives[resting, 0] = derivatives[source, 0]
-        derivatives[resting, 1:] = 0.0
-
-
 @lru_cache(maxsize=64)
 def _sampling_of(operator: Observation, nodes: bytes) -> ProfileSampling:
     """Where `operator` observes a surface with these radii."""
-    from creepkit.specimens.bulge.gaussian_fit import LOG_OF_ZERO, PolarGrid
+    from creepkit.specimens.bulge.gaussian_fit import LOG_OF_ZERO, GaussianFit, PolarGrid
 
     radii = checked_surface_radii(np.frombuffer(nodes))
     if radii[0] > 1e-9 or radii[-1] < operator.window * (1 - 1e-9):
@@ -222,7 +204,8 @@ def _sampling_of(operator: Observation, nodes: bytes) -> ProfileSampling:
     grid = PolarGrid(
         frozen(logarithms[0]), frozen(radial), frozen(logarithms[1]), frozen(logarithms[2]), frozen(angular)
     )
-    return ProfileSampling(frozen(shares), surface_interpolation_with_slopes(radii, operator.window * shares), grid)
+    interpolation = surface_interpolation_with_slopes(radii, operator.window * shares)
+    return ProfileSampling(frozen(shares), interpolation, GaussianFit(grid, interpolation.values, operator.window))
 
 
 def _line(operator: Observation) -> tuple[Floats, Floats, Floats, Floats]:

@@ -25,20 +25,20 @@ def rate_features(
     log_rate: float,
     stress_factors: Floats,
     strain_factors: Floats,
-    rows: Floats,
+    points: Floats,
     law_values: Floats,
     out: Floats,
 ) -> None:
     """log10 of the rate at (strain factors) x (stress factors) of a point over the rate there; log_rate : ln of that.
 
-    rows (features, 6 + S), law_values : workspace for the law.
+    points (6 + S, features), law_values (1 + S, features) : workspace for the law.
     """
-    _around(point, stress_factors, strain_factors, rows)
-    rate(rows.shape[0], data_pointer(rows), data_pointer(theta), data_pointer(law_values))
-    columns = point.size - 5  # the rate, then each state's
-    for k in range(rows.shape[0]):
-        out[k] = (np.log(max(law_values[k * columns], 1e-300)) - log_rate) / _LOG_10
-    for k in range(rows.shape[0]):
+    _around(point, stress_factors, strain_factors, points)
+    features = points.shape[1]
+    rate(features, data_pointer(points), data_pointer(theta), data_pointer(law_values))
+    for k in range(features):
+        out[k] = (np.log(max(law_values[0, k], 1e-300)) - log_rate) / _LOG_10
+    for k in range(features):
         out[k] /= _bent(out[k])
 
 
@@ -50,16 +50,16 @@ def _bent(value: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _around(point: Floats, stress_factors: Floats, strain_factors: Floats, rows: Floats) -> None:
-    """Write the point (6 + S,) for all factors, (features, 6 + S)."""
+def _around(point: Floats, stress_factors: Floats, strain_factors: Floats, points: Floats) -> None:
+    """Write the point (6 + S,) for all factors, (6 + S, features)."""
     k = 0
     for c in strain_factors:
         for s in stress_factors:
             for i in range(point.size):
-                rows[k, i] = point[i]
+                points[i, k] = point[i]
             for i in (STRESS, PRINCIPAL_STRESS, MEAN_STRESS):
-                rows[k, i] *= s
-            rows[k, STRAIN] *= c
+                points[i, k] *= s
+            points[STRAIN, k] *= c
             k += 1
 
 
@@ -73,32 +73,32 @@ def rate_feature_derivatives(
     log_rate_changes: Floats,
     stress_factors: Floats,
     strain_factors: Floats,
-    rows: Floats,
+    points: Floats,
     law_values: Floats,
     out: Floats,
 ) -> None:
     """Derivatives of the features, (features, directions), the parameters first.
 
-    changes : (directions, 6 + S) of the point; log_rate_changes : (directions,) of ln of the rate there.
+    changes : (directions, 6 + S) of the point; log_rate_changes : (directions,) of ln of the rate there. points
+    (6 + S, features), law_values (columns of `sensitivity`, features) : workspace for the law.
     """
-    _around(point, stress_factors, strain_factors, rows)
-    sensitivity(rows.shape[0], data_pointer(rows), data_pointer(theta), data_pointer(law_values))
+    _around(point, stress_factors, strain_factors, points)
+    features = points.shape[1]
+    sensitivity(features, data_pointer(points), data_pointer(theta), data_pointer(law_values))
     width, parameters = point.size, theta.size
-    outputs = width - 5
-    columns = outputs * (1 + width + parameters)
-    for k in range(rows.shape[0]):
-        first = k * columns
-        rate = max(law_values[first], 1e-300)
+    outputs = width - 5  # the rate, then each state's
+    for k in range(features):
+        rate = max(law_values[0, k], 1e-300)
         value = (np.log(rate) - log_rate) / _LOG_10
         bend = _bent(value)
         scale = 1.0 / (bend * bend * bend * bend * bend * _LOG_10)
         s, c = stress_factors[k % stress_factors.size], strain_factors[k // stress_factors.size]
         for i in range(width):
-            law_values[first + outputs + i] *= (
+            law_values[outputs + i, k] *= (
                 s if i in (STRESS, PRINCIPAL_STRESS, MEAN_STRESS) else (c if i == STRAIN else 1.0)
             )
         for p in range(changes.shape[0]):
-            total = law_values[first + outputs * (1 + width) + p] if p < parameters else 0.0
+            total = law_values[outputs * (1 + width) + p, k] if p < parameters else 0.0
             for i in range(width):
-                total += law_values[first + outputs + i] * changes[p, i]
+                total += law_values[outputs + i, k] * changes[p, i]
             out[k, p] = scale * (total / rate - log_rate_changes[p])

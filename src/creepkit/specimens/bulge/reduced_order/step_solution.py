@@ -72,7 +72,8 @@ class FeatureFactors(NamedTuple):
 class ReducedWorkspace(NamedTuple):
     """Working arrays: for the law at the probes and at the features, for curves and Newton's method.
 
-    rows (PROBES, 6 + S), law_values (PROBES, .) of `update`; wide, feature_values at features; values (CURVES,).
+    rows (PROBES, 6 + S), law_values (PROBES, .) of `update`; wide (6 + S, features),
+    feature_values (1 + S, features) at features; values (CURVES,).
     """
 
     rows: Floats
@@ -121,8 +122,8 @@ def reduced_workspace(states: int, count: int) -> ReducedWorkspace:
     return ReducedWorkspace(
         np.zeros((PROBES, width)),
         np.zeros((PROBES, size * (1 + width))),
-        np.zeros((count, width)),
-        np.zeros(count * size),
+        np.zeros((width, count)),
+        np.zeros((size, count)),
         np.zeros(CURVES),
         np.zeros(PROBES),
         np.zeros(states),
@@ -150,7 +151,7 @@ def sensitivity_workspace(
         np.zeros(size, kind),
         np.zeros(columns, kind),
         np.zeros((PROBES, law_columns)),
-        np.zeros(some * count * law_columns),
+        np.zeros((some * law_columns, count)),
         np.zeros((size, size)),
         np.zeros((size, directions)),
         np.zeros((size + directions, STATES + states + width + columns)),
@@ -261,6 +262,13 @@ _LOG_OVER = float(np.log(100.0))
 
 
 @njit(cache=True, error_model="numpy")
+def evaluate_probes(entry: Any, theta: Floats, rows: Floats, law_values: Floats) -> None:
+    """Evaluate an entry of the law at the probes one by one: rows (PROBES, 6 + S), law_values (PROBES, .)."""
+    for k in range(PROBES):
+        entry(1, data_pointer(rows[k]), data_pointer(theta), data_pointer(law_values[k]))
+
+
+@njit(cache=True, error_model="numpy")
 def solve_step(
     update: Any,
     theta: Floats,
@@ -276,7 +284,7 @@ def solve_step(
     logs, rates, right, matrix = work.logs, work.rates, work.right, work.matrix
     for iteration in range(_ITERATIONS):
         middle = write_probes(node, state, unknown, dimple, 0.0, rows, values)
-        update(PROBES, data_pointer(rows), data_pointer(theta), data_pointer(law_values))
+        evaluate_probes(update, theta, rows, law_values)
         for k in range(PROBES):
             logs[k] = max(law_values[k, 0], _STILL) if law_values[k, 0] < 0.0 else law_values[k, 0]
         for v in range(rates.size):

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from creepkit.arrays import Floats, Ints
-from creepkit.kernels.interface import STRAIN, data_pointer
+from creepkit.kernels.interface import STRAIN
 from creepkit.specimens.bulge.reduced_order.deflection_curves import DimpleCurves
 from creepkit.specimens.bulge.reduced_order.rate_features import rate_feature_derivatives, rate_features
 from creepkit.specimens.bulge.reduced_order.step_equations import (
@@ -16,7 +16,6 @@ from creepkit.specimens.bulge.reduced_order.step_equations import (
     CREEP_DEFLECTION,
     FAST,
     FIRST_STEP_COLUMN,
-    PROBES,
     SLOW,
     STATES,
     STRAIN_STATE,
@@ -36,6 +35,7 @@ from creepkit.specimens.bulge.reduced_order.step_solution import (
     ReducedSensitivities,
     ReducedWorkspace,
     end_of,
+    evaluate_probes,
     real_node,
     reduced_workspace,
     sensitivity_workspace,
@@ -47,8 +47,8 @@ from creepkit.specimens.bulge.reduced_order.step_solution import (
 @njit(cache=True, error_model="numpy")
 def evaluate_law(update: Any, sensitivity: Any, theta: Floats, work: ReducedWorkspace, full: Floats) -> None:
     """What the law says at the solution."""
-    update(PROBES, data_pointer(work.rows), data_pointer(theta), data_pointer(work.law_values))
-    sensitivity(PROBES, data_pointer(work.rows), data_pointer(theta), data_pointer(full))
+    evaluate_probes(update, theta, work.rows, work.law_values)
+    evaluate_probes(sensitivity, theta, work.rows, full)
 
 
 REACHED_END, RUPTURED, NOT_CONVERGED = range(3)

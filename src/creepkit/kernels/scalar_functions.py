@@ -1,11 +1,9 @@
-"""The functions of printed kernels for scalars in numba-compiled code."""
+"""The functions of printed kernels for Python numbers: what exported modules take along."""
 
 from __future__ import annotations
 
 from math import asinh, atan, cos, cosh, erf, exp, expm1, log, log1p, sin, sinh, sqrt, tanh
 from typing import Any
-
-from numba import njit
 
 __all__ = [
     "asinh", "atan", "both", "choose", "cos", "cosh", "coth", "either", "erf", "exp", "exp_difference", "expm1",
@@ -14,94 +12,77 @@ __all__ = [
 ]  # fmt: skip
 
 
-_inline = njit(cache=True, error_model="numpy", inline="always")
-
-
 _LN2 = log(2.0)
 
 
-@_inline
 def power(x: Any, y: Any) -> Any:
     """Return x to the y."""
     return x**y
 
 
-@_inline
 def square(x: Any) -> Any:
     """Return x times x."""
     return x * x
 
 
-@_inline
 def choose(condition: Any, a: Any, b: Any) -> Any:
     """Return a where the condition holds, else b."""
     return a if condition else b
 
 
-@_inline
 def both(a: Any, b: Any) -> Any:
     """Whether both conditions hold."""
     return a and b
 
 
-@_inline
 def either(a: Any, b: Any) -> Any:
     """Whether one of the conditions holds."""
     return a or b
 
 
-@_inline
 def larger(a: Any, b: Any) -> Any:
     """max(a, b); NaN when either is."""
     return a if a >= b or a != a else b
 
 
-@_inline
 def smaller(a: Any, b: Any) -> Any:
     """min(a, b); NaN when either is."""
     return a if a <= b or a != a else b
 
 
-@_inline
 def heaviside(x: Any) -> Any:
     """1 where x > 0, else 0."""
     return 1.0 if x > 0.0 else 0.0
 
 
-@_inline
 def floored(x: Any, floor: Any) -> Any:
     """max(x, floor); NaN when x is."""
     return floor if x < floor else x
 
 
-@_inline
 def log_floor(x: Any, floor: Any) -> Any:
     """ln max(x, floor)."""
     return log(floor if x < floor else x)
 
 
-@_inline
 def log_sinh(x: Any) -> Any:
     """Return ln sinh(x), x > 0."""
     y = 1e-30 if x < 1e-30 else x
     return y + log(-0.5 * expm1(-2.0 * y))
 
 
-@_inline
 def log_cosh(x: Any) -> Any:
     """Return ln cosh(x)."""
     y = abs(x)
     return log1p(2.0 * sinh(0.5 * y) ** 2) if y < 1.0 else y + log1p(exp(-2.0 * y)) - _LN2
 
 
-@_inline
 def log_rise(x: Any) -> Any:
     """ln(1 - exp(-x)), x > 0."""
     y = 1e-30 if x < 1e-30 else x
     return log1p(-exp(-y)) if y > _LN2 else log(-expm1(-y))
 
 
-@_inline
 def log_tanh(x: Any) -> Any:
     """Return ln tanh(x), x > 0."""
     y = 1e-30 if x < 1e-30 else x
@@ -109,13 +90,11 @@ def log_tanh(x: Any) -> Any:
     return (log1p(-tail) if 2.0 * y > _LN2 else log(-expm1(-2.0 * y))) - log1p(tail)
 
 
-@_inline
 def coth(x: Any) -> Any:
     """coth(x), x > 0."""
     return 1.0 / tanh(1e-30 if x < 1e-30 else x)
 
 
-@_inline
 def exp_difference(a: Any, b: Any) -> Any:
     """exp(a) - exp(b) without cancellation."""
     if a >= b:

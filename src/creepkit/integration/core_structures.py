@@ -1,0 +1,108 @@
+"""The structures of `src/core` that the integrators are called with, field by field; arrays go as addresses."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+
+from creepkit.arrays import Floats, Ints
+from creepkit.core import address
+from creepkit.integration.implicit_stage import MAX_STATES, Axes
+from creepkit.integration.step_control import IntegrationSettings
+from creepkit.integration.time_discretisation import Tableau
+from creepkit.kernels.interface import CompiledLaw
+
+_NUMBER, _COUNT, _POINTER = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
+
+
+class AxesStructure(ctypes.Structure):
+    """Axes of `stage_problem.hpp`."""
+
+    _fields_ = [(name, _NUMBER) for name in Axes._fields]
+
+
+class SettingsStructure(ctypes.Structure):
+    """IntegrationSettings of `step_control.hpp`."""
+
+    _fields_ = [
+        *((name, _NUMBER) for name in ("rtol", "smallest", "strain_limit", "first", "longest")),
+        ("max_steps", _COUNT),
+    ]
+
+
+class TableauStructure(ctypes.Structure):
+    """Tableau of `tableaux.hpp`."""
+
+    _fields_ = [
+        *((name, _COUNT) for name in ("stages", "degree", "error_order")),
+        *((name, _POINTER) for name in ("a", "c", "error", "dense")),
+    ]
+
+
+class BatchStructure(ctypes.Structure):
+    """BatchIntegration of `batch_integration.cpp`, where every field's shape is given."""
+
+    _fields_ = [
+        *((name, _POINTER) for name in ("update", "sensitivity")),
+        *((name, _COUNT) for name in ("candidates", "tests", "parameters", "states", "with_sensitivities")),
+        *((name, _POINTER) for name in ("theta", "beta", "initial", "limits", "stress_controls")),
+        *((name, _POINTER) for name in ("segments", "segment_offsets", "times", "time_offsets")),
+        *((name, _POINTER) for name in ("levels", "level_offsets")),
+        ("axes", AxesStructure),
+        ("settings", SettingsStructure),
+        ("tableau", TableauStructure),
+        *((name, _POINTER) for name in ("strain", "jacobian", "endings", "end_times", "steps", "end_jacobian")),
+        *((name, _POINTER) for name in ("arrivals", "arrival_slopes", "arrival_jacobian")),
+    ]
+
+
+class TensorStructure(ctypes.Structure):
+    """TensorIntegration of `tensor_integration.cpp`, where every field's shape is given."""
+
+    _fields_ = [
+        ("update", _POINTER),
+        *((name, _COUNT) for name in ("states", "segment_count", "output_count")),
+        *((name, _POINTER) for name in ("theta", "initial", "limits", "held", "segments", "outputs")),
+        *((name, _NUMBER) for name in ("modulus", "ratio", "beta")),
+        ("settings", SettingsStructure),
+        ("tableau", TableauStructure),
+        ("history", _POINTER),
+        *((name, _COUNT) for name in ("reached", "ending", "steps")),
+        ("end_time", _NUMBER),
+    ]
+
+
+def axes_structure(axes: Axes) -> AxesStructure:
+    """Axes as the core reads them."""
+    return AxesStructure(*axes)
+
+
+def settings_structure(settings: IntegrationSettings) -> SettingsStructure:
+    """Settings as the core reads them."""
+    return SettingsStructure(**{**settings._asdict(), "max_steps": int(settings.max_steps)})
+
+
+def tableau_structure(tableau: Tableau) -> TableauStructure:
+    """A tableau as the core reads it; the caller keeps the tableau alive."""
+    return TableauStructure(
+        tableau.stages,
+        tableau.dense.shape[1],
+        tableau.error_order,
+        *(address(array) for array in (tableau.a, tableau.c, tableau.error, tableau.dense)),
+    )
+
+
+def write_addresses(structure: ctypes.Structure, arrays: Mapping[str, Floats | Ints]) -> None:
+    """Write the addresses of arrays into the fields of their names; the caller keeps the arrays alive."""
+    for name, array in arrays.items():
+        setattr(structure, name, address(array))
+
+
+def refusal(law: CompiledLaw, theta: Floats) -> str:
+    """Why the core cannot take a law with parameters theta, (..., P); nothing when it can."""
+    if law.states > MAX_STATES:
+        return f"a law may have {MAX_STATES} internal variables, but this one has {law.states}"
+    if theta.shape[-1] != len(law.names):
+        found = theta.shape[-1]
+        return f"theta has {found} numbers, but the law needs {len(law.names)}: {', '.join(law.names)}"
+    return ""

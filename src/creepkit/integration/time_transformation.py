@@ -1,0 +1,73 @@
+"""The transformed time s in [0, 1] of a segment of the load program, in which creep strain is nearly a straight line.
+
+`time_transformation.hpp` has the formulas; the integrators choose a transformation for each segment by themselves.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import NamedTuple
+
+import numpy as np
+
+from creepkit.arrays import ArrayLike, Floats
+from creepkit.core import address, function
+
+SMALLEST_EXPONENT = 0.05
+"""Exponents of time are not taken below this: t^m with m = -0.95, where the laws' bounds stop."""
+
+
+class TimeTransformation(NamedTuple):
+    """start and length of the segment, s; beta, and tau in s (0: from a virgin state)."""
+
+    start: float
+    length: float
+    beta: float
+    tau: float
+
+
+class TransformedTime(NamedTuple):
+    """A time, s, and ln(dt/ds) there."""
+
+    time: float
+    log_pace: float
+
+
+class TransformedTimes(NamedTuple):
+    """What a transformation makes of positions, all (count,): times, s, and ln(dt/ds), their derivatives to beta and
+    to tau, and the positions of those times.
+    """
+
+    time: Floats
+    log_pace: Floats
+    time_by_beta: Floats
+    log_pace_by_beta: Floats
+    time_by_tau: Floats
+    log_pace_by_tau: Floats
+    position: Floats
+
+
+def transformed_times(clock: TimeTransformation, s: ArrayLike) -> TransformedTimes:
+    """Times, paces and derivatives at positions `s`, (count,) above 0."""
+    positions = np.array(s, dtype=float, ndmin=1)
+    out = np.empty((positions.size, len(TransformedTimes._fields)))
+    function("creepkit_transformed_times", None)(
+        address(np.array(clock, dtype=float)), ctypes.c_int64(positions.size), address(positions), address(out)
+    )
+    return TransformedTimes(*out.T)
+
+
+def power_law_transformation(start: float, length: float, beta: float) -> TimeTransformation:
+    """Of a segment that begins without creep strain; `beta` is the leading exponent of time."""
+    return _chosen("creepkit_power_law_time", start, length, beta)
+
+
+def shifted_power_law_transformation(start: float, length: float, bend: float, bend_rate: float) -> TimeTransformation:
+    """Of a segment that begins after some creep, from r = `bend` in p'' = r p' and the rate of r."""
+    return _chosen("creepkit_shifted_power_law_time", start, length, bend, bend_rate)
+
+
+def _chosen(name: str, *numbers: float) -> TimeTransformation:
+    clock = np.empty(4)
+    function(name, None)(*(ctypes.c_double(number) for number in numbers), address(clock))
+    return TimeTransformation(*clock.tolist())

@@ -1,0 +1,171 @@
+"""The covariance of residuals by its factors, and likelihoods under it, linear in observations.
+
+A covariance of Ornstein-Uhlenbeck processes, random effects and white noise is that of a state-space model: whitening
+by its Cholesky factor is a Kalman filter, which the compiled core runs (src/core/noise_likelihood.hpp). The covariances
+themselves, as matrices, are creepkit.inverse.noise_model.covariance.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.core import address, function
+from creepkit.errors import FitError
+from creepkit.inverse.noise_model import (
+    ABSOLUTE_JITTER,
+    OUTPUT_COMPONENTS,
+    RELATIVE_JITTER,
+    SHARED_COMPONENTS,
+    NoiseModel,
+    Residuals,
+)
+from creepkit.inverse.observation_series import ObservationSeries
+
+
+def _check(code: int) -> None:
+    """Raise what a function of the core returned."""
+    if code == 1:
+        raise np.linalg.LinAlgError("the covariance of the residuals is not positive definite")
+    if code:
+        raise FitError("the likelihood of the noise needs more memory than there is" if code == 2 else "wrong counts")
+
+
+@dataclass(frozen=True, eq=False)
+class CovarianceFactor:
+    """The covariance C = L L' of every test; L^-1 r is white.
+
+    series : of the observations. components : (5 outputs + 3,) as NoiseModel.components has them. counts : (tests,
+    observations) how often the square of each whitened value counts, or None for once.
+    """
+
+    series: ObservationSeries
+    components: Floats
+    counts: Floats | None = None
+
+    @classmethod
+    def of_residuals(cls, residuals: Residuals, noise_model: NoiseModel) -> CovarianceFactor:
+        """The covariance of residuals under a noise model."""
+        return cls(residuals.series, noise_model.components)
+
+    def with_counts(self, counts: Floats) -> CovarianceFactor:
+        """The same with squares of whitened values counted (tests, observations) times."""
+        return replace(self, counts=counts)
+
+    def whiten(self, values: Floats) -> Floats:
+        """L^-1 v of values (tests, observations[, columns]), of the same shape; observations without data stay."""
+        whitened = self._transformed(values, inverse=False)[0]
+        if self.counts is None:
+            return whitened
+        roots = np.sqrt(self.counts)
+        return np.asarray(whitened * (roots if values.ndim == 2 else roots[..., None]))
+
+    def inverse_times(self, values: Floats) -> Floats:
+        """C^-1 v of values (tests, observations[, columns]), of the same shape; observations without data stay."""
+        return self._transformed(values, inverse=True)[0]
+
+    @cached_property
+    def log_determinant(self) -> float:
+        """ln|C| over all tests."""
+        return self._transformed(np.zeros((*self.series.shape, 0)), inverse=False)[1]
+
+    @cached_property
+    def variances(self) -> Floats:
+        """(tests, observations) the diagonal of C, 1 for observations without data."""
+        series, size = self.series, self.components[: -len(SHARED_COMPONENTS)].reshape(-1, len(OUTPUT_COMPONENTS))
+        noise, misfit, offset, drift, _ = size[series.output].T
+        rate, discrepancy, _ = self.components[-len(SHARED_COMPONENTS) :]
+        _, white, offset_effect, unit, rate_effect = series.loadings[:, :5].T
+        correlated = drift**2 + (offset * offset_effect) ** 2 + (discrepancy * unit) ** 2 + (rate * rate_effect) ** 2
+        correlated += (series.loadings[:, 5:] ** 2).sum(axis=1)
+        out = np.ones(series.shape)
+        variance = correlated * (1.0 + RELATIVE_JITTER) + (noise * white) ** 2 + misfit**2 + ABSOLUTE_JITTER
+        out.flat[series.places] = variance / series.root_weights[:, 0] ** 2
+        return out
+
+    def _transformed(self, values: Floats, *, inverse: bool) -> tuple[Floats, float]:
+        series, rows = self.series, self.series.rows(values)
+        log_determinant = np.zeros(1)
+        _check(
+            function("creepkit_noise_whiten")(
+                *series.arguments(self.components),
+                ctypes.c_int64(rows.shape[1]),
+                ctypes.c_int64(inverse),
+                address(rows),
+                address(log_determinant),
+            )
+        )
+        out = np.array(values, float, order="C")
+        if rows.size:
+            flat = out.reshape(-1, rows.shape[1])
+            flat[series.places] = rows * series.root_weights if inverse else rows
+        return out, float(log_determinant[0])
+
+
+class NoiseLikelihood:
+    """-ln L, but for a constant, of residuals that are linear in unknowns, as a function of the noise's components.
+
+    With unknowns it is the restricted likelihood, in which they are integrated out. One thread at a time may call it.
+    """
+
+    def __init__(
+        self, series: ObservationSeries, values: Floats, precision: Floats, prior_residual: Floats, components: Floats
+    ) -> None:
+        """values : (tests, observations, 1 + unknowns) residuals and their derivatives to the unknowns.
+
+        precision, prior_residual : (unknowns,) of their priors, and the distance from their means.
+        components : (5 outputs + 3,) of a noise model, as NoiseModel.components has them.
+        """
+        rows, unknowns = series.rows(values), values.shape[-1] - 1
+        self._components, self._value, self._gradient = components.copy(), np.zeros(1), np.zeros(components.size)
+        priors = [np.ascontiguousarray(prior, float) for prior in (precision, prior_residual)]
+        arrays = [rows, *priors, self._value, self._gradient]
+        self._kept_alive = series, arrays
+        self._arguments = (
+            *series.arguments(self._components),
+            ctypes.c_int64(unknowns),
+            *(address(array) for array in arrays),
+        )
+
+    def __call__(self, components: Floats) -> tuple[float, Floats]:
+        """Value, and gradient to the logarithms of the components.
+
+        components : (5 outputs + 3,). Returns the value and (5 outputs + 3,) derivatives.
+        """
+        self._components[:] = components
+        _check(function("creepkit_restricted_likelihood")(*self._arguments))
+        return float(self._value[0]), self._gradient.copy()
+
+
+def log_likelihood(residuals: Residuals, noise_model: NoiseModel) -> float:
+    """Gaussian log-likelihood of the residuals under a noise model."""
+    factor = CovarianceFactor.of_residuals(residuals, noise_model)
+    whitened, count = factor.whiten(residuals.values), int(residuals.present.sum())
+    return float(-0.5 * ((whitened**2).sum() + factor.log_determinant + count * np.log(2 * np.pi)))
+
+
+def predicted_random_effects(residuals: Residuals, noise_model: NoiseModel) -> tuple[Floats, Floats]:
+    """Best linear prediction of each test's offsets, (tests, outputs) in their units, and ln rate factor, (tests,)."""
+    unweighted = residuals.with_test_weights(np.ones(len(residuals.values)))
+    weighted = CovarianceFactor.of_residuals(unweighted, noise_model).inverse_times(-residuals.values)
+    weighted_sensitivity = residuals.offset_sensitivity * weighted
+    offsets = [
+        s.offset**2 * np.where(residuals.output_index == k, weighted_sensitivity, 0.0).sum(axis=1)
+        for k, s in enumerate(noise_model.outputs.values())
+    ]
+    return np.stack(offsets, axis=1), noise_model.rate**2 * (residuals.log_rate_sensitivity * weighted).sum(axis=1)
+
+
+def effective_sample_size(residuals: Residuals, noise_model: NoiseModel) -> float:
+    """Number of independent observations that carry the same information on a common mean as all frames together."""
+    without_offset = replace(
+        noise_model, outputs={name: replace(output, offset=0.0) for name, output in noise_model.outputs.items()}
+    )
+    factor = CovarianceFactor.of_residuals(residuals, without_offset)
+    standard_deviations = np.where(residuals.present, np.sqrt(factor.variances), 0.0)
+    information = float((factor.whiten(standard_deviations) ** 2).sum())
+    return float(np.clip(information, len(residuals.values), residuals.present.sum()))

@@ -1,0 +1,289 @@
+"""Whitening and likelihood by the filter: arithmetic of fifty digits, SciPy's normal density, and facts of REML."""
+
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from creepkit.inverse.noise_covariance import CovarianceFactor, NoiseLikelihood, log_likelihood
+from creepkit.inverse.noise_model import (
+    OUTPUT_COMPONENTS,
+    SHARED_COMPONENTS,
+    NoiseModel,
+    OutputNoise,
+    Residuals,
+    covariance,
+)
+
+NAMES = ("amplitude", "width", "rupture_time")
+
+
+def example(seed=0, frames=5, tests=3):
+    """Tests of two outputs and one rupture time each, with every source of scatter, and residuals of three unknowns.
+
+    Absent frames, one of them the whole second output of a test; two frames at one time; tests of different weight; the
+    third unknown belongs to the first test alone.
+    """
+    rng, count = np.random.default_rng(seed), 2 * frames + 1
+    times = np.sort(rng.uniform(0.1, 5.0, size=(tests, frames)), axis=1)
+    times[0, 2] = times[0, 1]
+    clock = np.concatenate([times, times, times[:, -1:] + 0.3], axis=1)
+    output = np.tile(np.repeat([0, 1, 2], [frames, frames, 1]), (tests, 1))
+    present = np.ones((tests, count), bool)
+    present[0, 1] = present[-1, count - 1] = False
+    present[1, frames : 2 * frames] = False
+    jacobian = rng.normal(size=(tests, count, 3)) * present[..., None]
+    jacobian[1:, :, 2] = 0.0
+    values, slope, rate, unit = (rng.normal(size=(tests, count)) * present for _ in range(4))
+    residuals = Residuals(
+        values=values,
+        offset_sensitivity=slope,
+        present=present,
+        correlation_coordinate=clock,
+        jacobian=jacobian,
+        log_rate_sensitivity=rate,
+        output_index=output,
+        relative_noise=1.0 + rng.uniform(size=(tests, count)),
+        test_weights=np.linspace(0.3, 1.0, tests),
+        random_effect_sensitivities=0.3 * rng.normal(size=(tests, count, 2)) * present[..., None],
+        discrepancy_unit=np.where(output == 2, 0.0, np.abs(unit)),
+    )
+    noise = NoiseModel(
+        {
+            "amplitude": OutputNoise(0.1, 0.05, 0.7, 0.4, 0.6),
+            "width": OutputNoise(0.3, 0.0, 0.2, 0.9, 2.0),
+            "rupture_time": OutputNoise(0.0, 0.4, 0.0, 0.0, 1.0),
+        },
+        rate=0.5,
+        discrepancy=1.3,
+        discrepancy_length=0.8,
+    )
+    return residuals, noise
+
+
+def likelihood_of(residuals, noise, precision=(0.1, 0.0, 2.0), prior_residual=(0.2, 0.0, -0.4)):
+    values = np.concatenate([residuals.values[..., None], residuals.jacobian], axis=-1)
+    return NoiseLikelihood(residuals.series, values, np.array(precision), np.array(prior_residual), noise.components)
+
+
+# ---- fifty digits ----------------------------------------------------------------------------------------------------
+
+
+def exact_covariance(residuals, sizes, test):
+    """The covariance of the data of one test, entry by entry; sizes : {(output, component): number}."""
+    r, index = residuals, np.flatnonzero(residuals.present[test])
+    s, d, t, w, u = (
+        [mpmath.mpf(float(v)) for v in array[test]]
+        for array in (
+            r.offset_sensitivity,
+            r.log_rate_sensitivity,
+            r.correlation_coordinate,
+            r.relative_noise,
+            r.discrepancy_unit,
+        )
+    )
+    effects = mpmath.matrix(r.random_effect_sensitivities[test].tolist())
+    c = mpmath.zeros(index.size)
+    for a, i in enumerate(index):
+        for b, j in enumerate(index):
+            entry = sizes["", "rate"] ** 2 * d[i] * d[j]
+            entry += sum(effects[int(i), k] * effects[int(j), k] for k in range(effects.cols))
+            if r.output_index[test, i] == r.output_index[test, j]:
+                own, lag = NAMES[r.output_index[test, i]], abs(t[i] - t[j])
+                entry += sizes[own, "offset"] ** 2 * s[i] * s[j]
+                entry += sizes[own, "drift"] ** 2 * mpmath.exp(-lag / sizes[own, "correlation_length"])
+                entry += (
+                    sizes["", "discrepancy"] ** 2 * u[i] * u[j] * mpmath.exp(-lag / sizes["", "discrepancy_length"])
+                )
+            if i == j:
+                entry *= 1 + mpmath.mpf(1e-9)
+                entry += (sizes[own, "noise"] * w[i] * s[i]) ** 2 + sizes[own, "misfit"] ** 2 + mpmath.mpf(1e-10)
+            c[a, b] = entry
+    return c / mpmath.mpf(float(r.test_weights[test]))
+
+
+def exact_restricted_cost(residuals, sizes, precision, prior_residual):
+    """(ln|C| + ln|A| + least chi-square) / 2 by LU decompositions."""
+    p = len(precision)
+    normal, right, total = mpmath.diag(list(precision)), mpmath.zeros(p, 1), mpmath.mpf(0)
+    for k in range(p):
+        right[k] = precision[k] * mpmath.mpf(prior_residual[k])
+        total += right[k] * mpmath.mpf(prior_residual[k])
+    for test, present in enumerate(residuals.present):
+        c = exact_covariance(residuals, sizes, test)
+        X = mpmath.matrix(residuals.jacobian[test, present].tolist())
+        y = mpmath.matrix(residuals.values[test, present].tolist())
+        inverse = c**-1
+        total += mpmath.log(mpmath.det(c)) + (y.T * inverse * y)[0]
+        normal += X.T * inverse * X
+        right += X.T * inverse * y
+    total += mpmath.log(mpmath.det(normal)) - (right.T * mpmath.lu_solve(normal, right))[0]
+    return total / 2
+
+
+@pytest.fixture
+def fifty_digits():
+    with mpmath.workdps(50):
+        yield
+
+
+def exact_sizes(noise):
+    sizes = {(o, n): getattr(noise[o], n) for o in noise.outputs for n in OUTPUT_COMPONENTS}
+    sizes |= {("", n): getattr(noise, n) for n in SHARED_COMPONENTS}
+    return {key: mpmath.mpf(float(v)) for key, v in sizes.items()}
+
+
+@pytest.mark.usefixtures("fifty_digits")
+@pytest.mark.parametrize("restricted", [True, False])
+def test_value_and_gradient_are_those_of_fifty_digits(restricted):
+    residuals, noise = example()
+    precision, prior_residual = ((0.1, 0.0, 2.0), (0.2, 0.0, -0.4)) if restricted else ((), ())
+    residuals = residuals if restricted else replace(residuals, jacobian=residuals.jacobian[..., :0])
+    value, gradient = likelihood_of(residuals, noise, precision, prior_residual)(noise.components)
+
+    def exact(sizes):
+        if restricted:
+            return exact_restricted_cost(residuals, sizes, precision, prior_residual)
+        total = mpmath.mpf(0)
+        for test, present in enumerate(residuals.present):
+            c, y = exact_covariance(residuals, sizes, test), mpmath.matrix(residuals.values[test, present].tolist())
+            total += mpmath.log(mpmath.det(c)) + (y.T * mpmath.lu_solve(c, y))[0]
+        return total / 2
+
+    sizes, step = exact_sizes(noise), mpmath.mpf(10) ** -15
+    assert value == pytest.approx(float(exact(sizes)), rel=1e-12)
+    for (key, size), found in zip(sizes.items(), gradient, strict=True):
+        ends = [exact(sizes | {key: size * mpmath.exp(sign * step)}) for sign in (1, -1)]
+        slope = float((ends[0] - ends[1]) / (2 * step)) if size > 0 else 0.0
+        assert found == pytest.approx(slope, rel=1e-10, abs=1e-12), key
+
+
+@pytest.mark.usefixtures("fifty_digits")
+@pytest.mark.parametrize("noise_of_offsets", [1e-3, 1e-5])
+def test_offsets_far_above_the_noise_cost_no_digits(noise_of_offsets):
+    """A condition of up to 1e10: the matrix itself, in double precision, would leave six digits."""
+    residuals, noise = example(seed=1)
+    small = {
+        name: replace(output, noise=noise_of_offsets, misfit=noise_of_offsets) for name, output in noise.outputs.items()
+    }
+    noise = replace(noise, outputs=small)
+    value, _ = likelihood_of(residuals, noise)(noise.components)
+    exact = exact_restricted_cost(residuals, exact_sizes(noise), (0.1, 0.0, 2.0), (0.2, 0.0, -0.4))
+    assert value == pytest.approx(float(exact), rel=1e-10)
+
+
+# ---- one factor ------------------------------------------------------------------------------------------------------
+
+
+def test_whitening_is_by_the_cholesky_factor_and_solving_by_the_inverse():
+    residuals, noise = example(frames=12)
+    c, factor = covariance(residuals, noise), CovarianceFactor.of_residuals(residuals, noise)
+    values = np.random.default_rng(3).normal(size=(*residuals.values.shape, 4))
+    np.testing.assert_allclose(factor.whiten(values), np.linalg.solve(np.linalg.cholesky(c), values), rtol=1e-8)
+    np.testing.assert_allclose(factor.inverse_times(values), np.linalg.solve(c, values), rtol=1e-7)
+    np.testing.assert_array_equal(factor.whiten(values[..., 1]), factor.whiten(values)[..., 1])
+    assert factor.log_determinant == pytest.approx(np.linalg.slogdet(c)[1].sum(), rel=1e-10)
+    np.testing.assert_allclose(factor.variances, np.diagonal(c, axis1=1, axis2=2), rtol=1e-12)
+
+
+def test_the_likelihood_is_scipys():
+    residuals, noise = example(frames=12)
+    c = covariance(residuals, noise)
+    truth = sum(
+        multivariate_normal(np.zeros(p.sum()), c[k][np.ix_(p, p)]).logpdf(residuals.values[k, p])
+        for k, p in enumerate(residuals.present)
+    )
+    assert log_likelihood(residuals, noise) == pytest.approx(truth, rel=1e-10)
+
+
+def test_the_order_of_observations_does_not_matter():
+    """Frames shuffled, and outputs among each other: the same likelihood, and a whitening of the same squares."""
+    residuals, noise = example(frames=7)
+    order = np.random.default_rng(4).permutation(residuals.values.shape[1])
+    arrays = {name: v[:, order] for name, v in vars(residuals).items() if isinstance(v, np.ndarray) and v.ndim > 1}
+    shuffled = replace(residuals, **arrays)
+    ends = [likelihood_of(one, noise)(noise.components) for one in (residuals, shuffled)]
+    assert ends[0][0] == pytest.approx(ends[1][0], rel=1e-12)
+    np.testing.assert_allclose(ends[0][1], ends[1][1], rtol=1e-10)
+    factor = CovarianceFactor.of_residuals(shuffled, noise)
+    expected = np.einsum("te,tef,tf->", shuffled.values, np.linalg.inv(covariance(shuffled, noise)), shuffled.values)
+    assert (factor.whiten(shuffled.values) ** 2).sum() == pytest.approx(expected, rel=1e-9)
+
+
+def test_an_observation_without_data_is_left_as_it_is():
+    residuals, noise = example()
+    values = np.ones(residuals.values.shape)
+    for found in (CovarianceFactor.of_residuals(residuals, noise).whiten(values),
+                  CovarianceFactor.of_residuals(residuals, noise).inverse_times(values)):  # fmt: skip
+        np.testing.assert_array_equal(found[~residuals.present], 1.0)
+    nothing = replace(residuals, present=np.zeros_like(residuals.present))
+    assert CovarianceFactor.of_residuals(nothing, noise).log_determinant == 0.0
+
+
+def test_counted_twice_is_the_square_twice():
+    residuals, noise = example()
+    factor = CovarianceFactor.of_residuals(residuals, noise)
+    counts = np.full(residuals.values.shape, 2.0)
+    once, twice = ((f.whiten(residuals.values) ** 2).sum() for f in (factor, factor.with_counts(counts)))
+    assert twice == pytest.approx(2.0 * once, rel=1e-12)
+
+
+def test_a_covariance_that_is_no_number_is_an_error():
+    residuals, noise = example()
+    broken = replace(noise, rate=float("nan"), discrepancy=float("inf"))
+    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+        CovarianceFactor.of_residuals(residuals, broken).whiten(residuals.values)
+    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+        likelihood_of(residuals, noise)(broken.components)
+
+
+def test_components_go_into_a_noise_model_and_out():
+    _, noise = example()
+    assert noise.with_components(noise.components) == noise
+    doubled = noise.with_components(2.0 * noise.components)
+    assert doubled["width"].drift == 2.0 * noise["width"].drift
+    assert doubled.discrepancy_length == 2.0 * noise.discrepancy_length
+    for output, name in (("width", "offset"), ("", "rate")):
+        size = getattr(noise[output] if output else noise, name)
+        assert noise.components[noise.position(output, name)] == size
+
+
+# ---- restricted likelihood -------------------------------------------------------------------------------------------
+
+FLAT = (0.0, 0.0, 0.0)
+
+
+def test_what_the_unknowns_can_explain_changes_nothing():
+    """Patterson & Thompson (1971): y + X b has the same restricted likelihood, and the same gradient."""
+    residuals, noise = example(frames=9)
+    moved = replace(residuals, values=residuals.values + residuals.jacobian @ np.array([3.0, -2.0, 5.0]))
+    plain, other = (likelihood_of(one, noise, FLAT, FLAT)(noise.components) for one in (residuals, moved))
+    assert other[0] == pytest.approx(plain[0], rel=1e-11)
+    np.testing.assert_allclose(other[1], plain[1], rtol=1e-9, atol=1e-11)
+
+
+def test_other_coordinates_of_the_unknowns_shift_it_by_their_determinant():
+    residuals, noise = example(frames=9)
+    T = np.random.default_rng(5).normal(size=(3, 3))
+    changed = replace(residuals, jacobian=residuals.jacobian @ T)
+    plain, other = (likelihood_of(one, noise, FLAT, FLAT)(noise.components) for one in (residuals, changed))
+    assert other[0] - plain[0] == pytest.approx(np.log(abs(np.linalg.det(T))), rel=1e-10)
+    np.testing.assert_allclose(other[1], plain[1], rtol=1e-9, atol=1e-11)
+
+
+def test_a_prior_is_an_observation_of_the_unknown():
+    """Precision 1 / v about m: one more observation m of variance v, apart from ln v."""
+    residuals, noise = example(frames=6)
+    own = {
+        name: np.concatenate([v, np.zeros((1, *v.shape[1:]), v.dtype)])
+        for name, v in vars(residuals).items()
+        if isinstance(v, np.ndarray)
+    }
+    own["present"][-1, 0], own["test_weights"][-1] = True, 1.0
+    own["values"][-1, 0], own["jacobian"][-1, 0, 0], own["output_index"][-1] = -0.7, 1.0, 2
+    variance = noise["rupture_time"].misfit ** 2 + 1e-10
+    stated = likelihood_of(residuals, noise, (1.0 / variance, 0.0, 0.0), (-0.7, 0.0, 0.0))(noise.components)[0]
+    observed = likelihood_of(Residuals(**own), noise, FLAT, FLAT)(noise.components)[0]
+    assert observed == pytest.approx(stated + 0.5 * np.log(variance), rel=1e-11)
