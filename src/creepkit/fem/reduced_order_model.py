@@ -114,11 +114,12 @@ class ReducedOrderModel:
     def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]:
         """Velocity gradients and hoop strains of the points, and changes (G, side points, 3) of the pressed sides."""
         chosen, count = self.compiled.points, len(directions.velocities)
-        gradients = directions.gradients.reshape(count, -1, 2, 2)[:, chosen]
-        hoops = directions.hoops.reshape(count, -1)[:, chosen]
-        at_sides = directions.velocities.reshape(count, -1, 2)[:, self.model.pressed]  # (G, sides, 3, 2)
+        gradients = directions.gradients.reshape(count, self.model.weights.size, 2, 2)[:, chosen]
+        hoops = directions.hoops.reshape(count, self.model.weights.size)[:, chosen]
+        velocities = directions.velocities.reshape(count, *self.model.nodes.shape)
+        at_sides = velocities[:, self.model.pressed]  # (G, sides, 3, 2)
         changes = [at_sides[..., 0] @ _SIDE_VALUES.T, *(at_sides[..., i] @ _SIDE_SLOPES.T for i in (0, 1))]
-        return gradients, hoops, np.stack(changes, axis=-1).reshape(count, -1, 3)
+        return gradients, hoops, np.stack(changes, axis=-1).reshape(count, 3 * len(self.model.pressed), 3)
 
 
 _SIDE_PLACES = np.sqrt(0.6) * np.array([-1.0, 0.0, 1.0])

@@ -21,7 +21,7 @@ from creepkit.fem.simulation import LoadHistory, simulate
 from creepkit.fem.solver import CREEP_COMPONENTS, SolverSettings
 from creepkit.kernels.interface import CompiledLaw
 
-SMALL_DEFLECTION = 0.2
+SMALL_DEFLECTION = 0.05
 """Snapshots whose largest displacement is less than this share of the deflection limit count less, by the root of it."""
 
 
