@@ -67,10 +67,9 @@ class FiniteElementModel:
         """Nodes of the observed surface."""
         return self.top.size
 
-    @property
-    def dofs(self) -> int:
-        """Displacements of the mesh."""
-        return self.equations.size
+    def held_motion(self, pattern: Floats | None) -> Floats:
+        """(2 nodes,) mm of displacement of the held nodes for a unit of motion; pattern : (nodes, 2), None for none."""
+        return np.zeros(self.equations.size) if pattern is None else np.ravel(pattern)
 
     def displacements(self, coordinates: Floats) -> Floats:
         """(steps, nodes, 2) mm, from what the core keeps of each step, (steps, displacement_count)."""

@@ -101,10 +101,11 @@ class ReducedOrderModel:
         """Nodes of the observed surface."""
         return self.model.top.size
 
-    @property
-    def dofs(self) -> int:
-        """Displacements of the mesh."""
-        return self.model.equations.size
+    def held_motion(self, pattern: Floats | None) -> Floats:
+        """(0,): held nodes stay where they are; SolveError for a pattern (nodes, 2) of motion."""
+        if pattern is not None:
+            raise SolveError("a reduced-order model does not move held nodes; simulate its finite elements")
+        return np.zeros(0)
 
     def displacements(self, coordinates: Floats) -> Floats:
         """(steps, nodes, 2) mm, from the coordinates (steps, displacement_count) of the modes."""

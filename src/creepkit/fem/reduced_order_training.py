@@ -1,9 +1,10 @@
 """Training of a reduced-order model: modes by proper orthogonal decomposition, points by non-negative least squares.
 
 Snapshots are the accepted steps of finite element simulations, on one mesh or on meshes of the same numbering. Modes
-minimise the mean square of what they leave of the snapshots' displacement gradients (Sirovich 1987). Points and their
-weights make the forces of the snapshots' stresses on the modes what all points make them (energy-conserving sampling and
-weighting, Farhat et al. 2014), found by the method of Lawson and Hanson (1974), Solving Least Squares Problems, chap. 23.
+leave as little as they can of the elastic energy of the snapshots' displacements, and of their changes from step to
+step (Sirovich 1987). Points and their weights make the forces of the snapshots' stresses on the modes, and the elastic
+stiffness, what all points make them (energy-conserving sampling and weighting, Farhat et al. 2014), found by the method
+of Lawson and Hanson (1974), Solving Least Squares Problems, chapter 23.
 """
 
 from __future__ import annotations
@@ -22,7 +23,19 @@ from creepkit.fem.solver import CREEP_COMPONENTS, SolverSettings
 from creepkit.kernels.interface import CompiledLaw
 
 SMALL_DEFLECTION = 0.05
-"""Snapshots whose largest displacement is less than this share of the deflection limit count less, by the root of it."""
+"""Snapshots whose largest displacement is below this share of the deflection limit count less, by the root of it."""
+
+
+CHANGE_SHARE = 0.1
+"""Weight of the changes of displacement over a step beside the displacements, each of the same size."""
+
+
+SMALLEST_CHANGE = 1e-6
+"""mm; smaller changes over a step count less."""
+
+
+MOST_SNAPSHOTS = 1500
+"""That modes are found from; drawn evenly."""
 
 
 MOST_FORCE_ROWS = 12_000
@@ -59,11 +72,13 @@ class TrainingRun:
 class Snapshots:
     """Steps of the training simulations.
 
-    displacements : (snapshots, nodes, 2) mm. stresses : (snapshots, points, 5) MPa, first Piola-Kirchhoff stress.
+    displacements, changes : (snapshots, nodes, 2) mm, and since the step before.
+    stresses : (snapshots, points, 5) MPa, first Piola-Kirchhoff stress.
     models : finite element models of the meshes; mesh : (snapshots,) number of each snapshot's.
     """
 
     displacements: Floats
+    changes: Floats
     stresses: Floats
     models: Sequence[FiniteElementModel]
     mesh: Ints
@@ -72,7 +87,7 @@ class Snapshots:
 def snapshots(runs: Sequence[TrainingRun], settings: SolverSettings) -> Snapshots:
     """Simulate all runs and keep their steps."""
     models = list({id(run.model): run.model for run in runs}.values())
-    displacements, stresses, mesh = [], [], []
+    displacements, changes, stresses, mesh = [], [], [], []
     for run in runs:
         made = simulate(run.law, run.theta, run.model, run.load_history, settings=settings, keep_points=True)
         moved = np.flatnonzero(np.abs(made.displacements).max(axis=(1, 2)) > 0.0)
@@ -80,19 +95,23 @@ def snapshots(runs: Sequence[TrainingRun], settings: SolverSettings) -> Snapshot
             continue
         modulus = np.array([_at(run.load_history, t) for t in made.times[moved]])
         displacements.append(made.displacements[moved])
+        changes.append(np.diff(made.displacements, axis=0, prepend=0.0)[moved])
         creep = made.values[moved, :, :CREEP_COMPONENTS]
         stresses.append(_stresses(run.model, made.displacements[moved], creep, modulus, run.load_history.poisson))
         mesh.append(np.full(moved.size, models.index(run.model)))
     if not displacements:
         raise SolveError("no training simulation of a reduced-order model moved the body; check its loads")
-    return Snapshots(np.concatenate(displacements), np.concatenate(stresses), models, np.concatenate(mesh))
+    u, du, P = (np.concatenate(parts) for parts in (displacements, changes, stresses))
+    return Snapshots(u, du, P, models, np.concatenate(mesh))
 
 
 def _at(load_history: LoadHistory, time: float) -> float:
     return float(np.interp(time, load_history.modulus.times, load_history.modulus.values))
 
 
-def _stresses(model: FiniteElementModel, displacements: Floats, creep: Floats, modulus: Floats, poisson: float) -> Floats:
+def _stresses(
+    model: FiniteElementModel, displacements: Floats, creep: Floats, modulus: Floats, poisson: float
+) -> Floats:
     """First Piola-Kirchhoff stresses (steps, points, 5) of Hencky's law; creep : (steps, points, 3) as in the core."""
     points = np.arange(model.weights.size)
     gradient = np.moveaxis(mode_gradients(model, displacements, points), 2, 0)  # (steps, points, 5)
@@ -129,14 +148,24 @@ def train(data: Snapshots, mode_count: int, point_count: int, deflection_limit: 
 
 def principal_modes(data: Snapshots, count: int, deflection_limit: float) -> Floats:
     """Modes (count, nodes, 2) that leave the least elastic energy of the snapshots, orthonormal in that energy."""
-    model = data.models[0]
-    size = np.abs(data.displacements).max(axis=(1, 2))
-    share = np.sqrt(np.minimum(1.0, size / (SMALL_DEFLECTION * deflection_limit))) / size
-    scaled = data.displacements * share[:, None, None]
-    roots = _energy_roots(model, scaled).reshape(-1, len(scaled))
-    values, vectors = np.linalg.eigh(roots.T @ roots)
+    chosen = _evenly(len(data.mesh), MOST_SNAPSHOTS)
+    displacements, changes = data.displacements[chosen], data.changes[chosen]
+    size, step = (np.abs(values).max(axis=(1, 2)) for values in (displacements, changes))
+    share = np.sqrt(np.minimum(1.0, size / (SMALL_DEFLECTION * deflection_limit)))
+    weights = np.concatenate([share / size, CHANGE_SHARE * share / np.maximum(step, SMALLEST_CHANGE)])
+    fields = np.concatenate([displacements, changes]) * weights[:, None, None]
+    roots = _energy_roots(data.models[0], fields).reshape(-1, len(fields))
+    values, vectors = np.linalg.eigh(roots @ roots.T if len(roots) < len(fields) else roots.T @ roots)
     kept = np.flatnonzero(values > 1e-13 * values[-1])[::-1][:count]
-    return np.asarray(np.tensordot((vectors[:, kept] / np.sqrt(values[kept])).T, scaled, 1))
+    scaled = vectors[:, kept] / np.sqrt(values[kept])
+    if len(roots) < len(fields):  # from directions of the gradients to combinations of the fields
+        scaled = roots.T @ scaled / np.sqrt(values[kept])
+    return np.asarray(np.tensordot(scaled.T, fields, 1))
+
+
+def _evenly(total: int, most: int) -> Ints:
+    """At most so many of the numbers from 0 to total - 1, evenly spaced."""
+    return np.unique(np.linspace(0, total - 1, min(total, most)).round().astype(np.int64))
 
 
 def _energy_roots(model: FiniteElementModel, modes: Floats) -> Floats:
@@ -154,7 +183,7 @@ def cubature(data: Snapshots, modes: Floats, count: int) -> tuple[Ints, Floats]:
     every = data.models[0].weights.size
     if count >= every:
         return np.arange(every), np.ones(every)
-    chosen = np.unique(np.linspace(0, len(data.mesh) - 1, max(1, MOST_FORCE_ROWS // len(modes))).round().astype(int))
+    chosen = _evenly(len(data.mesh), max(1, MOST_FORCE_ROWS // len(modes)))
     gram, right = np.zeros((every, every)), np.zeros(every)
     for number, model in enumerate(data.models):
         stresses = data.stresses[chosen[data.mesh[chosen] == number]]

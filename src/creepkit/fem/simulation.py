@@ -152,7 +152,7 @@ def simulate(
     theta = np.ascontiguousarray(theta, dtype=float)
     beta = float(np.asarray(law.leading_exponent(theta))) if same_steps_as is None else same_steps_as.beta
     script = np.zeros((0, 2)) if same_steps_as is None else same_steps_as.positions
-    pattern = np.zeros(model.dofs) if load_history.pattern is None else np.ravel(load_history.pattern)
+    pattern = model.held_motion(load_history.pattern)
     segments = load_history.segments
     record = solver.solve(
         law, theta, model, LoadProgram(beta, load_history.poisson, segments, pattern, script),

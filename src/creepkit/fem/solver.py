@@ -111,8 +111,7 @@ class SolvableModel(Protocol):
     def point_count(self) -> int: ...  # noqa: D102
     @property
     def observed_count(self) -> int: ...  # noqa: D102
-    @property
-    def dofs(self) -> int: ...  # noqa: D102
+    def held_motion(self, pattern: Floats | None) -> Floats: ...  # noqa: D102
     def displacements(self, coordinates: Floats) -> Floats: ...  # noqa: D102
     def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]: ...  # noqa: D102
 

@@ -32,7 +32,7 @@ from creepkit.kernels.interface import CompiledLaw
 from creepkit.language import CreepLaw, Param, parameters, stress
 from creepkit.records import Program
 
-MODES, POINTS = 16, 96
+MODES, POINTS = 24, 96
 """Of a model unless asked for others."""
 
 
@@ -52,8 +52,12 @@ CREEP_STRAIN = (1e-4, 1.0)
 """Creep strain at the first pressure's largest stress over the time of a run; many end by bursting before."""
 
 
-_MODULUS, _TIME, _RAMP = 1e5, 1e5, 5.0
-"""MPa; s; s of a change of pressure. Only ratios matter."""
+RAMP = 5.0
+"""s of a change of pressure."""
+
+
+_MODULUS, _TIME = 1e5, 1e5
+"""MPa and s; only ratios to pressures and rates matter."""
 
 
 _TEMPERATURE = 1000.0
@@ -88,7 +92,7 @@ def power_law_runs(
         second = _between((first, ELASTIC_STRAIN[1]), draw[2]) if k % 2 else first
         level = np.log(_between(CREEP_STRAIN, draw[3]) / _TIME) - exponent * np.log(first * _MODULUS)
         change = _between((1e-3 * _TIME, 0.5 * _TIME), draw[4])
-        times = np.array([0.0, _RAMP, change, change + _RAMP])
+        times = np.array([0.0, RAMP, change, change + RAMP])
         pressure = np.array([0.0, first, first, second]) * _MODULUS / ratio
         load_history = LoadHistory(
             Program(times, pressure), Program.constant(_TEMPERATURE), Program.constant(_MODULUS), _TIME, poisson

@@ -89,7 +89,7 @@ def set_up_test(specimen: BulgeSettings, history: History, nuisances: Mapping[st
     temperature = history.temperature_program()
     temperature = Program(temperature.times, temperature.values + nuisances.get("temperature", 0.0))
     modulus = modulus_program(history.elastic, temperature, 1.0 + nuisances.get("modulus", 0.0), where)
-    model = model_of_geometry(geometry, specimen.refinement) if specimen.mesh is None else _model_of_mesh(specimen)
+    model = model_of_specimen(specimen, geometry)
     poisson = float(history.elastic.at(float(temperature.values[0])).nu)
     load_history = LoadHistory(pressure, temperature, modulus, float(history.times[-1]), poisson)
     return BulgeSetup(model, load_history, geometry, operator, specimen.refinement if specimen.mesh is None else None)
@@ -108,6 +108,13 @@ def modulus_program(elastic: Elastic, temperature: Program, factor: float, where
 def model_of_geometry(geometry: DimpleGeometry, refinement: float) -> FiniteElementModel:
     """The finite element model of a dimple; kept, for a fit needs it a thousand times."""
     return finite_element_model(geometry.mesh(refinement))
+
+
+def model_of_specimen(specimen: BulgeSettings, geometry: DimpleGeometry | None = None) -> FiniteElementModel:
+    """The finite element model of a specimen's mesh, or of its geometry or another one in its place."""
+    if specimen.mesh is not None:
+        return _model_of_mesh(specimen)
+    return model_of_geometry(geometry or specimen.geometry, specimen.refinement)
 
 
 @lru_cache(maxsize=16)
@@ -348,9 +355,7 @@ def predict_bulge(
     def run(task: tuple[int, int]) -> BulgeResponse:
         c, k = task
         nuisance_values = {kind: float(value[c, k]) for kind, value in nuisances.items()}
-        return simulate_and_observe(
-            specimen, kernel, theta[c], histories[k], nuisance_values, sensitivities, model_of
-        )
+        return simulate_and_observe(specimen, kernel, theta[c], histories[k], nuisance_values, sensitivities, model_of)
 
     workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
     if workers > 1:
