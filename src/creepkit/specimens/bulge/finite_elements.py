@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -19,7 +19,7 @@ from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import GeometryDerivative, geometry_derivative
 from creepkit.fem.simulation import LoadHistory, Simulation, SurfaceSensitivities, sensitivity_directions, simulate
-from creepkit.fem.solver import SensitivityDirections, SolverSettings
+from creepkit.fem.solver import SensitivityDirections, SolvableModel, SolverSettings
 from creepkit.records import (
     PROGRAM_NUISANCES,
     History,
@@ -89,7 +89,7 @@ def set_up_test(specimen: BulgeSettings, history: History, nuisances: Mapping[st
     temperature = history.temperature_program()
     temperature = Program(temperature.times, temperature.values + nuisances.get("temperature", 0.0))
     modulus = modulus_program(history.elastic, temperature, 1.0 + nuisances.get("modulus", 0.0), where)
-    model = model_of_geometry(geometry, specimen.refinement) if specimen.mesh is None else _model_of_mesh(specimen)
+    model = model_of_specimen(specimen, geometry)
     poisson = float(history.elastic.at(float(temperature.values[0])).nu)
     load_history = LoadHistory(pressure, temperature, modulus, float(history.times[-1]), poisson)
     return BulgeSetup(model, load_history, geometry, operator, specimen.refinement if specimen.mesh is None else None)
@@ -108,6 +108,13 @@ def modulus_program(elastic: Elastic, temperature: Program, factor: float, where
 def model_of_geometry(geometry: DimpleGeometry, refinement: float) -> FiniteElementModel:
     """The finite element model of a dimple; kept, for a fit needs it a thousand times."""
     return finite_element_model(geometry.mesh(refinement))
+
+
+def model_of_specimen(specimen: BulgeSettings, geometry: DimpleGeometry | None = None) -> FiniteElementModel:
+    """The finite element model of a specimen's mesh, or of its geometry or another one in its place."""
+    if specimen.mesh is not None:
+        return _model_of_mesh(specimen)
+    return model_of_geometry(geometry or specimen.geometry, specimen.refinement)
 
 
 @lru_cache(maxsize=16)
@@ -332,10 +339,12 @@ def predict_bulge(
     histories: Sequence[History],
     nuisances: NuisanceValues,
     sensitivities: bool,
+    model_of: Callable[[BulgeSetup], SolvableModel] | None = None,
 ) -> Prediction:
     """Predict every candidate in every test; see records.Predictor.
 
-    theta : (candidates, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}.
+    theta : (candidates, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}. model_of : the model
+    of a test that is simulated in the place of its finite elements, such as a reduced-order model.
     """
     known = (*specimen.nuisances, *PROGRAM_NUISANCES)
     check_nuisances([kind_and_start(key)[0] for key in nuisances], known, "a bulge specimen")
@@ -346,7 +355,7 @@ def predict_bulge(
     def run(task: tuple[int, int]) -> BulgeResponse:
         c, k = task
         nuisance_values = {kind: float(value[c, k]) for kind, value in nuisances.items()}
-        return simulate_and_observe(specimen, kernel, theta[c], histories[k], nuisance_values, sensitivities)
+        return simulate_and_observe(specimen, kernel, theta[c], histories[k], nuisance_values, sensitivities, model_of)
 
     workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
     if workers > 1:
@@ -365,17 +374,17 @@ def simulate_and_observe(
     history: History,
     nuisances: Mapping[str, float],
     jacobian: bool,
+    model_of: Callable[[BulgeSetup], SolvableModel] | None = None,
 ) -> BulgeResponse:
     """Simulate one test and observe it at the times of its history; theta : (parameters,) internal values."""
     test_setup = set_up_test(specimen, history, nuisances)
+    model = test_setup.model if model_of is None else model_of(test_setup)
     settings = solver_settings(specimen, exact=jacobian)
     names, directions = tuple(nuisances), None
     if jacobian:
         programs = program_directions(specimen, history, nuisances)
         directions = sensitivity_directions_of(test_setup, history, names, programs)
-    simulation = simulate(
-        kernel, theta, test_setup.model, test_setup.load_history, settings=settings, directions=directions
-    )
+    simulation = simulate(kernel, theta, model, test_setup.load_history, settings=settings, directions=directions)
     profiles = simulation.displacements[:, test_setup.model.top, 1]
     sensitivities = None
     if directions is not None:
