@@ -184,7 +184,7 @@ def train(
         data = read_dataset(data)
     if not hasattr(data, "accepted"):
         raise DatasetError(f"train() takes a data set or its file, found {type(data).__name__}; generate() makes one")
-    if isinstance(recipe, type) or not hasattr(recipe, "sample_tensors"):
+    if isinstance(recipe, type) or not hasattr(recipe, "sample_arrays"):
         found_type = recipe.__name__ if isinstance(recipe, type) else type(recipe).__name__
         raise SurrogateError(f"train() takes a recipe such as ParameterGru(hidden=128, layers=3), found {found_type}")
     return run(data, recipe, to=to, seed=seed, training=training, device=device, progress=progress)

@@ -119,8 +119,8 @@ def _is_surrogate(predictor: Predictor) -> bool:
 
 def _fingerprint(surrogate: Any) -> str:
     digest = hashlib.sha256(canonical_json(surrogate.file_header))
-    for name, tensor in sorted(surrogate.module.state_dict().items()):
-        digest.update(name.encode() + tensor.detach().cpu().numpy().tobytes())
+    for name, array in sorted(surrogate.weights.items()):
+        digest.update(name.encode() + array.tobytes())
     return digest.hexdigest()[:32]
 
 

@@ -12,7 +12,6 @@ from creepkit.errors import SurrogateError
 from creepkit.report.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
 from creepkit.surrogates.evaluation import PredictionComparison, evaluate, worst_histories
 from creepkit.surrogates.recipe import SurrogateMetadata
-from creepkit.surrogates.training import SizeStudyResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
 
     from creepkit.dataset.dataset import Dataset
     from creepkit.surrogates.surrogate import Surrogate
+    from creepkit.surrogates.training import SizeStudyResult
 
 
 OUTPUT_LABELS = {"amplitude": "amplitude, mm", "width": "width, mm", "shape": "shape", "strain": "strain"}

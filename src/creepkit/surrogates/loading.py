@@ -42,20 +42,19 @@ RECIPE_CLASSES = {
 
 def load_surrogate(path: str | Path) -> Surrogate:
     """Return the surrogate in a file; SurrogateError says what is wrong with any other file."""
-    tensors, header = read_weights(path)
+    weights, header = read_weights(path)
     try:
         problem = check_keys(header, ("kind", "recipe", "metadata"), "its header")
         if problem:
             raise SurrogateError(f"{problem}; train it again")
         recipe = CODEC.from_json(_recipe_class(header["kind"]), header["recipe"], "recipe")
         metadata = CODEC.from_json(SurrogateMetadata, header["metadata"], "metadata")
-        module = recipe.empty_module(metadata)
-        module.load_state_dict(tensors)
+        surrogate = recipe.surrogate(weights, metadata)
     except CreepkitError as error:
         raise SurrogateError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
     except (KeyError, TypeError, ValueError, RuntimeError, AttributeError):
         raise SurrogateError(f"{path}: its header and its weights do not belong together; train it again") from None
-    return recipe.surrogate(module, metadata)
+    return surrogate
 
 
 def _recipe_class(kind: Any) -> type[Recipe]:

@@ -11,6 +11,7 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -35,6 +36,7 @@ from creepkit.specimens.bulge.reduced_order.trajectories import Trajectories, Tr
 from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 from creepkit.surrogates.law_class import LawClass
+from creepkit.surrogates.parameter_network import SampleTensors, SurrogateModule, load_weights, sample_tensors
 from creepkit.surrogates.rate_network import (
     BASE_COLUMNS,
     RateModule,
@@ -43,7 +45,7 @@ from creepkit.surrogates.rate_network import (
     network_inputs,
     with_running_means,
 )
-from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, SurrogateModule, Training
+from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, SurrogateMetadata, Training, Weights
 from creepkit.surrogates.surrogate import Surrogate
 
 if TYPE_CHECKING:
@@ -115,8 +117,8 @@ class RateNet:
         """
         return LawClass(("stress", "strain", "time", "temperature"))
 
-    def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:
-        """Tensors of a data set: inputs and base at nodes, weights of frames, targets and masks."""
+    def sample_arrays(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleArrays:
+        """Arrays of a data set: inputs and base at nodes, weights of frames, targets and masks."""
         specimen, reason = bulge_of(data), self.law_class(data.law).reason_outside(data.law)
         if reason:
             raise DatasetError(
@@ -156,7 +158,8 @@ class RateNet:
         single = {name: tensor.to(torch.float32) for name, tensor in tensors.items()}
         domain_rows = local_inputs(values, thickness)[:, _domain_nodes(nodes)].to(torch.float32)
         node_mask = torch.arange(nodes) < counts[:, None]
-        return {**single, "mask": torch.from_numpy(mask), "nodes": node_mask, "domain": domain_rows}
+        arrays = {name: t.numpy() for name, t in {**single, "nodes": node_mask, "domain": domain_rows}.items()}
+        return {**arrays, "mask": mask}
 
     def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
         """A fresh network with the scales of the training rows; train : (rows,) their positions."""
@@ -181,13 +184,15 @@ class RateNet:
             domain=ApplicabilityDomain.from_rows(domain_names, rows.reshape(-1, rows.shape[-1]), margins),
         )
 
-    def empty_module(self, metadata: SurrogateMetadata) -> SurrogateModule:
-        """A network for the weights of a file."""
-        return RateModule(len(input_names(self._feature_count)), self.hidden, self.layers)
-
-    def surrogate(self, module: SurrogateModule, metadata: SurrogateMetadata) -> Surrogate:
+    def surrogate(self, weights: Weights, metadata: SurrogateMetadata) -> Surrogate:
         """The network as a predictor."""
-        return RateSurrogate(self, module, metadata)
+        return RateSurrogate(self, weights, metadata)
+
+    def network(self, weights: Weights) -> RateModule:
+        """The network with these weights."""
+        module = RateModule(len(input_names(self._feature_count)), self.hidden, self.layers)
+        load_weights(module.to(torch.from_numpy(weights["mean"].copy()).dtype), weights)
+        return module
 
     @property
     def _feature_count(self) -> int:
@@ -339,10 +344,14 @@ class RateSurrogate(Surrogate):
                 list(pool.map(evaluate, parts))
         return values, outside
 
-    @property
+    @cached_property
     def _module(self) -> RateModule:
-        assert isinstance(self.module, RateModule)
-        return self.module
+        return self.recipe.network(self.weights)
+
+    def predict_samples(self, samples: SampleArrays) -> Floats:
+        """(rows, frames, outputs) of the network for samples of its recipe."""
+        with torch.no_grad():
+            return np.asarray(self._module(sample_tensors(samples)).numpy(), float)
 
     def _derivatives(self, trajectory: Tensor, thickness: Tensor, trajectory_derivatives: Tensor) -> Floats:
         """Derivatives of outputs at nodes: forward through inputs and network, all directions at once."""

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
-from creepkit.surrogates.recipe import SampleTensors, SurrogateModule
+from creepkit.surrogates.parameter_network import SampleTensors, SurrogateModule
 
 FEATURE_START = len(TRAJECTORY_COLUMNS)
 """First column of the features in a trajectory."""

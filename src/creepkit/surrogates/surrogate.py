@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
-from torch import Tensor
 
 from creepkit.arrays import Floats
 from creepkit.errors import SurrogateError
@@ -31,12 +30,15 @@ from creepkit.sampling.conditions import TimeGrid, test_kind
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.surrogates.law_class import LawClass
-from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, SurrogateModule, Training
+from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, SurrogateMetadata, Training, Weights
 from creepkit.surrogates.weight_files import CODEC, write_weights
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from creepkit.dataset.dataset import Dataset
     from creepkit.language import CreepLaw
+    from creepkit.surrogates.parameter_network import SampleTensors, SurrogateModule
 
 
 CONTROLLED_QUANTITY = {"bulge": "pressure", "uniaxial": "stress"}
@@ -129,14 +131,14 @@ def observation_derivative(specimen: Specimen, history: History, values: Floats)
 class Surrogate(Presentable, ABC):
     """A trained network in the place of a specimen; a records.Predictor.
 
-    recipe, module, metadata : what it was trained as, its network (on the CPU), and what is known of its training.
+    recipe, weights, metadata : what it was trained as, the arrays of its network, and what is known of its training.
     """
 
     nuisances: tuple[str, ...] = ()
     """Kinds of explicit nuisances that predict() understands."""
 
-    def __init__(self, recipe: Recipe, module: SurrogateModule, metadata: SurrogateMetadata) -> None:
-        self.recipe, self.module, self.metadata = recipe, module.eval(), metadata
+    def __init__(self, recipe: Recipe, weights: Weights, metadata: SurrogateMetadata) -> None:
+        self.recipe, self.weights, self.metadata = recipe, weights, metadata
 
     @property
     def name(self) -> str:
@@ -203,6 +205,15 @@ class Surrogate(Presentable, ABC):
     ) -> Prediction:
         """As predict(), of a law and of histories that were checked."""
 
+    @abstractmethod
+    def predict_samples(self, samples: SampleArrays) -> Floats:
+        """(rows, frames, outputs) of the network for samples of its recipe, in physical units."""
+
+    @property
+    def weight_count(self) -> int:
+        """Numbers that its training fitted; scales, which are not fitted, are float64."""
+        return sum(array.size for array in self.weights.values() if array.dtype == np.float32)
+
     @property
     def error(self) -> dict[str, float]:
         """{output: standard deviation of its error}, in the output's unit, from the validation rows.
@@ -254,7 +265,7 @@ class Surrogate(Presentable, ABC):
 
     def save(self, path: str | Path) -> Path:
         """Write the weights with their header."""
-        return write_weights(path, self.module.state_dict(), self.file_header)
+        return write_weights(path, self.weights, self.file_header)
 
     def __repr__(self) -> str:
         return f"<Surrogate: {self.title}>"
@@ -282,8 +293,8 @@ class Recipe(Protocol):
         """The laws that are predicted after a training on simulations of `law`."""
         ...
 
-    def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:
-        """The tensors of a data set; DatasetError where it cannot be learnt from."""
+    def sample_arrays(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleArrays:
+        """The arrays of a data set; DatasetError where it cannot be learnt from."""
         ...
 
     def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
@@ -294,10 +305,6 @@ class Recipe(Protocol):
         """What the data say of a surrogate before its training: scaling, domain and notes among it; train : (rows,)."""
         ...
 
-    def empty_module(self, metadata: SurrogateMetadata) -> SurrogateModule:
-        """A network of the right shapes, into which the weights and scales of a file are put."""
-        ...
-
-    def surrogate(self, module: SurrogateModule, metadata: SurrogateMetadata) -> Surrogate:
-        """The trained network as a predictor."""
+    def surrogate(self, weights: Weights, metadata: SurrogateMetadata) -> Surrogate:
+        """The trained network as a predictor; SurrogateError where the weights are not those of such a network."""
         ...

@@ -10,7 +10,7 @@ from creepkit.dataset.storage import write_dataset
 from creepkit.report.surrogate import size_study_rows
 from creepkit.surrogates import training as sweeping
 from creepkit.surrogates.evaluation import evaluate
-from creepkit.surrogates.training_loop import training_split
+from creepkit.surrogates.training_rows import training_split
 from helpers.command_line import creepkit, one_line
 from helpers.planted_datasets import bars
 

@@ -95,7 +95,7 @@ def test_a_file_without_the_field_has_the_class_of_its_recipe(dimple: Surrogate,
 
 def test_the_class_of_a_file_holds(dimple: Surrogate, tmp_path) -> None:
     narrow = LawClass(("stress",))
-    model = dimple.recipe.surrogate(dimple.module, replace(dimple.metadata, law_class=narrow))
+    model = dimple.recipe.surrogate(dimple.weights, replace(dimple.metadata, law_class=narrow))
     again = load_surrogate(model.save(tmp_path / "m.safetensors"))
     assert again.law_class == narrow
     assert "depends on the strain" in again.outside_class(ck.law("strain-hardening"))

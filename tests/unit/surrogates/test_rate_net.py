@@ -1,6 +1,5 @@
 """RateNet: laws it never saw, derivatives, tests of any length, its domain, and identification with it."""
 
-import copy
 from dataclasses import replace
 
 import numpy as np
@@ -13,10 +12,11 @@ from creepkit.errors import DatasetError, SolveError, SurrogateError
 from creepkit.language import symbols
 from creepkit.records import History, Program, RecordedLoading, Status
 from creepkit.surrogates.loading import load_surrogate
+from creepkit.surrogates.parameter_network import sample_tensors
 from creepkit.surrogates.rate_net import RateNet, RateSurrogate
 from creepkit.surrogates.recipe import Training
 from creepkit.surrogates.training import train
-from creepkit.surrogates.training_loop import training_split
+from creepkit.surrogates.training_rows import training_split
 from helpers.laws_with_states import BACK_STRESS, COUNTED, VALUES
 from helpers.planted_datasets import HOURS, bars, measured, rates, unsimulated_rates
 
@@ -62,18 +62,19 @@ def learnt(family: Dataset) -> RateSurrogate:
 @pytest.fixture(scope="module")
 def exact(learnt: RateSurrogate) -> RateSurrogate:
     """The same in float64: a difference over 1e-5 of numbers with seven digits has two."""
-    return RateSurrogate(learnt.recipe, copy.deepcopy(learnt.module).double(), learnt.metadata)
+    return RateSurrogate(learnt.recipe, {name: a.astype(float) for name, a in learnt.weights.items()}, learnt.metadata)
 
 
 # ---- what it learns --------------------------------------------------------------------------------------------------
 
 
 def test_training_corrects_the_base(learnt: RateSurrogate, family: Dataset) -> None:
-    samples = RECIPE.sample_tensors(family)
-    train_rows, aside = training_split(len(family), HOW, 0)
+    samples = sample_tensors(RECIPE.sample_arrays(family))
+    train_rows, aside = (torch.from_numpy(part) for part in training_split(len(family), HOW, 0))
     batch = {name: tensor[aside] for name, tensor in samples.items()}
     with torch.no_grad():
-        base, after = (float(m.loss(batch)) for m in (RECIPE.module(family, samples, train_rows), learnt.module))
+        modules = RECIPE.module(family, samples, train_rows), RECIPE.network(learnt.weights)
+        base, after = (float(module.loss(batch)) for module in modules)
     assert after < 0.6 * base
     assert learnt.metadata.metrics["outputs"]["amplitude"]["rse"] < 1e-2
 
@@ -181,8 +182,8 @@ def test_a_burst_has_values_up_to_it(learnt: RateSurrogate) -> None:
 def guarded(learnt: RateSurrogate) -> RateSurrogate:
     """With the domain of more samples; those need not be simulated."""
     drawn = unsimulated_rates(200)
-    told = RECIPE.metadata(drawn, RECIPE.sample_tensors(drawn), torch.arange(len(drawn)))
-    return RateSurrogate(RECIPE, learnt.module, replace(learnt.metadata, domain=told.domain))
+    told = RECIPE.metadata(drawn, sample_tensors(RECIPE.sample_arrays(drawn)), torch.arange(len(drawn)))
+    return RateSurrogate(RECIPE, learnt.weights, replace(learnt.metadata, domain=told.domain))
 
 
 FALLING = RecordedLoading(Program(np.array([0.0, 100, 2e4, 20100, 43200]), np.array([0.0, 10, 10, 4, 4])), "pressure")
@@ -274,4 +275,4 @@ def test_an_answer_outside_the_domain_says_so_wherever_it_is_told(guarded: RateS
 def test_a_law_whose_state_acts_back_teaches_it_nothing(family: Dataset) -> None:
     """Its inputs are rates along one path, and the state has another value at each point of the dimple."""
     with pytest.raises(DatasetError, match=r"internal variables that act back \(b\), which RateNet is not given"):
-        RECIPE.sample_tensors(replace(family, law=BACK_STRESS))
+        RECIPE.sample_arrays(replace(family, law=BACK_STRESS))
