@@ -130,9 +130,9 @@ ERROR_HEADS = ("RSE (Eq. 4)", "MSE", "MAE", "R2", "largest error, median", "95 %
 
 
 def surrogate_text(surrogate: Surrogate) -> str:
-    """Title, class of laws, errors on the validation rows for each output, and where it came from."""
-    metadata = surrogate.metadata
-    lines, metrics = [surrogate.title, f"predicts {surrogate.law_class}"], metadata.metrics
+    """Title, laws, errors on the validation rows for each output, and where it came from."""
+    metadata, metrics = surrogate.metadata, surrogate.metadata.metrics
+    lines = [surrogate.title, f"predicts law '{metadata.law.name}', and that less some of its terms"]
     if metrics:
         rows = {
             name: [_number_text(errors_of_output[c]) for c in ERROR_COLUMNS]

@@ -48,6 +48,8 @@ def single_threaded(predictor: Predictor) -> Predictor:
     if _is_surrogate(untyped):
         metadata = replace(untyped.metadata, specimen=single_threaded(untyped.metadata.specimen))
         return untyped.recipe.surrogate(untyped.weights, metadata)  # type: ignore[no-any-return]
+    if "specimen" in getattr(untyped, "__dataclass_fields__", ()):  # the reduced-order model of a specimen
+        return replace(untyped, specimen=single_threaded(untyped.specimen))  # type: ignore[no-any-return]
     if getattr(untyped, "threads", 1) == 1:
         return predictor
     return untyped.replace(threads=1)  # type: ignore[no-any-return]

@@ -49,13 +49,16 @@ ROWS_IN_BATCH = 512
 
 @dataclass(frozen=True, eq=False)
 class ColumnScale:
-    """Mean and standard deviation of columns, (columns,) each, in their units."""
+    """Standardisation of columns.
+
+    mean, deviation : (columns,) in their units.
+    """
 
     mean: Floats
     deviation: Floats
 
     def standardised(self, values: Floats) -> Floats:
-        """Values (..., columns) without unit."""
+        """The values without unit, (..., columns); values : (..., columns) in their units."""
         return np.asarray((values - self.mean) / self.deviation)
 
 
@@ -86,6 +89,7 @@ LayerState = list[Floats]
 class ParameterNetwork:
     """The trained network: constants and series of tests to outputs in physical units.
 
+    head_weights, head_bias : (hidden, outputs) and (outputs,) of the linear layer behind the recurrent ones.
     constants, series, targets : scales of its inputs and of what it gives. floor, most : of the logarithm of the first
     output (see parameter_network.ParameterModule). logarithm : whether the first output is learnt by its logarithm.
     corrects_base : whether that is the logarithm of its ratio to a base.
@@ -162,8 +166,8 @@ class ParameterNetwork:
     ) -> tuple[Floats, Floats]:
         """Outputs (rows, frames, outputs) in physical units, and derivatives (rows, frames, outputs, directions).
 
-        constants, series, base : as for outputs(). directions : (rows, directions, constants), how constants move; with
-        a base there are none, as that moves too.
+        constants : (rows, constants). series : (tests, frames, series). base : (rows, frames); all as for outputs().
+        directions : (rows, directions, constants), how constants move; with a base there are none, as that moves too.
         """
         if directions is None:
             directions = np.zeros((len(constants), 0, constants.shape[1]))

@@ -10,7 +10,6 @@ import numpy as np
 from creepkit.errors import SurrogateError, nearest
 from creepkit.records import Specimen
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
-from creepkit.surrogates.law_class import LawClass
 from creepkit.surrogates.network_evaluation import ParameterNetwork, RecurrentCell
 from creepkit.surrogates.parameter_inputs import (
     CONSTANT_INPUTS,
@@ -20,6 +19,7 @@ from creepkit.surrogates.parameter_inputs import (
     base_outputs,
     load_history_arrays,
 )
+from creepkit.surrogates.parameter_surrogate import ParameterSurrogate
 from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, SurrogateMetadata, Training, Weights
 from creepkit.surrogates.surrogate import Surrogate
 
@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from creepkit.dataset.dataset import Dataset
-    from creepkit.language import CreepLaw
-    from creepkit.surrogates.parameter_network import SampleTensors, SurrogateModule
+    from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors
 
 
 @dataclass(frozen=True)
@@ -72,10 +71,6 @@ class ParameterGru:
 
     # ---- for the training ------------------------------------------------------------------------------------------
 
-    def law_class(self, law: CreepLaw) -> LawClass:
-        """The law of the data, and its reductions: its parameters are the inputs."""
-        return LawClass.of_law(law)
-
     def sample_arrays(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleArrays:
         """Arrays of a data set: constants, series, targets, mask, base, and "domain" for the applicability domain."""
         law, history_inputs = LawInputs(data.law), self._history_inputs(data)
@@ -92,7 +87,7 @@ class ParameterGru:
         single = {name: np.asarray(v, np.float32) for name, v in arrays.items()}
         return {**single, "mask": mask, "domain": np.concatenate([rows, domain_rows], axis=1)}
 
-    def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
+    def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> ParameterModule:
         """A fresh network with the scales of the training rows; train : (rows,) their positions."""
         from creepkit.surrogates.parameter_network import ParameterModule
 
@@ -105,7 +100,7 @@ class ParameterGru:
         """Scales by name, the domain, and what was constant; train : (rows,) positions of training rows."""
         history_inputs, law = self._history_inputs(data), LawInputs(data.law)
         names = (*law.names, *history_inputs.constants)
-        module: Any = self.module(data, samples, train)
+        module = self.module(data, samples, train)
         series = (*history_inputs.series, *(["ln base"] if self.base != "none" else []))
         scaling = {
             "inputs": _scale_pairs(names, module.constants),
@@ -125,8 +120,6 @@ class ParameterGru:
 
     def surrogate(self, weights: Weights, metadata: SurrogateMetadata) -> Surrogate:
         """The network as a predictor."""
-        from creepkit.surrogates.parameter_surrogate import ParameterSurrogate
-
         return ParameterSurrogate(self, weights, metadata)
 
     def network(self, weights: Weights, metadata: SurrogateMetadata) -> ParameterNetwork:

@@ -1,11 +1,10 @@
-"""The networks that training fits, in torch: their interface, standardisation, and the recurrent one of ParameterGru.
+"""The network of ParameterGru as training fits it, in torch, and the standardisation of its inputs.
 
 What is trained predicts without torch; see network_evaluation.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from typing import TypeAlias
 
 import torch
@@ -23,30 +22,14 @@ def sample_tensors(samples: SampleArrays) -> SampleTensors:
     return {name: torch.from_numpy(array) for name, array in samples.items()}
 
 
-class SurrogateModule(nn.Module, ABC):
-    """A network with its scales: from samples to outputs in physical units. Its buffers are saved with its weights."""
-
-    @abstractmethod
-    def forward(self, batch: SampleTensors) -> Tensor:
-        """(rows, frames, outputs) in physical units at the times of the data."""
-
-    @abstractmethod
-    def loss(self, batch: SampleTensors) -> Tensor:
-        """What training makes small: a number, the mean over the rows of the batch."""
-
-    def loss_and_outputs(self, batch: SampleTensors) -> tuple[Tensor, Tensor]:
-        """The loss, a number, and the outputs (rows, frames, outputs); a module may spare itself the second pass."""
-        return self.loss(batch), self(batch)
-
-
-def load_weights(module: SurrogateModule, weights: Weights) -> SurrogateModule:
+def load_weights(module: ParameterModule, weights: Weights) -> ParameterModule:
     """The module with the weights and scales of a file."""
     module.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in weights.items()})
     return module
 
 
 def weights_of(tensors: dict[str, Tensor]) -> Weights:
-    """{name: (...,)} arrays of the state of a module."""
+    """{name: (...,)} arrays of the state of a module; tensors : {name: (...,)}."""
     return {name: tensor.detach().cpu().numpy() for name, tensor in tensors.items()}
 
 
@@ -104,7 +87,7 @@ LARGEST_LOG_EXCESS = 2.0
 """By how much (of ln) a prediction may exceed the largest value of the training: an exponential must not overflow."""
 
 
-class ParameterModule(SurrogateModule):
+class ParameterModule(nn.Module):
     """Standardised constants and series into recurrent layers, and a linear layer to standardised outputs.
 
     Its samples are "constants" (n, C), NaN where a coefficient is off; "series" (n, frames, S); and "base" (n, frames)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -16,11 +16,12 @@ from creepkit.records import (
     HistoryPrediction,
     NuisanceValues,
     Prediction,
+    Specimen,
     Status,
     assemble_prediction,
     broadcast_candidates,
 )
-from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.network_evaluation import ParameterNetwork
 from creepkit.surrogates.parameter_inputs import (
     LawInputs,
     LoadHistoryInputs,
@@ -31,6 +32,7 @@ from creepkit.surrogates.parameter_inputs import (
 )
 from creepkit.surrogates.recipe import SampleArrays, SurrogateMetadata, Weights
 from creepkit.surrogates.surrogate import (
+    Recipe,
     Surrogate,
     interpolation_weights,
     observation_derivative,
@@ -69,12 +71,29 @@ class NetworkQuery:
         return constants, self.series, None if self.base is None else self.base.reshape(count * tests, -1)
 
 
+class ParameterRecipe(Recipe, Protocol):
+    """What the surrogate asks of its recipe, ParameterGru."""
+
+    @property
+    def base(self) -> str:
+        """What the network corrects, or "none"."""
+        ...
+
+    def network(self, weights: Weights, metadata: SurrogateMetadata) -> ParameterNetwork:
+        """The trained network; SurrogateError where the weights are not those of this recipe."""
+        ...
+
+    def history_inputs(self, specimen: Specimen, conditions: tuple[str, ...], relative: bool) -> LoadHistoryInputs:
+        """The inputs that tests give."""
+        ...
+
+
 class ParameterSurrogate(Surrogate):
     """The network on the frames it was trained at, and between them linear in time."""
 
-    recipe: ParameterGru
+    recipe: ParameterRecipe
 
-    def __init__(self, recipe: ParameterGru, weights: Weights, metadata: SurrogateMetadata) -> None:
+    def __init__(self, recipe: ParameterRecipe, weights: Weights, metadata: SurrogateMetadata) -> None:
         super().__init__(recipe, weights, metadata)
         self.network = recipe.network(weights, metadata)
 

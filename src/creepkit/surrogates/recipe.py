@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from creepkit.errors import SurrogateError
 from creepkit.jobs.shard_progress import ProgressCallback as ProgressCallback
-from creepkit.surrogates.law_class import LawClass
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
@@ -77,7 +76,6 @@ class SurrogateMetadata:
     metrics : of the validation rows (see surrogates.evaluation). curves : {name: one number an epoch}.
     provenance : versions, seed, fingerprints, counts, when.
     notes : limitations, a sentence each.
-    law_class : the laws that it predicts; None, as in older files, stands for that of its recipe.
     """
 
     law: CreepLaw
@@ -92,7 +90,6 @@ class SurrogateMetadata:
     curves: Mapping[str, list[float]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    law_class: LawClass | None = None
 
     @classmethod
     def from_dataset(cls, data: Dataset, **fields: Any) -> SurrogateMetadata:

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from creepkit.arrays import Ints
 from creepkit.errors import SurrogateError
-from creepkit.surrogates.parameter_network import SampleTensors, SurrogateModule, sample_tensors, weights_of
+from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors, sample_tensors, weights_of
 from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, Training, Weights
 from creepkit.surrogates.training_rows import output_deviation
 
@@ -69,7 +69,7 @@ class NetworkTraining:
 
     def __init__(
         self,
-        module: SurrogateModule,
+        module: ParameterModule,
         samples: SampleArrays,
         rows: tuple[Ints, Ints],
         training: Training,

@@ -88,12 +88,7 @@ def test_the_best_of_a_sweep_stands_on_top(file: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("train", "{set}", "--to", "{to}", "--recipe", "gru"), "--recipe gru is not known"),
         (("train", "{set}", "--to", "{to}", "--cell", "rnn"), "cell is 'rnn'; allowed are gru, lstm"),
-        (
-            ("train", "{set}", "--to", "{to}", "--recipe", "rate-net", "--cell", "gru"),
-            "--cell means nothing to rate-net",
-        ),
         (("train", "{to}", "--to", "{to}"), "no such"),
         (("sweep", "{set}", "--to", "{to}", "--hidden", "64;128"), "--hidden 64;128 is not understood"),
         (

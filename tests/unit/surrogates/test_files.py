@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from safetensors.numpy import save_file
 
+import creepkit as ck
 from creepkit.errors import SurrogateError
+from creepkit.inverse.composite_predictor import refined_of
 from creepkit.surrogates.loading import load_surrogate, surrogate_by_name
 from creepkit.surrogates.weight_files import read_weights, write_weights
 
@@ -66,6 +68,12 @@ def test_a_header_without_its_parts_says_so(tmp_path: Path) -> None:
     path = write_weights(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "recipe": {"training": {}}, "metadata": {}})
     with pytest.raises(SurrogateError, match="metadata: 'law' is missing"):
         load_surrogate(path)
+
+
+def test_the_surrogate_of_the_dimple_is_the_reduced_order_model_of_the_bulge_specimen() -> None:
+    model = surrogate_by_name("dimple")
+    assert model == ck.specimen("bulge").reduced_order_model()
+    assert refined_of(model) == ck.specimen("bulge").refined()
 
 
 def test_names_that_nobody_knows(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import torch
 
 import creepkit as ck
 from creepkit.dataset.dataset import Dataset
-from creepkit.errors import SurrogateError
+from creepkit.errors import SolveError, SurrogateError
 from creepkit.records import Program, RecordedLoading, Status
 from creepkit.sampling.conditions import TimeGrid
 from creepkit.surrogates.loading import load_surrogate
@@ -18,6 +18,7 @@ from creepkit.surrogates.parameter_network import load_weights, sample_tensors
 from creepkit.surrogates.recipe import Training
 from creepkit.surrogates.surrogate import Surrogate
 from creepkit.surrogates.training import train
+from creepkit.surrogates.weight_files import write_weights
 from helpers.planted_datasets import HOURS, bars, data_set, dimples, measured
 
 BRIEF = Training(epochs=2, batch=32, rate=1e-2)
@@ -270,7 +271,16 @@ def test_another_law_is_refused(learnt: Surrogate, tension: Dataset) -> None:
     assert found.status.tolist() == [[Status.OUTSIDE_CLASS]]
     assert np.isnan(found.values).all()
     assert found.reason.startswith("a surrogate of law 'norton' cannot predict law 'time-hardening'")
-    assert str(learnt.law_class) == "law 'norton', and that less some of its terms"
+    assert "predicts law 'norton', and that less some of its terms" in str(learnt)
+    with pytest.raises(SolveError, match="simulate it with the specimen 'uniaxial' itself"):
+        ck.simulate(law, learnt, law.center(), loading=ck.constant_stress(100.0), times=[HOURS])
+
+
+def test_files_of_older_versions_that_name_the_class_of_laws_are_read(learnt: Surrogate, tmp_path) -> None:
+    header = {**learnt.file_header}
+    header["metadata"] = {**header["metadata"], "law_class": {"variables": ["stress"], "states": False}}
+    path = write_weights(tmp_path / "old.safetensors", learnt.weights, header)
+    assert load_surrogate(path).file_header == learnt.file_header
 
 
 def test_other_kinds_of_tests_are_refused(
