@@ -1,6 +1,5 @@
 # make test   set up .venv, then check style, types, layers and run all tests, those of plugins/ included
 # make verify-export   exported laws in a CalculiX built from Debian's source, beside our solver: a table
-# make surrogate   remake the surrogate that ships: 8,000 simulations, 300 epochs; some 20 minutes of CPU
 # make docs   build the documentation into build/docs; needs no network once .venv is set up
 # make core   compile the core (src/core) again where its sources changed; 'make test' does it first
 # make sanitize   tests of the core with checks of addresses and of undefined behaviour; needs g++ and its libasan
@@ -17,7 +16,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := test
-.PHONY: test core sanitize demo docs verify-export surrogate clean
+.PHONY: test core sanitize demo docs verify-export clean
 
 PYTHONS := python3.11 python3.12 python3.13
 BIN := .venv/bin
@@ -65,12 +64,6 @@ docs: core
 
 verify-export: core
 	$(BIN)/python -u tests/benchmarks/verify_export.py
-
-surrogate: core
-	mkdir -p build
-	$(BIN)/creepkit generate rate-family --samples 8000 --seed 1 --to build/rates.h5
-	$(BIN)/creepkit train build/rates.h5 --recipe rate-net --epochs 300 --seed 0 --to build/dimple.safetensors
-	cp build/dimple.safetensors src/creepkit/surrogates/weights/
 
 .venv/.ok: pyproject.toml $(PLUGINS:%=%/pyproject.toml)
 	@echo "set-up 1/5: virtual environment .venv"

@@ -51,18 +51,6 @@ BENCHMARKS = {
     "dataset_generation_speed": Benchmark(6, (("--samples", "256"),)),
     "surrogate_accuracy": Benchmark(10, (("--samples", "150"),)),
     "surrogate_speed": Benchmark(3),
-    "surrogate_identification": Benchmark(3, (("--tests", "3"),)),
-    "surrogate_law_classes": Benchmark(15),
-    "surrogate_comparison": Benchmark(
-        10,
-        (("build/case1.h5", "build/case1.safetensors", "--samples", "300"),),
-        "a data set and a network of Eq. (1), see the program",
-    ),
-    "rate_net_memory": Benchmark(
-        4,
-        (("build/rates.h5", "--samples", "1500", "--epochs", "50", "--seeds", "1"),),
-        "build/rates.h5: creepkit generate rate-family --samples 2000 --seed 1 --to build/rates.h5",
-    ),
     "identification_speed": Benchmark(1),
     "search_success": Benchmark(15, (("--specimens", "6", "--through", "surrogate", "--searches", "default", "cma"),)),
     "swarm_speed": Benchmark(1),

@@ -15,7 +15,9 @@ from creepkit.records import (
     HistoryPrediction,
     NuisanceValues,
     Prediction,
+    Predictor,
     Status,
+    SupportsRefinement,
     assemble_prediction,
     broadcast_candidates,
     check_nuisances,
@@ -74,6 +76,11 @@ class BulgeReducedOrderModel:
         )
         parts = [_history_prediction(history, k, trajectories, nuisances or ()) for k, history in enumerate(histories)]
         return assemble_prediction(parts, histories, OBSERVED, len(theta))
+
+    def refined(self) -> Predictor:
+        """What it stands for: the specimen by finite elements, on its finer mesh."""
+        specimen: Predictor = self.specimen  # type: ignore[assignment]  # a Bulge, whose module imports this one
+        return specimen.refined() if isinstance(specimen, SupportsRefinement) else specimen
 
     def reference_stress(self, history: History) -> Floats:
         """As the specimen's, (levels,) MPa."""
