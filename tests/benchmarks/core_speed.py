@@ -22,7 +22,7 @@ from creepkit.core import address, function, library
 from creepkit.fem import solver
 from creepkit.fem.simulation import simulate
 from creepkit.records import History, PressureJump
-from creepkit.specimens.bulge.finite_elements import set_up_test, simulate_and_observe, solver_settings
+from creepkit.specimens.bulge.finite_elements import PreparedTest, set_up_test, solver_settings
 from creepkit.specimens.bulge.specimen import Bulge
 
 TIMES = np.maximum(np.arange(289) * 150.0, 1.0)
@@ -60,7 +60,8 @@ class Case:
     def predict(self, jacobian: bool = False):
         """What a fit asks for."""
         nuisances = NUISANCES if jacobian else {}
-        return simulate_and_observe(self.specimen, self.law, self.theta, self.history, nuisances, jacobian)
+        test = PreparedTest.of(self.specimen, self.history, nuisances, jacobian)
+        return test.simulate_and_observe(self.law, self.theta, solver_settings(self.specimen, exact=jacobian))
 
 
 def least(call, repeats: int) -> float:

@@ -180,7 +180,7 @@ def _global_search(
     """The best minima that differ, by the reduced-order model of the cheapest predictor."""
     predictor = through or problem.predictor
     reduced_order_model = reduced_order_model_of(predictor)
-    searched = search_problem(problem, reduced_order_model or search_predictor_of(predictor))
+    searched = search_problem(problem, search_predictor_of(reduced_order_model or predictor))
     search_result = search.minima(searched, progress)
     distinct_minima = distinct(
         search_result.minima,

@@ -340,22 +340,29 @@ def predict_bulge(
     nuisances: NuisanceValues,
     sensitivities: bool,
     model_of: Callable[[BulgeSetup], SolvableModel] | None = None,
+    settings: SolverSettings | None = None,
 ) -> Prediction:
     """Predict every candidate in every test; see records.Predictor.
 
     theta : (candidates, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}. model_of : the model
-    of a test that is simulated in the place of its finite elements, such as a reduced-order model.
+    of a test that is simulated in the place of its finite elements, such as a reduced-order model. settings : of the
+    solver, by default those of the specimen.
     """
     known = (*specimen.nuisances, *PROGRAM_NUISANCES)
     check_nuisances([kind_and_start(key)[0] for key in nuisances], known, "a bulge specimen")
     kernel = kernels.lower(law, "numba")
     theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
     tasks = list(product(range(len(theta)), range(len(histories))))
+    settings = settings or solver_settings(specimen, exact=sensitivities)
+    tests: dict[tuple[float, ...], PreparedTest] = {}
 
     def run(task: tuple[int, int]) -> BulgeResponse:
         c, k = task
-        nuisance_values = {kind: float(value[c, k]) for kind, value in nuisances.items()}
-        return simulate_and_observe(specimen, kernel, theta[c], histories[k], nuisance_values, sensitivities, model_of)
+        values = {kind: float(value[c, k]) for kind, value in nuisances.items()}
+        key = (k, *values.values())
+        if key not in tests:  # candidates that differ in the law alone share it
+            tests[key] = PreparedTest.of(specimen, histories[k], values, sensitivities, model_of)
+        return tests[key].simulate_and_observe(kernel, theta[c], settings)
 
     workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
     if workers > 1:
@@ -367,35 +374,52 @@ def predict_bulge(
     return assemble_prediction(parts, histories, OBSERVED, len(theta))
 
 
-def simulate_and_observe(
-    specimen: BulgeSettings,
-    kernel: CompiledLaw,
-    theta: Floats,
-    history: History,
-    nuisances: Mapping[str, float],
-    jacobian: bool,
-    model_of: Callable[[BulgeSetup], SolvableModel] | None = None,
-) -> BulgeResponse:
-    """Simulate one test and observe it at the times of its history; theta : (parameters,) internal values."""
-    test_setup = set_up_test(specimen, history, nuisances)
-    model = test_setup.model if model_of is None else model_of(test_setup)
-    settings = solver_settings(specimen, exact=jacobian)
-    names, directions = tuple(nuisances), None
-    if jacobian:
-        programs = program_directions(specimen, history, nuisances)
-        directions = sensitivity_directions_of(test_setup, history, names, programs)
-    simulation = simulate(kernel, theta, model, test_setup.load_history, settings=settings, directions=directions)
-    profiles = simulation.displacements[:, test_setup.model.top, 1]
-    sensitivities = None
-    if directions is not None:
-        outputs, sensitivities = output_sensitivities(
-            test_setup, theta, history, simulation, profiles, names, directions
+@dataclass(frozen=True, eq=False)
+class PreparedTest:
+    """One test with its nuisances, ready to be simulated by any law.
+
+    model : what is simulated. names, directions : the nuisances, and what is differentiated to; None for nothing.
+    """
+
+    setup: BulgeSetup
+    history: History
+    model: SolvableModel
+    names: tuple[str, ...]
+    directions: SensitivityDirections | None
+
+    @classmethod
+    def of(
+        cls,
+        specimen: BulgeSettings,
+        history: History,
+        nuisances: Mapping[str, float],
+        jacobian: bool,
+        model_of: Callable[[BulgeSetup], SolvableModel] | None = None,
+    ) -> PreparedTest:
+        """Set one test up; jacobian : for a simulation with its sensitivities."""
+        setup = set_up_test(specimen, history, nuisances)
+        model = setup.model if model_of is None else model_of(setup)
+        names, directions = tuple(nuisances), None
+        if jacobian:
+            programs = program_directions(specimen, history, nuisances)
+            directions = sensitivity_directions_of(setup, history, names, programs)
+        return cls(setup, history, model, names, directions)
+
+    def simulate_and_observe(self, kernel: CompiledLaw, theta: Floats, settings: SolverSettings) -> BulgeResponse:
+        """Simulate the test and observe it at the times of its history; theta : (parameters,) internal values."""
+        setup, times = self.setup, self.history.times
+        simulation = simulate(
+            kernel, theta, self.model, setup.load_history, settings=settings, directions=self.directions
         )
-    else:
-        outputs = test_setup.observation.observe_at_times(
-            test_setup.radii, profiles, simulation.timeline, history.times
-        )
-    return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
+        profiles = simulation.displacements[:, setup.model.top, 1]
+        sensitivities = None
+        if self.directions is not None:
+            outputs, sensitivities = output_sensitivities(
+                setup, theta, self.history, simulation, profiles, self.names, self.directions
+            )
+        else:
+            outputs = setup.observation.observe_at_times(setup.radii, profiles, simulation.timeline, times)
+        return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
 
 
 def solver_settings(specimen: BulgeSettings, *, exact: bool = False) -> SolverSettings:
