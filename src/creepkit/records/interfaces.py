@@ -74,9 +74,8 @@ class Predictor(Protocol):
     `program_nuisances`, those of PROGRAM_NUISANCES that predict() takes and differentiates itself (without it they
     become other programs of the histories);
     `reference_stress(history)`, the von Mises stress, MPa, that stands for the test (a number, or one for each level
-    of its loading); `reduced_order_model()`, `refined()` and `for_search()`, see SupportsReducedOrderModel, SupportsRefinement and
-    SupportsSearchTolerance;
-    `specimen`, that a surrogate stands for; `outside_class(law)`, why it does not know the class of a law, in a
+    of its loading); `reduced_order_model()`, `refined()` and `for_search()`, see SupportsReducedOrderModel,
+    SupportsRefinement and SupportsSearchTolerance; `specimen`, that a surrogate stands for; `outside_class(law)`, why it does not know the class of a law, in a
     sentence, or "" where it does.
     """
 
