@@ -29,7 +29,7 @@ from creepkit.specimens.bulge.finite_elements import (
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import OBSERVED
 from creepkit.specimens.bulge.settings import BulgeSettings
-from creepkit.specimens.reduced_order_training import MODES, POINTS, RAMP, power_law_runs, trained_basis
+from creepkit.specimens.reduced_order_training import MODES, RAMP, power_law_runs, trained_basis
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
@@ -56,12 +56,12 @@ LENGTH_STEP = 1.05
 class BulgeReducedOrderModel:
     """A bulge specimen in a reduced-order model; same outputs, nuisances and errors, and derivatives to all of them.
 
-    Trained at the first prediction, in some seconds of CPU for each dimple. modes, points : of the model.
+    Trained at the first prediction, in some seconds of CPU for each dimple. modes, points : of the model; None for as many as the mesh needs.
     """
 
     specimen: BulgeSettings
     modes: int = MODES
-    points: int = POINTS
+    points: int | None = None
     name: str = field(default="bulge, reduced-order model", init=False)
     title: str = field(default="Bulge test in a reduced-order model, for searches", init=False)
     outputs: tuple[str, ...] = field(default=OBSERVED, init=False)
@@ -148,14 +148,14 @@ def _output_errors(predictor: BulgeReducedOrderModel) -> tuple[float, ...]:
 
 @lru_cache(maxsize=256)
 def _model_of_geometry(
-    specimen: BulgeSettings, geometry: DimpleGeometry, refinement: float, modes: int, points: int
+    specimen: BulgeSettings, geometry: DimpleGeometry, refinement: float, modes: int, points: int | None
 ) -> ReducedOrderModel:
     """The reduced-order model of a dimple; kept, for a fit needs it a thousand times."""
     model = model_of_geometry(geometry, refinement)
-    nominal = nominal_geometry(specimen.geometry, geometry)
-    family = _trained_models(nominal, refinement)
-    if not all(_same_numbering(model, other) for other in family):
-        family = (model,)
+    candidates = _thicknesses(nominal_geometry(specimen.geometry, geometry), refinement)
+    alike = [each for each in candidates if _same_numbering(model, each)] or [model]
+    places = np.linspace(0, len(alike) - 1, min(len(alike), TRAINED_THICKNESSES)).round().astype(int)
+    family = [alike[k] for k in places]
     settings = solver_settings(specimen)
     return ReducedOrderModel(model, trained_basis(family, settings, modes=modes, points=points))
 
@@ -175,9 +175,9 @@ def nominal_geometry(own: DimpleGeometry, geometry: DimpleGeometry) -> DimpleGeo
 
 
 @lru_cache(maxsize=64)
-def _trained_models(nominal: DimpleGeometry, refinement: float) -> tuple[FiniteElementModel, ...]:
-    """Models of the thicknesses that a basis is trained at, as far as the plate allows."""
-    ends = np.log(THICKNESS_RANGE) * 0.5 * np.cos(np.pi * (np.arange(TRAINED_THICKNESSES) + 0.5) / TRAINED_THICKNESSES)
+def _thicknesses(nominal: DimpleGeometry, refinement: float) -> tuple[FiniteElementModel, ...]:
+    """Models of thicknesses that a basis may be trained at, as far as the plate allows."""
+    ends = np.log(THICKNESS_RANGE) * np.linspace(-0.5, 0.5, 2 * TRAINED_THICKNESSES + 1)
     most = nominal.plate_thickness - nominal.roof_axial
     thicknesses = sorted({min(float(nominal.apex_thickness * np.exp(e)), most) for e in ends})
     return tuple(model_of_geometry(nominal.replace(apex_thickness=h), refinement) for h in thicknesses)
