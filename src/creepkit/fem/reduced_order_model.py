@@ -18,7 +18,7 @@ from creepkit.arrays import Floats, Ints, frozen
 from creepkit.core import CoreStructure, address
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
-from creepkit.fem.solver import SensitivityDirections
+from creepkit.fem.solvable_model import SensitivityDirections
 
 BLOCK = 8
 """Modes and points are kept in blocks of so many."""

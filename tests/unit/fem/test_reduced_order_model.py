@@ -20,7 +20,7 @@ from creepkit.laws.norton import NORTON
 from creepkit.records import Program, Status
 from creepkit.specimens.reduced_order_training import power_law_runs, trained_basis
 from helpers.fem_cases import FREE, STILL, block, course, left_of, lowered, mesh_of
-from helpers.literature_laws import RATE, damage, law, number, omega
+from helpers.literature_laws import RATE, damage, number, omega
 
 TIGHT = SolverSettings(newton=1e-12, **FREE)
 A, B, n, k, c = parameters("A B n k c")

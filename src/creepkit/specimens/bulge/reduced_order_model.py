@@ -18,17 +18,12 @@ from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.reduced_order_model import ReducedOrderModel
 from creepkit.fem.simulation import simulate
-from creepkit.records import PROGRAM_NUISANCES, History, NuisanceValues, Prediction, Predictor
-from creepkit.specimens.bulge.finite_elements import (
-    BulgeSetup,
-    model_of_geometry,
-    model_of_specimen,
-    predict_bulge,
-    solver_settings,
-)
+from creepkit.records import PROGRAM_NUISANCES, History, NuisanceValues, Prediction, Predictor, SupportsRefinement
+from creepkit.specimens.bulge.finite_elements import predict_bulge, solver_settings
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import OBSERVED
 from creepkit.specimens.bulge.settings import BulgeSettings
+from creepkit.specimens.bulge.setup import BulgeSetup, model_of_geometry, model_of_specimen
 from creepkit.specimens.reduced_order_training import MODES, RAMP, power_law_runs, trained_basis
 
 if TYPE_CHECKING:
@@ -56,7 +51,8 @@ LENGTH_STEP = 1.05
 class BulgeReducedOrderModel:
     """A bulge specimen in a reduced-order model; same outputs, nuisances and errors, and derivatives to all of them.
 
-    Trained at the first prediction, in some seconds of CPU for each dimple. modes, points : of the model; None for as many as the mesh needs.
+    Trained at the first prediction, in some seconds of CPU for each dimple, and kept on disk. modes, points : of the
+    model; None for as many points as the mesh needs.
     """
 
     specimen: BulgeSettings
@@ -118,9 +114,8 @@ class BulgeReducedOrderModel:
 
     def refined(self) -> Predictor:
         """What it stands for: the specimen itself on its finer discretisation."""
-        from creepkit.specimens.bulge.specimen import Bulge
-
-        assert isinstance(self.specimen, Bulge)
+        if not isinstance(self.specimen, SupportsRefinement):
+            raise SolveError("the specimen of this reduced-order model has no finer discretisation")
         return self.specimen.refined()
 
 

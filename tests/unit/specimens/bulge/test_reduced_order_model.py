@@ -18,9 +18,10 @@ from creepkit.language import Elastic, parameters, principal_stress, strain, str
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.norton import NORTON
 from creepkit.records import History, PressureJump, Status
-from creepkit.specimens.bulge.finite_elements import set_up_test, solver_settings
+from creepkit.specimens.bulge.finite_elements import solver_settings
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel, nominal_geometry
+from creepkit.specimens.bulge.setup import set_up_test
 from creepkit.specimens.bulge.specimen import Bulge
 from helpers.fem_cases import lowered
 from helpers.literature_laws import RATE, damage, law, number, omega
