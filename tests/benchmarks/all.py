@@ -37,6 +37,7 @@ class Benchmark:
 DATA = "measured data in ../shared/data"
 BENCHMARKS = {
     "import_time": Benchmark(0.1),
+    "core_speed": Benchmark(2),
     "kernel_speed": Benchmark(1, ((), ("1000",))),
     "kernel_start": Benchmark(1),
     "uniaxial_speed": Benchmark(1),

@@ -2,30 +2,7 @@
 #include "../finite_element_sensitivities.hpp"
 #include "../finite_elements.hpp"
 #include "../lane_functions.hpp"
-#include "../sensitivities.hpp"
-#include "../time_integration.hpp"
-
-namespace creepkit {
-namespace {
-
-template <class Sensitivities>
-Termination integrate(FiniteElements& system, const PointLaw& law, const SimulationInput& input,
-                      const SolverSettings& settings, StepRecord& record, Sensitivities& sensitivities,
-                      Workspace& memory) {
-    TimeIntegration<FiniteElements, Sensitivities> integration(system, law, input, settings, record, sensitivities);
-    const auto take = [&] {
-        system.take(memory);
-        integration.take(memory);
-        if constexpr (!__is_same(Sensitivities, NoSensitivities)) sensitivities.take(memory, system, law);
-    };
-    take();
-    if (!memory.allocate()) return {0, OUT_OF_MEMORY, 0.0};
-    take();
-    return integration.run();
-}
-
-}  // namespace
-}  // namespace creepkit
+#include "../run_simulation.hpp"
 
 // Simulate a body under its load history, with sensitivities unless `directions` is null.
 extern "C" void LANE_FUNCTION(creepkit_simulate)(
@@ -33,16 +10,8 @@ extern "C" void LANE_FUNCTION(creepkit_simulate)(
     const creepkit::SolverSettings* settings, creepkit::StepRecord* record,
     const creepkit::SensitivityDirections* directions, creepkit::SensitivityRecord* derivatives,
     creepkit::Termination* ended) {
-    using namespace creepkit;
-    Workspace memory;
-    FiniteElements system(*model);
-    if (directions) {
-        StageSensitivities<FiniteElements> sensitivities(*law, *directions, *derivatives);
-        *ended = integrate(system, *law, *input, *settings, *record, sensitivities, memory);
-    } else {
-        NoSensitivities none;
-        *ended = integrate(system, *law, *input, *settings, *record, none, memory);
-    }
+    creepkit::FiniteElements system(*model);
+    *ended = creepkit::simulate(system, *law, *input, *settings, *record, directions, derivatives);
 }
 
 // Out-of-balance forces (size,) and, unless null, the tangent made symmetric (size, size), of given displacements.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from creepkit.arrays import Floats, Ints
 from creepkit.core import CoreStructure, address
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import Mesh, discretize
+
+if TYPE_CHECKING:
+    from creepkit.fem.solver import SensitivityDirections
 
 TILE = 8
 """Side of the tiles in which the core keeps banded matrices."""
@@ -41,10 +44,44 @@ class FiniteElementModel:
     pressed: Ints
     top: Ints
 
+    entry: ClassVar[str] = "creepkit_simulate"
+    """The function of the core that simulates it."""
+
     @cached_property
     def compiled(self) -> CompiledModel:
         """The model as the core reads it; made once."""
         return CompiledModel(self)
+
+    @property
+    def displacement_count(self) -> int:
+        """Numbers of a state of displacement."""
+        return self.equations.size
+
+    @property
+    def point_count(self) -> int:
+        """Points whose state is kept."""
+        return self.weights.size
+
+    @property
+    def observed_count(self) -> int:
+        """Nodes of the observed surface."""
+        return self.top.size
+
+    def held_motion(self, pattern: Floats | None) -> Floats:
+        """(2 nodes,) mm of displacement of the held nodes for a unit of motion; pattern : (nodes, 2), None for none."""
+        return np.zeros(self.equations.size) if pattern is None else np.ravel(pattern)
+
+    def displacements(self, coordinates: Floats) -> Floats:
+        """(steps, nodes, 2) mm, from what the core keeps of each step, (steps, displacement_count)."""
+        return coordinates.reshape(len(coordinates), -1, 2)
+
+    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]:
+        """Velocity gradients and hoop strains of all points, the copy's included, and velocities of the nodes."""
+        padded = self.compiled.padded
+        gradients, hoops = (
+            np.array([padded(a) for a in values]) for values in (directions.gradients, directions.hoops)
+        )
+        return gradients, hoops, directions.velocities
 
     def __getstate__(self) -> dict[str, object]:
         """All but the addresses for the core, which another process makes for itself."""

@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
+from creepkit.errors import SolveError
 from creepkit.fem import solver
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.mesh import GeometryDerivative
-from creepkit.fem.solver import LoadProgram, SensitivityDirections, SolverSettings
+from creepkit.fem.solver import LoadProgram, SensitivityDirections, SolvableModel, SolverSettings
 from creepkit.fem.time_interpolation import TimeInterpolation
 from creepkit.integration.time_discretisation import merge_programs
 from creepkit.kernels.interface import CompiledLaw
@@ -135,7 +136,7 @@ def sensitivity_directions(
 def simulate(
     law: CompiledLaw,
     theta: Floats,
-    model: FiniteElementModel,
+    model: SolvableModel,
     load_history: LoadHistory,
     *,
     settings: SolverSettings | None = None,
@@ -150,9 +151,13 @@ def simulate(
     directions : differentiate the accepted steps to the law's parameters and to these (`sensitivity_directions`).
     """
     theta = np.ascontiguousarray(theta, dtype=float)
+    if theta.shape != (len(law.names),):
+        raise SolveError(
+            f"theta has the shape {theta.shape}, but the law needs {len(law.names)} numbers: {', '.join(law.names)}"
+        )
     beta = float(np.asarray(law.leading_exponent(theta))) if same_steps_as is None else same_steps_as.beta
     script = np.zeros((0, 2)) if same_steps_as is None else same_steps_as.positions
-    pattern = np.zeros(model.equations.size) if load_history.pattern is None else np.ravel(load_history.pattern)
+    pattern = model.held_motion(load_history.pattern)
     segments = load_history.segments
     record = solver.solve(
         law, theta, model, LoadProgram(beta, load_history.poisson, segments, pattern, script),
@@ -163,7 +168,7 @@ def simulate(
         derivatives = SurfaceSensitivities(record.surface, record.moments)
     return Simulation(
         times=record.times,
-        displacements=record.displacements.reshape(record.times.size, -1, 2),
+        displacements=model.displacements(record.displacements),
         mises=record.mises,
         values=record.values,
         status=_STATUS.get(record.code, Status.NOT_CONVERGED),

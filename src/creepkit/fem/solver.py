@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.core import CoreStructure, address, function
 from creepkit.errors import SolveError
-from creepkit.fem.finite_element_model import FiniteElementModel
-from creepkit.kernels.interface import CompiledLaw
+from creepkit.kernels.interface import CompiledLaw, Entry
+
+if TYPE_CHECKING:
+    from creepkit.fem.finite_element_model import FiniteElementModel
 
 (
     REACHED_END, DEFLECTION_LIMIT, STRAIN_LIMIT, STATE_LIMIT, LIMIT_LOAD, LOST_CONVERGENCE, TOO_MANY_STEPS, LAW_FAILED,
@@ -89,10 +91,35 @@ class SensitivityDirections:
     velocities: Floats
 
 
+class CompiledArrays(Protocol):
+    """A model in the order of the core; structure : for calls of it."""
+
+    @property
+    def structure(self) -> CoreStructure: ...  # noqa: D102
+
+
+class SolvableModel(Protocol):
+    """What can be simulated: a FiniteElementModel, or a ReducedOrderModel of one; see there."""
+
+    entry: ClassVar[str]
+
+    @property
+    def compiled(self) -> CompiledArrays: ...  # noqa: D102
+    @property
+    def displacement_count(self) -> int: ...  # noqa: D102
+    @property
+    def point_count(self) -> int: ...  # noqa: D102
+    @property
+    def observed_count(self) -> int: ...  # noqa: D102
+    def held_motion(self, pattern: Floats | None) -> Floats: ...  # noqa: D102
+    def displacements(self, coordinates: Floats) -> Floats: ...  # noqa: D102
+    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]: ...  # noqa: D102
+
+
 def solve(
     law: CompiledLaw,
     theta: Floats,
-    model: FiniteElementModel,
+    model: SolvableModel,
     program: LoadProgram,
     settings: SolverSettings,
     *,
@@ -103,14 +130,12 @@ def solve(
     theta = _contiguous(theta)
     if law.states > MAX_STATES:
         raise SolveError(f"the law has {law.states} internal variables; finite elements take up to {MAX_STATES}")
-    if theta.shape != (len(law.names),):
-        raise SolveError(f"theta has the shape {theta.shape}; expected ({len(law.names)},)")
-    compiled, segments = model.compiled, _contiguous(program.segments)
-    rows, points = settings.max_steps + len(segments) + 2, 4 * len(model.elements)
+    segments = _contiguous(program.segments)
+    rows, points = settings.max_steps + len(segments) + 2, model.point_count
     initial, limits, script = (_contiguous(a) for a in (law.initial, law.limits, program.script))
     times, positions, counts = np.zeros(rows), np.zeros((rows, 2)), np.zeros(4, np.int64)
     numbers = np.zeros(rows, np.int64)
-    displacements = np.zeros((rows, model.equations.size))
+    displacements = np.zeros((rows, model.displacement_count))
     values = np.zeros((rows, points, 4 + law.states)) if keep_points else None
     mises = np.zeros((rows, points))
     pattern = _contiguous(program.pattern)
@@ -118,7 +143,7 @@ def solve(
         rows, address(times), address(numbers), address(displacements), _optional(values), address(mises),
         address(positions), address(counts), points,
     )  # fmt: skip
-    entries = _Law(law.update.address, law.sensitivity.address, address(theta), theta.size, law.states)
+    entries = _Law(*_entry_addresses(law), address(theta), theta.size, law.states)
     given = _Input(
         program.beta, program.poisson, len(segments), address(segments), address(pattern), address(initial),
         address(limits), len(script), address(script), None,
@@ -127,22 +152,15 @@ def solve(
     along = derivatives = None
     kept: tuple[Floats, ...] = ()
     if directions is not None:
-        kept = (
-            _contiguous(directions.segments),
-            *(
-                np.ascontiguousarray([compiled.padded(a) for a in values])
-                for values in (directions.gradients, directions.hoops)
-            ),
-            _contiguous(directions.velocities),
-        )
+        kept = tuple(map(_contiguous, (directions.segments, *model.core_directions(directions))))
         columns = theta.size + len(directions.segments) + len(directions.velocities)
-        surface = np.zeros((rows, len(model.top), columns))
+        surface = np.zeros((rows, model.observed_count, columns))
         moments = np.zeros((rows, len(directions.segments)))
         along = _Directions(len(directions.segments), len(directions.velocities), *map(address, kept))
         derivatives = _Derivatives(address(surface), address(moments))
     ended = _Termination()
-    function("creepkit_simulate", None)(
-        *(ctypes.byref(s) for s in (compiled.structure, entries, given, _Settings(*settings), record)),
+    function(model.entry, None)(
+        *(ctypes.byref(s) for s in (model.compiled.structure, entries, given, _Settings(*settings), record)),
         None if along is None else ctypes.byref(along),
         None if derivatives is None else ctypes.byref(derivatives),
         ctypes.byref(ended),
@@ -169,7 +187,7 @@ def assemble(
     history = np.zeros((4 * model.compiled.elements, 4 + law.states))
     history[:, 4:] = law.initial
     residual, tangent = np.zeros(model.size), np.zeros((model.size, model.size))
-    entries = _Law(law.update.address, law.sensitivity.address, address(theta), theta.size, law.states)
+    entries = _Law(*_entry_addresses(law), address(theta), theta.size, law.states)
     flag = function("creepkit_assemble")(
         ctypes.byref(model.compiled.structure), ctypes.byref(entries), ctypes.byref(_Stage(*stage)),
         *map(address, (history, displacement, residual, tangent)),
@@ -208,6 +226,16 @@ class LoadProgram(NamedTuple):
     segments: Floats
     pattern: Floats
     script: Floats
+
+
+def _entry_addresses(law: CompiledLaw) -> tuple[int, int]:
+    """Addresses of the entries that the core calls; SolveError for what is no entry of a compiled law."""
+    for entry in (law.update, law.sensitivity):
+        if not isinstance(entry, Entry) or not entry.address:
+            raise SolveError(
+                f"a compiled law has {entry!r} for an entry, which is no compiled function of this package"
+            )
+    return law.update.address, law.sensitivity.address
 
 
 def _contiguous(values: Floats) -> Floats:

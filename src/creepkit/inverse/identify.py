@@ -18,6 +18,7 @@ from creepkit.inverse.composite_predictor import (
     predictors_for_law,
     reduced_order_model_of,
     refined_of,
+    search_predictor_of,
 )
 from creepkit.inverse.defect_correction import (
     NumericalError,
@@ -179,7 +180,7 @@ def _global_search(
     """The best minima that differ, by the reduced-order model of the cheapest predictor."""
     predictor = through or problem.predictor
     reduced_order_model = reduced_order_model_of(predictor)
-    searched = search_problem(problem, reduced_order_model or predictor)
+    searched = search_problem(problem, search_predictor_of(reduced_order_model or predictor))
     search_result = search.minima(searched, progress)
     distinct_minima = distinct(
         search_result.minima,

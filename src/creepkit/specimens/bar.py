@@ -34,6 +34,10 @@ STEPS_PER_BREAKPOINT = 20
 """Each straight piece of a program takes some 7 steps of its own; a logged temperature has thousands of pieces."""
 
 
+SEARCH_TOLERANCE = 1e-3
+"""Tolerance of the integration in a global search; creep of bars scatters by a thousand times as much."""
+
+
 NUISANCES = ("temperature", "modulus")
 
 
@@ -69,6 +73,10 @@ class Bar:
     def replace(self, **changes: float) -> Self:
         """The same specimen with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
+
+    def for_search(self) -> Self:
+        """The bar at the tolerance of a global search, at which strains err by some 1e-4 of themselves."""
+        return self.replace(tolerance=max(self.tolerance, SEARCH_TOLERANCE))
 
     # ---- of each kind of bar --------------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import chi2, multivariate_t, norm, qmc
 
 from creepkit.arrays import Floats
-from creepkit.inverse.composite_predictor import reduced_order_model_of
+from creepkit.inverse.composite_predictor import reduced_order_model_of, search_predictor_of
 from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.posterior import Posterior
@@ -41,6 +41,10 @@ LEAST_EFFECTIVE_SIZE = 40.0
 """Effective number of samples below which they say nothing."""
 
 
+ENOUGH_EFFECTIVE_SIZE = 250.0
+"""Effective number of samples above which no further round is drawn."""
+
+
 UNCERTAIN_VERDICTS = ("at its bound", "not determined")
 
 
@@ -57,7 +61,7 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
     problem = fit.least_squares_problem
     cheaper = cheaper or reduced_order_model_of(problem.predictor)
     if cheaper is not None:
-        problem = with_cheaper_predictor(problem, fit.x, cheaper)
+        problem = with_cheaper_predictor(problem, fit.x, search_predictor_of(cheaper))
     samples = posterior_samples(replace(fit, problem=problem))
     if samples is None:
         note = (
@@ -91,6 +95,8 @@ def posterior_samples(fit: Identification, seed: int | None = None) -> Floats | 
         deviation = points - centre
         shape = (weights[:, None] * deviation).T @ deviation
         shape += 1e-6 * np.diag(np.diag(fit.covariance))
+        if 1.0 / float((weights**2).sum()) >= ENOUGH_EFFECTIVE_SIZE:
+            break
     if 1.0 / float((weights**2).sum()) < LEAST_EFFECTIVE_SIZE:
         return None
     positions = (np.arange(SAMPLES) + 0.5) / SAMPLES

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -19,7 +19,7 @@ from creepkit.errors import SolveError, nearest
 from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
 from creepkit.fem.mesh import GeometryDerivative, geometry_derivative
 from creepkit.fem.simulation import LoadHistory, Simulation, SurfaceSensitivities, sensitivity_directions, simulate
-from creepkit.fem.solver import SensitivityDirections, SolverSettings
+from creepkit.fem.solver import SensitivityDirections, SolvableModel, SolverSettings
 from creepkit.records import (
     PROGRAM_NUISANCES,
     History,
@@ -89,7 +89,7 @@ def set_up_test(specimen: BulgeSettings, history: History, nuisances: Mapping[st
     temperature = history.temperature_program()
     temperature = Program(temperature.times, temperature.values + nuisances.get("temperature", 0.0))
     modulus = modulus_program(history.elastic, temperature, 1.0 + nuisances.get("modulus", 0.0), where)
-    model = model_of_geometry(geometry, specimen.refinement) if specimen.mesh is None else _model_of_mesh(specimen)
+    model = model_of_specimen(specimen, geometry)
     poisson = float(history.elastic.at(float(temperature.values[0])).nu)
     load_history = LoadHistory(pressure, temperature, modulus, float(history.times[-1]), poisson)
     return BulgeSetup(model, load_history, geometry, operator, specimen.refinement if specimen.mesh is None else None)
@@ -108,6 +108,13 @@ def modulus_program(elastic: Elastic, temperature: Program, factor: float, where
 def model_of_geometry(geometry: DimpleGeometry, refinement: float) -> FiniteElementModel:
     """The finite element model of a dimple; kept, for a fit needs it a thousand times."""
     return finite_element_model(geometry.mesh(refinement))
+
+
+def model_of_specimen(specimen: BulgeSettings, geometry: DimpleGeometry | None = None) -> FiniteElementModel:
+    """The finite element model of a specimen's mesh, or of its geometry or another one in its place."""
+    if specimen.mesh is not None:
+        return _model_of_mesh(specimen)
+    return model_of_geometry(geometry or specimen.geometry, specimen.refinement)
 
 
 @lru_cache(maxsize=16)
@@ -332,21 +339,30 @@ def predict_bulge(
     histories: Sequence[History],
     nuisances: NuisanceValues,
     sensitivities: bool,
+    model_of: Callable[[BulgeSetup], SolvableModel] | None = None,
+    settings: SolverSettings | None = None,
 ) -> Prediction:
     """Predict every candidate in every test; see records.Predictor.
 
-    theta : (candidates, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}.
+    theta : (candidates, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}. model_of : the model
+    of a test that is simulated in the place of its finite elements, such as a reduced-order model. settings : of the
+    solver, by default those of the specimen.
     """
     known = (*specimen.nuisances, *PROGRAM_NUISANCES)
     check_nuisances([kind_and_start(key)[0] for key in nuisances], known, "a bulge specimen")
     kernel = kernels.lower(law, "numba")
     theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
     tasks = list(product(range(len(theta)), range(len(histories))))
+    settings = settings or solver_settings(specimen, exact=sensitivities)
+    tests: dict[tuple[float, ...], PreparedTest] = {}
 
     def run(task: tuple[int, int]) -> BulgeResponse:
         c, k = task
-        nuisance_values = {kind: float(value[c, k]) for kind, value in nuisances.items()}
-        return simulate_and_observe(specimen, kernel, theta[c], histories[k], nuisance_values, sensitivities)
+        values = {kind: float(value[c, k]) for kind, value in nuisances.items()}
+        key = (k, *values.values())
+        if key not in tests:  # candidates that differ in the law alone share it
+            tests[key] = PreparedTest.of(specimen, histories[k], values, sensitivities, model_of)
+        return tests[key].simulate_and_observe(kernel, theta[c], settings)
 
     workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
     if workers > 1:
@@ -358,42 +374,59 @@ def predict_bulge(
     return assemble_prediction(parts, histories, OBSERVED, len(theta))
 
 
-def simulate_and_observe(
-    specimen: BulgeSettings,
-    kernel: CompiledLaw,
-    theta: Floats,
-    history: History,
-    nuisances: Mapping[str, float],
-    jacobian: bool,
-) -> BulgeResponse:
-    """Simulate one test and observe it at the times of its history; theta : (parameters,) internal values."""
-    test_setup = set_up_test(specimen, history, nuisances)
-    settings = solver_settings(specimen, exact=jacobian)
-    names, directions = tuple(nuisances), None
-    if jacobian:
-        programs = program_directions(specimen, history, nuisances)
-        directions = sensitivity_directions_of(test_setup, history, names, programs)
-    simulation = simulate(
-        kernel, theta, test_setup.model, test_setup.load_history, settings=settings, directions=directions
-    )
-    profiles = simulation.displacements[:, test_setup.model.top, 1]
-    sensitivities = None
-    if directions is not None:
-        outputs, sensitivities = output_sensitivities(
-            test_setup, theta, history, simulation, profiles, names, directions
+@dataclass(frozen=True, eq=False)
+class PreparedTest:
+    """One test with its nuisances, ready to be simulated by any law.
+
+    model : what is simulated. names, directions : the nuisances, and what is differentiated to; None for nothing.
+    """
+
+    setup: BulgeSetup
+    history: History
+    model: SolvableModel
+    names: tuple[str, ...]
+    directions: SensitivityDirections | None
+
+    @classmethod
+    def of(
+        cls,
+        specimen: BulgeSettings,
+        history: History,
+        nuisances: Mapping[str, float],
+        jacobian: bool,
+        model_of: Callable[[BulgeSetup], SolvableModel] | None = None,
+    ) -> PreparedTest:
+        """Set one test up; jacobian : for a simulation with its sensitivities."""
+        setup = set_up_test(specimen, history, nuisances)
+        model = setup.model if model_of is None else model_of(setup)
+        names, directions = tuple(nuisances), None
+        if jacobian:
+            programs = program_directions(specimen, history, nuisances)
+            directions = sensitivity_directions_of(setup, history, names, programs)
+        return cls(setup, history, model, names, directions)
+
+    def simulate_and_observe(self, kernel: CompiledLaw, theta: Floats, settings: SolverSettings) -> BulgeResponse:
+        """Simulate the test and observe it at the times of its history; theta : (parameters,) internal values."""
+        setup, times = self.setup, self.history.times
+        simulation = simulate(
+            kernel, theta, self.model, setup.load_history, settings=settings, directions=self.directions
         )
-    else:
-        outputs = test_setup.observation.observe_at_times(
-            test_setup.radii, profiles, simulation.timeline, history.times
-        )
-    return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
+        profiles = simulation.displacements[:, setup.model.top, 1]
+        sensitivities = None
+        if self.directions is not None:
+            outputs, sensitivities = output_sensitivities(
+                setup, theta, self.history, simulation, profiles, self.names, self.directions
+            )
+        else:
+            outputs = setup.observation.observe_at_times(setup.radii, profiles, simulation.timeline, times)
+        return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
 
 
 def solver_settings(specimen: BulgeSettings, *, exact: bool = False) -> SolverSettings:
-    """The solver's settings; exact : equilibrium so tight that derivatives are those of the scheme."""
+    """The solver's settings; exact : equilibrium so tight that derivatives err by 1e-5 to 1e-3 of their largest."""
     return SolverSettings(
         tolerance=specimen.tolerance,
-        newton=1e-7 if exact else 1e-2 * specimen.tolerance,
+        newton=1e-6 if exact else 1e-2 * specimen.tolerance,
         deflection_limit=specimen.deflection_limit,
         strain_limit=specimen.strain_limit,
         max_steps=int(specimen.max_steps),

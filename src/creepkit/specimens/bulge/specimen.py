@@ -57,8 +57,8 @@ class Bulge(BulgeSettings):
         return run_bulge(self, law, values, plan)
 
     def reduced_order_model(self) -> Predictor:
-        """The model of one degree of freedom, for global searches."""
-        from creepkit.specimens.bulge.reduced_order.predictor import BulgeReducedOrderModel
+        """The same finite elements in few modes and points, for global searches."""
+        from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
 
         return BulgeReducedOrderModel(self)
 

@@ -1,0 +1,252 @@
+// A reduced-order model of an axisymmetric body: displacements as a sum of modes, integrals over few weighted points.
+//
+// The displacement of the mesh is Phi q with r modes Phi from a proper orthogonal decomposition of finite element
+// solutions (Sirovich 1987, Quart. Appl. Math. 45, 561), and the balance of forces is that of finite elements in the
+// space of the modes (Galerkin). Its integrals run over some of the points with other weights (energy-conserving
+// sampling and weighting: Farhat, Avery, Chapman and Cortial 2014, Int. J. Numer. Meth. Engng 98, 625). A point has the
+// law, the history and the stress of a point of a finite element.
+//
+// R is r in whole vectors of eight numbers; what is added to r modes or to the points is zero or without weight.
+#pragma once
+
+#include "banded_matrix.hpp"
+#include "material_point.hpp"
+#include "workspace.hpp"
+
+namespace creepkit {
+
+// The model as Python prepares it for one mesh; lengths in mm, q in mm too where modes have no unit.
+struct ReducedOrderModel {
+    int64_t modes;                // r
+    int64_t points;               // a multiple of eight
+    int64_t side_points;          // Gauss points of the sides under pressure
+    int64_t observed;             // nodes of the observed surface
+    int64_t measured;             // displacements that errors are measured by; a multiple of eight
+    const double* gradients;      // (points, 5, R) of F11, F12, F21, F22, F33 to q, 1/mm
+    const double* points_first;   // (points/8, r, 5, 8) the same
+    const double* weights;        // (points,) area times radius, mm^3
+    const double* sides;          // (side points, 4) Gauss weight; at rest r, dr/dx, dz/dx, mm, x in [-1, 1] on a side
+    const double* side_modes;     // (side points, 4, R) of u_r, u_z, du_r/dx, du_z/dx to q
+    const double* surface;        // (observed, R) u_z of the observed nodes to q
+    const double* measures;       // (r, measured) displacements to q
+};
+
+class ReducedOrderSensitivities;
+
+// Tile (8 x 8, by columns) += the sum over rows k of column_k row_k^T, whose numbers lie `stride` apart from row to row.
+CREEPKIT_INLINE void add_products(double* tile, const double* columns, const double* rows, int64_t stride,
+                                  int64_t count) {
+    Eight sums[EIGHT];
+#pragma GCC unroll 8
+    for (int q = 0; q < EIGHT; ++q) sums[q] = load(tile + EIGHT * q);
+    for (int64_t k = 0; k < count; ++k) {
+        const Eight column = load(columns + stride * k);
+#pragma GCC unroll 8
+        for (int q = 0; q < EIGHT; ++q) sums[q] += rows[stride * k + q] * column;
+    }
+#pragma GCC unroll 8
+    for (int q = 0; q < EIGHT; ++q) store(tile + EIGHT * q, sums[q]);
+}
+
+// A Gauss point of a side under pressure: its radius and its slopes in the deformed state, mm.
+struct SidePoint {
+    double radius, dr, dz;
+};
+
+// What `FiniteElements` is for a mesh; see time_integration.hpp.
+class ReducedOrderSystem {
+public:
+    using SensitivityMemory = ReducedOrderSensitivities;
+
+    explicit ReducedOrderSystem(const ReducedOrderModel& model)
+        : model(model), shape(BandShape::of(model.modes, model.modes - 1)),
+          width((model.modes + EIGHT - 1) / EIGHT * EIGHT) {}
+
+    const ReducedOrderModel& model;
+    const BandShape shape;  // the whole matrix is the band
+    const int64_t width;    // R
+    double *tangent = nullptr, *residual = nullptr;  // lower triangle in tiles; (shape.rows(),)
+
+    void take(Workspace& memory) {
+        tangent = memory.doubles(shape.numbers() + 1);
+        residual = memory.doubles(shape.rows());
+        products = memory.doubles(5 * EIGHT * width);
+        side_columns = memory.doubles(4 * model.side_points * width);
+        side_rows = memory.doubles(4 * model.side_points * width);
+    }
+
+    int64_t point_count() const { return model.points; }
+    int64_t displacement_count() const { return width; }
+    int64_t observed_count() const { return model.observed; }
+    Eight weights(int64_t block) const { return load(model.weights + EIGHT * block); }
+
+    // Deformation gradient of eight points.
+    CREEPKIT_INLINE void deform(int64_t block, const double* q, Kinematics& at) const {
+        const double* by_mode = model.points_first + block * model.modes * 5 * EIGHT;
+        at.f11 = at.f22 = at.f33 = Eight(1.0);
+        at.f12 = at.f21 = Eight(0.0);
+        for (int64_t i = 0; i < model.modes; ++i) {
+            const double* at_mode = by_mode + 5 * EIGHT * i;
+            at.f11 += q[i] * load(at_mode);
+            at.f12 += q[i] * load(at_mode + EIGHT);
+            at.f21 += q[i] * load(at_mode + 2 * EIGHT);
+            at.f22 += q[i] * load(at_mode + 3 * EIGHT);
+            at.f33 += q[i] * load(at_mode + 4 * EIGHT);
+        }
+    }
+
+    // Out-of-balance forces into `residual`; if STIFF the tangent, made symmetric, into `tangent`.
+    template <bool STIFF>
+    PointFlag assemble(const PointLaw& law, const StageConditions& stage, const double* q, PointStates& points,
+                       double tolerance) {
+        clear();
+        if (STIFF) memset(tangent, 0, sizeof(double) * size_t(shape.numbers() + 1));
+        alignas(64) double A[25][EIGHT];
+        for (int64_t block = 0; block < model.points / EIGHT; ++block) {
+            Kinematics at;
+            deform(block, q, at);
+            Eight stress[5], moduli[25];
+            const PointFlag flag =
+                update_points<STIFF>(law, stage, points, EIGHT * block, at, tolerance, stress, moduli);
+            if (flag != POINTS_SOLVED) return flag;
+            const Eight weight = weights(block);
+            add_forces(block, stress, weight);
+            if (!STIFF) continue;
+            for (int i = 0; i < 25; ++i) store(A[i], moduli[i] * weight);
+            tangent_products(block, A, products);
+            for (int64_t column = 0; column < shape.blocks; ++column)
+                for (int64_t row = column; row < shape.blocks; ++row)
+                    add_products(tangent + (column * shape.diagonals + row - column) * TILE,
+                                 model.gradients + block * EIGHT * 5 * width + EIGHT * row, products + EIGHT * column,
+                                 width, 5 * EIGHT);
+        }
+        press<STIFF>(stage.pressure, q);
+        return POINTS_SOLVED;
+    }
+
+    // Out-of-balance forces of a change of all creep strains by the sum of weights_i slopes_i, into `residual`.
+    void error_forces(const double* q, const PointStates& points, const double weights[STAGES]) {
+        clear();
+        const int64_t stride = points.values * points.count;
+        for (int64_t block = 0; block < model.points / EIGHT; ++block) {
+            Kinematics at;
+            deform(block, q, at);
+            if (!set_strains(at)) continue;  // never: the stage has just converged here
+            const int64_t k = EIGHT * block;
+            Eight change[3], stress[5];
+            for (int v = 0; v < CREEP_COMPONENTS; ++v)
+                change[v] = weights[0] * load(points.slopes + v * points.count + k) +
+                            weights[1] * load(points.slopes + stride + v * points.count + k);
+            stress_of_creep_change(points, k, at, change, stress);
+            add_forces(block, stress, load(model.weights + k));
+        }
+    }
+
+    bool factorize() { return factorize_symmetric(shape, tangent); }
+    void solve() { solve_symmetric(shape, tangent, residual); }
+
+    // Largest displacement, mm, that the numbers in `residual` stand for; NaN or infinite where one is.
+    double largest_correction() const { return largest_displacement(residual); }
+
+    // q less `factor` times the correction in `residual`.
+    void correct(double* q, double factor) const {
+        for (int64_t i = 0; i < model.modes; ++i) q[i] -= factor * residual[i];
+    }
+
+    // Largest of the measured displacements, mm; NaN or infinite where one is.
+    double largest_displacement(const double* q) const {
+        Eight worst(0.0), unusual(0.0);
+        for (int64_t k = 0; k < model.measured; k += EIGHT) {
+            Eight value(0.0);
+            for (int64_t i = 0; i < model.modes; ++i) value += q[i] * load(model.measures + i * model.measured + k);
+            worst = larger(worst, magnitude(value));
+            unusual += value - value;  // 0, or NaN where a value is NaN or infinite
+        }
+        double result = 0.0;
+        for (int lane = 0; lane < EIGHT; ++lane) result = fmax(result, worst[lane]);
+        return result + sum(unusual);
+    }
+
+    // Held nodes do not move: all modes are zero there.
+    void prescribe(const double*, double, double*) const {}
+
+    SidePoint side_point(int64_t k, const double* q) const {
+        const double *rest = model.sides + 4 * k, *modes = model.side_modes + 4 * k * width;
+        Eight radius(0.0), dr(0.0), dz(0.0);
+        for (int64_t i = 0; i < width; i += EIGHT) {
+            const Eight part = load(q + i);
+            radius += part * load(modes + i);
+            dr += part * load(modes + 2 * width + i);
+            dz += part * load(modes + 3 * width + i);
+        }
+        return {rest[1] + sum(radius), rest[2] + sum(dr), rest[3] + sum(dz)};
+    }
+
+    // Tangent times gradients of eight points, (8, 5, R), from A (25, 8), which carries the weights.
+    CREEPKIT_INLINE void tangent_products(int64_t block, const double A[25][EIGHT], double* result) const {
+        const double* gradients = model.gradients + block * EIGHT * 5 * width;
+        for (int64_t i = 0; i < width; i += EIGHT)
+            for (int lane = 0; lane < EIGHT; ++lane) {
+                const double* G = gradients + lane * 5 * width + i;
+                Eight g[5];
+                for (int t = 0; t < 5; ++t) g[t] = load(G + t * width);
+                for (int s = 0; s < 5; ++s)
+                    store(result + (lane * 5 + s) * width + i,
+                          A[5 * s][lane] * g[0] + A[5 * s + 1][lane] * g[1] + A[5 * s + 2][lane] * g[2] +
+                              A[5 * s + 3][lane] * g[3] + A[5 * s + 4][lane] * g[4]);
+            }
+    }
+
+private:
+    double *products = nullptr, *side_columns = nullptr, *side_rows = nullptr;  // (8, 5, R); (side points, 4, R) each
+
+    void clear() { memset(residual, 0, sizeof(double) * size_t(shape.rows())); }
+
+    CREEPKIT_INLINE void add_forces(int64_t block, const Eight stress[5], const Eight& weight) {
+        alignas(64) double P[5][EIGHT];
+        for (int i = 0; i < 5; ++i) store(P[i], stress[i] * weight);
+        const double* gradients = model.gradients + block * EIGHT * 5 * width;
+        for (int64_t i = 0; i < width; i += EIGHT) {
+            Eight total = load(residual + i);
+            for (int lane = 0; lane < EIGHT; ++lane)
+                for (int s = 0; s < 5; ++s) total += P[s][lane] * load(gradients + (lane * 5 + s) * width + i);
+            store(residual + i, total);
+        }
+    }
+
+    // Take the pressure's force off the internal one, and its stiffness (made symmetric) off the tangent.
+    //
+    // A unit pressure pushes with the integral of (-dz/dx, dr/dx) r N dx, see pressure.hpp.
+    template <bool STIFF>
+    void press(double pressure, const double* q) {
+        if (pressure == 0.0) return;
+        for (int64_t k = 0; k < model.side_points; ++k) {
+            const SidePoint at = side_point(k, q);
+            const double weight = pressure * model.sides[4 * k], *modes = model.side_modes + 4 * k * width;
+            double *columns = side_columns + 4 * k * width, *rows = side_rows + 4 * k * width;
+            for (int64_t i = 0; i < width; i += EIGHT) {
+                const Eight r = load(modes + i), z = load(modes + width + i);
+                store(residual + i, load(residual + i) + weight * at.radius * (at.dz * r - at.dr * z));
+                if (!STIFF) continue;
+                // the symmetric part of r_modes (dz r + radius dz_modes)^T - z_modes (dr r + radius dr_modes)^T
+                const Eight across = weight * (at.dz * r + at.radius * load(modes + 3 * width + i));
+                const Eight along = weight * (at.dr * r + at.radius * load(modes + 2 * width + i));
+                store(columns + i, 0.5 * r);
+                store(columns + width + i, -0.5 * z);
+                store(columns + 2 * width + i, 0.5 * across);
+                store(columns + 3 * width + i, -0.5 * along);
+                store(rows + i, across);
+                store(rows + width + i, along);
+                store(rows + 2 * width + i, r);
+                store(rows + 3 * width + i, z);
+            }
+        }
+        if (!STIFF) return;
+        for (int64_t column = 0; column < shape.blocks; ++column)
+            for (int64_t row = column; row < shape.blocks; ++row)
+                add_products(tangent + (column * shape.diagonals + row - column) * TILE, side_columns + EIGHT * row,
+                             side_rows + EIGHT * column, width, 4 * model.side_points);
+    }
+};
+
+}  // namespace creepkit

@@ -1,0 +1,196 @@
+"""A reduced-order model of a body: few modes of displacement, integrals over few weighted points.
+
+A ReducedBasis is what is trained (see `fem.reduced_order_training`); together with the finite element model of a mesh
+with the same numbering it gives the ReducedOrderModel that the compiled core simulates. Nodes may lie elsewhere than in
+training: modes are displacements of nodes, and gradients and weights of the points follow from the mesh at hand.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from creepkit.arrays import Floats, Ints, frozen
+from creepkit.core import CoreStructure, address
+from creepkit.errors import SolveError
+from creepkit.fem.finite_element_model import FiniteElementModel
+from creepkit.fem.solver import SensitivityDirections
+
+BLOCK = 8
+"""Modes and points are kept in blocks of so many."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedBasis:
+    """Modes and points of a reduced-order model.
+
+    modes : (modes, nodes, 2) mm, zero where a displacement is held.
+    points : (points,) number 4 element + point of each integration point that is used.
+    factors : (points,) by which its weight in finite elements is multiplied.
+    """
+
+    modes: Floats
+    points: Ints
+    factors: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "modes", frozen(self.modes))
+        object.__setattr__(self, "points", frozen(self.points, dtype=np.int64))
+        object.__setattr__(self, "factors", frozen(self.factors))
+
+
+def full_basis(model: FiniteElementModel) -> ReducedBasis:
+    """A basis of all displacements and points: finite elements themselves."""
+    free = np.flatnonzero(model.equations >= 0)
+    modes = np.zeros((free.size, model.equations.size))
+    modes[np.arange(free.size), free] = 1.0
+    points = np.arange(model.weights.size)
+    return ReducedBasis(modes.reshape(free.size, -1, 2), points, np.ones(points.size))
+
+
+def mode_gradients(model: FiniteElementModel, modes: Floats, points: Ints) -> Floats:
+    """Gradients (points, 5, modes) of modes (modes, nodes, 2) at points: of F11, F12, F21, F22 and F33, 1/mm."""
+    element, place = points // 4, points % 4
+    nodes = model.elements[element]
+    by_radius, by_height, over_radius = (
+        shapes[element, place][:, None] for shapes in (model.by_radius, model.by_height, model.over_radius)
+    )
+    radial, axial = (np.moveaxis(modes[:, :, i], 0, 1)[nodes] for i in (0, 1))  # (points, 8, modes)
+    parts = ((by_radius, radial), (by_height, radial), (by_radius, axial), (by_height, axial), (over_radius, radial))
+    return np.concatenate([shapes @ values for shapes, values in parts], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedOrderModel:
+    """A reduced-order model of one mesh, ready to be simulated as a FiniteElementModel is."""
+
+    model: FiniteElementModel
+    basis: ReducedBasis
+
+    entry: ClassVar[str] = "creepkit_simulate_reduced"
+    """The function of the core that simulates it."""
+
+    def __post_init__(self) -> None:
+        if self.basis.modes.shape[1:] != self.model.nodes.shape:
+            raise SolveError(
+                f"the modes are those of a mesh of {self.basis.modes.shape[1]} nodes, the mesh at hand has "
+                f"{len(self.model.nodes)}; train a reduced-order model for it"
+            )
+
+    @cached_property
+    def compiled(self) -> CompiledReducedModel:
+        """The model as the core reads it; made once."""
+        return CompiledReducedModel(self.model, self.basis)
+
+    @property
+    def displacement_count(self) -> int:
+        """Numbers of a state of displacement: those of the modes, in whole blocks."""
+        return self.compiled.width
+
+    @property
+    def point_count(self) -> int:
+        """Points whose state is kept."""
+        return self.basis.points.size
+
+    @property
+    def observed_count(self) -> int:
+        """Nodes of the observed surface."""
+        return self.model.top.size
+
+    def held_motion(self, pattern: Floats | None) -> Floats:
+        """(0,): held nodes stay where they are; SolveError for a pattern (nodes, 2) of motion."""
+        if pattern is not None:
+            raise SolveError("a reduced-order model does not move held nodes; simulate its finite elements")
+        return np.zeros(0)
+
+    def displacements(self, coordinates: Floats) -> Floats:
+        """(steps, nodes, 2) mm, from the coordinates (steps, displacement_count) of the modes."""
+        modes = self.basis.modes
+        return np.asarray(coordinates[:, : len(modes)] @ modes.reshape(len(modes), -1)).reshape(-1, *modes.shape[1:])
+
+    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]:
+        """Velocity gradients and hoop strains of the points, and changes (G, side points, 3) of the pressed sides."""
+        chosen, count = self.compiled.points, len(directions.velocities)
+        gradients = directions.gradients.reshape(count, self.model.weights.size, 2, 2)[:, chosen]
+        hoops = directions.hoops.reshape(count, self.model.weights.size)[:, chosen]
+        velocities = directions.velocities.reshape(count, *self.model.nodes.shape)
+        at_sides = velocities[:, self.model.pressed]  # (G, sides, 3, 2)
+        changes = [at_sides[..., 0] @ _SIDE_VALUES.T, *(at_sides[..., i] @ _SIDE_SLOPES.T for i in (0, 1))]
+        return gradients, hoops, np.stack(changes, axis=-1).reshape(count, 3 * len(self.model.pressed), 3)
+
+
+_SIDE_PLACES = np.sqrt(0.6) * np.array([-1.0, 0.0, 1.0])
+
+
+_SIDE_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 9.0
+
+
+_SIDE_VALUES = np.stack([0.5 * _SIDE_PLACES * (_SIDE_PLACES - 1), 1 - _SIDE_PLACES**2,
+                         0.5 * _SIDE_PLACES * (_SIDE_PLACES + 1)], axis=1)  # fmt: skip
+"""(Gauss points, nodes) of a side, and their derivatives along it."""
+
+
+_SIDE_SLOPES = np.stack([_SIDE_PLACES - 0.5, -2 * _SIDE_PLACES, _SIDE_PLACES + 0.5], axis=1)
+
+
+class _ModelStructure(CoreStructure):
+    """Mirrors ReducedOrderModel of src/core/reduced_order_model.hpp."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("modes", "points", "side_points", "observed", "measured")),
+        *((name, ctypes.c_void_p) for name in (
+            "gradients", "points_first", "weights", "sides", "side_modes", "surface", "measures",
+        )),
+    )  # fmt: skip
+
+
+class CompiledReducedModel:
+    """Arrays of a reduced-order model in the order of the core.
+
+    width : modes in whole blocks. points : those used, with copies of the first without weight up to whole blocks.
+    structure : for calls of the core.
+    """
+
+    def __init__(self, model: FiniteElementModel, basis: ReducedBasis) -> None:
+        modes, count = basis.modes, len(basis.modes)
+        self.width = -(-count // BLOCK) * BLOCK
+        pad = -basis.points.size % BLOCK
+        self.points = np.concatenate([basis.points, np.repeat(basis.points[:1], pad)])
+        narrow = mode_gradients(model, modes, self.points)
+        by_block = narrow.reshape(-1, BLOCK, 5, count).transpose(0, 3, 2, 1)
+        weights = model.weights.ravel()[self.points] * np.concatenate([basis.factors, np.zeros(pad)])
+        sides, side_modes = _sides(model, modes)
+        observed = modes[:, model.top, 1]
+        measured = observed if model.top.size else modes.reshape(count, -1)
+        kept = {
+            "gradients": self._padded(narrow),
+            "points_first": by_block,
+            "weights": weights,
+            "sides": sides,
+            "side_modes": self._padded(side_modes),
+            "surface": self._padded(observed.T),
+            "measures": np.pad(measured, ((0, 0), (0, -measured.shape[1] % BLOCK))),
+        }
+        self._kept = {name: np.ascontiguousarray(array, dtype=float) for name, array in kept.items()}
+        self.structure = _ModelStructure(
+            count, self.points.size, len(sides), model.top.size, self._kept["measures"].shape[1],
+            *(address(array) for array in self._kept.values()),
+        )  # fmt: skip
+
+    def _padded(self, values: Floats) -> Floats:
+        """Values (..., modes) with zeros for the modes added."""
+        return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, self.width - values.shape[-1])])
+
+
+def _sides(model: FiniteElementModel, modes: Floats) -> tuple[Floats, Floats]:
+    """Gauss points of the sides under pressure: (points, 4) weight, r, dr/dx, dz/dx, and (points, 4, modes)."""
+    at_rest, moving = model.nodes[model.pressed], np.moveaxis(modes, 0, -1)[model.pressed]  # (sides, 3, 2, modes)
+    rest = [at_rest[..., 0] @ _SIDE_VALUES.T, *(at_rest[..., i] @ _SIDE_SLOPES.T for i in (0, 1))]
+    weights = np.broadcast_to(_SIDE_WEIGHTS, rest[0].shape)
+    parts = [np.einsum("gn,snm->sgm", shapes, moving[:, :, i])
+             for shapes in (_SIDE_VALUES, _SIDE_SLOPES) for i in (0, 1)]  # fmt: skip
+    return np.stack([weights, *rest], axis=-1).reshape(-1, 4), np.stack(parts, axis=2).reshape(-1, 4, len(modes))

@@ -1,0 +1,205 @@
+"""The reduced-order model of the bulge test as a predictor: the dimple's finite elements in few modes and points.
+
+Set-up, observation and sensitivities are those of the finite elements. One basis serves thicknesses about the one that
+it was trained for, and the derivatives to a thickness are exact; another basis is trained where a test piece needs it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import SolveError
+from creepkit.fem.finite_element_model import FiniteElementModel
+from creepkit.fem.reduced_order_model import ReducedOrderModel
+from creepkit.fem.simulation import simulate
+from creepkit.fem.solver import SolverSettings
+from creepkit.records import PROGRAM_NUISANCES, History, NuisanceValues, Prediction, Predictor
+from creepkit.specimens.bulge.finite_elements import (
+    BulgeSetup,
+    model_of_geometry,
+    model_of_specimen,
+    predict_bulge,
+    solver_settings,
+)
+from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.specimens.bulge.observation import OBSERVED
+from creepkit.specimens.bulge.settings import BulgeSettings
+from creepkit.specimens.reduced_order_training import MODES, POINTS, RAMP, power_law_runs, trained_basis
+
+if TYPE_CHECKING:
+    from creepkit.language import CreepLaw
+
+
+THICKNESS_RANGE = 1.25
+"""Largest over smallest apex thickness of one basis."""
+
+
+SEARCH_TOLERANCE, SEARCH_GROWTH = 4e-2, 4.0
+"""Of the steps in a global search: they add some 0.15 % to the error of the model, for 0.6 of its cost."""
+
+
+TRAINED_THICKNESSES = 3
+"""Thicknesses that a basis is trained at."""
+
+
+TESTED_RUNS, TESTED_SHARE = 16, 0.95
+"""Runs that the stated error is measured on, and the share of the shorter simulation that counts: at its end, where the
+dimple bursts, any difference of time is a large one of deflection."""
+
+
+LENGTH_STEP = 1.05
+"""Other lengths of a test piece share a basis within half of this ratio."""
+
+
+@dataclass(frozen=True)
+class BulgeReducedOrderModel:
+    """A bulge specimen in a reduced-order model; same outputs, nuisances and errors, and derivatives to all of them.
+
+    Trained at the first prediction, in some seconds of CPU for each dimple. modes, points : of the model. searching :
+    whether steps are as long as a global search allows, which err as much as the model does.
+    """
+
+    specimen: BulgeSettings
+    modes: int = MODES
+    points: int = POINTS
+    searching: bool = False
+    name: str = field(default="bulge, reduced-order model", init=False)
+    title: str = field(default="Bulge test in a reduced-order model, for searches", init=False)
+    outputs: tuple[str, ...] = field(default=OBSERVED, init=False)
+
+    nuisances: ClassVar[tuple[str, ...]] = BulgeSettings.nuisances
+    program_nuisances: ClassVar[tuple[str, ...]] = PROGRAM_NUISANCES
+
+    def predict(
+        self,
+        law: CreepLaw,
+        theta: Floats,
+        histories: Sequence[History],
+        *,
+        nuisances: NuisanceValues | None = None,
+        sensitivities: bool = False,
+    ) -> Prediction:
+        """Predict amplitude, width and shape of each history at its times; see records.Predictor.
+
+        theta : (candidates, parameters) internal values.
+        """
+        return predict_bulge(
+            self.specimen, law, theta, histories, nuisances or {}, sensitivities, self.reduced_model_of,
+            self._search_settings(sensitivities) if self.searching else None,
+        )  # fmt: skip
+
+    def for_search(self) -> BulgeReducedOrderModel:
+        """The same model in longer steps."""
+        return replace(self, searching=True)
+
+    def _search_settings(self, sensitivities: bool) -> SolverSettings:
+        tolerance = max(SEARCH_TOLERANCE, self.specimen.tolerance)
+        newton = (1e-3 if sensitivities else 1e-2) * tolerance
+        return solver_settings(self.specimen)._replace(tolerance=tolerance, newton=newton, growth=SEARCH_GROWTH)
+
+    def reduced_model_of(self, setup: BulgeSetup) -> ReducedOrderModel:
+        """The reduced-order model of a test that is set up."""
+        if setup.refinement is None:
+            basis = trained_basis([setup.model], solver_settings(self.specimen), modes=self.modes, points=self.points)
+            return ReducedOrderModel(setup.model, basis)
+        return _model_of_geometry(self.specimen, setup.geometry, setup.refinement, self.modes, self.points)
+
+    def prediction_error(
+        self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, nuisances: NuisanceValues | None = None
+    ) -> Floats:
+        """(candidates, tests, times, outputs) by which a prediction is too large, found by finite elements.
+
+        theta : (candidates, parameters) internal values. Costs a simulation each; NaN where either has ended.
+        """
+        reduced = self.predict(law, theta, histories, nuisances=nuisances)
+        exact = predict_bulge(self.specimen, law, theta, histories, nuisances or {}, False)
+        return np.asarray(reduced.values - exact.values)
+
+    @property
+    def error(self) -> dict[str, float]:
+        """{output: standard deviation of its error}, in the output's unit, from runs that training did not see.
+
+        1.25 times the mean absolute error, that of a Gaussian: rare large errors would widen every interval.
+        """
+        return dict(zip(OBSERVED, _output_errors(self), strict=True))
+
+    def reference_stress(self, history: History) -> Floats:
+        """As the specimen's, (levels,) MPa."""
+        return self.specimen.reference_stress(history)
+
+    def refined(self) -> Predictor:
+        """What it stands for: the specimen itself on its finer discretisation."""
+        from creepkit.specimens.bulge.specimen import Bulge
+
+        assert isinstance(self.specimen, Bulge)
+        return self.specimen.refined()
+
+
+@lru_cache(maxsize=16)
+def _output_errors(predictor: BulgeReducedOrderModel) -> tuple[float, ...]:
+    """(3,) standard deviations of the errors of D and S in mm and of p, on the specimen's own dimple."""
+    specimen = predictor.specimen
+    model = model_of_specimen(specimen)
+    refinement = specimen.refinement if specimen.mesh is None else None
+    runs = power_law_runs([model], TESTED_RUNS, seed=1)
+    setup = BulgeSetup(model, runs[0].load_history, specimen.geometry, specimen.observation, refinement)
+    reduced, settings, errors = predictor.reduced_model_of(setup), solver_settings(specimen), []
+    for run in runs:
+        made = [simulate(run.law, run.theta, each, run.load_history, settings=settings) for each in (model, reduced)]
+        end = TESTED_SHARE * min(each.end_time for each in made)
+        times = made[0].times[(made[0].times > RAMP) & (made[0].times <= end)]
+        profiles = ((each, each.displacements[:, model.top, 1]) for each in made)
+        exact, found = (
+            specimen.observation.observe_at_times(setup.radii, profile, each.timeline, times)
+            for each, profile in profiles
+        )
+        errors.append(np.abs(found - exact))
+    return tuple(float(e) for e in 1.2533 * np.nanmean(np.concatenate(errors), axis=0))
+
+
+@lru_cache(maxsize=256)
+def _model_of_geometry(
+    specimen: BulgeSettings, geometry: DimpleGeometry, refinement: float, modes: int, points: int
+) -> ReducedOrderModel:
+    """The reduced-order model of a dimple; kept, for a fit needs it a thousand times."""
+    model = model_of_geometry(geometry, refinement)
+    nominal = nominal_geometry(specimen.geometry, geometry)
+    family = _trained_models(nominal, refinement)
+    if not all(_same_numbering(model, other) for other in family):
+        family = (model,)
+    settings = solver_settings(specimen)
+    return ReducedOrderModel(model, trained_basis(family, settings, modes=modes, points=points))
+
+
+def nominal_geometry(own: DimpleGeometry, geometry: DimpleGeometry) -> DimpleGeometry:
+    """The dimple that a basis for `geometry` is trained about; own : the specimen's, which is one of them."""
+
+    def nearest(name: str) -> float:
+        step = THICKNESS_RANGE if name == "apex_thickness" else LENGTH_STEP
+        value = getattr(own, name)
+        return float(value * step ** np.round(np.log(getattr(geometry, name) / value) / np.log(step)))
+
+    try:
+        return geometry.replace(**{name: nearest(name) for name in DimpleGeometry.lengths})
+    except SolveError:  # lengths that fit each other no longer when rounded
+        return geometry
+
+
+@lru_cache(maxsize=64)
+def _trained_models(nominal: DimpleGeometry, refinement: float) -> tuple[FiniteElementModel, ...]:
+    """Models of the thicknesses that a basis is trained at, as far as the plate allows."""
+    ends = np.log(THICKNESS_RANGE) * 0.5 * np.cos(np.pi * (np.arange(TRAINED_THICKNESSES) + 0.5) / TRAINED_THICKNESSES)
+    most = nominal.plate_thickness - nominal.roof_axial
+    thicknesses = sorted({min(float(nominal.apex_thickness * np.exp(e)), most) for e in ends})
+    return tuple(model_of_geometry(nominal.replace(apex_thickness=h), refinement) for h in thicknesses)
+
+
+def _same_numbering(one: FiniteElementModel, other: FiniteElementModel) -> bool:
+    pairs = ((getattr(m, name) for m in (one, other)) for name in ("elements", "equations", "pressed", "top"))
+    return all(np.array_equal(a, b) for a, b in pairs)

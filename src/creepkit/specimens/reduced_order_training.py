@@ -1,0 +1,198 @@
+"""Training of a reduced-order model for a body under pressure: power-law creep at drawn loads, on one or more meshes.
+
+The spatial fields of the displacement matter, not the law that made them: power laws of exponents from one to those of
+nearly plastic flow, from elastic deformation to large strains, also serve laws with hardening, drifting exponents or
+several terms (tests/benchmarks/reduced_order_model.py measures it). Bases are kept in memory and on disk, by what they
+were trained on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import qmc
+
+from creepkit import kernels
+from creepkit.arrays import Floats
+from creepkit.errors import CreepkitError, SolveError
+from creepkit.fem.finite_element_model import FiniteElementModel
+from creepkit.fem.reduced_order_model import ReducedBasis
+from creepkit.fem.reduced_order_training import TrainingRun, snapshots, train
+from creepkit.fem.simulation import LoadHistory, simulate
+from creepkit.fem.solver import SolverSettings
+from creepkit.files.json_documents import DocumentFormat
+from creepkit.files.reading import FileKind
+from creepkit.files.safetensors_files import read_safetensors, write_safetensors
+from creepkit.kernels.interface import CompiledLaw
+from creepkit.language import CreepLaw, Param, parameters, stress
+from creepkit.records import Program
+
+MODES, POINTS = 24, 96
+"""Of a model unless asked for others."""
+
+
+RUNS = 64
+"""Training simulations; a power of two, for a Sobol sequence."""
+
+
+EXPONENTS = (1.0, 12.0)
+"""Of the training's power laws."""
+
+
+ELASTIC_STRAIN = (2e-4, 8e-3)
+"""Elastic strain that the largest stresses stand for at the training's pressures."""
+
+
+CREEP_STRAIN = (1e-4, 1.0)
+"""Creep strain at the first pressure's largest stress over the time of a run; many end by bursting before."""
+
+
+RAMP = 5.0
+"""s of a change of pressure."""
+
+
+_MODULUS, _TIME = 1e5, 1e5
+"""MPa and s; only ratios to pressures and rates matter."""
+
+
+_TEMPERATURE = 1000.0
+
+
+_A, _n = parameters("A n")
+
+
+_POWER_LAW = CreepLaw(
+    name="norton",
+    title="Norton power law",
+    terms={"power law": _A * stress**_n},
+    params={
+        _A: Param("rate coefficient", unit="1/s", bounds=(1e-300, 1.0), scale="log", off=0.0),
+        _n: Param("stress exponent", bounds=(0.5, 13)),
+    },
+    references=("Norton (1929), The Creep of Steel at High Temperatures",),
+)
+
+
+def power_law_runs(
+    models: Sequence[FiniteElementModel], count: int, poisson: float = 0.3, seed: int = 0
+) -> list[TrainingRun]:
+    """Runs at drawn exponents, pressures and rates, every second with two pressures; meshes in turn."""
+    law = kernels.lower(_POWER_LAW, "numba")
+    ratios = [stress_ratio(law, model, poisson) for model in models]
+    runs = []
+    for k, draw in enumerate(qmc.Sobol(5, seed=seed).random(count)):
+        exponent = EXPONENTS[0] + (EXPONENTS[1] - EXPONENTS[0]) * draw[0]
+        ratio = ratios[k % len(models)]
+        first = _between(ELASTIC_STRAIN, draw[1])
+        second = _between((first, ELASTIC_STRAIN[1]), draw[2]) if k % 2 else first
+        level = np.log(_between(CREEP_STRAIN, draw[3]) / _TIME) - exponent * np.log(first * _MODULUS)
+        change = _between((1e-3 * _TIME, 0.5 * _TIME), draw[4])
+        times = np.array([0.0, RAMP, change, change + RAMP])
+        pressure = np.array([0.0, first, first, second]) * _MODULUS / ratio
+        load_history = LoadHistory(
+            Program(times, pressure), Program.constant(_TEMPERATURE), Program.constant(_MODULUS), _TIME, poisson
+        )
+        runs.append(TrainingRun(models[k % len(models)], law, np.array([level, exponent]), load_history))
+    return runs
+
+
+def _between(ends: tuple[float, float], share: float) -> float:
+    """A number between two, even in its logarithm."""
+    return float(ends[0] * (ends[1] / ends[0]) ** share)
+
+
+def stress_ratio(law: CompiledLaw, model: FiniteElementModel, poisson: float) -> float:
+    """Large von Mises stress over a small pressure, the body elastic: a twentieth of its volume has more."""
+    pressure = 1e-6 * _MODULUS
+    load_history = LoadHistory(
+        Program.constant(pressure), Program.constant(_TEMPERATURE), Program.constant(_MODULUS), 1.0, poisson
+    )
+    made = simulate(law, np.array([-np.inf, 1.0]), model, load_history)
+    mises, weights = made.mises[-1][: model.weights.size], model.weights.ravel()
+    order = np.argsort(mises)
+    share = np.cumsum(weights[order]) / weights.sum()
+    ratio = float(mises[order][np.searchsorted(share, 0.95)]) / pressure
+    if not (np.isfinite(ratio) and ratio > 0.0):
+        raise SolveError("pressure does not stress the body, so that it has no reduced-order model; check its mesh")
+    return ratio
+
+
+def trained_basis(
+    models: Sequence[FiniteElementModel], settings: SolverSettings, *, modes: int = MODES, points: int = POINTS
+) -> ReducedBasis:
+    """Modes and points for meshes of the same numbering; from memory, from disk, or trained now (some CPU seconds)."""
+    key = _key(models, settings, modes, points)
+    if key not in _in_memory():
+        basis = _read(_file(key), models[0])
+        if basis is None:
+            data = snapshots(power_law_runs(models, RUNS), settings)
+            basis = train(data, modes, points, settings.deflection_limit)
+            _keep(basis, _file(key))
+        _in_memory()[key] = basis
+    return _in_memory()[key]
+
+
+@cache
+def _in_memory() -> dict[str, ReducedBasis]:
+    return {}
+
+
+_FORMAT = DocumentFormat(
+    "creepkit-reduced-basis",
+    1,
+    FileKind("a file of modes", SolveError, "delete it", maximum_bytes=2**30),
+    remedy="delete it",
+)
+
+
+def _key(models: Sequence[FiniteElementModel], settings: SolverSettings, modes: int, points: int) -> str:
+    """Of everything that a basis follows from."""
+    digest = hashlib.sha256(
+        repr((_FORMAT, settings, modes, points, RUNS, EXPONENTS, ELASTIC_STRAIN, CREEP_STRAIN)).encode()
+    )
+    for model in models:
+        for array in (model.nodes, model.elements, model.equations, model.pressed, model.top):
+            digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:32]
+
+
+def _file(key: str) -> Path:
+    """Where a basis is kept: CREEPKIT_CACHE, else `creepkit` in the user's cache folder."""
+    chosen = os.environ.get("CREEPKIT_CACHE")
+    base = Path(chosen) if chosen else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "creepkit"
+    return base / "reduced_bases" / f"{key}.safetensors"
+
+
+def _keep(basis: ReducedBasis, path: Path) -> None:
+    """Write a basis; where nothing can be written it is trained again by the next process."""
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        arrays = {"modes": basis.modes, "points": basis.points, "factors": basis.factors}
+        write_safetensors(path, arrays, {}, _FORMAT)
+    except (OSError, CreepkitError):
+        return
+
+
+def _read(path: Path, model: FiniteElementModel) -> ReducedBasis | None:
+    """The basis of a file; None where there is none for this mesh."""
+    if not path.is_file():
+        return None
+    try:
+        arrays, _ = read_safetensors(path, _FORMAT)
+        modes, points, factors = (arrays[name] for name in ("modes", "points", "factors"))
+    except (OSError, CreepkitError, KeyError):
+        return None
+    fits = modes.ndim == 3 and modes.shape[1:] == model.nodes.shape and points.shape == factors.shape == (points.size,)
+    sound = fits and points.size > 0 and bool(_finite(modes) and _finite(factors))
+    if not (sound and 0 <= points.min() <= points.max() < model.weights.size):
+        return None
+    return ReducedBasis(modes, points, factors)
+
+
+def _finite(values: Floats) -> bool:
+    return values.dtype == np.float64 and bool(np.isfinite(values).all())
