@@ -12,7 +12,7 @@ from creepkit.screening.planted import planted_plate
 from helpers.planted_alloys import bulge
 
 LAWS = ("--law", "norton", "--law", "strain-hardening")
-HOW = (*LAWS, "--dense", "none", "--confirm", "always", "--workers", "1")
+HOW = (*LAWS, "--surrogate", "dimple", "--dense", "none", "--confirm", "always", "--workers", "1")
 
 
 def screen(folder, *more):
