@@ -52,7 +52,7 @@ BENCHMARKS = {
     "surrogate_accuracy": Benchmark(10, (("--samples", "150"),)),
     "surrogate_speed": Benchmark(3),
     "identification_speed": Benchmark(1),
-    "search_success": Benchmark(15, (("--specimens", "6", "--through", "surrogate", "--searches", "default", "cma"),)),
+    "search_success": Benchmark(15, (("--specimens", "6", "--searches", "default", "cma"),)),
     "swarm_speed": Benchmark(1),
     "law_recovery": Benchmark(45, (("--specimens", "24", "--others", "10"),)),
     "penalty_confusion": Benchmark(

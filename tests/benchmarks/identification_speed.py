@@ -1,4 +1,4 @@
-"""Time of an identification of one dimple, through the surrogate that ships and by finite elements.
+"""Time of an identification of one dimple, through the reduced-order model and by finite elements.
 
     python tests/benchmarks/identification_speed.py [--specimens 4] [--write]
 

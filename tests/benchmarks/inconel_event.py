@@ -187,8 +187,8 @@ def print_selection(page: Page, row: Row, event: bool) -> None:
     page.heading(f"Law selection {'with' if event else 'without'} the event")
     page.paragraph(
         '`ck.select(laws, tests, using="bulge", test_loss="student", sums=False)`: likelihood and BIC, of these five '
-        "laws alone. Laws far behind the best keep the values of a cheaper predictor where one was used on the way; the "
-        "column says what each was identified with."
+        "laws alone. Laws far behind the best keep the values of a cheaper predictor where there was one on the way; "
+        "the column says what each was identified with."
     )
     page.paragraph(f"The verdict: {row['verdict']}.")
     for name, reason in row["failed"].items():

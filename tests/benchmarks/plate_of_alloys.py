@@ -7,8 +7,8 @@
 Each alloy is one dimple under 8, then 10 MPa for 4 h, a frame a minute, with white noise as measured (1.5 um on D_amp,
 0.02 mm on S_d, 0.02 on S_p), its law and values drawn around the three of Fig. 7a of Chen et al.
 (creepkit.screening.planted). The four laws of Table 1 are identified with intervals, the best one is confirmed by
-finite elements, and Eq. (2) is fitted without sparsity unless --no-full-law. `--how through` searches in the surrogate
-that ships and ends with finite elements; `surrogate` uses nothing else; `finite-elements` does without it. The
+finite elements, and Eq. (2) is fitted without sparsity unless --no-full-law. `--how through` searches in the
+reduced-order model and ends with finite elements; `surrogate` uses nothing else; `finite-elements` does without it. The
 simulation of the plate is not timed. Started again with the same --to, the screening continues, and its time means
 nothing.
 

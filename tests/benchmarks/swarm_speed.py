@@ -4,7 +4,7 @@
                                            [--write]
 
 One 12 h test (8 to 10 MPa after 4 h, 48 frames with noise), simulated by finite elements, is identified through the
-surrogate that ships by each search in turn, in one process, compiled beforehand; the least of the repeats. Columns:
+reduced-order model by each search in turn, in one process, compiled beforehand; the least of the repeats. Columns:
 predicted candidates; wall and CPU time of the whole identification, and of its search alone (the refinement of its best
 candidates included), both also as ratios to the default search (wall, CPU); -2 ln L above that of the default search.
 The goal is 15 s of wall time for 300 particles and 100 iterations on two cores; the paper: 5 min on an RTX 5000 Ada.

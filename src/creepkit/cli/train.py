@@ -36,7 +36,7 @@ def command(
     plots: Annotated[Path | None, typer.Option(help="Folder for pictures; by default beside the file.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the errors as JSON.")] = False,
 ) -> None:
-    """Train a surrogate of one law, the recurrent network of the paper, on a data set.
+    """Train the paper's network on a data set.
 
     Interrupted at any moment, the same command goes on where it was. Curves of the training, predicted against true
     outputs, and the worst samples are drawn.

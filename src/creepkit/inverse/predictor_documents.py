@@ -95,7 +95,7 @@ def _document_of(predictor: Predictor) -> PredictorDocument:
     if _is_surrogate(predictor):
         return PredictorDocument("surrogate", name, fingerprint=_fingerprint(predictor))
     underlying = getattr(predictor, "specimen", None)
-    if isinstance(underlying, SupportsReducedOrderModel) and type(underlying.reduced_order_model()) is type(predictor):
+    if isinstance(underlying, SupportsReducedOrderModel) and underlying.reduced_order_model() == predictor:
         document = _document_of(underlying)
         if document.kind == "specimen":
             return replace(document, kind="reduced-order model")

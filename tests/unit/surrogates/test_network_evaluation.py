@@ -1,5 +1,6 @@
 """Evaluation of the recurrent network in NumPy: torch's own cells and their derivatives, and no torch is loaded."""
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ from creepkit.surrogates.parameter_gru import ParameterGru
 from creepkit.surrogates.parameter_network import ParameterModule, weights_of
 from creepkit.surrogates.recipe import Training
 from creepkit.surrogates.training import train
+from helpers import source_tree
 from helpers.planted_datasets import bars
 
 CONSTANTS, SERIES, OUTPUTS, HIDDEN, LAYERS = 4, 2, 3, 5, 3
@@ -135,6 +137,21 @@ str(ck.identify(law, [measured], using=model, starts=1))
 str(ck.identify(law, [measured], starts=1))
 assert "torch" not in sys.modules
 """
+
+
+TRAINING = {"surrogates.parameter_network", "surrogates.training", "surrogates.training_loop"}
+"""Modules that import torch when they are imported, beside the functions of the torch target of kernels."""
+
+
+def test_only_training_and_the_torch_target_import_torch() -> None:
+    found = set()
+    for module, path in source_tree.modules().items():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        names = [a.name for node in tree.body if isinstance(node, ast.Import) for a in node.names]
+        names += [str(node.module) for node in tree.body if isinstance(node, ast.ImportFrom)]
+        if any(name.split(".")[0] == "torch" for name in names):
+            found.add(module.removeprefix("creepkit."))
+    assert found == {*TRAINING, "kernels.torch_functions"}
 
 
 def test_prediction_and_identification_load_no_torch(tmp_path: Path) -> None:
