@@ -45,7 +45,7 @@ class Case:
     def __init__(self, name: str, **settings: float) -> None:
         self.specimen = Bulge(threads=1).replace(**settings)
         law = ck.law(name)
-        self.law, self.theta = kernels.lower(law, "numba"), law.to_internal(law.values(CASES[name]))[0]
+        self.law, self.theta = kernels.lower(law, "compiled"), law.to_internal(law.values(CASES[name]))[0]
         self.history = History(
             name=name, times=TIMES, outputs={}, loading=PressureJump(8.0, 10.0, 14400.0), temperature=1000.0,
             specimen="bulge", elastic=ck.Elastic(150e3),

@@ -29,7 +29,6 @@ from measured import Page, arguments, progress
 from public_calls import cross_validated_tests
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
 
@@ -275,7 +274,6 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=1, help="of each search")
     parser.add_argument("--keep", default="build/inconel_event", help="folder in which finished rows are kept")
     options = parser.parse_args()
-    set_numba_cache()
     runs = Runs(ck.exclude_suspect_frames(ck.read_histories(options.folder)), options.starts)
     file = Path(options.keep) / "rows.jsonl"
 

@@ -30,7 +30,7 @@ law = creepkit.law(sys.argv[1])
 if sys.argv[1] == "combined":
     law = law.times(creepkit.arrhenius()).with_temperature(n_2=creepkit.linear())
 start = time.process_time()
-kernel = creepkit.lower(law, "numba")
+kernel = creepkit.lower(law, "compiled")
 point = numpy.array([[100.0, 0.01, 10.0, 1000.0, 100.0, 33.0]])
 call_entry(kernel, "update", point, law.to_internal(law.center())[0])
 print(time.process_time() - start)

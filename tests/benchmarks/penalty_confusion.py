@@ -25,7 +25,6 @@ from measured import Page, arguments, progress
 from scipy.optimize import brentq
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.bootstrap import binomial_interval
 from creepkit.inverse.sparsity.term_selection import identify_full, identify_reduced
@@ -154,7 +153,6 @@ def main():
     parser.add_argument("--penalties", nargs="*", default=list(PENALTIES), choices=list(PENALTIES))
     parser.add_argument("--through", default="dimple", help="a surrogate; by default the reduced-order model")
     options = parser.parse_args()
-    set_numba_cache()
     model, law = ck.surrogate(options.through), ck.law("combined")
     settings = IdentificationSettings(**SETTINGS)
     results = {label: [] for label in options.penalties}

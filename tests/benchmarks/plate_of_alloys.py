@@ -31,7 +31,6 @@ from measured import Page, arguments, progress
 from proportions import share_with_interval
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.screening.planted import THICKNESS_MEAN_SD, planted_plate
 from creepkit.screening.results import mean_relative_squared_error
 from creepkit.screening.screen import screen
@@ -138,7 +137,6 @@ def main():
     parser.add_argument("--workers", type=int)
     parser.add_argument("--to", help="folder in which results are kept")
     options = parser.parse_args()
-    set_numba_cache()
     planted = planted_plate(options.alloys, options.seed, thickness_known=not options.unknown_thickness)
     folder = nullcontext(options.to) if options.to else tempfile.TemporaryDirectory()
     with folder as to:

@@ -23,7 +23,6 @@ from measured import Page, arguments
 from proportions import share_with_interval
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identify import StartingEstimate, identify
 from creepkit.inverse.reference_conditions import ReferencePoint
@@ -136,7 +135,6 @@ def main():
     parser.add_argument("--searches", nargs="*", default=list(SEARCHES), choices=list(SEARCHES))
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    set_numba_cache()
     using = ck.surrogate("dimple")
     page = Page("search_success", __doc__)
     page.paragraph(f"{options.specimens} specimens of each law, through the reduced-order model.")

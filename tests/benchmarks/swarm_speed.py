@@ -17,7 +17,6 @@ import numpy as np
 from measured import Page, arguments
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 from creepkit.inverse.search.multistart import MultiStart
 
@@ -96,7 +95,6 @@ def main():
     parser.add_argument("--laws", nargs="*", default=["norton", "drifting-exponent"], choices=list(LAWS))
     parser.add_argument("--repeats", type=int, default=1)
     options = parser.parse_args()
-    set_numba_cache()
     model = ck.surrogate("dimple")
     searches = {
         "default": MultiStart(),

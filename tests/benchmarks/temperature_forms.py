@@ -27,7 +27,6 @@ from measured import Page, arguments, progress
 from proportions import share_with_interval
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.discovery.discover import discover, group_by_temperature
 from creepkit.discovery.refitting import refit
 from creepkit.discovery.temperature_law import TemperatureLaw
@@ -162,7 +161,6 @@ def main() -> None:
     parser.add_argument("--max-forms", type=int, default=3, help="forms of one parameter that are refitted")
     parser.add_argument("--no-refit", action="store_true")
     options = parser.parse_args()
-    set_numba_cache()
     bulge = options.through == "surrogate"
     model = ck.surrogate("dimple") if bulge else ck.specimen("uniaxial")
     nuisances = () if bulge else (ck.Nuisance("rate", sd=0.03),)

@@ -74,7 +74,7 @@ def main() -> None:
     parser.add_argument("--curves", type=int, default=10_000)
     parser.add_argument("--scipy", type=int, default=40, help="curves that scipy integrates")
     options = parser.parse_args()
-    kernel, theta = lower(COMBINED, "numba"), candidates(options.curves)
+    kernel, theta = lower(COMBINED, "compiled"), candidates(options.curves)
     test = PointTest(Program.constant(STRESS), Program.constant(1000.0), TIMES)
 
     def integrated(tolerance: float, curves: int = options.curves, sensitivities: bool = False) -> Integration:

@@ -32,7 +32,7 @@ def body() -> FiniteElementModel:
 
 
 def norton() -> CompiledLaw:
-    return kernels.lower(NORTON, "numba")
+    return kernels.lower(NORTON, "compiled")
 
 
 def entry(columns: int, value: float) -> Entry:

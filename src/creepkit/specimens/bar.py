@@ -161,7 +161,7 @@ class Bar:
         return assemble_prediction(parts, histories, self.outputs, len(result.strain))
 
     def _integrate(self, law: CreepLaw, theta: Floats, tests: Sequence[PointTest], sensitivities: bool) -> Integration:
-        kernel = kernels.lower(law, "numba")
+        kernel = kernels.lower(law, "compiled")
         breaks = max((test.driving.times.size + test.temperature.times.size - 2 for test in tests), default=0)
         settings = integration.IntegrationSettings(
             rtol=self.tolerance,

@@ -56,7 +56,7 @@ KACHANOV = CreepLaw(
 
 
 def run(law, values, controls, times, temperature=300.0, settings=None, tableau=SDIRK2):
-    kernel = lower(law, "numba")
+    kernel = lower(law, "compiled")
     theta = law.to_internal(values)[0]
     return integrate_tensor_point(
         kernel, theta, STEEL, controls, temperature, times, settings=settings, tableau=tableau
@@ -66,7 +66,7 @@ def run(law, values, controls, times, temperature=300.0, settings=None, tableau=
 @pytest.mark.parametrize("weight", [1.0, 30.0, 1e3], ids=["elastic", "half crept", "crept"])
 def test_the_tangent_is_the_derivative_of_stress(weight: float) -> None:
     """Central differences of strain, for a law of all four: von Mises, principal, mean stress and a state."""
-    kernel = lower(DAMAGING, "numba")
+    kernel = lower(DAMAGING, "compiled")
     theta = DAMAGING.to_internal({"A": 1e-14, "n": 4.0, "C": 1e-13, "v": 3.5})[0]
     base = np.array([1e-4, -6e-5, -4e-5, 3e-5, 0.0, 1e-5, 2e-4, 0.1])
     strain = np.array([1.2e-3, 3e-4, -2e-4, 4e-4, 2e-4, -3e-4])
@@ -220,4 +220,4 @@ class TestEnds:
 def test_what_cannot_be_driven_is_refused(change, message: str) -> None:
     given = {"theta": [-30.0, 4.0], "elastic": STEEL, "controls": {}, "temperature": 300.0, "times": [1.0]}
     with pytest.raises(SolveError, match=message):
-        integrate_tensor_point(lower(NORTON, "numba"), **(given | change))
+        integrate_tensor_point(lower(NORTON, "compiled"), **(given | change))

@@ -257,7 +257,7 @@ def predict_bulge(
     """
     known = (*specimen.nuisances, *PROGRAM_NUISANCES)
     check_nuisances([kind_and_start(key)[0] for key in nuisances], known, "a bulge specimen")
-    kernel = kernels.lower(law, "numba")
+    kernel = kernels.lower(law, "compiled")
     theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
     tasks = list(product(range(len(theta)), range(len(histories))))
     settings = settings or solver_settings(specimen, exact=sensitivities)
