@@ -1,4 +1,4 @@
-"""The implicit adaptive integration of creep at a material point, compiled once for any law.
+"""The implicit adaptive integration of creep at a material point, in the compiled core.
 
 Names load when first used: numba is heavy.
 """
