@@ -239,3 +239,42 @@ def test_too_many_states_are_refused() -> None:
     test = PointTest(Program.constant(100.0), ROOM, np.ones(1))
     with pytest.raises(SolveError, match="a law may have 16 internal variables, but this one has 17"):
         integrate(lower(law, "numba"), law.to_internal({"A": 1e-12, "n": 3.0}), [test])
+
+
+class TestWhatIsNoHistory:
+    """Parameters and programs that mean nothing get an answer that says so."""
+
+    TIMES = np.array([0.0, 1.0, 1e4])
+
+    @pytest.mark.parametrize("bad", [np.nan, np.inf])
+    @pytest.mark.parametrize("jacobian", [False, True])
+    def test_parameters_that_are_not_finite(self, bad: float, jacobian: bool) -> None:
+        theta = np.repeat(COMBINED.to_internal(VALUES), 2, axis=0)
+        theta[0, 4] = bad
+        test = PointTest(Program.constant(100.0), ROOM, self.TIMES)
+        result = integrate(lower(COMBINED, "numba"), theta, [test], jacobian=jacobian)
+        assert result.status[:, 0].tolist() == [Status.NOT_CONVERGED, Status.COMPLETE]
+        assert np.isnan(result.strain[0, 1:]).all()
+        assert np.isfinite(result.strain[1]).all()
+
+    @pytest.mark.parametrize("stiffness", [0.0, 1.5e5])
+    def test_a_law_whose_terms_are_all_off(self, stiffness: float) -> None:
+        theta = COMBINED.to_internal({**VALUES, "A_1": 0.0, "A_2": 0.0, "A_3": 0.0})
+        test = PointTest(Program.constant(100.0), ROOM, self.TIMES, stiffness, levels=np.array([1e-6]))
+        result = integrate(lower(COMBINED, "numba"), theta, [test], jacobian=True)
+        assert result.status[0, 0] == Status.COMPLETE
+        assert not result.strain.any()
+        assert np.isnan(result.level_times).all()
+
+    def test_no_tests_no_times_no_candidates(self) -> None:
+        kernel, theta = lower(NORTON, "numba"), NORTON.to_internal({"A": 1e-12, "n": 3.0})
+        nothing = PointTest(Program.constant(100.0), ROOM, np.zeros(0))
+        assert integrate(kernel, theta, [], jacobian=True).strain.shape == (1, 0)
+        assert integrate(kernel, theta, [nothing]).status.tolist() == [[Status.COMPLETE]]
+        assert integrate(kernel, np.zeros((0, 2)), [nothing, nothing]).status.shape == (0, 2)
+
+    def test_a_rate_beyond_all_numbers(self) -> None:
+        theta = NORTON.to_internal({"A": 1e-12, "n": 3.0}) + np.array([[800.0, 0.0]])
+        test = PointTest(Program.constant(100.0), ROOM, self.TIMES)
+        result = integrate(lower(NORTON, "numba"), theta, [test], jacobian=True)
+        assert result.status[0, 0] != Status.COMPLETE

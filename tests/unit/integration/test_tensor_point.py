@@ -115,6 +115,28 @@ def test_a_turned_frame_turns_the_answer() -> None:
     np.testing.assert_allclose(turn @ tensors[0] @ turn.T, tensors[1], rtol=1e-8, atol=1e-8 * tensors[0].max())
 
 
+STRESSES = {
+    "compression, the two largest equal": [-100.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    "the two largest equal": [80.0, 80.0, 0.0, 0.0, 0.0, 0.0],
+    "the two largest equal, turned": [40.0, 40.0, 80.0, 40.0, 0.0, 0.0],
+    "shear": [0.0, 0.0, 0.0, 60.0, 0.0, 0.0],
+    "all different": [60.0, -20.0, 35.0, 18.0, -42.0, 27.0],
+    "nearly equal": [70.0, 70.0 + 1e-7, -10.0, 1e-7, 1e-8, 0.0],
+}
+
+
+@pytest.mark.parametrize("stresses", STRESSES.values(), ids=STRESSES)
+def test_a_law_of_the_largest_principal_stress(stresses: list[float]) -> None:
+    """At constant stress p = A lambda^n t, with lambda the largest eigenvalue by NumPy, shifted to stay above zero."""
+    shift = 150.0
+    law = CreepLaw("principal", {"creep": A * (principal_stress + shift) ** n}, {k: RATES[k] for k in (A, n)})
+    controls = {k: prescribed_stress(value) for k, value in zip(TENSOR_COMPONENTS, stresses, strict=True)}
+    result = run(law, {"A": 1e-13, "n": 3.0}, controls, [1e3])
+    s11, s22, s33, s12, s23, s13 = stresses
+    largest = np.linalg.eigvalsh(np.array([[s11, s12, s13], [s12, s22, s23], [s13, s23, s33]]))[-1]
+    assert result.equivalent[0] == pytest.approx(1e-13 * (largest + shift) ** 3 * 1e3, rel=1e-9)
+
+
 def test_temperature_follows_its_program() -> None:
     """Strain is the integral of the rate, here over a temperature that rises evenly."""
     law = NORTON.times(arrhenius(T_ref=1000.0))
