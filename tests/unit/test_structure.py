@@ -10,7 +10,7 @@ from helpers import source_tree
 MOST_LINES = 400
 MOST_PARAMETERS = 8
 
-COMPILED_PACKAGES = ("creepkit.fem.", "creepkit.integration.", "creepkit.specimens.bulge.reduced_order.")
+COMPILED_PACKAGES = ("creepkit.fem.", "creepkit.specimens.bulge.reduced_order.")
 """Their compiled functions take arrays and scalars one by one, since numba knows no records of ours."""
 
 
