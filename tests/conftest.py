@@ -5,7 +5,6 @@ import pytest
 from helpers.compilers import compiler_or_skip, skipped_without_need
 
 
-
 @pytest.fixture(scope="session")
 def gfortran() -> str:
     """The Fortran compiler."""

@@ -20,7 +20,7 @@ from measured import Page, arguments
 LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine", "drifting-exponent", "combined")
 PROGRAM = """
 import sys, time
-import numpy, numba, sympy
+import llvmlite, numpy, sympy
 import creepkit
 from creepkit.integration import integrate
 from creepkit.kernels import compilation

@@ -32,7 +32,7 @@ def command(
         raise SolveError(f"--specimen {specimen}: only a bulge has a reduced-order model; leave it out")
     specimen_record = specimen_record.replace(**parse_numbers(geometry or [], "--geometry", "cavity_radius=6"))
     predictor = BulgeReducedOrderModel(specimen_record)
-    model = predictor.own_model()
+    model = predictor.reduced_model_of(predictor.own_setup())
     typer.echo(f"{len(model.basis.modes)} modes, {len(model.basis.points)} of {model.model.weights.size} points")
     errors = ", ".join(f"{name} {value:.2g}" for name, value in predictor.error.items())
     typer.echo(f"error against its finite elements, one standard deviation over runs it was not trained on: {errors}")

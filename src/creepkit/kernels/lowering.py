@@ -33,13 +33,13 @@ def lower(law: CreepLaw, target: Literal["compiled"]) -> CompiledLaw: ...
 
 
 def lower(law: CreepLaw, target: KernelTarget = "numpy") -> ArrayKernel | CompiledLaw:
-    """Return the law as a numeric kernel for "numpy", "torch" or "compiled" (compiled, for integrators)."""
+    """Return the law as a numeric kernel for "numpy", "torch" or "compiled" (C functions, for solvers)."""
     if target == "compiled":
         from creepkit.kernels.compilation import compile_law
 
         return compile_law(law)
     if target not in ("numpy", "torch"):
-        raise LawError(f"no kernel target '{target}': {nearest(str(target), ('numpy', 'torch', 'numba'))}")
+        raise LawError(f"no kernel target '{target}': {nearest(str(target), ('numpy', 'torch', 'compiled'))}")
     return _array_kernel(law, target)
 
 

@@ -169,8 +169,8 @@ def cubature_figure(model: ReducedOrderModel, path: str | Path | None = None) ->
     _draw_outline(axes, body.nodes, body.elements, 1.0, color=_GREY, linewidth=0.8)
     places = np.einsum("pa,eai->epi", shape_functions(GAUSS_POINTS), body.nodes[body.elements]).reshape(-1, 2)
     weights = basis.factors * body.weights.ravel()[basis.points]
-    axes.scatter(*places.T, s=1.0, color=_GREY)
-    axes.scatter(*places[basis.points].T, s=60.0 * weights / weights.max(), color="tab:blue")
+    axes.plot(*places.T, ".", markersize=1.0, color=_GREY)
+    axes.scatter(places[basis.points, 0], places[basis.points, 1], s=60.0 * weights / weights.max(), color="tab:blue")
     axes.set_aspect("equal")
     axes.set_xlabel("radius, mm")
     axes.set_ylabel("height, mm")

@@ -1,22 +1,11 @@
 """The compiled interface: layout, rows, flags, and what is off."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
-from numba import float64, int64, njit
 
 from creepkit.arrays import Floats
 from creepkit.kernels import CompiledLaw, lower
-from creepkit.kernels.interface import (
-    DERIVATIVE_NOT_FINITE,
-    ENTRY_TYPE,
-    RATE_NOT_FINITE,
-    EntryName,
-    call_entry,
-    data_pointer,
-)
+from creepkit.kernels.interface import DERIVATIVE_NOT_FINITE, RATE_NOT_FINITE, EntryName, call_entry
 from creepkit.language import CreepLaw, strain, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
@@ -132,26 +121,6 @@ def test_update_is_the_logarithm_of_the_rate(law_: CreepLaw) -> None:
             assert np.exp(update[0]) == pytest.approx(sensitivity[0], rel=1e-12)
             slopes = sensitivity[inner : inner + x.size] / sensitivity[0]
             np.testing.assert_allclose(update[inner : inner + x.size], slopes, rtol=1e-10)
-
-
-def test_numba_knows_the_type_of_an_entry() -> None:
-    """In an interpreter that has done nothing else."""
-    program = "import creepkit, numba; print(numba.typeof(creepkit.lower(creepkit.law('norton'), 'numba').update))"
-    found = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
-
-    assert found.stdout.strip() == str(ENTRY_TYPE)
-
-
-def test_code_compiled_once_takes_any_law() -> None:
-    @njit(int64(ENTRY_TYPE, float64[::1], float64[::1], float64[::1]))
-    def called(entry, x, theta, out):  # type: ignore[no-untyped-def]
-        return entry(1, data_pointer(x), data_pointer(theta), data_pointer(out))
-
-    for law_, expected in ((NORTON, 1e-8), (STRAIN_HARDENING, 1e-7)):
-        compiled, out = lower(law_, "compiled"), np.empty(1)
-        theta = law_.to_internal({"A": 1e-16, "n": 4.0, **({"m": -0.5} if "m" in law_.names else {})})[0]
-        assert called(compiled.rate, point()[0], theta, out) == 0
-        assert out[0] == pytest.approx(expected, rel=1e-13)
 
 
 # ---- flags and off -------------------------------------------------------------------------------------------------

@@ -17,9 +17,17 @@ from creepkit.arrays import Floats
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.reduced_order_model import ReducedOrderModel
-from creepkit.fem.simulation import simulate
+from creepkit.fem.simulation import LoadHistory, simulate
 from creepkit.fem.solver import SolverSettings
-from creepkit.records import PROGRAM_NUISANCES, History, NuisanceValues, Prediction, Predictor, SupportsRefinement
+from creepkit.records import (
+    PROGRAM_NUISANCES,
+    History,
+    NuisanceValues,
+    Prediction,
+    Predictor,
+    Program,
+    SupportsRefinement,
+)
 from creepkit.specimens.bulge.finite_elements import predict_bulge, solver_settings
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import OBSERVED
@@ -110,6 +118,18 @@ class BulgeReducedOrderModel:
         model = _model_of_geometry(self.specimen, setup.geometry, setup.refinement, self.modes, self.points)
         return _with_leading_modes(model, SEARCH_MODES) if self.searching else model
 
+    def own_setup(self) -> BulgeSetup:
+        """The specimen's own dimple without a load, set up."""
+        specimen, unloaded, stiffness = self.specimen, Program.constant(0.0), Program.constant(1.0)
+        refinement = specimen.refinement if specimen.mesh is None else None
+        return BulgeSetup(
+            model_of_specimen(specimen),
+            LoadHistory(unloaded, unloaded, stiffness, 1.0),
+            specimen.geometry,
+            specimen.observation,
+            refinement,
+        )
+
     def prediction_error(
         self, law: CreepLaw, theta: Floats, histories: Sequence[History], *, nuisances: NuisanceValues | None = None
     ) -> Floats:
@@ -144,11 +164,10 @@ class BulgeReducedOrderModel:
 def _output_errors(predictor: BulgeReducedOrderModel) -> tuple[float, ...]:
     """(3,) standard deviations of the errors of D and S in mm and of p, on the specimen's own dimple."""
     specimen = predictor.specimen
-    model = model_of_specimen(specimen)
-    refinement = specimen.refinement if specimen.mesh is None else None
+    setup = predictor.own_setup()
+    model, reduced = setup.model, predictor.reduced_model_of(setup)
     runs = power_law_runs([model], TESTED_RUNS, seed=1)
-    setup = BulgeSetup(model, runs[0].load_history, specimen.geometry, specimen.observation, refinement)
-    reduced, settings, errors = predictor.reduced_model_of(setup), solver_settings(specimen), []
+    settings, errors = solver_settings(specimen), []
     for run in runs:
         made = [simulate(run.law, run.theta, each, run.load_history, settings=settings) for each in (model, reduced)]
         end = TESTED_SHARE * min(each.end_time for each in made)
