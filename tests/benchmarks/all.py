@@ -45,6 +45,7 @@ BENCHMARKS = {
         90, (("--cases", "145", "--cache", "build/dimple_references.jsonl"),), "reference cases in ../shared/data"
     ),
     "sensitivity_cost": Benchmark(3, (("--cold",),)),
+    "reduced_order_model": Benchmark(2),
     "calculix": Benchmark(6, (("N3", "N7", "TH", "c1", "c2", "c3"),), "CalculiX (ccx)"),
     "verify_export": Benchmark(20, needs="gcc, gfortran, make, the network for CalculiX's source; CalculiX is built"),
     "neml2_model": Benchmark(1, needs="NEML2 3.1, see the program"),
