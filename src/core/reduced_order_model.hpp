@@ -21,14 +21,15 @@ struct ReducedOrderModel {
     int64_t points;               // a multiple of eight
     int64_t side_points;          // Gauss points of the sides under pressure
     int64_t observed;             // nodes of the observed surface
-    int64_t measured;             // displacements that errors are measured by; a multiple of eight
+    int64_t limited;              // displacements, of those measured, that the deflection limit is for
+    int64_t measured;             // displacements that errors are measured by; both multiples of eight
     const double* gradients;      // (points, 5, R) of F11, F12, F21, F22, F33 to q, 1/mm
     const double* points_first;   // (points/8, r, 5, 8) the same
     const double* weights;        // (points,) area times radius, mm^3
     const double* sides;          // (side points, 4) Gauss weight; at rest r, dr/dx, dz/dx, mm, x in [-1, 1] on a side
     const double* side_modes;     // (side points, 4, R) of u_r, u_z, du_r/dx, du_z/dx to q
     const double* surface;        // (observed, R) u_z of the observed nodes to q
-    const double* measures;       // (r, measured) displacements to q
+    const double* measures;       // (r, measured) displacements to q; those of the observed nodes, u_z, come first
 };
 
 class ReducedOrderSensitivities;
@@ -146,26 +147,15 @@ public:
     void solve() { solve_symmetric(shape, tangent, residual); }
 
     // Largest displacement, mm, that the numbers in `residual` stand for; NaN or infinite where one is.
-    double largest_correction() const { return largest_displacement(residual); }
+    double largest_correction() const { return largest_of(residual, model.measured); }
 
     // q less `factor` times the correction in `residual`.
     void correct(double* q, double factor) const {
         for (int64_t i = 0; i < model.modes; ++i) q[i] -= factor * residual[i];
     }
 
-    // Largest of the measured displacements, mm; NaN or infinite where one is.
-    double largest_displacement(const double* q) const {
-        Eight worst(0.0), unusual(0.0);
-        for (int64_t k = 0; k < model.measured; k += EIGHT) {
-            Eight value(0.0);
-            for (int64_t i = 0; i < model.modes; ++i) value += q[i] * load(model.measures + i * model.measured + k);
-            worst = larger(worst, magnitude(value));
-            unusual += value - value;  // 0, or NaN where a value is NaN or infinite
-        }
-        double result = 0.0;
-        for (int lane = 0; lane < EIGHT; ++lane) result = fmax(result, worst[lane]);
-        return result + sum(unusual);
-    }
+    // Largest displacement of the observed surface, or of all that are measured if none is observed, mm.
+    double largest_displacement(const double* q) const { return largest_of(q, model.limited); }
 
     // Held nodes do not move: all modes are zero there.
     void prescribe(const double*, double, double*) const {}
@@ -199,6 +189,20 @@ public:
 
 private:
     double *products = nullptr, *side_columns = nullptr, *side_rows = nullptr;  // (8, 5, R); (side points, 4, R) each
+
+    // Largest of the first `count` measured displacements, mm; NaN or infinite where one is.
+    double largest_of(const double* q, int64_t count) const {
+        Eight worst(0.0), unusual(0.0);
+        for (int64_t k = 0; k < count; k += EIGHT) {
+            Eight value(0.0);
+            for (int64_t i = 0; i < model.modes; ++i) value += q[i] * load(model.measures + i * model.measured + k);
+            worst = larger(worst, magnitude(value));
+            unusual += value - value;  // 0, or NaN where a value is NaN or infinite
+        }
+        double result = 0.0;
+        for (int lane = 0; lane < EIGHT; ++lane) result = fmax(result, worst[lane]);
+        return result + sum(unusual);
+    }
 
     void clear() { memset(residual, 0, sizeof(double) * size_t(shape.rows())); }
 

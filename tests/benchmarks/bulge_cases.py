@@ -22,8 +22,9 @@ from creepkit.arrays import Floats
 from creepkit.fem.simulation import Simulation, simulate
 from creepkit.language import CreepLaw
 from creepkit.records import History, Loading, PressureJump, Program, RecordedLoading
-from creepkit.specimens.bulge.finite_elements import BulgeSetup, set_up_test, solver_settings
+from creepkit.specimens.bulge.finite_elements import solver_settings
 from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.specimens.bulge.setup import BulgeSetup, set_up_test
 from creepkit.specimens.bulge.specimen import Bulge
 
 BENCHMARKS = Path(__file__).resolve().parents[2].parent / "shared/data/benchmarks"

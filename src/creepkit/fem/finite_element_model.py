@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,9 +13,7 @@ from creepkit.arrays import Floats, Ints
 from creepkit.core import CoreStructure, address
 from creepkit.errors import SolveError
 from creepkit.fem.mesh import Mesh, discretize
-
-if TYPE_CHECKING:
-    from creepkit.fem.solver import SensitivityDirections
+from creepkit.fem.solvable_model import SensitivityDirections
 
 TILE = 8
 """Side of the tiles in which the core keeps banded matrices."""

@@ -18,7 +18,7 @@ from creepkit.arrays import Floats, Ints, frozen
 from creepkit.core import CoreStructure, address
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
-from creepkit.fem.solver import SensitivityDirections
+from creepkit.fem.solvable_model import SensitivityDirections
 
 BLOCK = 8
 """Modes and points are kept in blocks of so many."""
@@ -141,7 +141,7 @@ class _ModelStructure(CoreStructure):
     """Mirrors ReducedOrderModel of src/core/reduced_order_model.hpp."""
 
     _fields_ = (
-        *((name, ctypes.c_int64) for name in ("modes", "points", "side_points", "observed", "measured")),
+        *((name, ctypes.c_int64) for name in ("modes", "points", "side_points", "observed", "limited", "measured")),
         *((name, ctypes.c_void_p) for name in (
             "gradients", "points_first", "weights", "sides", "side_modes", "surface", "measures",
         )),
@@ -165,7 +165,8 @@ class CompiledReducedModel:
         weights = model.weights.ravel()[self.points] * np.concatenate([basis.factors, np.zeros(pad)])
         sides, side_modes = _sides(model, modes)
         observed = modes[:, model.top, 1]
-        measured = observed if model.top.size else modes.reshape(count, -1)
+        limited = _in_blocks(observed if model.top.size else modes.reshape(count, -1))
+        pressed = modes[:, np.unique(model.pressed)].reshape(count, -1)
         kept = {
             "gradients": self._padded(narrow),
             "points_first": by_block,
@@ -173,17 +174,22 @@ class CompiledReducedModel:
             "sides": sides,
             "side_modes": self._padded(side_modes),
             "surface": self._padded(observed.T),
-            "measures": np.pad(measured, ((0, 0), (0, -measured.shape[1] % BLOCK))),
+            "measures": np.concatenate([limited, _in_blocks(pressed)], axis=1),
         }
         self._kept = {name: np.ascontiguousarray(array, dtype=float) for name, array in kept.items()}
         self.structure = _ModelStructure(
-            count, self.points.size, len(sides), model.top.size, self._kept["measures"].shape[1],
+            count, self.points.size, len(sides), model.top.size, limited.shape[1], self._kept["measures"].shape[1],
             *(address(array) for array in self._kept.values()),
         )  # fmt: skip
 
     def _padded(self, values: Floats) -> Floats:
         """Values (..., modes) with zeros for the modes added."""
         return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, self.width - values.shape[-1])])
+
+
+def _in_blocks(values: Floats) -> Floats:
+    """Values (modes, displacements) with zeros up to whole blocks."""
+    return np.pad(values, ((0, 0), (0, -values.shape[1] % BLOCK)))
 
 
 def _sides(model: FiniteElementModel, modes: Floats) -> tuple[Floats, Floats]:

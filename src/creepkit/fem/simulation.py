@@ -13,7 +13,8 @@ from creepkit.errors import SolveError
 from creepkit.fem import solver
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.mesh import GeometryDerivative
-from creepkit.fem.solver import LoadProgram, SensitivityDirections, SolvableModel, SolverSettings
+from creepkit.fem.solvable_model import SensitivityDirections, SolvableModel
+from creepkit.fem.solver import LoadProgram, SolverSettings
 from creepkit.fem.time_interpolation import TimeInterpolation
 from creepkit.integration.time_discretisation import merge_programs
 from creepkit.kernels.interface import CompiledLaw

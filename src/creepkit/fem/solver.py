@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
 from creepkit.core import CoreStructure, address, function
 from creepkit.errors import SolveError
+from creepkit.fem.finite_element_model import FiniteElementModel
+from creepkit.fem.solvable_model import SensitivityDirections, SolvableModel
 from creepkit.kernels.interface import CompiledLaw, Entry
-
-if TYPE_CHECKING:
-    from creepkit.fem.finite_element_model import FiniteElementModel
 
 (
     REACHED_END, DEFLECTION_LIMIT, STRAIN_LIMIT, STATE_LIMIT, LIMIT_LOAD, LOST_CONVERGENCE, TOO_MANY_STEPS, LAW_FAILED,
@@ -74,46 +72,6 @@ class StepRecord(NamedTuple):
     time: float
     surface: Floats | None
     moments: Floats | None
-
-
-@dataclass(frozen=True, eq=False)
-class SensitivityDirections:
-    """What is differentiated to beside the P parameters of the law: C = P + D + G columns.
-
-    segments : (D, segments, 10) change of the load history's segments.
-    gradients, hoops : (G, elements, 4, 2, 2) and (G, elements, 4), see fem.mesh.GeometryDerivative.
-    velocities : (G, 2 nodes) mm.
-    """
-
-    segments: Floats
-    gradients: Floats
-    hoops: Floats
-    velocities: Floats
-
-
-class CompiledArrays(Protocol):
-    """A model in the order of the core; structure : for calls of it."""
-
-    @property
-    def structure(self) -> CoreStructure: ...  # noqa: D102
-
-
-class SolvableModel(Protocol):
-    """What can be simulated: a FiniteElementModel, or a ReducedOrderModel of one; see there."""
-
-    entry: ClassVar[str]
-
-    @property
-    def compiled(self) -> CompiledArrays: ...  # noqa: D102
-    @property
-    def displacement_count(self) -> int: ...  # noqa: D102
-    @property
-    def point_count(self) -> int: ...  # noqa: D102
-    @property
-    def observed_count(self) -> int: ...  # noqa: D102
-    def held_motion(self, pattern: Floats | None) -> Floats: ...  # noqa: D102
-    def displacements(self, coordinates: Floats) -> Floats: ...  # noqa: D102
-    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]: ...  # noqa: D102
 
 
 def solve(

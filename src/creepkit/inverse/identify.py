@@ -19,6 +19,7 @@ from creepkit.inverse.composite_predictor import (
     reduced_order_model_of,
     refined_of,
     search_predictor_of,
+    through_for_law,
 )
 from creepkit.inverse.defect_correction import (
     NumericalError,
@@ -110,11 +111,29 @@ def identify(
     so.
     start : an estimate to begin from instead of a global search.
     """
+    how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
+    fit = identify_values(law, histories, using, through=through, **how)
+    with single_threaded_blas():
+        return with_samples(fit, through_for_law(through, law)) if needs_samples(fit) else fit
+
+
+def identify_values(
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: Predictor | Mapping[str, Predictor],
+    *,
+    settings: IdentificationSettings | None = None,
+    search: GlobalSearch | None = None,
+    through: Predictor | None = None,
+    start: StartingEstimate | None = None,
+    progress: IterationCallback | None = None,
+) -> Identification:
+    """As identify(), without samples of the posterior, which say more where a value is at its bound."""
     settings = settings or IdentificationSettings()
     known, known_through, notes = predictors_for_law(law, using, through)
     if notes:
         how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
-        fit = identify(law, histories, known, through=known_through, **how)
+        fit = identify_values(law, histories, known, through=known_through, **how)
         return replace(fit, notes=(*fit.notes, *notes))
     with single_threaded_blas():
         problem = LeastSquaresProblem.from_histories(
@@ -134,8 +153,7 @@ def identify(
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
-        fit = _result(histories, best, search_outcome, numerical_error)
-        return with_samples(fit, through) if needs_samples(fit) else fit
+        return _result(histories, best, search_outcome, numerical_error)
 
 
 def _gradient(best: EstimationResult) -> Floats:

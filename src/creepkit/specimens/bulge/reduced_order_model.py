@@ -19,18 +19,13 @@ from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.reduced_order_model import ReducedOrderModel
 from creepkit.fem.simulation import simulate
 from creepkit.fem.solver import SolverSettings
-from creepkit.records import PROGRAM_NUISANCES, History, NuisanceValues, Prediction, Predictor
-from creepkit.specimens.bulge.finite_elements import (
-    BulgeSetup,
-    model_of_geometry,
-    model_of_specimen,
-    predict_bulge,
-    solver_settings,
-)
+from creepkit.records import PROGRAM_NUISANCES, History, NuisanceValues, Prediction, Predictor, SupportsRefinement
+from creepkit.specimens.bulge.finite_elements import predict_bulge, solver_settings
 from creepkit.specimens.bulge.geometry import DimpleGeometry
 from creepkit.specimens.bulge.observation import OBSERVED
 from creepkit.specimens.bulge.settings import BulgeSettings
-from creepkit.specimens.reduced_order_training import MODES, POINTS, RAMP, power_law_runs, trained_basis
+from creepkit.specimens.bulge.setup import BulgeSetup, model_of_geometry, model_of_specimen
+from creepkit.specimens.reduced_order_training import MODES, RAMP, power_law_runs, trained_basis
 
 if TYPE_CHECKING:
     from creepkit.language import CreepLaw
@@ -61,13 +56,14 @@ LENGTH_STEP = 1.05
 class BulgeReducedOrderModel:
     """A bulge specimen in a reduced-order model; same outputs, nuisances and errors, and derivatives to all of them.
 
-    Trained at the first prediction, in some seconds of CPU for each dimple. modes, points : of the model. searching :
-    whether steps are as long as a global search allows, which err as much as the model does.
+    Trained at the first prediction, in some seconds of CPU for each dimple, and kept on disk. modes, points : of the
+    model; None for as many points as the mesh needs. searching : whether steps are as long as a global search allows, which
+    err as much as the model does.
     """
 
     specimen: BulgeSettings
     modes: int = MODES
-    points: int = POINTS
+    points: int | None = None
     searching: bool = False
     name: str = field(default="bulge, reduced-order model", init=False)
     title: str = field(default="Bulge test in a reduced-order model, for searches", init=False)
@@ -135,9 +131,8 @@ class BulgeReducedOrderModel:
 
     def refined(self) -> Predictor:
         """What it stands for: the specimen itself on its finer discretisation."""
-        from creepkit.specimens.bulge.specimen import Bulge
-
-        assert isinstance(self.specimen, Bulge)
+        if not isinstance(self.specimen, SupportsRefinement):
+            raise SolveError("the specimen of this reduced-order model has no finer discretisation")
         return self.specimen.refined()
 
 
@@ -165,14 +160,14 @@ def _output_errors(predictor: BulgeReducedOrderModel) -> tuple[float, ...]:
 
 @lru_cache(maxsize=256)
 def _model_of_geometry(
-    specimen: BulgeSettings, geometry: DimpleGeometry, refinement: float, modes: int, points: int
+    specimen: BulgeSettings, geometry: DimpleGeometry, refinement: float, modes: int, points: int | None
 ) -> ReducedOrderModel:
     """The reduced-order model of a dimple; kept, for a fit needs it a thousand times."""
     model = model_of_geometry(geometry, refinement)
-    nominal = nominal_geometry(specimen.geometry, geometry)
-    family = _trained_models(nominal, refinement)
-    if not all(_same_numbering(model, other) for other in family):
-        family = (model,)
+    candidates = _thicknesses(nominal_geometry(specimen.geometry, geometry), refinement)
+    alike = [each for each in candidates if _same_numbering(model, each)] or [model]
+    places = np.linspace(0, len(alike) - 1, min(len(alike), TRAINED_THICKNESSES)).round().astype(int)
+    family = [alike[k] for k in places]
     settings = solver_settings(specimen)
     return ReducedOrderModel(model, trained_basis(family, settings, modes=modes, points=points))
 
@@ -192,9 +187,9 @@ def nominal_geometry(own: DimpleGeometry, geometry: DimpleGeometry) -> DimpleGeo
 
 
 @lru_cache(maxsize=64)
-def _trained_models(nominal: DimpleGeometry, refinement: float) -> tuple[FiniteElementModel, ...]:
-    """Models of the thicknesses that a basis is trained at, as far as the plate allows."""
-    ends = np.log(THICKNESS_RANGE) * 0.5 * np.cos(np.pi * (np.arange(TRAINED_THICKNESSES) + 0.5) / TRAINED_THICKNESSES)
+def _thicknesses(nominal: DimpleGeometry, refinement: float) -> tuple[FiniteElementModel, ...]:
+    """Models of thicknesses that a basis may be trained at, as far as the plate allows."""
+    ends = np.log(THICKNESS_RANGE) * np.linspace(-0.5, 0.5, 2 * TRAINED_THICKNESSES + 1)
     most = nominal.plate_thickness - nominal.roof_axial
     thicknesses = sorted({min(float(nominal.apex_thickness * np.exp(e)), most) for e in ends})
     return tuple(model_of_geometry(nominal.replace(apex_thickness=h), refinement) for h in thicknesses)

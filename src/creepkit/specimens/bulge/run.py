@@ -27,8 +27,9 @@ from creepkit.kernels.interface import (
 )
 from creepkit.presentation import present
 from creepkit.records import History, Status
-from creepkit.specimens.bulge.finite_elements import BulgeSetup, set_up_test, solver_settings
+from creepkit.specimens.bulge.finite_elements import solver_settings
 from creepkit.specimens.bulge.observation import OBSERVED
+from creepkit.specimens.bulge.setup import BulgeSetup, set_up_test
 from creepkit.specimens.run import Run, run_from_outputs
 
 if TYPE_CHECKING:

@@ -24,12 +24,11 @@ from creepkit.laws.combined import COMBINED
 from creepkit.records import History, PressureJump, Status
 from creepkit.specimens.bulge.finite_elements import (
     BulgeSensitivities,
-    BulgeSetup,
     output_sensitivities,
     sensitivity_directions_of,
-    set_up_test,
     solver_settings,
 )
+from creepkit.specimens.bulge.setup import BulgeSetup, set_up_test
 from creepkit.specimens.bulge.specimen import Bulge
 from helpers.literature_laws import RATE, damage, law, number, omega
 

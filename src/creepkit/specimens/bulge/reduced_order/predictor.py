@@ -36,7 +36,7 @@ _OBSERVED_COLUMNS = slice(AMPLITUDE_COLUMN, AMPLITUDE_COLUMN + len(OBSERVED))
 
 
 @dataclass(frozen=True)
-class BulgeReducedOrderModel:
+class OneDegreeOfFreedomModel:
     """A bulge specimen with one degree of freedom; same outputs, nuisances and errors.
 
     Its tables come from some runs of `specimen` at the first prediction (some seconds of CPU for each dimple). Law

@@ -14,11 +14,12 @@ from scipy.interpolate import CubicSpline
 from creepkit.arrays import Floats, Ints
 from creepkit.errors import SolveError
 from creepkit.records import History
-from creepkit.specimens.bulge.finite_elements import MODULUS_TEMPERATURE_STEP, BulgeSetup, set_up_test
+from creepkit.specimens.bulge.finite_elements import MODULUS_TEMPERATURE_STEP
 from creepkit.specimens.bulge.reduced_order.step_equations import TRAJECTORY_COLUMNS
 from creepkit.specimens.bulge.reduced_order.step_solution import NUISANCE_DIRECTIONS, FeatureFactors
 from creepkit.specimens.bulge.reduced_order.tables import ReducedOrderTables, build_tables
 from creepkit.specimens.bulge.reduced_order.time_integration import integrate_candidates
+from creepkit.specimens.bulge.setup import BulgeSetup, set_up_test
 
 if TYPE_CHECKING:
     from creepkit.specimens.bulge.settings import BulgeSettings

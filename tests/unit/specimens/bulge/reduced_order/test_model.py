@@ -14,13 +14,13 @@ from creepkit.laws.strain_hardening import STRAIN_HARDENING
 from creepkit.laws.time_hardening import TIME_HARDENING
 from creepkit.records import History, Predictor, PressureJump, Program, RecordedLoading, Status, constant_stress
 from creepkit.specimens.bulge.reduced_order.deflection_curves import LOG_GROWTH, LOG_STRESS, curve_value, grid_position
-from creepkit.specimens.bulge.reduced_order.predictor import BulgeReducedOrderModel
+from creepkit.specimens.bulge.reduced_order.predictor import OneDegreeOfFreedomModel
 from creepkit.specimens.bulge.reduced_order.tables import build_tables, read_tables, write_tables
 from creepkit.specimens.bulge.reduced_order.trajectories import TrajectoryOptions, simulate_trajectories
 from creepkit.specimens.bulge.specimen import Bulge
 
 BULGE = Bulge(threads=1)
-REDUCED = BulgeReducedOrderModel(BULGE)
+REDUCED = OneDegreeOfFreedomModel(BULGE)
 HOURS = 3600.0
 STIFF = Elastic(9e7)
 """So stiff that stresses are those of steady creep from the first."""

@@ -1,0 +1,115 @@
+"""A bulge test set up from its history: finite element model, load history, geometry and observation operator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creepkit.arrays import Floats
+from creepkit.errors import SolveError
+from creepkit.fem.finite_element_model import FiniteElementModel, finite_element_model
+from creepkit.fem.simulation import LoadHistory
+from creepkit.records import History, Program, with_program_nuisances
+from creepkit.specimens.bulge.geometry import DimpleGeometry
+from creepkit.specimens.bulge.observation import Observation
+
+if TYPE_CHECKING:
+    from creepkit.language import Elastic
+    from creepkit.specimens.bulge.settings import BulgeSettings
+
+
+@dataclass(frozen=True, eq=False)
+class BulgeSetup:
+    """One test set up: its finite element model and load history, its geometry, its observation operator.
+
+    refinement : of the structured mesh, None for a mesh from files.
+    """
+
+    model: FiniteElementModel
+    load_history: LoadHistory
+    geometry: DimpleGeometry
+    observation: Observation
+    refinement: float | None
+
+    @property
+    def radii(self) -> Floats:
+        """(top,) mm, radii of the observed nodes at rest."""
+        return np.asarray(self.model.nodes[self.model.top, 0])
+
+
+def set_up_test(specimen: BulgeSettings, history: History, nuisances: Mapping[str, float]) -> BulgeSetup:
+    """Prepare one test; nuisances : {key: value} of its explicit nuisances."""
+    history, where = with_program_nuisances(history, nuisances), history.origin
+    if history.loading.quantity != "pressure":
+        raise SolveError(
+            f"{where}: a bulge specimen is loaded by pressure, found {history.loading.quantity}; use PressureJump"
+        )
+    if history.times[-1] <= 0.0:
+        raise SolveError(f"{where}: the last time is 0 s, where the load only begins; ask for a time after it")
+    if history.elastic is None:
+        raise SolveError(f"{where}: a bulge test needs elastic data; set elastic=Elastic(E=...), E in MPa")
+    pressure = history.loading.program()
+    if pressure.values.min() < 0.0:
+        raise SolveError(f"{where}: the pressure falls to {pressure.values.min():g} MPa; it must not be negative")
+    if not pressure.values.max() > 0.0:
+        raise SolveError(f"{where}: the pressure is zero throughout; a bulge test needs one above zero")
+    geometry = _geometry(specimen, history, nuisances)
+    operator = Observation.from_text(history.operator) if history.operator else specimen.observation
+    if "window" in nuisances:
+        operator = operator.replace(window=float(nuisances["window"]))
+    temperature = history.temperature_program()
+    temperature = Program(temperature.times, temperature.values + nuisances.get("temperature", 0.0))
+    modulus = modulus_program(history.elastic, temperature, 1.0 + nuisances.get("modulus", 0.0), where)
+    model = model_of_specimen(specimen, geometry)
+    poisson = float(history.elastic.at(float(temperature.values[0])).nu)
+    load_history = LoadHistory(pressure, temperature, modulus, float(history.times[-1]), poisson)
+    return BulgeSetup(model, load_history, geometry, operator, specimen.refinement if specimen.mesh is None else None)
+
+
+def modulus_program(elastic: Elastic, temperature: Program, factor: float, where: str) -> Program:
+    """Young's modulus over time, MPa, a straight line where the temperature is one."""
+    moduli = {float(T): float(elastic.at(float(T)).E) for T in np.unique(temperature.values)}
+    values = np.array([factor * moduli[float(T)] for T in temperature.values])
+    if not (values > 0).all():
+        raise SolveError(f"{where}: the modulus is {values.min():g} MPa; it must be above zero")
+    return Program(temperature.times, values)
+
+
+@lru_cache(maxsize=256)
+def model_of_geometry(geometry: DimpleGeometry, refinement: float) -> FiniteElementModel:
+    """The finite element model of a dimple; kept, for a fit needs it a thousand times."""
+    return finite_element_model(geometry.mesh(refinement))
+
+
+def model_of_specimen(specimen: BulgeSettings, geometry: DimpleGeometry | None = None) -> FiniteElementModel:
+    """The finite element model of a specimen's mesh, or of its geometry or another one in its place."""
+    if specimen.mesh is not None:
+        return _model_of_mesh(specimen)
+    return model_of_geometry(geometry or specimen.geometry, specimen.refinement)
+
+
+@lru_cache(maxsize=16)
+def _model_of_mesh(specimen: BulgeSettings) -> FiniteElementModel:
+    assert specimen.mesh is not None
+    if not specimen.mesh.top.size:
+        raise SolveError("the mesh of a bulge specimen names no observed surface; give it the nodes of its top")
+    return finite_element_model(specimen.mesh)
+
+
+def _geometry(specimen: BulgeSettings, history: History, nuisances: Mapping[str, float]) -> DimpleGeometry:
+    """The specimen's geometry, with what was measured of this test and then what is assumed of it."""
+    changes = {name: value for name, value in history.geometry.items() if name in DimpleGeometry.lengths}
+    if "thickness" in nuisances:
+        changes["apex_thickness"] = float(nuisances["thickness"])
+    if not changes:
+        return specimen.geometry
+    if specimen.mesh is not None:
+        raise SolveError(
+            f"history '{history.name}' has a geometry of its own ({', '.join(changes)}), which a specimen with a mesh "
+            "from files cannot follow; use one without mesh="
+        )
+    return specimen.geometry.replace(**changes)
