@@ -30,7 +30,6 @@ REASONS = {
     solver.TOO_MANY_STEPS: "the cap on steps was reached",
     solver.LAW_FAILED: "the law gave no finite rate at a point",
     solver.SINGULAR_TANGENT: "the tangent was singular, so that there are no derivatives",
-    solver.INTERRUPTED: "the simulation was interrupted",
 }
 """What each ending means, in words."""
 

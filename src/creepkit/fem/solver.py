@@ -16,8 +16,8 @@ from creepkit.kernels.interface import CompiledLaw, Entry
 
 (
     REACHED_END, DEFLECTION_LIMIT, STRAIN_LIMIT, STATE_LIMIT, LIMIT_LOAD, LOST_CONVERGENCE, TOO_MANY_STEPS, LAW_FAILED,
-    SINGULAR_TANGENT, INTERRUPTED, OUT_OF_MEMORY,
-) = range(11)  # fmt: skip
+    SINGULAR_TANGENT, OUT_OF_MEMORY,
+) = range(10)  # fmt: skip
 """Codes of an ending; whatever it is, the history so far is kept."""
 
 
@@ -104,7 +104,7 @@ def solve(
     entries = _Law(*_entry_addresses(law), address(theta), theta.size, law.states)
     given = _Input(
         program.beta, program.poisson, len(segments), address(segments), address(pattern), address(initial),
-        address(limits), len(script), address(script), None,
+        address(limits), len(script), address(script),
     )  # fmt: skip
     surface = moments = None
     along = derivatives = None
@@ -220,7 +220,7 @@ class _Stage(CoreStructure):
 class _Input(CoreStructure):
     _fields_ = (
         ("beta", _REAL), ("poisson", _REAL), ("segment_count", _NUMBER), ("segments", _ARRAY), ("pattern", _ARRAY),
-        ("initial", _ARRAY), ("limits", _ARRAY), ("script_steps", _NUMBER), ("script", _ARRAY), ("stop", _ARRAY),
+        ("initial", _ARRAY), ("limits", _ARRAY), ("script_steps", _NUMBER), ("script", _ARRAY),
     )  # fmt: skip
 
 

@@ -273,8 +273,11 @@ def predict_bulge(
 
     workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
     if workers > 1:
-        with ThreadPoolExecutor(workers) as pool:
+        pool = ThreadPoolExecutor(workers)
+        try:
             rows = list(pool.map(run, tasks))
+        finally:
+            pool.shutdown(cancel_futures=True)  # an interrupt waits for the simulations that run, not for the others
     else:
         rows = [run(task) for task in tasks]
     parts = [_history_prediction(rows[k :: len(histories)]) for k in range(len(histories))]
