@@ -259,10 +259,16 @@ def predict_bulge(
     theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
     tasks = list(product(range(len(theta)), range(len(histories))))
 
+    prepared: dict[tuple[int, tuple[float, ...]], PreparedTest] = {}  # candidates often share all nuisances
+
     def run(task: tuple[int, int]) -> BulgeResponse:
         c, k = task
-        nuisance_values = {kind: float(value[c, k]) for kind, value in nuisances.items()}
-        return simulate_and_observe(specimen, kernel, theta[c], histories[k], nuisance_values, sensitivities, model_of)
+        values = {kind: float(value[c, k]) for kind, value in nuisances.items()}
+        key = k, tuple(values.values())
+        test = prepared.get(key)
+        if test is None:
+            test = prepared[key] = prepare_test(specimen, histories[k], values, sensitivities, model_of)
+        return simulate_and_observe(specimen, kernel, theta[c], test)
 
     workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
     if workers > 1:
@@ -274,34 +280,52 @@ def predict_bulge(
     return assemble_prediction(parts, histories, OBSERVED, len(theta))
 
 
-def simulate_and_observe(
+@dataclass(frozen=True, eq=False)
+class PreparedTest:
+    """A test set up, the model that is simulated, and what is differentiated to.
+
+    names : of the explicit nuisances. directions : None for no derivatives.
+    """
+
+    history: History
+    setup: BulgeSetup
+    model: SolvableModel
+    names: tuple[str, ...]
+    directions: SensitivityDirections | None
+
+
+def prepare_test(
     specimen: BulgeSettings,
-    kernel: CompiledLaw,
-    theta: Floats,
     history: History,
     nuisances: Mapping[str, float],
     jacobian: bool,
     model_of: Callable[[BulgeSetup], SolvableModel] | None = None,
-) -> BulgeResponse:
-    """Simulate one test and observe it at the times of its history; theta : (parameters,) internal values."""
+) -> PreparedTest:
+    """What all candidates of a test share at the same explicit nuisances; model_of : see predict_bulge."""
     test_setup = set_up_test(specimen, history, nuisances)
     model = test_setup.model if model_of is None else model_of(test_setup)
-    settings = solver_settings(specimen, exact=jacobian)
     names, directions = tuple(nuisances), None
     if jacobian:
         programs = program_directions(specimen, history, nuisances)
         directions = sensitivity_directions_of(test_setup, history, names, programs)
-    simulation = simulate(kernel, theta, model, test_setup.load_history, settings=settings, directions=directions)
-    profiles = simulation.displacements[:, test_setup.model.top, 1]
+    return PreparedTest(history, test_setup, model, names, directions)
+
+
+def simulate_and_observe(
+    specimen: BulgeSettings, kernel: CompiledLaw, theta: Floats, test: PreparedTest
+) -> BulgeResponse:
+    """Simulate one test and observe it at the times of its history; theta : (parameters,) internal values."""
+    setup, history, directions = test.setup, test.history, test.directions
+    settings = solver_settings(specimen, exact=directions is not None)
+    simulation = simulate(kernel, theta, test.model, setup.load_history, settings=settings, directions=directions)
+    profiles = simulation.displacements[:, setup.model.top, 1]
     sensitivities = None
     if directions is not None:
         outputs, sensitivities = output_sensitivities(
-            test_setup, theta, history, simulation, profiles, names, directions
+            setup, theta, history, simulation, profiles, test.names, directions
         )
     else:
-        outputs = test_setup.observation.observe_at_times(
-            test_setup.radii, profiles, simulation.timeline, history.times
-        )
+        outputs = setup.observation.observe_at_times(setup.radii, profiles, simulation.timeline, history.times)
     return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
 
 
