@@ -44,8 +44,8 @@ RUNS = 64
 """Training simulations; a power of two, for a Sobol sequence."""
 
 
-EXPONENTS = (1.0, 12.0)
-"""Of the training's power laws."""
+EXPONENTS, NEARLY_PLASTIC = (1.0, 12.0), (12.0, 50.0)
+"""Of the training's power laws, and of every fourth: those of hyperbolic sines at large stresses."""
 
 
 ELASTIC_STRAIN = (2e-4, 8e-3)
@@ -76,7 +76,7 @@ _POWER_LAW = CreepLaw(
     terms={"power law": _A * stress**_n},
     params={
         _A: Param("rate coefficient", unit="1/s", bounds=(1e-300, 1.0), scale="log", off=0.0),
-        _n: Param("stress exponent", bounds=(0.5, 13)),
+        _n: Param("stress exponent", bounds=(0.5, 60)),
     },
     references=("Norton (1929), The Creep of Steel at High Temperatures",),
 )
@@ -90,7 +90,8 @@ def power_law_runs(
     ratios = [stress_ratio(law, model, poisson) for model in models]
     runs = []
     for k, draw in enumerate(qmc.Sobol(5, seed=seed).random(count)):
-        exponent = EXPONENTS[0] + (EXPONENTS[1] - EXPONENTS[0]) * draw[0]
+        low, high = EXPONENTS
+        exponent = _between(NEARLY_PLASTIC, draw[0]) if k % 4 == 3 else low + (high - low) * draw[0]
         ratio = ratios[k % len(models)]
         first = _between(ELASTIC_STRAIN, draw[1])
         second = _between((first, ELASTIC_STRAIN[1]), draw[2]) if k % 2 else first
@@ -163,7 +164,7 @@ _FORMAT = DocumentFormat(
 def _key(models: Sequence[FiniteElementModel], settings: SolverSettings, modes: int, points: int) -> str:
     """Of everything that a basis follows from."""
     digest = hashlib.sha256(
-        repr((_FORMAT, settings, modes, points, RUNS, EXPONENTS, ELASTIC_STRAIN, CREEP_STRAIN)).encode()
+        repr((_FORMAT, settings, modes, points, RUNS, EXPONENTS, NEARLY_PLASTIC, ELASTIC_STRAIN, CREEP_STRAIN)).encode()
     )
     for model in models:
         for array in (model.nodes, model.elements, model.equations, model.pressed, model.top):
