@@ -42,7 +42,7 @@ MOST_FORCE_ROWS = 12_000
 """Snapshots times modes that points are chosen by, at most; snapshots are drawn evenly."""
 
 
-STIFFNESS_SHARE = 1.0
+STIFFNESS_SHARE = 3.0
 """Weight of the elastic stiffness beside that of the forces when points are chosen."""
 
 

@@ -26,7 +26,7 @@ from creepkit.specimens.bulge.specimen import Bulge
 from helpers.fem_cases import lowered
 from helpers.literature_laws import RATE, damage, law, number, omega
 
-SPECIMEN = Bulge(threads=1, tolerance=1e-3)
+SPECIMEN = Bulge(threads=1, tolerance=1e-4)
 REDUCED = SPECIMEN.reduced_order_model()
 A, B, n, k, m, c = parameters("A B n k m c")
 TENSILE = law(A * stress**n * strain**m * (1 + c * principal_stress / stress), {
@@ -109,13 +109,13 @@ def test_thickness() -> None:
 
 
 def test_another_dimple_and_its_mesh_from_files() -> None:
-    """A plate with a fillet, meshed and as a mesh that came from elsewhere: nothing knows the paper's dimple."""
-    fillet = Bulge(geometry=DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",)), threads=1, tolerance=1e-3)
+    """A plate with a fillet, meshed and as a mesh from elsewhere, within one per cent: nothing knows the dimple."""
+    fillet = Bulge(geometry=DimpleGeometry(1.0, 5.0, 1.0, 1.5, 4.0, 7.5, ("rim",)), threads=1, tolerance=1e-4)
     theta = NORTON.to_internal({"A": 1e-13, "n": 4.3})
     for specimen in (fillet, fillet.replace(mesh=with_top(fillet))):
         exact, found = (p.predict(NORTON, theta, [history()]) for p in (specimen, specimen.reduced_order_model()))
         error = np.abs(found.values - exact.values)[0, 0, :, 0].max() / np.abs(exact.values[..., 0]).max()
-        assert error < 0.005
+        assert error < 0.01
 
 
 def with_top(specimen: Bulge):
