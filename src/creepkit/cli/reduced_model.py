@@ -17,9 +17,10 @@ def command(
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Picture of its points to write.")] = None,
 ) -> None:
-    """Train the reduced-order model of a dimple, in which searches begin.
+    """Train the reduced-order model of a dimple.
 
-    It is kept in the cache folder, so that the first identification of such a dimple finds it there; some seconds.
+    Searches begin in it. It is kept in the cache folder, so that the first identification of such a dimple finds it
+    there; some seconds.
     """
     import creepkit as ck
     from creepkit.errors import SolveError

@@ -107,8 +107,7 @@ def identify(
     search : how to begin; by default least squares from several screened starts (MultiStart).
     through : a cheaper predictor, such as a surrogate, in which the minima of the search are refined before `using`:
         values and intervals are those of `using`.
-    A surrogate that does not know this class of laws is replaced by its specimen, or left out on the way; a note says
-    so.
+    A surrogate that does not know this class of laws is replaced by its specimen, or left out; a note says so.
     start : an estimate to begin from instead of a global search.
     """
     how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
@@ -128,20 +127,20 @@ def identify_values(
     start: StartingEstimate | None = None,
     progress: IterationCallback | None = None,
 ) -> Identification:
-    """As identify(), without samples of the posterior, which say more where a value is at its bound."""
+    """As identify(), without samples of the posterior where a value is at its bound."""
     settings = settings or IdentificationSettings()
-    known, known_through, notes = predictors_for_law(law, using, through)
+    known, through, notes = predictors_for_law(law, using, through)
     if notes:
         how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
-        fit = identify_values(law, histories, known, through=known_through, **how)
+        fit = identify_values(law, histories, known, through=through, **how)
         return replace(fit, notes=(*fit.notes, *notes))
     with single_threaded_blas():
         problem = LeastSquaresProblem.from_histories(
             law, histories, using, settings, None if start is None else start.reference
         )
         if start is not None and start.u is not None:
-            u = np.clip(start.u, problem.bounds.lower[: len(law.params)], problem.bounds.upper[: len(law.params)])
-            search_outcome = SearchOutcome([u], 0, None)
+            lower, upper = (bound[: len(law.params)] for bound in (problem.bounds.lower, problem.bounds.upper))
+            search_outcome = SearchOutcome([np.clip(start.u, lower, upper)], 0, None)
         else:
             search_outcome = _global_search(problem, through, search or MultiStart(), progress)
         if search_outcome.dropped_terms:

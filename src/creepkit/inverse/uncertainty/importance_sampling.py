@@ -41,10 +41,6 @@ LEAST_EFFECTIVE_SIZE = 40.0
 """Effective number of samples below which they say nothing."""
 
 
-ENOUGH_EFFECTIVE_SIZE = 250.0
-"""Effective number of samples above which no further round is drawn."""
-
-
 UNCERTAIN_VERDICTS = ("at its bound", "not determined")
 
 
@@ -95,8 +91,6 @@ def posterior_samples(fit: Identification, seed: int | None = None) -> Floats | 
         deviation = points - centre
         shape = (weights[:, None] * deviation).T @ deviation
         shape += 1e-6 * np.diag(np.diag(fit.covariance))
-        if 1.0 / float((weights**2).sum()) >= ENOUGH_EFFECTIVE_SIZE:
-            break
     if 1.0 / float((weights**2).sum()) < LEAST_EFFECTIVE_SIZE:
         return None
     positions = (np.arange(SAMPLES) + 0.5) / SAMPLES
