@@ -62,19 +62,10 @@ def _package(name: str) -> str:
         names += sorted(module.name for module in pkgutil.walk_packages(root.__path__, f"{root.__name__}."))
     parts = [_title(root.__name__, "=")]
     for module in names:
-        _document_compiled_functions(importlib.import_module(module))
         if module != root.__name__:
             parts.append(_title(module, "-"))
         parts.append(f".. automodule:: {module}\n")
     return "\n".join(parts)
-
-
-def _document_compiled_functions(module: ModuleType) -> None:
-    """Put the Python function in the place of each one compiled by numba, which autodoc takes for data."""
-    for name, value in list(vars(module).items()):
-        function = getattr(value, "py_func", None)
-        if function is not None and not isinstance(value, type):
-            setattr(module, name, function)
 
 
 def _title(text: str, line: str) -> str:

@@ -12,7 +12,7 @@ if __name__ == "__main__":
         processes=4,  # one thread each: a simulation uses one
         memory="4GB",
         walltime="04:00:00",
-        job_script_prologue=["export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1"],
+        job_script_prologue=["export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1"],
     )
     jobs.adapt(maximum_jobs=16)
     data = ck.generate(

@@ -23,7 +23,7 @@ def command(
         str | None, typer.Option(help="Seen at each frame: load,mean_load,time,step; by default what the grid needs.")
     ] = None,
     target: Annotated[str | None, typer.Option(help="value, or log, of the output that grows with creep.")] = None,
-    base: Annotated[str | None, typer.Option(help="none; or one-dof: correct the reduced-order model.")] = None,
+    base: Annotated[str | None, typer.Option(help="none; or reduced-order: correct the reduced-order model.")] = None,
     epochs: Annotated[int | None, typer.Option(min=1, help="Passes over the training rows.")] = None,
     batch: Annotated[int | None, typer.Option(min=1, help="Histories in a step.")] = None,
     rate: Annotated[float | None, typer.Option(help="Rate of Adam at the beginning.")] = None,

@@ -1,1 +1,1 @@
-"""The axisymmetric finite element solver of creep at finite strain, compiled once for any law."""
+"""Axisymmetric finite elements of creep at finite strain, and reduced-order models of them; the core solves both."""

@@ -23,11 +23,12 @@ TILE = 8
 class FiniteElementModel:
     """A mesh ready to be simulated; displacements are kept as (2 nodes,) numbers, u_r and u_z in turn.
 
-    nodes : (nodes, 2) mm. elements : (elements, 8). by_radius, by_height, over_radius : (elements, 4, 8), weights :
-        (elements, 4), as in `fem.mesh`.
+    nodes : (nodes, 2) mm, radius r and height z. elements : (elements, 8) nodes of each element.
+    by_radius, by_height, over_radius : (elements, 4, 8) 1/mm, see fem.mesh.Discretization.
+    weights : (elements, 4) mm^3, area of the section that belongs to a point, times its radius.
     equations : (2 nodes,) number of the equation of a displacement, -1 where it is held.
     size, width : number of equations, half-bandwidth.
-    pressed : (edges, 3) nodes. top : (top,) nodes of the observed surface.
+    pressed : (edges, 3) nodes of the sides under pressure. top : (top,) nodes of the observed surface.
     """
 
     nodes: Floats
@@ -66,15 +67,25 @@ class FiniteElementModel:
         return self.top.size
 
     def held_motion(self, pattern: Floats | None) -> Floats:
-        """(2 nodes,) mm of displacement of the held nodes for a unit of motion; pattern : (nodes, 2), None for none."""
+        """Displacement of the held nodes for a unit of motion, (2 nodes,), mm.
+
+        pattern : (nodes, 2) mm, the same node by node; None for no motion.
+        """
         return np.zeros(self.equations.size) if pattern is None else np.ravel(pattern)
 
     def displacements(self, coordinates: Floats) -> Floats:
-        """(steps, nodes, 2) mm, from what the core keeps of each step, (steps, displacement_count)."""
+        """Displacements of the nodes, (steps, nodes, 2), mm.
+
+        coordinates : (steps, displacement_count) mm, what the core keeps of each step.
+        """
         return coordinates.reshape(len(coordinates), -1, 2)
 
     def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]:
-        """Velocity gradients and hoop strains of all points, the copy's included, and velocities of the nodes."""
+        """What the core needs of directions that move the nodes, for each unit of the G numbers of the geometry.
+
+        Velocity gradients (G, elements, 4, 2, 2) and hoop strains (G, elements, 4) of all points, those of the copy
+        included (see CompiledModel), and velocities (G, 2 nodes) of the nodes, mm.
+        """
         padded = self.compiled.padded
         gradients, hoops = (
             np.array([padded(a) for a in values]) for values in (directions.gradients, directions.hoops)
@@ -161,22 +172,22 @@ class CompiledModel:
         )  # fmt: skip
 
     def padded(self, values: Any) -> Any:
-        """Values (elements, ...) of the elements, with those of the copy."""
+        """Values (elements, ...) of the elements, in any unit, with those of the copy."""
         return np.concatenate([values, values[-1:]]) if len(values) < self.elements else values
 
 
 def _half_bandwidth(numbers: Ints) -> int:
-    """Largest distance between two equations of one element; numbers : (elements, unknowns)."""
+    """Largest distance between two equations of one element; numbers : (elements, unknowns), -1 where held."""
     high = numbers.max(axis=1)
     low = np.where(numbers >= 0, numbers, np.iinfo(np.int64).max).min(axis=1)
     return int(np.max(np.where(high >= 0, high - low, 0), initial=0))
 
 
 def _places(numbers: Ints, size: int, width: int) -> Ints:
-    """Places of the blocks rr, rz, zz in the lower triangle in tiles (see banded_matrix.hpp of the core).
+    """Places (elements, 3, nodes, nodes) of the blocks rr, rz, zz in the lower triangle in tiles.
 
-    numbers : (elements, 2, nodes) of the equations. What belongs to held displacements goes to the place behind the
-    last.
+    numbers : (elements, 2, nodes) of the equations, -1 where held. What belongs to held displacements goes to the place
+        behind the last. The tiles are those of banded_matrix.hpp of the core.
     """
     blocks, diagonals = -(-size // TILE), -(-width // TILE) + 1
     nobody = (blocks + diagonals) * diagonals * TILE**2

@@ -65,12 +65,12 @@ GAUSS_POINTS = CORNERS / np.sqrt(3.0)
 
 
 class Discretization(NamedTuple):
-    """A mesh at its integration points: (elements, 4 points, 8 nodes) unless said otherwise; mm.
+    """A mesh at the four integration points of each element.
 
-    by_radius, by_height : derivatives of the shape functions to r and to z, 1/mm.
-    over_radius : shape functions divided by the radius of the point, 1/mm.
-    weights : (elements, 4) area of the section that belongs to a point, times its radius, mm^3.
-    points : (elements, 4, 2) r and z, mm.
+    by_radius, by_height : (elements, 4, 8) 1/mm, derivatives of the shape functions to r and to z.
+    over_radius : (elements, 4, 8) 1/mm, shape functions divided by the radius of the point.
+    weights : (elements, 4) mm^3, area of the section that belongs to a point, times its radius.
+    points : (elements, 4, 2) mm, r and z.
     """
 
     by_radius: Floats
@@ -81,7 +81,7 @@ class Discretization(NamedTuple):
 
 
 class GeometryDerivative(NamedTuple):
-    """How the points move with a number of the geometry, for each unit of it.
+    """How the points move with a number of the geometry: 1 over the unit of that number, as velocities are mm over it.
 
     gradient : (elements, 4, 2, 2) derivative of the velocity's component (first of the two) to r and z.
     hoop : (elements, 4) radial velocity over the radius.
@@ -92,7 +92,7 @@ class GeometryDerivative(NamedTuple):
 
 
 def shape_functions(places: Floats) -> Floats:
-    """Values (places, 8) at places (places, 2) of the reference element."""
+    """Values (places, 8) of the shape functions at places (places, 2) of the reference element."""
     x, y = places[:, :1], places[:, 1:]
     cx, cy = CORNERS.T
     corner = 0.25 * (1 + x * cx) * (1 + y * cy) * (x * cx + y * cy - 1)
@@ -131,7 +131,10 @@ def discretize(mesh: Mesh) -> Discretization:
 
 
 def geometry_derivative(mesh: Mesh, velocity: Floats) -> GeometryDerivative:
-    """What exact shape derivatives need when the nodes move with `velocity` (nodes, 2), mm a unit of the number."""
+    """What exact shape derivatives need when the nodes move.
+
+    velocity : (nodes, 2) mm for each unit of the number of the geometry.
+    """
     at = discretize(mesh)
     moves = velocity[mesh.elements]
     gradient = np.stack([np.einsum("epa,eai->epi", slopes, moves) for slopes in (at.by_radius, at.by_height)], axis=3)
@@ -139,7 +142,10 @@ def geometry_derivative(mesh: Mesh, velocity: Floats) -> GeometryDerivative:
 
 
 def local_tangents(nodes: Floats, places: Floats) -> Floats:
-    """Derivatives (elements, places, 2 local, 2) of r and z, for nodes (elements, 8, 2)."""
+    """Derivatives (elements, places, 2 local, 2) of r and z to the local coordinates, mm.
+
+    nodes : (elements, 8, 2) mm, of each element. places : (places, 2) of the reference element.
+    """
     return np.asarray(np.einsum("pai,eaj->epij", shape_gradients(places), nodes))
 
 
@@ -158,7 +164,7 @@ def refuse_inverted(mesh: Mesh) -> None:
 
 
 def _alternate(first: Floats, second: Floats) -> Floats:
-    """Columns of two arrays (places, 2) in turn: the middles of the sides 1-2, 2-3, 3-4, 4-1."""
+    """Columns of two arrays (places, 2) in turn, (places, 4): the middles of the sides 1-2, 2-3, 3-4, 4-1."""
     return np.stack([first, second], axis=2).reshape(len(first), 4)
 
 
@@ -186,12 +192,15 @@ def mesh_quality(mesh: Mesh) -> MeshQuality:
 
 
 def half_bandwidth(elements: Ints) -> int:
-    """Diagonals beside the main one in a matrix of two unknowns a node."""
+    """Diagonals beside the main one in a matrix of two unknowns a node; elements : (elements, 8) nodes of each."""
     return int(2 * np.ptp(elements, axis=1).max() + 1)
 
 
 def outline(elements: Ints) -> Ints:
-    """Element and side number (sides, 2) of the sides that belong to one element only."""
+    """Element and side number (sides, 2) of the sides that belong to one element only.
+
+    elements : (elements, 8) nodes of each element.
+    """
     ends = np.sort(elements[:, SIDES[:, [0, 2]]].reshape(-1, 2), axis=1)
     _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
     alone = np.sort(first[count == 1])
@@ -201,8 +210,8 @@ def outline(elements: Ints) -> Ints:
 class StripMesh(NamedTuple):
     """Nodes and elements of a strip, and its four sides as node numbers.
 
-    nodes : (nodes, 2) mm. elements : (elements, 8), in the order that `Mesh` asks for.
-    inner, outer : (columns, 3) element sides along the two lines, the solid to their left.
+    nodes : (nodes, 2) mm. elements : (elements, 8) nodes of each, in the order that `Mesh` asks for.
+    inner, outer : (columns, 3) nodes of the element sides along the two lines, the solid to their left.
     first, last : (2 layers + 1,) nodes of the first and of the last column line, from the inner side.
     inner_line, outer_line : (2 columns + 1,) corner and middle nodes along the two lines, from the first column on.
     """
@@ -220,8 +229,8 @@ class StripMesh(NamedTuple):
 def strip_mesh(inner: Floats, outer: Floats, breaks: Floats) -> StripMesh:
     """The strip whose column lines run straight from `inner` to `outer`.
 
-    inner, outer : (2 columns + 1, 2) ends of the column lines, those of mid-columns included; each lies on its curve,
-        so the sides of the elements are parabolas through three points of it.
+    inner, outer : (2 columns + 1, 2) mm, ends of the column lines, those of mid-columns included; each lies on its
+        curve, so the sides of the elements are parabolas through three points of it.
     breaks : (layers + 1,) rising from 0 on the inner side to 1 on the outer side.
     With `layers` layers the half-bandwidth of a matrix of two unknowns a node is 6 layers + 9.
     """
@@ -247,7 +256,10 @@ def strip_mesh(inner: Floats, outer: Floats, breaks: Floats) -> StripMesh:
 
 
 def strip_nodes(inner: Floats, outer: Floats, breaks: Floats) -> Floats:
-    """The nodes of a strip, (nodes, 2); linear in the two sides, so velocities of the sides give those of the nodes."""
+    """The nodes of a strip, (nodes, 2), mm; linear in the two sides: velocities of the sides give those of the nodes.
+
+    inner, outer : (2 columns + 1, 2) mm, ends of the column lines. breaks : (layers + 1,) from 0 to 1.
+    """
     fine = np.empty(2 * len(breaks) - 1)
     fine[::2], fine[1::2] = breaks, 0.5 * (breaks[:-1] + breaks[1:])
     lines = [_points_across(inner[k], outer[k], breaks if k % 2 else fine) for k in range(len(inner))]
@@ -269,25 +281,33 @@ _ROUNDING = 1e-9
 
 
 class SurfaceInterpolation(NamedTuple):
-    """Matrices (wanted, nodes) from the displacement of the nodes to that at wanted radii, and to its slope d/dr."""
+    """Matrices that the displacements of the top nodes are multiplied by.
+
+    values : (wanted, nodes), giving the displacement at the wanted radii.
+    slopes : (wanted, nodes) 1/mm, giving its derivative to r there.
+    """
 
     values: Floats
     slopes: Floats
 
 
 def surface_interpolation(radii_nodes: ArrayLike, wanted: ArrayLike) -> Floats:
-    """Matrix (wanted, nodes) from the displacement of the top nodes to that at `wanted` radii, mm.
+    """Matrix (wanted, nodes) from the displacement of the top nodes to that at wanted radii.
 
     radii_nodes : (nodes,) mm, corner and middle nodes in turn from the axis outwards, in the undeformed plate.
+    wanted : (wanted,) mm, or one number.
 
-        >>> interpolation([0, 1, 2], [0.5]) @ [0.0, 1.0, 4.0]
+        >>> surface_interpolation([0, 1, 2], [0.5]) @ [0.0, 1.0, 4.0]
         array([0.25])
     """
     return surface_interpolation_with_slopes(radii_nodes, wanted).values
 
 
 def surface_interpolation_with_slopes(radii_nodes: ArrayLike, wanted: ArrayLike) -> SurfaceInterpolation:
-    """As `interpolation`, with the slopes; where two sides meet, the mean of theirs."""
+    """As `surface_interpolation`, with the slopes; where two sides meet, the mean of theirs.
+
+    radii_nodes : (nodes,) mm. wanted : (wanted,) mm, or one number.
+    """
     nodes, radii = checked_surface_radii(radii_nodes), np.atleast_1d(np.asarray(wanted, dtype=float))
     outside = ~((radii >= nodes[0] - _ROUNDING) & (radii <= nodes[-1] + _ROUNDING))
     if outside.any():
@@ -302,7 +322,10 @@ def surface_interpolation_with_slopes(radii_nodes: ArrayLike, wanted: ArrayLike)
 
 
 def checked_surface_radii(radii: ArrayLike) -> Floats:
-    """Radii of top nodes as an array; SolveError unless they can be corner and middle nodes of sides."""
+    """Radii (nodes,) of top nodes, mm, as an array; SolveError unless they can be corner and middle nodes of sides.
+
+    radii : (nodes,) mm, from the axis outwards.
+    """
     nodes = np.asarray(radii, dtype=float)
     if nodes.ndim != 1 or nodes.size < 3 or nodes.size % 2 == 0:
         raise SolveError(
@@ -322,7 +345,10 @@ def checked_surface_radii(radii: ArrayLike) -> Floats:
 
 
 def _on_sides(nodes: Floats, radii: Floats, side: Ints) -> SurfaceInterpolation:
-    """The matrices at radii that lie on the sides of these numbers, or at an end of them."""
+    """The matrices at radii (wanted,), mm, that lie on the sides of these numbers, or at an end of them.
+
+    nodes : (nodes,) mm. side : (wanted,) number of the side, from the axis outwards.
+    """
     side = np.clip(side, 0, nodes.size // 2 - 1)
     first, middle, last = nodes[2 * side], nodes[2 * side + 1], nodes[2 * side + 2]
     bend, reach = 0.5 * (first + last) - middle, 0.5 * (last - first)

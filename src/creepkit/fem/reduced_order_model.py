@@ -57,7 +57,10 @@ def full_basis(model: FiniteElementModel) -> ReducedBasis:
 
 
 def mode_gradients(model: FiniteElementModel, modes: Floats, points: Ints) -> Floats:
-    """Gradients (points, 5, modes) of modes (modes, nodes, 2) at points: of F11, F12, F21, F22 and F33, 1/mm."""
+    """Changes (points, 5, modes) of the deformation gradient's F11, F12, F21, F22 and F33 with each mode.
+
+    modes : (modes, nodes, 2) mm. points : (points,) number 4 element + point of each integration point.
+    """
     element, place = points // 4, points % 4
     nodes = model.elements[element]
     by_radius, by_height, over_radius = (
@@ -70,7 +73,10 @@ def mode_gradients(model: FiniteElementModel, modes: Floats, points: Ints) -> Fl
 
 @dataclass(frozen=True, eq=False)
 class ReducedOrderModel:
-    """A reduced-order model of one mesh, ready to be simulated as a FiniteElementModel is."""
+    """A reduced-order model of one mesh, ready to be simulated as a FiniteElementModel is.
+
+    model : finite elements of the mesh. basis : modes and points of that mesh or of one with the same numbering.
+    """
 
     model: FiniteElementModel
     basis: ReducedBasis
@@ -106,18 +112,25 @@ class ReducedOrderModel:
         return self.model.top.size
 
     def held_motion(self, pattern: Floats | None) -> Floats:
-        """(0,): held nodes stay where they are; SolveError for a pattern (nodes, 2) of motion."""
+        """Nothing, (0,): held nodes stay where they are; SolveError for a pattern (nodes, 2) of motion, mm."""
         if pattern is not None:
             raise SolveError("a reduced-order model does not move held nodes; simulate its finite elements")
         return np.zeros(0)
 
     def displacements(self, coordinates: Floats) -> Floats:
-        """(steps, nodes, 2) mm, from the coordinates (steps, displacement_count) of the modes."""
+        """Displacements of the nodes, (steps, nodes, 2), mm.
+
+        coordinates : (steps, displacement_count) factors of the modes, those added up to whole blocks last.
+        """
         modes = self.basis.modes
         return np.asarray(coordinates[:, : len(modes)] @ modes.reshape(len(modes), -1)).reshape(-1, *modes.shape[1:])
 
     def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]:
-        """Velocity gradients and hoop strains of the points, and changes (G, side points, 3) of the pressed sides."""
+        """What the core needs of directions that move the nodes, for each unit of the G numbers of the geometry.
+
+        Velocity gradients (G, points, 2, 2) and hoop strains (G, points) of the points in whole blocks, and changes
+        (G, side points, 3) of r, dr/dx and dz/dx at the Gauss points of the pressed sides at rest, mm.
+        """
         chosen, count = self.compiled.points, len(directions.velocities)
         gradients = directions.gradients.reshape(count, self.model.weights.size, 2, 2)[:, chosen]
         hoops = directions.hoops.reshape(count, self.model.weights.size)[:, chosen]
@@ -155,7 +168,8 @@ class _ModelStructure(CoreStructure):
 class CompiledReducedModel:
     """Arrays of a reduced-order model in the order of the core.
 
-    width : modes in whole blocks. points : those used, with copies of the first without weight up to whole blocks.
+    width : modes in whole blocks.
+    points : (points,) number of each one used, with copies of the first without weight up to whole blocks.
     structure : for calls of the core.
     """
 
@@ -187,7 +201,7 @@ class CompiledReducedModel:
         )  # fmt: skip
 
     def _padded(self, values: Floats) -> Floats:
-        """Values (..., modes) with zeros for the modes added."""
+        """Values (..., modes) with zeros for the modes added, (..., width)."""
         return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, self.width - values.shape[-1])])
 
 
@@ -197,7 +211,11 @@ def _in_blocks(values: Floats) -> Floats:
 
 
 def _sides(model: FiniteElementModel, modes: Floats) -> tuple[Floats, Floats]:
-    """Gauss points of the sides under pressure: (points, 4) weight, r, dr/dx, dz/dx, and (points, 4, modes)."""
+    """Gauss points of the sides under pressure, x from -1 to 1 along each side.
+
+    (points, 4) weight, then r, dr/dx and dz/dx at rest, mm; (points, 4, modes) changes of u_r, u_z, du_r/dx and du_z/dx
+    with each of the modes (modes, nodes, 2), mm.
+    """
     at_rest, moving = model.nodes[model.pressed], np.moveaxis(modes, 0, -1)[model.pressed]  # (sides, 3, 2, modes)
     rest = [at_rest[..., 0] @ _SIDE_VALUES.T, *(at_rest[..., i] @ _SIDE_SLOPES.T for i in (0, 1))]
     weights = np.broadcast_to(_SIDE_WEIGHTS, rest[0].shape)

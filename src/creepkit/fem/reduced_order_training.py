@@ -60,7 +60,7 @@ NORM = _energy_norm()
 
 @dataclass(frozen=True, eq=False)
 class TrainingRun:
-    """A simulation that a reduced-order model learns from; theta : (P,) internal values."""
+    """A simulation that a reduced-order model learns from; theta : (P,) internal parameters."""
 
     model: FiniteElementModel
     law: CompiledLaw
@@ -72,7 +72,7 @@ class TrainingRun:
 class Snapshots:
     """Steps of the training simulations.
 
-    displacements, changes : (snapshots, nodes, 2) mm, and since the step before.
+    displacements, changes : (snapshots, nodes, 2) mm, at the step, and since the step before.
     stresses : (snapshots, points, 5) MPa, first Piola-Kirchhoff stress.
     models : finite element models of the meshes; mesh : (snapshots,) number of each snapshot's.
     """
@@ -112,7 +112,10 @@ def _at(load_history: LoadHistory, time: float) -> float:
 def _stresses(
     model: FiniteElementModel, displacements: Floats, creep: Floats, modulus: Floats, poisson: float
 ) -> Floats:
-    """First Piola-Kirchhoff stresses (steps, points, 5) of Hencky's law; creep : (steps, points, 3) as in the core."""
+    """First Piola-Kirchhoff stresses (steps, points, 5) of Hencky's law, MPa.
+
+    displacements : (steps, nodes, 2) mm. creep : (steps, points, 3) components as in the core. modulus : (steps,) MPa.
+    """
     points = np.arange(model.weights.size)
     gradient = np.moveaxis(mode_gradients(model, displacements, points), 2, 0)  # (steps, points, 5)
     F = gradient[..., :4].reshape(*gradient.shape[:2], 2, 2) + np.eye(2)
@@ -147,7 +150,7 @@ def train(data: Snapshots, mode_count: int, point_count: int, deflection_limit: 
 
 
 def principal_modes(data: Snapshots, count: int, deflection_limit: float) -> Floats:
-    """Modes (count, nodes, 2) that leave the least elastic energy of the snapshots, orthonormal in that energy."""
+    """Modes (count, nodes, 2) that leave the least elastic energy of the snapshots, orthonormal in that energy; mm."""
     chosen = _evenly(len(data.mesh), MOST_SNAPSHOTS)
     displacements, changes = data.displacements[chosen], data.changes[chosen]
     size, step = (np.abs(values).max(axis=(1, 2)) for values in (displacements, changes))
@@ -169,16 +172,20 @@ def _evenly(total: int, most: int) -> Ints:
 
 
 def _energy_roots(model: FiniteElementModel, modes: Floats) -> Floats:
-    """(points, 5, modes) whose sum of squares is the elastic energy of modes (modes, nodes, 2) for a modulus of one."""
+    """(points, 5, modes) whose sum of squares is the elastic energy of the modes for a modulus of one.
+
+    modes : (modes, nodes, 2) mm.
+    """
     gradients = mode_gradients(model, modes, np.arange(model.weights.size))
     weights = np.sqrt(model.weights.ravel())[:, None, None]
     return np.asarray(NORM @ gradients * weights)
 
 
 def cubature(data: Snapshots, modes: Floats, count: int) -> tuple[Ints, Floats]:
-    """Points (points,) and the factors of their weights, by which the forces on the modes come out right.
+    """Points and the factors of their weights, both (points,), by which the forces on the modes come out right.
 
-    modes : orthonormal in the elastic energy, so that forces are measured by the displacements they make.
+    modes : (modes, nodes, 2) mm, orthonormal in the elastic energy, so that forces are measured by the displacements
+        they make. count : points at most.
     """
     every = data.models[0].weights.size
     if count >= every:
@@ -201,7 +208,8 @@ def cubature(data: Snapshots, modes: Floats, count: int) -> tuple[Ints, Floats]:
 def non_negative_least_squares(gram: Floats, right: Floats, count: int) -> tuple[Ints, Floats]:
     """The x >= 0 with at most `count` numbers above zero that nearly minimises |A x - b|: their places and values.
 
-    gram : A^T A. right : A^T b. One number is added at a time, the one along which the residual falls fastest.
+    gram : (unknowns, unknowns) A^T A. right : (unknowns,) A^T b.
+    Places and values are (found,). One number is added at a time, the one along which the residual falls fastest.
     """
     scale = np.sqrt(np.diag(gram))
     scale = np.where(scale > 0.0, scale, 1.0)

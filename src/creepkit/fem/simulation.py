@@ -61,7 +61,7 @@ class LoadHistory:
 
     @cached_property
     def segments(self) -> Floats:
-        """The programs merged, (segments, 10)."""
+        """The programs merged, (segments, 10); columns as in fem.solver.LoadProgram."""
         return merge_programs(self.pressure, self.temperature, self.modulus, self.motion, end=self.end)
 
 
@@ -69,9 +69,9 @@ class LoadHistory:
 class SurfaceSensitivities:
     """Derivatives of a simulation.
 
-    surface : (steps, top, C) of u_z of the observed nodes, to the law's internal parameters, then to the directions
+    surface : (steps, top, C) mm, of u_z of the observed nodes, to the law's internal parameters, then to the directions
         of the load program, then to the numbers of the geometry.
-    times : (steps, D) of the times of the steps, s, to the directions.
+    times : (steps, D) s, of the times of the steps, to the directions.
     """
 
     surface: Floats
@@ -121,7 +121,7 @@ def sensitivity_directions(
     """What to differentiate to beside the law's parameters.
 
     segments : (D, segments, 10) derivatives of `load_history.segments`.
-    velocities : for each number of the geometry its GeometryDerivative and the velocities (nodes, 2) of the nodes.
+    velocities : for each number of the geometry its GeometryDerivative and the velocities (nodes, 2) of the nodes, mm.
     """
     along = np.zeros((0, *load_history.segments.shape)) if segments is None else np.asarray(segments, dtype=float)
     points = (len(velocities), *model.weights.shape)

@@ -13,9 +13,10 @@ from creepkit.core import CoreStructure
 class SensitivityDirections:
     """What is differentiated to beside the P parameters of the law: C = P + D + G columns.
 
-    segments : (D, segments, 10) change of the load history's segments.
-    gradients, hoops : (G, elements, 4, 2, 2) and (G, elements, 4), see fem.mesh.GeometryDerivative.
-    velocities : (G, 2 nodes) mm.
+    segments : (D, segments, 10) change of the load history's segments, in the units of their columns.
+    gradients : (G, elements, 4, 2, 2) and
+    hoops : (G, elements, 4), see fem.mesh.GeometryDerivative.
+    velocities : (G, 2 nodes) mm, all three for each unit of a number of the geometry.
     """
 
     segments: Floats
@@ -44,6 +45,18 @@ class SolvableModel(Protocol):
     def point_count(self) -> int: ...  # noqa: D102
     @property
     def observed_count(self) -> int: ...  # noqa: D102
-    def held_motion(self, pattern: Floats | None) -> Floats: ...  # noqa: D102
-    def displacements(self, coordinates: Floats) -> Floats: ...  # noqa: D102
-    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]: ...  # noqa: D102
+
+    def held_motion(self, pattern: Floats | None) -> Floats:
+        """What the core takes for a unit of motion of the held nodes, (2 nodes,), mm, or (0,) where none moves.
+
+        pattern : (nodes, 2) mm, or None.
+        """
+
+    def displacements(self, coordinates: Floats) -> Floats:
+        """Displacements of the nodes, (steps, nodes, 2), mm.
+
+        coordinates : (steps, displacement_count) what the core keeps of each step.
+        """
+
+    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]:
+        """Velocity gradients (G, ..., 2, 2), hoop strains (G, ...) and velocities (G, ...), as the core takes them."""

@@ -52,13 +52,15 @@ class SolverSettings(NamedTuple):
 class StepRecord(NamedTuple):
     """Accepted steps of a simulation, from rest at 0 s on.
 
-    times : (steps,) s. segments : (steps,) of each. displacements : (steps, 2 nodes) mm.
-    values : (steps, points, 4 + S) or None. mises : (steps, points) MPa.
+    times : (steps,) s. segments : (steps,) number of the segment of each.
+    displacements : (steps, displacement_count) mm of the nodes, or factors of the modes of a reduced-order model.
+    values : (steps, points, 4 + S) creep components, equivalent creep strain and states, or None.
+    mises : (steps, points) MPa.
     positions : (steps, 2) where a step began in its segment, and its length, in the transformed time.
     counts : (4,) accepted and rejected steps; equilibrium passes with and without a new tangent.
     code, time : how it ended, and when, s.
-    surface : (steps, top, C) derivatives of u_z of the observed nodes, moments : (steps, D) those of the times, s; or
-        None.
+    surface : (steps, top, C) mm, derivatives of u_z of the observed nodes, or None.
+    moments : (steps, D) s, derivatives of the times to the directions of the load program, or None.
     """
 
     times: Floats
@@ -174,9 +176,11 @@ class StageConditions(NamedTuple):
 class LoadProgram(NamedTuple):
     """The load history as the solver takes it.
 
-    beta : exponent of the time transformation. segments : (segments, 10). pattern : (2 nodes,) displacement of held
-    nodes for a unit of motion, mm. script : (steps, 2) positions of another simulation, to make the very same steps;
-    (0, 2) for steps by error control.
+    beta : exponent of the time transformation. poisson : Poisson's ratio.
+    segments : (segments, 10) s, MPa, K, MPa and a number: times, pressures, temperatures, moduli and motion of held
+        nodes, each at the segment's start and end.
+    pattern : (2 nodes,) mm, displacement of held nodes for a unit of motion; (0,) in a reduced-order model.
+    script : (steps, 2) positions of another simulation, to make the very same steps; (0, 2) for steps by error control.
     """
 
     beta: float

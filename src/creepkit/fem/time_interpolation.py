@@ -22,9 +22,10 @@ OFFSET = 20.0
 class TimeInterpolation:
     """The accepted steps of a simulation.
 
-    times : (steps,) s. starts : (segments reached,) s. rows : first and last step of each segment; without a jump of
-    the load the first is the last one of the segment before. origins : (segments reached,) s, zero of the time y.
-    exponents : (segments reached,) beta.
+    times : (steps,) s. starts : (segments reached,) s.
+    rows : first and last step of each segment; without a jump of the load the first is the last one of the segment
+        before.
+    origins : (segments reached,) s, zero of the time y. exponents : (segments reached,) beta.
     """
 
     times: Floats
@@ -35,7 +36,12 @@ class TimeInterpolation:
 
     @classmethod
     def from_steps(cls, times: Floats, segments: Ints, program: Floats, beta: float = 1.0) -> TimeInterpolation:
-        """From the rows of a record and the program (segments, 10); beta : the law's leading exponent of time."""
+        """From the rows of a record of steps.
+
+        times : (steps,) s. segments : (steps,) number of each step's segment.
+        program : (segments, 10) the load history, see fem.solver.LoadProgram.
+        beta : the law's leading exponent of time.
+        """
         rows = []
         reached = program[: int(segments[-1]) + 1]
         starts = reached[:, START].copy()
@@ -50,8 +56,9 @@ class TimeInterpolation:
         return cls(np.array(times), starts, tuple(rows), np.where(young, 0.0, starts), exponents)
 
     def interpolate(self, values: Floats, times: ArrayLike) -> Floats:
-        """Values (steps, ...) at other times, (times, ...); NaN after the last step.
+        """Values at other times, (times, ...); NaN after the last step.
 
+        values : (steps, ...) in any unit, at the accepted steps. times : (times,) s, or one number.
         Each segment has a cubic spline with not-a-knot ends in ln(1 + (y / 20 s)^beta); a segment of one step has a
         straight line. At the time of a jump it is the value before it; at time zero the one after.
         """
@@ -84,7 +91,10 @@ class TimeInterpolation:
         return times, starts, np.array(self.rows, np.int64), origins, exponents
 
     def moved(self, times: Floats, starts: Floats) -> TimeInterpolation:
-        """The same steps at other times, the segments beginning at others too."""
+        """The same steps at other times, the segments beginning at others too.
+
+        times : (steps,) s, and starts : (segments reached,) s, added to those here.
+        """
         origins = np.where(self.origins == self.starts, self.origins + starts, self.origins)
         return replace(self, times=self.times + times, starts=self.starts + starts, origins=origins)
 

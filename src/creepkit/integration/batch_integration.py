@@ -142,7 +142,10 @@ def integrate(
     axes: Axes = UNIAXIAL,
     tableau: Tableau = SDIRK4,
 ) -> Integration:
-    """Integrate every candidate, theta (candidates, P) in internal form, over every test."""
+    """Integrate every candidate over every test.
+
+    theta : (candidates, P) internal parameters. jacobian : calculate derivatives too.
+    """
     theta = np.array(theta, dtype=float, order="C", ndmin=2)
     if sentence := refusal(law, theta):
         raise SolveError(sentence)

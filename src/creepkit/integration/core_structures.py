@@ -93,13 +93,16 @@ def tableau_structure(tableau: Tableau) -> TableauStructure:
 
 
 def write_addresses(structure: ctypes.Structure, arrays: Mapping[str, Floats | Ints]) -> None:
-    """Write the addresses of arrays into the fields of their names; the caller keeps the arrays alive."""
+    """Write the addresses of arrays into the fields of their names; the caller keeps the arrays alive.
+
+    arrays : by name, each of any shape, contiguous, of float64 or int64.
+    """
     for name, array in arrays.items():
         setattr(structure, name, address(array))
 
 
 def refusal(law: CompiledLaw, theta: Floats) -> str:
-    """Why the core cannot take a law with parameters theta, (..., P); nothing when it can."""
+    """Why the core cannot take a law with internal parameters theta (..., P); nothing when it can."""
     if law.states > MAX_STATES:
         return f"a law may have {MAX_STATES} internal variables, but this one has {law.states}"
     if theta.shape[-1] != len(law.names):

@@ -54,7 +54,11 @@ BY_TRIAL, BY_STRAIN, BY_TIME, BY_TEMPERATURE, BY_LOG_WEIGHT, BY_PRINCIPAL, BY_ME
 
 
 class StageSolution(NamedTuple):
-    """The increment D, 0 unless solved; the flag; and the law's input row at the end of the stage, (6 + S,)."""
+    """What a stage ends with.
+
+    increment : D, creep strain, 0 unless solved. flag : see SOLVED.
+    row : (6 + S,) the law's input at the end of the stage, in the units of `kernels.interface`.
+    """
 
     increment: float
     flag: int
@@ -75,7 +79,13 @@ def solve_stage(
     guess: float = 1e-6,
     tolerance: float = 1e-7,
 ) -> StageSolution:
-    """Solve a stage that starts from the states in `row`, (6 + S,), at the time and temperature there."""
+    """Solve a stage.
+
+    theta : (P,) internal parameters.
+    row : (6 + S,) the law's input, in the units of `kernels.interface`: the states that the stage starts from, and
+        its time and temperature.
+    guess : of the increment. tolerance : of the last Newton correction of the increment's logarithm.
+    """
     theta, row = np.array(theta, dtype=float), np.array(row, dtype=float)
     states, increment = row[POINT_SIZE:].copy(), ctypes.c_double()
     flag = function("creepkit_solve_stage")(
@@ -103,6 +113,7 @@ def stage_response(
 ) -> Floats | None:
     """Derivatives of (D, z) to the inputs of a solved stage, (1 + S, 7 + S + P), None where the stage is singular.
 
+    theta : (P,) internal parameters.
     entry : from which of the law's entries; `update` knows no parameters, (1 + S, 7 + S).
     """
     theta = np.array(theta, dtype=float)

@@ -27,7 +27,11 @@ _ROWS, _COLUMNS = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
 
 
 class ConstitutiveResponse(NamedTuple):
-    """The vector after a stage, (7 + S,), the stress, (6,), and its consistent tangent to the strain, (6, 6)."""
+    """What follows from a strain at the end of a stage.
+
+    vector : (7 + S,) creep strains, equivalent creep strain and states after the stage.
+    stress : (6,) MPa. tangent : (6, 6) MPa, consistent derivative of the stress to the strain.
+    """
 
     vector: Floats
     stress: Floats
@@ -44,9 +48,11 @@ def constitutive_response(
     temperature: float,
     weight: float,
 ) -> ConstitutiveResponse | None:
-    """What follows from a strain, (6,), at the end of a stage that starts from `base`, (7 + S,); None: no solution.
+    """What follows from a strain at the end of a stage; None where there is no solution.
 
-    elastic : E, MPa, and nu. time, s, and temperature, K, at the end; weight of the stage, s.
+    theta : (P,) internal parameters. elastic : E, MPa, and nu. strain : (6,) total strain, tensor components.
+    base : (7 + S,) creep strains, equivalent creep strain and states that the stage starts from.
+    time, temperature : s and K, at the end. weight : s, of the stage.
     """
     theta, strain, base = (np.array(values, dtype=float) for values in (theta, strain, base))
     material = TensorStructure(update=law.update.address, states=law.states, modulus=elastic[0], ratio=elastic[1])

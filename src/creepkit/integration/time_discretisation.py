@@ -97,7 +97,7 @@ The dense output is the one quartic that meets the conditions of order 3, and of
 def merge_programs(*programs: Program, end: float) -> Floats:
     """Merge programs from 0 to `end` (s) into segments, (segments, 2 + 2 programs); every breakpoint is a boundary.
 
-    Columns: start and end, s, then the values of each program at both.
+    Columns: start and end, s, then the values of each program at both, in the program's unit.
     """
     marks = np.concatenate([*(program.times for program in programs), [0.0, end]])
     marks = np.unique(marks[marks <= end])
@@ -109,7 +109,7 @@ def merge_programs(*programs: Program, end: float) -> Floats:
 
 
 def _just_before(program: Program, times: Floats) -> Floats:
-    """Values of a program as each time is approached from the left."""
+    """Values (times,) of a program as each of the times (times,), s, is approached from the left."""
     after = np.searchsorted(program.times, times, side="left")
     before = np.maximum(after - 1, 0)
     after = np.minimum(after, program.times.size - 1)

@@ -34,8 +34,12 @@ class TransformedTime(NamedTuple):
 
 
 class TransformedTimes(NamedTuple):
-    """What a transformation makes of positions, all (count,): times, s, and ln(dt/ds), their derivatives to beta and
-    to tau, and the positions of those times.
+    """What a transformation makes of positions, s in [0, 1].
+
+    time, log_pace : (count,) s, and ln(dt/ds) with dt/ds in s.
+    time_by_beta, log_pace_by_beta : (count,) s and 1, their derivatives to beta.
+    time_by_tau, log_pace_by_tau : (count,) 1 and 1/s, their derivatives to tau.
+    position : (count,) the positions of those times.
     """
 
     time: Floats
@@ -48,7 +52,10 @@ class TransformedTimes(NamedTuple):
 
 
 def transformed_times(clock: TimeTransformation, s: ArrayLike) -> TransformedTimes:
-    """Times, paces and derivatives at positions `s`, (count,) above 0."""
+    """Times, paces and derivatives at positions.
+
+    s : (count,) above 0, or one number.
+    """
     numbers, positions = np.array(clock, dtype=float), np.array(s, dtype=float, ndmin=1)
     out = np.empty((positions.size, len(TransformedTimes._fields)))
     function("creepkit_transformed_times", None)(

@@ -246,7 +246,10 @@ def _code_fingerprint() -> str:
 def _leading_exponent(
     module: ModuleType, reference_point: tuple[float, ...], theta: Floats, point: Floats | None = None
 ) -> Floats:
-    """Smallest (1 + a)/(1 - b) among the terms that are not switched off; 1 when all are."""
+    """Smallest (1 + a)/(1 - b) among the terms that are not switched off, (...,); 1 when all are.
+
+    theta : (..., P) internal parameters. point : (..., 6 + S) variables of the law, or None.
+    """
     theta = np.asarray(theta, float)
     smallest = np.full(theta.shape[:-1], np.inf)
     point_columns = reference_point if point is None else np.moveaxis(np.asarray(point, float), -1, 0)

@@ -55,6 +55,7 @@ class CompiledLaw:
     """A law as compiled entries.
 
     rate, update, sensitivity : entries.
+    names : of the P parameters, in the order of theta.
     initial : (S,) states at time zero; limits : (S,) values at which the point has failed (inf: none).
     leading_exponent : function of theta (..., P) giving the exponent beta of time in strain ~ t^beta as t -> 0+ from a
         virgin state at constant stress, (...,). Where an exponent varies with the point, a second argument
@@ -89,7 +90,7 @@ EntryName = Literal["rate", "update", "sensitivity"]
 def call_entry(law: CompiledLaw, entry: EntryName, points: Floats, theta: Floats) -> tuple[Floats, int]:
     """Return an entry's output, (rows, columns), the columns as `interface` orders them, and its flags.
 
-    points : (rows, 6 + S); theta : (P,).
+    points : (rows, 6 + S) variables of the law, in the units of x above. theta : (P,) internal parameters.
     """
     x, theta = np.ascontiguousarray(np.transpose(points), float), np.ascontiguousarray(theta, float)
     width, rows = x.shape

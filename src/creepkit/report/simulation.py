@@ -162,7 +162,7 @@ _COLUMN = 8
 
 
 def cubature_figure(model: ReducedOrderModel, path: str | Path | None = None) -> Figure:
-    """The section at rest with the points at which a reduced-order model evaluates the law; area : of its weight."""
+    """The section at rest with the points where a reduced-order model evaluates the law; areas are weights."""
     body, basis = model.model, model.basis
     figure = empty_figure(9.0, 2.6)
     axes = figure.subplots()

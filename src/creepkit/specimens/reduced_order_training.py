@@ -46,12 +46,13 @@ RUNS = 64
 
 
 EXPONENTS, NEARLY_PLASTIC = (1.0, 12.0), (12.0, 50.0)
-"""Of the training's power laws, and of every fourth: those of hyperbolic sines at large stresses."""
+"""Stress exponents of the training's power laws; every fourth has one of the latter range, which hyperbolic sines
+reach at large stresses."""
 
 
 TENSION = 1.0
-"""Every fourth run creeps faster under tension: by exp(c sigma_1/sigma), c up to this, with sigma_1 the largest principal
-and sigma the von Mises stress."""
+"""Every fourth run creeps faster under tension: by exp(c sigma_1/sigma), c up to this, with sigma_1 the largest
+principal and sigma the von Mises stress."""
 
 
 ELASTIC_STRAIN = (2e-4, 8e-3)
@@ -222,4 +223,5 @@ def _read(path: Path, model: FiniteElementModel) -> ReducedBasis | None:
 
 
 def _finite(values: Floats) -> bool:
+    """Whether values, of any shape, are finite numbers of double precision."""
     return values.dtype == np.float64 and bool(np.isfinite(values).all())

@@ -39,8 +39,8 @@ class ParameterGru:
         frame before: it tells when between two frames the load jumped), "time" and "step". () is "load" alone, and for
         grids that stretch with the test "load", "mean_load", "time" and "step".
     target : "value" of the first output, or its "log".
-    base : "none"; or "one-dof": the specimen's reduced-order model predicts the first output, and the network corrects
-        the logarithm of it. Derivatives are then left to differences.
+    base : "none"; or "reduced-order": the specimen's reduced-order model predicts the first output, and the network
+        corrects the logarithm of it. Derivatives are then left to differences.
     """
 
     hidden: int = 128
@@ -48,7 +48,7 @@ class ParameterGru:
     cell: RecurrentCell = "gru"
     inputs: tuple[str, ...] = ()
     target: Literal["value", "log"] = "value"
-    base: Literal["none", "one-dof"] = "none"
+    base: Literal["none", "reduced-order"] = "none"
     training: Training = field(default_factory=Training)
 
     kind: ClassVar[str] = "parameter-gru"
@@ -59,7 +59,7 @@ class ParameterGru:
             value = getattr(self, name)
             if value != int(value) or not 1 <= value <= largest:
                 raise SurrogateError(f"ParameterGru: {name} is {value}; allowed are whole numbers from 1 to {largest}")
-        choices = {"cell": ("gru", "lstm"), "target": ("value", "log"), "base": ("none", "one-dof")}
+        choices = {"cell": ("gru", "lstm"), "target": ("value", "log"), "base": ("none", "reduced-order")}
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
                 raise SurrogateError(

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-HEAVY = ("torch", "sympy", "scipy", "pysindy", "numba", "numpy", "h5py", "matplotlib", "sklearn")
+HEAVY = ("torch", "sympy", "scipy", "pysindy", "llvmlite", "numpy", "h5py", "matplotlib", "sklearn")
 REPORT = f"import sys; print('HEAVY', *sorted(set({HEAVY!r}) & set(sys.modules)), file=sys.stderr)"
 
 

@@ -49,6 +49,12 @@ def bulging(plates: Dataset) -> Surrogate:
     return train(plates, ParameterGru(12, 2, cell="lstm", target="log", training=how))
 
 
+@pytest.fixture(scope="module")
+def corrected(plates: Dataset) -> Surrogate:
+    how = Training(epochs=6, batch=8, rate=1e-2)
+    return train(plates, ParameterGru(6, 1, base="reduced-order", training=how))
+
+
 # ---- derivatives -----------------------------------------------------------------------------------------------------
 
 
@@ -309,7 +315,7 @@ def test_other_kinds_of_tests_are_refused(
         ({"cell": "rnn"}, "cell is 'rnn'; allowed are gru, lstm"),
         ({"hidden": 0}, "hidden is 0"),
         ({"inputs": ("laod",)}, "there is no input 'laod': did you mean 'load'"),
-        ({"base": "one dof"}, "base is 'one dof'"),
+        ({"base": "one-dof"}, "base is 'one-dof'; allowed are none, reduced-order"),
     ],
 )
 def test_recipes_that_make_no_sense(changes: dict, told: str) -> None:
@@ -317,9 +323,9 @@ def test_recipes_that_make_no_sense(changes: dict, told: str) -> None:
         ParameterGru(**changes)
 
 
-def test_a_bar_has_no_stand_in(tension: Dataset) -> None:
+def test_a_bar_has_no_reduced_order_model(tension: Dataset) -> None:
     with pytest.raises(SurrogateError, match="specimen 'uniaxial' has no reduced-order model"):
-        train(tension, ParameterGru(4, 1, base="one-dof", training=BRIEF))
+        train(tension, ParameterGru(4, 1, base="reduced-order", training=BRIEF))
 
 
 # ---- studies ---------------------------------------------------------------------------------------------------------
@@ -338,14 +344,23 @@ def test_a_few_dimples_are_learnt_and_the_file_predicts_the_same(bulging: Surrog
     )
 
 
-def test_a_network_on_a_base_is_near_before_it_has_learnt_much(plates: Dataset) -> None:
-    model = train(plates, ParameterGru(6, 1, base="one-dof", training=Training(epochs=6, batch=8, rate=1e-2)))
+def test_a_network_on_a_base_is_near_before_it_has_learnt_much(corrected: Surrogate, plates: Dataset) -> None:
     ratios = []
     for row in range(0, 24, 4):
-        found = model.predict(plates.law, plates.theta_of(row), [plates.planned_test(row)], sensitivities=True)
+        found = corrected.predict(plates.law, plates.theta_of(row), [plates.planned_test(row)], sensitivities=True)
         assert found.jacobian is None
         ratios.append(found.values[0, 0, 2:, 0] / plates.values[row, 2:, 0])
     assert np.median(np.abs(np.log(ratios))) < 0.15
+
+
+def test_older_files_with_a_base_are_read(corrected: Surrogate, tmp_path) -> None:
+    """They name it "one-dof"."""
+    header = corrected.file_header
+    assert header["recipe"]["base"] == "reduced-order"
+    older = {**header, "recipe": {**header["recipe"], "base": "one-dof"}}
+    found = load_surrogate(write_weights(tmp_path / "older.safetensors", corrected.weights, older))
+    assert found.recipe == corrected.recipe
+    assert found.file_header == header
 
 
 def test_identify_with_a_network_finds_what_was_planted(learnt: Surrogate, tension: Dataset) -> None:
