@@ -4,9 +4,9 @@
 
 Kernel and hand-written code run alternately on the same points (20,000 rows by default); each ratio is the median over
 31 repeats of the ratio of their CPU times, and the time is that of the kernel. "Rate" is the creep rate alone,
-"derivatives" the rate with its derivatives to stress, strain, time and every parameter. Compiled functions (numba) are
-called for all rows at once, torch runs on one thread. A call of a kernel costs some 10 us more than its arithmetic in
-NumPy and some 50 us in torch, which a few thousand rows make small.
+"derivatives" the rate with its derivatives to stress, strain, time and every parameter. Compiled functions (ours
+by LLVM, those by hand by numba) are called for all rows at once, torch runs on one thread. A call of a kernel costs
+some 10 us more than its arithmetic in NumPy and some 50 us in torch, which a few thousand rows make small.
 
 The second table calls compiled entries from compiled code, for one point and for a vector of eight, as the solvers do;
 the least of the repeats.
@@ -19,17 +19,17 @@ import math
 import statistics
 import time
 from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 import torch
 from hand_written_laws import LAWS
 from measured import Page, arguments
-from numba import float64, int64, njit
+from numba import njit
 
 import creepkit as ck
-from creepkit.kernels.interface import ENTRY_TYPE, CompiledLaw, Entry, data_pointer
+from creepkit.kernels.interface import CompiledLaw
 from creepkit.language import CreepLaw
 
 REPEATS = 31
@@ -185,22 +185,22 @@ def nanoseconds_a_point(law: CreepLaw, entry: str, rows: int) -> float:
     points = np.random.default_rng(1).uniform([20.0, 1e-4, 1e2], [200.0, 1e-1, 1e5], (BLOCKS * rows, 3))
     x = np.ascontiguousarray(all_variables(points).reshape(BLOCKS, rows, 6).transpose(0, 2, 1))
     out = np.empty((7 + theta.size) * rows)
-    run = partial(repeated_calls(), getattr(compiled, entry), rows, x.reshape(BLOCKS, -1), theta, out)
+    run = repeated_calls(getattr(compiled, entry).address, rows, x, theta, out)
     return 1e9 * min(cpu_seconds(run, 1) for _ in range(REPEATS)) / (CALLS * rows)
 
 
-@cache
-def repeated_calls() -> Callable[[Entry, int, Any, Any, Any], int]:
-    """A compiled loop that calls an entry for one group of points after the other, x (groups, 6 rows)."""
+def repeated_calls(entry: int, rows: int, x: Any, theta: Any, out: Any) -> Run:
+    """A compiled loop that calls the entry at an address for one group of points after another, x (groups, 6, rows)."""
+    function = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, *3 * [ctypes.c_void_p])(entry)
 
-    @njit(int64(ENTRY_TYPE, int64, float64[:, ::1], float64[::1], float64[::1]))
-    def run(entry, rows, x, theta, out):
+    @njit
+    def loop(x, theta, out):
         flags = 0
         for call in range(CALLS):
-            flags |= entry(rows, data_pointer(x[call % BLOCKS]), data_pointer(theta), data_pointer(out))
+            flags |= function(rows, x[call % BLOCKS].ctypes, theta.ctypes, out.ctypes)
         return flags
 
-    return run
+    return partial(loop, x, theta, out)
 
 
 if __name__ == "__main__":
