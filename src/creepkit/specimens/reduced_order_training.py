@@ -50,7 +50,7 @@ EXPONENTS, NEARLY_PLASTIC = (1.0, 12.0), (12.0, 50.0)
 
 
 TENSION = 1.0
-"""Every fourth run creeps faster under tension: by exp(c sigma_1/sigma), c up to this, with sigma_1 the largest principal
+"""Every fourth run creeps faster under tension: by exp(c sigma_1/sigma), c up to this, sigma_1 the largest principal
 and sigma the von Mises stress."""
 
 
