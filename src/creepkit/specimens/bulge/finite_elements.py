@@ -268,7 +268,7 @@ def predict_bulge(
         test = prepared.get(key)
         if test is None:
             test = prepared[key] = prepare_test(specimen, histories[k], values, sensitivities, model_of)
-        return simulate_and_observe(specimen, kernel, theta[c], test)
+        return simulate_and_observe(kernel, theta[c], test)
 
     workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
     if workers > 1:
@@ -280,9 +280,13 @@ def predict_bulge(
     return assemble_prediction(parts, histories, OBSERVED, len(theta))
 
 
+REDUCED_NEWTON = 1e-3
+"""Last correction of equilibrium in a reduced-order model over the specimen's tolerance of a step."""
+
+
 @dataclass(frozen=True, eq=False)
 class PreparedTest:
-    """A test set up, the model that is simulated, and what is differentiated to.
+    """A test set up, the model that is simulated and how accurately, and what is differentiated to.
 
     names : of the explicit nuisances. directions : None for no derivatives.
     """
@@ -290,6 +294,7 @@ class PreparedTest:
     history: History
     setup: BulgeSetup
     model: SolvableModel
+    settings: SolverSettings
     names: tuple[str, ...]
     directions: SensitivityDirections | None
 
@@ -304,20 +309,20 @@ def prepare_test(
     """What all candidates of a test share at the same explicit nuisances; model_of : see predict_bulge."""
     test_setup = set_up_test(specimen, history, nuisances)
     model = test_setup.model if model_of is None else model_of(test_setup)
+    settings = solver_settings(specimen, exact=jacobian)
+    if model_of is not None:  # equilibrium costs it little, and a search sees differences that are not of the law
+        settings = settings._replace(newton=min(settings.newton, REDUCED_NEWTON * specimen.tolerance))
     names, directions = tuple(nuisances), None
     if jacobian:
         programs = program_directions(specimen, history, nuisances)
         directions = sensitivity_directions_of(test_setup, history, names, programs)
-    return PreparedTest(history, test_setup, model, names, directions)
+    return PreparedTest(history, test_setup, model, settings, names, directions)
 
 
-def simulate_and_observe(
-    specimen: BulgeSettings, kernel: CompiledLaw, theta: Floats, test: PreparedTest
-) -> BulgeResponse:
+def simulate_and_observe(kernel: CompiledLaw, theta: Floats, test: PreparedTest) -> BulgeResponse:
     """Simulate one test and observe it at the times of its history; theta : (parameters,) internal values."""
     setup, history, directions = test.setup, test.history, test.directions
-    settings = solver_settings(specimen, exact=directions is not None)
-    simulation = simulate(kernel, theta, test.model, setup.load_history, settings=settings, directions=directions)
+    simulation = simulate(kernel, theta, test.model, setup.load_history, settings=test.settings, directions=directions)
     profiles = simulation.displacements[:, setup.model.top, 1]
     sensitivities = None
     if directions is not None:
