@@ -1,14 +1,10 @@
 # make test   set up .venv, then check style, types, layers and run all tests, those of plugins/ included
 # make verify-export   exported laws in a CalculiX built from Debian's source, beside our solver: a table
-# make surrogate   remake the surrogate that ships: 8,000 simulations, 300 epochs; some 20 minutes of CPU
 # make docs   build the documentation into build/docs; needs no network once .venv is set up
 # make core   compile the core (src/core) again where its sources changed; 'make test' does it first
 # make sanitize   tests of the core with checks of addresses and of undefined behaviour; needs g++ and its libasan
 # make demo   set up .venv, then identify laws from measured creep curves and a simulated bulge test; plots in demo/
 #
-# The first make demo with an empty cache of compiled code takes 148 s of CPU after the packages are installed: 91 s
-# compilation of the solver at set-up, 30 s compilation of the laws and of creep under constant load, 27 s computation
-# (six identifications, plots, imports). A second one takes the computation alone.
 # Both need make and Python alone; tests that need a compiler are skipped without it. The core is compiled by the
 # machine's C++ compiler, else by the one in the package ziglang (400 MB in .venv). PYTEST_OPTIONS goes to pytest.
 # TORCH chooses another build of torch: make test TORCH='torch==2.13.0' on a machine with a GPU.
@@ -17,12 +13,11 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := test
-.PHONY: test core sanitize demo docs verify-export surrogate clean
+.PHONY: test core sanitize demo docs verify-export clean
 
 PYTHONS := python3.11 python3.12 python3.13
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check
-COMPILED := from creepkit.cli import numba_cache_folder as folder; print(folder())
 PLUGINS := $(patsubst %/pyproject.toml,%,$(wildcard plugins/*/pyproject.toml))
 
 TORCH_CPU := torch==2.13.0+cpu
@@ -40,8 +35,7 @@ test: core
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
-	@export NUMBA_CACHE_DIR=$$($(BIN)/python -c '$(COMPILED)'); \
-	    for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q); done
+	@for plugin in $(PLUGINS); do echo "pytest $$plugin"; (cd $$plugin && ../../$(BIN)/pytest -q); done
 	$(BIN)/pytest -q -n 2 $(PYTEST_OPTIONS)
 
 core: .venv/.ok
@@ -50,8 +44,7 @@ core: .venv/.ok
 # The libraries of the sanitizer, and the C++ one whose exceptions it watches, come first into the process.
 sanitize: core
 	$(BIN)/python src/core/compile.py --sanitize
-	@export NUMBA_CACHE_DIR=$$($(BIN)/python -c '$(COMPILED)'); \
-	    CREEPKIT_CORE=$(CURDIR)/build/sanitize/libcreepkit_core.so ASAN_OPTIONS=detect_leaks=0 \
+	@CREEPKIT_CORE=$(CURDIR)/build/sanitize/libcreepkit_core.so ASAN_OPTIONS=detect_leaks=0 \
 	    LD_PRELOAD="$$($(CXX) -print-file-name=libasan.so) $$($(CXX) -print-file-name=libstdc++.so)" \
 	    $(BIN)/python -m pytest -q $(PYTEST_OPTIONS) $(SANITIZED_TESTS)
 
@@ -59,25 +52,18 @@ demo: core
 	$(BIN)/creepkit demo --to demo
 
 docs: core
-	@export NUMBA_CACHE_DIR=$$($(BIN)/python -c '$(COMPILED)'); \
-	    $(BIN)/sphinx-build --fail-on-warning --keep-going --quiet --jobs 2 docs build/docs
+	@$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet --jobs 2 docs build/docs
 	@echo "the documentation: build/docs/index.html"
 
 verify-export: core
 	$(BIN)/python -u tests/benchmarks/verify_export.py
 
-surrogate: core
-	mkdir -p build
-	$(BIN)/creepkit generate rate-family --samples 8000 --seed 1 --to build/rates.h5
-	$(BIN)/creepkit train build/rates.h5 --recipe rate-net --epochs 300 --seed 0 --to build/dimple.safetensors
-	cp build/dimple.safetensors src/creepkit/surrogates/weights/
-
 .venv/.ok: pyproject.toml $(PLUGINS:%=%/pyproject.toml)
-	@echo "set-up 1/5: virtual environment .venv"
+	@echo "set-up 1/4: virtual environment .venv"
 	@for python in $(PYTHONS); do \
 	    if $$python -c 'import ensurepip, venv' >/dev/null 2>&1; then $$python -m venv .venv; exit 0; fi; \
 	done; echo "none of $(PYTHONS) can make a virtual environment; install one of them, with its venv module" >&2; exit 1
-	@echo "set-up 2/5: torch"
+	@echo "set-up 2/4: torch"
 ifdef TORCH
 	@$(PIP) $(TORCH)
 else
@@ -85,17 +71,15 @@ else
 	    || $(PIP) --retries 1 --timeout 20 --extra-index-url $(CPU_WHEELS) '$(TORCH_CPU)' 2>/dev/null \
 	    || $(PIP) '$(TORCH_ANY)'
 endif
-	@echo "set-up 3/5: creepkit and what it needs"
+	@echo "set-up 3/4: creepkit and what it needs"
 	@tools=$$($(BIN)/python src/core/compile.py --requirements); \
 	    $(PIP) 'hatchling>=1.26' 'editables>=0.5' $$tools || { echo "the core of creepkit cannot be compiled: this" \
 	    "machine lacks" $$tools "and pip cannot get it; install a C++ compiler and CMake, or make PyPI reachable" >&2; \
 	    exit 1; }
 	@$(PIP) --no-build-isolation --no-deps --editable .
 	@$(PIP) 'creepkit[dev]'
-	@echo "set-up 4/5: plugins"
+	@echo "set-up 4/4: plugins"
 	@for plugin in $(PLUGINS); do $(PIP) --no-build-isolation --editable $$plugin; done
-	@echo "set-up 5/5: compile the solver"  # what numba compiles; nearly nothing once all solvers are in the core
-	@$(BIN)/python -c 'from creepkit.cli import set_numba_cache; set_numba_cache(); from creepkit.cli.demo import compile_kernels; compile_kernels()'
 	@touch $@
 
 clean:

@@ -2,10 +2,7 @@
 
 import pytest
 
-from creepkit.cli import set_numba_cache
 from helpers.compilers import compiler_or_skip, skipped_without_need
-
-set_numba_cache()
 
 
 @pytest.fixture(scope="session")

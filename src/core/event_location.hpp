@@ -90,38 +90,49 @@ inline double limit_crossing(const TerminationLimits& limits, const Tableau& tab
     return high;
 }
 
-// dv/d(ln t) at the share x of the step.
-inline double log_time_rate(const SegmentClock& clock, const Tableau& tableau, const StepWorkspace& work, double s,
-                            double h, double x, int64_t v) {
-    const TimeAndPace now = clock.at(s + x * h);
-    return work.dense(tableau, h, v).slope(x) * now.time / now.pace;
+// dv/d(ln t) of an unknown at the share x of the step.
+inline double log_time_rate(const SegmentClock& clock, const DenseOutput& unknown, double s, double x) {
+    const TimeAndPace now = clock.at(s + x * unknown.h);
+    return unknown.slope(x) * now.time / now.pace;
 }
 
 // Derivatives (P,), into `change`, of the ln of the time at which unknown v has the value it has at x.
 inline void log_time_sensitivity(const SegmentClock& clock, const Tableau& tableau, const StepWorkspace& work,
                                  double s, double h, double x, int64_t v, double* change) {
     dense_sensitivity(clock, tableau, work, s, h, x, v, change);
-    const double rate = log_time_rate(clock, tableau, work, s, h, x, v);
+    const double rate = log_time_rate(clock, work.dense(tableau, h, v), s, x);
     for (int64_t p = 0; p < work.parameters; ++p) change[p] = -change[p] / rate;
+}
+
+// Share of the step, from `low` to `high`, at which a dense output that is below the level at `low` and not at `high`
+// reaches it: Newton's method, by bisection where it leaves the bracket.
+inline double level_crossing(const DenseOutput& output, double level, double low, double high) {
+    constexpr int ITERATIONS = 60;
+    constexpr double SMALLEST = 1e-15;  // last correction, over the place
+    double x = 0.5 * (low + high);
+    for (int k = 0; k < ITERATIONS; ++k) {
+        const double miss = output.at(x) - level;
+        (miss < 0.0 ? low : high) = x;
+        const double next = x - miss / (output.h * output.slope(x));
+        if (fabs(next - x) <= SMALLEST * x || high - low <= SMALLEST * high) break;
+        x = next > low && next < high ? next : 0.5 * (low + high);
+    }
+    return x;
 }
 
 // Write the times of the levels reached within the step, up to its `share`; returns how many levels are reached.
 inline int64_t locate_levels(const SegmentClock& clock, const Tableau& tableau, const StepWorkspace& work, double s,
                              double h, double share, const LevelEvents& arrivals, int64_t reached) {
-    constexpr int BISECTIONS = 50;
     if (reached >= arrivals.count) return reached;
     const DenseOutput strain = work.dense(tableau, h, 0);
     const double end = strain.at(share);
+    double x = 0.0;
     for (; reached < arrivals.count && arrivals.levels[reached] <= end; ++reached) {
-        double low = 0.0, high = share;
-        for (int k = 0; k < BISECTIONS; ++k) {
-            const double middle = 0.5 * (low + high);
-            (strain.at(middle) < arrivals.levels[reached] ? low : high) = middle;
-        }
-        arrivals.times[reached] = clock.at(s + high * h).time;
-        arrivals.slopes[reached] = log_time_rate(clock, tableau, work, s, h, high, 0);
+        x = level_crossing(strain, arrivals.levels[reached], x, share);
+        arrivals.times[reached] = clock.at(s + x * h).time;
+        arrivals.slopes[reached] = log_time_rate(clock, strain, s, x);
         if (arrivals.changes) {
-            log_time_sensitivity(clock, tableau, work, s, h, high, 0, arrivals.changes + reached * work.parameters);
+            log_time_sensitivity(clock, tableau, work, s, h, x, 0, arrivals.changes + reached * work.parameters);
         }
     }
     return reached;

@@ -10,7 +10,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "vector_exponential.hpp"
+#include "vectors.hpp"
 #include "workspace.hpp"
 
 namespace creepkit {
@@ -76,9 +76,9 @@ inline double best_amplitude(const PolarGrid& grid, const double* y, const doubl
     for (int64_t j = 0; j < grid.angles; ++j) {
         const double g = angular_factor(grid, p, j).g;
         for (int64_t i = 0; i < grid.size; i += CREEPKIT_LANES) {
-            const Vector m = exponential(-exponent(load(grid.log_radius + i) - x[1], p, g));
-            const Vector weighted = grid.angular[j] * load(grid.radial + i) * m;
-            product += weighted * load(y + i);
+            const Vector m = exponential(-exponent(load_vector(grid.log_radius + i) - x[1], p, g));
+            const Vector weighted = grid.angular[j] * load_vector(grid.radial + i) * m;
+            product += weighted * load_vector(y + i);
             square += weighted * m;
         }
     }
@@ -92,9 +92,9 @@ inline void sum_up(const PolarGrid& grid, const double* y, const double* x, Norm
     for (int64_t j = 0; j < grid.angles; ++j) {
         const AngularFactor angle = angular_factor(grid, p, j);
         for (int64_t i = 0; i < grid.size; i += CREEPKIT_LANES) {
-            const Vector weight = grid.angular[j] * load(grid.radial + i), far = load(grid.log_radius + i) - x[1];
+            const Vector weight = grid.angular[j] * load_vector(grid.radial + i), far = load_vector(grid.log_radius + i) - x[1];
             const Vector q = exponent(far, p, angle.g), m = exponential(-q);
-            const Vector residual = D * m - load(y + i), left = weight * residual;
+            const Vector residual = D * m - load_vector(y + i), left = weight * residual;
             const Vector steep = p * (far + angle.first);  // d ln q / d ln p
             const Vector fq = D * m * q, fs = fq * p, fp = -fq * steep;
             squares += left * residual;
@@ -158,11 +158,11 @@ inline void derivatives_to_profile(const PolarGrid& grid, const double* x, const
     for (int64_t j = 0; j < grid.angles; ++j) {
         const AngularFactor angle = angular_factor(grid, p, j);
         for (int64_t i = 0; i < grid.size; i += CREEPKIT_LANES) {
-            const Vector far = load(grid.log_radius + i) - x[1], q = exponent(far, p, angle.g);
-            const Vector weight = grid.angular[j] * load(grid.radial + i) * exponential(-q), fq = x[0] * q * p;
+            const Vector far = load_vector(grid.log_radius + i) - x[1], q = exponent(far, p, angle.g);
+            const Vector weight = grid.angular[j] * load_vector(grid.radial + i) * exponential(-q), fq = x[0] * q * p;
             for (int v = 0; v < 3; ++v) {
                 double* to = derivatives + v * grid.size + i;
-                store(to, load(to) + weight * (inverse[v][0] +
+                store(to, load_vector(to) + weight * (inverse[v][0] +
                                                fq * (inverse[v][1] - inverse[v][2] * (far + angle.first))));
             }
         }

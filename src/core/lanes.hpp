@@ -9,9 +9,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#ifndef CREEPKIT_LANES
-#define CREEPKIT_LANES 2
-#endif
+#include "vectors.hpp"
 
 #define CREEPKIT_INLINE inline __attribute__((always_inline))
 
@@ -19,7 +17,6 @@ namespace creepkit {
 
 constexpr int LANES = CREEPKIT_LANES, EIGHT = 8, VECTORS = EIGHT / LANES;
 
-typedef double Vector __attribute__((vector_size(8 * LANES)));
 typedef int64_t Integers __attribute__((vector_size(8 * LANES)));
 
 // Truth values of eight comparisons: all bits set where true.
@@ -134,26 +131,10 @@ CREEPKIT_INLINE double sum(const Eight& a) {
     return total;
 }
 
-// exp(x) by x = k ln 2 + r, |r| <= ln(2)/2, and a polynomial of degree 12 for exp(r): 1e-15 relative. Arguments are
-// cut to 700 on both sides.
-CREEPKIT_INLINE Eight exponential(const Eight& argument) {
-    constexpr double ROUND = 6755399441055744.0;  // 1.5 2^52: adding it rounds to a whole number
-    const double coefficients[] = {1.0 / 39916800.0, 1.0 / 3628800.0, 1.0 / 362880.0, 1.0 / 40320.0, 1.0 / 5040.0,
-                                   1.0 / 720.0,      1.0 / 120.0,     1.0 / 24.0,     1.0 / 6.0,     0.5,
-                                   1.0,              1.0};
-    Eight result;
-    for (int i = 0; i < VECTORS; ++i) {
-        Vector x = argument.part[i];
-        x = x < 700.0 ? x : Vector{} + 700.0;
-        x = x > -700.0 ? x : Vector{} - 700.0;
-        const Vector shifted = x * 1.4426950408889634 + ROUND, k = shifted - ROUND;
-        const Vector r = (x - k * 0.693147180369123816490) - k * 1.90821492927058770002e-10;
-        Vector p = Vector{} + 1.0 / 479001600.0;
-        for (double c : coefficients) p = p * r + c;
-        const Integers power = ((Integers)shifted + 1023) << 52;  // the low bits of `shifted` hold k
-        result.part[i] = p * (Vector)power;
-    }
-    return result;
+CREEPKIT_INLINE Eight exponential(const Eight& x) {
+    Eight r;
+    for (int i = 0; i < VECTORS; ++i) r.part[i] = exponential(x.part[i]);
+    return r;
 }
 
 // ln(x), x > 0 and normal, by x = 2^k m, m in [sqrt(1/2), sqrt(2)], and ln m = 2 artanh((m - 1)/(m + 1)): 4e-16.

@@ -18,6 +18,7 @@ constexpr double NEGLIGIBLE = 0.01;            // share of the tolerance within 
 // Share of a step's tolerance that the increment of a stage may err by. The weights of the methods add up the errors of
 // the stages some thirty times at most.
 constexpr double NEGLIGIBLE_STAGE_ERROR = 1e-3;
+constexpr double LOOSEST_STAGES = 1e-2;  // as if the tolerance of a step were at most this
 
 // One candidate's numbers: the law with its parameters; beta, the leading exponent of time; its limits.
 struct Candidate {
@@ -163,7 +164,7 @@ private:
         // Under prescribed strain the stress counts as well: there Newton's tolerance alone decides.
         const double negligible = test.drive.stiffness > 0.0 ? 0.0 : work.value[0] + settings.smallest;
         const StepStart start = {slope, before.length, newton_tolerance(settings),
-                                 NEGLIGIBLE_STAGE_ERROR * settings.rtol * negligible};
+                                 NEGLIGIBLE_STAGE_ERROR * smaller(LOOSEST_STAGES, settings.rtol) * negligible};
         if (advance(candidate.law, test.drive, segment, clock, tableau, predictor, work, s, h, start) != SOLVED) {
             return INFINITY;
         }
@@ -182,7 +183,7 @@ private:
     // Make the end of the step the start of the next.
     void accept() const {
         for (int64_t v = 0; v < work.unknowns(); ++v) work.value[v] = work.new_value[v];
-        for (int64_t i = 0; i < work.stages; ++i) work.past_slopes[i] = work.slopes[i * work.unknowns()];
+        for (int64_t k = 0; k < work.stages * work.unknowns(); ++k) work.past_slopes[k] = work.slopes[k];
         if (!record.jacobian) return;
         for (int64_t k = 0; k < work.unknowns() * work.parameters; ++k) work.change[k] = work.new_change[k];
     }

@@ -51,7 +51,7 @@ struct LawCall {
 // slopes, slope_changes : (stages, V), (stages, V, P) d/ds at the stages
 // base, base_change     : (stages, V), (V, P) history of the stages, and of the stage at hand
 // problems, times       : (stages,) what each stage was solved for, and when, s
-// past_slopes           : (stages,) of strain in the step before
+// past_slopes           : (stages, V) of the step before
 // row, out, full        : input and outputs of the law
 // gradient, matrix, response : for differentiate_stage
 // clock_change          : (2, P) of beta and tau
@@ -59,8 +59,9 @@ struct LawCall {
 struct StepWorkspace {
     int64_t states, parameters, stages;
     double *value, *change, *new_value, *new_change, *slopes, *slope_changes, *base, *base_change;
-    double *times, *past_slopes, *row, *out, *full, *gradient, *matrix, *response;
+    double *past_slopes, *row, *out, *full, *gradient, *matrix, *response;
     double *clock_change, *nudged, *nudged_value;
+    TimeAndPace* times;
     StageProblem* problems;
 
     StepWorkspace(Workspace& memory, int64_t states, int64_t parameters, int64_t stages)
@@ -74,8 +75,8 @@ struct StepWorkspace {
         slope_changes = memory.doubles(stages * size * parameters);
         base = memory.doubles(stages * size);
         base_change = memory.doubles(size * parameters);
-        times = memory.doubles(stages);
-        past_slopes = memory.doubles(stages);
+        times = memory.array<TimeAndPace>(stages);
+        past_slopes = memory.doubles(stages * size);
         row = memory.doubles(width);
         out = memory.doubles(size * (1 + width));
         full = memory.doubles(size * (1 + width + parameters));
@@ -110,7 +111,8 @@ inline StageProblem set_stage(const StressControl& drive, const Segment& segment
     const TimeAndPace now = clock.at(s + tableau.c[i] * h);
     const double elapsed = now.time - segment.start, strain = base[0] > 0.0 ? base[0] : 0.0;
     const double driving = segment.stress + segment.stress_rate * elapsed - drive.stiffness * strain;
-    work.times[i] = work.row[TIME] = now.time;
+    work.times[i] = now;
+    work.row[TIME] = now.time;
     work.row[TEMPERATURE] = segment.temperature + segment.temperature_rate * elapsed;
     const double trial = drive.load != 0.0 ? driving * exp(drive.load * strain) : driving;
     return work.problems[i] = {trial, drive.stiffness, drive.load, tableau.diagonal(i) * h * now.pace, strain};
@@ -136,9 +138,14 @@ inline int64_t advance(const LawCall& law, const StressControl& drive, const Seg
         const double share = tableau.diagonal(i) * h;
         const double *base = work.base + i * size, *before = i > 0 ? work.slopes + (i - 1) * size : nullptr;
         double* slopes = work.slopes + i * size;
-        for (int64_t v = 1; v < size; ++v) work.row[POINT_SIZE + v - 1] = base[v] + (before ? share * before[v] : 0.0);
         double guess = predictor.slope(i, start.slope, work.slopes, size, work.past_slopes, start.length / h);
         if (!(guess > 0.0)) guess = before ? before[0] : FIRST_SLOPE;
+        for (int64_t v = 1; v < size; ++v) {
+            const double first = start.length > 0.0 ? work.past_slopes[(work.stages - 1) * size + v] : NAN;
+            const double state_slope =
+                predictor.slope(i, first, work.slopes + v, size, work.past_slopes + v, start.length / h);
+            work.row[POINT_SIZE + v - 1] = base[v] + (isfinite(state_slope) ? share * state_slope : 0.0);
+        }
         StageSolution answer = {0.0, TOO_MANY};
         if (size == 1 && problem.trial > 0.0) {
             answer = solve_stage_near_guess(law.update, law.theta, drive.axes, problem, work.row, work.out,
@@ -170,7 +177,7 @@ inline void chain_stage_response(const StressControl& drive, const Segment& segm
         for (int64_t k = 0; k < size * count; ++k) work.base_change[k] += weight * changes[k];
     }
     const StageProblem& problem = work.problems[i];
-    const TransformationDerivatives moved = transformation_derivatives(clock, s + tableau.c[i] * h);
+    const TransformationDerivatives moved = clock.derivatives(s + tableau.c[i] * h, work.times[i]);
     const double growth = drive.load != 0.0 ? exp(drive.load * problem.strain) : 1.0;
     const double trial_by_strain = drive.load * problem.trial - drive.stiffness * growth;
     const double trial_by_time = segment.stress_rate * growth, share = tableau.diagonal(i) * h;
@@ -201,8 +208,9 @@ inline int64_t differentiate(const LawCall& law, const StressControl& drive, con
     for (int64_t i = 0; i < tableau.stages; ++i) {
         const StageProblem& problem = work.problems[i];
         const double share = tableau.diagonal(i) * h, increment = share * work.slopes[i * size];
-        work.row[TIME] = work.times[i];
-        work.row[TEMPERATURE] = segment.temperature + segment.temperature_rate * (work.times[i] - segment.start);
+        const double time = work.times[i].time;
+        work.row[TIME] = time;
+        work.row[TEMPERATURE] = segment.temperature + segment.temperature_rate * (time - segment.start);
         for (int64_t v = 1; v < size; ++v) {
             work.row[POINT_SIZE + v - 1] = work.base[i * size + v] + share * work.slopes[i * size + v];
         }
@@ -252,8 +260,9 @@ inline void dense_sensitivity(const SegmentClock& clock, const Tableau& tableau,
         const double* changes = work.slope_changes + (i * size + v) * count;
         for (int64_t p = 0; p < count; ++p) change[p] += weight * changes[p];
     }
-    const TransformationDerivatives moved = transformation_derivatives(clock, place);
-    const double rate = slope / clock.at(place).pace;
+    const TimeAndPace now = clock.at(place);
+    const TransformationDerivatives moved = clock.derivatives(place, now);
+    const double rate = slope / now.pace;
     const double by_beta = rate * moved.by_beta.time, by_tau = rate * moved.by_tau.time;
     for (int64_t p = 0; p < count; ++p) {
         change[p] -= by_beta * work.clock_change[p] + by_tau * work.clock_change[count + p];

@@ -71,7 +71,7 @@ CREEPKIT_API void creepkit_transformed_times(const TimeTransformation* clock, in
     const SegmentClock segment_clock(*clock);
     for (int64_t k = 0; k < count; ++k) {
         const TimeAndPace now = segment_clock.at(s[k]);
-        const TransformationDerivatives moved = transformation_derivatives(segment_clock, s[k]);
+        const TransformationDerivatives moved = segment_clock.derivatives(s[k], now);
         const double row[7] = {now.time,
                                log(now.pace),
                                moved.by_beta.time,

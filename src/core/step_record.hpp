@@ -16,7 +16,6 @@ enum Ending {
     TOO_MANY_STEPS,
     LAW_FAILED,
     SINGULAR_TANGENT,
-    INTERRUPTED,
     OUT_OF_MEMORY
 };
 
@@ -42,7 +41,6 @@ struct SimulationInput {
     const double* limits;    // (S,) at which a point has failed; infinite: none
     int64_t script_steps;
     const double* script;    // (steps, 2) positions of another simulation, to make the very same steps
-    const int64_t* stop;     // a number that another thread sets to end the simulation, or null
 };
 
 // Accepted steps; row 0 is the body at rest. Null pointers: not wanted.

@@ -67,8 +67,8 @@ public:
 
     // The guess at stage i, NaN when nothing is known.
     //
-    // start : slope where the step begins, NaN when there is none; slopes : of the stages, `stride` apart.
-    // before : (stages,) slopes of the step before, whose length was `length` times that of this one, or 0.
+    // start : slope where the step begins, NaN when there is none. slopes, before : of one unknown at the stages of this
+    // step and of the one before, `stride` apart; the one before was `length` times as long, 0 when there is none.
     double slope(int64_t i, double start, const double* slopes, int64_t stride, const double* before,
                  double length) const {
         const double last = i > 0 ? slopes[(i - 1) * stride] : start;
@@ -81,11 +81,11 @@ public:
         if (!(length > 0.0) || last_ < 0 || (i == 0 && next_ < 0)) return last;
         const double past = (tableau_.c[last_] - 1.0) * length;
         if (i == 1) {
-            const double places[3] = {tableau_.c[0], 0.0, past}, values[3] = {slopes[0], start, before[last_]};
+            const double places[3] = {tableau_.c[0], 0.0, past}, values[3] = {slopes[0], start, before[last_ * stride]};
             return parabola(places, values, tableau_.c[1]);
         }
         const double places[3] = {0.0, past, (tableau_.c[next_] - 1.0) * length};
-        const double values[3] = {start, before[last_], before[next_]};
+        const double values[3] = {start, before[last_ * stride], before[next_ * stride]};
         return parabola(places, values, tableau_.c[0]);
     }
 

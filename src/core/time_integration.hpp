@@ -181,7 +181,6 @@ private:
         int failures = 0;
         copy(displacement, start);
         while (s < 1.0) {
-            if (input.stop && *static_cast<const volatile int64_t*>(input.stop)) return end(INTERRUPTED, ended.time);
             h = fmin(h, position(clock, begin + fmin(settings.growth * elapsed + settings.first, length)) - s);
             if (s + 1.0001 * h > 1.0) h = 1.0 - s;
             const bool scripted = ended.records < input.script_steps;

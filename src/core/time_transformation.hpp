@@ -64,32 +64,39 @@ inline TimeTransformation shifted_power_law_time(double start, double length, do
     return {start, length, fabs(beta) < 1e-3 ? 1e-3 : beta, tau};
 }
 
-// A time, s, and dt/ds there.
+// A time, s, dt/ds there, and ln((y + tau)/tau), or ln(y/L) from a virgin state, with y the time since the start; not
+// worked out where time is linear.
 struct TimeAndPace {
-    double time, pace;
+    double time, pace, log_growth;
+};
+
+// Derivatives of time and of ln(dt/ds) to beta and to tau at a fixed position.
+struct TransformationDerivatives {
+    TransformedTime by_beta, by_tau;
 };
 
 // A transformation with all that is constant over its segment worked out.
 struct SegmentClock {
     TimeTransformation transformation;
-    double reach;  // (1 + L/tau)^beta - 1, where tau > 0
-    bool linear;   // s is proportional to time
+    double log_reach, reach;  // ln(1 + L/tau) and (1 + L/tau)^beta - 1, where tau > 0
+    bool linear;              // s is proportional to time
 
     explicit SegmentClock(const TimeTransformation& clock)
         : transformation(clock),
-          reach(clock.tau == 0.0 ? 0.0 : expm1(clock.beta * log1p(clock.length / clock.tau))),
+          log_reach(clock.tau == 0.0 ? 0.0 : log1p(clock.length / clock.tau)),
+          reach(clock.tau == 0.0 ? 0.0 : expm1(clock.beta * log_reach)),
           linear(clock.beta == 1.0) {}
 
     // Time and pace at position s > 0, with one logarithm and one exponential.
     TimeAndPace at(double s) const {
         const TimeTransformation& clock = transformation;
-        if (linear) return {clock.start + clock.length * s, clock.length};
+        if (linear) return {clock.start + clock.length * s, clock.length, NAN};
         if (clock.tau == 0.0) {
-            const double elapsed = clock.length * exp(log(s) / clock.beta);
-            return {clock.start + elapsed, elapsed / (clock.beta * s)};
+            const double power = log(s) / clock.beta, elapsed = clock.length * exp(power);
+            return {clock.start + elapsed, elapsed / (clock.beta * s), power};
         }
-        const double growth = s * reach, elapsed = clock.tau * expm1(log1p(growth) / clock.beta);
-        return {clock.start + elapsed, (clock.tau + elapsed) * reach / (clock.beta * (1.0 + growth))};
+        const double growth = s * reach, power = log1p(growth) / clock.beta, elapsed = clock.tau * expm1(power);
+        return {clock.start + elapsed, (clock.tau + elapsed) * reach / (clock.beta * (1.0 + growth)), power};
     }
 
     // Position of a time in the segment.
@@ -101,32 +108,28 @@ struct SegmentClock {
         if (clock.tau == 0.0) return exp(clock.beta * log(elapsed / clock.length));
         return expm1(clock.beta * log1p(elapsed / clock.tau)) / reach;
     }
-};
 
-// Derivatives of time and of ln(dt/ds) to beta and to tau at a fixed position.
-struct TransformationDerivatives {
-    TransformedTime by_beta, by_tau;
-};
-
-inline TransformationDerivatives transformation_derivatives(const SegmentClock& segment_clock, double s) {
-    const double beta = segment_clock.transformation.beta, tau = segment_clock.transformation.tau;
-    const double length = segment_clock.transformation.length, reach = segment_clock.reach;
-    if (tau == 0.0) {
-        const double logarithm = log(s), slope = -logarithm / (beta * beta);
-        return {{length * exp(logarithm / beta) * slope, slope - 1.0 / beta}, {0.0, 0.0}};
+    // At the position s of a time.
+    TransformationDerivatives derivatives(double s, const TimeAndPace& now) const {
+        const double beta = transformation.beta, tau = transformation.tau, length = transformation.length;
+        const double elapsed = now.time - transformation.start;
+        const double power = !linear ? now.log_growth : tau == 0.0 ? log(s) : log1p(elapsed / tau);
+        if (tau == 0.0) {
+            const double slope = -power / beta;
+            return {{elapsed * slope, slope - 1.0 / beta}, {0.0, 0.0}};
+        }
+        const double inner = 1.0 + s * reach, grown = tau + elapsed;
+        // What goes through `reach`, which changes by `change`.
+        const auto through = [&](double change) -> TransformedTime {
+            const double rise = s * change / (beta * inner);
+            return {grown * rise, rise + change / reach - s * change / inner};
+        };
+        const TransformedTime by_beta = through(log_reach * (1.0 + reach));
+        const TransformedTime by_tau = through(-beta * (1.0 + reach) * length / (tau * (tau + length)));
+        const double shrink = power / beta;
+        return {{by_beta.time - grown * shrink, by_beta.log_pace - shrink - 1.0 / beta},
+                {by_tau.time + elapsed / tau, by_tau.log_pace + 1.0 / tau}};
     }
-    const double ratio = log1p(length / tau), inner = 1.0 + s * reach, power = log1p(s * reach) / beta;
-    const double grown = exp(power);
-    // What goes through `reach`, which changes by `change`.
-    const auto through = [=](double change) -> TransformedTime {
-        const double rise = s * change / (beta * inner);
-        return {tau * grown * rise, rise + change / reach - s * change / inner};
-    };
-    const TransformedTime by_beta = through(ratio * (1.0 + reach));
-    const TransformedTime by_tau = through(-beta * (1.0 + reach) * length / (tau * (tau + length)));
-    const double shrink = power / beta;
-    return {{by_beta.time - tau * grown * shrink, by_beta.log_pace - shrink - 1.0 / beta},
-            {by_tau.time + expm1(power), by_tau.log_pace + 1.0 / tau}};
-}
+};
 
 }  // namespace creepkit

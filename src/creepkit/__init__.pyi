@@ -18,7 +18,6 @@ from .api.objects import surrogate as surrogate
 from .api.simulation import check_data_quality as check_data_quality
 from .api.simulation import exclude_suspect_frames as exclude_suspect_frames
 from .api.simulation import generate as generate
-from .api.simulation import rate_family as rate_family
 from .api.simulation import simulate as simulate
 from .api.simulation import train as train
 from .dataset.storage import read_dataset as read_dataset
@@ -84,7 +83,6 @@ from .screening.screen import ScreeningOptions as ScreeningOptions
 from .screening.screen import screen as screen
 from .specimens.bulge.observation import fit_field as fit_field
 from .surrogates.parameter_gru import ParameterGru as ParameterGru
-from .surrogates.rate_net import RateNet as RateNet
 from .surrogates.recipe import Training as Training
 from .testing import check_law as check_law
 

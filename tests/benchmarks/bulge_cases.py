@@ -69,7 +69,7 @@ class Case:
         """A run until `end`, s, by the specimen with some settings changed."""
         specimen = self.specimen.replace(**changes)
         setup = set_up_test(specimen, self.history(np.array([end])), {})
-        kernel = kernels.lower(self.model, "numba")
+        kernel = kernels.lower(self.model, "compiled")
         theta = self.model.to_internal(self.model.values(self.values))[0]
         return simulate(kernel, theta, setup.model, setup.load_history, settings=solver_settings(specimen)), setup
 

@@ -19,7 +19,6 @@ from pathlib import Path
 from measured import Page, arguments
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.dataset.dataset import Dataset
 from creepkit.dataset.generation import generate
 from creepkit.sampling.domains import SamplingDesign, sampling_design
@@ -82,7 +81,6 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=400, help="accepted samples of each domain (400)")
     parser.add_argument("--domains", nargs="*", default=["conditioned", "paper"], choices=["conditioned", "paper"])
     options = parser.parse_args()
-    set_numba_cache()
     page = Page("dataset_generation_speed", __doc__)
     page.table(
         "sampling domain",

@@ -1,4 +1,4 @@
-"""Time of an identification of one dimple, through the surrogate that ships and by finite elements.
+"""Time of an identification of one dimple, through the reduced-order model and by finite elements.
 
     python tests/benchmarks/identification_speed.py [--specimens 4] [--write]
 
@@ -14,7 +14,6 @@ import planted_bulge_tests as planted
 from measured import Page, arguments
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 
 DESIGN = planted.DESIGNS["jump"]
 SETTINGS = dict(nuisances=DESIGN.nuisances, weights="likelihood", frames=60)
@@ -46,7 +45,6 @@ def main():
     parser = arguments(__doc__)
     parser.add_argument("--specimens", type=int, default=4)
     options = parser.parse_args()
-    set_numba_cache()
     dimple = ck.specimen("bulge")
     specimens = [planted.specimen(k, planted.SINGLE, DESIGN, dimple) for k in range(options.specimens + 1)]
     page = Page("identification_speed", __doc__)

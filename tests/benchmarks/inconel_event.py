@@ -29,7 +29,6 @@ from measured import Page, arguments, progress
 from public_calls import cross_validated_tests
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.laplace_approximation import interval_quantile
 
@@ -187,8 +186,8 @@ def print_selection(page: Page, row: Row, event: bool) -> None:
     page.heading(f"Law selection {'with' if event else 'without'} the event")
     page.paragraph(
         '`ck.select(laws, tests, using="bulge", test_loss="student", sums=False)`: likelihood and BIC, of these five '
-        "laws alone. Laws far behind the best keep their values from the surrogate (rate-net); the others have those "
-        "of finite elements (bulge)."
+        "laws alone. Laws far behind the best keep the values of a cheaper predictor where there was one on the way; "
+        "the column says what each was identified with."
     )
     page.paragraph(f"The verdict: {row['verdict']}.")
     for name, reason in row["failed"].items():
@@ -275,7 +274,6 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=1, help="of each search")
     parser.add_argument("--keep", default="build/inconel_event", help="folder in which finished rows are kept")
     options = parser.parse_args()
-    set_numba_cache()
     runs = Runs(ck.exclude_suspect_frames(ck.read_histories(options.folder)), options.starts)
     file = Path(options.keep) / "rows.jsonl"
 

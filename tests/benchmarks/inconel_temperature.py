@@ -29,7 +29,6 @@ from measured import Page, arguments, progress
 from public_calls import cross_validated_tests
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.discovery.discover import discover, group_by_temperature
 from creepkit.discovery.forms import law_with_forms
 from creepkit.discovery.refitting import refit
@@ -189,7 +188,6 @@ def main() -> None:
     parser.add_argument("--no-finite-elements", action="store_true")
     parser.add_argument("--plot", type=Path, default=None)
     options = parser.parse_args()
-    set_numba_cache()
     start = time.monotonic()
     tests = amplitudes(ck.exclude_suspect_frames(ck.read_histories(options.folder)))
     by_surrogate = options.through == "surrogate"

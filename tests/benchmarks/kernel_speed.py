@@ -35,7 +35,7 @@ from creepkit.language import CreepLaw
 REPEATS = 31
 SHORTEST = 0.01
 """s of CPU that one measurement takes at least."""
-TARGETS = ("numpy", "torch", "numba")
+TARGETS = ("numpy", "torch", "compiled")
 Run = Callable[[], Any]
 
 
@@ -77,7 +77,7 @@ def compare_with_hand(law: CreepLaw, target: str, rows: int) -> list[tuple[float
     """Return (ratio, seconds a call) for the rate and for the rate with derivatives."""
     points = np.random.default_rng(1).uniform([20.0, 1e-4, 1e2], [200.0, 1e-1, 1e5], (rows, 3))
     values = law.center()
-    build = {"numpy": numpy_runs, "torch": torch_runs, "numba": numba_runs}[target]
+    build = {"numpy": numpy_runs, "torch": torch_runs, "compiled": numba_runs}[target]
     return [ratio_of_times(hand, kernel) for hand, kernel in build(law, points, values)]
 
 
@@ -129,7 +129,7 @@ def array_runs(
 
 def numba_runs(law: CreepLaw, points: Any, values: dict[str, float]) -> list[tuple[Run, Run]]:
     """Compiled loops over rows."""
-    compiled, x = ck.lower(law, "numba"), all_variables(points)
+    compiled, x = ck.lower(law, "compiled"), all_variables(points)
     theta, given = law.to_internal(values)[0], tuple(values.values())
     rate, derivatives = (
         loop_by_hand(f, several) for f, several in zip(LAWS[law.name](math), (False, True), strict=True)
@@ -181,7 +181,7 @@ BLOCKS, CALLS = 64, 20_000
 
 def nanoseconds_a_point(law: CreepLaw, entry: str, rows: int) -> float:
     """CPU time of an entry that compiled code calls for so many points at once."""
-    compiled, theta = ck.lower(law, "numba"), law.to_internal(law.center())[0]
+    compiled, theta = ck.lower(law, "compiled"), law.to_internal(law.center())[0]
     points = np.random.default_rng(1).uniform([20.0, 1e-4, 1e2], [200.0, 1e-1, 1e5], (BLOCKS * rows, 3))
     x = np.ascontiguousarray(all_variables(points).reshape(BLOCKS, rows, 6).transpose(0, 2, 1))
     out = np.empty((7 + theta.size) * rows)

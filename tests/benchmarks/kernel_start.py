@@ -20,7 +20,7 @@ from measured import Page, arguments
 LAWS = ("norton", "strain-hardening", "time-hardening", "hyperbolic-sine", "drifting-exponent", "combined")
 PROGRAM = """
 import sys, time
-import numpy, numba, sympy
+import llvmlite, numpy, sympy
 import creepkit
 from creepkit.integration import integrate
 from creepkit.kernels import compilation
@@ -30,7 +30,7 @@ law = creepkit.law(sys.argv[1])
 if sys.argv[1] == "combined":
     law = law.times(creepkit.arrhenius()).with_temperature(n_2=creepkit.linear())
 start = time.process_time()
-kernel = creepkit.lower(law, "numba")
+kernel = creepkit.lower(law, "compiled")
 point = numpy.array([[100.0, 0.01, 10.0, 1000.0, 100.0, 33.0]])
 call_entry(kernel, "update", point, law.to_internal(law.center())[0])
 print(time.process_time() - start)

@@ -35,7 +35,6 @@ from measured import Page, arguments, progress
 from proportions import share_with_interval
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.errors import FitWarning
 from creepkit.inverse.noise_model import NoiseModel, OutputNoise, covariance
 from creepkit.inverse.uncertainty.model_averaging import ModelAverage
@@ -75,7 +74,6 @@ QUANTITIES = ("log rate at 72 MPa", "log rate at 120 MPa", "log rate at 168 MPa"
 def specimen_result(job):
     """All that the tables need of one specimen, as plain numbers."""
     k, row_name = job
-    set_numba_cache()
     row = ROWS[row_name]
     design = planted.DESIGNS[row.design]
     dimple = ck.specimen("bulge").replace(threads=1)

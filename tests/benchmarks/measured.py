@@ -18,7 +18,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "measured"
-PACKAGES = ("creepkit", "numpy", "numba", "torch")
+PACKAGES = ("creepkit", "numpy", "llvmlite", "torch")
 
 
 class Page:

@@ -7,7 +7,7 @@ Plants HS, PL, SPL and TPL, `--specimens` of each, in a dimple of 0.5 mm simulat
 to 10 MPa at 4 h, 48 times of 900 s, white noise of 1.5 um on D_amp, 0.02 mm on S_d, 0.02 on S_p. With R = log10 of the
 rate at 120 MPa, a strain of 0.01 and 1e4 s: R uniform in -7.3 to -5.7; PL n 1.5 to 7; SPL and TPL n 2 to 6, m -0.7 to
 -0.2; HS local exponent at 120 MPa 4 to 8 and n 1 to 4; E about 150 GPa by 10 %. Draws that do not end between 0.15 and
-1.2 mm are drawn again. Each is identified from the sum of Eq. (2) through the surrogate that ships (or --through), its
+1.2 mm are drawn again. Each is identified from the sum of Eq. (2) through the reduced-order model (or --through), its
 modulus a nuisance of 10 %, by: no penalty, L2, GroupL2, Sqrt, Subsets, Sqrt with automatic strength; and L2 with the
 particle swarm, the paper's way. The answer is the term that contributes most to the reduced law; with its exponent m
 switched off it is a power law (PL).
@@ -25,7 +25,6 @@ from measured import Page, arguments, progress
 from scipy.optimize import brentq
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.inverse.sparsity.bootstrap import binomial_interval
 from creepkit.inverse.sparsity.term_selection import identify_full, identify_reduced
@@ -152,9 +151,8 @@ def main():
     parser.add_argument("--specimens", type=int, default=12)
     parser.add_argument("--laws", nargs="*", default=list(LAWS), choices=list(LAWS))
     parser.add_argument("--penalties", nargs="*", default=list(PENALTIES), choices=list(PENALTIES))
-    parser.add_argument("--through", default="dimple", help="the surrogate; by default the one that ships")
+    parser.add_argument("--through", default="dimple", help="a surrogate; by default the reduced-order model")
     options = parser.parse_args()
-    set_numba_cache()
     model, law = ck.surrogate(options.through), ck.law("combined")
     settings = IdentificationSettings(**SETTINGS)
     results = {label: [] for label in options.penalties}

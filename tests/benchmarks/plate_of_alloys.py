@@ -7,8 +7,8 @@
 Each alloy is one dimple under 8, then 10 MPa for 4 h, a frame a minute, with white noise as measured (1.5 um on D_amp,
 0.02 mm on S_d, 0.02 on S_p), its law and values drawn around the three of Fig. 7a of Chen et al.
 (creepkit.screening.planted). The four laws of Table 1 are identified with intervals, the best one is confirmed by
-finite elements, and Eq. (2) is fitted without sparsity unless --no-full-law. `--how through` searches in the surrogate
-that ships and ends with finite elements; `surrogate` uses nothing else; `finite-elements` does without it. The
+finite elements, and Eq. (2) is fitted without sparsity unless --no-full-law. `--how through` searches in the
+reduced-order model and ends with finite elements; `surrogate` uses nothing else; `finite-elements` does without it. The
 simulation of the plate is not timed. Started again with the same --to, the screening continues, and its time means
 nothing.
 
@@ -31,7 +31,6 @@ from measured import Page, arguments, progress
 from proportions import share_with_interval
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.screening.planted import THICKNESS_MEAN_SD, planted_plate
 from creepkit.screening.results import mean_relative_squared_error
 from creepkit.screening.screen import screen
@@ -138,7 +137,6 @@ def main():
     parser.add_argument("--workers", type=int)
     parser.add_argument("--to", help="folder in which results are kept")
     options = parser.parse_args()
-    set_numba_cache()
     planted = planted_plate(options.alloys, options.seed, thickness_known=not options.unknown_thickness)
     folder = nullcontext(options.to) if options.to else tempfile.TemporaryDirectory()
     with folder as to:

@@ -69,7 +69,7 @@ def references(specimen: Bulge, thicknesses: tuple[float, ...], count: int, seed
     for case in drawn_cases(seed):
         own = specimen.replace(apex_thickness=thicknesses[len(result) % len(thicknesses)]) if thicknesses else specimen
         setup = set_up_test(own, case.history(TIMES), {})
-        kernel = kernels.lower(case.model, "numba")
+        kernel = kernels.lower(case.model, "compiled")
         theta = case.model.to_internal(case.model.values(case.values))[0]
         settings = solver_settings(own)
         cpu, run = timed(

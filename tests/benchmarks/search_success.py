@@ -1,6 +1,6 @@
 """How often a search ends at the best optimum known: planted bulge tests, one law each.
 
-    python tests/benchmarks/search_success.py [--specimens 40] [--laws norton ...] [--through reduced-order|surrogate]
+    python tests/benchmarks/search_success.py [--specimens 40] [--laws norton ...]
                                               [--searches default swarm cma] [--seed 0] [--write]
 
 Each specimen is one 12 h test (8 to 10 MPa after 4 h, 48 frames, white noise of 1.5 um on D_amp, 0.02 mm on S_d, 0.02
@@ -23,7 +23,6 @@ from measured import Page, arguments
 from proportions import share_with_interval
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.inverse.coordinates import Coordinates
 from creepkit.inverse.identify import StartingEstimate, identify
 from creepkit.inverse.reference_conditions import ReferencePoint
@@ -134,15 +133,11 @@ def main():
     parser.add_argument("--specimens", type=int, default=40, help="of each law")
     parser.add_argument("--laws", nargs="*", default=list(PRIORS), choices=list(PRIORS))
     parser.add_argument("--searches", nargs="*", default=list(SEARCHES), choices=list(SEARCHES))
-    parser.add_argument("--through", default="reduced-order", choices=("reduced-order", "surrogate"))
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    set_numba_cache()
-    reduced_order = options.through == "reduced-order"
-    using = ck.specimen("bulge").reduced_order_model() if reduced_order else ck.surrogate("dimple")
-    page = Page(f"search_success_{options.through.replace('-', '_')}", __doc__)
-    through = "reduced-order model" if reduced_order else "surrogate"
-    page.paragraph(f"{options.specimens} specimens of each law, through the {through}.")
+    using = ck.surrogate("dimple")
+    page = Page("search_success", __doc__)
+    page.paragraph(f"{options.specimens} specimens of each law, through the reduced-order model.")
     page.table(
         "law", "search", "within 2 of the best [95 % interval]", "largest difference", "candidates", "CPU time, s"
     )

@@ -1,22 +1,18 @@
-"""Speed of surrogates of the dimple, beside the finite element model and the paper's network: one 12 h jump test.
+"""Speed of what predicts dimples in the place of finite elements: one 12 h test with a pressure jump, 289 frames.
 
-    python tests/benchmarks/surrogate_speed.py [--candidates 300] [--simulated 6] [--laws norton ...]
-                                               [--surrogate FILE] [--write]
+    python tests/benchmarks/surrogate_speed.py [--candidates 300] [--simulated 6] [--law norton] [--write]
 
-First table, CPU time of a candidate at 289 times: RateNet by its parts (the reduced-order model alone, with its
-features, with the network), RateNet with sensitivities to all parameters and to the apex thickness, the finite element
-model without and with the same sensitivities, and the ratios of finite elements to RateNet. Second table, wall time of
-all candidates on all cores, and that of the bare network of ParameterGru (128 x 3, the paper's) at 49 and 289 frames.
-Networks are not trained, which costs the same, unless --surrogate names one. All is measured in one process, in turns;
-the least of some repeats. The first run also compiles.
+First table, CPU time of a candidate: the reduced-order model and the finite element model, values alone and with
+sensitivities to all parameters and to the apex thickness. Second table, the network of ParameterGru, 128 x 3 as in the
+paper: all candidates together, and one candidate, without and with ten directions; beside it torch's forward pass in
+float64. Its weights are not trained, which costs the same. All is measured in one process, on one thread, in turns; the
+least of some repeats. The first run also compiles.
 """
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -25,28 +21,15 @@ from measured import Page, arguments
 from public_calls import predict
 
 import creepkit as ck
-from creepkit import kernels
 from creepkit.records import History
-from creepkit.sampling.conditions import TimeGrid
-from creepkit.specimens.bulge.observation import OBSERVED
-from creepkit.specimens.bulge.reduced_order.trajectories import (
-    WITHOUT_FEATURES,
-    TrajectoryOptions,
-    simulate_trajectories,
-)
 from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.surrogates.applicability_domain import ApplicabilityDomain
-from creepkit.surrogates.loading import load_surrogate
-from creepkit.surrogates.parameter_network import ParameterModule
-from creepkit.surrogates.rate_net import RateNet, RateSurrogate
-from creepkit.surrogates.rate_network import RateModule, input_names
-from creepkit.surrogates.recipe import SurrogateMetadata
+from creepkit.surrogates.network_evaluation import ParameterNetwork
+from creepkit.surrogates.parameter_network import ParameterModule, weights_of
 
 LAWS = {
     "norton": {"A": 3e-15, "n": 3.5},
     "strain-hardening": {"A": 3e-16, "n": 3.0, "m": -0.5},
     "hyperbolic-sine": {"A": 3e-9, "n": 3.0, "B": 90.0},
-    "combined": dict(A_1=1e-9, n_1=3.0, B=60.0, A_2=1e-14, n_2=4.0, m_1=-0.3, A_3=3e-12, n_3=3.0, m_2=-0.4),
 }
 END, EVERY = 43200.0, 150.0
 TEST = History(
@@ -58,119 +41,78 @@ TEST = History(
     specimen="bulge",
     elastic=ck.Elastic(E=150e3),
 )
-REPEATS = 7
-GRU_INPUTS = (8, 1, len(OBSERVED))
-"""Constants (some law's parameters and conditions), series and outputs."""
-
-
-CPU_HEADS = (
-    "law",
-    "reduced-order model, ms",
-    "with features, ms",
-    "RateNet, ms",
-    "with sensitivities, ms",
-    "finite elements, ms",
-    "with sensitivities, ms",
-    "finite elements over RateNet",
-    "with sensitivities",
-)
-WALL_HEADS = ("law", "RateNet, ms", "reduced-order model and features, ms", "GRU, 49 frames, ms", "GRU, 289 frames, ms")
+REPEATS = 3
+SIZES, HIDDEN, LAYERS, DIRECTIONS = (8, 1, 3), 128, 3, 10
+"""Constants (some law's parameters and conditions), series and outputs; width, depth; directions of derivatives."""
 
 
 def main() -> None:
     parser = arguments(__doc__)
     parser.add_argument("--candidates", type=int, default=300)
     parser.add_argument("--simulated", type=int, default=6, help="candidates of the finite element model")
-    parser.add_argument("--laws", nargs="*", default=list(LAWS))
-    parser.add_argument("--surrogate", help="file of a RateNet")
+    parser.add_argument("--law", choices=list(LAWS), default="norton")
     options = parser.parse_args()
     torch.set_num_threads(1)
     page = Page("surrogate_speed", __doc__)
-    page.heading("CPU time of a candidate")
-    page.table(*CPU_HEADS)
-    for name in options.laws:
-        page.row(name, *cpu_times(name, options.candidates, options.simulated, options.surrogate))
-    page.heading(f"Wall time of {options.candidates} candidates on {len(os.sched_getaffinity(0))} cores")
-    page.table(*WALL_HEADS)
-    for name in options.laws:
-        page.row(name, *wall_times(name, options.candidates, options.surrogate))
+    page.heading(f"CPU time of a candidate of law '{options.law}'")
+    page.table("model", "values, ms", "with sensitivities, ms")
+    exact = Bulge(threads=1)
+    for title, model, count in (
+        ("reduced-order model", exact.reduced_order_model(), options.candidates),
+        ("finite elements", exact, options.simulated),
+    ):
+        page.row(title, *(f"{1e3 * s:.3g}" for s in specimen_times(model, options.law, count)))
+    page.heading(f"CPU time of the network, {HIDDEN} x {LAYERS}, {TEST.times.size} frames")
+    page.table("candidates", "values, ms", f"with {DIRECTIONS} directions, ms", "values by torch, ms")
+    for count in (options.candidates, 1):
+        page.row(count, *(f"{1e3 * s:.3g}" for s in network_times(count)))
     if options.write:
         page.write()
 
 
-def cpu_times(name: str, count: int, simulated: int, file: str | None) -> list[str]:
-    """CPU times of one law, ms, and ratios."""
-    law, surrogate, exact = ck.law(name), rate_surrogate(file, threads=1), Bulge(threads=1)
-    kernel, many, few = kernels.lower(law, "numba"), scattered(name, count), scattered(name, simulated)
-    theta, factors = law.to_internal(many), surrogate.recipe.factors
-    thickness = {"thickness": np.full((1, 1), exact.geometry.apex_thickness)}
-    some = {n: v[: max(1, count // 10)] for n, v in many.items()}
-    spent = in_turns(
-        (
-            lambda: simulate_trajectories(
-                exact,
-                kernel,
-                theta,
-                [TEST],
-                options=TrajectoryOptions(options=TrajectoryOptions(factors=WITHOUT_FEATURES)),
-            ),
-            count,
-        ),
-        (
-            lambda: simulate_trajectories(exact, kernel, theta, [TEST], options=TrajectoryOptions(factors=factors)),
-            count,
-        ),
-        (lambda: predict(surrogate, law, many, [TEST]), count),
-        (lambda: predict(surrogate, law, some, [TEST], thickness, sensitivities=True), max(1, count // 10)),
+def specimen_times(model: Any, name: str, count: int) -> list[float]:
+    """CPU time of a candidate, s: values, and values with sensitivities."""
+    law, candidates = ck.law(name), scattered(name, count)
+    few = {n: v[: max(1, count // 10)] for n, v in candidates.items()}
+    thickness = {"thickness": np.full((1, 1), Bulge().geometry.apex_thickness)}
+    values, derivatives = in_turns(
+        lambda: predict(model, law, candidates, [TEST]),
+        lambda: predict(model, law, few, [TEST], thickness, sensitivities=True),
     )
-    finite_elements = in_turns(
-        (lambda: predict(exact, law, few, [TEST]), simulated),
-        (lambda: predict(exact, law, few, [TEST], thickness, sensitivities=True), simulated),
-        repeats=1,
+    return [values / count, derivatives / max(1, count // 10)]
+
+
+def network_times(count: int) -> list[float]:
+    """CPU time of all candidates, s: values, values with derivatives, and torch's values."""
+    module = ParameterModule(SIZES, HIDDEN, LAYERS, "gru", logarithm=False, corrects_base=False)
+    shape = ("gru", HIDDEN, LAYERS)
+    weights = weights_of(module.state_dict())
+    network = ParameterNetwork.from_weights(weights, SIZES, shape, logarithm=False, corrects_base=False)
+    module, rng = module.double().eval(), np.random.default_rng(0)
+    constants, series = rng.normal(size=(count, SIZES[0])), rng.normal(size=(1, TEST.times.size, SIZES[1]))
+    directions = rng.normal(size=(count, DIRECTIONS, SIZES[0]))
+    batch = {"constants": torch.from_numpy(constants), "series": torch.from_numpy(np.tile(series, (count, 1, 1)))}
+
+    def by_torch() -> None:
+        with torch.no_grad():
+            module(batch)
+
+    return in_turns(
+        lambda: network.outputs(constants, series),
+        lambda: network.outputs_with_derivatives(constants, series, directions=directions),
+        by_torch,
     )
-    ratios = finite_elements[0] / spent[2], finite_elements[1] / spent[3]
-    return [
-        *(f"{1e3 * s:.3f}" for s in spent),
-        *(f"{1e3 * s:.1f}" for s in finite_elements),
-        *(f"{ratio:.0f}" for ratio in ratios),
-    ]
 
 
-def wall_times(name: str, count: int, file: str | None) -> list[str]:
-    """Wall times of one law on all cores, ms."""
-    law, surrogate, cores = ck.law(name), rate_surrogate(file), len(os.sched_getaffinity(0))
-    kernel, many = kernels.lower(law, "numba"), scattered(name, count)
-    theta, factors = law.to_internal(many), surrogate.recipe.factors
-    spent = in_turns(
-        (lambda: predict(surrogate, law, many, [TEST]), 1),
-        (
-            lambda: simulate_trajectories(
-                Bulge(),
-                kernel,
-                theta,
-                [TEST],
-                options=TrajectoryOptions(options=TrajectoryOptions(factors=factors, threads=cores)),
-            ),
-            1,
-        ),
-        (gru(count, 49, cores), 1),
-        (gru(count, TEST.times.size, cores), 1),
-        clock=time.perf_counter,
-    )
-    return [f"{1e3 * s:.0f}" for s in spent]
-
-
-def in_turns(
-    *runs: tuple[Callable[[], Any], int], repeats: int = REPEATS, clock: Callable[[], float] = time.process_time
-) -> list[float]:
-    """Least time of each run over its number of candidates, s; the first turn, which may compile, does not count."""
+def in_turns(*runs: Callable[[], Any]) -> list[float]:
+    """Least CPU time of each run, s; the first turn, which may compile, does not count."""
     best = [np.inf] * len(runs)
-    for turn in range(repeats + 1):
-        for k, (run, count) in enumerate(runs):
-            start = clock()
+    for turn in range(REPEATS + 1):
+        for k, run in enumerate(runs):
+            start = time.process_time()
             run()
             if turn > 0:
-                best[k] = min(best[k], (clock() - start) / count)
+                best[k] = min(best[k], time.process_time() - start)
     return best
 
 
@@ -180,39 +122,6 @@ def scattered(name: str, count: int) -> dict[str, np.ndarray]:
     return {
         n: v * np.exp(rng.normal(0.0, 0.5 if table[n].scale == "log" else 0.03, count)) for n, v in LAWS[name].items()
     }
-
-
-def rate_surrogate(file: str | None, threads: int | None = None) -> RateSurrogate:
-    """A RateNet with some domain, of random weights unless there is a file."""
-    specimen = Bulge() if threads is None else Bulge(threads=threads)
-    if file is not None:
-        surrogate = load_surrogate(file)
-        if not isinstance(surrogate, RateSurrogate):
-            raise SystemExit(f"{file} holds a {surrogate.recipe.kind}; give a rate-net")
-        return surrogate
-    recipe = RateNet()
-    names = input_names(recipe.factors.stress.size * recipe.factors.strain.size)
-    local = [n for n in names if not n.startswith(("mean", "fading"))]
-    domain = ApplicabilityDomain.from_rows(local, np.random.default_rng(0).normal(size=(500, len(local))))
-    grid = TimeGrid(TEST.times, False)
-    metadata = SurrogateMetadata(ck.law("norton"), specimen, OBSERVED, grid, (), (), domain=domain)
-    return RateSurrogate(recipe, RateModule(len(names), recipe.hidden, recipe.layers), metadata)
-
-
-def gru(count: int, frames: int, cores: int) -> Callable[[], None]:
-    """A run of the paper's network, threads sharing the candidates."""
-    module = ParameterModule(GRU_INPUTS, 128, 3, "gru", logarithm=False, corrects_base=False).eval()
-    constants, series = torch.randn(count, GRU_INPUTS[0]), torch.randn(count, frames, GRU_INPUTS[1])
-
-    def part(k: int) -> None:
-        with torch.no_grad():
-            module({"constants": constants[k::cores], "series": series[k::cores]})
-
-    def run() -> None:
-        with ThreadPoolExecutor(cores) as pool:
-            list(pool.map(part, range(cores)))
-
-    return run
 
 
 if __name__ == "__main__":

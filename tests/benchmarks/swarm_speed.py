@@ -4,7 +4,7 @@
                                            [--write]
 
 One 12 h test (8 to 10 MPa after 4 h, 48 frames with noise), simulated by finite elements, is identified through the
-surrogate that ships by each search in turn, in one process, compiled beforehand; the least of the repeats. Columns:
+reduced-order model by each search in turn, in one process, compiled beforehand; the least of the repeats. Columns:
 predicted candidates; wall and CPU time of the whole identification, and of its search alone (the refinement of its best
 candidates included), both also as ratios to the default search (wall, CPU); -2 ln L above that of the default search.
 The goal is 15 s of wall time for 300 particles and 100 iterations on two cores; the paper: 5 min on an RTX 5000 Ada.
@@ -17,7 +17,6 @@ import numpy as np
 from measured import Page, arguments
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.inverse.search.derivative_free import CmaEs, ParticleSwarm
 from creepkit.inverse.search.multistart import MultiStart
 
@@ -96,7 +95,6 @@ def main():
     parser.add_argument("--laws", nargs="*", default=["norton", "drifting-exponent"], choices=list(LAWS))
     parser.add_argument("--repeats", type=int, default=1)
     options = parser.parse_args()
-    set_numba_cache()
     model = ck.surrogate("dimple")
     searches = {
         "default": MultiStart(),

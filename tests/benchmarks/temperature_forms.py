@@ -7,7 +7,7 @@ A specimen is one set of tests at nine temperatures, 973 to 1083 K, of a Norton 
 constant), `linear` (Arrhenius, n linear in T) and `inverse` (Arrhenius, n linear in 1/T). Priors, seed 625: n at 1033 K
 uniform in 3 to 6, its decrease over the 110 K uniform in 0.3 to 1.5, Q uniform in 350 to 480 kJ/mol, ln of the rate at
 the reference stress and 1033 K within 0.5 of one that deflects the dimple well. `surrogate`: one bulge test a
-temperature, 8 then 10 MPa for 12 h, 48 frames, through the surrogate that ships; noise 1.5 um on D_amp, 0.02 mm on S_d,
+temperature, 8 then 10 MPa for 12 h, 48 frames, through the reduced-order model; noise 1.5 um on D_amp, 0.02 mm on S_d,
 0.02 on S_p. `uniaxial`: three creep tests a temperature at 60, 90 and 120 MPa to about 2 %, noise 2e-5 of strain, rates
 that scatter by 3 % from test to test.
 
@@ -27,7 +27,6 @@ from measured import Page, arguments, progress
 from proportions import share_with_interval
 
 import creepkit as ck
-from creepkit.cli import set_numba_cache
 from creepkit.discovery.discover import discover, group_by_temperature
 from creepkit.discovery.refitting import refit
 from creepkit.discovery.temperature_law import TemperatureLaw
@@ -162,7 +161,6 @@ def main() -> None:
     parser.add_argument("--max-forms", type=int, default=3, help="forms of one parameter that are refitted")
     parser.add_argument("--no-refit", action="store_true")
     options = parser.parse_args()
-    set_numba_cache()
     bulge = options.through == "surrogate"
     model = ck.surrogate("dimple") if bulge else ck.specimen("uniaxial")
     nuisances = () if bulge else (ck.Nuisance("rate", sd=0.03),)

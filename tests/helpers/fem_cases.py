@@ -64,7 +64,7 @@ def right_of(body: StripMesh) -> np.ndarray:
 @cache
 def lowered(law: CreepLaw) -> CompiledLaw:
     """The compiled form of a law."""
-    return kernels.lower(law, "numba")
+    return kernels.lower(law, "compiled")
 
 
 def course(pressure, end: float, modulus: float, poisson: float = 0.3, **more) -> LoadHistory:

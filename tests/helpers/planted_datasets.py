@@ -1,7 +1,4 @@
-"""Small data sets whose histories are known: Norton bars under held loads in closed form, and a few dimples.
-
-And dimples of the rate family, simulated or only drawn.
-"""
+"""Small data sets whose histories are known: Norton bars under held loads in closed form, and a few dimples."""
 
 from collections.abc import Mapping
 
@@ -9,10 +6,8 @@ import numpy as np
 
 import creepkit as ck
 from creepkit.dataset.dataset import Dataset
-from creepkit.dataset.simulation import empty_dataset, simulate_rows
 from creepkit.records import History
 from creepkit.sampling.conditions import TimeGrid
-from creepkit.sampling.rate_family import rate_family
 
 HOURS = 3600.0
 
@@ -62,23 +57,6 @@ def dimples(count: int = 24) -> Dataset:
     empty = data_set("bulge", ck.law("norton"), grid, parameters, columns, np.zeros((count, grid.frames, 3)))
     found = [empty.specimen.predict(empty.law, empty.theta_of(k), [empty.planned_test(k)]).of(0) for k in range(count)]
     return data_set("bulge", empty.law, grid, parameters, columns, np.array(found))
-
-
-def rates(draws: int = 40) -> Dataset:
-    """Dimples of the rate family by finite elements: those of some draws that are accepted."""
-    family, specimen = rate_family(), ck.specimen("bulge")
-    header = empty_dataset(family, specimen, {"seed": 1})
-    return simulate_rows(family, header, 1, 0, draws, lambda row: None).accepted
-
-
-def unsimulated_rates(count: int) -> Dataset:
-    """Draws of the rate family with nothing for histories, which is all that a domain is made of."""
-    family = rate_family()
-    drawn = family.draw(0, count, 1)
-    columns = dict(zip(family.condition_names, drawn.conditions.T, strict=True))
-    return data_set(
-        "bulge", family.law, family.grid, drawn.parameters, columns, np.zeros((count, family.grid.frames, 3))
-    )
 
 
 def data_set(

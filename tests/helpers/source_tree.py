@@ -91,9 +91,3 @@ def parameter_count(function: ast.FunctionDef) -> int:
     """The number of named parameters, `self` and `cls` apart."""
     names = [argument.arg for argument in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)]
     return len(names) - (names[:1] in (["self"], ["cls"]))
-
-
-def is_compiled(function: ast.FunctionDef) -> bool:
-    """Whether numba compiles a function: whether a decorator is njit, or a call of it."""
-    decorators = [d.func if isinstance(d, ast.Call) else d for d in function.decorator_list]
-    return any(isinstance(d, ast.Name) and d.id in ("njit", "cfunc", "vectorize") for d in decorators)

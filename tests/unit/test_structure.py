@@ -10,9 +10,6 @@ from helpers import source_tree
 MOST_LINES = 400
 MOST_PARAMETERS = 8
 
-COMPILED_PACKAGES = ("creepkit.fem.", "creepkit.integration.", "creepkit.specimens.bulge.reduced_order.")
-"""Their compiled functions take arrays and scalars one by one, since numba knows no records of ours."""
-
 
 def test_no_module_imports_itself_by_way_of_others() -> None:
     """Imports within functions and for type checking count as well."""
@@ -31,18 +28,16 @@ def test_no_file_is_too_long_to_read() -> None:
     assert {m: length for m, length in lengths.items() if length > MOST_LINES} == {}
 
 
-def _is_exempt(module: str, function: ast.FunctionDef) -> bool:
-    """Commands, whose parameters are the options of the command line; and compiled functions of three packages."""
-    if module.startswith("creepkit.cli."):
-        return function.name == "command"
-    return module.startswith(COMPILED_PACKAGES) and source_tree.is_compiled(function)
+def _is_command(module: str, function: ast.FunctionDef) -> bool:
+    """Its parameters are the options of the command line."""
+    return module.startswith("creepkit.cli.") and function.name == "command"
 
 
 def test_no_function_takes_more_than_eight_parameters() -> None:
     wide = {
         f"{module}.{function.name}": source_tree.parameter_count(function)
         for module, function in source_tree.functions()
-        if source_tree.parameter_count(function) > MOST_PARAMETERS and not _is_exempt(module, function)
+        if source_tree.parameter_count(function) > MOST_PARAMETERS and not _is_command(module, function)
     }
     assert wide == {}
 

@@ -32,7 +32,7 @@ G, K = E / (2 * (1 + NU)), E / (3 * (1 - 2 * NU))
 
 
 def driven(law: CreepLaw, values, controls, times, elastic=STEEL, temperature=300.0) -> PointTrajectory:
-    kernel = lower(law, "numba")
+    kernel = lower(law, "compiled")
     run = integrate_tensor_point(
         kernel, law.to_internal(values)[0], elastic, controls, temperature, times, settings=ENDLESS
     )

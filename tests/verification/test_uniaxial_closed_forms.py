@@ -27,7 +27,7 @@ TIGHT, DEFAULT = IntegrationSettings(rtol=1e-9, smallest=1e-9), IntegrationSetti
 
 
 def strain_of(law, theta, stress, times, settings, **kwargs):
-    kernel = lower(law, "numba")
+    kernel = lower(law, "compiled")
     driving = stress if isinstance(stress, Program) else Program.constant(stress)
     result = integrate(kernel, theta, [PointTest(driving, ROOM, times, **kwargs)], settings=settings)
     assert (result.status == 0).all()
@@ -218,7 +218,7 @@ def test_nafems_uniaxial_cases():
 @pytest.mark.parametrize("loading", ["stress", "load", "steps and a ramp"])
 def test_sensitivities_are_the_derivatives_of_the_solution(loading):
     """Against Richardson differences of tight runs: 1e-5 of the strain, or of the largest sensitivity."""
-    kernel = lower(COMBINED, "numba")
+    kernel = lower(COMBINED, "compiled")
     for theta, stress, end in combined_cases(32):
         program = Program.constant(stress)
         if loading == "steps and a ramp":

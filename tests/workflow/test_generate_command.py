@@ -94,8 +94,8 @@ def test_a_dry_run_simulates_nothing(tmp_path):
     assert result.exit_code == 0, result.output
     assert "criterion" in result.stdout
     assert os.listdir(tmp_path) == ["a.rates.png"]
-    family = creepkit("generate", "rate-family", "--dry-run", "--json", "--to", tmp_path / "r.h5")
-    assert json.loads(family.stdout)["simulated"] > 0.8
+    conditioned = creepkit("generate", "combined", "--dry-run", "--json", "--to", tmp_path / "r.h5")
+    assert json.loads(conditioned.stdout)["simulated"] > 0.8
 
 
 def test_ranges_of_conditions_and_what_is_left_out_can_be_said():
@@ -118,10 +118,6 @@ def test_ranges_of_conditions_and_what_is_left_out_can_be_said():
         (
             ("generate", "norton", "--to", "a.h5", "--samples", 9, "--domain", "pandora"),
             "there is no sampling domain 'pandora'",
-        ),
-        (
-            ("generate", "rate-family", "--domain", "paper", "--to", "a.h5"),
-            "rate-family has a sampling domain of its own",
         ),
         (("generate", "nortn", "--to", "a.h5", "--samples", 9), "did you mean 'norton'"),
         (("generate", "norton", "--specimen", "relaxation", "--to", "a.h5", "--samples", 9), "relaxation"),

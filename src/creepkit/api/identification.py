@@ -58,8 +58,8 @@ def identify(
     search : how to begin: by default least squares from screened starts; ParticleSwarm() as in the paper, CmaEs().
     penalty : on the contributions of a sum's terms, such as L2(), GroupL2(), Sqrt() or Subsets(): terms that are left
         out stand in `sparsity` of the result, and its law is the one that remains.
-    through : a surrogate in which the minima of the search are refined before `using` (finite elements) gives values
-        and intervals; "auto" takes the one that comes with creepkit where it is of this specimen and knows the law.
+    through : a cheaper predictor in which the minima of the search are refined before `using` (finite elements) gives
+        values and intervals; "auto" takes the reduced-order model of `using` where that states its own error.
         A surrogate that does not know the class of the law is replaced by its specimen, and a note says so.
     settings : what is minimised, nuisance parameters, starts, seed, frames, robust losses, and whether suspect frames
         are left out; see IdentificationSettings. changes : single fields of it by name:
@@ -76,7 +76,7 @@ def identify(
     histories = without_suspect_frames(check_histories(histories), settings)
     predictor = resolve_predictors(using, histories)
     check_nuisance_tests(settings.nuisances, [h.name for h in histories])
-    surrogate = _resolve_surrogate(through, predictor, histories)
+    surrogate = _resolve_through(through, predictor)
     if through == "auto":
         surrogate = through_for_law(surrogate, law)
     if penalty is None:
@@ -134,7 +134,7 @@ def select(
         histories,
         predictor,
         settings=settings,
-        through=_resolve_surrogate(through, predictor, histories),
+        through=_resolve_through(through, predictor),
         sums=sums,
         by=by,
         progress=progress,
@@ -209,20 +209,16 @@ def change_settings(settings: IdentificationSettings, changes: SettingChanges) -
     return replace(settings, **given)
 
 
-def _resolve_surrogate(
-    through: Predictor | Literal["auto"] | None,
-    predictor: Predictor | Mapping[str, Predictor],
-    histories: Sequence[History],
+def _resolve_through(
+    through: Predictor | Literal["auto"] | None, predictor: Predictor | Mapping[str, Predictor]
 ) -> Predictor | None:
-    """The surrogate given; or the one that comes with creepkit, where it is of this specimen and these histories."""
+    """The predictor given; or the reduced-order model of the specimen, where it states how accurate it is."""
+    from creepkit.inverse.composite_predictor import prediction_errors_of, reduced_order_model_of
+
     if not isinstance(through, str):
         return through
-    if isinstance(predictor, Mapping) or getattr(predictor, "name", "") != "bulge":
-        return None
-    from creepkit.surrogates.loading import surrogate_by_name
-
-    model = surrogate_by_name("dimple")
-    return model if model.applies_to(predictor, histories) else None
+    reduced = None if isinstance(predictor, Mapping) else reduced_order_model_of(predictor)
+    return reduced if reduced is not None and prediction_errors_of(reduced) else None
 
 
 def export(

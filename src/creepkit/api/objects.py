@@ -12,9 +12,8 @@ from creepkit.registry.arguments import resolve_law
 if TYPE_CHECKING:
     from creepkit.inverse.identification import Identification
     from creepkit.language import CreepLaw
-    from creepkit.records import Specimen
+    from creepkit.records import Predictor, Specimen
     from creepkit.registry import Plugin
-    from creepkit.surrogates.surrogate import Surrogate
 
 
 EXAMPLE_DATA = Path(__file__).parents[1] / "example_data"
@@ -46,8 +45,12 @@ def load_plugin(path: str | Path) -> Plugin:
     return registry.default_registry().load_file(path)
 
 
-def surrogate(name_or_path: str | Path) -> Surrogate:
-    """Return the surrogate of this name that comes with creepkit, such as "dimple", or the one in a file."""
+def surrogate(name_or_path: str | Path) -> Predictor:
+    """Return a cheap model that stands for a specimen, by its name or from its file.
+
+    name_or_path : "dimple", the reduced-order model of the default bulge specimen; or the file of a trained network,
+        see train().
+    """
     from creepkit.surrogates.loading import surrogate_by_name
 
     return surrogate_by_name(name_or_path)

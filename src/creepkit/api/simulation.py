@@ -115,7 +115,7 @@ def generate(
 ) -> Dataset:
     """Simulate samples until so many are accepted, write them to an HDF5 file, and return them.
 
-    source : a law or its name, or a design such as rate_family(). Samples of a law are drawn from a sampling domain,
+    source : a law or its name, or a design. Samples of a law are drawn from a sampling domain,
         domain="conditioned" (the default, where most creep visibly) or "paper"; `design` says this and what else is
         to differ from it: ranges of conditions in MPa, s, mm and K, as in P1=(5, 20), and the s between frames, as in
         every=900.
@@ -147,17 +147,6 @@ def resolve_design(source: SamplingDesign | CreepLaw | str, specimen: Specimen, 
     return source
 
 
-def rate_family(using: Specimen | str | None = None, **changes: Any) -> SamplingDesign:
-    """Return the design of diverse rate functions, not of one law, from which a surrogate learns to serve many.
-
-    using : the specimen, by default the paper's dimple. changes : ranges of conditions, P1=(5, 20); grid=TimeGrid(...).
-    """
-    from creepkit.sampling.rate_family import rate_family as run
-
-    specimen: Any = None if using is None else resolve_predictor(using)
-    return run(specimen, **changes)
-
-
 def train(
     data: Dataset | str | Path,
     recipe: Recipe,
@@ -170,7 +159,7 @@ def train(
 ) -> Surrogate:
     """Train a network on a data set, or its file, and return it as a predictor: identify(..., using=it).
 
-    recipe : ParameterGru() for the law of the data, RateNet() for any law without internal variables.
+    recipe : ParameterGru(), the recurrent network of the law of the data, with its settings.
     to : file to write. Interrupted, the same call goes on where it was; done, it returns what the file holds.
     seed : of the split into training and validation rows, the first weights and the order of rows.
     training : epochs, rate and so on in the place of the recipe's. device : "auto" (a GPU where there is one), "cpu".
@@ -184,7 +173,7 @@ def train(
         data = read_dataset(data)
     if not hasattr(data, "accepted"):
         raise DatasetError(f"train() takes a data set or its file, found {type(data).__name__}; generate() makes one")
-    if isinstance(recipe, type) or not hasattr(recipe, "sample_tensors"):
+    if isinstance(recipe, type) or not hasattr(recipe, "sample_arrays"):
         found_type = recipe.__name__ if isinstance(recipe, type) else type(recipe).__name__
         raise SurrogateError(f"train() takes a recipe such as ParameterGru(hidden=128, layers=3), found {found_type}")
     return run(data, recipe, to=to, seed=seed, training=training, device=device, progress=progress)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -55,33 +54,13 @@ def command(
     Rupture times are printed beside the measured ones, the true law of the simulated test beside the identified one.
     """
     started = time.perf_counter()
-    with _seconds_of_compilation() as compilation:
-        if uniaxial:
-            plots = _planted_creep_curves(to)
-        else:
-            plots = [*_measured_creep_curves(to / "creep_curves"), *_planted_bulge_test(to / "bulge_test")]
-    seconds = time.perf_counter() - started
-    typer.echo(f"\ntime: {seconds:.0f} s, of which {sum(compilation):.0f} s compilation (kept for the next run)")
+    if uniaxial:
+        plots = _planted_creep_curves(to)
+    else:
+        plots = [*_measured_creep_curves(to / "creep_curves"), *_planted_bulge_test(to / "bulge_test")]
+    typer.echo(f"\ntime: {time.perf_counter() - started:.0f} s")
     typer.echo(f"results of every law as JSON, the best one as LaTeX and Python: {to}")
     typer.echo(f"plots: {' '.join(map(str, plots))}")
-
-
-def compile_kernels() -> None:
-    """Compile what the demo needs and keep it on disk, as part of setting up."""
-    import creepkit as ck
-    from creepkit.inverse.composite_predictor import reduced_order_model_of
-
-    (test,) = ck.read_histories(sorted(PLANTED_BULGE.glob("*.csv")))
-    shortened_test = test.replace(
-        times=test.times[:3], outputs={name: values[:3] for name, values in test.outputs.items()}
-    )
-    law = ck.law(BULGE_LAWS[0])
-    theta = law.to_internal(law.center())
-    bulge = ck.specimen("bulge")
-    bulge.predict(law, theta, [shortened_test], sensitivities=True)
-    reduced_model = reduced_order_model_of(bulge)
-    assert reduced_model is not None
-    reduced_model.predict(law, theta, [shortened_test])  # a fit to a bulge test asks it where to begin
 
 
 def _measured_creep_curves(folder: Path) -> list[Path]:
@@ -233,13 +212,3 @@ def _plot_section(fit: Identification, test: History, folder: Path) -> Path:
     path = folder / f"{file_stem(fit.law.name)}-section.png"
     run.section(path=path)  # type: ignore[attr-defined]
     return path
-
-
-@contextmanager
-def _seconds_of_compilation() -> Iterator[list[float]]:
-    """A list that holds, after the block, how long numba compiled; empty where it did not."""
-    from numba.core.event import install_timer
-
-    seconds: list[float] = []
-    with install_timer("numba:compiler_lock", seconds.append):
-        yield seconds

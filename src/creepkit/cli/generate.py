@@ -15,12 +15,8 @@ if TYPE_CHECKING:
     from creepkit.sampling.domains import SamplingDesign
 
 
-RATE_FAMILY = "rate-family"
-"""Name that stands in the place of a law for rate functions of many laws."""
-
-
 def command(
-    law: Annotated[str, typer.Argument(metavar="LAW", help=f"Name of a law; or {RATE_FAMILY}, rates of many kinds.")],
+    law: Annotated[str, typer.Argument(metavar="LAW", help="Name of a law.")],
     to: Annotated[Path | None, typer.Option(help="HDF5 file to write; its shards lie in FILE.parts.")] = None,
     samples: Annotated[int | None, typer.Option(min=1, help="Accepted samples wanted.")] = None,
     draws: Annotated[int | None, typer.Option(min=1, help="Or draws, whatever becomes of them.")] = None,
@@ -121,22 +117,10 @@ def select_design(
     law: str, specimen: Specimen, domain: str | None, changes: dict[str, Any], interval: float | None
 ) -> SamplingDesign:
     """The design that these options name; interval : s between frames."""
-    import numpy as np
-
-    import creepkit as ck
     from creepkit.api.simulation import resolve_design
-    from creepkit.errors import DatasetError
-    from creepkit.sampling.conditions import TimeGrid
-    from creepkit.sampling.rate_family import END_TIME_RANGE
 
-    if law != RATE_FAMILY:
-        given = {name: value for name, value in (("domain", domain), ("every", interval)) if value is not None}
-        return resolve_design(law, specimen, **given, **changes)
-    if domain is not None:
-        raise DatasetError(f"--domain {domain}: {RATE_FAMILY} has a sampling domain of its own; leave --domain out")
-    if interval is not None:
-        changes["grid"] = TimeGrid.every(interval, np.max(changes.get("end_time", END_TIME_RANGE[1])))
-    return ck.rate_family(specimen, **changes)
+    given = {name: value for name, value in (("domain", domain), ("every", interval)) if value is not None}
+    return resolve_design(law, specimen, **given, **changes)
 
 
 def parse_part(text: str | None) -> tuple[int, int] | None:

@@ -1,4 +1,4 @@
-"""`creepkit reduced-model`: the tables of the reduced-order model of a bulge specimen, from finite elements."""
+"""`creepkit reduced-model`: train the reduced-order model of a bulge specimen, and say how far it errs."""
 
 from __future__ import annotations
 
@@ -11,30 +11,32 @@ from creepkit.cli.options import parse_numbers
 
 
 def command(
-    to: Annotated[Path, typer.Option(help="File to write, .safetensors.")],
     specimen: Annotated[str, typer.Option(help="A bulge specimen.")] = "bulge",
     geometry: Annotated[
         list[str] | None, typer.Option(metavar="NAME=MM", help="A length of the dimple, such as cavity_radius=6.")
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="Picture of k, kappa and redistribution to write.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Picture of its points to write.")] = None,
 ) -> None:
-    """Tabulate the reduced-order model of a dimple.
+    """Train the reduced-order model of a dimple.
 
-    k(D, h), kappa(D, h), redistribution, elastic deflection and shapes; some seconds.
+    Searches begin in it. It is kept in the cache folder, so that the first identification of such a dimple finds it
+    there; some seconds.
     """
     import creepkit as ck
     from creepkit.errors import SolveError
-    from creepkit.report.simulation import tables_figure, tables_text
-    from creepkit.specimens.bulge.reduced_order.tables import build_tables, write_tables
+    from creepkit.report.simulation import cubature_figure
+    from creepkit.specimens.bulge.reduced_order_model import BulgeReducedOrderModel
     from creepkit.specimens.bulge.specimen import Bulge
 
     specimen_record = ck.specimen(specimen)
     if not isinstance(specimen_record, Bulge):
-        raise SolveError(f"--specimen {specimen}: only a bulge has a one-degree-of-freedom model; leave it out")
+        raise SolveError(f"--specimen {specimen}: only a bulge has a reduced-order model; leave it out")
     specimen_record = specimen_record.replace(**parse_numbers(geometry or [], "--geometry", "cavity_radius=6"))
-    model_tables = build_tables(specimen_record, specimen_record.geometry, specimen_record.observation)
-    typer.echo(tables_text(model_tables))
+    predictor = BulgeReducedOrderModel(specimen_record)
+    model = predictor.reduced_model_of(predictor.own_setup())
+    typer.echo(f"{len(model.basis.modes)} modes, {len(model.basis.points)} of {model.model.weights.size} points")
+    errors = ", ".join(f"{name} {value:.2g}" for name, value in predictor.error.items())
+    typer.echo(f"error against its finite elements, one standard deviation over runs it was not trained on: {errors}")
     if picture is not None:
-        tables_figure(model_tables, picture)
+        cubature_figure(model, picture)
         typer.echo(f"wrote {picture}", err=True)
-    typer.echo(f"wrote {write_tables(model_tables, to)}", err=True)

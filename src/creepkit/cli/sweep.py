@@ -34,17 +34,15 @@ def command(
     """
     import torch
 
-    from creepkit.cli.train import select_recipe
+    from creepkit.cli.train import recipe_with
     from creepkit.dataset.storage import read_dataset
     from creepkit.report.surrogate import size_study_figure, size_study_rows
-    from creepkit.surrogates.parameter_gru import ParameterGru
     from creepkit.surrogates.training import NetworkSizes, size_study
 
     if threads is not None:
         torch.set_num_threads(threads)
     training_options = {"epochs": epochs, "rate": rate, "schedule": schedule}
-    recipe = select_recipe("parameter-gru", {"target": target}, training_options)
-    assert isinstance(recipe, ParameterGru)
+    recipe = recipe_with({"target": target}, training_options)
     with ProgressBar() as progress:
         trainings = size_study(
             read_dataset(data, accepted_only=True),

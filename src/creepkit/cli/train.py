@@ -10,18 +10,12 @@ import typer
 from creepkit.report.terminal import ProgressBar, print_json
 
 if TYPE_CHECKING:
-    from creepkit.surrogates.surrogate import Recipe
-
-
-RECIPE_NAMES = ("parameter-gru", "rate-net")
+    from creepkit.surrogates.parameter_gru import ParameterGru
 
 
 def command(
     data: Annotated[Path, typer.Argument(metavar="DATA", help="Data set that creepkit generate wrote.")],
     to: Annotated[Path, typer.Option(help="File of the surrogate; a checkpoint lies beside it meanwhile.")],
-    recipe: Annotated[
-        str, typer.Option(help="parameter-gru, the paper's network of one law; or rate-net, for laws without states.")
-    ] = "parameter-gru",
     hidden: Annotated[int | None, typer.Option(min=1, help="Width of a layer.")] = None,
     layers: Annotated[int | None, typer.Option(min=1, help="Layers.")] = None,
     cell: Annotated[str | None, typer.Option(help="gru or lstm.")] = None,
@@ -42,7 +36,7 @@ def command(
     plots: Annotated[Path | None, typer.Option(help="Folder for pictures; by default beside the file.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the errors as JSON.")] = False,
 ) -> None:
-    """Train a surrogate on a data set.
+    """Train the paper's network on a data set.
 
     Interrupted at any moment, the same command goes on where it was. Curves of the training, predicted against true
     outputs, and the worst samples are drawn.
@@ -71,10 +65,7 @@ def command(
         "early_stop": early_stop,
         "clip": clip,
     }
-    selected_recipe, samples = (
-        select_recipe(recipe, network_options, training_options),
-        read_dataset(data, accepted_only=True),
-    )
+    selected_recipe, samples = (recipe_with(network_options, training_options), read_dataset(data, accepted_only=True))
     with ProgressBar() as progress:
         model = ck.train(samples, selected_recipe, to=to, seed=seed, device=device, progress=progress.tick)
     plot_files = write_surrogate_figures(model, samples, plots or to.parent, to.stem)
@@ -86,24 +77,13 @@ def command(
         typer.echo(f"wrote {path}")
 
 
-def select_recipe(recipe_name: str, network_options: dict[str, Any], training_options: dict[str, Any]) -> Recipe:
-    """The recipe of this kind with what was given of its fields; SurrogateError for a field that it has not."""
-    from dataclasses import fields, replace
+def recipe_with(network_options: dict[str, Any], training_options: dict[str, Any]) -> ParameterGru:
+    """The recipe with what was given of its fields; None stands for what was not."""
+    from dataclasses import replace
 
     import creepkit as ck
-    from creepkit.errors import SurrogateError, nearest
 
-    if recipe_name not in RECIPE_NAMES:
-        raise SurrogateError(f"--recipe {recipe_name} is not known; {nearest(recipe_name, RECIPE_NAMES)}")
-    default_recipe: Any = ck.ParameterGru() if recipe_name == "parameter-gru" else ck.RateNet()
-    field_names = {f.name for f in fields(default_recipe) if f.init}
-    given_options = {name: value for name, value in network_options.items() if value is not None}
-    for name in given_options.keys() - field_names:
-        raise SurrogateError(
-            f"--{name} means nothing to {recipe_name}; it has {', '.join(sorted(field_names - {'training'}))}"
-        )
-    training = replace(
-        default_recipe.training, **{name: value for name, value in training_options.items() if value is not None}
-    )
-    recipe: Recipe = replace(default_recipe, **given_options, training=training)
-    return recipe
+    recipe = ck.ParameterGru()
+    training = {name: value for name, value in training_options.items() if value is not None}
+    network = {name: value for name, value in network_options.items() if value is not None}
+    return replace(recipe, **network, training=replace(recipe.training, **training))

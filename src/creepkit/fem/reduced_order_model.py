@@ -42,6 +42,10 @@ class ReducedBasis:
         object.__setattr__(self, "points", frozen(self.points, dtype=np.int64))
         object.__setattr__(self, "factors", frozen(self.factors))
 
+    def leading(self, count: int) -> ReducedBasis:
+        """The first modes, at the same points: a coarser basis."""
+        return ReducedBasis(self.modes[:count], self.points, self.factors)
+
 
 def full_basis(model: FiniteElementModel) -> ReducedBasis:
     """A basis of all displacements and points: finite elements themselves."""

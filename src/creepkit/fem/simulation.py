@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from creepkit.arrays import Floats, Ints
+from creepkit.errors import SolveError
 from creepkit.fem import solver
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.mesh import GeometryDerivative
@@ -29,7 +30,6 @@ REASONS = {
     solver.TOO_MANY_STEPS: "the cap on steps was reached",
     solver.LAW_FAILED: "the law gave no finite rate at a point",
     solver.SINGULAR_TANGENT: "the tangent was singular, so that there are no derivatives",
-    solver.INTERRUPTED: "the simulation was interrupted",
 }
 """What each ending means, in words."""
 
@@ -151,6 +151,10 @@ def simulate(
     directions : differentiate the accepted steps to the law's parameters and to these (`sensitivity_directions`).
     """
     theta = np.ascontiguousarray(theta, dtype=float)
+    if theta.shape != (len(law.names),):
+        raise SolveError(
+            f"theta has the shape {theta.shape}, but the law needs {len(law.names)} numbers: {', '.join(law.names)}"
+        )
     beta = float(np.asarray(law.leading_exponent(theta))) if same_steps_as is None else same_steps_as.beta
     script = np.zeros((0, 2)) if same_steps_as is None else same_steps_as.positions
     pattern = model.held_motion(load_history.pattern)

@@ -12,12 +12,12 @@ from creepkit.core import CoreStructure, address, function
 from creepkit.errors import SolveError
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.solvable_model import SensitivityDirections, SolvableModel
-from creepkit.kernels.interface import CompiledLaw
+from creepkit.kernels.interface import CompiledLaw, Entry
 
 (
     REACHED_END, DEFLECTION_LIMIT, STRAIN_LIMIT, STATE_LIMIT, LIMIT_LOAD, LOST_CONVERGENCE, TOO_MANY_STEPS, LAW_FAILED,
-    SINGULAR_TANGENT, INTERRUPTED, OUT_OF_MEMORY,
-) = range(11)  # fmt: skip
+    SINGULAR_TANGENT, OUT_OF_MEMORY,
+) = range(10)  # fmt: skip
 """Codes of an ending; whatever it is, the history so far is kept."""
 
 
@@ -88,8 +88,6 @@ def solve(
     theta = _contiguous(theta)
     if law.states > MAX_STATES:
         raise SolveError(f"the law has {law.states} internal variables; finite elements take up to {MAX_STATES}")
-    if theta.shape != (len(law.names),):
-        raise SolveError(f"theta has the shape {theta.shape}; expected ({len(law.names)},)")
     segments = _contiguous(program.segments)
     rows, points = settings.max_steps + len(segments) + 2, model.point_count
     initial, limits, script = (_contiguous(a) for a in (law.initial, law.limits, program.script))
@@ -103,10 +101,10 @@ def solve(
         rows, address(times), address(numbers), address(displacements), _optional(values), address(mises),
         address(positions), address(counts), points,
     )  # fmt: skip
-    entries = _Law(law.update.address, law.sensitivity.address, address(theta), theta.size, law.states)
+    entries = _Law(*_entry_addresses(law), address(theta), theta.size, law.states)
     given = _Input(
         program.beta, program.poisson, len(segments), address(segments), address(pattern), address(initial),
-        address(limits), len(script), address(script), None,
+        address(limits), len(script), address(script),
     )  # fmt: skip
     surface = moments = None
     along = derivatives = None
@@ -147,7 +145,7 @@ def assemble(
     history = np.zeros((4 * model.compiled.elements, 4 + law.states))
     history[:, 4:] = law.initial
     residual, tangent = np.zeros(model.size), np.zeros((model.size, model.size))
-    entries = _Law(law.update.address, law.sensitivity.address, address(theta), theta.size, law.states)
+    entries = _Law(*_entry_addresses(law), address(theta), theta.size, law.states)
     flag = function("creepkit_assemble")(
         ctypes.byref(model.compiled.structure), ctypes.byref(entries), ctypes.byref(_Stage(*stage)),
         *map(address, (history, displacement, residual, tangent)),
@@ -188,6 +186,16 @@ class LoadProgram(NamedTuple):
     script: Floats
 
 
+def _entry_addresses(law: CompiledLaw) -> tuple[int, int]:
+    """Addresses of the entries that the core calls; SolveError for what is no entry of a compiled law."""
+    for entry in (law.update, law.sensitivity):
+        if not isinstance(entry, Entry) or not entry.address:
+            raise SolveError(
+                f"a compiled law has {entry!r} for an entry, which is no compiled function of this package"
+            )
+    return law.update.address, law.sensitivity.address
+
+
 def _contiguous(values: Floats) -> Floats:
     return np.ascontiguousarray(values, dtype=float)
 
@@ -212,7 +220,7 @@ class _Stage(CoreStructure):
 class _Input(CoreStructure):
     _fields_ = (
         ("beta", _REAL), ("poisson", _REAL), ("segment_count", _NUMBER), ("segments", _ARRAY), ("pattern", _ARRAY),
-        ("initial", _ARRAY), ("limits", _ARRAY), ("script_steps", _NUMBER), ("script", _ARRAY), ("stop", _ARRAY),
+        ("initial", _ARRAY), ("limits", _ARRAY), ("script_steps", _NUMBER), ("script", _ARRAY),
     )  # fmt: skip
 
 

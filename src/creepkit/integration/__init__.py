@@ -1,6 +1,6 @@
-"""The implicit adaptive integration of creep at a material point, compiled once for any law.
+"""The implicit adaptive integration of creep at a material point, in the compiled core.
 
-Names load when first used: numba is heavy.
+Names load when first used.
 """
 
 from __future__ import annotations

@@ -1,41 +1,18 @@
-"""Time discretisation of creep: Runge-Kutta tableaux, segments of a load program, and time transformations.
+"""Time discretisation of creep: Runge-Kutta tableaux and the segments of a load program.
 
 The tableaux are diagonally implicit and stiffly accurate. Within each segment of the load program steps are taken in a
-transformed time in which creep strain is nearly a straight line.
+transformed time in which creep strain is nearly a straight line (`time_transformation`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp, expm1, isfinite, log, log1p
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from creepkit.arrays import Floats
-from creepkit.integration.time_transformation import SMALLEST_EXPONENT, TimeTransformation, TransformedTime
 from creepkit.records import Program
-
-__all__ = [
-    "SDIRK2",
-    "SDIRK4",
-    "SMALLEST_EXPONENT",
-    "Segment",
-    "Tableau",
-    "TimeTransformation",
-    "TransformedTime",
-    "linear_time",
-    "merge_programs",
-    "position",
-    "power_law_time",
-    "segment_from_row",
-    "shifted_power_law_time",
-    "stress_rate",
-    "temperature_rate",
-    "transformation_derivatives",
-    "transformed_time",
-]
 
 
 class Tableau(NamedTuple):
@@ -117,35 +94,6 @@ The dense output is the one quartic that meets the conditions of order 3, and of
 """
 
 
-class Segment(NamedTuple):
-    """start and end, s; driving stress, MPa, and temperature, K, at both."""
-
-    start: float
-    end: float
-    stress: float
-    end_stress: float
-    temperature: float
-    end_temperature: float
-
-
-@njit(cache=True, error_model="numpy")
-def segment_from_row(row: Floats) -> Segment:
-    """A segment from its row of six numbers."""
-    return Segment(row[0], row[1], row[2], row[3], row[4], row[5])
-
-
-@njit(cache=True, error_model="numpy")
-def stress_rate(segment: Segment) -> float:
-    """Slope of the driving stress, MPa/s."""
-    return (segment.end_stress - segment.stress) / (segment.end - segment.start)
-
-
-@njit(cache=True, error_model="numpy")
-def temperature_rate(segment: Segment) -> float:
-    """Slope of the temperature, K/s."""
-    return (segment.end_temperature - segment.temperature) / (segment.end - segment.start)
-
-
 def merge_programs(*programs: Program, end: float) -> Floats:
     """Merge programs from 0 to `end` (s) into segments, (segments, 2 + 2 programs); every breakpoint is a boundary.
 
@@ -169,99 +117,3 @@ def _just_before(program: Program, times: Floats) -> Floats:
     share = np.divide(times - program.times[before], width, out=np.zeros_like(times), where=width > 0)
     values = program.values
     return np.asarray(values[before] + np.minimum(share, 1.0) * (values[after] - values[before]))
-
-
-_LARGEST_POWER = 12.0
-"""Bound of |beta| ln(1 + L/tau): (1 + y/tau)^beta keeps some ten digits next to 1."""
-
-
-_LONGEST_TAU = 1e6
-"""A shift this much longer than the segment bends nothing within it."""
-
-
-@njit(cache=True, error_model="numpy")
-def transformed_time(clock: TimeTransformation, s: float) -> TransformedTime:
-    """Time and pace at position `s` > 0."""
-    if clock.tau == 0.0:
-        logarithm = log(s) / clock.beta
-        elapsed = clock.length * exp(logarithm)
-        return TransformedTime(clock.start + elapsed, log(clock.length / clock.beta) + logarithm - log(s))
-    reach = expm1(clock.beta * log1p(clock.length / clock.tau))
-    grown = log1p(s * reach)
-    power = grown / clock.beta
-    elapsed = clock.tau * expm1(power)
-    return TransformedTime(clock.start + elapsed, log(clock.tau * reach / clock.beta) + power - grown)
-
-
-@njit(cache=True, error_model="numpy")
-def position(clock: TimeTransformation, time: float) -> float:
-    """Position of a time in the segment."""
-    elapsed = time - clock.start
-    if elapsed <= 0.0:
-        return 0.0
-    if clock.tau == 0.0:
-        return float((elapsed / clock.length) ** clock.beta)
-    reach = expm1(clock.beta * log1p(clock.length / clock.tau))
-    return expm1(clock.beta * log1p(elapsed / clock.tau)) / reach
-
-
-@njit(cache=True, error_model="numpy")
-def transformation_derivatives(clock: TimeTransformation, s: float) -> tuple[TransformedTime, TransformedTime]:
-    """Derivatives of `moment` with respect to beta and to tau at a fixed position."""
-    beta, tau, length = clock.beta, clock.tau, clock.length
-    if tau == 0.0:
-        slope = -log(s) / beta**2
-        elapsed = length * exp(log(s) / beta)
-        return TransformedTime(elapsed * slope, slope - 1.0 / beta), TransformedTime(0.0, 0.0)
-    ratio = log1p(length / tau)
-    reach = expm1(beta * ratio)
-    inner = 1.0 + s * reach
-    power = log1p(s * reach) / beta
-    by_beta = _through(tau, beta, s, reach, inner, power, ratio * (1.0 + reach))
-    fall = -length / (tau * (tau + length))
-    by_tau = _through(tau, beta, s, reach, inner, power, beta * (1.0 + reach) * fall)
-    shrink = power / beta
-    return (
-        TransformedTime(by_beta.time - tau * exp(power) * shrink, by_beta.log_pace - shrink - 1.0 / beta),
-        TransformedTime(by_tau.time + expm1(power), by_tau.log_pace + 1.0 / tau),
-    )
-
-
-@njit(cache=True, error_model="numpy")
-def _through(
-    tau: float, beta: float, s: float, reach: float, inner: float, power: float, change: float
-) -> TransformedTime:
-    """The part of a derivative of `moment` that goes through `reach`, which changes by `change`."""
-    rise = s * change / (beta * inner)
-    return TransformedTime(tau * exp(power) * rise, rise + change / reach - s * change / inner)
-
-
-@njit(cache=True, error_model="numpy")
-def linear_time(start: float, length: float) -> TimeTransformation:
-    """Plain time: s proportional to it."""
-    return TimeTransformation(start, length, 1.0, length)
-
-
-@njit(cache=True, error_model="numpy")
-def power_law_time(start: float, length: float, beta: float) -> TimeTransformation:
-    """The time transformation of a segment that begins without creep strain; `beta` is the leading exponent of time."""
-    return TimeTransformation(start, length, min(max(beta, SMALLEST_EXPONENT), 1.0), 0.0)
-
-
-@njit(cache=True, error_model="numpy")
-def shifted_power_law_time(start: float, length: float, bend: float, bend_rate: float) -> TimeTransformation:
-    """The time transformation of a segment that begins after some creep.
-
-    With p'' = r p', a curve (1 + y/tau)^beta has r = (beta - 1)/(tau + y), so r and its rate give beta and tau.
-    """
-    if not (isfinite(bend) and isfinite(bend_rate)) or bend >= 0.0 or bend_rate <= 0.0:
-        return linear_time(start, length)
-    tau = -bend / bend_rate
-    beta = 1.0 + bend * tau
-    if not 1e-30 * length < tau < _LONGEST_TAU * length:
-        return linear_time(start, length)
-    bound = _LARGEST_POWER / log1p(length / tau)
-    beta = min(max(beta, -bound), bound)
-    if abs(beta) < 1e-3:
-        beta = 1e-3
-    return TimeTransformation(start, length, beta, tau)

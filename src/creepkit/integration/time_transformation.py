@@ -49,10 +49,10 @@ class TransformedTimes(NamedTuple):
 
 def transformed_times(clock: TimeTransformation, s: ArrayLike) -> TransformedTimes:
     """Times, paces and derivatives at positions `s`, (count,) above 0."""
-    positions = np.array(s, dtype=float, ndmin=1)
+    numbers, positions = np.array(clock, dtype=float), np.array(s, dtype=float, ndmin=1)
     out = np.empty((positions.size, len(TransformedTimes._fields)))
     function("creepkit_transformed_times", None)(
-        address(np.array(clock, dtype=float)), ctypes.c_int64(positions.size), address(positions), address(out)
+        address(numbers), ctypes.c_int64(positions.size), address(positions), address(out)
     )
     return TransformedTimes(*out.T)
 

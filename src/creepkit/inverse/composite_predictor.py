@@ -5,7 +5,7 @@ Finite differences replace the derivatives that a predictor does not give.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +23,7 @@ from creepkit.records import (
     SupportsReducedOrderModel,
     SupportsRefinement,
     SupportsRupturePrediction,
+    SupportsSearchTolerance,
     TimesToStrain,
     kind_and_start,
 )
@@ -194,20 +195,28 @@ def _name(predictor: Predictor) -> str:
 
 def reduced_order_model_of(predictor: Predictor) -> Predictor | None:
     """The reduced-order model of a predictor, or None where it has none."""
-    if isinstance(predictor, CompositePredictor):
-        reduced = {name: reduced_order_model_of(p) or p for name, p in predictor.predictors.items()}
-        changed = any(reduced[name] is not p for name, p in predictor.predictors.items())
-        return CompositePredictor(reduced) if changed else None
-    return predictor.reduced_order_model() if isinstance(predictor, SupportsReducedOrderModel) else None
+    return _derived(predictor, lambda p: p.reduced_order_model() if isinstance(p, SupportsReducedOrderModel) else None)
 
 
 def refined_of(predictor: Predictor) -> Predictor | None:
     """The more exact predictor of a predictor, or None where it has none."""
-    if isinstance(predictor, CompositePredictor):
-        refined = {name: refined_of(p) or p for name, p in predictor.predictors.items()}
-        changed = any(refined[name] is not p for name, p in predictor.predictors.items())
-        return CompositePredictor(refined) if changed else None
-    return predictor.refined() if isinstance(predictor, SupportsRefinement) else None
+    return _derived(predictor, lambda p: p.refined() if isinstance(p, SupportsRefinement) else None)
+
+
+def search_predictor_of(predictor: Predictor) -> Predictor:
+    """The predictor at the tolerances that a global search needs: itself where it has no others."""
+    result = _derived(predictor, lambda p: p.for_search() if isinstance(p, SupportsSearchTolerance) else None)
+    return predictor if result is None else result
+
+
+def _derived(predictor: Predictor, derive: Callable[[Predictor], Predictor | None]) -> Predictor | None:
+    """What each predictor gives, in a composite one beside those that give nothing; None if none gives anything."""
+    if not isinstance(predictor, CompositePredictor):
+        return derive(predictor)
+    derived = {name: _derived(p, derive) for name, p in predictor.predictors.items()}
+    if all(p is None for p in derived.values()):
+        return None
+    return CompositePredictor({name: derived[name] or p for name, p in predictor.predictors.items()})
 
 
 RELATIVE_STEP = 1e-4

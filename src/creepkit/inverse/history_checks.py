@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from creepkit.arrays import single_threaded_blas
 from creepkit.errors import FitError
 from creepkit.inverse.composite_predictor import compared_outputs, predictor_for
 from creepkit.inverse.observation_vector import LOGARITHMIC_OUTPUTS, ObservationVector, frames_with_data
 from creepkit.inverse.reference_conditions import detect_creep
 from creepkit.inverse.settings import IdentificationSettings
 from creepkit.language import CreepLaw
-from creepkit.quality import check_data_quality, exclude_suspect_frames
+from creepkit.quality import check_rig, exclude_suspect_frames
 from creepkit.records import History, Predictor
 
 SUSPECT_LABEL = "suspect"
@@ -40,15 +41,13 @@ def suspect_frames_note(histories: Sequence[History]) -> tuple[str, ...]:
     return (f"suspect frames were left out: {', '.join(described)}",) if described else ()
 
 
-RIG_FLAG_KINDS = ("rate change", "jump", "record")
-"""Kinds of flags of the data quality that say what the rig did, which no law should have to explain."""
-
-
 def rig_notes(histories: Sequence[History], settings: IdentificationSettings) -> tuple[str, ...]:
     """What the rig did, one sentence each, unless a nuisance parameter of a step or drift models it."""
     if any(n.kind in ("temperature step", "rate step", "load step") for n in settings.nuisances):
         return ()
-    return tuple(f"the rig: {flag}" for flag in check_data_quality(histories) if flag.kind in RIG_FLAG_KINDS)
+    sound = exclude_suspect_frames(histories) if settings.suspect_frames == "keep" else histories
+    with single_threaded_blas():
+        return tuple(f"the rig: {flag}" for flag in check_rig(sound))
 
 
 def check_creep(observations: ObservationVector, histories: Sequence[History]) -> None:

@@ -18,6 +18,8 @@ from creepkit.inverse.composite_predictor import (
     predictors_for_law,
     reduced_order_model_of,
     refined_of,
+    search_predictor_of,
+    through_for_law,
 )
 from creepkit.inverse.defect_correction import (
     NumericalError,
@@ -105,23 +107,40 @@ def identify(
     search : how to begin; by default least squares from several screened starts (MultiStart).
     through : a cheaper predictor, such as a surrogate, in which the minima of the search are refined before `using`:
         values and intervals are those of `using`.
-    A surrogate that does not know this class of laws is replaced by its specimen, or left out on the way; a note says
-    so.
+    A surrogate that does not know this class of laws is replaced by its specimen, or left out; a note says so.
     start : an estimate to begin from instead of a global search.
     """
+    how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
+    fit = identify_values(law, histories, using, through=through, **how)
+    with single_threaded_blas():
+        return with_samples(fit, through_for_law(through, law)) if needs_samples(fit) else fit
+
+
+def identify_values(
+    law: CreepLaw,
+    histories: Sequence[History],
+    using: Predictor | Mapping[str, Predictor],
+    *,
+    settings: IdentificationSettings | None = None,
+    search: GlobalSearch | None = None,
+    through: Predictor | None = None,
+    start: StartingEstimate | None = None,
+    progress: IterationCallback | None = None,
+) -> Identification:
+    """As identify(), without samples of the posterior where a value is at its bound."""
     settings = settings or IdentificationSettings()
-    known, known_through, notes = predictors_for_law(law, using, through)
+    known, through, notes = predictors_for_law(law, using, through)
     if notes:
         how: dict[str, Any] = {"settings": settings, "search": search, "start": start, "progress": progress}
-        fit = identify(law, histories, known, through=known_through, **how)
+        fit = identify_values(law, histories, known, through=through, **how)
         return replace(fit, notes=(*fit.notes, *notes))
     with single_threaded_blas():
         problem = LeastSquaresProblem.from_histories(
             law, histories, using, settings, None if start is None else start.reference
         )
         if start is not None and start.u is not None:
-            u = np.clip(start.u, problem.bounds.lower[: len(law.params)], problem.bounds.upper[: len(law.params)])
-            search_outcome = SearchOutcome([u], 0, None)
+            lower, upper = (bound[: len(law.params)] for bound in (problem.bounds.lower, problem.bounds.upper))
+            search_outcome = SearchOutcome([np.clip(start.u, lower, upper)], 0, None)
         else:
             search_outcome = _global_search(problem, through, search or MultiStart(), progress)
         if search_outcome.dropped_terms:
@@ -133,8 +152,7 @@ def identify(
         check_bounds(
             best.problem.bound_penalties, best.minimum.x[: len(law.params)], gradient, problem.observations.count
         )
-        fit = _result(histories, best, search_outcome, numerical_error)
-        return with_samples(fit, through) if needs_samples(fit) else fit
+        return _result(histories, best, search_outcome, numerical_error)
 
 
 def _gradient(best: EstimationResult) -> Floats:
@@ -179,7 +197,7 @@ def _global_search(
     """The best minima that differ, by the reduced-order model of the cheapest predictor."""
     predictor = through or problem.predictor
     reduced_order_model = reduced_order_model_of(predictor)
-    searched = search_problem(problem, reduced_order_model or predictor)
+    searched = search_problem(problem, search_predictor_of(reduced_order_model or predictor))
     search_result = search.minima(searched, progress)
     distinct_minima = distinct(
         search_result.minima,

@@ -1,7 +1,8 @@
 """What predicted the tests of an identification, as a file names it, and back.
 
-A registered specimen is stored with the fields that decide what it predicts. A surrogate is stored by a fingerprint of
-its header and weights, and found again among those that come with creepkit. Anything else is stored by name alone.
+A registered specimen is stored with the fields that decide what it predicts, and its reduced-order model likewise. A
+trained surrogate is stored by a fingerprint of its header and weights, anything else by name alone; neither is found
+again.
 """
 
 from __future__ import annotations
@@ -9,26 +10,31 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from creepkit.errors import DatasetError, FitError
 from creepkit.files.json_documents import as_read_back, canonical_json
 from creepkit.inverse.composite_predictor import CompositePredictor
-from creepkit.records import Predictor
+from creepkit.records import Predictor, SupportsReducedOrderModel
 from creepkit.registry import default_registry
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 
 
 @dataclass(frozen=True)
 class PredictorDocument:
-    """One predictor: fields are those of a specimen that is registered under the name; fingerprint, of a surrogate."""
+    """One predictor: fields are those of a specimen that is registered under the name, or of the specimen whose
+    reduced-order model it is; fingerprint, of a surrogate.
+    """
 
-    kind: Literal["specimen", "surrogate", "other"]
+    kind: Literal["specimen", "reduced-order model", "surrogate", "other"]
     name: str
     fields: Any = None
     fingerprint: str = ""
+
+
+OF_SPECIMENS = ("specimen", "reduced-order model")
+"""Kinds of documents that name a registered specimen."""
 
 
 SINGLE = ""
@@ -56,12 +62,12 @@ def predictor_from_documents(documents: Mapping[str, PredictorDocument]) -> Pred
 def missing_predictor(documents: Mapping[str, PredictorDocument]) -> str:
     """Why an identification from a file has no predictor, and what to do, in one sentence."""
     for document in documents.values():
-        if document.kind == "specimen" and document.name not in default_registry().specimens():
+        if document.kind in OF_SPECIMENS and document.name not in default_registry().specimens():
             return (
                 f"this identification was made with specimen '{document.name:.40}', which is not known here: install "
                 "the plugin that has it, or give using="
             )
-        if document.kind == "surrogate" and document.fingerprint not in _shipped_surrogates():
+        if document.kind == "surrogate":
             return (
                 f"this identification was made with the surrogate '{document.name:.80}' of a file: give "
                 "using=ck.surrogate(that file)"
@@ -88,6 +94,11 @@ def _document_of(predictor: Predictor) -> PredictorDocument:
     name = str(getattr(predictor, "name", type(predictor).__name__))
     if _is_surrogate(predictor):
         return PredictorDocument("surrogate", name, fingerprint=_fingerprint(predictor))
+    underlying = getattr(predictor, "specimen", None)
+    if isinstance(underlying, SupportsReducedOrderModel) and underlying.reduced_order_model() == predictor:
+        document = _document_of(underlying)
+        if document.kind == "specimen":
+            return replace(document, kind="reduced-order model")
     registered = default_registry().specimens().get(name)
     specimen: Any = predictor
     if registered is not None and type(registered.value) is type(specimen):
@@ -99,15 +110,15 @@ def _document_of(predictor: Predictor) -> PredictorDocument:
 
 
 def _predictor_of(document: PredictorDocument) -> Predictor | None:
-    if document.kind == "specimen" and document.name in default_registry().specimens():
+    if document.kind in OF_SPECIMENS and document.name in default_registry().specimens():
         fields = {"name": document.name, "fields": document.fields}
         try:
-            return specimen_from_json(fields, "predictor_documents", default_registry().specimen)
+            specimen = specimen_from_json(fields, "predictor_documents", default_registry().specimen)
         except DatasetError as error:
             raise FitError(str(error)) from None
-    if document.kind == "surrogate":
-        path = _shipped_surrogates().get(document.fingerprint)
-        return None if path is None else _surrogate_at(path)
+        if document.kind == "specimen":
+            return specimen
+        return specimen.reduced_order_model() if isinstance(specimen, SupportsReducedOrderModel) else None
     return None
 
 
@@ -119,20 +130,6 @@ def _is_surrogate(predictor: Predictor) -> bool:
 
 def _fingerprint(surrogate: Any) -> str:
     digest = hashlib.sha256(canonical_json(surrogate.file_header))
-    for name, tensor in sorted(surrogate.module.state_dict().items()):
-        digest.update(name.encode() + tensor.detach().cpu().numpy().tobytes())
+    for name, array in sorted(surrogate.weights.items()):
+        digest.update(name.encode() + array.tobytes())
     return digest.hexdigest()[:32]
-
-
-@cache
-def _shipped_surrogates() -> dict[str, str]:
-    """{fingerprint: file} of the surrogates that come with creepkit."""
-    from creepkit.surrogates.loading import load_surrogate, shipped_files
-
-    return {_fingerprint(load_surrogate(path)): str(path) for path in shipped_files().values()}
-
-
-def _surrogate_at(path: str) -> Predictor:
-    from creepkit.surrogates.loading import load_surrogate
-
-    return load_surrogate(path)

@@ -1,7 +1,7 @@
 """Workers that run the tasks of a job: processes of this machine with one thread each, or a dask cluster.
 
 A worker process receives task numbers on standard input and writes results to standard output. It is started as a new
-interpreter, because a fork would copy locks of numba and torch.
+interpreter, because a fork would copy locks of libraries such as torch.
 """
 
 from __future__ import annotations

@@ -26,10 +26,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import numba.experimental.function_type  # noqa: F401 - numba knows the type of an Entry only with it
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 
 from creepkit.arrays import Floats
 
@@ -39,52 +36,18 @@ POINT_SIZE = 6
 STRESS, STRAIN, TIME, TEMPERATURE, PRINCIPAL_STRESS, MEAN_STRESS = range(POINT_SIZE)
 
 
-_DOUBLES: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
-
-
-SIGNATURE = types.int64(types.int64, _DOUBLES, _DOUBLES, _DOUBLES)
-
-
-ENTRY_TYPE = types.FunctionType(SIGNATURE)
-"""The numba type of an entry: a function compiled once for it accepts any law."""
-
-
 RATE_NOT_FINITE = 1
 
 
 DERIVATIVE_NOT_FINITE = 2
 
 
-def _pointer(typingctx: Any, array: Any) -> Any:
-    signature = _DOUBLES(array)
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        data = context.make_array(sig.args[0])(context, builder, args[0]).data
-        return builder.bitcast(data, context.get_value_type(_DOUBLES))
-
-    return signature, codegen
-
-
-data_pointer: Any = intrinsic(_pointer)
-"""Inside compiled code: the C pointer to the first number of a contiguous float64 array."""
-
-
 @dataclass(frozen=True, eq=False)
-class Entry(types.WrapperAddressProtocol):
-    """A C function as an argument of numba functions declared with ENTRY_TYPE.
-
-    code : what keeps the machine code in memory.
-    """
+class Entry:
+    """A C function; code : what keeps its machine code in memory."""
 
     address: int
     code: Any
-
-    def __wrapper_address__(self) -> int:
-        return self.address
-
-    def signature(self) -> Any:
-        """The numba signature."""
-        return SIGNATURE
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from creepkit.kernels.interface import CompiledLaw
 
 
-KernelTarget = Literal["numpy", "torch", "numba"]
+KernelTarget = Literal["numpy", "torch", "compiled"]
 
 
 @overload
@@ -29,17 +29,17 @@ def lower(law: CreepLaw, target: Literal["numpy", "torch"]) -> ArrayKernel: ...
 
 
 @overload
-def lower(law: CreepLaw, target: Literal["numba"]) -> CompiledLaw: ...
+def lower(law: CreepLaw, target: Literal["compiled"]) -> CompiledLaw: ...
 
 
 def lower(law: CreepLaw, target: KernelTarget = "numpy") -> ArrayKernel | CompiledLaw:
-    """Return the law as a numeric kernel for "numpy", "torch" or "numba" (compiled, for integrators)."""
-    if target == "numba":
+    """Return the law as a numeric kernel for "numpy", "torch" or "compiled" (C functions, for solvers)."""
+    if target == "compiled":
         from creepkit.kernels.compilation import compile_law
 
         return compile_law(law)
     if target not in ("numpy", "torch"):
-        raise LawError(f"no kernel target '{target}': {nearest(str(target), ('numpy', 'torch', 'numba'))}")
+        raise LawError(f"no kernel target '{target}': {nearest(str(target), ('numpy', 'torch', 'compiled'))}")
     return _array_kernel(law, target)
 
 

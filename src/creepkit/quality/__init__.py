@@ -32,6 +32,7 @@ __all__ = [
     "DataQuality",
     "QualityFlag",
     "check_data_quality",
+    "check_rig",
     "exclude_suspect_frames",
 ]
 
@@ -64,15 +65,24 @@ def check_data_quality(
             frames = (int(np.argmax(histories[k].used)),) if kind == "first frame" else ()
             results[k].append(QualityFlag((histories[k].name,), kind, frames, reason))
     flags = [flag for each in results for flag in each]
-    flags += [flag for history in histories for flag in record_flags(history, activation_energy)]
     sound = [
         _with_frames_unused(h, [k for flag in each for k in flag.frames if flag.kind in FRAME_FLAG_KINDS])
         for h, each in zip(histories, results, strict=True)
     ]
-    jumps = find_jumps(sound)
-    flags += jump_flags(sound, jumps)
-    flags += [rate_change_flag(sound, change, activation_energy) for change in common_rate_changes(sound, jumps)]
+    flags += check_rig(sound, activation_energy=activation_energy)
     return DataQuality(tuple(flags), len(histories))
+
+
+def check_rig(histories: Sequence[History], *, activation_energy: float = ACTIVATION_ENERGY) -> list[QualityFlag]:
+    """What the rig did: records that differ from the program, jumps, changes of rates across tests.
+
+    histories : without suspect frames, see exclude_suspect_frames. activation_energy : J/mol.
+    """
+    flags = [flag for history in histories for flag in record_flags(history, activation_energy)]
+    jumps = find_jumps(histories)
+    flags += jump_flags(histories, jumps)
+    changes = common_rate_changes(histories, jumps)
+    return [*flags, *(rate_change_flag(histories, change, activation_energy) for change in changes)]
 
 
 def exclude_suspect_frames(histories: Sequence[History], kinds: Collection[str] = FRAME_FLAG_KINDS) -> list[History]:

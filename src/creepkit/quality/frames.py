@@ -241,11 +241,13 @@ def _cubic_residuals(x: Floats, y: Floats) -> tuple[Floats, Floats]:
 
 def _local_scale(residuals: Floats) -> Floats:
     """The size of misses about each frame, without it and its neighbours: large where a curve bends sharply."""
-    size, scales = np.abs(residuals), np.zeros(residuals.size)
-    for k in range(residuals.size):
-        neighbours = np.concatenate([size[max(k - 7, 0) : max(k - 2, 0)], size[k + 3 : k + 8]])
-        scales[k] = 1.4826 * float(np.median(neighbours)) if neighbours.size else 0.0
-    return scales
+    padded = np.pad(np.abs(residuals), 7, constant_values=np.nan)
+    beside = np.r_[0:5, 10:15]  # from seven to three frames before and after
+    neighbours = np.sort(np.lib.stride_tricks.sliding_window_view(padded, 15)[:, beside], axis=1)
+    count = np.isfinite(neighbours).sum(axis=1)
+    rows = np.arange(residuals.size)
+    middle = 0.5 * (neighbours[rows, np.maximum(count - 1, 0) // 2] + neighbours[rows, np.minimum(count // 2, 9)])
+    return np.where(count > 0, 1.4826 * middle, 0.0)
 
 
 def _isolated(residuals: Floats) -> Bools:

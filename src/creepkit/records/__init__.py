@@ -9,6 +9,7 @@ from creepkit.records.interfaces import (
     SupportsReducedOrderModel,
     SupportsRefinement,
     SupportsRupturePrediction,
+    SupportsSearchTolerance,
 )
 from creepkit.records.law_with_values import LawWithValues, Units
 from creepkit.records.loading import (
@@ -78,6 +79,7 @@ __all__ = [
     "SupportsReducedOrderModel",
     "SupportsRefinement",
     "SupportsRupturePrediction",
+    "SupportsSearchTolerance",
     "TimesToStrain",
     "Units",
     "assemble_prediction",

@@ -74,9 +74,9 @@ class Predictor(Protocol):
     `program_nuisances`, those of PROGRAM_NUISANCES that predict() takes and differentiates itself (without it they
     become other programs of the histories);
     `reference_stress(history)`, the von Mises stress, MPa, that stands for the test (a number, or one for each level
-    of its loading); `reduced_order_model()` and `refined()`, see SupportsReducedOrderModel and SupportsRefinement;
-    `specimen`, that a surrogate stands for; `outside_class(law)`, why it does not know the class of a law, in a
-    sentence, or "" where it does.
+    of its loading); `reduced_order_model()`, `refined()` and `for_search()`, see SupportsReducedOrderModel,
+    SupportsRefinement and SupportsSearchTolerance; `specimen`, that a surrogate stands for; `outside_class(law)`, why
+    it does not know the class of a law, in a sentence, or "" where it does.
     """
 
     def predict(
@@ -132,6 +132,15 @@ class SupportsRefinement(Predictor, Protocol):
 
     def refined(self) -> Predictor:
         """Return the more exact predictor; a few runs of it may cost as much as the rest of an identification."""
+        ...
+
+
+@runtime_checkable
+class SupportsSearchTolerance(Predictor, Protocol):
+    """A predictor whose own error may be larger while a global search looks for minima, which is cheaper."""
+
+    def for_search(self) -> Predictor:
+        """Return the same predictor at such tolerances; its error is far below that of any measurement."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""Text and plots of simulated tests: outputs over time, deformed section, tables of the reduced-order model."""
+"""Text and plots of simulated tests: outputs over time, deformed section, points of a reduced-order model."""
 
 from __future__ import annotations
 
@@ -12,14 +12,12 @@ from creepkit.errors import SolveError
 from creepkit.fem.mesh import CORNERS, GAUSS_POINTS, SIDES, outline, shape_functions
 from creepkit.records import Status
 from creepkit.report.figures import empty_figure, save_figure, set_range
-from creepkit.specimens.bulge.reduced_order.deflection_curves import LOG_GROWTH, LOG_STRESS
-from creepkit.specimens.bulge.reduced_order.step_equations import growth_multiplier, redistribution_sizes
-from creepkit.specimens.bulge.reduced_order.tables import LOADS, ReducedOrderTables
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from creepkit.fem.reduced_order_model import ReducedOrderModel
     from creepkit.specimens.bulge.run import BulgeRun
     from creepkit.specimens.run import Run
 
@@ -163,61 +161,18 @@ _STRAINS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 _COLUMN = 8
 
 
-def tables_text(tables: ReducedOrderTables) -> str:
-    """k and kappa at some deflections for each thickness, the elastic deflection, and the multiplier."""
-    nominal, grid = tables.geometry.apex_thickness, tables.grid
-    deflections = np.array([d for d in nominal * np.array(_SHOWN) if d <= grid.points[-1]])
-    parts = []
-    for which, title in ((LOG_STRESS, "k = sigma*/P"), (LOG_GROWTH, "kappa = dD/d eps*, mm")):
-        rows = [np.exp(np.interp(deflections, grid.points, own_values[which])) for own_values in tables.curves]
-        parts.append(_table(title, "h \\ D, mm", deflections, tables.thicknesses, rows))
-    loads = LOADS.points[8::8]
-    rows = [tables.elastic_deflection(loads, float(h))[0] for h in tables.thicknesses]
-    parts.append(_table("elastic deflection, mm", "h, mm \\ P/E", loads, tables.thicknesses, rows))
-    rows = [growth_multiplier(np.array(_STRAINS), n, size=_first(tables)) for n in _EXPONENTS]
-    title = "growth over steady growth after the first loading"
-    parts.append(_table(title, "n \\ E eps*/sigma*", np.array(_STRAINS), np.array(_EXPONENTS), rows))
-    return "\n\n".join(parts)
-
-
-def _first(tables: ReducedOrderTables) -> float:
-    return float(redistribution_sizes(np.zeros(1))[0])
-
-
-def _table(title: str, corner: str, columns: Floats, labels: Floats, rows: list[Floats]) -> str:
-    """A table of numbers with four digits."""
-    width = max(len(corner), 6) + 2
-    head = f"{corner:<{width}}" + "".join(f"{c:>{_COLUMN}.3g}" for c in columns)
-    lines = [
-        f"{label:<{width}.4g}" + "".join(f"{v:>{_COLUMN}.4g}" for v in row)
-        for label, row in zip(labels, rows, strict=True)
-    ]
-    return "\n".join([title, head, *lines])
-
-
-def tables_figure(tables: ReducedOrderTables, path: str | Path | None = None) -> Figure:
-    """k and kappa against D for each thickness, and the multiplier against creep strain, side by side."""
-    figure = empty_figure(11.0, 3.6)
-    left, middle, right = figure.subplots(1, 3)
-    shades = np.linspace(0.75, 0.25, tables.thicknesses.size)
-    for own_values, h, shade in zip(tables.curves, tables.thicknesses, shades, strict=True):
-        for axes, which in ((left, LOG_STRESS), (middle, LOG_GROWTH)):
-            axes.plot(tables.grid.points, np.exp(own_values[which]), color=str(1.0 - shade), label=f"h = {h:.3g} mm")
-    left.set(ylabel="k = $\\sigma^*$/P", title="stress of the reference point")
-    middle.set(ylabel="$\\kappa$ = dD/d$\\epsilon^*$, mm", title="growth by its strain")
-    for axes in (left, middle):
-        set_range(axes, "x", 0.0, float(tables.grid.points[-1]))
-        set_range(axes, "y", 0.0, max(float(np.max(line.get_ydata())) for line in axes.lines))
-        axes.set(xlabel="D, mm")
-        axes.legend(frameon=False, fontsize=8)
-    strains = np.geomspace(1e-3, 5.0, 80)
-    for k, n in enumerate(_EXPONENTS):
-        right.loglog(strains, growth_multiplier(strains, n, size=_first(tables)), color=f"C{k}", label=f"n = {n:g}")
-    set_range(right, "x", float(strains[0]), float(strains[-1]), logarithmic=True)
-    set_range(right, "y", 0.9, max(float(np.max(line.get_ydata())) for line in right.lines), logarithmic=True)
-    right.axhline(1.0, color="0.7", lw=0.8)
-    right.set(xlabel="$\\lambda$ = E $\\epsilon^*$/$\\sigma^*$", title="growth over steady growth at first")
-    right.legend(frameon=False, fontsize=8)
-    for axes in (left, middle, right):
-        axes.spines[["top", "right"]].set_visible(False)
-    return save_figure(figure, path, SolveError)
+def cubature_figure(model: ReducedOrderModel, path: str | Path | None = None) -> Figure:
+    """The section at rest with the points at which a reduced-order model evaluates the law; area : of its weight."""
+    body, basis = model.model, model.basis
+    figure = empty_figure(9.0, 2.6)
+    axes = figure.subplots()
+    _draw_outline(axes, body.nodes, body.elements, 1.0, color=_GREY, linewidth=0.8)
+    places = np.einsum("pa,eai->epi", shape_functions(GAUSS_POINTS), body.nodes[body.elements]).reshape(-1, 2)
+    weights = basis.factors * body.weights.ravel()[basis.points]
+    axes.plot(*places.T, ".", markersize=1.0, color=_GREY)
+    axes.scatter(places[basis.points, 0], places[basis.points, 1], s=60.0 * weights / weights.max(), color="tab:blue")
+    axes.set_aspect("equal")
+    axes.set_xlabel("radius, mm")
+    axes.set_ylabel("height, mm")
+    axes.set_title(f"{len(basis.points)} of {len(places)} points, {len(basis.modes)} modes", fontsize=10)
+    return save_figure(figure, path)

@@ -12,7 +12,6 @@ from creepkit.errors import SurrogateError
 from creepkit.report.figures import empty_figure, make_folder, place_legend_below, save_figure, set_range
 from creepkit.surrogates.evaluation import PredictionComparison, evaluate, worst_histories
 from creepkit.surrogates.recipe import SurrogateMetadata
-from creepkit.surrogates.training import SizeStudyResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
 
     from creepkit.dataset.dataset import Dataset
     from creepkit.surrogates.surrogate import Surrogate
+    from creepkit.surrogates.training import SizeStudyResult
 
 
 OUTPUT_LABELS = {"amplitude": "amplitude, mm", "width": "width, mm", "shape": "shape", "strain": "strain"}
@@ -130,9 +130,9 @@ ERROR_HEADS = ("RSE (Eq. 4)", "MSE", "MAE", "R2", "largest error, median", "95 %
 
 
 def surrogate_text(surrogate: Surrogate) -> str:
-    """Title, class of laws, errors on the validation rows for each output, and where it came from."""
-    metadata = surrogate.metadata
-    lines, metrics = [surrogate.title, f"predicts {surrogate.law_class}"], metadata.metrics
+    """Title, laws, errors on the validation rows for each output, and where it came from."""
+    metadata, metrics = surrogate.metadata, surrogate.metadata.metrics
+    lines = [surrogate.title, f"predicts law '{metadata.law.name}', and that less some of its terms"]
     if metrics:
         rows = {
             name: [_number_text(errors_of_output[c]) for c in ERROR_COLUMNS]

@@ -28,10 +28,6 @@ MOST_FRAMES = 100_000
 """Largest number of frames of a sample: a typing error should not ask for all the memory."""
 
 
-RELATIVE_TIMES = (0.0, 60 / 43200, 240 / 43200, *(k / 48 for k in range(1, 49)))
-"""Times as fractions of the end of a test: 51 frames, two of them in the fast start; 900 s apart in 12 h."""
-
-
 @dataclass(frozen=True, eq=False)
 class TimeGrid:
     """The times of all samples of a design.

@@ -169,12 +169,7 @@ MOST_TRIALS = 32
 
 @dataclass(frozen=True)
 class ConditionedDomain(SamplingDomain):
-    """Uniform in the log of the mean rate at the reference stress.
-
-    term_count_probabilities : fractions of rows with one, two and three groups of terms.
-    """
-
-    term_count_probabilities: tuple[float, ...] = TERM_COUNT_PROBABILITIES
+    """Uniform in the log of the mean rate at the reference stress."""
 
     name: ClassVar[str] = "conditioned"
 
@@ -185,26 +180,24 @@ class ConditionedDomain(SamplingDomain):
         unit_coordinates = np.split(sobol_rows(sum(sizes), first, count, seed), np.cumsum(sizes)[:-1], axis=1)
         tests = Draws(np.zeros((count, 0)), self.conditions.draw(unit_coordinates[4]), self.condition_names)
         low, high = self.reference_stress.useful_rates(tests, self.conditions.end)
-        active = active_terms(unit_coordinates[1], group_count, self.term_count_probabilities)
+        active = active_terms(unit_coordinates[1], group_count)
         ln_rates = np.log(10.0) * (low + unit_coordinates[0][:, 0] * (high - low))[:, None] + ln_term_fractions(
             unit_coordinates[2], active
         )
         points = self.reference_stress.evaluation_points(tests, self.conditions.end)
         return Draws(
-            self._parameters(unit_coordinates[3], active, ln_rates, points, tests),
-            tests.conditions,
-            self.condition_names,
+            self._parameters(unit_coordinates[3], ln_rates, points, tests), tests.conditions, self.condition_names
         )
 
     def _parameters(
-        self, unit_coordinates: Floats, active: Bools, ln_rates: Floats, points: RateEvaluationPoints, tests: Draws
+        self, unit_coordinates: Floats, ln_rates: Floats, points: RateEvaluationPoints, tests: Draws
     ) -> Floats:
         """The author's parameters for wanted rates.
 
         A row whose parameters leave the bounds or break the law's constraints moves on, by a fixed step in all
         coordinates at once, to the first place where they do not.
         """
-        parameters = self._solved_parameters(unit_coordinates, active, ln_rates, points)
+        parameters = self._solved_parameters(unit_coordinates, ln_rates, points)
         rejected_rows, step = np.arange(len(unit_coordinates)), additive_recurrence_step(unit_coordinates.shape[1])
         for trial in range(1, MOST_TRIALS):
             rejected_rows = rejected_rows[
@@ -216,15 +209,13 @@ class ConditionedDomain(SamplingDomain):
                 break
             shifted = (unit_coordinates[rejected_rows] + trial * step) % 1.0
             parameters[rejected_rows] = self._solved_parameters(
-                shifted, active[rejected_rows], ln_rates[rejected_rows], points.rows(rejected_rows)
+                shifted, ln_rates[rejected_rows], points.rows(rejected_rows)
             )
         return parameters
 
-    def _solved_parameters(
-        self, unit_coordinates: Floats, active: Bools, ln_rates: Floats, points: RateEvaluationPoints
-    ) -> Floats:
+    def _solved_parameters(self, unit_coordinates: Floats, ln_rates: Floats, points: RateEvaluationPoints) -> Floats:
         groups = term_groups(self.law)
-        theta = self.shape_parameters(unit_coordinates, active, points)
+        theta = uniform_in_bounds(self.law, unit_coordinates)
         theta = draw_stress_scales(
             self.law, groups, theta, unit_coordinates[:, list(stress_scale_positions(self.law))], ln_rates, points
         )
@@ -235,20 +226,9 @@ class ConditionedDomain(SamplingDomain):
         met = [c.passes(self.law, draws) for c in self.criteria if c.stage == "before"]
         return np.asarray(np.all(met, axis=0))
 
-    def shape_parameters(self, unit_coordinates: Floats, active: Bools, points: RateEvaluationPoints) -> Floats:
-        """Internal values, (rows, parameters), within their bounds, before coefficients and stress scales.
-
-        unit_coordinates : (rows, parameters) from 0 to 1. active : (rows, groups) which groups are not switched off.
-        """
-        return uniform_in_bounds(self.law, unit_coordinates)
-
     def document(self) -> dict[str, Any]:
         """Everything that decides the draws, as JSON-able data."""
-        return {
-            **super().document(),
-            "reference": vars(self.reference_stress),
-            "how_many": self.term_count_probabilities,
-        }
+        return {**super().document(), "reference": vars(self.reference_stress), "how_many": TERM_COUNT_PROBABILITIES}
 
 
 def conditioned_domain(
@@ -337,7 +317,7 @@ class SamplingDesign(Protocol):
 
     @property
     def name(self) -> str:
-        """paper, conditioned or rate-family."""
+        """paper or conditioned."""
         ...
 
     @property

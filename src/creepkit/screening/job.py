@@ -47,7 +47,9 @@ def single_threaded(predictor: Predictor) -> Predictor:
         return CompositePredictor({name: single_threaded(p) for name, p in untyped.predictors.items()})
     if _is_surrogate(untyped):
         metadata = replace(untyped.metadata, specimen=single_threaded(untyped.metadata.specimen))
-        return untyped.recipe.surrogate(untyped.module, metadata)  # type: ignore[no-any-return]
+        return untyped.recipe.surrogate(untyped.weights, metadata)  # type: ignore[no-any-return]
+    if "specimen" in getattr(untyped, "__dataclass_fields__", ()):  # the reduced-order model of a specimen
+        return replace(untyped, specimen=single_threaded(untyped.specimen))  # type: ignore[no-any-return]
     if getattr(untyped, "threads", 1) == 1:
         return predictor
     return untyped.replace(threads=1)  # type: ignore[no-any-return]
@@ -63,7 +65,7 @@ def _serialised_predictor(predictor: Predictor) -> bytes:
     if isinstance(untyped, CompositePredictor):
         return b"".join(name.encode() + _serialised_predictor(p) for name, p in sorted(untyped.predictors.items()))
     if _is_surrogate(untyped):
-        weights = b"".join(tensor.detach().numpy().tobytes() for tensor in untyped.module.state_dict().values())
+        weights = b"".join(array.tobytes() for array in untyped.weights.values())
         return canonical_json(untyped.file_header) + weights
     try:
         return canonical_json(specimen_to_json(untyped))
@@ -72,8 +74,8 @@ def _serialised_predictor(predictor: Predictor) -> bytes:
 
 
 def _is_surrogate(predictor: Any) -> bool:
-    """Whether it is a surrogate.Surrogate; asking by class would load torch for everybody."""
-    return all(hasattr(predictor, name) for name in ("recipe", "module", "metadata"))
+    """Whether it is a surrogate.Surrogate; asking by class would load surrogates for everybody."""
+    return all(hasattr(predictor, name) for name in ("recipe", "weights", "metadata"))
 
 
 def screen_alloy(job: ScreeningJob, alloy: Alloy) -> AlloyResult:

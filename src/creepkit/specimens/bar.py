@@ -34,6 +34,10 @@ STEPS_PER_BREAKPOINT = 20
 """Each straight piece of a program takes some 7 steps of its own; a logged temperature has thousands of pieces."""
 
 
+SEARCH_TOLERANCE = 1e-3
+"""Tolerance of the integration in a global search; creep of bars scatters by a thousand times as much."""
+
+
 NUISANCES = ("temperature", "modulus")
 
 
@@ -69,6 +73,10 @@ class Bar:
     def replace(self, **changes: float) -> Self:
         """The same specimen with some fields changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
+
+    def for_search(self) -> Self:
+        """The bar at the tolerance of a global search, at which strains err by some 1e-4 of themselves."""
+        return self.replace(tolerance=max(self.tolerance, SEARCH_TOLERANCE))
 
     # ---- of each kind of bar --------------------------------------------------------------------------------------
 
@@ -153,7 +161,7 @@ class Bar:
         return assemble_prediction(parts, histories, self.outputs, len(result.strain))
 
     def _integrate(self, law: CreepLaw, theta: Floats, tests: Sequence[PointTest], sensitivities: bool) -> Integration:
-        kernel = kernels.lower(law, "numba")
+        kernel = kernels.lower(law, "compiled")
         breaks = max((test.driving.times.size + test.temperature.times.size - 2 for test in tests), default=0)
         settings = integration.IntegrationSettings(
             rtol=self.tolerance,

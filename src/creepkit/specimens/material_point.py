@@ -118,7 +118,7 @@ class MaterialPoint:
     # ---- one history at a time -------------------------------------------------------------------------------------
 
     def _predict(self, law: CreepLaw, theta: Floats, histories: Sequence[History], sensitivities: bool) -> Prediction:
-        kernel = kernels.lower(law, "numba")
+        kernel = kernels.lower(law, "compiled")
         steps = DIFFERENCE_STEP * np.array([1.0 if p.scale == "log" else np.inf for p in law.params.values()])
         steps = np.where(np.isinf(steps), DIFFERENCE_STEP * np.maximum(1.0, np.abs(theta)), steps)
         parts = [
@@ -267,7 +267,7 @@ class PointRun(Run):
 
 def run_material_point(specimen: MaterialPoint, law: CreepLaw, values: Mapping[str, float], plan: History) -> PointRun:
     """Simulate one test and keep all of it."""
-    kernel = kernels.lower(law, "numba")
+    kernel = kernels.lower(law, "compiled")
     result = specimen.simulate(kernel, law.to_internal(law.values(values))[0], plan)
     rows = point_outputs(result, plan)
     shown_columns = [k for k, column in enumerate(rows.T) if k == 0 or np.nanmax(np.abs(column), initial=0.0) > 0.0]

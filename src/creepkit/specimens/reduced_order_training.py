@@ -93,7 +93,7 @@ def power_law_runs(
     models: Sequence[FiniteElementModel], count: int, poisson: float = 0.3, seed: int = 0
 ) -> list[TrainingRun]:
     """Runs at drawn exponents, pressures and rates, every second with two pressures; meshes in turn."""
-    law = kernels.lower(_POWER_LAW, "numba")
+    law = kernels.lower(_POWER_LAW, "compiled")
     ratios = [stress_ratio(law, model, poisson) for model in models]
     runs = []
     for k, draw in enumerate(qmc.Sobol(5, seed=seed).random(count)):

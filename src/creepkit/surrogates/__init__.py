@@ -1,5 +1,5 @@
 """Surrogates: networks trained on a data set of simulations, which predict as the specimen itself would.
 
-A recipe says how a data set becomes samples and a network; `train` fits the network; the surrogate that comes out is a
-records.Predictor, and one file.
+A recipe says how a data set becomes samples and a network; `train` fits the network in torch; the surrogate that comes
+out is a records.Predictor, evaluated in NumPy, and one file.
 """

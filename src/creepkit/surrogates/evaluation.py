@@ -13,16 +13,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from creepkit.arrays import Bools, Floats, Ints
 from creepkit.dataset.dataset import first_difference
 from creepkit.errors import DatasetError
 from creepkit.registry.specimen_documents import specimen_to_json
-from creepkit.surrogates.recipe import SampleTensors, SurrogateMetadata, SurrogateModule
+from creepkit.surrogates.recipe import SampleArrays, SurrogateMetadata
 from creepkit.surrogates.surrogate import Surrogate
-from creepkit.surrogates.training_loop import dataset_fingerprint, output_deviation, trainable_samples, training_split
+from creepkit.surrogates.training_rows import dataset_fingerprint, output_deviation, trainable_samples, training_split
 
 if TYPE_CHECKING:
     from creepkit.sampling.conditions import TimeGrid
@@ -195,13 +193,13 @@ def evaluate(surrogate: Surrogate, data: Dataset) -> Evaluation:
     data = trainable_samples(data)
     check_same_kind(surrogate.metadata, data)
     provenance = surrogate.metadata.provenance
-    samples = surrogate.recipe.sample_tensors(data)
-    all_rows = torch.arange(len(data))
+    samples = surrogate.recipe.sample_arrays(data)
+    all_rows = np.arange(len(data))
     rows, scale = all_rows, output_deviation(samples, all_rows)
     if provenance.get("data") == dataset_fingerprint(data):
         train, rows = training_split(len(data), surrogate.recipe.training, int(provenance["seed"]))
         scale = output_deviation(samples, train)
-    comparison = compare_predictions(surrogate.module, samples, data, rows, scale)
+    comparison = compare_predictions(surrogate, samples, data, rows, scale)
     times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
     return Evaluation(comparison, comparison_metrics(comparison, times), times)
 
@@ -217,20 +215,18 @@ def check_same_kind(metadata: SurrogateMetadata, data: Dataset) -> None:
         raise DatasetError(f"the data set has the outputs {', '.join(data.outputs)}, not {', '.join(metadata.outputs)}")
 
 
-@torch.no_grad()
 def compare_predictions(
-    module: SurrogateModule, samples: SampleTensors, data: Dataset, rows: Tensor, scale: Tensor
+    surrogate: Surrogate, samples: SampleArrays, data: Dataset, rows: Ints, scale: Floats
 ) -> PredictionComparison:
     """What a network predicts for rows (n,) of a data set, beside what is true; scale : (outputs,)."""
-    module.eval()
-    parts = [module({name: v[part] for name, v in samples.items()}) for part in torch.split(rows, EVALUATION_BATCH)]
-    row_numbers = rows.numpy()
+    parts = [rows[first : first + EVALUATION_BATCH] for first in range(0, len(rows), EVALUATION_BATCH)]
+    predicted = [surrogate.predict_samples({name: v[part] for name, v in samples.items()}) for part in parts]
     return PredictionComparison(
-        times=np.stack([data.times(int(k)) for k in row_numbers]),
-        true=samples["targets"][rows].double().numpy(),
-        predicted=torch.cat(parts).double().numpy(),
-        mask=samples["mask"][rows].numpy(),
+        times=np.stack([data.times(int(k)) for k in rows]),
+        true=np.asarray(samples["targets"][rows], float),
+        predicted=np.concatenate(predicted),
+        mask=samples["mask"][rows],
         outputs=data.outputs,
-        scale=scale.numpy(),
-        index=data.index[row_numbers],
+        scale=scale,
+        index=data.index[rows],
     )

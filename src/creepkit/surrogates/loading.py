@@ -1,4 +1,4 @@
-"""Surrogates by name (those shipped with creepkit) or from a file."""
+"""Surrogates by name (reduced-order models of specimens that come with creepkit) or from a file (trained networks)."""
 
 from __future__ import annotations
 
@@ -8,54 +8,53 @@ from typing import Any
 
 from creepkit.errors import CreepkitError, SurrogateError, nearest
 from creepkit.files.json_documents import check_keys
+from creepkit.records import Predictor, SupportsReducedOrderModel
+from creepkit.registry import default_registry
 from creepkit.surrogates.recipe import SurrogateMetadata
 from creepkit.surrogates.surrogate import Recipe, Surrogate
 from creepkit.surrogates.weight_files import CODEC, read_weights
 
-WEIGHTS_FOLDER = Path(__file__).with_name("weights")
+REDUCED_ORDER_MODELS = {"dimple": "bulge"}
+"""{name of a surrogate that comes with creepkit: the registered specimen whose reduced-order model it is}."""
 
 
 SUFFIX = ".safetensors"
 
 
-def shipped_files() -> dict[str, Path]:
-    """{name: file} of the surrogates inside the package."""
-    return {path.name.removesuffix(SUFFIX): path for path in sorted(WEIGHTS_FOLDER.glob(f"*{SUFFIX}"))}
-
-
-def surrogate_by_name(name_or_path: str | Path) -> Surrogate:
-    """The surrogate of this name, or in this file."""
-    files, text = shipped_files(), str(name_or_path)
-    if isinstance(name_or_path, str) and text in files:
-        return load_surrogate(files[text])
+def surrogate_by_name(name_or_path: str | Path) -> Predictor:
+    """The reduced-order model of this name, or the trained network in this file."""
+    text = str(name_or_path)
+    if isinstance(name_or_path, str) and text in REDUCED_ORDER_MODELS:
+        specimen = default_registry().specimen(REDUCED_ORDER_MODELS[text])
+        assert isinstance(specimen, SupportsReducedOrderModel)
+        return specimen.reduced_order_model()
     if not (text.endswith(SUFFIX) or Path(text).exists()):
-        raise SurrogateError(f"no surrogate is called '{text}', and there is no such file; {nearest(text, files)}")
+        choices = nearest(text, REDUCED_ORDER_MODELS)
+        raise SurrogateError(f"no surrogate is called '{text}', and there is no such file; {choices}")
     return load_surrogate(text)
 
 
-RECIPE_CLASSES = {
-    "parameter-gru": "creepkit.surrogates.parameter_gru:ParameterGru",
-    "rate-net": "creepkit.surrogates.rate_net:RateNet",
-}
+RECIPE_CLASSES = {"parameter-gru": "creepkit.surrogates.parameter_gru:ParameterGru"}
 """{kind: where its recipe is}; the recipe makes the network that the weights of a file belong to."""
 
 
 def load_surrogate(path: str | Path) -> Surrogate:
     """Return the surrogate in a file; SurrogateError says what is wrong with any other file."""
-    tensors, header = read_weights(path)
+    weights, header = read_weights(path)
     try:
         problem = check_keys(header, ("kind", "recipe", "metadata"), "its header")
         if problem:
             raise SurrogateError(f"{problem}; train it again")
         recipe = CODEC.from_json(_recipe_class(header["kind"]), header["recipe"], "recipe")
-        metadata = CODEC.from_json(SurrogateMetadata, header["metadata"], "metadata")
-        module = recipe.empty_module(metadata)
-        module.load_state_dict(tensors)
+        # files of older versions name the class of laws as well, which is that of their recipe
+        known = {name: value for name, value in header["metadata"].items() if name != "law_class"}
+        metadata = CODEC.from_json(SurrogateMetadata, known, "metadata")
+        surrogate = recipe.surrogate(weights, metadata)
     except CreepkitError as error:
         raise SurrogateError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
     except (KeyError, TypeError, ValueError, RuntimeError, AttributeError):
         raise SurrogateError(f"{path}: its header and its weights do not belong together; train it again") from None
-    return recipe.surrogate(module, metadata)
+    return surrogate
 
 
 def _recipe_class(kind: Any) -> type[Recipe]:

@@ -1,19 +1,82 @@
-"""The recurrent network of ParameterGru, and its forward-mode derivatives.
+"""The network of ParameterGru as training fits it, in torch, and the standardisation of its inputs.
 
-torch differentiates recurrent layers backwards, once for each output and frame. A fit needs the derivatives to a
-dozen inputs at all frames, so they are carried forward with the values.
+What is trained predicts without torch; see network_evaluation.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TypeAlias
 
 import torch
 from torch import Tensor, nn
 
-from creepkit.surrogates.recipe import SampleTensors, Standardisation, SurrogateModule
+from creepkit.surrogates.network_evaluation import RecurrentCell
+from creepkit.surrogates.recipe import SampleArrays, Weights
 
-RecurrentCell = Literal["gru", "lstm"]
+SampleTensors: TypeAlias = dict[str, Tensor]
+"""recipe.SampleArrays as tensors."""
+
+
+def sample_tensors(samples: SampleArrays) -> SampleTensors:
+    """The same numbers as tensors."""
+    return {name: torch.from_numpy(array) for name, array in samples.items()}
+
+
+def load_weights(module: ParameterModule, weights: Weights) -> ParameterModule:
+    """The module with the weights and scales of a file."""
+    module.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in weights.items()})
+    return module
+
+
+def weights_of(tensors: dict[str, Tensor]) -> Weights:
+    """{name: (...,)} arrays of the state of a module; tensors : {name: (...,)}."""
+    return {name: tensor.detach().cpu().numpy() for name, tensor in tensors.items()}
+
+
+CONSTANT_TOLERANCE = 1e-6
+"""A standard deviation below this share of the largest value is rounding: the column is constant."""
+
+
+class Standardisation(nn.Module):
+    """Standardises the last axis; its scales are buffers, float64, saved with the weights.
+
+    mean, deviation : (columns,) of the training rows.
+    A column that is constant in training is only shifted: its standardised value is zero, and the applicability
+    domain refuses others.
+    """
+
+    mean: Tensor
+    deviation: Tensor
+
+    def __init__(self, mean: Tensor, deviation: Tensor) -> None:
+        super().__init__()
+        self.register_buffer("mean", mean.double())
+        self.register_buffer("deviation", deviation.double())
+
+    @classmethod
+    def from_rows(cls, values: Tensor, mask: Tensor | None = None) -> Standardisation:
+        """The scale of columns; NaN counts nowhere.
+
+        values : (..., columns). mask : (...,) which rows count.
+        """
+        rows = (values[mask] if mask is not None else values.reshape(-1, values.shape[-1])).double()
+        mean = torch.nan_to_num(rows.nanmean(dim=0), nan=0.0)
+        deviation = torch.nan_to_num((rows - mean).square().nanmean(dim=0).sqrt(), nan=0.0)
+        constant = deviation <= CONSTANT_TOLERANCE * torch.nan_to_num(rows, nan=0.0).abs().amax(dim=0)
+        return cls(mean, torch.where(constant, 1.0, deviation))
+
+    @classmethod
+    def identity(cls, columns: int) -> Standardisation:
+        """A scale that changes nothing."""
+        return cls(torch.zeros(columns), torch.ones(columns))
+
+    def forward(self, values: Tensor) -> Tensor:
+        """The values (..., columns), standardised."""
+        return (values - self.mean.to(values.dtype)) / self.deviation.to(values.dtype)
+
+    def inverse(self, values: Tensor) -> Tensor:
+        """Physical values, (..., columns), of standardised values (..., columns)."""
+        return values * self.deviation.to(values.dtype) + self.mean.to(values.dtype)
 
 
 LOG_FLOOR = 0.01
@@ -24,7 +87,7 @@ LARGEST_LOG_EXCESS = 2.0
 """By how much (of ln) a prediction may exceed the largest value of the training: an exponential must not overflow."""
 
 
-class ParameterModule(SurrogateModule):
+class ParameterModule(nn.Module):
     """Standardised constants and series into recurrent layers, and a linear layer to standardised outputs.
 
     Its samples are "constants" (n, C), NaN where a coefficient is off; "series" (n, frames, S); and "base" (n, frames)
@@ -160,70 +223,3 @@ class ParameterModule(SurrogateModule):
 
 def _masked_squares(values: Tensor, mask: Tensor) -> Tensor:
     return torch.where(mask[..., None], values, 0.0).square().sum()
-
-
-ValuesAndDerivatives = tuple[Tensor, Tensor]
-"""Values (rows, ...) and their derivatives (rows, directions, ...)."""
-
-
-def recurrent_with_derivatives(network: nn.GRU | nn.LSTM, inputs: Tensor, directions: Tensor) -> ValuesAndDerivatives:
-    """Outputs of a stack of layers, (rows, frames, hidden), and derivatives, (rows, directions, frames, hidden).
-
-    inputs : (rows, frames, inputs). directions : (rows, directions, frames, inputs), how inputs move.
-    """
-    cell = _gru_step if isinstance(network, nn.GRU) else _lstm_step
-    values = torch.cat([inputs[:, None], directions], dim=1)
-    for layer in range(network.num_layers):
-        weights = [getattr(network, f"{name}_l{layer}") for name in ("weight_ih", "weight_hh", "bias_ih", "bias_hh")]
-        values = _recurrent_layer(cell, values, *weights)
-    return values[:, 0], values[:, 1:]
-
-
-def _recurrent_layer(
-    cell: object, values: Tensor, w_in: Tensor, w_hidden: Tensor, b_in: Tensor, b_hidden: Tensor
-) -> Tensor:
-    """One layer over all frames; (rows, 1 + directions, frames, inputs), the value first."""
-    input_part = values @ w_in.T
-    input_part[:, 0] += b_in
-    rows, width, frames, hidden = *values.shape[:3], w_hidden.shape[1]
-    state, memory = (values.new_zeros(rows, width, hidden) for _ in range(2))
-    states = []
-    for k in range(frames):
-        hidden_part = state @ w_hidden.T
-        hidden_part[:, 0] += b_hidden
-        state, memory = cell(input_part[:, :, k], hidden_part, state, memory)  # type: ignore[operator]
-        states.append(state)
-    return torch.stack(states, dim=2)
-
-
-def _gru_step(input_part: Tensor, hidden_part: Tensor, state: Tensor, memory: Tensor) -> ValuesAndDerivatives:
-    """r, z = sigmoid(i + b), n = tanh(i_n + r b_n), h' = (1 - z) n + z h."""
-    r_in, z_in, n_in = input_part.chunk(3, dim=-1)
-    r_back, z_back, n_back = hidden_part.chunk(3, dim=-1)
-    r, z = _sigmoid(r_in + r_back), _sigmoid(z_in + z_back)
-    n = _tanh(n_in + _product(r, n_back))
-    return n + _product(z, state - n), memory
-
-
-def _lstm_step(input_part: Tensor, hidden_part: Tensor, state: Tensor, memory: Tensor) -> ValuesAndDerivatives:
-    """i, f, o = sigmoid, g = tanh; c' = f c + i g, h' = o tanh c'."""
-    i, f, g, o = (input_part + hidden_part).chunk(4, dim=-1)
-    memory = _product(_sigmoid(f), memory) + _product(_sigmoid(i), _tanh(g))
-    return _product(_sigmoid(o), _tanh(memory)), memory
-
-
-# ---- functions of values that carry their derivatives, (rows, 1 + directions, hidden) --------------------------------
-
-
-def _sigmoid(x: Tensor) -> Tensor:
-    value = torch.sigmoid(x[:, :1])
-    return torch.cat([value, value * (1.0 - value) * x[:, 1:]], dim=1)
-
-
-def _tanh(x: Tensor) -> Tensor:
-    value = torch.tanh(x[:, :1])
-    return torch.cat([value, (1.0 - value * value) * x[:, 1:]], dim=1)
-
-
-def _product(a: Tensor, b: Tensor) -> Tensor:
-    return torch.cat([a[:, :1] * b[:, :1], a[:, 1:] * b[:, :1] + a[:, :1] * b[:, 1:]], dim=1)

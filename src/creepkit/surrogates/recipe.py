@@ -1,18 +1,15 @@
-"""Training settings, the network interface, the metadata of a surrogate, and the standardisation of its inputs."""
+"""Training settings, arrays of samples, and the metadata of a surrogate."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-import torch
-from torch import Tensor, nn
+from numpy.typing import NDArray
 
 from creepkit.errors import SurrogateError
 from creepkit.jobs.shard_progress import ProgressCallback as ProgressCallback
-from creepkit.surrogates.law_class import LawClass
 
 if TYPE_CHECKING:
     from creepkit.dataset.dataset import Dataset
@@ -22,9 +19,13 @@ if TYPE_CHECKING:
     from creepkit.surrogates.applicability_domain import ApplicabilityDomain
 
 
-SampleTensors: TypeAlias = dict[str, Tensor]
-"""Tensors whose leading axis is the sample. Always there: "targets" (n, frames, outputs), physical, float32, zero where
-there is none; "mask" (n, frames), which frames are data. The rest is the recipe's own: the inputs of its module."""
+SampleArrays: TypeAlias = dict[str, NDArray[Any]]
+"""Arrays whose leading axis is the sample. Always there: "targets" (n, frames, outputs), physical, float32, zero where
+there is none; "mask" (n, frames), which frames are data. The rest is the recipe's own: the inputs of its network."""
+
+
+Weights: TypeAlias = Mapping[str, NDArray[Any]]
+"""{name: (...,)} weights and scales of a network, as they stand in its file."""
 
 
 @dataclass(frozen=True)
@@ -64,22 +65,6 @@ class Training:
             raise SurrogateError(f"training: validation is {self.validation}; allowed are shares between 0 and 1")
 
 
-class SurrogateModule(nn.Module, ABC):
-    """A network with its scales: from samples to outputs in physical units. Its buffers are saved with its weights."""
-
-    @abstractmethod
-    def forward(self, batch: SampleTensors) -> Tensor:
-        """(rows, frames, outputs) in physical units at the times of the data."""
-
-    @abstractmethod
-    def loss(self, batch: SampleTensors) -> Tensor:
-        """What training makes small: a number, the mean over the rows of the batch."""
-
-    def loss_and_outputs(self, batch: SampleTensors) -> tuple[Tensor, Tensor]:
-        """The loss, a number, and the outputs (rows, frames, outputs); a module may spare itself the second pass."""
-        return self.loss(batch), self(batch)
-
-
 @dataclass(frozen=True, eq=False)
 class SurrogateMetadata:
     """What a surrogate knows beside its weights; all of it stands in the header of its file.
@@ -91,7 +76,6 @@ class SurrogateMetadata:
     metrics : of the validation rows (see surrogates.evaluation). curves : {name: one number an epoch}.
     provenance : versions, seed, fingerprints, counts, when.
     notes : limitations, a sentence each.
-    law_class : the laws that it predicts; None, as in older files, stands for that of its recipe.
     """
 
     law: CreepLaw
@@ -106,7 +90,6 @@ class SurrogateMetadata:
     curves: Mapping[str, list[float]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    law_class: LawClass | None = None
 
     @classmethod
     def from_dataset(cls, data: Dataset, **fields: Any) -> SurrogateMetadata:
@@ -120,49 +103,3 @@ class SurrogateMetadata:
             conditions=data.condition_names,
             **fields,
         )
-
-
-CONSTANT_TOLERANCE = 1e-6
-"""A standard deviation below this share of the largest value is rounding: the column is constant."""
-
-
-class Standardisation(nn.Module):
-    """Standardises the last axis; its scales are buffers, float64, saved with the weights.
-
-    mean, deviation : (columns,) of the training rows.
-    A column that is constant in training is only shifted: its standardised value is zero, and the applicability
-    domain refuses others.
-    """
-
-    mean: Tensor
-    deviation: Tensor
-
-    def __init__(self, mean: Tensor, deviation: Tensor) -> None:
-        super().__init__()
-        self.register_buffer("mean", mean.double())
-        self.register_buffer("deviation", deviation.double())
-
-    @classmethod
-    def from_rows(cls, values: Tensor, mask: Tensor | None = None) -> Standardisation:
-        """The scale of columns; NaN counts nowhere.
-
-        values : (..., columns). mask : (...,) which rows count.
-        """
-        rows = (values[mask] if mask is not None else values.reshape(-1, values.shape[-1])).double()
-        mean = torch.nan_to_num(rows.nanmean(dim=0), nan=0.0)
-        deviation = torch.nan_to_num((rows - mean).square().nanmean(dim=0).sqrt(), nan=0.0)
-        constant = deviation <= CONSTANT_TOLERANCE * torch.nan_to_num(rows, nan=0.0).abs().amax(dim=0)
-        return cls(mean, torch.where(constant, 1.0, deviation))
-
-    @classmethod
-    def identity(cls, columns: int) -> Standardisation:
-        """A scale that changes nothing."""
-        return cls(torch.zeros(columns), torch.ones(columns))
-
-    def forward(self, values: Tensor) -> Tensor:
-        """The values (..., columns), standardised."""
-        return (values - self.mean.to(values.dtype)) / self.deviation.to(values.dtype)
-
-    def inverse(self, values: Tensor) -> Tensor:
-        """Physical values, (..., columns), of standardised values (..., columns)."""
-        return values * self.deviation.to(values.dtype) + self.mean.to(values.dtype)

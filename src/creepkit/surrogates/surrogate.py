@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
-from torch import Tensor
 
 from creepkit.arrays import Floats
 from creepkit.errors import SurrogateError
@@ -28,15 +26,15 @@ from creepkit.records import (
     unpredicted,
 )
 from creepkit.sampling.conditions import TimeGrid, test_kind
-from creepkit.specimens.bulge.geometry import DimpleGeometry
-from creepkit.specimens.bulge.specimen import Bulge
-from creepkit.surrogates.law_class import LawClass
-from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, SurrogateModule, Training
+from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, SurrogateMetadata, Training, Weights
 from creepkit.surrogates.weight_files import CODEC, write_weights
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from creepkit.dataset.dataset import Dataset
     from creepkit.language import CreepLaw
+    from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors
 
 
 CONTROLLED_QUANTITY = {"bulge": "pressure", "uniaxial": "stress"}
@@ -129,14 +127,14 @@ def observation_derivative(specimen: Specimen, history: History, values: Floats)
 class Surrogate(Presentable, ABC):
     """A trained network in the place of a specimen; a records.Predictor.
 
-    recipe, module, metadata : what it was trained as, its network (on the CPU), and what is known of its training.
+    recipe, weights, metadata : what it was trained as, the arrays of its network, and what is known of its training.
     """
 
     nuisances: tuple[str, ...] = ()
     """Kinds of explicit nuisances that predict() understands."""
 
-    def __init__(self, recipe: Recipe, module: SurrogateModule, metadata: SurrogateMetadata) -> None:
-        self.recipe, self.module, self.metadata = recipe, module.eval(), metadata
+    def __init__(self, recipe: Recipe, weights: Weights, metadata: SurrogateMetadata) -> None:
+        self.recipe, self.weights, self.metadata = recipe, weights, metadata
 
     @property
     def name(self) -> str:
@@ -158,17 +156,9 @@ class Surrogate(Presentable, ABC):
         """Names of what is predicted."""
         return self.metadata.outputs
 
-    @property
-    def law_class(self) -> LawClass:
-        """The laws that it predicts."""
-        return self.metadata.law_class or self.recipe.law_class(self.metadata.law)
-
+    @abstractmethod
     def outside_class(self, law: CreepLaw) -> str:
         """Why it does not predict a law, in a sentence; "" where it does."""
-        reason = self.law_class.reason_outside(law)
-        if not reason:
-            return ""
-        return f"law '{law.name}' {reason}, and the surrogate '{self.name}' predicts {self.law_class}"
 
     def predict(
         self,
@@ -203,6 +193,15 @@ class Surrogate(Presentable, ABC):
     ) -> Prediction:
         """As predict(), of a law and of histories that were checked."""
 
+    @abstractmethod
+    def predict_samples(self, samples: SampleArrays) -> Floats:
+        """(rows, frames, outputs) of the network for samples of its recipe, in physical units."""
+
+    @property
+    @abstractmethod
+    def weight_count(self) -> int:
+        """Numbers that its training fitted."""
+
     @property
     def error(self) -> dict[str, float]:
         """{output: standard deviation of its error}, in the output's unit, from the validation rows.
@@ -227,16 +226,6 @@ class Surrogate(Presentable, ABC):
         """What it stands for: the specimen itself, on the finer discretisation where it has one."""
         return self.specimen.refined() if isinstance(self.specimen, SupportsRefinement) else self.specimen
 
-    def applies_to(self, specimen: object, histories: Sequence[History]) -> bool:
-        """Whether it was trained on this specimen, but for its apex thickness and threads, and knows such histories."""
-        if _without_free_fields(specimen) != _without_free_fields(self.specimen):
-            return False
-        try:
-            check_applicable(self.metadata, histories, (), self.nuisances)
-        except SurrogateError:
-            return False
-        return True
-
     def reference_stress(self, history: History) -> Floats:
         """The reference von Mises stresses, (levels,) MPa: the specimen's, or those that are prescribed."""
         specimen_stress = getattr(self.specimen, "reference_stress", None)
@@ -248,23 +237,15 @@ class Surrogate(Presentable, ABC):
     @property
     def file_header(self) -> dict[str, Any]:
         """Everything that a file says beside the weights."""
-        metadata = replace(self.metadata, law_class=self.law_class)
-        recipe, metadata = CODEC.to_json(self.recipe), CODEC.to_json(metadata)
+        recipe, metadata = CODEC.to_json(self.recipe), CODEC.to_json(self.metadata)
         return {"kind": self.recipe.kind, "recipe": recipe, "metadata": metadata}
 
     def save(self, path: str | Path) -> Path:
         """Write the weights with their header."""
-        return write_weights(path, self.module.state_dict(), self.file_header)
+        return write_weights(path, self.weights, self.file_header)
 
     def __repr__(self) -> str:
         return f"<Surrogate: {self.title}>"
-
-
-def _without_free_fields(specimen: object) -> object:
-    """A specimen without what a surrogate is free of."""
-    if isinstance(specimen, Bulge):
-        return specimen.replace(threads=None, apex_thickness=DimpleGeometry().apex_thickness)
-    return specimen
 
 
 class Recipe(Protocol):
@@ -278,15 +259,11 @@ class Recipe(Protocol):
         """How it is trained, unless train() is given other settings; a field."""
         ...
 
-    def law_class(self, law: CreepLaw) -> LawClass:
-        """The laws that are predicted after a training on simulations of `law`."""
+    def sample_arrays(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleArrays:
+        """The arrays of a data set; DatasetError where it cannot be learnt from."""
         ...
 
-    def sample_tensors(self, data: Dataset, progress: ProgressCallback | None = None) -> SampleTensors:
-        """The tensors of a data set; DatasetError where it cannot be learnt from."""
-        ...
-
-    def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> SurrogateModule:
+    def module(self, data: Dataset, samples: SampleTensors, train: Tensor) -> ParameterModule:
         """A fresh network for these data; its scales are those of the training rows, train (rows,), alone."""
         ...
 
@@ -294,10 +271,6 @@ class Recipe(Protocol):
         """What the data say of a surrogate before its training: scaling, domain and notes among it; train : (rows,)."""
         ...
 
-    def empty_module(self, metadata: SurrogateMetadata) -> SurrogateModule:
-        """A network of the right shapes, into which the weights and scales of a file are put."""
-        ...
-
-    def surrogate(self, module: SurrogateModule, metadata: SurrogateMetadata) -> Surrogate:
-        """The trained network as a predictor."""
+    def surrogate(self, weights: Weights, metadata: SurrogateMetadata) -> Surrogate:
+        """The trained network as a predictor; SurrogateError where the weights are not those of such a network."""
         ...

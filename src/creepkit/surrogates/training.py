@@ -12,23 +12,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
-from torch import Tensor
 
+from creepkit.arrays import Ints
 from creepkit.errors import SurrogateError
 from creepkit.files.json_documents import as_read_back
-from creepkit.surrogates.evaluation import compare_predictions, comparison_metrics, evaluation_times
-from creepkit.surrogates.loading import load_surrogate
-from creepkit.surrogates.parameter_gru import ParameterGru
-from creepkit.surrogates.parameter_network import RecurrentCell
-from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateMetadata, Training
-from creepkit.surrogates.surrogate import Recipe, Surrogate
-from creepkit.surrogates.training_loop import (
-    NetworkTraining,
-    dataset_fingerprint,
-    output_deviation,
-    trainable_samples,
-    training_split,
+from creepkit.surrogates.evaluation import (
+    PredictionComparison,
+    compare_predictions,
+    comparison_metrics,
+    evaluation_times,
 )
+from creepkit.surrogates.loading import load_surrogate
+from creepkit.surrogates.network_evaluation import RecurrentCell
+from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.parameter_network import sample_tensors, weights_of
+from creepkit.surrogates.recipe import ProgressCallback, SurrogateMetadata, Training
+from creepkit.surrogates.surrogate import Recipe, Surrogate
+from creepkit.surrogates.training_loop import NetworkTraining
+from creepkit.surrogates.training_rows import dataset_fingerprint, output_deviation, trainable_samples, training_split
 from creepkit.surrogates.weight_files import CHECKPOINT, read_weights, write_weights
 
 if TYPE_CHECKING:
@@ -110,20 +111,23 @@ def train(
     request = training_request(data, recipe, seed)
     if path is not None and path.exists():
         return _load_finished(path, request)
-    samples = recipe.sample_tensors(data, progress)
+    samples = recipe.sample_arrays(data, progress)
     rows = training_split(len(data), recipe.training, seed)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        module, metadata = recipe.module(data, samples, rows[0]), recipe.metadata(data, samples, rows[0])
+        tensors, train_rows = sample_tensors(samples), torch.from_numpy(rows[0])
+        module, metadata = recipe.module(data, tensors, train_rows), recipe.metadata(data, tensors, train_rows)
     fit, checkpoint = (
         NetworkTraining(module, samples, rows, recipe.training, seed, torch_device),
         Checkpoint(path, request),
     )
     checkpoint.restore(fit)
     fit.run(checkpoint.save, progress)
-    module = module.cpu().eval()
-    module.load_state_dict(fit.best)
-    result = recipe.surrogate(module, _training_metadata(metadata, data, samples, rows, fit, request))
+    weights = weights_of(fit.best)
+    comparison = compare_predictions(
+        recipe.surrogate(weights, metadata), samples, data, rows[1], output_deviation(samples, rows[0])
+    )
+    result = recipe.surrogate(weights, _training_metadata(metadata, data, comparison, rows, fit, request))
     if path is not None:
         result.save(path)
         checkpoint.remove()
@@ -133,13 +137,12 @@ def train(
 def _training_metadata(
     metadata: SurrogateMetadata,
     data: Dataset,
-    samples: SampleTensors,
-    rows: tuple[Tensor, Tensor],
+    comparison: PredictionComparison,
+    rows: tuple[Ints, Ints],
     fit: NetworkTraining,
     request: dict[str, Any],
 ) -> SurrogateMetadata:
     """The metadata of the surrogate, with how its training went."""
-    comparison = compare_predictions(fit.module, samples, data, rows[1], output_deviation(samples, rows[0]))
     times = evaluation_times(data.grid, float(np.median(comparison.times[:, -1])))
     provenance = {
         **request,
@@ -267,7 +270,7 @@ def _study_result(model: Surrogate, recipe: ParameterGru, count: int, path: Path
         hidden=recipe.hidden,
         layers=recipe.layers,
         samples=count,
-        weight_count=sum(weight.numel() for weight in model.module.parameters()),
+        weight_count=model.weight_count,
         loss=float(metadata.metrics["loss"]),
         training=float(metadata.curves["loss"][best - 1]),
         epochs=int(provenance["epochs"]),

@@ -1,4 +1,4 @@
-"""Training of a network: rows for training and validation, the learning-rate schedule, and epochs of Adam.
+"""Training of a network: the learning-rate schedule, and epochs of Adam.
 
 Every epoch has its own random seed, derived from the seed of the training and the epoch number, so that a training
 resumed from a checkpoint gives the same result.
@@ -6,86 +6,19 @@ resumed from a checkpoint gives the same result.
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from creepkit.arrays import Bools
-from creepkit.errors import DatasetError, SurrogateError
-from creepkit.files.json_documents import canonical_json
-from creepkit.registry.specimen_documents import specimen_to_json
-from creepkit.sampling.conditions import CONDITION_UNITS
-from creepkit.surrogates.recipe import ProgressCallback, SampleTensors, SurrogateModule, Training
-
-if TYPE_CHECKING:
-    from creepkit.dataset.dataset import Dataset
-
-
-LEAST_SAMPLES = 10
-"""Samples below which nothing can be learnt and nothing be said of it."""
-
-
-PLAUSIBLE_RANGES = {
-    "modulus": (1e3, 2e6),
-    "P1": (1e-4, 1e4),
-    "P2": (1e-4, 1e4),
-    "stress_1": (1e-3, 1e5),
-    "stress_2": (1e-3, 1e5),
-    "apex_thickness": (1e-3, 1e3),
-    "temperature": (50.0, 4000.0),
-}
-"""Where conditions lie that are in MPa, mm and K; a modulus in GPa does not."""
-
-
-def trainable_samples(data: Dataset) -> Dataset:
-    """The samples to learn from: accepted ones, each with a history; DatasetError where there are too few."""
-    accepted = data.accepted
-    if len(accepted) < LEAST_SAMPLES:
-        raise DatasetError(
-            f"a data set with {len(accepted)} accepted samples of {len(data)} is too small to train on; "
-            f"{LEAST_SAMPLES} are the least, generate more"
-        )
-    _check_units(accepted)
-    finite_frames: Bools = np.asarray(np.isfinite(accepted.values).all(axis=-1))
-    empty = ~finite_frames.any(axis=1)
-    if empty.any():
-        first = int(accepted.index[int(np.argmax(empty))])
-        raise DatasetError(
-            f"sample {first} of the data set is accepted, but no frame of its history is a number (so it is with "
-            f"{int(empty.sum())} in all); the file is damaged, generate it again"
-        )
-    return accepted
-
-
-def _check_units(data: Dataset) -> None:
-    for name, column in zip(data.condition_names, data.conditions.T, strict=True):
-        low, high = PLAUSIBLE_RANGES.get(name, (0.0, np.inf))
-        if not ((column >= low) & (column <= high)).all():
-            raise DatasetError(
-                f"condition '{name}' of the data set goes from {column.min():g} to {column.max():g}, which is not in "
-                f"{CONDITION_UNITS.get(name, 'its unit')}; it was written in another unit or is damaged"
-            )
-    if not np.isfinite(data.parameters).all():
-        raise DatasetError("some parameter of the data set is not a number; the file is damaged, generate it again")
-
-
-def training_split(count: int, training: Training, seed: int) -> tuple[Tensor, Tensor]:
-    """Positions (rows,) of training and of validation rows, in the order of the data; the seed draws the latter."""
-    order = np.random.default_rng(seed).permutation(count)
-    validation_count = min(max(round(training.validation * count), 1), count - 1)
-    training_rows = np.sort(order[validation_count:])
-    if training.samples is not None and training.samples > len(training_rows):
-        raise DatasetError(
-            f"there are not {training.samples} samples to learn from: the data set has {count} accepted ones, of which "
-            f"{validation_count} are set aside; ask for {len(training_rows)} at most or generate more"
-        )
-    return torch.from_numpy(training_rows[: training.samples]), torch.from_numpy(np.sort(order[:validation_count]))
-
+from creepkit.arrays import Ints
+from creepkit.errors import SurrogateError
+from creepkit.surrogates.parameter_network import ParameterModule, SampleTensors, sample_tensors, weights_of
+from creepkit.surrogates.recipe import ProgressCallback, SampleArrays, Training, Weights
+from creepkit.surrogates.training_rows import output_deviation
 
 PLATEAU_THRESHOLD = 1e-4
 """Relative fall of a loss that counts as one, and DROP what the rate falls to: torch's ReduceLROnPlateau, unset in the
@@ -136,21 +69,21 @@ class NetworkTraining:
 
     def __init__(
         self,
-        module: SurrogateModule,
-        samples: SampleTensors,
-        rows: tuple[Tensor, Tensor],
+        module: ParameterModule,
+        samples: SampleArrays,
+        rows: tuple[Ints, Ints],
         training: Training,
         seed: int,
         device: torch.device,
     ) -> None:
         self.module, self.device = module.to(device), device
-        self.samples = {name: tensor.to(device) for name, tensor in samples.items()}
-        self.train, self.validation = (part.to(device) for part in rows)
+        self.samples = {name: tensor.to(device) for name, tensor in sample_tensors(samples).items()}
+        self.train, self.validation = (torch.from_numpy(part).to(device) for part in rows)
         self.training, self.seed = training, seed
         self.adam = torch.optim.Adam(module.parameters(), lr=training.rate)
         self.curves: dict[str, list[float]] = {"loss": [], "validation": [], "rse": [], "rate": []}
         self.best = self._weights()
-        self._scale = output_deviation(self.samples, self.train)
+        self._scale = torch.from_numpy(output_deviation(samples, rows[0])).to(device)
         self._total_squares = self._validation_squares()
 
     @property
@@ -245,16 +178,17 @@ class NetworkTraining:
 
     # ---- between runs ----------------------------------------------------------------------------------------------
 
-    def state(self) -> dict[str, Tensor]:
-        """{name: (...,)} all tensors that going on needs: weights, the best ones, Adam's moments."""
+    def state(self) -> Weights:
+        """{name: (...,)} all arrays that going on needs: weights, the best ones, Adam's moments."""
         tensors = {f"module/{name}": tensor for name, tensor in self._weights().items()}
         tensors |= {f"best/{name}": tensor for name, tensor in self.best.items()}
         for number, moments in self.adam.state_dict()["state"].items():
             tensors |= {f"adam/{number}/{name}": torch.as_tensor(value).cpu() for name, value in moments.items()}
-        return tensors
+        return weights_of(tensors)
 
-    def restore(self, tensors: dict[str, Tensor], curves: dict[str, list[float]]) -> None:
-        """Go back to where `state` was asked; tensors : {name: (...,)} what it gave."""
+    def restore(self, arrays: Weights, curves: dict[str, list[float]]) -> None:
+        """Go back to where `state` was asked; arrays : {name: (...,)} what it gave."""
+        tensors = {name: torch.from_numpy(array) for name, array in arrays.items()}
         self.module.load_state_dict(_with_prefix(tensors, "module/"))
         self.best = _with_prefix(tensors, "best/")
         moments: dict[int, dict[str, Any]] = {}
@@ -265,25 +199,9 @@ class NetworkTraining:
         self.curves = {name: list(values) for name, values in curves.items()}
 
 
-def output_deviation(samples: SampleTensors, rows: Tensor) -> Tensor:
-    """Standard deviation of each output over the frames of rows (n,), (outputs,) float64."""
-    target_rows = samples["targets"][rows][samples["mask"][rows]].double()
-    standard_deviation = target_rows.std(dim=0, correction=0)
-    return torch.where(standard_deviation > 0, standard_deviation, 1.0)
-
-
 def _batch(samples: SampleTensors, rows: Tensor) -> SampleTensors:
     return {name: tensor[rows] for name, tensor in samples.items()}
 
 
 def _with_prefix(tensors: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:
     return {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}
-
-
-def dataset_fingerprint(data: Dataset) -> str:
-    """Identity of what can be learnt from a data set: 16 hexadecimal digits."""
-    document = [data.law.fingerprint, specimen_to_json(data.specimen), data.grid.relative, data.outputs]
-    digest = hashlib.sha256(canonical_json([*document, data.parameter_names, data.condition_names]))
-    for array in (data.grid.values, data.parameters, data.conditions, data.values):
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()[:16]

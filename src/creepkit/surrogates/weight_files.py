@@ -1,13 +1,10 @@
-"""Files of surrogates and of interrupted trainings: PyTorch weights below a JSON header."""
+"""Files of surrogates and of interrupted trainings: the weights of a network below a JSON header."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-
-import torch
-from torch import Tensor
 
 from creepkit import registry
 from creepkit.errors import SurrogateError
@@ -21,6 +18,7 @@ from creepkit.records import Specimen
 from creepkit.registry.specimen_documents import specimen_from_json, specimen_to_json
 from creepkit.sampling.conditions import TimeGrid
 from creepkit.surrogates.applicability_domain import ApplicabilityDomain
+from creepkit.surrogates.recipe import Weights
 
 SURROGATE = DocumentFormat(
     "creepkit-surrogate",
@@ -59,14 +57,12 @@ CODEC = RecordCodec(
 
 
 def write_weights(
-    path: str | Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any], document: DocumentFormat = SURROGATE
+    path: str | Path, weights: Weights, header: Mapping[str, Any], document: DocumentFormat = SURROGATE
 ) -> Path:
-    """Write tensors (...,) by name with a JSON-able header; the file is whole or absent."""
-    arrays = {name: tensor.detach().cpu().numpy() for name, tensor in tensors.items()}
-    return write_safetensors(path, arrays, header, document)
+    """Write weights (...,) by name with a JSON-able header; the file is whole or absent."""
+    return write_safetensors(path, weights, header, document)
 
 
-def read_weights(path: str | Path, document: DocumentFormat = SURROGATE) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """The tensors, {name: (...,)}, and the header of a file; SurrogateError says what is wrong with any other."""
-    arrays, header = read_safetensors(path, document)
-    return {name: torch.from_numpy(array) for name, array in arrays.items()}, header
+def read_weights(path: str | Path, document: DocumentFormat = SURROGATE) -> tuple[Weights, dict[str, Any]]:
+    """The weights, {name: (...,)}, and the header of a file; SurrogateError says what is wrong with any other."""
+    return read_safetensors(path, document)

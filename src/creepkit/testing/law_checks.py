@@ -122,7 +122,7 @@ def check_signs(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck
 
 def check_finite(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck]:
     """The log rate and its derivatives are finite, at zero strain, time and stress too."""
-    kernel, compiled = lower(law, "numpy"), lower(law, "numba")
+    kernel, compiled = lower(law, "numpy"), lower(law, "compiled")
     yield _check_at_samples("ln rate is finite", law, samples, np.abs(_log_rate(kernel, samples)) < _LARGEST_LOG_RATE)
     zeros = ({"strain": 0.0}, {"time": 0.0}, {"stress": 0.0, "principal_stress": 0.0, "mean_stress": 0.0})
     for columns in (*zeros, zeros[0] | zeros[1] | zeros[2]):
@@ -190,7 +190,7 @@ def check_switches(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCh
 
 def check_leading_exponent(law: CreepLaw, samples: LawSamples) -> Iterator[ConformanceCheck]:
     """The exponent of time at the start, against slopes of the author's terms at 1e-12 s; logarithms die out slowly."""
-    exact, compiled = MultiprecisionLaw(law), lower(law, "numba")
+    exact, compiled = MultiprecisionLaw(law), lower(law, "compiled")
     differences = []
     for start in ((1e-40, 1e-12), (1e-80, 1e-24)):
         subset = LawSamples(samples.points[:16].copy(), samples.theta[:16])
@@ -271,7 +271,7 @@ def _check_all_terms_off(law: CreepLaw, samples: LawSamples) -> tuple[bool, str]
         finite = np.isfinite(result.rows).all() and np.isfinite(result.log_rates).all()
         if not (finite and (result.rows[:, 0, 0] < NEGLIGIBLE_RATE).all()):
             return False, f"the {target} kernel leaves a rate, or a number that is not finite"
-    compiled = lower(law, "numba")
+    compiled = lower(law, "compiled")
     flags = [call_entry(compiled, "update", p[None], t)[1] for p, t in zip(samples.points, samples.theta, strict=True)]
     return not any(flags), "rate 0, update finite" if not any(flags) else "the update entry is not finite"
 

@@ -47,9 +47,9 @@ def evaluate_torch(law: CreepLaw, samples: LawSamples) -> KernelTable:
     return _kernel_table(lower(law, "torch"), [torch.tensor(column) for column in samples.arguments()])
 
 
-def evaluate_numba(law: CreepLaw, samples: LawSamples) -> KernelTable:
+def evaluate_compiled(law: CreepLaw, samples: LawSamples) -> KernelTable:
     """Evaluate the compiled entries."""
-    compiled = lower(law, "numba")
+    compiled = lower(law, "compiled")
     rows, width, count = 1 + compiled.states, POINT_SIZE + compiled.states, len(law.params)
     blocks, log_rates = [], []
     for point, theta in zip(samples.points, samples.theta, strict=True):
@@ -75,7 +75,7 @@ def _kernel_table(kernel: ArrayKernel, arguments: Sequence[Any]) -> KernelTable:
 KERNEL_EVALUATORS: dict[str, Callable[[CreepLaw, LawSamples], KernelTable]] = {
     "numpy": evaluate_numpy,
     "torch": evaluate_torch,
-    "numba": evaluate_numba,
+    "compiled": evaluate_compiled,
 }
 """{target: function that evaluates it}."""
 

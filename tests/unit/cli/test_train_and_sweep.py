@@ -10,7 +10,7 @@ from creepkit.dataset.storage import write_dataset
 from creepkit.report.surrogate import size_study_rows
 from creepkit.surrogates import training as sweeping
 from creepkit.surrogates.evaluation import evaluate
-from creepkit.surrogates.training_loop import training_split
+from creepkit.surrogates.training_rows import training_split
 from helpers.command_line import creepkit, one_line
 from helpers.planted_datasets import bars
 
@@ -88,12 +88,7 @@ def test_the_best_of_a_sweep_stands_on_top(file: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("train", "{set}", "--to", "{to}", "--recipe", "gru"), "--recipe gru is not known"),
         (("train", "{set}", "--to", "{to}", "--cell", "rnn"), "cell is 'rnn'; allowed are gru, lstm"),
-        (
-            ("train", "{set}", "--to", "{to}", "--recipe", "rate-net", "--cell", "gru"),
-            "--cell means nothing to rate-net",
-        ),
         (("train", "{to}", "--to", "{to}"), "no such"),
         (("sweep", "{set}", "--to", "{to}", "--hidden", "64;128"), "--hidden 64;128 is not understood"),
         (

@@ -100,7 +100,7 @@ def test_moving_all_steps_moves_the_curve():
 
 @cache
 def run_of(law, pressure, few):
-    kernel = kernels.lower(ck.law(law), "numba")
+    kernel = kernels.lower(ck.law(law), "compiled")
     theta = ck.law(law).to_internal(ck.law(law).values(LAWS[law]))[0]
     course = LoadHistory(pressure, Program.constant(1000.0), Program.constant(150e3), 1200.0)
     return simulate(

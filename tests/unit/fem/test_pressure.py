@@ -94,7 +94,7 @@ def test_load_stiffness_is_skew_at_a_free_end() -> None:
 def tangents(geometry: DimpleGeometry) -> tuple[FiniteElementModel, np.ndarray, np.ndarray, np.ndarray]:
     """Body, displacements, the tangent that Newton's method takes, and differences of the residual, (size, size)."""
     body, u = deformed(geometry)
-    kernel = kernels.lower(NORTON, "numba")
+    kernel = kernels.lower(NORTON, "compiled")
     theta = NORTON.to_internal({"A": 1e-15, "n": 4.0})[0]
     stage = StageConditions(0.0, 0.0, 0.0, 300.0, E / (3 * (1 - 2 * NU)), E / (2 * (1 + NU)), PRESSURE)
 

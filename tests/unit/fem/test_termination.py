@@ -29,7 +29,7 @@ def body() -> FiniteElementModel:
 def run(
     body: FiniteElementModel, creep: CreepLaw, values, pressure: Program = RAMP, end: float = END, **settings
 ) -> Simulation:
-    kernel = kernels.lower(creep, "numba")
+    kernel = kernels.lower(creep, "compiled")
     course = LoadHistory(pressure, Program.constant(300.0), Program.constant(150e3), end)
     return simulate(
         kernel, creep.to_internal(values)[0], body, course, settings=SolverSettings(**settings), keep_points=True

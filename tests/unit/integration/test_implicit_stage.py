@@ -54,7 +54,7 @@ def samples(count: int) -> np.ndarray:
 @pytest.mark.parametrize("stiffness", [0.0, 1.5e5])
 def test_the_stage_equation_holds_over_the_bounds_of_the_combined_law(stiffness: float) -> None:
     """From k D << trial to creep that takes all the stress, from p0 = 0 with m = -1 on; D = w f to 1e-10."""
-    kernel = lower(COMBINED, "numba")
+    kernel = lower(COMBINED, "compiled")
     for u in samples(512):
         low = np.array([-90, 1, np.log(2), -90, 1, -1, -90, 1, -0.95])
         high = np.array([-10, 8, np.log(800), -10, 8, 0, -10, 8, 0])
@@ -74,7 +74,7 @@ def test_the_stage_equation_holds_over_the_bounds_of_the_combined_law(stiffness:
 @pytest.mark.parametrize("guess", [1e-30, 1e-6, 1.0, 1e20])
 def test_any_guess_leads_to_the_closed_form(guess: float) -> None:
     """Norton with n = 1: D = w A (trial - k D), a linear equation."""
-    kernel = lower(NORTON, "numba")
+    kernel = lower(NORTON, "compiled")
     theta = NORTON.to_internal({"A": 1e-9, "n": 1.0})[0]
     for weight in (1e-6, 1.0, 1e5, 1e12):
         increment, flag, _ = solved(kernel, theta, StageProblem(100.0, 1e5, 0.0, weight, 0.0), guess=guess)
@@ -84,7 +84,7 @@ def test_any_guess_leads_to_the_closed_form(guess: float) -> None:
 
 def test_constant_load_has_a_solution_only_up_to_the_turning_point() -> None:
     """D = w A s exp(n D) has its last solution at D = 1/n; beyond it the step must be refused."""
-    kernel = lower(NORTON, "numba")
+    kernel = lower(NORTON, "compiled")
     theta = NORTON.to_internal({"A": 1e-9, "n": 4.0})[0]
     last = 1 / (4 * np.e) / (1e-9 * 50.0**4)
     increment, flag, _ = solved(kernel, theta, StageProblem(50.0, 0.0, 1.0, 0.9 * last, 0.0))
@@ -94,7 +94,7 @@ def test_constant_load_has_a_solution_only_up_to_the_turning_point() -> None:
 
 
 def test_no_stress_no_creep() -> None:
-    kernel = lower(NORTON, "numba")
+    kernel = lower(NORTON, "compiled")
     theta = NORTON.to_internal({"A": 1e-9, "n": 4.0})[0]
     assert solved(kernel, theta, StageProblem(0.0, 0.0, 0.0, 1e3, 0.1))[:2] == (0.0, SOLVED)
     assert solved(kernel, theta, StageProblem(-1.0, 1e5, 0.0, 1e3, 0.1))[1] == NO_SOLUTION
@@ -107,7 +107,7 @@ DAMAGE_VALUES = {"A": 1e-14, "n": 4.0, "C": 1e-12, "v": 3.5, "a": 0.4}
 
 @pytest.mark.parametrize("problem", [StageProblem(90.0, 0.0, 0.0, 1e4, 0.01), StageProblem(200.0, 1e5, 0.0, 3e4, 0.0)])
 def test_states_satisfy_their_equations(problem: StageProblem) -> None:
-    kernel = lower(MULTIAXIAL_DAMAGE, "numba")
+    kernel = lower(MULTIAXIAL_DAMAGE, "compiled")
     theta = MULTIAXIAL_DAMAGE.to_internal(DAMAGE_VALUES)[0]
     axes = Axes(30.0, 0.7, 40.0, 0.0)
     increment, flag, row = solved(kernel, theta, problem, (0.1,), axes)
@@ -120,7 +120,7 @@ def test_states_satisfy_their_equations(problem: StageProblem) -> None:
 
 
 def test_damage_beyond_the_last_solution_is_refused() -> None:
-    kernel = lower(MULTIAXIAL_DAMAGE, "numba")
+    kernel = lower(MULTIAXIAL_DAMAGE, "compiled")
     theta = MULTIAXIAL_DAMAGE.to_internal(DAMAGE_VALUES)[0]
     assert solved(kernel, theta, StageProblem(200.0, 0.0, 0.0, 1e9, 0.0), (0.1,))[1] != SOLVED
 
@@ -144,7 +144,7 @@ def responses(kernel, theta, problem, z0, axes, entry):
     ids=["prescribed stress", "prescribed strain", "constant load"],
 )
 def test_responses_are_the_derivatives_of_the_solution(problem: StageProblem, entry: str) -> None:
-    kernel = lower(MULTIAXIAL_DAMAGE, "numba")
+    kernel = lower(MULTIAXIAL_DAMAGE, "compiled")
     theta = MULTIAXIAL_DAMAGE.to_internal(DAMAGE_VALUES)[0]
     axes, z0, time = Axes(30.0, 0.7, 40.0, 0.1), np.array([0.1]), 1e3
     response = responses(kernel, theta, problem, z0, axes, entry)

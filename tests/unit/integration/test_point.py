@@ -34,7 +34,7 @@ VALUES = {**SINH, **HARDENING, "A_3": 1e-12, "n_3": 3.0, "m_2": -0.4}
 
 
 def run(law, values, driving, times, stiffness=0.0, constant_load=False, **kwargs):
-    kernel = lower(law, "numba")
+    kernel = lower(law, "compiled")
     test = PointTest(driving, ROOM, np.asarray(times, float), stiffness, constant_load)
     return integrate(kernel, law.to_internal(values), [test], **kwargs)
 
@@ -126,7 +126,7 @@ def test_strain_hardening_continues_from_its_strain_after_steps_and_holds() -> N
 
 
 def test_many_tests_and_candidates_in_one_call_equal_one_by_one() -> None:
-    kernel = lower(COMBINED, "numba")
+    kernel = lower(COMBINED, "compiled")
     theta = COMBINED.to_internal({**VALUES, "n_1": np.array([1.5, 2.0, 2.5])})
     tests = [PointTest(Program.constant(s), ROOM, np.linspace(0, 1e5, count)) for s, count in ((60.0, 11), (100.0, 7))]
     together = integrate(kernel, theta, tests, jacobian=True)
@@ -171,7 +171,7 @@ def test_the_cap_on_steps_keeps_the_history_so_far() -> None:
 
 
 def test_a_candidate_that_is_not_a_number_ends_as_not_converged() -> None:
-    kernel = lower(NORTON, "numba")
+    kernel = lower(NORTON, "compiled")
     theta = np.array([[np.nan, 4.0], [np.log(1e-15), np.nan], [np.log(1e-15), 4.0]])
     result = integrate(kernel, theta, [PointTest(Program.constant(100.0), ROOM, np.array([10.0]))])
     assert result.status[:2, 0].tolist() == [Status.NOT_CONVERGED] * 2
@@ -179,7 +179,7 @@ def test_a_candidate_that_is_not_a_number_ends_as_not_converged() -> None:
 
 
 def test_no_times_and_time_zero() -> None:
-    kernel = lower(NORTON, "numba")
+    kernel = lower(NORTON, "compiled")
     theta = NORTON.to_internal({"A": 1e-15, "n": 4.0})
     empty = PointTest(Program.constant(100.0), ROOM, np.zeros(0))
     start = PointTest(Program.constant(100.0), ROOM, np.zeros(1))
@@ -201,7 +201,7 @@ def test_stiffness_goes_with_prescribed_strain_only() -> None:
 
 def test_derivatives_without_output_times() -> None:
     """Norton: p = A s^n t, so that ln t at a strain, and at the strain limit, falls by 1 a ln A and by ln s an n."""
-    kernel, theta = lower(NORTON, "numba"), NORTON.to_internal({"A": 1e-12, "n": 3.0})
+    kernel, theta = lower(NORTON, "compiled"), NORTON.to_internal({"A": 1e-12, "n": 3.0})
     test = PointTest(Program.constant(100.0), ROOM, np.zeros(0), levels=np.array([1e-3, 0.1]), until=1e9)
     result = integrate(kernel, theta, [test], jacobian=True)
     expected = [-1.0, -np.log(100.0)]
@@ -214,7 +214,7 @@ def test_derivatives_without_output_times() -> None:
 def test_threads_and_single_calls_agree_to_the_last_digit() -> None:
     """A call keeps nothing: batches in four threads are the batch of one thread and the candidates one by one."""
     kernel, theta = (
-        lower(COMBINED, "numba"),
+        lower(COMBINED, "compiled"),
         COMBINED.to_internal(VALUES)[0] + np.linspace(-0.5, 0.5, 64)[:, None] * 0.1,
     )
     test = PointTest(Program.constant(100.0), ROOM, np.linspace(0.0, 1e5, 50))
@@ -238,4 +238,43 @@ def test_too_many_states_are_refused() -> None:
     )
     test = PointTest(Program.constant(100.0), ROOM, np.ones(1))
     with pytest.raises(SolveError, match="a law may have 16 internal variables, but this one has 17"):
-        integrate(lower(law, "numba"), law.to_internal({"A": 1e-12, "n": 3.0}), [test])
+        integrate(lower(law, "compiled"), law.to_internal({"A": 1e-12, "n": 3.0}), [test])
+
+
+class TestWhatIsNoHistory:
+    """Parameters and programs that mean nothing get an answer that says so."""
+
+    TIMES = np.array([0.0, 1.0, 1e4])
+
+    @pytest.mark.parametrize("bad", [np.nan, np.inf])
+    @pytest.mark.parametrize("jacobian", [False, True])
+    def test_parameters_that_are_not_finite(self, bad: float, jacobian: bool) -> None:
+        theta = np.repeat(COMBINED.to_internal(VALUES), 2, axis=0)
+        theta[0, 4] = bad
+        test = PointTest(Program.constant(100.0), ROOM, self.TIMES)
+        result = integrate(lower(COMBINED, "compiled"), theta, [test], jacobian=jacobian)
+        assert result.status[:, 0].tolist() == [Status.NOT_CONVERGED, Status.COMPLETE]
+        assert np.isnan(result.strain[0, 1:]).all()
+        assert np.isfinite(result.strain[1]).all()
+
+    @pytest.mark.parametrize("stiffness", [0.0, 1.5e5])
+    def test_a_law_whose_terms_are_all_off(self, stiffness: float) -> None:
+        theta = COMBINED.to_internal({**VALUES, "A_1": 0.0, "A_2": 0.0, "A_3": 0.0})
+        test = PointTest(Program.constant(100.0), ROOM, self.TIMES, stiffness, levels=np.array([1e-6]))
+        result = integrate(lower(COMBINED, "compiled"), theta, [test], jacobian=True)
+        assert result.status[0, 0] == Status.COMPLETE
+        assert not result.strain.any()
+        assert np.isnan(result.level_times).all()
+
+    def test_no_tests_no_times_no_candidates(self) -> None:
+        kernel, theta = lower(NORTON, "compiled"), NORTON.to_internal({"A": 1e-12, "n": 3.0})
+        nothing = PointTest(Program.constant(100.0), ROOM, np.zeros(0))
+        assert integrate(kernel, theta, [], jacobian=True).strain.shape == (1, 0)
+        assert integrate(kernel, theta, [nothing]).status.tolist() == [[Status.COMPLETE]]
+        assert integrate(kernel, np.zeros((0, 2)), [nothing, nothing]).status.shape == (0, 2)
+
+    def test_a_rate_beyond_all_numbers(self) -> None:
+        theta = NORTON.to_internal({"A": 1e-12, "n": 3.0}) + np.array([[800.0, 0.0]])
+        test = PointTest(Program.constant(100.0), ROOM, self.TIMES)
+        result = integrate(lower(NORTON, "compiled"), theta, [test], jacobian=True)
+        assert result.status[0, 0] != Status.COMPLETE

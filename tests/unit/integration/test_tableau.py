@@ -74,7 +74,7 @@ def in_equal_steps(theta: np.ndarray, tableau: Tableau, steps: int, segment: lis
     """Strain at the end of a segment and at 0.3 of the first step, from `start`; strain hardening."""
     out, program = np.zeros(2), np.array(segment)
     flag = function("creepkit_integrate_in_equal_steps")(
-        ctypes.c_void_p(lower(STRAIN_HARDENING, "numba").update.address),
+        ctypes.c_void_p(lower(STRAIN_HARDENING, "compiled").update.address),
         address(theta),
         ctypes.byref(tableau_structure(tableau)),
         address(program),

@@ -56,7 +56,7 @@ KACHANOV = CreepLaw(
 
 
 def run(law, values, controls, times, temperature=300.0, settings=None, tableau=SDIRK2):
-    kernel = lower(law, "numba")
+    kernel = lower(law, "compiled")
     theta = law.to_internal(values)[0]
     return integrate_tensor_point(
         kernel, theta, STEEL, controls, temperature, times, settings=settings, tableau=tableau
@@ -66,7 +66,7 @@ def run(law, values, controls, times, temperature=300.0, settings=None, tableau=
 @pytest.mark.parametrize("weight", [1.0, 30.0, 1e3], ids=["elastic", "half crept", "crept"])
 def test_the_tangent_is_the_derivative_of_stress(weight: float) -> None:
     """Central differences of strain, for a law of all four: von Mises, principal, mean stress and a state."""
-    kernel = lower(DAMAGING, "numba")
+    kernel = lower(DAMAGING, "compiled")
     theta = DAMAGING.to_internal({"A": 1e-14, "n": 4.0, "C": 1e-13, "v": 3.5})[0]
     base = np.array([1e-4, -6e-5, -4e-5, 3e-5, 0.0, 1e-5, 2e-4, 0.1])
     strain = np.array([1.2e-3, 3e-4, -2e-4, 4e-4, 2e-4, -3e-4])
@@ -113,6 +113,28 @@ def test_a_turned_frame_turns_the_answer() -> None:
         full[rows, columns] = full[columns, rows] = result.stress[0]
         tensors.append(full)
     np.testing.assert_allclose(turn @ tensors[0] @ turn.T, tensors[1], rtol=1e-8, atol=1e-8 * tensors[0].max())
+
+
+STRESSES = {
+    "compression, the two largest equal": [-100.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    "the two largest equal": [80.0, 80.0, 0.0, 0.0, 0.0, 0.0],
+    "the two largest equal, turned": [40.0, 40.0, 80.0, 40.0, 0.0, 0.0],
+    "shear": [0.0, 0.0, 0.0, 60.0, 0.0, 0.0],
+    "all different": [60.0, -20.0, 35.0, 18.0, -42.0, 27.0],
+    "nearly equal": [70.0, 70.0 + 1e-7, -10.0, 1e-7, 1e-8, 0.0],
+}
+
+
+@pytest.mark.parametrize("stresses", STRESSES.values(), ids=STRESSES)
+def test_a_law_of_the_largest_principal_stress(stresses: list[float]) -> None:
+    """At constant stress p = A lambda^n t, with lambda the largest eigenvalue by NumPy, shifted to stay above zero."""
+    shift = 150.0
+    law = CreepLaw("principal", {"creep": A * (principal_stress + shift) ** n}, {k: RATES[k] for k in (A, n)})
+    controls = {k: prescribed_stress(value) for k, value in zip(TENSOR_COMPONENTS, stresses, strict=True)}
+    result = run(law, {"A": 1e-13, "n": 3.0}, controls, [1e3])
+    s11, s22, s33, s12, s23, s13 = stresses
+    largest = np.linalg.eigvalsh(np.array([[s11, s12, s13], [s12, s22, s23], [s13, s23, s33]]))[-1]
+    assert result.equivalent[0] == pytest.approx(1e-13 * (largest + shift) ** 3 * 1e3, rel=1e-9)
 
 
 def test_temperature_follows_its_program() -> None:
@@ -198,4 +220,4 @@ class TestEnds:
 def test_what_cannot_be_driven_is_refused(change, message: str) -> None:
     given = {"theta": [-30.0, 4.0], "elastic": STEEL, "controls": {}, "temperature": 300.0, "times": [1.0]}
     with pytest.raises(SolveError, match=message):
-        integrate_tensor_point(lower(NORTON, "numba"), **(given | change))
+        integrate_tensor_point(lower(NORTON, "compiled"), **(given | change))

@@ -12,6 +12,7 @@ from creepkit.inverse.composite_predictor import CompositePredictor
 from creepkit.inverse.identification_document import identification_from_json, identification_to_json
 from creepkit.inverse.predictor_documents import (
     PredictorDocument,
+    missing_predictor,
     predictor_documents,
     predictor_from_documents,
     registered_specimens,
@@ -108,15 +109,23 @@ def test_a_specimen_under_another_ones_name_is_no_specimen():
     assert document.kind == "other"
 
 
-def test_a_surrogate_is_found_again_by_its_fingerprint_among_those_that_come_with_creepkit():
+def test_a_reduced_order_model_is_found_again_with_the_fields_of_its_specimen():
     dimple = ck.surrogate("dimple")
-    documents = predictor_documents(dimple)
-    found = predictor_from_documents(documents)
+    coarse = dimple.specimen.replace(refinement=0.5).reduced_order_model()
+    for model in (dimple, coarse):
+        documents = predictor_documents(model)
+        assert documents[""].kind == "reduced-order model"
+        assert predictor_from_documents(documents) == model
 
-    assert documents[""].kind == "surrogate"
-    assert found.title == dimple.title
-    other = {"": replace(documents[""], fingerprint="0" * 32)}
-    assert predictor_from_documents(other) is None
+    gone = {"": replace(documents[""], name="tube")}
+    assert predictor_from_documents(gone) is None
+    assert "made with specimen 'tube', which is not known here" in missing_predictor(gone)
+
+
+def test_a_trained_surrogate_is_asked_for():
+    network = {"": PredictorDocument("surrogate", "parameter-gru of bulge", fingerprint="0" * 32)}
+    assert predictor_from_documents(network) is None
+    assert "made with the surrogate 'parameter-gru of bulge' of a file: give using=" in missing_predictor(network)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from creepkit.laws.norton import NORTON
 
 made, object_code = [], compilation.object_code
 compilation.object_code = lambda text: made.append(text) or object_code(text)
-compiled = lower(NORTON, "numba")
+compiled = lower(NORTON, "compiled")
 theta = NORTON.to_internal({"A": 1e-16, "n": 4.0})[0]
 out, flags = call_entry(compiled, "rate", numpy.array([[100.0] + 5 * [0.0]]), theta)
 print(out[0, 0], flags, len(made))
@@ -107,7 +107,7 @@ def test_processes_may_build_the_same_law_at_once(cache: Path) -> None:
     ],
 )
 def test_what_is_damaged_is_made_anew(cache: Path, made: list[str], name: str, damage: str, factor: int) -> None:
-    lower(some_law(factor), "numba")
+    lower(some_law(factor), "compiled")
     victim = folder_of(cache) / name
     content = victim.read_bytes()
     if damage == "removed":
@@ -118,23 +118,23 @@ def test_what_is_damaged_is_made_anew(cache: Path, made: list[str], name: str, d
     assert not is_intact(folder_of(cache))
 
     compilation._loaded_modules.clear()
-    lower(some_law(factor), "numba")
+    lower(some_law(factor), "compiled")
 
     assert is_intact(folder_of(cache))
     assert len(made) == 2
     compilation._loaded_modules.clear()
-    lower(some_law(factor), "numba")
+    lower(some_law(factor), "compiled")
     assert len(made) == 2
     assert [p.name for p in (cache / "kernels").iterdir()] == [folder_of(cache).name]
 
 
 def test_a_file_that_does_not_belong_makes_the_folder_suspect(cache: Path) -> None:
-    lower(some_law(23), "numba")
+    lower(some_law(23), "compiled")
     (folder_of(cache) / "extra.py").write_text("raise SystemExit('was run')")
 
     assert not is_intact(folder_of(cache))
     compilation._loaded_modules.clear()
-    lower(some_law(23), "numba")
+    lower(some_law(23), "compiled")
     assert is_intact(folder_of(cache))
 
 
@@ -152,14 +152,14 @@ def test_without_a_folder_to_write_to_each_process_compiles_for_itself(tmp_path:
 def test_a_folder_that_is_read_only_still_serves_what_it_holds(
     cache: Path, made: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lower(some_law(29), "numba")
+    lower(some_law(29), "compiled")
     before = folder_of(cache)
     monkeypatch.setattr(compilation, "_writable", lambda folder: False)
     compilation._loaded_modules.clear()
 
-    lower(some_law(29), "numba")
+    lower(some_law(29), "compiled")
     assert len(made) == 1
-    lower(some_law(31), "numba")
+    lower(some_law(31), "compiled")
 
     assert len(made) == 2
     assert folder_of(cache) == before
@@ -173,7 +173,7 @@ def test_a_failure_leaves_nothing_half_made(cache: Path) -> None:
 
 
 def test_the_folder_is_for_its_owner_alone(cache: Path) -> None:
-    lower(some_law(37), "numba")
+    lower(some_law(37), "compiled")
 
     for folder in (cache / "kernels", folder_of(cache)):
         assert folder.stat().st_mode & 0o022 == 0

@@ -1,22 +1,11 @@
 """The compiled interface: layout, rows, flags, and what is off."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
-from numba import float64, int64, njit
 
 from creepkit.arrays import Floats
 from creepkit.kernels import CompiledLaw, lower
-from creepkit.kernels.interface import (
-    DERIVATIVE_NOT_FINITE,
-    ENTRY_TYPE,
-    RATE_NOT_FINITE,
-    EntryName,
-    call_entry,
-    data_pointer,
-)
+from creepkit.kernels.interface import DERIVATIVE_NOT_FINITE, RATE_NOT_FINITE, EntryName, call_entry
 from creepkit.language import CreepLaw, strain, stress
 from creepkit.laws.combined import COMBINED
 from creepkit.laws.drifting_exponent import DRIFTING_EXPONENT
@@ -43,7 +32,7 @@ def point(**given: float) -> Floats:
 
 
 def test_norton_by_hand() -> None:
-    compiled = lower(NORTON, "numba")
+    compiled = lower(NORTON, "compiled")
     theta = NORTON.to_internal({"A": 1e-16, "n": 4.0})[0]
 
     rate, flags = call_entry(compiled, "rate", point(), theta)
@@ -59,7 +48,7 @@ def test_norton_by_hand() -> None:
 def test_damage_comes_after_the_rate_row_by_row() -> None:
     """Rate A s^n (1 + omega) and damage rate B s omega: values, then slopes to x of both, then to theta."""
     damaging = damage(A * stress**n * (1 + omega), B * stress * omega, {A: RATE, n: POWER, B: RATE})
-    compiled = lower(damaging, "numba")
+    compiled = lower(damaging, "compiled")
     theta = damaging.to_internal({"A": 1e-16, "n": 4.0, "B": 1e-9})[0]
     x = np.column_stack([point(), [[0.25]]])
 
@@ -80,7 +69,7 @@ def test_damage_comes_after_the_rate_row_by_row() -> None:
 @each_law
 @pytest.mark.parametrize("entry", ["rate", "update", "sensitivity"])
 def test_rows_are_taken_by_eight_and_the_rest_one_by_one(law_: CreepLaw, entry: EntryName) -> None:
-    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 32, seed=2)
+    compiled, drawn = lower(law_, "compiled"), draw_samples(law_, 32, seed=2)
     x, theta = drawn.points[:19], drawn.theta[0]
     parts = [x[:8], x[8:16], x[16:17], x[17:18], x[18:]]
 
@@ -93,7 +82,7 @@ def test_rows_are_taken_by_eight_and_the_rest_one_by_one(law_: CreepLaw, entry: 
 @pytest.mark.parametrize("entry", ["rate", "update", "sensitivity"])
 def test_eight_points_together_are_the_points_alone(law_: CreepLaw, entry: EntryName) -> None:
     """They round differently; exponents of 50 make a hundred units of the last place of that."""
-    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 64, seed=3)
+    compiled, drawn = lower(law_, "compiled"), draw_samples(law_, 64, seed=3)
     theta = drawn.theta[0]
 
     together, _ = call_entry(compiled, entry, drawn.points, theta)
@@ -107,7 +96,7 @@ def test_eight_points_together_are_the_points_alone(law_: CreepLaw, entry: Entry
 @pytest.mark.parametrize("bad", [0.0, -1.0, -1e300, 5e-324, 1e300, np.inf, -np.inf, np.nan])
 def test_hostile_points_give_what_the_arrays_give(law_: CreepLaw, column: int, bad: float) -> None:
     """One such point among seven good ones, and alone: the values of the NumPy kernel, and the flags they ask for."""
-    compiled, arrays, drawn = lower(law_, "numba"), lower(law_, "numpy"), draw_samples(law_, 8, seed=5)
+    compiled, arrays, drawn = lower(law_, "compiled"), lower(law_, "numpy"), draw_samples(law_, 8, seed=5)
     x, theta = drawn.points.copy(), drawn.theta[0]
     x[3, column] = bad
     with np.errstate(all="ignore"):
@@ -124,7 +113,7 @@ def test_hostile_points_give_what_the_arrays_give(law_: CreepLaw, column: int, b
 
 @each_law
 def test_update_is_the_logarithm_of_the_rate(law_: CreepLaw) -> None:
-    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 16, seed=4)
+    compiled, drawn = lower(law_, "compiled"), draw_samples(law_, 16, seed=4)
     for x, theta in zip(drawn.points, drawn.theta, strict=True):
         sensitivity, update = (call_entry(compiled, e, x[None], theta)[0][0] for e in ("sensitivity", "update"))
         inner = 1 + compiled.states
@@ -132,26 +121,6 @@ def test_update_is_the_logarithm_of_the_rate(law_: CreepLaw) -> None:
             assert np.exp(update[0]) == pytest.approx(sensitivity[0], rel=1e-12)
             slopes = sensitivity[inner : inner + x.size] / sensitivity[0]
             np.testing.assert_allclose(update[inner : inner + x.size], slopes, rtol=1e-10)
-
-
-def test_numba_knows_the_type_of_an_entry() -> None:
-    """In an interpreter that has done nothing else."""
-    program = "import creepkit, numba; print(numba.typeof(creepkit.lower(creepkit.law('norton'), 'numba').update))"
-    found = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
-
-    assert found.stdout.strip() == str(ENTRY_TYPE)
-
-
-def test_code_compiled_once_takes_any_law() -> None:
-    @njit(int64(ENTRY_TYPE, float64[::1], float64[::1], float64[::1]))
-    def called(entry, x, theta, out):  # type: ignore[no-untyped-def]
-        return entry(1, data_pointer(x), data_pointer(theta), data_pointer(out))
-
-    for law_, expected in ((NORTON, 1e-8), (STRAIN_HARDENING, 1e-7)):
-        compiled, out = lower(law_, "numba"), np.empty(1)
-        theta = law_.to_internal({"A": 1e-16, "n": 4.0, **({"m": -0.5} if "m" in law_.names else {})})[0]
-        assert called(compiled.rate, point()[0], theta, out) == 0
-        assert out[0] == pytest.approx(expected, rel=1e-13)
 
 
 # ---- flags and off -------------------------------------------------------------------------------------------------
@@ -162,7 +131,7 @@ def flags(compiled: CompiledLaw, entry: EntryName, x: Floats, theta: Floats) -> 
 
 
 def test_a_rate_beyond_float64_is_flagged_but_not_its_logarithm() -> None:
-    compiled = lower(HYPERBOLIC_SINE, "numba")
+    compiled = lower(HYPERBOLIC_SINE, "compiled")
     theta = HYPERBOLIC_SINE.to_internal({"A": 1e-5, "n": 8.0, "B": 1.0})[0]
 
     assert flags(compiled, "rate", point(stress=2000.0), theta) == RATE_NOT_FINITE
@@ -171,7 +140,7 @@ def test_a_rate_beyond_float64_is_flagged_but_not_its_logarithm() -> None:
 
 
 def test_one_bad_row_among_good_ones_is_flagged() -> None:
-    compiled = lower(HYPERBOLIC_SINE, "numba")
+    compiled = lower(HYPERBOLIC_SINE, "compiled")
     theta = HYPERBOLIC_SINE.to_internal({"A": 1e-5, "n": 8.0, "B": 1.0})[0]
     rows = np.vstack([point(stress=1.0), point(stress=2000.0), point(stress=2.0)])
 
@@ -184,7 +153,7 @@ def test_one_bad_row_among_good_ones_is_flagged() -> None:
 def test_a_derivative_alone_can_be_flagged() -> None:
     """The rate at strain 0 is 1e-10 (1e-30)^-10 = 1e290, its slope a factor 1e31 larger."""
     steep = law(A * stress / strain**10, {A: scale(1e-12, 1e-5)})
-    compiled = lower(steep, "numba")
+    compiled = lower(steep, "compiled")
     theta = steep.to_internal({"A": 1e-10})[0]
 
     assert flags(compiled, "sensitivity", point(strain=0.0, stress=1.0), theta) == DERIVATIVE_NOT_FINITE
@@ -192,14 +161,14 @@ def test_a_derivative_alone_can_be_flagged() -> None:
 
 def test_large_numbers_that_are_finite_are_not_flagged() -> None:
     """The sum of the derivatives would overflow; each of them does not."""
-    compiled = lower(law(A * stress, {A: RATE}), "numba")
+    compiled = lower(law(A * stress, {A: RATE}), "compiled")
 
     assert flags(compiled, "sensitivity", point(stress=2.0), np.array([709.0])) == 0
 
 
 @each_law
 def test_a_nan_is_flagged(law_: CreepLaw) -> None:
-    compiled = lower(law_, "numba")
+    compiled = lower(law_, "compiled")
     theta, x = law_.to_internal(law_.center())[0], point(stress=np.nan)
     x = np.column_stack([x, np.full((1, compiled.states), 0.1)])
 
@@ -210,7 +179,7 @@ def test_a_nan_is_flagged(law_: CreepLaw) -> None:
 @each_law
 @pytest.mark.parametrize("zeros", [(), (0, 1, 2, 4, 5)], ids=["somewhere", "at zero"])
 def test_with_every_term_off_the_rate_is_zero_and_the_update_finite(law_: CreepLaw, zeros: tuple[int, ...]) -> None:
-    compiled, drawn = lower(law_, "numba"), draw_samples(law_, 8)
+    compiled, drawn = lower(law_, "compiled"), draw_samples(law_, 8)
     x, theta = drawn.points.copy(), drawn.theta[0].copy()
     x[:, zeros] = 0.0
     theta[[k for k, p in enumerate(law_.params.values()) if p.off == 0 and p.scale == "log"]] = -np.inf
@@ -227,7 +196,7 @@ def test_with_every_term_off_the_rate_is_zero_and_the_update_finite(law_: CreepL
 
 
 def test_a_term_that_is_off_leaves_the_others() -> None:
-    compiled = lower(COMBINED, "numba")
+    compiled = lower(COMBINED, "compiled")
     values = {**COMBINED.center(), "A_1": 0.0, "A_3": 0.0, "A_2": 1e-16, "n_2": 4.0, "m_1": -0.5}
 
     update, _ = call_entry(compiled, "update", point(), COMBINED.to_internal(values)[0])
@@ -250,9 +219,9 @@ def test_one_structure_is_compiled_once() -> None:
     other = law({"power law": A * stress**n}, {A: scale(1e-9, 1e-1), n: POWER}, name="other")
     linear = law({"power law": A * stress**n}, {A: POWER, n: POWER}, name="linear")
 
-    assert lower(other, "numba").fingerprint == lower(NORTON, "numba").fingerprint
-    assert lower(other, "numba").rate is lower(NORTON, "numba").rate
-    assert lower(linear, "numba").fingerprint != lower(NORTON, "numba").fingerprint
+    assert lower(other, "compiled").fingerprint == lower(NORTON, "compiled").fingerprint
+    assert lower(other, "compiled").rate is lower(NORTON, "compiled").rate
+    assert lower(linear, "compiled").fingerprint != lower(NORTON, "compiled").fingerprint
 
 
 # ---- every kind of equation ----------------------------------------------------------------------------------------
@@ -262,7 +231,7 @@ def test_one_structure_is_compiled_once() -> None:
 def test_equations_of_every_kind_give_what_the_arrays_give(name: str) -> None:
     """Branches, functions of the C library, states: a vector of eight points and one point more."""
     law_ = EQUATIONS[name]
-    compiled, arrays, drawn = lower(law_, "numba"), lower(law_, "numpy"), draw_samples(law_, 16, seed=6)
+    compiled, arrays, drawn = lower(law_, "compiled"), lower(law_, "numpy"), draw_samples(law_, 16, seed=6)
     x, theta = drawn.points[:9], drawn.theta[0]
     with np.errstate(all="ignore"):
         expected = np.stack(np.broadcast_arrays(*arrays.internal_rates(*x.T, *theta)), -1)

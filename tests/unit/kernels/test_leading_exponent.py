@@ -14,7 +14,7 @@ from helpers.literature_laws import EQUATIONS, POWER, RATE, A, law, m, n, number
 
 
 def leading(of: CreepLaw, point: list[float] | None = None, **values: float) -> float:
-    compiled = lower(of, "numba")
+    compiled = lower(of, "compiled")
     theta = of.to_internal({**of.center(), **values})
     return float(
         compiled.leading_exponent(theta)[0] if point is None else compiled.leading_exponent(theta, np.array([point]))[0]
@@ -58,7 +58,7 @@ def test_an_exponent_that_varies_with_temperature_is_taken_at_the_point() -> Non
 
 
 def test_candidates_are_taken_together() -> None:
-    compiled = lower(TIME_HARDENING, "numba")
+    compiled = lower(TIME_HARDENING, "compiled")
     theta = TIME_HARDENING.to_internal({"A": 1e-10, "n": 3.0, "m": np.array([-0.9, -0.5, 0.0])})
 
     np.testing.assert_allclose(compiled.leading_exponent(theta), [0.1, 0.5, 1.0], rtol=1e-12)

@@ -1,4 +1,4 @@
-"""The conditioned domain and the rate family: rates in closed form, fractions, stress scales, every registered law."""
+"""The conditioned domain: rates in closed form, fractions, stress scales, every registered law."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from creepkit.sampling.coefficients import term_groups
 from creepkit.sampling.conditions import hold_times, planned_test
 from creepkit.sampling.criteria import SimulationOutcome
 from creepkit.sampling.domains import sampling_design
-from creepkit.sampling.rate_family import RATE_FAMILY_LAW, rate_family
 
 DIMPLE, BAR = ck.specimen("bulge"), ck.specimen("uniaxial")
 HOURS_12 = 43200.0
@@ -170,60 +169,7 @@ def informative_share(design, specimen, samples):
 
 def test_at_least_80_percent_of_bars_creep_visibly_and_last():
     assert informative_share(sampling_design(ck.law("combined"), BAR), BAR, 60) >= 0.8
-    assert informative_share(rate_family(BAR), BAR, 60) >= 0.8
 
 
 def test_at_least_80_percent_of_dimples_do():
     assert informative_share(sampling_design(ck.law("norton"), DIMPLE), DIMPLE, 16) >= 0.8
-    assert informative_share(rate_family(), DIMPLE, 16) >= 0.8
-
-
-# ---- the rate family ------------------------------------------------------------------------------------------------
-
-
-def test_the_conditions_of_the_rate_family():
-    draws = rate_family().draw(0, 2048, seed=3)
-    h, end = draws.condition("apex_thickness"), draws.condition("end_time")
-    np.testing.assert_allclose([h.min(), h.max()], [0.44, 0.60], atol=1e-3)
-    np.testing.assert_allclose([end.min(), end.max()], [1200, 86400], rtol=0.01)
-    np.testing.assert_allclose(np.median(end), np.sqrt(1200 * 86400), rtol=0.01)
-    jump = draws.condition("Tj") / end
-    np.testing.assert_allclose([jump.min(), jump.max()], [0.15, 0.85], atol=0.01)
-    assert rate_family().grid.times(86400.0)[[1, 3, -1]].tolist() == [120.0, 1800.0, 86400.0]
-
-
-def test_exponents_are_off_decay_or_rise():
-    p = columns(rate_family().draw(0, 2048, seed=3), RATE_FAMILY_LAW)
-    for letter, expected, ends in (("m", [0.5, 0.4, 0.1], (-0.7, 0.5)), ("k", [0.4, 0.3, 0.3], (-0.7, 2.0))):
-        found = np.concatenate([p[f"{letter}_{number}"] for number in (2, 3)])
-        several = np.tile(np.stack([p[f"A_{k}"] > 0 for k in (1, 2, 3)]).sum(axis=0) > 1, 2)
-        signs = np.sign(found[several])
-        np.testing.assert_allclose([np.mean(signs == s) for s in (0, -1, 1)], expected, atol=0.02)
-        np.testing.assert_allclose([found.min(), found.max()], ends, rtol=0.02)
-
-
-def test_a_third_of_the_terms_fade_within_the_test():
-    draws = rate_family().draw(0, 2048, seed=3)
-    p, end = columns(draws, RATE_FAMILY_LAW), draws.condition("end_time")
-    for name in ("q_1", "q_2", "q_3"):
-        fading = p[name] > 0
-        np.testing.assert_allclose(fading.mean(), 0.35, atol=0.02)
-        scale = 1.0 / (p[name][fading] * end[fading])
-        np.testing.assert_allclose([scale.min(), scale.max()], [0.03, 1.0], rtol=0.05)
-        np.testing.assert_allclose(np.median(scale), np.sqrt(0.03), rtol=0.1)
-
-
-def test_a_term_alone_does_not_grow_with_strain():
-    p = columns(rate_family().draw(0, 2048, seed=3), RATE_FAMILY_LAW)
-    there = np.stack([p[f"A_{k}"] > 0 for k in (1, 2, 3)])
-    exponents = np.stack([p[f"m_{k}"] for k in (1, 2, 3)])
-    alone = there.sum(axis=0) == 1
-    np.testing.assert_allclose([np.mean(there.sum(axis=0) == k) for k in (1, 2, 3)], [0.25, 0.45, 0.3], atol=0.005)
-    assert (exponents[:, alone] <= 0).all()
-    assert (exponents[:, ~alone] > 0).any()
-
-
-def test_the_rate_family_of_a_bar_has_no_thickness():
-    design = rate_family(BAR, stress_1=(50, 80), stress_2=(50, 80))
-    assert design.condition_names == ("stress_1", "stress_2", "Tj", "end_time")
-    assert design.draw(0, 16, seed=0).condition("stress_2").max() <= 80

@@ -3,23 +3,25 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
-import torch
-from safetensors.torch import save_file
+from safetensors.numpy import save_file
 
+import creepkit as ck
 from creepkit.errors import SurrogateError
+from creepkit.inverse.composite_predictor import refined_of
 from creepkit.surrogates.loading import load_surrogate, surrogate_by_name
 from creepkit.surrogates.weight_files import read_weights, write_weights
 
 HEADER = {"kind": "parameter-gru"}
-WEIGHTS = {"a": torch.arange(6.0).reshape(2, 3), "b": torch.tensor(3, dtype=torch.int64)}
+WEIGHTS = {"a": np.arange(6.0, dtype=np.float32).reshape(2, 3), "b": np.array(3)}
 
 
-def test_tensors_and_header_come_back(tmp_path: Path) -> None:
+def test_weights_and_header_come_back(tmp_path: Path) -> None:
     path = write_weights(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "curves": {"loss": [1.0, 0.5]}})
     tensors, header = read_weights(path)
     assert all(
-        torch.equal(tensors[name], WEIGHTS[name]) and tensors[name].dtype == WEIGHTS[name].dtype for name in WEIGHTS
+        np.array_equal(tensors[name], WEIGHTS[name]) and tensors[name].dtype == WEIGHTS[name].dtype for name in WEIGHTS
     )
     assert header["curves"] == {"loss": [1.0, 0.5]}
     assert [p.name for p in tmp_path.iterdir()] == ["m.safetensors"]
@@ -66,6 +68,12 @@ def test_a_header_without_its_parts_says_so(tmp_path: Path) -> None:
     path = write_weights(tmp_path / "m.safetensors", WEIGHTS, {**HEADER, "recipe": {"training": {}}, "metadata": {}})
     with pytest.raises(SurrogateError, match="metadata: 'law' is missing"):
         load_surrogate(path)
+
+
+def test_the_surrogate_of_the_dimple_is_the_reduced_order_model_of_the_bulge_specimen() -> None:
+    model = surrogate_by_name("dimple")
+    assert model == ck.specimen("bulge").reduced_order_model()
+    assert refined_of(model) == ck.specimen("bulge").refined()
 
 
 def test_names_that_nobody_knows(tmp_path: Path) -> None:

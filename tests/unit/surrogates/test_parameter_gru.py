@@ -5,20 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from torch import nn
 
 import creepkit as ck
 from creepkit.dataset.dataset import Dataset
-from creepkit.errors import SurrogateError
+from creepkit.errors import SolveError, SurrogateError
 from creepkit.records import Program, RecordedLoading, Status
 from creepkit.sampling.conditions import TimeGrid
 from creepkit.surrogates.loading import load_surrogate
 from creepkit.surrogates.parameter_gru import ParameterGru
 from creepkit.surrogates.parameter_inputs import LawInputs, LoadHistoryInputs
-from creepkit.surrogates.parameter_network import recurrent_with_derivatives
+from creepkit.surrogates.parameter_network import load_weights, sample_tensors
 from creepkit.surrogates.recipe import Training
 from creepkit.surrogates.surrogate import Surrogate
 from creepkit.surrogates.training import train
+from creepkit.surrogates.weight_files import write_weights
 from helpers.planted_datasets import HOURS, bars, data_set, dimples, measured
 
 BRIEF = Training(epochs=2, batch=32, rate=1e-2)
@@ -50,18 +50,6 @@ def bulging(plates: Dataset) -> Surrogate:
 
 
 # ---- derivatives -----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", [nn.GRU, nn.LSTM])
-def test_derivatives_carried_forward_are_those_of_autograd(kind: type) -> None:
-    torch.manual_seed(0)
-    network = kind(3, 4, 2, batch_first=True).double()
-    inputs, directions = torch.randn(2, 5, 3).double(), torch.randn(2, 6, 5, 3).double()
-    values, slopes = recurrent_with_derivatives(network, inputs, directions)
-    assert torch.allclose(values, network(inputs)[0], atol=1e-14)
-    for k in range(6):
-        _, exact = torch.autograd.functional.jvp(lambda x: network(x)[0], inputs, directions[:, k])
-        assert torch.allclose(slopes[:, k], exact, atol=1e-13)
 
 
 def differences(model: Surrogate, data: Dataset, row: int, step: float = 1e-5) -> np.ndarray:
@@ -158,9 +146,10 @@ def test_candidates_and_tests_are_predicted_as_one_by_one(learnt: Surrogate, ten
 
 
 def test_frames_of_the_training_are_predicted_as_in_training(learnt: Surrogate, tension: Dataset) -> None:
-    samples = learnt.recipe.sample_tensors(tension)
+    samples = sample_tensors(learnt.recipe.sample_arrays(tension))
+    module = load_weights(learnt.recipe.module(tension, samples, torch.arange(100)), learnt.weights)
     with torch.no_grad():
-        known = learnt.module({name: v[:4] for name, v in samples.items()}).numpy()
+        known = module({name: v[:4] for name, v in samples.items()}).numpy()
     for row in range(4):
         found = learnt.predict(tension.law, tension.theta_of(row), [tension.planned_test(row)])
         assert found.values[0, 0] == pytest.approx(known[row], rel=1e-3, abs=1e-6)
@@ -282,7 +271,16 @@ def test_another_law_is_refused(learnt: Surrogate, tension: Dataset) -> None:
     assert found.status.tolist() == [[Status.OUTSIDE_CLASS]]
     assert np.isnan(found.values).all()
     assert found.reason.startswith("a surrogate of law 'norton' cannot predict law 'time-hardening'")
-    assert str(learnt.law_class) == "law 'norton', and that less some of its terms"
+    assert "predicts law 'norton', and that less some of its terms" in str(learnt)
+    with pytest.raises(SolveError, match="simulate it with the specimen 'uniaxial' itself"):
+        ck.simulate(law, learnt, law.center(), loading=ck.constant_stress(100.0), times=[HOURS])
+
+
+def test_files_of_older_versions_that_name_the_class_of_laws_are_read(learnt: Surrogate, tmp_path) -> None:
+    header = {**learnt.file_header}
+    header["metadata"] = {**header["metadata"], "law_class": {"variables": ["stress"], "states": False}}
+    path = write_weights(tmp_path / "old.safetensors", learnt.weights, header)
+    assert load_surrogate(path).file_header == learnt.file_header
 
 
 def test_other_kinds_of_tests_are_refused(

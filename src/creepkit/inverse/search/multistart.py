@@ -37,13 +37,22 @@ class MultiStart:
 
     def minima(self, problem: LeastSquaresProblem, progress: IterationCallback | None = None) -> SearchResult:
         """The minima of all starts, best first; a sum's best single term stands behind the best."""
-        starts, draws = self.starts or problem.settings.starts, self.draws or problem.settings.sobol_points
+        starts, draws = self.starts or problem.settings.starts, self.draws or default_draws(problem)
         screened = screened_starts(problem, starts=starts, draws=draws)
         problem.check_predicted(np.array(screened))  # from where nothing is predicted, no direction leads away
         initial_points = [*single_term_starts(problem, starts=max(2, starts // 3), draws=draws // 2), *screened]
         costs: list[Floats] = []
         minima = batched_levenberg_marquardt(problem, initial_points, progress=progress, costs=costs)
         return SearchResult(tuple(minima), SearchTrace.from_costs("multi-start", costs) if costs else None)
+
+
+def default_draws(problem: LeastSquaresProblem) -> int:
+    """Those of the settings for three parameters beside rates, half of them for two, a quarter for one or none.
+
+    Rates are not drawn: they are shifted to those of the data.
+    """
+    shapes = problem.bounds.lower.size - len(problem.coordinates.term_rates)
+    return max(problem.settings.sobol_points // {0: 4, 1: 4, 2: 2}.get(shapes, 1), 1)
 
 
 def single_term_starts(problem: LeastSquaresProblem, *, starts: int, draws: int) -> list[Floats]:

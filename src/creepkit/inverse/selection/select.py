@@ -16,7 +16,7 @@ from creepkit.errors import CreepkitError, FitError
 from creepkit.inverse.composite_predictor import through_for_law
 from creepkit.inverse.cross_validation import cross_validate
 from creepkit.inverse.identification import Identification
-from creepkit.inverse.identify import StartingEstimate, identify
+from creepkit.inverse.identify import StartingEstimate, identify, identify_values
 from creepkit.inverse.reference_conditions import with_arrhenius
 from creepkit.inverse.search.local_refinement import IterationCallback
 from creepkit.inverse.selection.discrimination import under_common_covariance
@@ -160,7 +160,8 @@ def _identify_all(
     """
     fits = []
     for k, law in enumerate(laws):
-        fit = _try_to_identify(law, histories, through_for_law(through, law) or using, settings, failed)
+        first = through_for_law(through, law)
+        fit = _try_to_identify(law, histories, first or using, settings, failed, sampled=first is None)
         fits += [fit] if fit is not None else []
         if progress is not None:
             progress("law", k + 1, len(laws))
@@ -182,11 +183,16 @@ def _try_to_identify(
     settings: IdentificationSettings,
     failed: dict[str, str],
     previous_fit: Identification | None = None,
+    sampled: bool = True,
 ) -> Identification | None:
-    """Identify one law, from where a cheaper predictor ended if it did; errors are recorded in `failed`."""
+    """Identify one law, from where a cheaper predictor ended if it did; errors are recorded in `failed`.
+
+    sampled : whether its posterior is sampled where that is needed; not of what is identified again.
+    """
     start = None if previous_fit is None else StartingEstimate.from_identification(previous_fit)
     try:
-        return identify(law, histories, using, settings=settings, start=start)
+        run = identify if sampled else identify_values
+        return run(law, histories, using, settings=settings, start=start)
     except CreepkitError as error:
         failed[law.name] = str(error)
         return None

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import chi2, multivariate_t, norm, qmc
 
 from creepkit.arrays import Floats
-from creepkit.inverse.composite_predictor import reduced_order_model_of
+from creepkit.inverse.composite_predictor import reduced_order_model_of, search_predictor_of
 from creepkit.inverse.defect_correction import with_cheaper_predictor
 from creepkit.inverse.identification import Identification
 from creepkit.inverse.uncertainty.posterior import Posterior
@@ -57,7 +57,7 @@ def with_samples(fit: Identification, cheaper: Predictor | None = None) -> Ident
     problem = fit.least_squares_problem
     cheaper = cheaper or reduced_order_model_of(problem.predictor)
     if cheaper is not None:
-        problem = with_cheaper_predictor(problem, fit.x, cheaper)
+        problem = with_cheaper_predictor(problem, fit.x, search_predictor_of(cheaper))
     samples = posterior_samples(replace(fit, problem=problem))
     if samples is None:
         note = (

@@ -247,98 +247,96 @@ def predict_bulge(
     nuisances: NuisanceValues,
     sensitivities: bool,
     model_of: Callable[[BulgeSetup], SolvableModel] | None = None,
+    settings: SolverSettings | None = None,
 ) -> Prediction:
     """Predict every candidate in every test; see records.Predictor.
 
     theta : (candidates, parameters) internal values. nuisances : {kind: (candidates or 1, tests)}. model_of : the model
-    of a test that is simulated in the place of its finite elements, such as a reduced-order model.
+    of a test that is simulated in the place of its finite elements, such as a reduced-order model. settings : of the
+    solver, by default those of the specimen.
     """
     known = (*specimen.nuisances, *PROGRAM_NUISANCES)
     check_nuisances([kind_and_start(key)[0] for key in nuisances], known, "a bulge specimen")
-    kernel = kernels.lower(law, "numba")
+    kernel = kernels.lower(law, "compiled")
     theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
     tasks = list(product(range(len(theta)), range(len(histories))))
-
-    prepared: dict[tuple[int, tuple[float, ...]], PreparedTest] = {}  # candidates often share all nuisances
+    settings = settings or solver_settings(specimen, exact=sensitivities)
+    tests: dict[tuple[float, ...], PreparedTest] = {}
 
     def run(task: tuple[int, int]) -> BulgeResponse:
         c, k = task
         values = {kind: float(value[c, k]) for kind, value in nuisances.items()}
-        key = k, tuple(values.values())
-        test = prepared.get(key)
-        if test is None:
-            test = prepared[key] = prepare_test(specimen, histories[k], values, sensitivities, model_of)
-        return simulate_and_observe(kernel, theta[c], test)
+        key = (k, *values.values())
+        if key not in tests:  # candidates that differ in the law alone share it
+            tests[key] = PreparedTest.of(specimen, histories[k], values, sensitivities, model_of)
+        return tests[key].simulate_and_observe(kernel, theta[c], settings)
 
     workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
     if workers > 1:
-        with ThreadPoolExecutor(workers) as pool:
+        pool = ThreadPoolExecutor(workers)
+        try:
             rows = list(pool.map(run, tasks))
+        finally:
+            pool.shutdown(cancel_futures=True)  # an interrupt waits for the simulations that run, not for the others
     else:
         rows = [run(task) for task in tasks]
     parts = [_history_prediction(rows[k :: len(histories)]) for k in range(len(histories))]
     return assemble_prediction(parts, histories, OBSERVED, len(theta))
 
 
-REDUCED_NEWTON = 1e-3
-"""Last correction of equilibrium in a reduced-order model over the specimen's tolerance of a step."""
-
-
 @dataclass(frozen=True, eq=False)
 class PreparedTest:
-    """A test set up, the model that is simulated and how accurately, and what is differentiated to.
+    """One test with its nuisances, ready to be simulated by any law.
 
-    names : of the explicit nuisances. directions : None for no derivatives.
+    model : what is simulated. names, directions : the nuisances, and what is differentiated to; None for nothing.
     """
 
-    history: History
     setup: BulgeSetup
+    history: History
     model: SolvableModel
-    settings: SolverSettings
     names: tuple[str, ...]
     directions: SensitivityDirections | None
 
+    @classmethod
+    def of(
+        cls,
+        specimen: BulgeSettings,
+        history: History,
+        nuisances: Mapping[str, float],
+        jacobian: bool,
+        model_of: Callable[[BulgeSetup], SolvableModel] | None = None,
+    ) -> PreparedTest:
+        """Set one test up; jacobian : for a simulation with its sensitivities."""
+        setup = set_up_test(specimen, history, nuisances)
+        model = setup.model if model_of is None else model_of(setup)
+        names, directions = tuple(nuisances), None
+        if jacobian:
+            programs = program_directions(specimen, history, nuisances)
+            directions = sensitivity_directions_of(setup, history, names, programs)
+        return cls(setup, history, model, names, directions)
 
-def prepare_test(
-    specimen: BulgeSettings,
-    history: History,
-    nuisances: Mapping[str, float],
-    jacobian: bool,
-    model_of: Callable[[BulgeSetup], SolvableModel] | None = None,
-) -> PreparedTest:
-    """What all candidates of a test share at the same explicit nuisances; model_of : see predict_bulge."""
-    test_setup = set_up_test(specimen, history, nuisances)
-    model = test_setup.model if model_of is None else model_of(test_setup)
-    settings = solver_settings(specimen, exact=jacobian)
-    if model_of is not None:  # equilibrium costs it little, and a search sees differences that are not of the law
-        settings = settings._replace(newton=min(settings.newton, REDUCED_NEWTON * specimen.tolerance))
-    names, directions = tuple(nuisances), None
-    if jacobian:
-        programs = program_directions(specimen, history, nuisances)
-        directions = sensitivity_directions_of(test_setup, history, names, programs)
-    return PreparedTest(history, test_setup, model, settings, names, directions)
-
-
-def simulate_and_observe(kernel: CompiledLaw, theta: Floats, test: PreparedTest) -> BulgeResponse:
-    """Simulate one test and observe it at the times of its history; theta : (parameters,) internal values."""
-    setup, history, directions = test.setup, test.history, test.directions
-    simulation = simulate(kernel, theta, test.model, setup.load_history, settings=test.settings, directions=directions)
-    profiles = simulation.displacements[:, setup.model.top, 1]
-    sensitivities = None
-    if directions is not None:
-        outputs, sensitivities = output_sensitivities(
-            setup, theta, history, simulation, profiles, test.names, directions
+    def simulate_and_observe(self, kernel: CompiledLaw, theta: Floats, settings: SolverSettings) -> BulgeResponse:
+        """Simulate the test and observe it at the times of its history; theta : (parameters,) internal values."""
+        setup, times = self.setup, self.history.times
+        simulation = simulate(
+            kernel, theta, self.model, setup.load_history, settings=settings, directions=self.directions
         )
-    else:
-        outputs = setup.observation.observe_at_times(setup.radii, profiles, simulation.timeline, history.times)
-    return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
+        profiles = simulation.displacements[:, setup.model.top, 1]
+        sensitivities = None
+        if self.directions is not None:
+            outputs, sensitivities = output_sensitivities(
+                setup, theta, self.history, simulation, profiles, self.names, self.directions
+            )
+        else:
+            outputs = setup.observation.observe_at_times(setup.radii, profiles, simulation.timeline, times)
+        return BulgeResponse(outputs, simulation.status, simulation.end_time, sensitivities)
 
 
 def solver_settings(specimen: BulgeSettings, *, exact: bool = False) -> SolverSettings:
-    """The solver's settings; exact : equilibrium so tight that derivatives are those of the scheme."""
+    """The solver's settings; exact : equilibrium so tight that derivatives err by 1e-5 to 1e-3 of their largest."""
     return SolverSettings(
         tolerance=specimen.tolerance,
-        newton=1e-7 if exact else 1e-2 * specimen.tolerance,
+        newton=1e-6 if exact else 1e-2 * specimen.tolerance,
         deflection_limit=specimen.deflection_limit,
         strain_limit=specimen.strain_limit,
         max_steps=int(specimen.max_steps),

@@ -205,7 +205,7 @@ class BulgeRun(Run):
 def run_bulge(specimen: BulgeSettings, law: CreepLaw, values: Mapping[str, float], plan: History) -> BulgeRun:
     """Simulate one test and keep all of it."""
     test_setup = set_up_test(specimen, plan, {})
-    kernel = kernels.lower(law, "numba")
+    kernel = kernels.lower(law, "compiled")
     theta = law.to_internal(law.values(values))[0]
     simulation = simulate(
         kernel, theta, test_setup.model, test_setup.load_history, settings=solver_settings(specimen), keep_points=True

@@ -76,7 +76,7 @@ def base(request) -> Base:
         loading=PressureJump(8.0, 9.0, 7200.0), temperature=1000.0, specimen="bulge",
         elastic=Elastic(E=210e3 - 60 * temperature),
     )  # fmt: skip
-    kernel = kernels.lower(creep, "numba")
+    kernel = kernels.lower(creep, "compiled")
     theta = creep.to_internal(values)[0]
     made = set_up_test(SPECIMEN, history, {})
     directions = sensitivity_directions_of(made, history, NAMES)

@@ -13,7 +13,7 @@ namespace creepkit {
 typedef double Vector __attribute__((vector_size(8 * CREEPKIT_LANES)));
 typedef uint64_t BitVector __attribute__((vector_size(8 * CREEPKIT_LANES)));
 
-inline Vector load(const double* from) {
+inline Vector load_vector(const double* from) {
     Vector v;
     memcpy(&v, from, sizeof v);
     return v;

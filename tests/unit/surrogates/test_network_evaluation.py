@@ -1,0 +1,162 @@
+"""Evaluation of the recurrent network in NumPy: torch's own cells and their derivatives, and no torch is loaded."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+import creepkit as ck
+from creepkit.errors import SurrogateError
+from creepkit.surrogates.network_evaluation import FRAMES_IN_BLOCK, ParameterNetwork
+from creepkit.surrogates.parameter_gru import ParameterGru
+from creepkit.surrogates.parameter_network import ParameterModule, weights_of
+from creepkit.surrogates.recipe import Training
+from creepkit.surrogates.training import train
+from helpers import source_tree
+from helpers.planted_datasets import bars
+
+CONSTANTS, SERIES, OUTPUTS, HIDDEN, LAYERS = 4, 2, 3, 5, 3
+SIZES = CONSTANTS, SERIES, OUTPUTS
+FRAMES = 2 * FRAMES_IN_BLOCK + 3
+
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
+
+
+def module_of(cell: str, *, logarithm: bool = False, corrects_base: bool = False) -> ParameterModule:
+    """A network of torch in float64 with scales that are not trivial."""
+    torch.manual_seed(0)
+    module = ParameterModule(SIZES, HIDDEN, LAYERS, cell, logarithm=logarithm, corrects_base=corrects_base).double()
+    for scale in (module.constants, module.series, module.targets):
+        scale.mean, scale.deviation = torch.randn_like(scale.mean), 0.5 + torch.rand_like(scale.mean)
+    module.floor, module.most = torch.tensor(0.02).double(), torch.tensor(9.0).double()
+    return module
+
+
+def network_of(module: ParameterModule, cell: str, **how: bool) -> ParameterNetwork:
+    how = {"logarithm": False, "corrects_base": False, **how}
+    return ParameterNetwork.from_weights(weights_of(module.state_dict()), SIZES, (cell, HIDDEN, LAYERS), **how)
+
+
+def inputs(rows: int, tests: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(1)
+    return rng.normal(size=(rows, CONSTANTS)), rng.normal(size=(tests, FRAMES, SERIES))
+
+
+def by_torch(module: ParameterModule, constants: torch.Tensor, series: np.ndarray, **base: torch.Tensor):
+    repeated = torch.from_numpy(np.tile(series, (len(constants) // len(series), 1, 1)))
+    return module({"constants": constants, "series": repeated, **base})
+
+
+@pytest.mark.parametrize("cell", ["gru", "lstm"])
+@pytest.mark.parametrize("logarithm", [False, True])
+def test_values_and_derivatives_are_those_of_torch(cell: str, logarithm: bool) -> None:
+    module = module_of(cell, logarithm=logarithm)
+    constants, series = inputs(6, 2)
+    directions = np.random.default_rng(2).normal(size=(6, 7, CONSTANTS))
+    if logarithm:  # a bound that half of the outputs exceed
+        median = np.median(network_of(module, cell, logarithm=True).outputs(constants, series)[..., 0])
+        module.most = torch.tensor(np.log(median + 0.02))
+    network = network_of(module, cell, logarithm=logarithm)
+    values, slopes = network.outputs_with_derivatives(constants, series, directions=directions)
+
+    def along(moved: torch.Tensor) -> torch.Tensor:
+        return by_torch(module, moved, series)
+
+    point = torch.from_numpy(constants)
+    assert values == pytest.approx(along(point).detach().numpy(), rel=1e-11, abs=1e-13)
+    assert network.outputs(constants, series) == pytest.approx(values, rel=1e-12)
+    for k in range(7):
+        _, exact = torch.autograd.functional.jvp(along, point, torch.from_numpy(directions[:, k]))
+        assert slopes[..., k] == pytest.approx(exact.numpy(), rel=1e-10, abs=1e-12)
+    bounded = np.isclose(values[..., 0], np.exp(network.most) - network.floor, rtol=1e-13)
+    assert not logarithm or (0 < bounded.mean() < 1 and (slopes[..., 0, :][bounded] == 0).all())
+
+
+@pytest.mark.parametrize("rows", [1, 600])
+def test_batches_of_rows_are_one(rows: int) -> None:
+    module = module_of("gru")
+    constants, series = inputs(2 * rows, 2)
+    values = network_of(module, "gru").outputs(constants, series)
+    with torch.no_grad():
+        assert values == pytest.approx(by_torch(module, torch.from_numpy(constants), series).numpy(), rel=1e-10)
+
+
+def test_a_coefficient_that_is_off_stands_at_zero_and_does_not_move() -> None:
+    module, (constants, series) = module_of("gru"), inputs(2, 1)
+    constants[1, 0] = np.nan
+    with torch.no_grad():
+        exact = by_torch(module, torch.from_numpy(constants), series).numpy()
+    assert network_of(module, "gru").outputs(constants, series) == pytest.approx(exact, rel=1e-11)
+
+
+def test_a_base_is_corrected_and_has_no_derivatives() -> None:
+    module, (constants, series) = module_of("lstm", corrects_base=True), inputs(4, 2)
+    network, base = network_of(module, "lstm", corrects_base=True), np.random.default_rng(3).random((4, FRAMES))
+    with torch.no_grad():
+        exact = by_torch(module, torch.from_numpy(constants), series, base=torch.from_numpy(base)).numpy()
+    assert network.outputs(constants, series, base) == pytest.approx(exact, rel=1e-11)
+    with pytest.raises(SurrogateError, match="left to differences"):
+        network.outputs_with_derivatives(constants, series, base, np.zeros((4, 1, CONSTANTS)))
+
+
+def test_weights_of_another_network_are_refused() -> None:
+    weights = dict(weights_of(module_of("gru").state_dict()))
+    for other in ({**weights, "head.bias": np.zeros(2)}, {**weights, "more": np.zeros(1)}):
+        with pytest.raises(SurrogateError, match="do not belong together"):
+            ParameterNetwork.from_weights(other, SIZES, ("gru", HIDDEN, LAYERS), logarithm=False, corrects_base=False)
+    with pytest.raises(SurrogateError, match="do not belong together"):
+        ParameterNetwork.from_weights(weights, SIZES, ("lstm", HIDDEN, LAYERS), logarithm=False, corrects_base=False)
+
+
+@pytest.mark.parametrize(("cell", "kind"), [("gru", nn.GRU), ("lstm", nn.LSTM)])
+def test_all_weights_that_are_fitted_are_counted(cell: str, kind: type) -> None:
+    expected = sum(p.numel() for p in kind(CONSTANTS + SERIES, HIDDEN, LAYERS).parameters()) + (HIDDEN + 1) * OUTPUTS
+    assert network_of(module_of(cell), cell).weight_count == expected
+
+
+NO_TORCH = """
+import sys
+import numpy as np
+import creepkit as ck
+model = ck.surrogate({path!r})
+law = ck.law("norton")
+history = ck.History("bar", np.linspace(1800.0, 36000.0, 9), {{}}, ck.constant_stress(100.0), 293.15, "uniaxial")
+theta = law.to_internal({{"A": 1e-7 / 100.0**4, "n": 4.0}})
+found = model.predict(law, theta, [history], sensitivities=True)
+assert np.isfinite(found.jacobian).all()
+noise = 1 + 1e-3 * np.random.default_rng(0).normal(size=found.values[0, 0, :, 0].shape)
+outputs = {{"strain": found.values[0, 0, :, 0] * noise}}
+measured = ck.History("bar", history.times, outputs, history.loading, 293.15, "uniaxial")
+str(model)
+str(ck.identify(law, [measured], using=model, starts=1))
+str(ck.identify(law, [measured], starts=1))
+assert "torch" not in sys.modules
+"""
+
+
+TRAINING = {"surrogates.parameter_network", "surrogates.training", "surrogates.training_loop"}
+"""Modules that import torch when they are imported, beside the functions of the torch target of kernels."""
+
+
+def test_only_training_and_the_torch_target_import_torch() -> None:
+    found = set()
+    for module, path in source_tree.modules().items():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        names = [a.name for node in tree.body if isinstance(node, ast.Import) for a in node.names]
+        names += [str(node.module) for node in tree.body if isinstance(node, ast.ImportFrom)]
+        if any(name.split(".")[0] == "torch" for name in names):
+            found.add(module.removeprefix("creepkit."))
+    assert found == {*TRAINING, "kernels.torch_functions"}
+
+
+def test_prediction_and_identification_load_no_torch(tmp_path: Path) -> None:
+    model = train(bars(40), ParameterGru(4, 1, target="log", training=Training(epochs=2, batch=16)))
+    program = NO_TORCH.format(path=str(model.save(tmp_path / "bars.safetensors")))
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert ck.surrogate(tmp_path / "bars.safetensors").weight_count == model.weight_count
