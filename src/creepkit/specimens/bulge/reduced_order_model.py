@@ -111,7 +111,7 @@ class BulgeReducedOrderModel:
         if not self.searching:
             return settings._replace(newton=min(settings.newton, 1e-3 * settings.tolerance))
         tolerance = max(SEARCH_TOLERANCE, self.specimen.tolerance)
-        newton = (1e-3 if sensitivities else 1e-2) * tolerance
+        newton = 1e-3 * tolerance  # with and without derivatives, so that values are the same
         return settings._replace(tolerance=tolerance, newton=newton, growth=SEARCH_GROWTH)
 
     def reduced_model_of(self, setup: BulgeSetup) -> ReducedOrderModel:
