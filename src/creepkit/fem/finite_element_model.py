@@ -70,11 +70,13 @@ class FiniteElementModel:
         return np.zeros(self.equations.size) if pattern is None else np.ravel(pattern)
 
     def displacements(self, coordinates: Floats) -> Floats:
-        """(steps, nodes, 2) mm, from what the core keeps of each step, (steps, displacement_count)."""
+        """(steps, nodes, 2) mm of the steps; coordinates : (steps, displacement_count) what the core keeps of them."""
         return coordinates.reshape(len(coordinates), -1, 2)
 
     def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]:
-        """Velocity gradients and hoop strains of all points, the copy's included, and velocities of the nodes."""
+        """Velocity gradients (G, elements, 4, 2, 2) and hoop strains (G, elements, 4), the copy's included, and
+        velocities (G, 2 nodes) of the nodes.
+        """
         padded = self.compiled.padded
         gradients, hoops = (
             np.array([padded(a) for a in values]) for values in (directions.gradients, directions.hoops)

@@ -57,7 +57,10 @@ def full_basis(model: FiniteElementModel) -> ReducedBasis:
 
 
 def mode_gradients(model: FiniteElementModel, modes: Floats, points: Ints) -> Floats:
-    """Gradients (points, 5, modes) of modes (modes, nodes, 2) at points: of F11, F12, F21, F22 and F33, 1/mm."""
+    """Gradients (points, 5, modes) of modes (modes, nodes, 2): of F11, F12, F21, F22 and F33, 1/mm.
+
+    points : (points,) number 4 element + point of each.
+    """
     element, place = points // 4, points % 4
     nodes = model.elements[element]
     by_radius, by_height, over_radius = (

@@ -178,7 +178,8 @@ def _energy_roots(model: FiniteElementModel, modes: Floats) -> Floats:
 def cubature(data: Snapshots, modes: Floats, count: int) -> tuple[Ints, Floats]:
     """Points (points,) and the factors of their weights, by which the forces on the modes come out right.
 
-    modes : orthonormal in the elastic energy, so that forces are measured by the displacements they make.
+    modes : (modes, nodes, 2), orthonormal in the elastic energy, so that forces are measured by the displacements that
+        they make.
     """
     every = data.models[0].weights.size
     if count >= every:
@@ -201,7 +202,8 @@ def cubature(data: Snapshots, modes: Floats, count: int) -> tuple[Ints, Floats]:
 def non_negative_least_squares(gram: Floats, right: Floats, count: int) -> tuple[Ints, Floats]:
     """The x >= 0 with at most `count` numbers above zero that nearly minimises |A x - b|: their places and values.
 
-    gram : A^T A. right : A^T b. One number is added at a time, the one along which the residual falls fastest.
+    gram : (numbers, numbers) A^T A. right : (numbers,) A^T b. One number is added at a time, the one along which the
+        residual falls fastest.
     """
     scale = np.sqrt(np.diag(gram))
     scale = np.where(scale > 0.0, scale, 1.0)

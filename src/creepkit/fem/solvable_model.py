@@ -44,6 +44,14 @@ class SolvableModel(Protocol):
     def point_count(self) -> int: ...  # noqa: D102
     @property
     def observed_count(self) -> int: ...  # noqa: D102
-    def held_motion(self, pattern: Floats | None) -> Floats: ...  # noqa: D102
-    def displacements(self, coordinates: Floats) -> Floats: ...  # noqa: D102
-    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]: ...  # noqa: D102
+    def held_motion(self, pattern: Floats | None) -> Floats:
+        """(2 nodes,) mm for a unit of motion, or (0,); pattern : (nodes, 2) mm, None where held nodes stay."""
+        ...
+
+    def displacements(self, coordinates: Floats) -> Floats:
+        """(steps, nodes, 2) mm of the steps; coordinates : (steps, displacement_count)."""
+        ...
+
+    def core_directions(self, directions: SensitivityDirections) -> tuple[Floats, Floats, Floats]:
+        """Velocity gradients (G, points, 2, 2), hoop strains (G, points) and velocities (G, ...) for the core."""
+        ...
