@@ -34,7 +34,7 @@ struct ReducedOrderModel {
 
 class ReducedOrderSensitivities;
 
-// Tile (8 x 8, by columns) += the sum over rows k of column_k row_k^T, whose numbers lie `stride` apart from row to row.
+// Tile (8 x 8, by columns) += the sum over k of column_k row_k^T, whose numbers lie `stride` apart from k to k.
 CREEPKIT_INLINE void add_products(double* tile, const double* columns, const double* rows, int64_t stride,
                                   int64_t count) {
     Eight sums[EIGHT];

@@ -6,7 +6,8 @@ Tests of six laws drawn over the paper's bounds, 12 h with 288 frames, by the re
 elements of the same mesh, at the same tolerance of their steps. The error is the largest difference of the displacement
 of the top over all frames and nodes in % of the largest that the finite elements reach; median, 90 % and largest of the
 cases. Tests that end before 60 s or bulge by less than 0.02 mm are left out. Where a test ruptures, its frames before
-the first of both ruptures count; the difference of the times of rupture, in % of the finite elements', stands beside.
+the first of both ruptures count; beside stands the difference of the times at which the middle of the top has risen
+by 2.4 mm, in % of the finite elements' (a simulation ends with the step that reaches 3 mm, not with 3 mm).
 
 CPU times are the least of three calls of the simulation alone, the mean over the cases, on one thread; a prediction
 adds set-up and observation.
@@ -37,6 +38,8 @@ from creepkit.specimens.bulge.specimen import Bulge
 from creepkit.specimens.reduced_order_training import RUNS, power_law_runs
 
 SHORTEST, LEAST = 60.0, 0.02
+DEFLECTION = 2.4
+"""mm."""
 SIZES = ((12, 64), (16, 96), (24, 96), (24, 128), (32, 128), (32, 200))
 TRAINED, BETWEEN = (0.45, 0.5, 0.555), (0.47, 0.5, 0.53, 0.485, 0.515)
 """Apex thicknesses, mm, of training and of the cases between them."""
@@ -99,7 +102,14 @@ def errors_of(reference: Reference, basis: ReducedBasis) -> tuple[float, float, 
     both = np.isfinite(exact[:, 0]) & np.isfinite(found[:, 0])
     largest = reference.run.displacements[:, top, 1].max()
     error = np.abs(found - exact)[both].max(initial=0.0) / largest
-    return 100 * float(error), 100 * abs(run.end_time / reference.run.end_time - 1.0), cpu
+    exact_time, found_time = (time_of_deflection(each, top[0]) for each in (reference.run, run))
+    return 100 * float(error), 100 * abs(found_time / exact_time - 1.0), cpu
+
+
+def time_of_deflection(run: Simulation, node: int) -> float:
+    """When the node has risen by DEFLECTION, s, between the steps; NaN if never."""
+    rise = np.maximum.accumulate(run.displacements[:, node, 1])
+    return float(np.interp(DEFLECTION, rise, run.times)) if rise[-1] >= DEFLECTION else float("nan")
 
 
 def row(page: Page, label: str, cases: list[Reference], basis: ReducedBasis, *more: str) -> None:
@@ -115,11 +125,11 @@ def three(values: Floats) -> str:
     """Median, 90 % and largest."""
     if not values.size:
         return "-"
-    return ", ".join(f"{v:.2f}" for v in np.percentile(values, [50, 90, 100]))
+    return ", ".join(f"{v:.2f}" for v in np.nanpercentile(values, [50, 90, 100]))
 
 
 HEADS = (
-    "all: median, 90 %, largest error, %", "complete tests, %", "time of rupture, %", "CPU ms, complete", "ruptured",
+    "all: median, 90 %, largest error, %", "complete tests, %", "time to 2.4 mm, %", "CPU ms, complete", "ruptured",
 )  # fmt: skip
 
 

@@ -98,17 +98,21 @@ class BulgeReducedOrderModel:
         """
         return predict_bulge(
             self.specimen, law, theta, histories, nuisances or {}, sensitivities, self.reduced_model_of,
-            self._search_settings(sensitivities) if self.searching else None,
+            self._settings(sensitivities),
         )  # fmt: skip
 
     def for_search(self) -> BulgeReducedOrderModel:
         """The same model in longer steps."""
         return replace(self, searching=True)
 
-    def _search_settings(self, sensitivities: bool) -> SolverSettings:
+    def _settings(self, sensitivities: bool) -> SolverSettings:
+        """The solver's settings; equilibrium costs little here, and a search is to see differences of the law alone."""
+        settings = solver_settings(self.specimen, exact=sensitivities)
+        if not self.searching:
+            return settings._replace(newton=min(settings.newton, 1e-3 * settings.tolerance))
         tolerance = max(SEARCH_TOLERANCE, self.specimen.tolerance)
-        newton = (1e-3 if sensitivities else 1e-2) * tolerance
-        return solver_settings(self.specimen)._replace(tolerance=tolerance, newton=newton, growth=SEARCH_GROWTH)
+        newton = 1e-3 * tolerance  # with and without derivatives, so that values are the same
+        return settings._replace(tolerance=tolerance, newton=newton, growth=SEARCH_GROWTH)
 
     def reduced_model_of(self, setup: BulgeSetup) -> ReducedOrderModel:
         """The reduced-order model of a test that is set up."""
