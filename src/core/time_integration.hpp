@@ -173,12 +173,14 @@ private:
     // Integrate over one segment in its transformed time s, from 0 to 1.
     void integrate_segment(const double* segment, int64_t n) {
         constexpr double SMALLEST = 1e-9;  // least step, as a share of the position it begins at
+        constexpr double LIMIT_WIDTH = 1e-3;  // share of the deflection limit by which the last step may pass it
+        constexpr int MOST_OVERSHOOTS = 20;
         const TimeTransformation clock = segment_transformation(segment, input.beta);
         const double begin = segment[START], length = segment[END] - segment[START];
         double s = 0.0, elapsed = 0.0, h = position(clock, begin + fmin(settings.first, length));
         double time_before = begin;    // where the step before began, for a straight line through it
         bool has_before = false;       // whether there is one in this segment
-        int failures = 0;
+        int failures = 0, overshoots = 0;
         copy(displacement, start);
         while (s < 1.0) {
             h = fmin(h, position(clock, begin + fmin(settings.growth * elapsed + settings.first, length)) - s);
@@ -199,6 +201,17 @@ private:
                     const bool rises = segment[END_PRESSURE] != segment[PRESSURE];
                     return end(flag == UNDEFINED ? LAW_FAILED : rises ? LIMIT_LOAD : LOST_CONVERGENCE, ended.time);
                 }
+                continue;
+            }
+            const double risen = system.largest_displacement(displacement), limit = settings.deflection_limit;
+            if (risen > limit * (1.0 + LIMIT_WIDTH) && !scripted && overshoots < MOST_OVERSHOOTS) {
+                // the limit lies within the step: again, to where a straight line reaches it
+                const double from = system.largest_displacement(start);
+                const double share = (limit * (1.0 + 0.5 * LIMIT_WIDTH) - from) / (risen - from);
+                copy(start, displacement);
+                record.counts[1] += 1;
+                overshoots += 1;
+                h *= fmin(fmax(share, 0.05), 0.95);
                 continue;
             }
             failures = 0;

@@ -55,6 +55,15 @@ def test_burst_by_deflection(body) -> None:
     history_is_kept(made, body)
 
 
+def test_the_time_of_a_burst_does_not_depend_on_the_steps(body) -> None:
+    """The limit is located within a step: to a thousandth of itself, whatever the tolerance of the steps."""
+    coarse, fine = (run(body, NORTON, FAST, deflection_limit=1.0, tolerance=t, newton=1e-2 * t) for t in (3e-2, 3e-4))
+    for made in (coarse, fine):
+        assert made.displacements[-1, body.top[0], 1] == pytest.approx(1.0, rel=2e-3)
+    assert coarse.times.size < fine.times.size / 3
+    assert coarse.end_time == pytest.approx(fine.end_time, rel=5e-3)
+
+
 def test_burst_by_strain(body) -> None:
     made = run(body, NORTON, FAST, strain_limit=0.05)
     largest = made.values[:, :, 3].max(axis=1)
