@@ -70,7 +70,7 @@ def compile_core(build: Path, output: Path = IN_PLACE, sanitize: bool = False) -
         f"-DCREEPKIT_SANITIZE={'ON' if sanitize else 'OFF'}",
         "-DCMAKE_BUILD_TYPE=Release",
     ]
-    _remove_other_configuration(build, generator[0], (compiler or _zig())[0])
+    _remove_other_configuration(build, generator[0], shutil.which((compiler or _zig())[0]) or "")
     _run([cmake, "-S", str(SOURCES), "-B", str(build), *options])
     _run([cmake, "--build", str(build), "--parallel", str(os.cpu_count() or 1)])
     return output / LIBRARY_NAME
@@ -84,7 +84,12 @@ def _remove_other_configuration(build: Path, generator: str, compiler: str) -> N
         values = dict(line.split("=", 1) for line in lines if "=" in line and not line.startswith(("#", "//")))
         entries = {name.partition(":")[0]: value for name, value in values.items()}
         used = shutil.which(entries.get("CMAKE_CXX_COMPILER", ""))
-        if entries.get("CMAKE_GENERATOR") != generator or used is None or not os.path.samefile(used, compiler):
+        if (
+            entries.get("CMAKE_GENERATOR") != generator
+            or not used
+            or not compiler
+            or not os.path.samefile(used, compiler)
+        ):
             shutil.rmtree(build)
 
 

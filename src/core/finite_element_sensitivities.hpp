@@ -11,7 +11,7 @@ public:
     void take(Workspace& memory, const FiniteElements& system, int64_t padded) {
         matrix = memory.doubles(2 * system.shape.numbers() + 1);
         right = memory.doubles(system.shape.rows() * padded);
-        places = memory.array<int32_t>(system.model.elements * 16 * 16);
+        places = memory.array<int64_t>(system.model.elements * 16 * 16);
         places_known = false;
     }
 
@@ -36,7 +36,7 @@ public:
                     products[g][5 + j] = A[5 * j + 2][lane] * x + A[5 * j + 3][lane] * y;
                 }
             }
-            const int32_t* place = places + element * 256;
+            const int64_t* place = places + element * 256;
             for (int a = 0; a < EIGHT; ++a) {
                 Eight rr(0.0), rz(0.0), zr(0.0), zz(0.0);
                 for (int g = 0; g < 4; ++g) {
@@ -164,7 +164,7 @@ public:
 
 private:
     double *matrix = nullptr, *right = nullptr;  // lower and upper triangle and one place behind; (rows, padded)
-    int32_t* places = nullptr;                   // (elements, 16, 16) of the tangent of an element, r and z in turn
+    int64_t* places = nullptr;                   // (elements, 16, 16) of the tangent of an element, r and z in turn
     bool places_known = false, right_is_clear = false;
 
     void clear_right(const FiniteElements& system, int64_t padded) {
@@ -187,7 +187,7 @@ private:
                     const int64_t row = model.equations[2 * model.connectivity[EIGHT * e + p / 2] + p % 2];
                     const int64_t column = model.equations[2 * model.connectivity[EIGHT * e + q / 2] + q % 2];
                     places[(e * 16 + p) * 16 + q] =
-                        int32_t(row >= 0 && column >= 0 ? place(system, row, column) : nowhere);
+                        row >= 0 && column >= 0 ? place(system, row, column) : nowhere;
                 }
         places_known = true;
     }

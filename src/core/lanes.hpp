@@ -124,7 +124,7 @@ CREEPKIT_INLINE Eight square_root(const Eight& a) {
     return r;
 }
 
-// The sum of the first and of the second four.
+// The sum of all eight.
 CREEPKIT_INLINE double sum(const Eight& a) {
     double total = 0.0;
     for (int k = 0; k < EIGHT; ++k) total += a[k];

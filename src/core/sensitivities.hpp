@@ -100,7 +100,7 @@ private:
 
     // Change of pressure, time, temperature, ln E and ln weight with each direction, at place `s` of segment `n`.
     void set_inputs(const SimulationInput& input, int64_t n, double s, bool sudden) {
-        constexpr double NUDGE = 1e-4;  // share of a segment's length by which its ends are moved for a difference
+        constexpr double NUDGE = 1e-6;  // share of a segment's length, or start, by which its ends are moved
         const double* segment = input.segments + SEGMENT_COLUMNS * n;
         const double length = segment[END] - segment[START];
         const double time = sudden ? segment[START] : transformed_time(segment_transformation(segment, input.beta), s).time;
@@ -112,7 +112,7 @@ private:
             const double longer = by[END] - by[START];
             double later = by[START], slower = 0.0;
             if (!sudden && (by[START] != 0.0 || longer != 0.0)) {
-                const double step = NUDGE * length;
+                const double step = NUDGE * (segment[START] > 0.0 ? fmin(length, segment[START]) : length);
                 TransformedTime moved[2];
                 for (int sign = 0; sign < 2; ++sign) {
                     double nudged[SEGMENT_COLUMNS];

@@ -26,7 +26,7 @@ inline Tableau sdirk2() { return {{{GAMMA, 0.0}, {1.0 - GAMMA, GAMMA}}, {GAMMA, 
 
 enum EquilibriumFlag { CONVERGED, NO_STRESS, UNSTABLE, TOO_FAR, TOO_MANY_PASSES, UNDEFINED };
 
-// Nobody who wants derivatives.
+// In the place of sensitivities where no derivatives are wanted.
 struct NoSensitivities {
     template <class... Anything>
     bool differentiate(const Anything&...) {
@@ -167,7 +167,7 @@ private:
             part *= 0.25;
             if (part < 1e-5) break;
         }
-        end(LIMIT_LOAD, segment[START]);
+        end(target > pressure ? LIMIT_LOAD : LOST_CONVERGENCE, segment[START]);
     }
 
     // Integrate over one segment in its transformed time s, from 0 to 1.
@@ -198,7 +198,7 @@ private:
                 failures += 1;
                 h *= flag != CONVERGED ? 0.25 : fmax(0.2, 0.9 / sqrt(error));
                 if (failures > 12 || !(h >= SMALLEST * s)) {
-                    const bool rises = segment[END_PRESSURE] != segment[PRESSURE];
+                    const bool rises = segment[END_PRESSURE] > segment[PRESSURE];
                     return end(flag == UNDEFINED ? LAW_FAILED : rises ? LIMIT_LOAD : LOST_CONVERGENCE, ended.time);
                 }
                 continue;

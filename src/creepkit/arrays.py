@@ -1,7 +1,8 @@
-"""Aliases for arrays, used in signatures; shapes and units stand in the docstrings."""
+"""Aliases for arrays, used in signatures; shapes and units stand in the docstrings. Threads and cores."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Any, TypeAlias
@@ -19,7 +20,7 @@ Ints: TypeAlias = NDArray[np.int64]
 Bools: TypeAlias = NDArray[np.bool_]
 
 
-__all__ = ["ArrayLike", "Bools", "Floats", "Ints", "frozen"]
+__all__ = ["ArrayLike", "Bools", "Floats", "Ints", "frozen", "single_threaded_blas", "usable_cores"]
 
 
 def frozen(values: ArrayLike | Sequence[Any], dtype: type = np.float64) -> NDArray[Any]:
@@ -33,3 +34,10 @@ def single_threaded_blas() -> AbstractContextManager[object]:
     """Limit BLAS to one thread inside a with statement."""
     manager: AbstractContextManager[object] = threadpool_limits(1, user_api="blas")
     return manager
+
+
+def usable_cores() -> int:
+    """How many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -23,7 +23,7 @@ from creepkit.errors import CreepkitError
 LIBRARY_NAMES = {"darwin": "libcreepkit_core.dylib", "win32": "creepkit_core.dll"}
 
 
-INTERFACE_VERSION = 1
+INTERFACE_VERSION = 2
 """What `creepkit_core_version` of the library must return; both change when a function or its arguments do."""
 
 REMEDY = "run 'make core' in a clone of the sources, or install creepkit again"
@@ -82,15 +82,24 @@ def function(name: str, result: Any = ctypes.c_int64) -> Callable[..., Any]:
     return entry  # type: ignore[no-any-return]
 
 
-def address(array: np.ndarray) -> ctypes.c_void_p:
-    """Address of the first number of a contiguous array; the caller keeps it alive.
+class Address(ctypes.c_void_p):
+    """Address of an array, which lives as long as this does."""
 
-    array : (...,) of float64 or int64.
-    """
+    array: np.ndarray
+
+
+def address(array: np.ndarray) -> Address:
+    """Address of the first number of a contiguous array (...,) of double or int64."""
     if array.dtype not in (np.float64, np.int64) or not array.flags.c_contiguous:
         raise TypeError(f"the core takes contiguous arrays of float64 or int64, found {array.dtype}")
-    return ctypes.c_void_p(array.ctypes.data)
+    pointer = Address(array.ctypes.data)
+    pointer.array = array
+    return pointer
 
 
 class CoreStructure(ctypes.Structure):
-    """A record that the core reads: numbers, and addresses of arrays that the caller keeps alive."""
+    """A record that the core reads: numbers, and addresses of arrays, which live as long as this does."""
+
+    def __init__(self, *fields: Any, **named: Any) -> None:
+        super().__init__(*fields, **named)
+        self._kept = (fields, named)

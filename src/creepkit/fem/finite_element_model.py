@@ -190,11 +190,11 @@ def _places(numbers: Ints, size: int, width: int) -> Ints:
         behind the last. The tiles are those of banded_matrix.hpp of the core.
     """
     blocks, diagonals = -(-size // TILE), -(-width // TILE) + 1
-    nobody = (blocks + diagonals) * diagonals * TILE**2
+    unused = (blocks + diagonals) * diagonals * TILE**2
     result = []
     for i, j in ((0, 0), (0, 1), (1, 1)):
         one, other = numbers[:, i, :, None], numbers[:, j, None, :]
         column, row = np.minimum(one, other), np.maximum(one, other)
         tile = (column // TILE) * diagonals + row // TILE - column // TILE
-        result.append(np.where(column >= 0, tile * TILE**2 + (column % TILE) * TILE + row % TILE, nobody))
+        result.append(np.where(column >= 0, tile * TILE**2 + (column % TILE) * TILE + row % TILE, unused))
     return np.stack(result, axis=1)

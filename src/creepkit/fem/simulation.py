@@ -26,7 +26,7 @@ REASONS = {
     solver.STRAIN_LIMIT: "creep strain reached the strain limit",
     solver.STATE_LIMIT: "an internal variable reached its limit",
     solver.LIMIT_LOAD: "no equilibrium with a larger pressure: limit load",
-    solver.LOST_CONVERGENCE: "equilibrium was lost while the load was constant",
+    solver.LOST_CONVERGENCE: "equilibrium was lost while the pressure did not rise",
     solver.TOO_MANY_STEPS: "the cap on steps was reached",
     solver.LAW_FAILED: "the law gave no finite rate at a point",
     solver.SINGULAR_TANGENT: "the tangent was singular, so that there are no derivatives",

@@ -16,6 +16,7 @@ from creepkit.errors import SolveError
 from creepkit.integration.core_structures import (
     BatchStructure,
     axes_structure,
+    check_call,
     refusal,
     settings_structure,
     tableau_structure,
@@ -163,8 +164,7 @@ def integrate(
         tableau=tableau_structure(tableau),
     )
     write_addresses(batch, {**inputs, **result})
-    if function("creepkit_integrate_batch")(ctypes.byref(batch)) != 0:
-        raise SolveError("the integration of creep found no memory for its working arrays")
+    check_call(function("creepkit_integrate_batch")(ctypes.byref(batch)))
     return Integration(
         strain=result["strain"],
         starts=inputs["time_offsets"],

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from creepkit.arrays import Floats, Ints
 from creepkit.core import address
+from creepkit.errors import SolveError
 from creepkit.integration.implicit_stage import MAX_STATES, Axes
 from creepkit.integration.step_control import IntegrationSettings
 from creepkit.integration.time_discretisation import Tableau
@@ -109,3 +110,11 @@ def refusal(law: CompiledLaw, theta: Floats) -> str:
         found = theta.shape[-1]
         return f"theta has {found} numbers, but the law needs {len(law.names)}: {', '.join(law.names)}"
     return ""
+
+
+def check_call(code: int) -> None:
+    """Raise what an integrator has returned."""
+    if code == 1:
+        raise MemoryError("no memory for the working arrays of an integration of creep")
+    if code != 0:
+        raise SolveError("an integration of creep was asked for with counts or a tableau that the core does not take")

@@ -16,6 +16,7 @@ from creepkit.errors import SolveError
 from creepkit.integration.batch_integration import REASONS
 from creepkit.integration.core_structures import (
     TensorStructure,
+    check_call,
     refusal,
     settings_structure,
     tableau_structure,
@@ -113,8 +114,7 @@ def integrate_tensor_point(
         tableau=tableau_structure(tableau),
     )
     write_addresses(call, arrays)
-    if function("creepkit_integrate_tensor_point")(ctypes.byref(call)) != 0:
-        raise SolveError("the integration of a material point found no memory for its working arrays")
+    check_call(function("creepkit_integrate_tensor_point")(ctypes.byref(call)))
     code, rows, reached = call.ending, arrays["history"][: call.reached], outputs[: call.reached]
     imposed = np.stack([c.program.at(reached) for c in component_controls], axis=-1)
     stress, strain = _elastic_response(elastic, held, imposed, rows[:, :6])

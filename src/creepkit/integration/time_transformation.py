@@ -26,13 +26,6 @@ class TimeTransformation(NamedTuple):
     tau: float
 
 
-class TransformedTime(NamedTuple):
-    """A time, s, and ln(dt/ds) there."""
-
-    time: float
-    log_pace: float
-
-
 class TransformedTimes(NamedTuple):
     """What a transformation makes of positions, s in [0, 1].
 

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import IO, Any, Protocol
 
+from creepkit.arrays import usable_cores
 from creepkit.errors import CreepkitError, DatasetError
 from creepkit.jobs.worker_process import Job, ShardedJob, TaskResult, run_task
 
@@ -174,7 +175,7 @@ def process_count(workers: int | None, error: type[CreepkitError] = DatasetError
     """How many processes are meant: `workers`, or one for each core; `error` for what is no number of them."""
     if workers is not None and (workers != int(workers) or workers < 1):
         raise error(f"workers is {workers}; allowed are whole numbers above zero, or None for one on each core")
-    return workers or len(os.sched_getaffinity(0))
+    return workers or usable_cores()
 
 
 class WorkerDeaths:

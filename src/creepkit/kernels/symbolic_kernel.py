@@ -112,12 +112,6 @@ class KernelFunction:
     outputs: tuple[sympy.Expr, ...]
 
     @property
-    def used_inputs(self) -> set[sympy.Symbol]:
-        """The inputs that matter."""
-        expressions = [*self.outputs, *(e for _, e in (*self.constants, *self.steps))]
-        return set().union(*(e.free_symbols for e in expressions)) & set(self.inputs)
-
-    @property
     def source(self) -> str:
         """The function as text: it takes its inputs one by one and returns a tuple."""
         arguments = ", ".join(s.name for s in self.inputs)

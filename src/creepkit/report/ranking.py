@@ -114,18 +114,3 @@ def _fit_to_json(fit: Identification) -> dict[str, Any]:
         "noise_model": fit.noise_model,
         "notes": list(fit.notes),
     }
-
-
-def print_truth(truth: dict[str, Any], fit: Identification) -> None:
-    """The planted values beside the identified ones."""
-    law_is_correct = fit.law.name.startswith(truth["law"])
-    rows = []
-    for e in fit.estimates if law_is_correct else ():
-        planted = truth["values"][e.name]
-        inside = "yes" if e.low <= planted <= e.high else "no"
-        rows.append((e.name, f"{planted:.4g}", f"{e.value:.4g}", f"{e.low:.4g} to {e.high:.4g}", inside))
-    if "rate_scatter" in truth:
-        scatter = f"{100 * truth['rate_scatter']:.0f} %", f"{100 * fit.noise_model.rate:.0f} %"
-        rows.append(("rate between tests", *scatter, "", ""))
-    print()
-    print_table(f"the truth: {truth['law']}", ("parameter", "planted", "identified", "95 % interval", "inside"), rows)

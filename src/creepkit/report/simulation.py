@@ -148,19 +148,6 @@ def _duration(time: float) -> str:
     return f"{time / 3600:.4g} h" if time >= 3600 else f"{time:.4g} s"
 
 
-_SHOWN = (0.05, 0.1, 0.2, 0.4, 0.6, 0.9, 1.2, 1.6, 2.0, 2.6, 3.2, 4.0, 4.8)
-"""Deflections of the text over the apex thickness."""
-
-
-_EXPONENTS = (3.0, 5.0, 8.0, 12.0)
-
-
-_STRAINS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
-
-
-_COLUMN = 8
-
-
 def cubature_figure(model: ReducedOrderModel, path: str | Path | None = None) -> Figure:
     """The section at rest with the points where a reduced-order model evaluates the law; areas are weights."""
     body, basis = model.model, model.basis

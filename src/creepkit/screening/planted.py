@@ -24,7 +24,7 @@ from creepkit.errors import SolveError
 from creepkit.files.writing import write_text
 from creepkit.language import Elastic
 from creepkit.readers.history_csv import write_history
-from creepkit.records import History, Nuisance, PressureJump, Status
+from creepkit.records import History, PressureJump, Status
 from creepkit.screening.alloys import Compositions, atomic_percent
 
 BASE_ALLOYS = {
@@ -100,12 +100,6 @@ class PlantedPlate:
     histories: tuple[History, ...]
     compositions: Compositions
     truth: Mapping[str, AlloyTruth]
-
-    @property
-    def thickness_prior(self) -> Nuisance:
-        """The distribution, mm, from which the apex thickness of every dimple was drawn, as a nuisance parameter."""
-        mean, sd = THICKNESS_MEAN_SD
-        return Nuisance("thickness", mean=mean, sd=sd)
 
     def write(self, folder: Path) -> tuple[Path, Path]:
         """Write tests/*.csv, compositions.csv and truth.csv; the folder of the tests and the compositions."""

@@ -18,9 +18,10 @@ import numpy as np
 from scipy.stats import qmc
 from sympy import exp
 
-from creepkit import kernels
+from creepkit import core, kernels
 from creepkit.arrays import Floats
 from creepkit.errors import CreepkitError, SolveError
+from creepkit.fem import reduced_order_training
 from creepkit.fem.finite_element_model import FiniteElementModel
 from creepkit.fem.reduced_order_model import ReducedBasis
 from creepkit.fem.reduced_order_training import TrainingRun, snapshots, train
@@ -178,11 +179,9 @@ _FORMAT = DocumentFormat(
 
 def _key(models: Sequence[FiniteElementModel], settings: SolverSettings, modes: int, points: int) -> str:
     """Of everything that a basis follows from."""
-    digest = hashlib.sha256(
-        repr(
-            (_FORMAT, settings, modes, points, RUNS, EXPONENTS, NEARLY_PLASTIC, TENSION, ELASTIC_STRAIN, CREEP_STRAIN)
-        ).encode()
-    )
+    digest = hashlib.sha256(repr((_FORMAT, settings, modes, points)).encode())
+    for source in (__file__, reduced_order_training.__file__, core.library_path()):
+        digest.update(Path(source).read_bytes())  # what it is trained by, and solved with
     for model in models:
         for array in (model.nodes, model.elements, model.equations, model.pressed, model.top):
             digest.update(np.ascontiguousarray(array).tobytes())

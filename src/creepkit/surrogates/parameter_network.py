@@ -179,15 +179,6 @@ class ParameterModule(nn.Module):
         scale = 1.0 if base is None or not self.corrects_base else base + floor
         return torch.cat([(scale * first - floor)[..., None], outputs[..., 1:]], dim=-1)
 
-    def decoded_derivatives(self, raw: Tensor) -> Tensor:
-        """(rows, frames, outputs) derivative of physical outputs to standardised ones, raw (rows, frames, outputs)."""
-        derivatives = self.targets.deviation.to(raw.dtype).expand_as(raw)
-        if not self.logarithm:
-            return derivatives
-        log_output = self.targets.inverse(raw)[..., 0]
-        inside = (log_output < self.most) * torch.exp(torch.minimum(log_output, self.most.to(raw.dtype)))
-        return torch.cat([(inside * derivatives[..., 0])[..., None], derivatives[..., 1:]], dim=-1)
-
     def loss(self, batch: SampleTensors) -> Tensor:
         """A number: see the class."""
         return self.loss_and_outputs(batch)[0]

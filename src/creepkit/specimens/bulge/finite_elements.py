@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creepkit import kernels
-from creepkit.arrays import Floats
+from creepkit.arrays import Floats, usable_cores
 from creepkit.errors import SolveError, nearest
 from creepkit.fem.mesh import GeometryDerivative, geometry_derivative
 from creepkit.fem.simulation import Simulation, SurfaceSensitivities, sensitivity_directions, simulate
@@ -261,17 +260,21 @@ def predict_bulge(
     theta, nuisances = broadcast_candidates(theta, nuisances, len(histories))
     tasks = list(product(range(len(theta)), range(len(histories))))
     settings = settings or solver_settings(specimen, exact=sensitivities)
-    tests: dict[tuple[float, ...], PreparedTest] = {}
+    shared = all(np.ptp(value, axis=0).max() == 0.0 for value in nuisances.values())
+
+    def prepared(c: int, k: int) -> PreparedTest:
+        values = {kind: float(value[c, k]) for kind, value in nuisances.items()}
+        return PreparedTest.of(specimen, histories[k], values, sensitivities, model_of)
+
+    # before threads begin: a reduced-order model may have to be trained
+    tests = [prepared(0, k) for k in range(len(histories))] if tasks else []
 
     def run(task: tuple[int, int]) -> BulgeResponse:
         c, k = task
-        values = {kind: float(value[c, k]) for kind, value in nuisances.items()}
-        key = (k, *values.values())
-        if key not in tests:  # candidates that differ in the law alone share it
-            tests[key] = PreparedTest.of(specimen, histories[k], values, sensitivities, model_of)
-        return tests[key].simulate_and_observe(kernel, theta[c], settings)
+        test = tests[k] if shared or c == 0 else prepared(c, k)
+        return test.simulate_and_observe(kernel, theta[c], settings)
 
-    workers = min(specimen.threads or len(os.sched_getaffinity(0)), len(tasks))
+    workers = min(specimen.threads or usable_cores(), len(tasks))
     if workers > 1:
         pool = ThreadPoolExecutor(workers)
         try:
