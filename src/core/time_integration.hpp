@@ -167,7 +167,7 @@ private:
             part *= 0.25;
             if (part < 1e-5) break;
         }
-        end(target > pressure ? LIMIT_LOAD : LOST_CONVERGENCE, segment[START]);
+        end(fabs(target) > fabs(pressure) ? LIMIT_LOAD : LOST_CONVERGENCE, segment[START]);
     }
 
     // Integrate over one segment in its transformed time s, from 0 to 1.
@@ -198,7 +198,7 @@ private:
                 failures += 1;
                 h *= flag != CONVERGED ? 0.25 : fmax(0.2, 0.9 / sqrt(error));
                 if (failures > 12 || !(h >= SMALLEST * s)) {
-                    const bool rises = segment[END_PRESSURE] > segment[PRESSURE];
+                    const bool rises = fabs(segment[END_PRESSURE]) > fabs(segment[PRESSURE]);
                     return end(flag == UNDEFINED ? LAW_FAILED : rises ? LIMIT_LOAD : LOST_CONVERGENCE, ended.time);
                 }
                 continue;
