@@ -9,11 +9,14 @@ import typer
 
 from creepkit.cli.options import parse_numbers
 
+UNITS = {"amplitude": " mm", "width": " mm"}
+"""Of outputs that have one."""
+
 
 def command(
     specimen: Annotated[str, typer.Option(help="A bulge specimen.")] = "bulge",
     geometry: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=MM", help="A length of the dimple, such as cavity_radius=6.")
+        list[str] | None, typer.Option(metavar="NAME=MM", help="A length of the dimple, such as apex_thickness=0.45.")
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Picture of its points to write.")] = None,
 ) -> None:
@@ -31,11 +34,11 @@ def command(
     specimen_record = ck.specimen(specimen)
     if not isinstance(specimen_record, Bulge):
         raise SolveError(f"--specimen {specimen}: only a bulge has a reduced-order model; leave it out")
-    specimen_record = specimen_record.replace(**parse_numbers(geometry or [], "--geometry", "cavity_radius=6"))
+    specimen_record = specimen_record.replace(**parse_numbers(geometry or [], "--geometry", "apex_thickness=0.45"))
     predictor = BulgeReducedOrderModel(specimen_record)
     model = predictor.reduced_model_of(predictor.own_setup())
     typer.echo(f"{len(model.basis.modes)} modes, {len(model.basis.points)} of {model.model.weights.size} points")
-    errors = ", ".join(f"{name} {value:.2g}" for name, value in predictor.error.items())
+    errors = ", ".join(f"{name} {value:.2g}{UNITS.get(name, '')}" for name, value in predictor.error.items())
     typer.echo(f"error against its finite elements, one standard deviation over runs it was not trained on: {errors}")
     if picture is not None:
         cubature_figure(model, picture)

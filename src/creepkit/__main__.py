@@ -1,0 +1,5 @@
+"""`python -m creepkit`: the command line."""
+
+from creepkit.cli import main
+
+main()
